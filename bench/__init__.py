@@ -1,0 +1,1 @@
+"""Benchmark layer: error against run time, measured, each speed as a ratio of two runs."""

@@ -1,0 +1,1 @@
+"""Golden layer: float64 reference, tables and polynomial fits, bit-true twins. NumPy only."""

@@ -1,0 +1,67 @@
+"""Triangle meshes as arrays, and unit vectors in float64."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["Mesh", "normalise"]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A triangle mesh with one unit normal a corner vertex.
+
+    A vertex that needs two normals (a crease) stands twice in ``vertices``.
+
+    Parameters
+    ----------
+    vertices : float64 array, shape (V, 3)
+        Positions, finite, in world units; y is up.
+    faces : int64 array, shape (F, 3)
+        Vertex indices, anticlockwise seen from outside.
+    normals : float64 array, shape (V, 3)
+        Unit vertex normals.
+
+    Raises
+    ------
+    ValueError
+        If a shape is wrong, an index is out of range, or a number is not finite.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    normals: np.ndarray
+
+    def __post_init__(self):
+        for name, array in (("vertices", self.vertices), ("faces", self.faces), ("normals", self.normals)):
+            if array.ndim != 2 or array.shape[1] != 3:
+                raise ValueError(f"{name} must have shape (count, 3), not {array.shape}")
+        if self.vertices.shape != self.normals.shape:
+            raise ValueError(
+                f"there must be one normal a vertex, not {len(self.normals)} for {len(self.vertices)}"
+            )
+        if self.faces.size and not 0 <= self.faces.min() <= self.faces.max() < len(self.vertices):
+            raise ValueError(f"faces must index the {len(self.vertices)} vertices")
+        if not (np.isfinite(self.vertices).all() and np.isfinite(self.normals).all()):
+            raise ValueError("vertices and normals must be finite")
+
+
+def normalise(vectors: np.ndarray) -> np.ndarray:
+    """Unit vectors along the last axis; a vector of length 0 stays 0.
+
+    Parameters
+    ----------
+    vectors : array, shape (..., 3)
+        Finite vectors.
+
+    Returns
+    -------
+    float64 array, same shape
+        ``v / |v|``, or 0 where ``|v|`` is 0.
+    """
+    vectors = np.asarray(vectors, dtype=np.float64)
+    # Scaling by the largest component first keeps tiny and huge vectors from under- and overflow.
+    largest = np.abs(vectors).max(axis=-1, keepdims=True)
+    scaled = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0)
+    length = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., np.newaxis]
+    return np.divide(scaled, length, out=scaled, where=length > 0)
