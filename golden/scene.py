@@ -1,0 +1,74 @@
+"""Everything that a picture depends on: mesh, camera, size, material and lights."""
+
+import operator
+from dataclasses import dataclass
+
+from golden.camera import Camera
+from golden.geometry import Mesh
+from golden.lighting import Light, Material, Triple, triple
+
+__all__ = ["BACK_FACES", "LARGEST_SIDE", "Scene"]
+
+BACK_FACES = ("flip", "show", "cull")
+"""What happens to a triangle seen from behind."""
+
+LARGEST_SIDE = 4095
+"""Largest width and height: x, y and a span's length are 12 bits each."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A picture to be made.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The surface.
+    camera : Camera
+        The viewer.
+    width, height : int
+        Pixels, 1 to 4095 each.
+    material : Material
+        The surface's coefficients.
+    lights : sequence of Light
+        Any number of directional lights; stored as a tuple.
+    ambient_light : three floats
+        I_a a channel, at least 0.
+    background : three floats
+        Color of the pixels that show no surface, in [0, 1].
+    back_faces : {"flip", "show", "cull"}
+        A triangle seen from behind (its corners clockwise) is drawn with its normals negated, so that those
+        of an outer surface turn to the viewer's side, or with its normals as they are, or is left out.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range.
+    TypeError
+        If a size is not an integer or a light is not a `Light`.
+    """
+
+    mesh: Mesh
+    camera: Camera
+    width: int
+    height: int
+    material: Material
+    lights: tuple[Light, ...]
+    ambient_light: Triple = (1.0, 1.0, 1.0)
+    background: Triple = (0.0, 0.0, 0.0)
+    back_faces: str = "flip"
+
+    def __post_init__(self):
+        for name in ("width", "height"):
+            size = operator.index(getattr(self, name))
+            if not 1 <= size <= LARGEST_SIDE:
+                raise ValueError(f"a scene's {name} must be in 1 to {LARGEST_SIDE}, not {size}")
+            object.__setattr__(self, name, size)
+        object.__setattr__(self, "lights", tuple(self.lights))
+        for light in self.lights:
+            if not isinstance(light, Light):
+                raise TypeError(f"a scene's lights must be Light, not {type(light).__name__}")
+        object.__setattr__(self, "ambient_light", triple("a scene's ambient_light", self.ambient_light, 0))
+        object.__setattr__(self, "background", triple("a scene's background", self.background, 0, 1))
+        if self.back_faces not in BACK_FACES:
+            raise ValueError(f"back_faces must be one of {', '.join(BACK_FACES)}, not {self.back_faces!r}")

@@ -1,0 +1,133 @@
+import math
+
+import numpy as np
+import pytest
+
+from golden.geometry import normalise
+from golden.lighting import Light, Material, gram_determinant, halfway_vector, intensity, saturate
+from golden.reflection import REFLECTION_MODELS
+
+V = np.array([0.0, 0.0, 1.0])
+
+
+def grey(value):
+    return (value, value, value)
+
+
+def random_units(count, seed):
+    return normalise(np.random.default_rng(seed).normal(size=(count, 3)))
+
+
+def test_worked_example():
+    material = Material(grey(0.1), grey(0.7), grey(0.5), 10)
+    light = Light((1, 1, 1))
+    # I_a = 0.2, I_d = 0.8, I_s = 1: one light has one color here, so I_d goes into k_d.
+    material = Material(material.ambient, grey(0.7 * 0.8), material.specular, 10)
+    value = intensity(np.array([0.0, 0.0, 1.0]), material, [light], grey(0.2), V, "phong")
+    assert value == pytest.approx(grey(0.345374), abs=0.5e-6)
+    dark = Material(material.ambient, grey(0), grey(0.5), 10)
+    value = intensity(np.array([0.0, 0.0, 1.0]), dark, [light], grey(0.2), V, "phong")
+    assert value == pytest.approx(grey(0.02 + 0.002058), abs=0.5e-6)
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+def test_formula_channel_by_channel(model):
+    n = 9
+    slopes = {"cosquad": n / 2, "cosquad7": 7 * n / 16, "cosquad_lin": 0.448 * n + 0.099}
+    slopes["cosquad_q"] = (0.8 - 1) / (0.64 ** (1 / n) - 1)
+    material = Material((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), n)
+    lights = [Light((3, 1, 2), (0.5, 0.6, 0.7)), Light((-1, 4, 1), (0.2, 0.1, 0.9))]
+    viewer = normalise([0.2, 0.3, 1])
+    ambient = (0.3, 0.2, 0.1)
+    normals = random_units(200, 2)
+    found = intensity(normals, material, lights, ambient, viewer, model)
+    lit = 0
+    for normal, value in zip(normals.tolist(), found, strict=True):
+        for channel in range(3):
+            total = material.ambient[channel] * ambient[channel]
+            for light in lights:
+                cosine = sum(a * b for a, b in zip(normal, light.direction, strict=True))
+                if cosine <= 0:
+                    continue
+                lit += 1
+                if model == "phong":
+                    reflected = [2 * cosine * a - b for a, b in zip(normal, light.direction, strict=True)]
+                    c = sum(a * b for a, b in zip(reflected, viewer, strict=True))
+                else:
+                    half = [a + b for a, b in zip(light.direction, viewer, strict=True)]
+                    c = sum(a * b for a, b in zip(normal, half, strict=True)) / math.hypot(*half)
+                highlight = max(slopes[model] * (c - 1) + 1, 0) ** 2 if model in slopes else max(c, 0) ** n
+                shade = material.diffuse[channel] * cosine + material.specular[channel] * highlight
+                total += light.color[channel] * shade
+            assert value[channel] == pytest.approx(total, abs=1e-12)
+    assert lit > 200
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+def test_light_behind_gives_nothing(model):
+    material = Material(grey(0.1), grey(0.7), grey(0.5), 1)
+    # N·L = 0 exactly, and below: with exponent 1 the cosine N·H alone would give a highlight.
+    for direction in ((1, 0, 0), (1, 0, -0.01)):
+        assert intensity(V, material, [Light(direction)], grey(1), V, model) == pytest.approx(grey(0.1))
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+def test_light_opposite_to_the_viewer_has_no_highlight(model):
+    material = Material(grey(0.1), grey(0.7), grey(0.5), 1)
+    direction = normalise([1, 2, 3])
+    light = Light(-direction)
+    assert (halfway_vector(light.direction, direction) == 0).all()
+    normals = random_units(50, 3)
+    found = intensity(normals, material, [light], grey(1), direction, model)
+    expected = 0.1 + 0.7 * np.maximum(normals @ -direction, 0)
+    assert found == pytest.approx(np.repeat(expected[:, np.newaxis], 3, axis=1), abs=1e-14)
+
+
+def test_halfway_vector():
+    rng = np.random.default_rng(4)
+    for light, viewer in normalise(rng.normal(size=(50, 2, 3))):
+        half = halfway_vector(light, viewer)
+        assert np.linalg.norm(half) == pytest.approx(1, abs=1e-15)
+        assert half @ light == pytest.approx(half @ viewer, abs=1e-12)
+        assert np.cross(light, viewer) @ half == pytest.approx(0, abs=1e-12)
+    assert halfway_vector(V, V) == pytest.approx(V)
+
+
+def test_gram_identity():
+    normals, lights, viewers = random_units(300, 5), random_units(300, 6), random_units(300, 7)
+    product = (np.cross(lights, normals) * viewers).sum(axis=1)
+    assert gram_determinant(normals, lights, viewers) == pytest.approx(product**2, abs=1e-14)
+    coplanar = normalise(normals + lights)
+    assert gram_determinant(normals, lights, coplanar) == pytest.approx(0, abs=1e-14)
+
+
+def test_normals_keep_their_length():
+    material = Material(grey(0), grey(1), grey(0), 10)
+    value = intensity(V * 0.5, material, [Light((0, 0, 1))], grey(1), V, "blinn")
+    assert value == pytest.approx(grey(0.5))
+
+
+def test_sums_over_one_and_sixteen_lights():
+    material = Material(grey(1), grey(1), grey(1), 2)
+    value = intensity(V, material, [Light((0, 0, 5))] * 16, grey(1), V, "blinn")
+    assert value == pytest.approx(grey(33))
+    assert saturate(value) == pytest.approx(grey(1))
+    assert intensity(np.zeros((4, 5, 3)), material, [], grey(0.5), V, "blinn").shape == (4, 5, 3)
+
+
+def test_refusals():
+    with pytest.raises(ValueError, match="a light's direction must not be 0"):
+        Light((0, 0, 0))
+    with pytest.raises(ValueError, match="a light's direction must be three finite numbers"):
+        Light((0, 0, math.nan))
+    with pytest.raises(ValueError, match="a light's color must be at least 0"):
+        Light((0, 0, 1), (1, -1, 1))
+    with pytest.raises(ValueError, match=r"a material's diffuse must be three finite numbers, not 0.5"):
+        Material(grey(0), 0.5, grey(0), 10)
+    for exponent in (0, 1001):
+        with pytest.raises(ValueError, match=f"exponent must be in 1 to 1000, not {exponent}"):
+            Material(grey(0), grey(0), grey(0), exponent)
+    with pytest.raises(TypeError):
+        Material(grey(0), grey(0), grey(0), 10.5)
+    with pytest.raises(ValueError, match=r"model must be one of phong, .* not 'gauss'"):
+        intensity(V, Material(grey(0), grey(0), grey(0), 1), [], grey(0), V, "gauss")
