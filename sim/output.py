@@ -1,0 +1,154 @@
+"""Output files that are whole or not there at all."""
+
+import errno
+import json
+import math
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from sim.errors import InputError
+
+__all__ = ["atomic_writer", "check_writable", "write_json", "write_text"]
+
+_REASONS = {
+    errno.ENOSPC: ("the disk is full", "free some space or choose another disk"),
+    errno.EDQUOT: ("your disk quota is used up", "free some space or choose another disk"),
+    errno.EROFS: ("the file system is read-only", "choose another folder"),
+    errno.EACCES: ("permission denied", "choose a folder that you may write to"),
+    errno.EPERM: ("permission denied", "choose a folder that you may write to"),
+    errno.ENAMETOOLONG: ("the name is too long", "choose a shorter name"),
+    errno.EISDIR: ("it is a folder", "give the name of a file"),
+}
+
+
+def _unwritable(path: Path, error: OSError) -> InputError:
+    reason = error.strerror or str(error)
+    reason, remedy = _REASONS.get(error.errno, (reason, "choose another file"))
+    return InputError(str(path), f"cannot be written, {reason}", remedy)
+
+
+def check_writable(path: str | os.PathLike) -> None:
+    """Check, before long work, that a file can be written; writes nothing.
+
+    Parameters
+    ----------
+    path : path
+        The output file, which may exist.
+
+    Raises
+    ------
+    InputError
+        If the parent is missing, is no folder or may not be written, or the path is a folder or a file
+        that may not be written.
+    """
+    path = Path(path)
+    parent = path.parent
+    try:
+        if path.is_dir():
+            raise InputError(str(path), "cannot be written, it is a folder", "give the name of a file")
+        if not parent.exists():
+            raise InputError(
+                str(path), f"cannot be written, there is no folder {parent}", "make the folder first"
+            )
+        if not parent.is_dir():
+            raise InputError(str(path), f"cannot be written, {parent} is no folder", "choose another folder")
+        for target in (parent, path):
+            if target.exists() and not os.access(target, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        raise _unwritable(path, error) from error
+
+
+@contextmanager
+def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
+    """Path of a temporary file beside ``path``, which takes its name when the block ends without an error.
+
+    Until then a file that was there stays as it was; whatever ends the block early (an interrupt, too)
+    removes the temporary file. The file's permissions are those of the one it replaces, or those that
+    the umask gives a new file. A link is followed: its target is replaced. A path that is no regular
+    file (``/dev/stdout``, a pipe) is given as it is, and written directly.
+
+    Parameters
+    ----------
+    path : path
+        The output file.
+
+    Yields
+    ------
+    Path
+        An empty file in the same folder, with the same suffix, to write to.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written; an `OSError` that the block raises about the temporary file, as on a
+        full disk, becomes one too.
+    """
+    path = Path(path)
+    check_writable(path)
+    if path.exists() and not path.is_file():
+        try:
+            yield path
+        except OSError as error:
+            raise _unwritable(path, error) from error
+        return
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".{target.stem[:100]}-{secrets.token_hex(8)}{target.suffix}")
+    try:
+        # The mode is cut by the umask, as that of any new file.
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        if target.exists():
+            temporary.chmod(target.stat().st_mode & 0o777)
+        yield temporary
+        os.replace(temporary, target)
+    except OSError as error:
+        # Errors of the block about another file are its own.
+        if error.filename is not None and Path(error.filename) not in (temporary, target):
+            raise
+        raise _unwritable(path, error) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: str | os.PathLike, text: str) -> None:
+    """Write a text in UTF-8 with Unix line ends, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    with atomic_writer(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def write_json(path: str | os.PathLike, value: Any) -> None:
+    """Write a value as JSON, indented by two, keys in their own order, whole or not at all.
+
+    JSON has no NaN and no infinity: they are written as ``null``. NumPy scalars and arrays are written as
+    numbers and lists.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    TypeError
+        If the value holds something that JSON cannot.
+    """
+    write_text(path, json.dumps(_plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
