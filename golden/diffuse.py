@@ -1,0 +1,46 @@
+"""Diffuse unit: the Lambert term, and whether the light is behind the surface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .dot_product import DotProduct
+from .fixed import UQ, Fixed
+
+__all__ = ["Diffuse"]
+
+
+@dataclass(frozen=True)
+class Diffuse:
+    """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated to ``1 - 2^-17``.
+
+    17 bits, an operand of the colour multipliers. Arithmetic error 2^-18 from the rounding, and up to 2^-17
+    at 1 itself, which the format does not hold.
+
+    Source: [B] 4, [T] 6.
+    """
+
+    OPERAND_FORMAT = DotProduct().result_format
+    RESULT_FORMAT = UQ(0, 17)
+
+    def compute(self, cosine: Fixed) -> Fixed:
+        """Bit-true diffuse terms.
+
+        Parameters
+        ----------
+        cosine : Fixed, any shape, SQ(4, 34)
+            ``N . L`` of two unit vectors.
+
+        Raises
+        ------
+        ValueError
+            If the operand has another format.
+        """
+        if cosine.format != self.OPERAND_FORMAT:
+            raise ValueError(f"operand must be {self.OPERAND_FORMAT}, not {cosine.format}")
+        return cosine.round_half_up(17).saturate(self.RESULT_FORMAT)
+
+    @staticmethod
+    def dark(cosine: Fixed) -> np.ndarray:
+        """Whether ``N . L <= 0``: no light at all, diffuse or specular, comes from behind the surface."""
+        return cosine.codes <= 0

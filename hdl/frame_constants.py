@@ -1,0 +1,100 @@
+"""Frame constants: the registers behind the write port."""
+
+from amaranth.hdl import Module, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from golden.frame_constants import FIELDS_OF_A_FRAME, FIELDS_OF_A_LIGHT, LIGHT_STRIDE
+from golden.specular import Specular
+
+from .intensity import color_shape
+from .middle_normal import normal_shape
+
+__all__ = ["FrameConstantsUnit", "frame_constants_shape", "write_shape"]
+
+
+def write_shape() -> data.StructLayout:
+    """Shape of a write: address and 18 bits of data."""
+    return data.StructLayout({"address": unsigned(9), "data": unsigned(18)})
+
+
+def frame_constants_shape(lights: int) -> data.StructLayout:
+    """Shape of all constants of a frame with so many lights."""
+    light = {
+        "direction": normal_shape(),
+        "halfway": normal_shape(),
+        "diffuse": color_shape(),
+        "specular": color_shape(),
+    }
+    return data.StructLayout(
+        {
+            "exponent": unsigned(Specular.EXPONENT_BITS),
+            "ambient": color_shape(),
+            "lights": data.ArrayLayout(data.StructLayout(light), lights),
+        }
+    )
+
+
+class FrameConstantsUnit(wiring.Component):
+    """Registers for the constants of a frame, one word a write.
+
+    A write is taken on a clock when ``hold`` is low, and seen one clock later. Words are 18 bits; the low
+    bits count where the constant is shorter. A write to any other address is taken and changes nothing. Reset
+    clears every constant: exponent 0 and black light.
+
+    ======================== ==========================================================
+    address                  constant
+    ======================== ==========================================================
+    0                        exponent, 1 to 1000
+    1 to 3                   ambient red, green, blue, ``UQ(11, 6)`` LSB
+    16 (light + 1) + 0 to 2  direction to the light, ``SQ(1, 17)``
+    16 (light + 1) + 3 to 5  half-way vector, ``SQ(1, 17)``
+    16 (light + 1) + 6 to 8  diffuse red, green, blue, ``UQ(11, 6)`` LSB
+    16 (light + 1) + 9 to 11 specular red, green, blue, ``UQ(11, 6)`` LSB
+    ======================== ==========================================================
+
+    Parameters
+    ----------
+    lights : int
+        Number of lights.
+
+    Members
+    -------
+    write : :py:`In(stream.Signature(write_shape()))`
+        Writes.
+    hold : :py:`In(1)`
+        Whether the constants must not change.
+    constants : :py:`Out(frame_constants_shape(lights))`
+        The constants.
+
+    Source: pipeline.md, "Span stream".
+    """
+
+    def __init__(self, lights: int):
+        self.lights = lights
+        super().__init__(
+            {
+                "write": In(stream.Signature(write_shape())),
+                "hold": In(1),
+                "constants": Out(frame_constants_shape(lights)),
+            }
+        )
+
+    def elaborate(self, platform):
+        """One decoded register a word."""
+        m = Module()
+        m.d.comb += self.write.ready.eq(~self.hold)
+        words = {}
+        for name, (first, count) in FIELDS_OF_A_FRAME.items():
+            field = self.constants[name]
+            words |= {first + k: field[k] if count > 1 else field for k in range(count)}
+        for light in range(self.lights):
+            base = (light + 1) * LIGHT_STRIDE
+            for name, (first, count) in FIELDS_OF_A_LIGHT.items():
+                words |= {base + first + k: self.constants.lights[light][name][k] for k in range(count)}
+        with m.If(self.write.valid & self.write.ready):
+            for address, word in words.items():
+                code = Value.cast(word)
+                with m.If(self.write.payload.address == address):
+                    m.d.sync += code.eq(self.write.payload.data[: len(code)])
+        return m

@@ -1,0 +1,199 @@
+"""The shading pipeline: raster spans in, pixels out, one a clock."""
+
+from amaranth.hdl import Module, Signal, unsigned
+from amaranth.lib import data, fifo, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from golden.intensity import Intensity
+from golden.pipeline import ShadingPipeline
+from golden.specular import Specular
+
+from .difference_accumulator import DifferenceAccumulatorUnit
+from .difference_setup import DifferenceSetupUnit
+from .frame_constants import FrameConstantsUnit, write_shape
+from .gpq import GPQUnit
+from .intensity import IntensityUnit
+from .light import LightUnit
+from .middle_normal import MiddleNormalUnit, normal_shape
+from .pixel_assembler import PixelAssemblerUnit, pixel_shape, place_shape
+from .stream import connect
+
+__all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
+
+
+def span_shape() -> data.StructLayout:
+    """Shape of a raster span: first pixel, pixels, unit normals at the first and last pixel centre."""
+    return data.StructLayout(
+        {
+            "x": unsigned(12),
+            "y": unsigned(12),
+            "length": unsigned(12),
+            "normal_left": normal_shape(),
+            "normal_right": normal_shape(),
+        }
+    )
+
+
+def status_shape() -> data.StructLayout:
+    """Shape of what the pipeline has counted since reset; counters stop at their largest value.
+
+    ``wide_spans``: spans over 45 degrees, whose normals are not to be trusted. ``empty_spans``: spans of
+    length 0. ``overrun``: whether a span has gone past x = 4095, where x starts again at 0.
+    """
+    return data.StructLayout(
+        {"wide_spans": unsigned(16), "empty_spans": unsigned(16), "overrun": unsigned(1)}
+    )
+
+
+class ShadingPipelineUnit(wiring.Component):
+    """Shades raster spans with the normals of a quadratic curve.
+
+    Setup (middle normal, G/P/Q, differences) of the next spans overlaps the pixels of this one; a FIFO
+    carries the spans' places round it. `golden.pipeline.ShadingPipeline` is the bit-true twin.
+
+    The first pixel of a span leaves `latency` clocks after an idle pipeline has taken it, 60 and the depth
+    of the adder tree: ``60 + ceil(log2(2 lights + 1))``. Without stalls each span then takes
+    ``max(length, 7)`` clocks: one pixel a clock, and a setup interval of 7. A span of length 0 takes one
+    clock and gives nothing. 5 multipliers, and 14 a light.
+
+    A write is taken when no span is inside, and no span is taken while a write waits, so a frame's constants
+    never change under a running span.
+
+    Parameters
+    ----------
+    parameters : ShadingPipeline
+        Method, reflection model, number of lights.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(span_shape()))`
+        Spans.
+    o : :py:`Out(stream.Signature(pixel_shape()))`
+        Pixels.
+    write : :py:`In(stream.Signature(write_shape()))`
+        Frame constants; see `FrameConstantsUnit` for the addresses.
+    status : :py:`Out(status_shape())`
+        Counters.
+
+    Source: pipeline.md; [T] figure 4.10.
+    """
+
+    PLACES = 32
+    LENGTHS = 8
+
+    def __init__(self, parameters: ShadingPipeline | None = None):
+        self.parameters = parameters or ShadingPipeline()
+        super().__init__(
+            {
+                "i": In(stream.Signature(span_shape())),
+                "o": Out(stream.Signature(pixel_shape())),
+                "write": In(stream.Signature(write_shape())),
+                "status": Out(status_shape()),
+            }
+        )
+        self._middle, self._gpq, self._setup = MiddleNormalUnit(), GPQUnit(), DifferenceSetupUnit()
+        self._accumulator, self._assembler = DifferenceAccumulatorUnit(), PixelAssemblerUnit()
+        self._lights = [LightUnit(Specular(self.parameters.model)) for _ in range(self.parameters.lights)]
+        self._intensity = IntensityUnit(Intensity(self.parameters.lights))
+        self.setup_interval = max(self._middle.initiation_interval, self._setup.initiation_interval)
+        chain = (self._middle, self._gpq, self._setup, self._accumulator)
+        chain += (self._lights[0], self._intensity, self._assembler)
+        self.latency = sum(unit.latency for unit in chain)
+
+    def elaborate(self, platform):
+        """Setup, then the lights side by side, then the assembler."""
+        m = Module()
+        m.submodules.middle_normal = middle = self._middle
+        m.submodules.gpq = gpq = self._gpq
+        m.submodules.difference_setup = setup = self._setup
+        m.submodules.difference_accumulator = accumulator = self._accumulator
+        m.submodules.intensity = intensity = self._intensity
+        m.submodules.pixel_assembler = assembler = self._assembler
+        m.submodules.frame_constants = frame = FrameConstantsUnit(self.parameters.lights)
+        m.submodules.places = places = fifo.SyncFIFOBuffered(width=place_shape().size, depth=self.PLACES)
+        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=12, depth=self.LENGTHS)
+
+        # Admission: a span goes to the setup, its place round it, both or neither.
+        busy = Signal()
+        place = Signal(place_shape())
+        empty, offered, free, admit = Signal(), Signal(), Signal(), Signal()
+        span = self.i.payload
+        m.d.comb += [
+            empty.eq(span.length == 0),
+            offered.eq(self.i.valid & ~self.write.valid & ~empty),
+            free.eq(places.w_rdy & lengths.w_rdy),
+            admit.eq(offered & free & middle.i.ready),
+            self.i.ready.eq(~self.write.valid & (empty | (free & middle.i.ready))),
+            middle.i.valid.eq(offered & free),
+            middle.i.payload.normal_left.eq(span.normal_left),
+            middle.i.payload.normal_right.eq(span.normal_right),
+            place.x.eq(span.x),
+            place.y.eq(span.y),
+            place.length.eq(span.length),
+            places.w_data.eq(place),
+            places.w_en.eq(admit),
+            lengths.w_data.eq(span.length),
+            lengths.w_en.eq(admit),
+        ]
+
+        # Setup. A length is always there before its coefficients: the two have left together.
+        m.d.comb += [
+            gpq.i.payload.normal_left.eq(middle.o.payload.normal_left),
+            gpq.i.payload.normal_middle.eq(middle.o.payload.normal_middle),
+            gpq.i.payload.normal_right.eq(middle.o.payload.normal_right),
+            gpq.i.valid.eq(middle.o.valid),
+            middle.o.ready.eq(gpq.i.ready),
+            *(setup.i.payload[name].eq(gpq.o.payload[name]) for name in "gpq"),
+            setup.i.payload.length.eq(lengths.r_data),
+            setup.i.valid.eq(gpq.o.valid),
+            gpq.o.ready.eq(setup.i.ready),
+            lengths.r_en.eq(gpq.o.valid & setup.i.ready),
+        ]
+        connect(m, setup.o, accumulator.i)
+
+        # Lights in lockstep: equal units that are offered the same beats and taken from on the same clocks.
+        for index, light in enumerate(self._lights):
+            m.submodules[f"light_{index}"] = light
+            constants = frame.constants.lights[index]
+            m.d.comb += [
+                light.i.payload.eq(accumulator.o.payload),
+                light.i.valid.eq(accumulator.o.valid),
+                light.o.ready.eq(intensity.i.ready),
+                light.constants.direction.eq(constants.direction),
+                light.constants.halfway.eq(constants.halfway),
+                light.constants.exponent.eq(frame.constants.exponent),
+                intensity.i.payload.diffuse[index].eq(light.o.payload.diffuse),
+                intensity.i.payload.specular[index].eq(light.o.payload.specular),
+                intensity.constants.diffuse[index].eq(constants.diffuse),
+                intensity.constants.specular[index].eq(constants.specular),
+            ]
+        m.d.comb += [
+            accumulator.o.ready.eq(self._lights[0].i.ready),
+            intensity.i.valid.eq(self._lights[0].o.valid),
+            intensity.constants.ambient.eq(frame.constants.ambient),
+        ]
+        connect(m, intensity.o, assembler.colors)
+        m.d.comb += [
+            assembler.places.payload.eq(places.r_data),
+            assembler.places.valid.eq(places.r_rdy),
+            places.r_en.eq(assembler.places.ready),
+        ]
+        connect(m, assembler.o, wiring.flipped(self.o))
+
+        # Writes, only while no span is inside.
+        connect(m, wiring.flipped(self.write), frame.write)
+        inside = Signal(range(self.PLACES + 2))
+        finished = self.o.valid & self.o.ready & self.o.payload.last
+        m.d.comb += [busy.eq(inside != 0), frame.hold.eq(busy)]
+        m.d.sync += inside.eq(inside + admit - finished)
+
+        status = self.status
+        for counter, event in (
+            (status.wide_spans, middle.o.valid & middle.o.ready & middle.o.payload.wide),
+            (status.empty_spans, self.i.valid & self.i.ready & empty),
+        ):
+            with m.If(event & ~counter.all()):
+                m.d.sync += counter.eq(counter + 1)
+        with m.If(admit & (span.x + span.length > 4096)):
+            m.d.sync += status.overrun.eq(1)
+        return m
