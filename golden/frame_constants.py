@@ -9,7 +9,7 @@ from .lighting import halfway_vector
 from .scene import Scene
 from .unit_vector import quantise
 
-__all__ = ["FIELDS_OF_A_FRAME", "FIELDS_OF_A_LIGHT", "LIGHT_STRIDE", "FrameConstants"]
+__all__ = ["FIELDS_OF_A_FRAME", "FIELDS_OF_A_LIGHT", "LIGHT_STRIDE", "FrameConstants", "address_table"]
 
 FIELDS_OF_A_FRAME = {"exponent": (0, 1), "ambient": (1, 3)}
 """First address and number of words of what a frame has once."""
@@ -83,3 +83,26 @@ class FrameConstants:
                 address += range(base + first, base + first + count)
                 data += getattr(self, name)[light].tolist()
         return {"address": np.array(address), "data": np.array(data) & 0x3FFFF}
+
+
+_MEANINGS = {
+    "exponent": "specular exponent, 1 to 1000",
+    "ambient": "ambient colour, red green blue, UQ(11, 6) in LSB of the channel",
+    "direction": "unit vector to the light, SQ(1, 17)",
+    "halfway": "unit half-way vector, SQ(1, 17)",
+    "diffuse": "diffuse colour, red green blue, UQ(11, 6)",
+    "specular": "specular colour, red green blue, UQ(11, 6)",
+}
+
+
+def address_table(lights: int) -> list[str]:
+    """Lines that tell the address of every constant of a pipeline with so many lights."""
+    rows = [(first, count, name) for name, (first, count) in FIELDS_OF_A_FRAME.items()]
+    for light in range(lights):
+        base = (light + 1) * LIGHT_STRIDE
+        rows += [(base + first, count, name) for name, (first, count) in FIELDS_OF_A_LIGHT.items()]
+    return [
+        f"  {first:>3}{f' to {first + count - 1}' if count > 1 else '':<8} {_MEANINGS[name]}"
+        + (f" (light {first // LIGHT_STRIDE - 1})" if first >= LIGHT_STRIDE else "")
+        for first, count, name in rows
+    ]

@@ -18,7 +18,27 @@ from .middle_normal import MiddleNormalUnit, normal_shape
 from .pixel_assembler import PixelAssemblerUnit, pixel_shape, place_shape
 from .stream import connect
 
-__all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
+__all__ = ["PORT_DESCRIPTIONS", "ShadingPipelineUnit", "span_shape", "status_shape"]
+
+PORT_DESCRIPTIONS = {
+    "i_x": "first pixel of the span, column",
+    "i_y": "its row",
+    "i_length": "pixels of the span; 0 gives none",
+    "i_normal_left": "unit normal at the first pixel centre, times 2^17 - 1",
+    "i_normal_right": "unit normal at the last pixel centre",
+    "o_x": "column of the pixel",
+    "o_y": "row",
+    "o_r": "red",
+    "o_g": "green",
+    "o_b": "blue",
+    "o_last": "last pixel of its span",
+    "write_address": "frame constant to write, see above",
+    "write_data": "its code; taken when no span is inside",
+    "status_wide_spans": "spans over 45 degrees since reset, at most 65535",
+    "status_empty_spans": "spans of length 0 since reset, at most 65535",
+    "status_overrun": "a span went past column 4095",
+}
+"""What each port of the pipeline is, for the table in its Verilog."""
 
 
 def span_shape() -> data.StructLayout:

@@ -1,0 +1,243 @@
+"""The frame runner: a scene through the simulated pipeline, and its errors against the golden renderer."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from golden.frame_constants import FrameConstants
+from golden.metrics import ErrorFigures, error_figures, mnse_printed, nmse
+from golden.pipeline import ShadingPipeline, Spans
+from golden.raster import Raster, rasterise
+from golden.renderer import render, shade_spans
+from golden.scene import Scene
+from golden.unit_vector import COMPONENT, quantise
+from hdl.pipeline import ShadingPipelineUnit
+from sim.engine import SimulationError, simulate
+from sim.spans import cut_wide_spans, quantise_spans
+
+__all__ = ["Comparison", "FrameSimulator", "SimulatedFrame", "compare"]
+
+
+@dataclass(frozen=True)
+class SimulatedFrame:
+    """A frame that came out of the simulated pipeline.
+
+    Parameters
+    ----------
+    image : uint8 array, shape (height, width, 3)
+        The frame buffer, after the depth test.
+    raster : Raster
+        The rasteriser's spans.
+    cut_raster : Raster
+        The spans that went into the pipeline, before quantisation: as the former, wide ones cut.
+    spans_cut : int
+        How many were cut.
+    clocks : int
+        Clocks from the first write of a constant to the last pixel.
+    wide_spans : int
+        Spans that the pipeline flagged as wider than it can shade.
+    engine : str
+        ``"cxxrtl"`` or ``"pysim"``.
+    seconds : dict
+        Of ``raster`` (rasterise, cut, quantise) and ``simulate`` (the stream in and out).
+    """
+
+    image: np.ndarray
+    raster: Raster
+    cut_raster: Raster
+    spans_cut: int
+    clocks: int
+    wide_spans: int
+    engine: str
+    seconds: dict[str, float]
+
+    @property
+    def spans(self) -> int:
+        """Spans that went into the pipeline."""
+        return len(self.cut_raster.length)
+
+    @property
+    def pixels(self) -> int:
+        """Pixels that came out of it, hidden ones included."""
+        return len(self.cut_raster.span)
+
+
+class FrameSimulator:
+    """A pipeline, built once, that renders any number of frames.
+
+    Parameters
+    ----------
+    design : ShadingPipeline
+        Method, reflection model, number of lights.
+    engine : str
+        ``"cxxrtl"`` or ``"pysim"``.
+
+    Attributes
+    ----------
+    build_seconds : float
+        Time to build or load the model, its check included.
+
+    Raises
+    ------
+    SimulationError
+        If the new model's pixels are not those of the twin.
+    CompilerMissing
+        If the engine is ``"cxxrtl"`` and no C++ compiler works.
+    """
+
+    def __init__(self, design: ShadingPipeline, engine: str = "cxxrtl"):
+        start = perf_counter()
+        self.design = design
+        self.engine = engine
+        self._unit = ShadingPipelineUnit(design)
+        spans, constants = _sample(design.lights)
+        expected = design.compute(spans, constants)
+        run = self._run(spans, constants, len(expected.x))
+        if not np.array_equal(_colors(run.beats), expected.color):
+            raise SimulationError("the simulated pipeline's pixels are not those of its twin")
+        self.build_seconds = perf_counter() - start
+
+    def _run(self, spans: Spans, constants: FrameConstants, count: int, **options):
+        fields = ("x", "y", "length", "normal_left", "normal_right")
+        return simulate(
+            self._unit,
+            {name: getattr(spans, name) for name in fields},
+            count=count,
+            write=constants.writes(),
+            engine=self.engine,
+            **options,
+        )
+
+    def render(
+        self,
+        scene: Scene,
+        progress: Callable[[int, int], object] | None = None,
+        vcd: str | None = None,
+    ) -> SimulatedFrame:
+        """Send a scene's spans through the pipeline, and its pixels into a frame buffer.
+
+        Parameters
+        ----------
+        scene : Scene
+            What to draw; at most as many lights as the design has.
+        progress : callable, optional
+            Called now and then with the pixels done and all pixels.
+        vcd : str, optional
+            File for the waveforms; engine ``"pysim"`` only.
+
+        Raises
+        ------
+        SimulationError
+            If the pipeline breaks the stream's rules, stops, or answers with other pixels than asked for.
+        ValueError
+            If the scene has more lights than the design, or a term is brighter than 8.
+        """
+        start = perf_counter()
+        constants = FrameConstants.of(scene, self.design.lights)
+        raster = rasterise(scene)
+        cut_raster, spans_cut = cut_wide_spans(raster)
+        spans = quantise_spans(cut_raster)
+        rastered = perf_counter()
+        count = len(cut_raster.span)
+        report = None if progress is None else lambda done: progress(done, count)
+        run = self._run(spans, constants, count, progress=report, vcd=vcd)
+        pixel = run.beats["y"].astype(np.int64) * scene.width + run.beats["x"]
+        if not np.array_equal(pixel, cut_raster.pixel):
+            raise SimulationError("the simulated pipeline answered with other pixels than it was asked for")
+        image = np.empty((scene.height, scene.width, 3), dtype=np.uint8)
+        image[...] = np.floor(np.multiply(scene.background, 255) + 0.5)
+        image.reshape(-1, 3)[pixel[cut_raster.visible]] = _colors(run.beats[cut_raster.visible])
+        return SimulatedFrame(
+            image=image,
+            raster=raster,
+            cut_raster=cut_raster,
+            spans_cut=spans_cut,
+            clocks=run.total_clocks,
+            wide_spans=int(run.status["wide_spans"]),
+            engine=run.engine,
+            seconds={"raster": rastered - start, "simulate": perf_counter() - rastered},
+        )
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Errors of a simulated frame over the pixels that show the surface.
+
+    Parameters
+    ----------
+    golden : float64 array, shape (height, width, 3)
+        Exactly normalised Phong interpolation along the spans with the frame's model, in [0, 1].
+    arithmetic_error : ErrorFigures
+        Against the same method and model in float64.
+    method_error : ErrorFigures
+        Against ``golden``.
+    total_error : ErrorFigures
+        Against the exact frame: Phong shading as on a GPU, Blinn's model.
+    nmse : float
+        Against the exact frame.
+    mnse_printed, mnse_printed_share : float
+        MNSE as [T] prints it, against the exact frame, and the share of values where it is defined.
+    seconds : float
+        Time of the three golden frames.
+    """
+
+    golden: np.ndarray
+    arithmetic_error: ErrorFigures
+    method_error: ErrorFigures
+    total_error: ErrorFigures
+    nmse: float
+    mnse_printed: float
+    mnse_printed_share: float
+    seconds: float
+
+
+def compare(scene: Scene, design: ShadingPipeline, frame: SimulatedFrame) -> Comparison:
+    """Hold a simulated frame against the golden renderer.
+
+    Of a frame that shows no surface every figure is NaN.
+    """
+    start = perf_counter()
+    same_method = shade_spans(scene, frame.cut_raster, design.method, design.model)
+    golden = shade_spans(scene, frame.raster, "normalised", design.model)
+    exact = render(scene, "phong", "blinn", raster=frame.raster)
+    seconds = perf_counter() - start
+    if exact.mask.any():
+        figures = [
+            error_figures(frame.image, reference * 255, exact.mask)
+            for reference in (same_method, golden, exact.image)
+        ]
+        shown, reference = frame.image[exact.mask], exact.image[exact.mask] * 255
+        squares = (nmse(shown, reference), *mnse_printed(shown, reference))
+    else:
+        figures = [ErrorFigures(*[math.nan] * len(dataclasses.fields(ErrorFigures)))] * 3
+        squares = (math.nan,) * 3
+    return Comparison(golden, *figures, *squares, seconds)
+
+
+def _colors(beats: np.ndarray) -> np.ndarray:
+    return np.stack([beats[channel] for channel in "rgb"], axis=-1)
+
+
+def _sample(lights: int) -> tuple[Spans, FrameConstants]:
+    """A few spans of every kind and lights from all sides, to check a model with."""
+    rng = np.random.default_rng(2025)
+    length = np.r_[1, 2, 3, rng.integers(0, 24, 37)]
+    normals = rng.normal(size=(len(length), 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    turned = normals + rng.uniform(-0.3, 0.3, normals.shape)
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    spans = Spans(
+        x=rng.integers(0, 4000, len(length)),
+        y=rng.integers(0, 4096, len(length)),
+        length=length,
+        normal_left=quantise(normals),
+        normal_right=quantise(turned),
+    )
+    vectors = rng.integers(-COMPONENT.max_code // 2, COMPONENT.max_code // 2, (2, lights, 3))
+    colors = rng.integers(0, 255 * 64, (3, lights, 3))
+    constants = FrameConstants(7, colors[2, 0] // 8, vectors[0], vectors[1], colors[0], colors[1])
+    return spans, constants

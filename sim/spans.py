@@ -1,0 +1,93 @@
+"""From the rasteriser's spans to the pipeline's: cut where too wide, and quantised."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from golden.interpolation import interpolate
+from golden.middle_normal import MAX_SPAN_ANGLE
+from golden.pipeline import Spans
+from golden.raster import Raster
+from golden.unit_vector import quantise
+
+__all__ = ["cut_wide_spans", "quantise_spans"]
+
+
+def cut_wide_spans(raster: Raster, largest_angle: float = MAX_SPAN_ANGLE) -> tuple[Raster, int]:
+    """Halve spans until the normals at the ends of each are at most an angle apart.
+
+    The normals at a cut are those of the span's own curve, ``normalise((1-t) N_l + t N_r)``, at the pixel
+    centres on both sides of it. A pixel more or less than half goes to the right. The fragments stay as they
+    are, in their order.
+
+    Parameters
+    ----------
+    raster : Raster
+        Spans; replaced are ``x, y, length, triangle, normal_left, normal_right, back, span, offset``.
+    largest_angle : float
+        Degrees, over 0.
+
+    Returns
+    -------
+    raster : Raster
+        The same fragments in narrower spans; the rasteriser's own weights and magnitudes are empty.
+    cut : int
+        How many of the given spans were cut.
+    """
+    origin = np.arange(len(raster.length))
+    first = np.zeros(len(origin), dtype=np.int64)
+    last = raster.length.astype(np.int64) - 1
+
+    def normals(span, offset):
+        t = offset / np.maximum(raster.length[span] - 1, 1)
+        curve = interpolate("normalised", raster.normal_left[span], raster.normal_right[span], t)
+        # Between opposite normals the curve passes through 0, where any normal is as good.
+        return np.where(np.any(curve, axis=-1, keepdims=True), curve, raster.normal_left[span])
+
+    left, right = raster.normal_left, raster.normal_right
+    cosine = np.cos(np.radians(largest_angle))
+    while True:
+        wide = (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
+        if not wide.any():
+            break
+        middle = (first[wide] + last[wide] + 1) // 2
+        parts = [
+            (origin[~wide], first[~wide], last[~wide], left[~wide], right[~wide]),
+            (origin[wide], first[wide], middle - 1, left[wide], normals(origin[wide], middle - 1)),
+            (origin[wide], middle, last[wide], normals(origin[wide], middle), right[wide]),
+        ]
+        origin, first, last, left, right = (np.concatenate(field) for field in zip(*parts, strict=True))
+    order = np.lexsort((first, origin))
+    origin, first, last, left, right = (field[order] for field in (origin, first, last, left, right))
+    length = (last - first + 1).astype(np.int32)
+    start = np.cumsum(length) - length
+    span = np.repeat(np.arange(len(length), dtype=np.int32), length)
+    nothing = np.empty((0, 3))
+    result = replace(
+        raster,
+        x=(raster.x[origin] + first).astype(np.int32),
+        y=raster.y[origin],
+        length=length,
+        triangle=raster.triangle[origin],
+        normal_left=left,
+        normal_right=right,
+        magnitude_left=nothing[:, 0],
+        magnitude_right=nothing[:, 0],
+        weights_left=nothing,
+        weights_right=nothing,
+        back=raster.back[origin],
+        span=span,
+        offset=(np.arange(len(span)) - start[span]).astype(np.int16),
+    )
+    return result, int(np.count_nonzero(np.bincount(origin, minlength=1) > 1))
+
+
+def quantise_spans(raster: Raster) -> Spans:
+    """The pipeline's input beats for a raster, normals in codes of ``SQ(1, 17)``."""
+    return Spans(
+        x=raster.x,
+        y=raster.y,
+        length=raster.length,
+        normal_left=quantise(raster.normal_left),
+        normal_right=quantise(raster.normal_right),
+    )
