@@ -13,7 +13,7 @@ FORMAT = DifferenceAccumulator.FORMAT
 
 
 def spans(lengths, seed):
-    """Spans with differences of every size, the ends of the words among them, and their pixels by the twin."""
+    """Spans with differences of every size, the words' ends among them, and their normals by the twin."""
     rng = np.random.default_rng(seed)
     lengths = np.asarray(lengths)
     start = rng.integers(COMPONENT.min_code, COMPONENT.max_code + 1, (len(lengths), 3))

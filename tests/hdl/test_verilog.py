@@ -15,7 +15,19 @@ from amaranth.lib import data, enum, fifo, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
+from golden.pipeline import ShadingPipeline
+from golden.specular import Specular
+from hdl.difference_accumulator import DifferenceAccumulatorUnit
+from hdl.difference_setup import DifferenceSetupUnit
+from hdl.diffuse import DiffuseUnit
+from hdl.dot_product import DotProductUnit
 from hdl.fixed import SQ, UQ
+from hdl.gpq import GPQUnit
+from hdl.intensity import IntensityUnit
+from hdl.light import LightUnit
+from hdl.middle_normal import MiddleNormalUnit
+from hdl.pipeline import ShadingPipelineUnit
+from hdl.specular import SpecularUnit
 from hdl.verilog import LINT_EXCEPTIONS, emit
 
 PROJECT = Path(__file__).parents[2]
@@ -164,6 +176,17 @@ CORES = {
     "stages": Stages,
     "awkward": Awkward,
     "combinational": Combinational,
+    "dot_product": DotProductUnit,
+    "middle_normal": MiddleNormalUnit,
+    "gpq": GPQUnit,
+    "difference_setup": DifferenceSetupUnit,
+    "difference_accumulator": DifferenceAccumulatorUnit,
+    "specular": lambda: SpecularUnit(Specular("cosquad_lin", "one_minus_cosine")),
+    "diffuse": DiffuseUnit,
+    "intensity": IntensityUnit,
+    "light": lambda: LightUnit(Specular("cosquad7")),
+    "pipeline": ShadingPipelineUnit,
+    "pipeline_lin": lambda: ShadingPipelineUnit(ShadingPipeline(model="cosquad_lin", lights=3)),
 }
 
 
