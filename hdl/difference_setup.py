@@ -1,6 +1,6 @@
 """Difference setup ([T] figure 2.11): first and second difference of a quadratic normal curve."""
 
-from amaranth.hdl import Cat, Mux, Signal, Value, unsigned
+from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
 from amaranth.lib import data
 from amaranth.lib.memory import Memory
 
@@ -29,7 +29,7 @@ class DifferenceSetupUnit(PipelinedUnit):
 
     Formats and error bound are those of `golden.difference_setup.DifferenceSetup`, the bit-true twin.
 
-    The latency is 16 clocks and the initiation interval 7. One multiplier: the square of dt, three products
+    The latency is 18 clocks and the initiation interval 7. One multiplier: the square of dt, three products
     with P and three with G, one a clock. A table of 2048 words of 17 bits holds the reciprocals.
 
     Parameters
@@ -59,12 +59,12 @@ class DifferenceSetupUnit(PipelinedUnit):
                 }
             ),
             difference_shape(),
-            latency=16,
+            latency=18,
             initiation_interval=7,
         )
 
     def datapath(self, m, operands):
-        """Ages: reciprocal 1 to 5, square at 5, P at 6 to 8, G at 9 to 11, then shift, round, add."""
+        """Ages: reciprocal 1 to 6, square at 6, P at 7 to 9, G at 10 to 12, then shift, round, add."""
         p = self.parameters
         at, register = self.at, self.register
         bits = p.LENGTH_BITS
@@ -86,7 +86,7 @@ class DifferenceSetupUnit(PipelinedUnit):
         )
         port = table.read_port()
         m.d.comb += port.addr.eq(address)
-        reciprocal = FixedValue(p.RECIPROCAL_FORMAT, port.data)
+        reciprocal = register(m, FixedValue(p.RECIPROCAL_FORMAT, port.data), "reciprocal", when=at(5))
         shift = register(m, position_held + address.any(), "shift", when=at(4))
 
         factor = Signal(FixedShape(p.RECIPROCAL_FORMAT))
@@ -97,28 +97,34 @@ class DifferenceSetupUnit(PipelinedUnit):
         normalised = FixedValue(
             UQ(0, 34), Mux(small, Cat(0, Value.cast(unsigned_square)[:-1]), Value.cast(unsigned_square))
         )
-        square = register(m, normalised.round_half_up(17).saturate(p.RECIPROCAL_FORMAT), "square", when=at(7))
-        small_held = register(m, small, "square_shift", when=at(7))
-        double_shift = register(m, Cat(small_held, shift), "double_shift", when=at(8))
+        rounded_square = register(m, normalised.round_half_up(17), "rounded_square", when=at(8))
+        square = register(m, rounded_square.saturate(p.RECIPROCAL_FORMAT), "square", when=at(9))
+        small_held = register(m, small, "square_shift", when=at(8))
+        double_shift = register(m, Cat(small_held, shift), "double_shift", when=at(9))
 
-        issues = [(5, reciprocal, reciprocal.extend(COMPONENT))]
-        issues += [(6 + c, reciprocal, held.p[c]) for c in range(3)]
-        issues += [(9 + c, square, held.g[c].extend(COMPONENT)) for c in range(3)]
+        issues = [(6, reciprocal, reciprocal.extend(COMPONENT))]
+        issues += [(7 + c, reciprocal, held.p[c]) for c in range(3)]
+        issues += [(10 + c, square, held.g[c].extend(COMPONENT)) for c in range(3)]
         for age, a, b in issues:
             with m.If(at(age)):
                 m.d.sync += [factor.eq(a), operand.eq(b)]
 
+        # The shift for the product of the next clock, then the shift itself in two stages.
         is_first_order = at(8) | at(9) | at(10)
+        amount = register(m, Mux(is_first_order, shift + 1, double_shift), "amount")
         scaled = product.scale(2).extend(SQ(3, 43))
-        amount = Mux(is_first_order, shift + 1, double_shift)
-        shifted = register(m, FixedValue(scaled.format, Value.cast(scaled) >> amount), "shifted")
+        coarse = register(
+            m, FixedValue(scaled.format, Value.cast(scaled) >> Cat(Const(0, 3), amount[3:])), "coarse"
+        )
+        fine_amount = register(m, amount[:3], "fine_amount")
+        shifted = register(m, FixedValue(scaled.format, Value.cast(coarse) >> fine_amount), "shifted")
         rounded = register(m, shifted.round_half_up(42).wrap(p.FORMAT), "rounded")
         result = Signal(self.o.payload.shape())
         for c in range(3):
-            first_order = register(m, rounded, f"first_order_{c}", when=at(10 + c))
-            first = register(m, (first_order + rounded).wrap(p.FORMAT), f"first_{c}", when=at(13 + c))
+            first_order = register(m, rounded, f"first_order_{c}", when=at(12 + c))
+            first = register(m, (first_order + rounded).wrap(p.FORMAT), f"first_{c}", when=at(15 + c))
             second = register(
-                m, rounded.scale(1).extend(SQ(3, 42)).wrap(p.FORMAT), f"second_{c}", when=at(13 + c)
+                m, rounded.scale(1).extend(SQ(3, 42)).wrap(p.FORMAT), f"second_{c}", when=at(15 + c)
             )
             m.d.comb += [result.first[c].eq(first), result.second[c].eq(second)]
         m.d.comb += [result.start.eq(late.q), result.length.eq(late.length)]

@@ -16,9 +16,12 @@ from .intensity import IntensityUnit
 from .light import LightUnit
 from .middle_normal import MiddleNormalUnit, normal_shape
 from .pixel_assembler import PixelAssemblerUnit, pixel_shape, place_shape
-from .stream import connect
+from .stream import connect, require_same_shape
 
 __all__ = ["PORT_DESCRIPTIONS", "ShadingPipelineUnit", "span_shape", "status_shape"]
+
+BUFFER_LATENCY = 2
+"""Clocks that a beat takes through an empty buffer."""
 
 PORT_DESCRIPTIONS = {
     "i_x": "first pixel of the span, column",
@@ -71,9 +74,10 @@ class ShadingPipelineUnit(wiring.Component):
     Setup (middle normal, G/P/Q, differences) of the next spans overlaps the pixels of this one; a FIFO
     carries the spans' places round it. `golden.pipeline.ShadingPipeline` is the bit-true twin.
 
-    The first pixel of a span leaves `latency` clocks after an idle pipeline has taken it, 60 and the depth
-    of the adder tree: ``60 + ceil(log2(2 lights + 1))``. Without stalls each span then takes
-    ``max(length, 7)`` clocks: one pixel a clock, and a setup interval of 7. A span of length 0 takes one
+    The first pixel of a span leaves `latency` clocks after an idle pipeline has taken it, 66 and the depth
+    of the adder tree: ``66 + ceil(log2(2 lights + 1))``. Without stalls each span then takes
+    at most ``max(length, 7)`` clocks: one pixel a clock, and a setup interval of 7; two spans are held ready,
+    so that a long one pays for short ones after it. A span of length 0 takes one
     clock and gives nothing. 5 multipliers, and 14 a light.
 
     A write is taken when no span is inside, and no span is taken while a write waits, so a frame's constants
@@ -118,7 +122,7 @@ class ShadingPipelineUnit(wiring.Component):
         self.setup_interval = max(self._middle.initiation_interval, self._setup.initiation_interval)
         chain = (self._middle, self._gpq, self._setup, self._accumulator)
         chain += (self._lights[0], self._intensity, self._assembler)
-        self.latency = sum(unit.latency for unit in chain)
+        self.latency = sum(unit.latency for unit in chain) + 2 * BUFFER_LATENCY
 
     def elaborate(self, platform):
         """Setup, then the lights side by side, then the assembler."""
@@ -169,7 +173,7 @@ class ShadingPipelineUnit(wiring.Component):
             gpq.o.ready.eq(setup.i.ready),
             lengths.r_en.eq(gpq.o.valid & setup.i.ready),
         ]
-        connect(m, setup.o, accumulator.i)
+        _buffer(m, "prepared", setup.o, accumulator.i, depth=2)
 
         # Lights in lockstep: equal units that are offered the same beats and taken from on the same clocks.
         for index, light in enumerate(self._lights):
@@ -192,7 +196,7 @@ class ShadingPipelineUnit(wiring.Component):
             intensity.i.valid.eq(self._lights[0].o.valid),
             intensity.constants.ambient.eq(frame.constants.ambient),
         ]
-        connect(m, intensity.o, assembler.colors)
+        _buffer(m, "shaded", intensity.o, assembler.colors, depth=4)
         m.d.comb += [
             assembler.places.payload.eq(places.r_data),
             assembler.places.valid.eq(places.r_rdy),
@@ -217,3 +221,17 @@ class ShadingPipelineUnit(wiring.Component):
         with m.If(admit & (span.x + span.length > 4096)):
             m.d.sync += status.overrun.eq(1)
         return m
+
+
+def _buffer(m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int) -> None:
+    """Connect two streams through a FIFO, which ends the combinational path of readies backwards."""
+    require_same_shape(source.payload.shape(), sink.payload.shape())
+    m.submodules[name] = buffer = fifo.SyncFIFOBuffered(width=source.payload.shape().size, depth=depth)
+    m.d.comb += [
+        buffer.w_data.eq(source.payload),
+        buffer.w_en.eq(source.valid),
+        source.ready.eq(buffer.w_rdy),
+        sink.payload.eq(buffer.r_data),
+        sink.valid.eq(buffer.r_rdy),
+        buffer.r_en.eq(sink.ready),
+    ]

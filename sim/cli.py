@@ -317,7 +317,8 @@ def verilog(method, model, lights, name, output):
     header = [
         f"blysk {version('blysk')} shading pipeline",
         f"method {method}, model {model}, lights {lights}",
-        f"latency {unit.latency} clocks, one pixel a clock; a span takes max(length, {unit.setup_interval})",
+        f"latency {unit.latency} clocks, one pixel a clock",
+        f"a span takes at most max(length, {unit.setup_interval}) clocks",
         "",
         "Frame constants, through the write port:",
         *address_table(lights),
