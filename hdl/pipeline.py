@@ -76,7 +76,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     The first pixel of a span leaves `latency` clocks after an idle pipeline has taken it, 66 and the depth
     of the adder tree: ``66 + ceil(log2(2 lights + 1))``. Without stalls each span then takes
-    at most ``max(length, 7)`` clocks: one pixel a clock, and a setup interval of 7; two spans are held ready,
+    at most ``max(length, 7)`` clocks: one pixel a clock, and a setup interval of 7; three spans are held ready,
     so that a long one pays for short ones after it. A span of length 0 takes one
     clock and gives nothing. 5 multipliers, and 14 a light.
 
@@ -173,7 +173,7 @@ class ShadingPipelineUnit(wiring.Component):
             gpq.o.ready.eq(setup.i.ready),
             lengths.r_en.eq(gpq.o.valid & setup.i.ready),
         ]
-        _buffer(m, "prepared", setup.o, accumulator.i, depth=2)
+        _buffer(m, "prepared", setup.o, accumulator.i, depth=3)
 
         # Lights in lockstep: equal units that are offered the same beats and taken from on the same clocks.
         for index, light in enumerate(self._lights):
