@@ -7,6 +7,7 @@ import re
 import sys
 import warnings
 from collections.abc import Sequence
+from contextlib import nullcontext
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
@@ -29,7 +30,7 @@ from sim.engine import CompilerMissing, SimulationError
 from sim.errors import InputError
 from sim.frame import Comparison, FrameSimulator, SimulatedFrame, compare
 from sim.mesh import load_mesh
-from sim.output import check_writable, write_json, write_text
+from sim.output import atomic_writer, check_writable, write_json, write_text
 from sim.picture import check_image_path, write_comparison, write_image
 
 __all__ = ["main"]
@@ -38,7 +39,7 @@ ENGINES = ("auto", "cxxrtl", "pysim")
 
 DEFAULT_SIZE = (640, 480)
 
-SLOW_SIZE = (96, 72)
+SLOW_SIZE = (160, 120)
 """Largest picture of the slow engine when it stands in for the compiled one, or writes waveforms unasked."""
 
 
@@ -82,6 +83,9 @@ class _Size(click.ParamType):
 
     name = "WIDTHxHEIGHT"
 
+    def get_metavar(self, param, ctx):
+        return self.name
+
     def convert(self, value, param, ctx):
         if isinstance(value, tuple):
             return value
@@ -100,6 +104,9 @@ class _Numbers(click.ParamType):
 
     def __init__(self, name: str, counts: Sequence[int], what: str):
         self.name, self.counts, self.what = name, counts, what
+
+    def get_metavar(self, param, ctx):
+        return self.name
 
     def convert(self, value, param, ctx):
         if isinstance(value, tuple):
@@ -133,12 +140,13 @@ class _Color(_Numbers):
 
 def _design_options(command):
     """Options of the pipeline's design, shared by the commands."""
+    served = "; ".join(f"{method} serves {', '.join(models)}" for method, models in METHODS.items())
     command = click.option(
         "--model",
         type=_Choice("reflection model", REFLECTION_MODELS),
         default="cosquad",
         show_default=True,
-        help="Reflection model.",
+        help=f"Reflection model; {served}.",
     )(command)
     return click.option(
         "--method",
@@ -156,7 +164,7 @@ def _design(method: str, model: str, lights: int) -> ShadingPipeline:
     return ShadingPipeline(method, model, lights)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(version("blysk"), "--version", prog_name="blysk", message="%(prog)s %(version)s")
 def cli():
     """Phong and Blinn shading by simulated hardware.
@@ -167,13 +175,13 @@ def cli():
     """
 
 
-@cli.command()
+@cli.command(short_help="Render a mesh through the simulated pipeline.")
 @click.argument("mesh")
 @_design_options
 @click.option(
     "--exponent", type=_Whole(1, MAX_EXPONENT), default=50, show_default=True, help="Of the highlight."
 )
-@click.option("--size", type=_Size(), help="Of the picture.  [default: 640x480; 96x72 with --vcd]")
+@click.option("--size", type=_Size(), help="Of the picture.  [default: 640x480; 160x120 with --vcd]")
 @click.option(
     "--engine",
     type=_Choice("engine", ENGINES),
@@ -208,7 +216,8 @@ def cli():
     "lights",
     multiple=True,
     type=_Numbers("X,Y,Z or X,Y,Z,R,G,B", (3, 6), "a light"),
-    help="Direction to a light, and its colour; repeat for more lights.  [default: -0.5,0.8,0.7]",
+    help="Direction to a light, and its colour, 1,1,1 if left out; repeat for more lights.  "
+    "[default: -0.5,0.8,0.7]",
 )
 @click.option("--ambient", type=_Color(), default="0.08,0.05,0.03", show_default=True, help="Reflection k_a.")
 @click.option("--diffuse", type=_Color(), default="0.75,0.42,0.2", show_default=True, help="Reflection k_d.")
@@ -242,8 +251,15 @@ def render(
     start = perf_counter()
     if vcd and engine == "cxxrtl":
         raise InputError("--vcd", "the engine cxxrtl writes no waveforms", "use --engine pysim")
+    if not any(options["view"]):
+        raise InputError("--view 0,0,0", "no direction", "give a vector other than 0")
+    crease = _angle(options["crease"][0])
     lights = [_light(numbers) for numbers in options["lights"] or ((-0.5, 0.8, 0.7),)]
+    if len(lights) > MAX_LIGHTS:
+        raise InputError("--light", f"{len(lights)} lights", f"give at most {MAX_LIGHTS}")
     design = _design(method, model, len(lights))
+    if not Path(mesh).stem:
+        raise InputError(f"MESH {mesh!r}", "is no file's name", "give a mesh file, or teapot")
     if triangles is not None and mesh != "teapot":
         raise InputError(
             f"--triangles {triangles}", "only the teapot is tessellated", "leave it out for a file"
@@ -251,52 +267,53 @@ def render(
     if not (output or comparison):
         output = f"{Path(mesh).stem}.png"
     _check_outputs(mesh, pictures=[output, comparison], others=[figures, vcd])
-
-    loaded = load_mesh(mesh, triangles=triangles or 10_000, crease_angle=_angle(options["crease"][0]))
-    loading = perf_counter() - start
-    simulator, note = _simulator(design, "pysim" if vcd else engine)
-    size = size or (SLOW_SIZE if vcd else DEFAULT_SIZE)
-    if note:
-        size = _at_most(size, SLOW_SIZE)
-        print(f"blysk: {note}; using pysim at {size[0]}x{size[1]}", file=sys.stderr)
-    scene = _scene(loaded.mesh, size, exponent, lights, options)
-    bar = tqdm(desc="simulating", unit=" pixels", unit_scale=True, delay=1, leave=False, disable=None)
-    with bar:
-        frame = simulator.render(scene, progress=lambda done, count: _show(bar, done, count), vcd=vcd)
-    result = compare(scene, design, frame)
-    seconds = {
-        "load": loading,
-        "raster": frame.seconds["raster"],
-        "golden": result.seconds,
-        "build": simulator.build_seconds,
-        "simulate": frame.seconds["simulate"],
-    }
-    report = _report(loaded, design, scene, frame, result, seconds)
-
-    if output:
-        write_image(output, frame.image)
-    if comparison:
-        error = result.method_error
-        write_comparison(
-            comparison,
-            frame.image,
-            result.golden,
-            title=f"{loaded.name}: {method} normals, {model}, exponent {exponent}",
-            subtitle=(
-                f"simulated RTL beside normalised Phong interpolation in float64: largest error "
-                f"{error.max_lsb:.2f} LSB, {frame.clocks:,} clocks for {frame.pixels:,} pixels"
-            ),
-        )
-    report["seconds"]["total"] = perf_counter() - start
-    if figures:
-        write_json(figures, report)
+    with tqdm(bar_format="{desc}", leave=False, disable=None) as stage:
+        stage.set_description_str("loading the mesh")
+        loaded = load_mesh(mesh, triangles=triangles or 10_000, crease_angle=crease)
+        loading = perf_counter() - start
+        size = size or (SLOW_SIZE if vcd else DEFAULT_SIZE)
+        scene = _scene(loaded.mesh, size, exponent, lights, options)
+        stage.set_description_str("building the model")
+        simulator, note = _simulator(design, "pysim" if vcd else engine)
+        if note:
+            size = _at_most(size, SLOW_SIZE)
+            scene = _scene(loaded.mesh, size, exponent, lights, options)
+            tqdm.write(f"blysk: pysim at {size[0]}x{size[1]} instead of cxxrtl, {note}", file=sys.stderr)
+        stage.set_description_str("rasterising and simulating")
+        with (
+            atomic_writer(vcd) if vcd else nullcontext() as waves,
+            tqdm(unit=" pixels", unit_scale=True, delay=1, leave=False, disable=None) as bar,
+        ):
+            frame = simulator.render(
+                scene,
+                progress=lambda done, count: _show(bar, done, count),
+                vcd=waves and str(waves),
+            )
+        stage.set_description_str("comparing with the golden renderer")
+        result = compare(scene, design, frame)
+        seconds = {
+            "load": loading,
+            "raster": frame.seconds["raster"],
+            "golden": result.seconds,
+            "build": simulator.build_seconds,
+            "simulate": frame.seconds["simulate"],
+        }
+        report = _report(loaded, design, scene, frame, result, seconds)
+        stage.set_description_str("writing")
+        if output:
+            write_image(output, frame.image)
+        if comparison:
+            write_comparison(comparison, frame.image, result.golden, **_captions(report))
+        report["seconds"]["total"] = perf_counter() - start
+        if figures:
+            write_json(figures, report)
     _print_report(report)
     for name, path in (("frame", output), ("comparison", comparison), ("figures", figures), ("waves", vcd)):
         if path:
             print(f"{name:<12}{path}")
 
 
-@cli.command()
+@cli.command(short_help="Emit the pipeline as Verilog.")
 @_design_options
 @click.option("--lights", type=_Whole(1, MAX_LIGHTS), default=1, show_default=True, help="Number of lights.")
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
@@ -375,11 +392,10 @@ def _at_most(size: tuple[int, int], largest: tuple[int, int]) -> tuple[int, int]
 
 
 def _scene(mesh, size: tuple[int, int], exponent: int, lights: list[Light], options: dict) -> Scene:
-    if len(lights) > MAX_LIGHTS:
-        raise InputError("--light", f"{len(lights)} lights", f"give at most {MAX_LIGHTS}")
-    if not any(options["view"]):
-        raise InputError("--view 0,0,0", "no direction", "give a vector other than 0")
     width, height = size
+    # The camera frames the mesh whatever its unit is; products of huge or tiny coordinates would overflow.
+    largest = np.frexp(np.abs(mesh.vertices).max())[1]
+    mesh = dataclasses.replace(mesh, vertices=np.ldexp(mesh.vertices, -largest))
     scene = Scene(
         mesh=mesh,
         camera=Camera.framing(mesh.vertices, options["view"], options["projection"], width / height),
@@ -400,6 +416,21 @@ def _scene(mesh, size: tuple[int, int], exponent: int, lights: list[Light], opti
 def _show(bar: tqdm, done: int, count: int) -> None:
     bar.total = count
     bar.update(done - bar.n)
+
+
+def _captions(report: dict) -> dict[str, str]:
+    """Title and subtitle of the comparison."""
+    return {
+        "title": f"{report['mesh']}: {report['method']} normals, {report['model']}, "
+        f"exponent {report['exponent']}",
+        "subtitle": (
+            f"simulated RTL beside normalised Phong interpolation in float64: largest error "
+            f"{report['method_error']['max_lsb']:.2f} LSB, {report['clocks']:,} clocks for "
+            f"{report['pixels']:,} pixels"
+            if report["visible_pixels"]
+            else "no pixel shows the surface"
+        ),
+    }
 
 
 def _report(
@@ -468,11 +499,25 @@ def _print_report(report: dict) -> None:
         "triangles": f"{report['triangles']:,}",
         "spans": f"{report['spans']:,}",
         "pixels": f"{report['pixels']:,} shaded, {report['visible_pixels']:,} visible",
-        "clocks": f"{report['clocks']:,}, {report['clocks_per_pixel']:.3f} a pixel",
-        "simulated": f"{report['simulated_pixels_per_second']:,.0f} pixels a second",
+        "clocks": f"{report['clocks']:,}",
     }
+    if report["pixels"]:
+        rows["clocks"] += f", {report['clocks_per_pixel']:.3f} a pixel"
+        rows["simulated"] = f"{report['simulated_pixels_per_second']:,.0f} pixels a second"
     for name, value in rows.items():
         print(f"{name:<12}{value}")
+    if report["visible_pixels"]:
+        _print_errors(report)
+    else:
+        print(f"{'error':<12}none, no pixel shows the surface")
+    for key, text in _COUNTS.items():
+        if report["counts"][key]:
+            print(f"{'counted':<12}{text}: {report['counts'][key]:,}")
+    times = ", ".join(f"{name} {value:.2f}" for name, value in report["seconds"].items())
+    print(f"{'seconds':<12}{times}")
+
+
+def _print_errors(report: dict) -> None:
     print(f"{'error, LSB':<12}{'largest':>9}{'99.9 %':>9}{'RMSE':>9}{'PSNR, dB':>10}   against")
     for name, against in (
         ("arithmetic", "the same method and model in float64"),
@@ -488,11 +533,16 @@ def _print_report(report: dict) -> None:
         f"{'NMSE':<12}{report['nmse']:.3g} (MNSE as printed {report['mnse_printed']:.3g}, "
         f"defined for {report['mnse_printed_share']:.1%})"
     )
-    for key, text in _COUNTS.items():
-        if report["counts"][key]:
-            print(f"{'counted':<12}{report['counts'][key]:,} {text}")
-    times = ", ".join(f"{name} {value:.2f}" for name, value in report["seconds"].items())
-    print(f"{'seconds':<12}{times}")
+
+
+def _run(arguments: list[str]) -> int:
+    """`cli.main` without its own ways with an interrupt and a closed pipe."""
+    try:
+        with cli.make_context("blysk", arguments) as context:
+            cli.invoke(context)
+    except click.exceptions.Exit as stop:
+        return stop.exit_code
+    return 0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -502,13 +552,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
 
     def show(message, *_):
-        print(f"blysk: warning: {message}", file=sys.stderr)
+        tqdm.write(f"blysk: warning: {message}", file=sys.stderr)
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("default", RuntimeWarning)
             warnings.showwarning = show
-            return cli.main(arguments, prog_name="blysk", standalone_mode=False) or 0
+            status = _run(sys.argv[1:] if arguments is None else list(arguments))
+        # A closed pipe or full disk behind standard output is found out here, not at exit.
+        print(end="", flush=True)
+        return status
     except (click.Abort, KeyboardInterrupt):
         print("blysk: interrupted", file=sys.stderr)
         return 130
@@ -528,6 +581,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("blysk: out of memory; use a smaller --size or mesh", file=sys.stderr)
         return 2
     except BrokenPipeError:
-        # The reader of the output has gone; what is left must not raise again at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _give_up_output()
         return 141
+    except OSError as error:
+        print(
+            f"blysk: {error.filename or 'standard output'}: {error.strerror or error}; "
+            "free some space or send it elsewhere",
+            file=sys.stderr,
+        )
+        _give_up_output()
+        return 2
+
+
+def _give_up_output() -> None:
+    """Keep what is left in the buffer of standard output from raising again at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,190 @@
+"""Cutting wide spans against the curve's own formula, and the pipeline's flag after quantisation."""
+
+import numpy as np
+import pytest
+
+from golden.fixed import Fixed
+from golden.frame_constants import FrameConstants
+from golden.geometry import normalise
+from golden.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
+from golden.pipeline import ShadingPipeline
+from golden.raster import Raster
+from golden.unit_vector import COMPONENT, ONE
+from sim.spans import cut_wide_spans, quantise_spans
+
+WIDTH = 4095
+EPSILON = 2.0**-53
+
+
+def raster_of(rng, left, right, length):
+    """Spans of these normals and lengths anywhere on a picture; a span of one pixel has one normal."""
+    length = np.broadcast_to(length, len(left)).astype(np.int32)
+    right = np.where(length[:, np.newaxis] == 1, left, right)
+    count, fragments = len(length), int(length.sum())
+    x = rng.integers(0, WIDTH - length, endpoint=True).astype(np.int32)
+    y = rng.integers(0, 4095, count).astype(np.int32)
+    span = np.repeat(np.arange(count, dtype=np.int32), length)
+    offset = (np.arange(fragments) - np.repeat(np.cumsum(length) - length, length)).astype(np.int16)
+    return Raster(
+        x=x,
+        y=y,
+        length=length,
+        triangle=rng.integers(0, 1000, count).astype(np.int32),
+        normal_left=left,
+        normal_right=right,
+        magnitude_left=np.ones(count),
+        magnitude_right=np.ones(count),
+        weights_left=np.ones((count, 3)),
+        weights_right=np.ones((count, 3)),
+        back=rng.random(count) < 0.5,
+        span=span,
+        offset=offset,
+        pixel=(y[span] * WIDTH + x[span] + offset).astype(np.int32),
+        visible=rng.random(fragments) < 0.5,
+        triangles=1000,
+        degenerate=1,
+        culled=2,
+        outside=3,
+        uncovered=4,
+        hidden_spans=5,
+        repaired_normals=6,
+    )
+
+
+def angles(raster):
+    """Degrees between the ends of each span, by the form that is exact at both ends of the scale."""
+    left, right = raster.normal_left, raster.normal_right
+    sine = np.linalg.norm(left - right, axis=1)
+    return np.degrees(2 * np.arctan2(sine, np.linalg.norm(left + right, axis=1)))
+
+
+def origins(raster, cut):
+    """The given span of each part, by its first fragment."""
+    first = np.cumsum(cut.length) - cut.length
+    return raster.span[first], raster.offset[first]
+
+
+@pytest.fixture
+def wide(normal_pairs):
+    """Spans of 0 to 179.9 degrees and 1 to 60 pixels, and what they are cut to."""
+    rng = np.random.default_rng(11)
+    left, right = map(normalise, normal_pairs(rng, 5000, rng.uniform(0, 179.9, 5000)))
+    raster = raster_of(rng, left, right, rng.integers(1, 60, 5000, endpoint=True))
+    return raster, *cut_wide_spans(raster)
+
+
+def test_fragments_and_pixels_stay(wide):
+    raster, cut, _ = wide
+    assert np.array_equal(cut.pixel, raster.pixel)
+    assert np.array_equal(cut.visible, raster.visible)
+    assert np.array_equal(cut.y[cut.span] * WIDTH + cut.x[cut.span] + cut.offset, raster.pixel)
+    assert np.array_equal(np.bincount(cut.span), cut.length)
+    assert (np.diff(cut.span) >= 0).all()
+    origin, _ = origins(raster, cut)
+    assert np.array_equal(np.bincount(origin, weights=cut.length), raster.length)
+    for name in ("triangle", "back", "y"):
+        assert np.array_equal(getattr(cut, name), getattr(raster, name)[origin])
+    for name in ("triangles", "degenerate", "culled", "outside", "uncovered", "hidden_spans"):
+        assert getattr(cut, name) == getattr(raster, name)
+    # Nothing may take the uncut spans' weights for those of the parts.
+    assert len(cut.magnitude_left) == len(cut.weights_right) == 0
+
+
+def test_every_part_is_narrow_or_one_pixel(wide):
+    _, cut, _ = wide
+    # The comparison of cosines is exact to 2**-52, an angle of 45 degrees to 2**-52 / sin 45 radians.
+    assert (angles(cut)[cut.length > 1] <= MAX_SPAN_ANGLE + 1e-12).all()
+
+
+def test_normals_at_cuts_are_on_the_curve(wide):
+    raster, cut, _ = wide
+    origin, first = origins(raster, cut)
+    for offset, normal in ((first, cut.normal_left), (first + cut.length - 1, cut.normal_right)):
+        t = offset / np.maximum(raster.length[origin] - 1, 1)
+        curve = (1 - t)[:, np.newaxis] * raster.normal_left[origin]
+        curve += t[:, np.newaxis] * raster.normal_right[origin]
+        size = np.linalg.norm(curve, axis=1, keepdims=True)
+        # Each term is rounded three times, on both sides; division by a short chord magnifies that.
+        assert (np.abs(normal - curve / size) <= 8 * EPSILON / size + 8 * EPSILON).all()
+
+
+def test_counts(wide):
+    raster, cut, count = wide
+    assert count == np.count_nonzero((angles(raster) > MAX_SPAN_ANGLE) & (raster.length > 1))
+    origin, _ = origins(raster, cut)
+    assert count == np.count_nonzero(np.bincount(origin) > 1)
+
+
+def test_narrow_spans_are_untouched(normal_pairs):
+    rng = np.random.default_rng(12)
+    left, right = normal_pairs(rng, 2000, rng.uniform(0, 44.999999, 2000))
+    raster = raster_of(rng, left, right, rng.integers(1, 30, 2000))
+    cut, count = cut_wide_spans(raster)
+    assert count == 0
+    for name in ("x", "y", "length", "triangle", "normal_left", "normal_right", "span", "offset", "pixel"):
+        assert np.array_equal(getattr(cut, name), getattr(raster, name)), name
+
+
+def test_no_span_at_all():
+    rng = np.random.default_rng(13)
+    cut, count = cut_wide_spans(raster_of(rng, np.empty((0, 3)), np.empty((0, 3)), 0))
+    assert (count, len(cut.length), len(quantise_spans(cut))) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 4, 5, 4094, 4095])
+def test_opposite_normals(length):
+    """The curve jumps at its middle: an odd span has a pixel there, which any unit normal may have."""
+    rng = np.random.default_rng(14)
+    left = np.eye(3)[:1]
+    raster = raster_of(rng, left, -left, length)
+    cut, count = cut_wide_spans(raster)
+    assert count == (length > 1)
+    # Halving closes in on the jump.
+    assert len(cut.length) <= 1 + length.bit_length()
+    assert (angles(cut)[cut.length > 1] == 0).all()
+    ends = np.concatenate([cut.normal_left, cut.normal_right])
+    assert (np.linalg.norm(ends, axis=1) == 1).all()
+    if length > 1:
+        assert np.array_equal(cut.normal_left[0], left[0])
+        assert np.array_equal(cut.normal_right[-1], -left[0])
+
+
+def test_the_pipeline_flags_no_span_after_the_cut(normal_pairs):
+    rng = np.random.default_rng(15)
+    angle = np.concatenate(
+        [
+            rng.uniform(0, 180, 40_000),
+            MAX_SPAN_ANGLE + rng.normal(0, 1e-4, 30_000),
+            2 * MAX_SPAN_ANGLE + rng.normal(0, 1e-4, 28_000),
+            np.full(1000, MAX_SPAN_ANGLE),
+            np.full(1000, 180.0),
+        ]
+    )
+    left, right = normal_pairs(rng, len(angle), angle)
+    raster = raster_of(rng, left, right, rng.integers(1, 12, len(angle), endpoint=True))
+
+    def flagged(raster):
+        spans = quantise_spans(raster)
+        _, wide = MiddleNormal().compute(
+            Fixed(COMPONENT, spans.normal_left), Fixed(COMPONENT, spans.normal_right)
+        )
+        return np.count_nonzero(wide)
+
+    cut, _ = cut_wide_spans(raster)
+    assert flagged(cut) == 0
+    assert flagged(raster) > 30_000
+    vector = np.array([[0, 0, ONE]])
+    constants = FrameConstants(10, np.zeros(3, int), vector, vector, np.zeros((1, 3), int), vector * 0)
+    assert ShadingPipeline().compute(quantise_spans(cut), constants).wide_spans == 0
+
+
+def test_quantised_ends():
+    rng = np.random.default_rng(16)
+    left = np.array([[1.0, 0, 0], [0.6, 0, 0.8]])
+    raster = raster_of(rng, left, -left[::-1], 7)
+    spans = quantise_spans(raster)
+    assert spans.normal_left[0].tolist() == [ONE, 0, 0]
+    for codes, normals in ((spans.normal_left, left), (spans.normal_right, -left[::-1])):
+        assert np.abs(codes / ONE - normals).max() < 2.0**-17
+    for name in ("x", "y", "length"):
+        assert np.array_equal(getattr(spans, name), getattr(raster, name))
