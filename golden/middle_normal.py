@@ -1,7 +1,7 @@
 """Middle normal of a span through the h polynomial ([T] 2.2)."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -55,19 +55,10 @@ class MiddleNormal:
         + 2.0**-20
     )
 
-    @cached_property
+    @property
     def coefficients(self) -> Fixed:
         """``c1, c2, c3``, fitted in words of the hardware."""
-        # The unit reads u in units of `ONE_SQUARED`.
-        one = ONE_SQUARED.values
-        codes = minimax_quantised(
-            lambda u: half_angle_factor(u / one),
-            0.0,
-            one * (1 - np.cos(np.radians(MAX_SPAN_ANGLE))),
-            dict.fromkeys((1, 2, 3), self.SUM_FORMAT),
-            held={0: 0.5},
-        )
-        return Fixed(self.SUM_FORMAT, codes)
+        return Fixed(self.SUM_FORMAT, _coefficients())
 
     @cached_property
     def widest(self) -> Fixed:
@@ -101,3 +92,16 @@ class MiddleNormal:
         e = Fixed(e.format, e.codes[..., np.newaxis])
         correction = (e * half_sum.truncate(17).saturate(COMPONENT)).scale(1).round_half_up(19)
         return (half_sum + correction).saturate(self.FORMAT), u > self.widest
+
+
+@cache
+def _coefficients() -> np.ndarray:
+    # The unit reads u in units of `ONE_SQUARED`.
+    one = ONE_SQUARED.values
+    return minimax_quantised(
+        lambda u: half_angle_factor(u / one),
+        0.0,
+        one * (1 - np.cos(np.radians(MAX_SPAN_ANGLE))),
+        dict.fromkeys((1, 2, 3), MiddleNormal.SUM_FORMAT),
+        held={0: 0.5},
+    )

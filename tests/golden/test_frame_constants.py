@@ -1,0 +1,126 @@
+"""Codes of a scene's constants, and the beats that write them."""
+
+import numpy as np
+import pytest
+
+from golden.camera import Camera
+from golden.frame_constants import (
+    FIELDS_OF_A_FRAME,
+    FIELDS_OF_A_LIGHT,
+    LIGHT_STRIDE,
+    FrameConstants,
+    address_table,
+)
+from golden.geometry import Mesh
+from golden.lighting import Light, Material
+from golden.scene import Scene
+from golden.unit_vector import ONE
+
+TRIANGLE = Mesh(
+    np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]), np.tile([0.0, 0, 1], (3, 1))
+)
+
+
+def scene(lights, material=None, ambient_light=(1.0, 1.0, 1.0)):
+    return Scene(
+        mesh=TRIANGLE,
+        camera=Camera.framing(TRIANGLE.vertices, (0, 0, 1)),
+        width=4,
+        height=4,
+        material=material or Material((0.1, 0.2, 0.3), (0.6, 0.5, 0.4), (0.5, 0.25, 1), 20),
+        lights=lights,
+        ambient_light=ambient_light,
+    )
+
+
+def test_codes_of_a_scene():
+    """L = V: the half-way vector is the light's. L at a right angle: between the two."""
+    lights = [Light((0, 0, 5), (1, 0.5, 2)), Light((3, 0, 0))]
+    given = scene(lights, ambient_light=(0.5, 1, 2))
+    np.testing.assert_allclose(given.camera.viewer, (0, 0, 1), atol=1e-15)
+    constants = FrameConstants.of(given)
+    assert constants.exponent == 20
+    np.testing.assert_array_equal(constants.ambient, np.rint(255 * 64 * np.array([0.05, 0.2, 0.6])))
+    np.testing.assert_array_equal(constants.direction, [[0, 0, ONE], [ONE, 0, 0]])
+    np.testing.assert_array_equal(constants.halfway[0], [0, 0, ONE])
+    np.testing.assert_allclose(constants.halfway[1] / ONE, [0.5**0.5, 0, 0.5**0.5], atol=2.0**-17)
+    scale = 255 * 64
+    # Half up: 0.6 * 255 * 64 is 9792, 0.5 * 0.5 a quarter, and so on; all off by at most half a code.
+    diffuse = scale * np.array([[0.6, 0.25, 0.8], [0.6, 0.5, 0.4]])
+    specular = scale * np.array([[0.5, 0.125, 2], [0.5, 0.25, 1]])
+    assert np.abs(constants.diffuse - diffuse).max() <= 0.5
+    assert np.abs(constants.specular - specular).max() <= 0.5
+
+
+def test_light_opposite_the_viewer_has_no_highlight():
+    constants = FrameConstants.of(scene([Light((0, 0, -1)), Light((0, 0, 1))]))
+    np.testing.assert_array_equal(constants.direction[0], [0, 0, -ONE])
+    assert not constants.halfway[0].any()
+    assert not constants.specular[0].any()
+    assert constants.diffuse[0].all()
+    assert constants.specular[1].all()
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_missing_lights_are_black(count):
+    constants = FrameConstants.of(scene([Light((0, 1, 1))] * count), lights=5)
+    for name in FIELDS_OF_A_LIGHT:
+        field = getattr(constants, name)
+        assert field.shape == (5, 3)
+        assert field[:count].any(axis=1).all()
+        assert not field[count:].any()
+    assert FrameConstants.of(scene([Light((0, 1, 1))] * count)).direction.shape == (max(count, 1), 3)
+
+
+def test_what_does_not_fit_is_refused():
+    with pytest.raises(ValueError, match=r"^the pipeline has 1 lights, the scene 2$"):
+        FrameConstants.of(scene([Light((0, 0, 1))] * 2), lights=1)
+    with pytest.raises(ValueError, match=r"^the pipeline has 17 lights, the scene 17$"):
+        FrameConstants.of(scene([Light((0, 0, 1))] * 17))
+    assert len(FrameConstants.of(scene([Light((0, 0, 1))] * 16)).direction) == 16
+    for bright in (
+        scene([Light((0, 0, 1), (14, 1, 1))]),
+        scene([Light((0, 0, 1))], Material((0, 0, 0), (0, 0, 0), (9, 0, 0), 3)),
+        scene([], ambient_light=(100, 1, 1)),
+    ):
+        with pytest.raises(ValueError, match=r"^the intensity of a term must be 0 to 8$"):
+            FrameConstants.of(bright)
+    # A light that is eight times the full channel is the brightest.
+    assert FrameConstants.of(scene([Light((0, 0, 1), (8, 8, 8))])).specular[0, 2] == 8 * 255 * 64
+
+
+@pytest.mark.parametrize("lights", [1, 2, 16])
+def test_writes_hold_every_constant(lights):
+    """Read back from the beats by the table of addresses, sign and all."""
+    rng = np.random.default_rng(lights)
+    vectors, colors = rng.integers(-ONE, ONE + 1, (2, lights, 3)), rng.integers(0, 2**17, (2, lights, 3))
+    constants = FrameConstants(1000, rng.integers(0, 2**17, 3), *vectors, *colors)
+    writes = constants.writes()
+    assert len(writes["address"]) == len(set(writes["address"].tolist())) == 4 + 12 * lights
+    assert 0 <= writes["data"].min() <= writes["data"].max() < 2**18
+    assert writes["address"].max() < 512
+    memory = dict(zip(writes["address"].tolist(), writes["data"].tolist(), strict=True))
+
+    def read(first, count, signed):
+        words = np.array([memory[first + k] for k in range(count)])
+        return np.where(signed & (words >= 2**17), words - 2**18, words)
+
+    for name, (first, count) in FIELDS_OF_A_FRAME.items():
+        np.testing.assert_array_equal(read(first, count, False), np.atleast_1d(getattr(constants, name)))
+    for light in range(lights):
+        for name, (first, count) in FIELDS_OF_A_LIGHT.items():
+            signed = name in ("direction", "halfway")
+            words = read((light + 1) * LIGHT_STRIDE + first, count, signed)
+            np.testing.assert_array_equal(words, getattr(constants, name)[light])
+
+
+@pytest.mark.parametrize("lights", [1, 3, 16])
+def test_address_table_tells_every_address_once(lights):
+    constants = FrameConstants(1, np.zeros(3, int), *np.zeros((4, lights, 3), int))
+    told = []
+    for line in address_table(lights):
+        words = line.split()
+        first, last = int(words[0]), int(words[2] if words[1] == "to" else words[0])
+        told += range(first, last + 1)
+        assert ("light" in line.rsplit("(", 1)[-1]) == (first >= LIGHT_STRIDE)
+    assert sorted(told) == sorted(constants.writes()["address"].tolist())

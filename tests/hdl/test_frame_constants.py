@@ -1,0 +1,297 @@
+"""Write port: every address, hold, and no change under a span; reset of the whole pipeline in mid span."""
+
+import numpy as np
+import pytest
+from amaranth.hdl import Module, ResetInserter, Signal, Value
+from amaranth.sim import Simulator
+
+from golden.frame_constants import FIELDS_OF_A_FRAME, FIELDS_OF_A_LIGHT, LIGHT_STRIDE, FrameConstants
+from golden.geometry import normalise
+from golden.intensity import Intensity
+from golden.pipeline import ShadingPipeline, Spans
+from golden.unit_vector import ONE, quantise
+from hdl.frame_constants import FrameConstantsUnit
+from hdl.pipeline import ShadingPipelineUnit
+
+
+def run_bench(m, bench):
+    simulator = Simulator(m)
+    simulator.add_clock(1e-8)
+    simulator.add_testbench(bench)
+    simulator.run()
+
+
+def random_constants(rng, lights):
+    vectors = quantise(normalise(rng.normal(size=(2, lights, 3))))
+    colors = Intensity.color(rng.uniform(0, 0.6, (2, lights, 3)))
+    return FrameConstants(
+        int(rng.integers(1, 30)), Intensity.color(rng.uniform(0, 0.2, 3)), *vectors, *colors
+    )
+
+
+# The registers alone.
+
+
+def words_of(constants, lights):
+    """Where each address's word is in the output: (fields to it, width, signed)."""
+    words = {}
+    for name, (first, count) in FIELDS_OF_A_FRAME.items():
+        for k in range(count):
+            words[first + k] = constants[name][k] if count > 1 else constants[name]
+    for light in range(lights):
+        for name, (first, count) in FIELDS_OF_A_LIGHT.items():
+            for k in range(count):
+                words[(light + 1) * LIGHT_STRIDE + first + k] = constants.lights[light][name][k]
+    return {address: Value.cast(word) for address, word in words.items()}
+
+
+async def write(ctx, unit, address, data):
+    ctx.set(unit.write.payload, {"address": address, "data": data})
+    ctx.set(unit.write.valid, 1)
+    await ctx.tick()
+    ctx.set(unit.write.valid, 0)
+    ctx.set(unit.write.payload, {"address": 511, "data": 2**18 - 1})
+
+
+@pytest.mark.parametrize("lights", [1, 3])
+def test_every_address_writes_its_constant_and_no_other(lights):
+    """All 512 addresses, in random order, twice: a word is seen one clock later, every other one stays."""
+    rng = np.random.default_rng(lights)
+    unit = FrameConstantsUnit(lights)
+    words = words_of(unit.constants, lights)
+    assert len(words) == 4 + 12 * lights
+    # The words cover the output: nothing is left that no address writes.
+    assert sum(len(word) for word in words.values()) == len(Value.cast(unit.constants))
+
+    async def bench(ctx):
+        expected = dict.fromkeys(words, 0)
+        for address in np.r_[rng.permutation(512), rng.permutation(512)].tolist():
+            data = int(rng.integers(0, 2**18))
+            assert ctx.get(unit.write.ready) == 1
+            await write(ctx, unit, address, data)
+            if address in words:
+                shape = words[address].shape()
+                code = data % 2**shape.width
+                expected[address] = code - 2**shape.width * (shape.signed and code >= 2 ** (shape.width - 1))
+            assert {a: ctx.get(word) for a, word in words.items()} == expected
+
+    run_bench(unit, bench)
+
+
+def test_writes_of_a_frame_give_its_constants():
+    """The beats of `FrameConstants.writes`, read back by name."""
+    given = random_constants(np.random.default_rng(3), 2)
+    unit = FrameConstantsUnit(2)
+    writes = given.writes()
+
+    async def bench(ctx):
+        for address, data in zip(writes["address"].tolist(), writes["data"].tolist(), strict=True):
+            await write(ctx, unit, address, data)
+        constants = unit.constants
+        assert ctx.get(constants.exponent) == given.exponent
+        assert [ctx.get(Value.cast(constants.ambient[k])) for k in range(3)] == given.ambient.tolist()
+        for name in FIELDS_OF_A_LIGHT:
+            for light in range(2):
+                codes = [ctx.get(Value.cast(constants.lights[light][name][k])) for k in range(3)]
+                assert codes == getattr(given, name)[light].tolist()
+
+    run_bench(unit, bench)
+
+
+def test_hold_keeps_a_write_waiting():
+    unit = FrameConstantsUnit(1)
+
+    async def bench(ctx):
+        ctx.set(unit.hold, 1)
+        ctx.set(unit.write.payload, {"address": 0, "data": 77})
+        ctx.set(unit.write.valid, 1)
+        for _ in range(5):
+            assert ctx.get(unit.write.ready) == 0
+            await ctx.tick()
+            assert ctx.get(unit.constants.exponent) == 0
+        ctx.set(unit.hold, 0)
+        assert ctx.get(unit.write.ready) == 1
+        assert ctx.get(unit.constants.exponent) == 0
+        await ctx.tick()
+        assert ctx.get(unit.constants.exponent) == 77
+        # No write without valid.
+        ctx.set(unit.write.valid, 0)
+        ctx.set(unit.write.payload, {"address": 0, "data": 5})
+        await ctx.tick()
+        assert ctx.get(unit.constants.exponent) == 77
+
+    run_bench(unit, bench)
+
+
+# Behind the pipeline's write port.
+
+
+def random_spans(rng, lengths, normal_pairs):
+    lengths = np.asarray(lengths)
+    left, right = normal_pairs(rng, len(lengths), rng.uniform(0, 40, len(lengths)))
+    x, y = rng.integers(0, 4000, len(lengths)), rng.integers(0, 4096, len(lengths))
+    return Spans(x, y, lengths, quantise(left), quantise(right))
+
+
+def part(spans, start, stop):
+    return Spans(
+        *(getattr(spans, f)[start:stop] for f in ("x", "y", "length", "normal_left", "normal_right"))
+    )
+
+
+class Driver:
+    """A pipeline in pysim: offers spans and writes, each until it is taken, and collects the pixels."""
+
+    PIXEL = ("x", "y", "r", "g", "b", "last")
+
+    def __init__(self, unit):
+        self.unit = unit
+        self.module = Module()
+        self.reset = Signal()
+        self.module.submodules.unit = ResetInserter(self.reset)(unit)
+
+    async def run(self, ctx, clocks, spans, writes, late=None, stalls=(False,)):
+        """Writes, then spans; ``late = (clock, writes)`` offers more writes from that clock on.
+
+        Returns the pixels with their clocks, the clocks of spans taken, and those of writes taken.
+        """
+        unit = self.unit
+        queue = list(zip(writes["address"].tolist(), writes["data"].tolist(), strict=True))
+        pixels, span_clocks, write_clocks = [], [], []
+        total = len(queue)
+        for clock in range(clocks):
+            if late and clock == late[0]:
+                queue += zip(late[1]["address"].tolist(), late[1]["data"].tolist(), strict=True)
+                total = len(queue)
+            writing = len(write_clocks) < len(queue)
+            address, data = queue[len(write_clocks)] if writing else (511, 2**18 - 1)
+            ctx.set(unit.write.valid, writing)
+            ctx.set(unit.write.payload, {"address": address, "data": data})
+            # The first frame's writes come before its spans; a late one beside them.
+            offered = len(span_clocks) < len(spans) and (len(write_clocks) >= len(writes["address"]))
+            index = len(span_clocks)
+            if offered:
+                ctx.set(
+                    unit.i.payload,
+                    {
+                        **{name: int(getattr(spans, name)[index]) for name in ("x", "y", "length")},
+                        **{
+                            name: [c * 2.0**-17 for c in getattr(spans, name)[index].tolist()]
+                            for name in ("normal_left", "normal_right")
+                        },
+                    },
+                )
+            ctx.set(unit.i.valid, offered)
+            stalled = stalls[clock % len(stalls)]
+            ctx.set(unit.o.ready, not stalled)
+            if ctx.get(unit.o.valid) and not stalled:
+                pixels.append((clock, tuple(ctx.get(unit.o.payload[name]) for name in self.PIXEL)))
+            if writing and ctx.get(unit.write.ready):
+                write_clocks.append(clock)
+            if offered and ctx.get(unit.i.ready):
+                span_clocks.append(clock)
+            await ctx.tick()
+        ctx.set(unit.write.valid, 0)
+        ctx.set(unit.i.valid, 0)
+        assert len(write_clocks) == total or clocks < 200
+        return pixels, span_clocks, write_clocks
+
+
+def pixels_of(design, spans, constants):
+    """By the twin."""
+    pixels = design.compute(spans, constants)
+    columns = (pixels.x, pixels.y, *pixels.color.T, pixels.last)
+    return list(zip(*(column.astype(int).tolist() for column in columns), strict=True))
+
+
+@pytest.mark.parametrize("late_clock", [17, 80, 150])
+def test_constants_never_change_under_a_span(late_clock, normal_pairs):
+    """A second frame is written while spans of the first are inside, and while more are offered.
+
+    What was taken before keeps the first frame's constants to its last pixel; what is taken after has the
+    second's. The write waits until the last pixel is gone, and the spans wait for the write.
+    """
+    rng = np.random.default_rng(late_clock)
+    design = ShadingPipeline()
+    first, second = random_constants(rng, 1), random_constants(rng, 1)
+    spans = random_spans(rng, rng.integers(1, 12, 24), normal_pairs)
+    driver = Driver(ShadingPipelineUnit(design))
+    result = []
+
+    async def bench(ctx):
+        stalls = (rng.random(31) < 0.3).tolist()
+        result.append(
+            await driver.run(ctx, 480, spans, first.writes(), (late_clock, second.writes()), stalls)
+        )
+
+    run_bench(driver.module, bench)
+    pixels, span_clocks, write_clocks = result[0]
+    late_writes = write_clocks[len(first.writes()["address"]) :]
+    before = sum(clock < late_writes[0] for clock in span_clocks)
+    assert 0 < before < len(spans) == len(span_clocks)
+    expected = pixels_of(design, part(spans, 0, before), first)
+    last_clock = pixels[len(expected) - 1][0]
+    expected += pixels_of(design, part(spans, before, None), second)
+    assert [pixel for _, pixel in pixels] == expected
+    # No span comes between the offer of the writes and the last of them, and no write before the last pixel.
+    assert not any(late_clock <= clock <= late_writes[-1] for clock in span_clocks)
+    assert late_writes[0] == last_clock + 1
+    assert np.all(np.diff(late_writes) == 1)
+
+
+@pytest.mark.parametrize("reset_at", [25, 90, 131])
+def test_reset_in_mid_span_leaves_nothing_behind(reset_at, normal_pairs):
+    """Spans in the setup, in the FIFOs and half shaded: after a reset the pipeline does as from power-up."""
+    rng = np.random.default_rng(reset_at)
+    design = ShadingPipeline()
+    spans = random_spans(rng, np.r_[40, rng.integers(0, 12, 11)], normal_pairs)
+    constants = random_constants(rng, 1)
+    stalls = (rng.random(31) < 0.2).tolist()
+    fresh, again, status = [], [], []
+
+    async def from_power_up(ctx):
+        fresh.append(await fresh_driver.run(ctx, 330, spans, constants.writes(), stalls=stalls))
+
+    async def after_reset(ctx):
+        other = random_spans(rng, rng.integers(0, 30, 40), normal_pairs)
+        unit = driver.unit
+        await driver.run(ctx, reset_at, other, random_constants(rng, 1).writes())
+        ctx.set(driver.reset, 1)
+        await ctx.tick()
+        ctx.set(driver.reset, 0)
+        status.append([ctx.get(unit.status[n]) for n in ("wide_spans", "empty_spans", "overrun")])
+        assert ctx.get(unit.o.valid) == 0
+        again.append(await driver.run(ctx, 330, spans, constants.writes(), stalls=stalls))
+        status.append(ctx.get(unit.status.empty_spans))
+
+    fresh_driver, driver = Driver(ShadingPipelineUnit(design)), Driver(ShadingPipelineUnit(design))
+    run_bench(fresh_driver.module, from_power_up)
+    run_bench(driver.module, after_reset)
+    assert again == fresh
+    assert [pixel for _, pixel in again[0][0]] == pixels_of(design, spans, constants)
+    assert status == [[0, 0, 0], np.count_nonzero(spans.length == 0)]
+
+
+def test_reset_clears_the_constants(normal_pairs):
+    """Black light and no ambient: a span after a reset without writes is black."""
+    rng = np.random.default_rng(1)
+    driver = Driver(ShadingPipelineUnit())
+    spans = random_spans(rng, [3], normal_pairs)
+    none = {"address": np.zeros(0, int), "data": np.zeros(0, int)}
+    result = []
+
+    async def bench(ctx):
+        bright = FrameConstants(
+            1, np.full(3, 2**17 - 1), *[np.array([[0, 0, ONE]])] * 2, *[np.full((1, 3), 999)] * 2
+        )
+        result.append(await driver.run(ctx, 100, spans, bright.writes()))
+        ctx.set(driver.reset, 1)
+        await ctx.tick()
+        ctx.set(driver.reset, 0)
+        result.append(await driver.run(ctx, 100, spans, none))
+
+    run_bench(driver.module, bench)
+    (before, *_), (after, *_) = result
+    assert len(before) == len(after) == 3
+    assert {pixel[2:5] for _, pixel in before} == {(255, 255, 255)}
+    assert {pixel[2:5] for _, pixel in after} == {(0, 0, 0)}

@@ -1,0 +1,121 @@
+"""Pixel assembler: two streams joined into one, under random stalls on all three sides."""
+
+import numpy as np
+import pytest
+from amaranth.hdl import Module, ResetInserter, Signal
+from amaranth.sim import Simulator
+
+from hdl.pixel_assembler import PixelAssemblerUnit
+
+
+def drive(lengths, seed=0, shares=(0.0, 0.0, 0.0), reset_at=None):
+    """Run the unit in pysim over spans of such lengths.
+
+    ``shares`` of the clocks on which places, colours and the sink pause. With ``reset_at``, the unit is
+    reset on that clock, and place and colour streams begin again.
+
+    Returns the pixels with their clocks, the clocks of the places taken, and what was expected of the pixels.
+    """
+    rng = np.random.default_rng(seed)
+    lengths = np.asarray(lengths)
+    spans, count = len(lengths), int(lengths.sum())
+    x, y = rng.integers(0, 4097 - lengths), rng.integers(0, 4096, spans)
+    colors = rng.integers(0, 256, (count, 3)).tolist()
+    pauses = rng.random((6 * count + 100, 3)) < shares
+    span = np.repeat(np.arange(spans), lengths)
+    offset = np.arange(count) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    expected = np.column_stack([x[span] + offset, y[span], colors, offset == lengths[span] - 1]).tolist()
+
+    unit, reset = PixelAssemblerUnit(), Signal()
+    m = Module()
+    m.submodules.unit = ResetInserter(reset)(unit)
+    pixels, place_clocks, color_clocks = [], [], []
+
+    async def run(ctx, clocks, stop_when_done):
+        place_waits = color_waits = False
+        held = None
+        for records in (pixels, place_clocks, color_clocks):
+            records.clear()
+        for clock in range(clocks):
+            pause_place, pause_color, pause_sink = (bool(p) for p in pauses[clock % len(pauses)])
+            # An offer, once made, stays.
+            place_waits = len(place_clocks) < spans and (place_waits or not pause_place)
+            color_waits = len(color_clocks) < count and (color_waits or not pause_color)
+            place, color = len(place_clocks), len(color_clocks)
+            ctx.set(unit.places.valid, place_waits)
+            ctx.set(
+                unit.places.payload,
+                {"x": int(x[place]), "y": int(y[place]), "length": int(lengths[place])}
+                if place_waits
+                else {"x": 4095, "y": 4095, "length": 4095},
+            )
+            ctx.set(unit.colors.valid, color_waits)
+            channels = colors[color] if color_waits else (255, 255, 255)
+            ctx.set(unit.colors.payload, dict(zip("rgb", channels, strict=True)))
+            ctx.set(unit.o.ready, not pause_sink)
+            valid = ctx.get(unit.o.valid)
+            pixel = [ctx.get(unit.o.payload[name]) for name in ("x", "y", "r", "g", "b", "last")]
+            assert held is None or (valid and pixel == held)
+            held = pixel if valid and pause_sink else None
+            if valid and not pause_sink:
+                pixels.append((clock, pixel))
+            if place_waits and ctx.get(unit.places.ready):
+                place_clocks.append(clock)
+                place_waits = False
+            if color_waits and ctx.get(unit.colors.ready):
+                color_clocks.append(clock)
+                color_waits = False
+            await ctx.tick()
+            if stop_when_done and len(pixels) == count and clock > pixels[-1][0] + 5:
+                return
+
+    async def bench(ctx):
+        if reset_at is not None:
+            await run(ctx, reset_at, False)
+            ctx.set(reset, 1)
+            await ctx.tick()
+            ctx.set(reset, 0)
+        await run(ctx, 20 * count + 200, True)
+
+    simulator = Simulator(m)
+    simulator.add_clock(1e-8)
+    simulator.add_testbench(bench)
+    simulator.run()
+    return pixels, place_clocks, color_clocks, expected
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_joins_the_streams_under_stalls(seed):
+    rng = np.random.default_rng(seed)
+    lengths = np.r_[1, 1, 2, 3, rng.integers(1, 12, 20)]
+    shares = rng.choice([0.0, 0.1, 0.5, 0.85], 3)
+    pixels, place_clocks, color_clocks, expected = drive(lengths, seed, shares)
+    assert [pixel for _, pixel in pixels] == expected
+    # A place goes together with the last colour of its span: it names the next one no sooner.
+    assert place_clocks == [color_clocks[last] for last in np.cumsum(lengths) - 1]
+    assert len(color_clocks) == len(pixels)
+
+
+def test_one_pixel_a_clock():
+    lengths = [1, 5, 1, 1, 2, 16, 3]
+    pixels, _, color_clocks, expected = drive(lengths)
+    assert [clock for clock, _ in pixels] == list(range(1, sum(lengths) + 1))
+    assert color_clocks == list(range(sum(lengths)))
+    assert [pixel for _, pixel in pixels] == expected
+
+
+def test_longest_span_reaches_the_last_column():
+    pixels, _, _, expected = drive([4095, 1])
+    assert [pixel for _, pixel in pixels] == expected
+    assert pixels[4094][1][5] == 1
+
+
+@pytest.mark.parametrize("reset_at", [2, 7, 20, 31])
+def test_reset_in_mid_span_leaves_nothing_behind(reset_at):
+    """The offset starts again, and a pixel that waited is gone."""
+    lengths = [9, 4, 12, 6]
+    shares = (0.3, 0.3, 0.5)
+    fresh = drive(lengths, 5, shares)
+    again = drive(lengths, 5, shares, reset_at)
+    assert again == fresh
+    assert [pixel for _, pixel in fresh[0]] == fresh[3]
