@@ -30,9 +30,9 @@ class DifferenceSetup:
     2 G dt^2 SQ(2, 42)    at most 1
     ======== ============ ===========================================================
 
-    Error over the span: dt is off by a relative 2^-17 at most, dt^2 by 2^-16 + 2^-17 + 2^-34, which moves the end of
-    the curve by under ``2^-17 |P| + (2^-16 + 2^-17) |G|``; the rounding of the differences adds, at pixel k,
-    at most ``2^-42 (k + k^2/2)``, 1.9e-6 after 4095 pixels.
+    Error over the span: dt is off by a relative 2^-17 at most, dt^2 by 2^-16 + 2^-17 + 2^-34, which moves
+    the end of the curve by under ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|``; the rounding of the
+    differences adds, at pixel k, at most ``2^-42 (k + k^2/2)``, 1.9e-6 after 4095 pixels.
 
     A span of one pixel has no dt; it gets dt = 1, which nothing reads.
 
