@@ -1,0 +1,139 @@
+"""Recurrence unit: RTL against its twin, pixel by pixel and clock by clock."""
+
+import numpy as np
+import pytest
+from amaranth.hdl import ResetInserter, Signal, Value
+from amaranth.sim import Simulator
+
+from golden.fixed import Fixed
+from golden.recurrence import Recurrence
+from hdl.recurrence import RecurrenceUnit
+from sim.engine import simulate
+
+VARIANTS = [Recurrence(), Recurrence(guard_bits=20), Recurrence("reinsch", 24, 20), Recurrence("direct")]
+COPIES = ("diffuse", "highlight")
+
+
+def spans(recurrence, lengths, seed):
+    """Cosines and, every third span, words of any size; results of both copies by the twin."""
+    rng = np.random.default_rng(seed)
+    lengths = np.asarray(lengths)
+    count = len(lengths)
+    step = np.radians(rng.uniform(0, 90, count)) / np.maximum(lengths - 1, 1)
+    coefficient, shift = recurrence.coefficient(step)
+    format, any_size = recurrence.coefficient_format, np.arange(0, count, 3)
+    coefficient.codes[any_size] = rng.integers(format.min_code, format.max_code + 1, len(any_size))
+    if recurrence.form == "reinsch":
+        shift[any_size] = rng.integers(0, 64, len(any_size))
+    span = np.repeat(np.arange(count), lengths)
+    index = np.arange(len(span)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    beats, expected = {"coefficient": coefficient.codes, "length": lengths}, {}
+    if recurrence.form == "reinsch":
+        beats["shift"] = shift
+    format = recurrence.state_format
+    for copy in COPIES:
+        start = recurrence.start(rng.uniform(-1, 1, count), rng.uniform(-np.pi, np.pi, count), step)
+        words = [word.codes.copy() for word in start]
+        for word in words:
+            word[any_size] = rng.integers(format.min_code, format.max_code + 1, len(any_size))
+            word[any_size[::5]] = rng.choice([format.min_code, format.max_code], len(any_size[::5]))
+        beats[copy] = dict(zip(("first", "second"), words, strict=True))
+        start = (Fixed(format, word) for word in words)
+        expected[copy] = recurrence.compute(*start, coefficient, shift, span, index).codes
+    expected["last"] = (index == lengths[span] - 1).astype(np.uint8)
+    return beats, expected
+
+
+def assert_equal(run, expected):
+    for name, value in expected.items():
+        np.testing.assert_array_equal(run.beats[name], value, err_msg=name)
+
+
+@pytest.mark.parametrize("recurrence", VARIANTS, ids=str)
+def test_clocks(recurrence):
+    unit = RecurrenceUnit(recurrence)
+    lengths = np.r_[1, 2, 3, 16, 1, 1, 400, 0, 5, 0, 0, 1]
+    beats, expected = spans(recurrence, lengths, 1)
+    run = simulate(unit, beats, count=lengths.sum(), engine="auto")
+    assert_equal(run, expected)
+    taken = np.where(lengths > 0, unit.clocks_per_pixel * (lengths - 1) + 1, 1)
+    np.testing.assert_array_equal(run.input_clocks, np.cumsum(taken) - taken)
+    index = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    first = np.repeat(run.input_clocks, lengths) + unit.latency
+    np.testing.assert_array_equal(run.clocks, first + unit.clocks_per_pixel * index)
+
+
+@pytest.mark.parametrize("recurrence", VARIANTS, ids=str)
+def test_equals_twin_under_stalls(recurrence):
+    rng = np.random.default_rng(2)
+    lengths = rng.integers(0, 40, 300)
+    beats, expected = spans(recurrence, lengths, 3)
+    for input_share, output_share in ((0, 0), (0.4, 0.4), (0.9, 0.1), (0.1, 0.9)):
+        stalls = {
+            "input_stalls": rng.random(997) < input_share,
+            "output_stalls": rng.random(1009) < output_share,
+        }
+        run = simulate(RecurrenceUnit(recurrence), beats, count=lengths.sum(), engine="auto", **stalls)
+        assert_equal(run, expected)
+
+
+@pytest.mark.parametrize("recurrence", [Recurrence(), Recurrence("direct")], ids=str)
+def test_longest_span(recurrence):
+    beats, expected = spans(recurrence, [4095] * 6, 4)
+    run = simulate(RecurrenceUnit(recurrence), beats, count=6 * 4095, engine="auto")
+    assert_equal(run, expected)
+
+
+@pytest.mark.parametrize("recurrence", [Recurrence(), Recurrence("direct")], ids=str)
+def test_engines_agree(recurrence):
+    rng = np.random.default_rng(5)
+    lengths = rng.integers(0, 8, 30)
+    beats, expected = spans(recurrence, lengths, 5)
+    stalls = {"input_stalls": rng.random(97) < 0.5, "output_stalls": rng.random(89) < 0.4}
+    slow, fast = (
+        simulate(RecurrenceUnit(recurrence), beats, count=lengths.sum(), engine=engine, **stalls)
+        for engine in ("pysim", "auto")
+    )
+    assert_equal(slow, expected)
+    assert_equal(fast, expected)
+    np.testing.assert_array_equal(slow.clocks, fast.clocks)
+    np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+
+
+@pytest.mark.parametrize("recurrence", [Recurrence(), Recurrence("direct")], ids=str)
+def test_reset_in_mid_span_leaves_nothing(recurrence):
+    unit = RecurrenceUnit(recurrence)
+    reset = Signal()
+    simulator = Simulator(ResetInserter(reset)(unit))
+    simulator.add_clock(1e-6)
+    span = unit.i.payload
+    found = []
+
+    async def drive(context):
+        context.set(unit.o.ready, 1)
+        for first, second, length, clocks in ((0.75, 0.5, 9, 17), (0.25, 0.125, 2, 30)):
+            context.set(span.length, length)
+            for copy in COPIES:
+                context.set(span[copy].first, first)
+                context.set(span[copy].second, second)
+            context.set(unit.i.valid, 1)
+            await context.tick()
+            context.set(unit.i.valid, 0)
+            for _ in range(clocks):
+                if context.get(unit.o.valid) and length == 2:
+                    payload = unit.o.payload
+                    found.append(
+                        [context.get(Value.cast(field)) for field in (payload.diffuse, payload.last)]
+                    )
+                await context.tick()
+            context.set(reset, 1)
+            await context.tick()
+            context.set(reset, 0)
+            assert not context.get(unit.o.valid)
+            assert context.get(unit.i.ready)
+
+    simulator.add_testbench(drive)
+    simulator.run()
+    # Coefficient 0: the second value is given, or the given difference away.
+    second = 0.125 if recurrence.form == "direct" else 0.375
+    assert found == [[0.25 * 2**17, 0], [second * 2**17, 1]]
