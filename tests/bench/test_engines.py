@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 from amaranth.hdl import Module, Signal, signed
-from amaranth.lib import stream
+from amaranth.lib import data, stream
 from amaranth.lib.wiring import Component, In, Out
 
 import bench.engines
-from bench.engines import Speed, measure
+from bench.engines import Speed, main, measure
 
 
 class Powers(Component):
@@ -33,6 +33,24 @@ class Powers(Component):
         return m
 
 
+class Pair(Component):
+    """``a`` and ``b``, both the input."""
+
+    i: In(stream.Signature(8))
+    o: Out(stream.Signature(data.StructLayout({"a": 8, "b": 8})))
+
+    def elaborate(self, platform):
+        m = Module()
+        m.d.comb += self.i.ready.eq(~self.o.valid | self.o.ready)
+        with m.If(self.i.ready):
+            m.d.sync += [
+                self.o.valid.eq(self.i.valid),
+                self.o.payload.a.eq(self.i.payload),
+                self.o.payload.b.eq(self.i.payload),
+            ]
+        return m
+
+
 @pytest.fixture(autouse=True)
 def _cache(tmp_path, monkeypatch):
     monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
@@ -45,14 +63,45 @@ def test_measure():
     # The promise of the compiled engine, which is kept by a wide margin.
     assert speed.ratio > 200
     assert speed.build > 0
+    # A beat a clock.
+    assert speed.cxxrtl_beats == pytest.approx(speed.cxxrtl, rel=0.01)
 
 
-def test_text():
-    speed = Speed(cxxrtl=7.5e6, pysim=15e3, build=1.25, clocks=9)
-    assert str(speed) == (
-        "cxxrtl 7.50 million clocks a second, pysim 0.0150: 500 times as fast; "
-        "model built and loaded in 1.25 s"
-    )
+@pytest.mark.parametrize(
+    ("cxxrtl", "pysim", "missed"),
+    [
+        (7.5e6, 2500.0, None),
+        (4.9e6, 2500.0, "5,000,000 clocks a second"),
+        (7.5e6, 40e3, "200 times pysim"),
+        (4.9e6, 40e3, "5,000,000 clocks a second, 200 times pysim"),
+    ],
+)
+def test_targets(monkeypatch, capsys, cxxrtl, pysim, missed):
+    """The spans, the pixels expected of them, the table and the exit status, without the runs."""
+    asked = {}
+
+    def measured(component, beats, **others):
+        asked.update(others, beats=beats)
+        return Speed(cxxrtl, pysim, cxxrtl * 0.75, pysim * 0.75, build=4.25, clocks=9000)
+
+    monkeypatch.setattr(bench.engines, "measure", measured)
+    # Amaranth complains of components that are made and not used.
+    monkeypatch.setattr(bench.engines, "ShadingPipelineUnit", lambda design: None)
+    assert main(64, 48) == (0 if missed is None else 1)
+    lines = capsys.readouterr().out.splitlines()
+    pixels = asked["beats"]["length"].sum()
+    assert pixels == len(asked["expected"]["r"]) > 64 * 48 / 10
+    spans = len(asked["beats"]["x"])
+    assert lines[0] == f"teapot at 64x48, {spans:,} spans: {pixels:,} pixels, 9,000 clocks"
+    assert lines[2].split() == ["cxxrtl", f"{cxxrtl:,.0f}", f"{cxxrtl * 0.75:,.0f}"]
+    assert lines[4].split() == ["ratio", *[f"{cxxrtl / pysim:,.0f}"] * 2]
+    assert lines[-1] == ("every target met" if missed is None else f"missed: {missed}")
+
+
+def test_other_beats_than_expected_are_no_measure():
+    beats = np.arange(10)
+    with pytest.raises(ValueError, match=r"^the compiled engine gives another b than expected$"):
+        measure(Pair(), beats, expected={"a": beats, "b": beats + 1})
 
 
 def test_engines_that_differ_are_no_measure(monkeypatch):
