@@ -1,6 +1,6 @@
 """Frame constants: the registers behind the write port."""
 
-from amaranth.hdl import Module, Value, unsigned
+from amaranth.hdl import Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -92,9 +92,11 @@ class FrameConstantsUnit(wiring.Component):
             base = (light + 1) * LIGHT_STRIDE
             for name, (first, count) in FIELDS_OF_A_LIGHT.items():
                 words |= {base + first + k: self.constants.lights[light][name][k] for k in range(count)}
-        with m.If(self.write.valid & self.write.ready):
-            for address, word in words.items():
-                code = Value.cast(word)
-                with m.If(self.write.payload.address == address):
-                    m.d.sync += code.eq(self.write.payload.data[: len(code)])
+        taken = self.write.valid & self.write.ready
+        for address, word in words.items():
+            code = Value.cast(word)
+            register = Signal(len(code), name=f"word_{address}")
+            m.d.comb += code.eq(register)
+            with m.If(taken & (self.write.payload.address == address)):
+                m.d.sync += register.eq(self.write.payload.data[: len(code)])
         return m
