@@ -1,0 +1,255 @@
+"""Highlight gate: every decision at reduced width, spans at full width through the pipeline's twin."""
+
+import numpy as np
+import pytest
+
+from golden.difference_accumulator import DifferenceAccumulator
+from golden.difference_setup import DifferenceSetup
+from golden.dot_product import DotProduct
+from golden.fixed import Fixed
+from golden.geometry import normalise
+from golden.gpq import GPQ
+from golden.highlight_gate import HighlightGate
+from golden.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
+from golden.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from golden.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
+
+EXPONENTS = (2, 3, 5, 10, 30, 100, 300, 500, 1000)
+
+
+def arc_maximum(a, b, angle, shares=513):
+    """Largest N·H over points of the arc, from the sine formula: no use of the gate's."""
+    x = np.linspace(0, 1, shares)
+    largest = np.full(np.broadcast_shapes(np.shape(a), np.shape(b), np.shape(angle)), -np.inf)
+    for share in x.tolist():
+        largest = np.maximum(
+            largest, (a * np.sin((1 - share) * angle) + b * np.sin(share * angle)) / np.sin(angle)
+        )
+    return largest
+
+
+@pytest.mark.parametrize("bits", [5, 6])
+def test_every_decision_at_reduced_width(bits):
+    gate = HighlightGate(fraction_bits=bits)
+    codes = np.arange(1 << bits)
+    a, b = codes[:, np.newaxis, np.newaxis], codes[:, np.newaxis]
+    lit_of_all = []
+    for angle in range(1, gate.widest.codes.item() + 4):
+        u = Fixed(gate.angle_format, angle)
+        lit = gate.decide(
+            Fixed(gate.level_format, a), Fixed(gate.level_format, b), u, Fixed(gate.level_format, codes)
+        )
+        psi = np.arccos(1 - u.values)
+        maximum = arc_maximum(a / 2**bits, b / 2**bits, psi)
+        threshold = codes / 2**bits
+        # Of 513 points one is within psi/1024 of the maximum, which is lower there by under 4e-7.
+        assert not (~lit & (maximum**2 >= threshold + 1e-12)).any()
+        # What is let through is near: w is cut by 2^(1-F), M^2 = (d^2 + 2abu) / (u (2 - u)).
+        needless = lit & (maximum**2 < threshold - 2.0 ** (1 - bits) / (2 - u.values) - 4e-7)
+        assert not needless.any()
+        lit_of_all.append(lit.mean())
+    assert 0.3 < np.mean(lit_of_all) < 0.8
+
+
+def test_every_pair_of_unit_codes_at_reduced_width():
+    """All vectors of about unit length on a grid, half-way vectors of an octant, all spans to 45 degrees."""
+    bits = 5
+    gate = HighlightGate(fraction_bits=bits)
+    one = (1 << bits) - 1
+    axis = np.arange(-one, one + 1)
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    length = np.linalg.norm(grid, axis=1)
+    units = grid[np.abs(length - one) < 0.02]
+    assert len(units) > 500
+    left, right = (units[k.ravel()] for k in np.indices((len(units), len(units))))
+    cosine = np.einsum("ij,ij->i", left, right) / one**2
+    near = cosine > np.cos(np.radians(MAX_SPAN_ANGLE + 4))
+    left, right, cosine = left[near], right[near], cosine[near]
+    format = gate.component_format
+    angle = np.arccos(np.minimum(cosine, 1 - 1e-9))
+    counts = np.zeros(2, dtype=int)
+    for halfway in units[
+        (units >= 0).all(axis=1) & (units[:, 0] <= units[:, 1]) & (units[:, 1] <= units[:, 2])
+    ]:
+        levels = [(end @ halfway) * 4.0**-bits for end in (left, right)]
+        maximum = arc_maximum(*levels, angle, 33)
+        for exponent in (4, 10, 40):
+            lit = gate.compute(Fixed(format, left), Fixed(format, right), Fixed(format, halfway), exponent)
+            threshold = gate.thresholds.values[exponent]
+            assert not (~lit & (maximum > 0) & (maximum**2 >= threshold)).any()
+            counts += np.bincount(lit, minlength=2)
+    assert counts.min() > 10**4
+
+
+def random_spans(rng, count, exponent, gate):
+    """Normals and H about which the largest N·H of the arc is near the threshold, inside or at an end."""
+    angle = np.radians(
+        rng.choice([0.0, 1e-4, 0.1, 1.0, 44.99, -1.0], count, p=[0.05, 0.05, 0.1, 0.1, 0.1, 0.6])
+    )
+    angle = np.where(angle < 0, np.radians(rng.uniform(0, 45, count)), angle)
+    left = normalise(rng.normal(size=(count, 3)))
+    side = np.cross(left, normalise(rng.normal(size=(count, 3))))
+    side = normalise(side)
+    across = np.cross(left, side)
+    right = left * np.cos(angle)[:, np.newaxis] + side * np.sin(angle)[:, np.newaxis]
+    tau = np.sqrt(gate.thresholds.values[exponent])
+    width = 10.0 ** rng.uniform(-5.3, -1, count) * (1 - tau)
+    level = np.minimum(tau + rng.choice([-1, 1], count, p=[0.8, 0.2]) * width, 1.0)
+    # The highest point of the great circle, at most as far out as the level allows.
+    turn = rng.choice([0.0, 0.5, 1.0, -1.0], count, p=[0.1, 0.2, 0.1, 0.6]) * angle
+    turn = np.where(turn < 0, rng.uniform(-0.2, 1.2, count) * angle, turn)
+    outside = np.maximum(np.maximum(-turn, turn - angle), 0)
+    projection = np.minimum(level / np.cos(outside), 1.0)[:, np.newaxis]
+    top = left * np.cos(turn)[:, np.newaxis] + side * np.sin(turn)[:, np.newaxis]
+    halfway = top * projection + across * np.sqrt(1 - projection**2)
+    return quantise(left), quantise(right), quantise(normalise(halfway))
+
+
+def largest_cosine(left, right, halfway, length):
+    """Largest code of N·H over the pixels of each span, by the pipeline's twin."""
+    left, right = (Fixed(COMPONENT, codes) for codes in (left, right))
+    middle, wide = MiddleNormal().compute(left, right)
+    g, p, q = GPQ().compute(left, middle, right)
+    first, second = DifferenceSetup().compute(g, p, length)
+    span = np.repeat(np.arange(len(length)), length)
+    start = np.cumsum(length) - length
+    step = np.arange(len(span)) - np.repeat(start, length)
+    normals = DifferenceAccumulator().compute(q, first, second, span, step)
+    cosine = DotProduct().compute(normals, Fixed(COMPONENT, halfway[span]))
+    return Fixed(cosine.format, np.maximum.reduceat(cosine.codes, start)), wide
+
+
+def check_spans(gate, rng, count):
+    """Run so many spans; most are decided by the last bits of the comparison."""
+    dark, shaded = 0, 0
+    for exponent in EXPONENTS:
+        left, right, halfway = random_spans(rng, count // len(EXPONENTS), exponent, gate)
+        length = rng.choice([1, 2, 3, 5, 8, 16], len(left), p=[0.1, 0.3, 0.3, 0.2, 0.08, 0.02])
+        operands = (Fixed(COMPONENT, codes) for codes in (left, right, halfway))
+        lit = gate.compute(*operands, exponent)
+        cosine, wide = largest_cosine(left, right, halfway, length)
+        assert not wide.any()
+        # The specular term falls with N·H: that of the largest is the largest.
+        term = gate.specular.compute(cosine, np.zeros(len(lit), bool), exponent)
+        assert not term.codes[~lit].any()
+        dark += np.count_nonzero(~lit)
+        shaded += np.count_nonzero(term.codes)
+    assert dark > count / 10
+    assert shaded > count / 20
+
+
+def test_no_pixel_is_suppressed():
+    check_spans(HighlightGate(), np.random.default_rng(1), 100_000)
+
+
+@pytest.mark.parametrize("model", ["cosquad7", "lyon3", "exp"])
+def test_no_pixel_is_suppressed_in_other_models(model):
+    check_spans(HighlightGate(Specular(model)), np.random.default_rng(2), 20_000)
+
+
+@pytest.mark.long
+def test_no_pixel_of_ten_million_spans_is_suppressed():
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        check_spans(HighlightGate(), rng, 200_007)
+
+
+def test_long_spans():
+    """The differences' rounding is largest at pixel 4095."""
+    gate, rng = HighlightGate(), np.random.default_rng(4)
+    for exponent in (10, 1000):
+        left, right, halfway = random_spans(rng, 150, exponent, gate)
+        length = np.full(150, 4095)
+        lit = gate.compute(*(Fixed(COMPONENT, codes) for codes in (left, right, halfway)), exponent)
+        cosine, _ = largest_cosine(left, right, halfway, length)
+        assert not gate.specular.compute(cosine, np.zeros(150, bool), exponent).codes[~lit].any()
+        assert 10 < np.count_nonzero(lit) < 140
+
+
+def test_margin_covers_the_pipeline():
+    """The sum of step 5 of the proof, and how near the pixels come to it."""
+    k = 4094
+    terms = [
+        np.sqrt(3) * MiddleNormal.ERROR,
+        2.0**-17 * 0.83 + (2.0**-16 + 2.0**-17 + 2.0**-34) * 0.305,
+        np.sqrt(3) * 2.0**-42 * (k + k * k / 2),
+        np.sqrt(3) * 2.0**-18,
+    ]
+    assert 4.2 * 2.0**-17 < sum(terms) < 4.45 * 2.0**-17 < HighlightGate.MARGIN
+    rng, gate = np.random.default_rng(5), HighlightGate()
+    worst = 0
+    for exponent in (10, 1000):
+        left, right, halfway = random_spans(rng, 20_000, exponent, gate)
+        cosine, _ = largest_cosine(left, right, halfway, rng.integers(1, 20, len(left)))
+        one = ONE_SQUARED.values
+        a, b = (np.einsum("ij,ij->i", end, halfway) * 2.0**-34 for end in (left, right))
+        r = np.einsum("ij,ij->i", left, right) * 2.0**-34 / one
+        maximum = np.maximum(arc_maximum(a, b, np.arccos(np.minimum(r, 1 - 1e-12)), 101), np.maximum(a, b))
+        worst = max(worst, (cosine.values - maximum).max())
+        # What is let through is near the threshold, so the margins cost little.
+        lit = gate.compute(*(Fixed(COMPONENT, codes) for codes in (left, right, halfway)), exponent)
+        assert (maximum[lit] ** 2 > gate.thresholds.values[exponent] - 9 * 2.0**-17).all()
+    assert HighlightGate.MARGIN / 8 < worst < HighlightGate.MARGIN
+
+
+def test_thresholds_lie_under_what_the_unit_shades():
+    for model in SPECULAR_MODELS + FURTHER_MODELS:
+        gate = HighlightGate(Specular(model))
+        lowest = gate.thresholds.values
+        for exponent in (1, 2, 3, 10, 100, 500, 999, 1000):
+            # The largest N·H that is shaded 0, by halving.
+            low, high = -ONE_SQUARED.codes.item(), ONE_SQUARED.codes.item()
+            operand = gate.specular.operand_format
+            shade = lambda code, gate=gate, n=exponent, operand=operand: gate.specular.compute(  # noqa: E731
+                Fixed(operand, np.array([code])), np.zeros(1, bool), n
+            ).codes[0]
+            assert shade(high) > 0
+            while high - low > 1:
+                middle = (low + high) // 2
+                low, high = (middle, high) if shade(middle) == 0 else (low, middle)
+            tau = low * 2.0**-34 - HighlightGate.MARGIN if shade(low) == 0 else -1.0
+            if tau <= 0:
+                assert lowest[exponent] == 0
+            else:
+                assert tau**2 - 2.0**-17 < lowest[exponent] <= tau**2
+
+
+def test_stiff_spans(normal_pairs):
+    """Equal normals, wide and opposite ones; corners of the words; the highlight wholly inside one span."""
+    gate, rng = HighlightGate(), np.random.default_rng(6)
+
+    def lit(left, right, halfway, exponent):
+        return gate.compute(*(Fixed(COMPONENT, np.asarray(v)) for v in (left, right, halfway)), exponent)
+
+    for angle in (45.1, 89.9, 90.0, 90.1, 180.0):
+        left, right = (quantise(n) for n in normal_pairs(rng, 300, angle))
+        halfway = quantise(normalise(rng.normal(size=(300, 3))))
+        for exponent in (1, 10, 1000):
+            assert lit(left, right, halfway, exponent).all()
+    # Away from H nothing is lit, at H everything is.
+    left, right = (quantise(n) for n in normal_pairs(rng, 300, rng.choice([0, 1e-4, 1, 30], 300)))
+    assert not lit(left, right, -left, 3).any()
+    assert lit(left, right, left, 1000).all()
+    assert lit(left, right, right, 1000).all()
+    # A highlight of 5 degrees in the middle of 40.
+    half = np.radians(20)
+    ends = quantise(np.array([[-np.sin(half), 0, np.cos(half)], [np.sin(half), 0, np.cos(half)]]))
+    for exponent in (100, 1000):
+        assert lit(ends[:1], ends[1:], [0, 0, ONE], exponent)
+        assert not lit(ends[:1], ends[:1], [0, 0, ONE], exponent)
+    # An exponent that lights everything: n = 1.
+    assert lit(left, right, -left, 1).all()
+    corners = rng.choice([-(2**17), 2**17 - 1, 0], (3, 500, 3))
+    lit(*corners, 10)
+
+
+def test_bad_arguments_are_refused():
+    for bits in (4, 18):
+        with pytest.raises(ValueError, match=rf"^fraction_bits must be 5 to 17, not {bits}$"):
+            HighlightGate(fraction_bits=bits)
+    zero = Fixed(COMPONENT, [[0, 0, 0]])
+    for exponent in (0, 1001):
+        with pytest.raises(ValueError, match=r"^exponents must be 1 to 1000$"):
+            HighlightGate().compute(zero, zero, zero, exponent)
+    with pytest.raises(ValueError, match=r"^operands must be SQ\(1, 17\) and SQ\(1, 17\), not "):
+        HighlightGate().compute(zero, Fixed(MiddleNormal.FORMAT, [[0, 0, 0]]), zero, 10)

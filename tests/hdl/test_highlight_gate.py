@@ -1,0 +1,85 @@
+"""Highlight gate unit: RTL against its twin, clock by clock, at full and at reduced width."""
+
+import numpy as np
+import pytest
+
+from golden.fixed import Fixed
+from golden.highlight_gate import HighlightGate
+from golden.specular import Specular
+from golden.unit_vector import quantise
+from hdl.highlight_gate import HighlightGateUnit
+from sim.engine import simulate
+
+
+def spans(rng, normal_pairs, count, halfway, cosine):
+    """Spans about a cosine to H, so that the comparisons are decided late, and corners of the words."""
+    left, right = normal_pairs(rng, count, rng.choice([0, 1e-3, 1, 10, 30, 44.9, 45.1, 90], count))
+    axis = np.cross(left, right) + 1e-9
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    # Turned so that H stands where the maximum over the arc is about the threshold.
+    middle = left + right * rng.uniform(0.2, 2, (count, 1)) + 1e-12
+    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    near = np.clip(cosine + rng.normal(size=(count, 1)) * 1e-3, -1, 1)
+    target = middle * near + axis * np.sqrt(1 - near**2)
+    # A rotation that takes each target to H.
+    mirror = target - halfway
+    size = np.maximum((mirror**2).sum(axis=1, keepdims=True), 1e-30)
+    left, right = (
+        n - 2 * mirror * np.einsum("ij,ij->i", n, mirror)[:, np.newaxis] / size for n in (left, right)
+    )
+    return left, right
+
+
+@pytest.mark.parametrize("model", ["cosquad", "lyon2"])
+def test_equals_twin(verify, normal_pairs, model):
+    parameters = HighlightGate(Specular(model))
+    unit = HighlightGateUnit(parameters)
+    rng = np.random.default_rng(11)
+    halfway = np.array([1.0, 2.0, 2.0]) / 3
+    code = quantise(halfway)
+    shares = []
+    for exponent in (1, 10, 1000):
+        cosine = np.sqrt(parameters.thresholds.values[exponent])
+        left, right = (quantise(n) for n in spans(rng, normal_pairs, 600, halfway, cosine))
+        corners = rng.choice([-(2**17), 2**17 - 1, 0, 1, -1], (100, 6))
+        left, right = np.vstack([left, corners[:, :3]]), np.vstack([right, corners[:, 3:]])
+        format = parameters.component_format
+        expected = parameters.compute(*(Fixed(format, n) for n in (left, right, code)), exponent)
+        shares.append(expected[:600].mean())
+        beats = {"normal_left": left, "normal_right": right}
+        constants = {"halfway": code, "exponent": exponent}
+        verify(unit, beats, expected.astype(np.uint8), constants=constants)
+    assert shares[0] == 1
+    assert min(shares) > 0.3
+    assert max(shares[1:]) < 0.9
+
+
+@pytest.mark.parametrize("fraction_bits", [5, 6, 9])
+def test_equals_twin_at_reduced_width(fraction_bits):
+    parameters = HighlightGate(fraction_bits=fraction_bits)
+    unit = HighlightGateUnit(parameters)
+    rng = np.random.default_rng(fraction_bits)
+    format = parameters.component_format
+    shares = []
+    for exponent in (2, 4, 20, 300):
+        # Neighbouring codes of about unit length.
+        left = rng.normal(size=(2500, 3))
+        right = left + rng.normal(size=left.shape) * 0.3
+        halfway = left[0] + rng.normal(size=3) * 0.3
+        left, right, halfway = (
+            np.rint(v / np.linalg.norm(v, axis=-1, keepdims=True) * format.max_code).astype(np.int64)
+            for v in (left, right, halfway)
+        )
+        left *= np.sign(left @ halfway)[:, np.newaxis] | 1
+        right *= np.sign(right @ halfway)[:, np.newaxis] | 1
+        expected = parameters.compute(*(Fixed(format, v) for v in (left, right, halfway)), exponent)
+        shares.append(expected.mean())
+        run = simulate(
+            unit,
+            {"normal_left": left, "normal_right": right},
+            count=len(left),
+            constants={"halfway": halfway, "exponent": exponent},
+            engine="auto",
+        )
+        np.testing.assert_array_equal(run.beats, expected)
+    assert 0.01 < min(shares) < 0.8
