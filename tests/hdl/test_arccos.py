@@ -1,0 +1,63 @@
+# amaranth: UnusedElaboratable=no
+# Above: a component that is refused is never elaborated.
+"""arccos and half-chord units: RTL against their twins, clock by clock."""
+
+import numpy as np
+import pytest
+
+from golden.arccos import ARCCOS_TABLES, Arccos, HalfChord
+from golden.fixed import Fixed
+from hdl.arccos import ArccosUnit, HalfChordUnit
+from sim.engine import simulate
+
+FORMAT = Arccos.OPERAND_FORMAT
+
+
+def assert_equals_twin(table, form, x):
+    angle, outside = Arccos(table).compute(Fixed(FORMAT, x))
+    run = simulate(ArccosUnit(Arccos(table), form), x, count=len(x), engine="auto")
+    np.testing.assert_array_equal(run.beats["angle"], angle.codes)
+    np.testing.assert_array_equal(run.beats["outside"], outside)
+
+
+@pytest.mark.parametrize("form", ["pipelined", "sequential"])
+@pytest.mark.parametrize("table", ["printed", "corrected"])
+def test_documented_table_equals_twin(table, form):
+    # 13 has no factor in common with a binary word, so every segment meets every low bit.
+    assert_equals_twin(table, form, np.arange(FORMAT.min_code, FORMAT.max_code + 1, 13))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("form", ["pipelined", "sequential"])
+@pytest.mark.parametrize("table", ARCCOS_TABLES)
+def test_arccos_equals_twin_for_every_input(table, form):
+    assert_equals_twin(table, form, np.arange(FORMAT.min_code, FORMAT.max_code + 1))
+
+
+@pytest.mark.parametrize("form", ["pipelined", "sequential"])
+def test_arccos_clocks_and_stalls(verify, form):
+    rng = np.random.default_rng(3)
+    one = 1 << FORMAT.fraction_bits
+    bounds = Arccos().bounds
+    edges = np.r_[0, 1, bounds - 1, bounds, bounds + 1, one - 1, one, one + 1, FORMAT.max_code]
+    x = np.r_[edges, -edges, FORMAT.min_code, rng.integers(-one, one + 1, 800)]
+    angle, outside = Arccos().compute(Fixed(FORMAT, x))
+    verify(ArccosUnit(form=form), x, {"angle": angle.codes, "outside": outside})
+
+
+def test_half_chord_equals_twin(verify):
+    rng = np.random.default_rng(4)
+    format = HalfChord.OPERAND_FORMAT
+    half = 1 << 35
+    powers = 1 << np.arange(36)
+    edges = np.r_[0, powers, powers - 1, format.max_code, half + 1, half - 2, half + (1 << 17)]
+    size = np.trunc(2.0 ** rng.uniform(0, 36, 2000)).astype(np.int64)
+    chord = np.r_[edges, size, rng.integers(0, half, 500)]
+    supplement = rng.random(len(chord)) < 0.3
+    expected = HalfChord().compute(Fixed(format, chord), supplement)
+    verify(HalfChordUnit(), {"chord_squared": chord, "supplement": supplement}, expected.codes)
+
+
+def test_unknown_form():
+    with pytest.raises(ValueError, match="form must be 'pipelined' or 'sequential', not 'fast'"):
+        ArccosUnit(form="fast")
