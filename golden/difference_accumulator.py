@@ -26,7 +26,8 @@ class DifferenceAccumulator:
     past the end of ``SQ(1, 17)`` saturates. The sums themselves are exact. Up to 45 degrees no value that is
     used leaves ``SQ(2, 42)``; a wider, flagged span may wrap there.
 
-    Error of a normal against ``Q + k W_0 + k (k - 1)/2 (2 G dt^2)``: the last rounding, 2^-18, alone. Drift
+    Error of a normal against ``Q + k W_0 + k (k - 1)/2 (2 G dt^2)``: the last rounding, 2^-18, alone, unless
+    it saturates. Drift
     from the rounding of the differences is bounded in `DifferenceSetup`.
 
     Source: [T] figure 2.10; numbers.md, "Recurrences in fixed point".

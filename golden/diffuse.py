@@ -14,8 +14,8 @@ __all__ = ["Diffuse"]
 class Diffuse:
     """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated to ``1 - 2^-17``.
 
-    17 bits, an operand of the colour multipliers. Arithmetic error 2^-18 from the rounding, and up to 2^-17
-    at 1 itself, which the format does not hold.
+    17 bits, an operand of the colour multipliers. Unit vectors have the length ``ONE / 2^17``, so the term is
+    short by a relative 2^-16 (0.004 LSB of a full channel); the rounding adds 2^-18.
 
     Source: [B] 4, [T] 6.
     """

@@ -86,7 +86,7 @@ class Intensity:
         for term in (diffuse, specular):
             if term.format != self.TERM_FORMAT:
                 raise ValueError(f"terms must be {self.TERM_FORMAT}, not {term.format}")
-        # 33 products of 34 bits and an ambient of 34 bits: 39 bits, far from an int64's end.
+        # At most 32 products and an ambient term of 34 bits each: 40 bits, far from an int64's end.
         fraction_bits = self.COLOR_FORMAT.fraction_bits + self.TERM_FORMAT.fraction_bits
         total = diffuse.codes @ diffuse_color.codes + specular.codes @ specular_color.codes
         total = total + (ambient.codes << self.TERM_FORMAT.fraction_bits)

@@ -21,6 +21,8 @@ __all__ = ["METHODS", "Pixels", "ShadingPipeline", "Spans"]
 METHODS = {"quadratic": SPECULAR_MODELS}
 """Normal interpolation methods of the pipeline, each with the reflection models it serves."""
 
+_LARGEST_PLACE = 4095
+
 # Pixels shaded at once; bounds the memory, changes no result.
 _CHUNK = 1 << 18
 
@@ -34,7 +36,7 @@ class Spans:
     x, y : int arrays, shape (spans,)
         First pixel of each span, 0 to 4095.
     length : int array, shape (spans,)
-        Pixels, 0 to 4095; ``x + length`` at most 4096. A span of length 0 gives no pixel.
+        Pixels, 0 to 4095. A span of length 0 gives no pixel; one that goes past x = 4095 starts again at 0.
     normal_left, normal_right : int arrays, shape (spans, 3)
         Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``.
     """
@@ -116,6 +118,10 @@ class ShadingPipeline:
         """
         if len(constants.direction) != self.lights:
             raise ValueError(f"the constants are for {len(constants.direction)} lights, not {self.lights}")
+        for name in ("x", "y", "length"):
+            codes = np.asarray(getattr(spans, name))
+            if codes.size and not 0 <= codes.min() <= codes.max() <= _LARGEST_PLACE:
+                raise ValueError(f"{name} must be 0 to {_LARGEST_PLACE}")
         kept = np.flatnonzero(np.asarray(spans.length) > 0)
         length = np.asarray(spans.length, dtype=np.int64)[kept]
         left, right = (Fixed(COMPONENT, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
@@ -131,7 +137,7 @@ class ShadingPipeline:
             normals = DifferenceAccumulator().compute(q, first, second, span[part], step[part])
             color[part] = self._shade(normals, constants)
         return Pixels(
-            x=np.asarray(spans.x)[kept][span] + step,
+            x=(np.asarray(spans.x)[kept][span] + step) & _LARGEST_PLACE,
             y=np.asarray(spans.y)[kept][span],
             color=color,
             last=step == length[span] - 1,

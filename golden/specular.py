@@ -196,7 +196,7 @@ class Specular:
         Parameters
         ----------
         operand : Fixed, any shape
-            ``cos gamma`` or ``1 - cos gamma`` in `operand_format`.
+            ``cos gamma`` or ``1 - cos gamma`` in `operand_format`; a cosine in units of `ONE_SQUARED`.
         dark : bool array, same shape
             Whether the light is behind the surface: the result is 0.
         exponent : int

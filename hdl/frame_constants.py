@@ -39,8 +39,9 @@ class FrameConstantsUnit(wiring.Component):
     """Registers for the constants of a frame, one word a write.
 
     A write is taken on a clock when ``hold`` is low, and seen one clock later. Words are 18 bits; the low
-    bits count where the constant is shorter. A write to any other address is taken and changes nothing. Reset
-    clears every constant: exponent 0 and black light.
+    bits count where the constant is shorter. A write to any other address is taken like the rest and changes
+    nothing. Reset clears every constant: exponent 0 and black light. Exponents 0 and 1001 to 1023 are taken
+    and shade by the same formula, outside the stated error.
 
     ======================== ==========================================================
     address                  constant

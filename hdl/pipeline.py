@@ -16,12 +16,9 @@ from .intensity import IntensityUnit
 from .light import LightUnit
 from .middle_normal import MiddleNormalUnit, normal_shape
 from .pixel_assembler import PixelAssemblerUnit, pixel_shape, place_shape
-from .stream import connect, require_same_shape
+from .stream import BUFFER_LATENCY, connect, connect_buffered
 
 __all__ = ["PORT_DESCRIPTIONS", "ShadingPipelineUnit", "span_shape", "status_shape"]
-
-BUFFER_LATENCY = 2
-"""Clocks that a beat takes through an empty buffer."""
 
 PORT_DESCRIPTIONS = {
     "i_x": "first pixel of the span, column",
@@ -60,8 +57,9 @@ def span_shape() -> data.StructLayout:
 def status_shape() -> data.StructLayout:
     """Shape of what the pipeline has counted since reset; counters stop at their largest value.
 
-    ``wide_spans``: spans over 45 degrees, whose normals are not to be trusted. ``empty_spans``: spans of
-    length 0. ``overrun``: whether a span has gone past x = 4095, where x starts again at 0.
+    ``wide_spans``: spans over 45 degrees, whose normals are not to be trusted; counted when their middle
+    normal is known, 25 clocks or more after they are taken. ``empty_spans``: spans of length 0.
+    ``overrun``: whether a span has gone past x = 4095, where x starts again at 0.
     """
     return data.StructLayout(
         {"wide_spans": unsigned(16), "empty_spans": unsigned(16), "overrun": unsigned(1)}
@@ -77,11 +75,11 @@ class ShadingPipelineUnit(wiring.Component):
     The first pixel of a span leaves `latency` clocks after an idle pipeline has taken it, 66 and the depth
     of the adder tree: ``66 + ceil(log2(2 lights + 1))``. Without stalls each span then takes
     at most ``max(length, 7)`` clocks: one pixel a clock, and a setup interval of 7; three spans are held ready,
-    so that a long one pays for short ones after it. A span of length 0 takes one
-    clock and gives nothing. 5 multipliers, and 14 a light.
+    so that a long one pays for short ones after it. A span of length 0 is taken like any other and
+    gives nothing. 5 multipliers, and 14 a light.
 
     A write is taken when no span is inside, and no span is taken while a write waits, so a frame's constants
-    never change under a running span.
+    never change under a running span: ``i.ready`` falls on the clock on which ``write.valid`` rises.
 
     Parameters
     ----------
@@ -102,8 +100,10 @@ class ShadingPipelineUnit(wiring.Component):
     Source: pipeline.md; [T] figure 4.10.
     """
 
-    PLACES = 32
+    # Up to 5 spans are in the middle-normal unit and 1 in G/P/Q before their lengths are read; up to 3 in
+    # the difference setup, 3 prepared, 1 in the accumulator and, if of one pixel each, 7 behind it.
     LENGTHS = 8
+    PLACES = 32
 
     def __init__(self, parameters: ShadingPipeline | None = None):
         self.parameters = parameters or ShadingPipeline()
@@ -138,7 +138,6 @@ class ShadingPipelineUnit(wiring.Component):
         m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=12, depth=self.LENGTHS)
 
         # Admission: a span goes to the setup, its place round it, both or neither.
-        busy = Signal()
         place = Signal(place_shape())
         empty, offered, free, admit = Signal(), Signal(), Signal(), Signal()
         span = self.i.payload
@@ -147,7 +146,7 @@ class ShadingPipelineUnit(wiring.Component):
             offered.eq(self.i.valid & ~self.write.valid & ~empty),
             free.eq(places.w_rdy & lengths.w_rdy),
             admit.eq(offered & free & middle.i.ready),
-            self.i.ready.eq(~self.write.valid & (empty | (free & middle.i.ready))),
+            self.i.ready.eq(~self.write.valid & free & middle.i.ready),
             middle.i.valid.eq(offered & free),
             middle.i.payload.normal_left.eq(span.normal_left),
             middle.i.payload.normal_right.eq(span.normal_right),
@@ -173,7 +172,7 @@ class ShadingPipelineUnit(wiring.Component):
             gpq.o.ready.eq(setup.i.ready),
             lengths.r_en.eq(gpq.o.valid & setup.i.ready),
         ]
-        _buffer(m, "prepared", setup.o, accumulator.i, depth=3)
+        connect_buffered(m, "prepared", setup.o, accumulator.i, depth=3)
 
         # Lights in lockstep: equal units that are offered the same beats and taken from on the same clocks.
         for index, light in enumerate(self._lights):
@@ -196,7 +195,7 @@ class ShadingPipelineUnit(wiring.Component):
             intensity.i.valid.eq(self._lights[0].o.valid),
             intensity.constants.ambient.eq(frame.constants.ambient),
         ]
-        _buffer(m, "shaded", intensity.o, assembler.colors, depth=4)
+        connect_buffered(m, "shaded", intensity.o, assembler.colors, depth=4)
         m.d.comb += [
             assembler.places.payload.eq(places.r_data),
             assembler.places.valid.eq(places.r_rdy),
@@ -208,7 +207,7 @@ class ShadingPipelineUnit(wiring.Component):
         connect(m, wiring.flipped(self.write), frame.write)
         inside = Signal(range(self.PLACES + 2))
         finished = self.o.valid & self.o.ready & self.o.payload.last
-        m.d.comb += [busy.eq(inside != 0), frame.hold.eq(busy)]
+        m.d.comb += frame.hold.eq(inside != 0)
         m.d.sync += inside.eq(inside + admit - finished)
 
         status = self.status
@@ -221,17 +220,3 @@ class ShadingPipelineUnit(wiring.Component):
         with m.If(admit & (span.x + span.length > 4096)):
             m.d.sync += status.overrun.eq(1)
         return m
-
-
-def _buffer(m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int) -> None:
-    """Connect two streams through a FIFO, which ends the combinational path of readies backwards."""
-    require_same_shape(source.payload.shape(), sink.payload.shape())
-    m.submodules[name] = buffer = fifo.SyncFIFOBuffered(width=source.payload.shape().size, depth=depth)
-    m.d.comb += [
-        buffer.w_data.eq(source.payload),
-        buffer.w_en.eq(source.valid),
-        source.ready.eq(buffer.w_rdy),
-        sink.payload.eq(buffer.r_data),
-        sink.valid.eq(buffer.r_rdy),
-        buffer.r_en.eq(sink.ready),
-    ]

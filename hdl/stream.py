@@ -1,12 +1,15 @@
 """What every streaming unit shares: checked connections and the pipeline with one common enable."""
 
 from amaranth.hdl import Cat, EnableInserter, Module, Mux, Shape, ShapeLike, Signal, Value
-from amaranth.lib import data, stream, wiring
+from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from .fixed import FixedShape
 
-__all__ = ["PipelinedUnit", "connect", "require_same_shape"]
+__all__ = ["BUFFER_LATENCY", "PipelinedUnit", "connect", "connect_buffered", "require_same_shape"]
+
+BUFFER_LATENCY = 2
+"""Clocks that a payload takes through an empty buffer."""
 
 
 def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> None:
@@ -54,7 +57,7 @@ def connect(m: Module, source: stream.Interface, sink: stream.Interface) -> None
     TypeError
         If the payloads differ in a field or in a fixed-point format.
     """
-    require_same_shape(_shape(source.payload), _shape(sink.payload))
+    require_same_shape(source.payload.shape(), sink.payload.shape())
     m.d.comb += [
         Value.cast(sink.payload).eq(Value.cast(source.payload)),
         sink.valid.eq(source.valid),
@@ -62,8 +65,38 @@ def connect(m: Module, source: stream.Interface, sink: stream.Interface) -> None
     ]
 
 
-def _shape(payload) -> ShapeLike:
-    return payload.shape()
+def connect_buffered(
+    m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int
+) -> None:
+    """Connect two streams through a FIFO, which ends the combinational path of readies backwards.
+
+    A payload takes `BUFFER_LATENCY` clocks through the empty FIFO.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the FIFO as a submodule ``name``.
+    source, sink : stream.Interface
+        As for `connect`.
+    depth : int
+        Payloads that the FIFO holds, at least 3.
+
+    Raises
+    ------
+    TypeError
+        If the payloads differ in a field or in a fixed-point format.
+    """
+    require_same_shape(source.payload.shape(), sink.payload.shape())
+    width = Shape.cast(source.payload.shape()).width
+    m.submodules[name] = buffer = fifo.SyncFIFOBuffered(width=width, depth=depth)
+    m.d.comb += [
+        buffer.w_data.eq(source.payload),
+        buffer.w_en.eq(source.valid),
+        source.ready.eq(buffer.w_rdy),
+        Value.cast(sink.payload).eq(buffer.r_data),
+        sink.valid.eq(buffer.r_rdy),
+        buffer.r_en.eq(sink.ready),
+    ]
 
 
 class PipelinedUnit(wiring.Component):

@@ -265,7 +265,7 @@ def render(
             f"--triangles {triangles}", "only the teapot is tessellated", "leave it out for a file"
         )
     if not (output or comparison):
-        output = f"{Path(mesh).stem}.png"
+        output = f"{Path(mesh).stem}-blysk.png"
     _check_outputs(mesh, pictures=[output, comparison], others=[figures, vcd])
     with tqdm(bar_format="{desc}", leave=False, disable=None) as stage:
         stage.set_description_str("loading the mesh")
@@ -522,7 +522,7 @@ def _print_errors(report: dict) -> None:
     for name, against in (
         ("arithmetic", "the same method and model in float64"),
         ("method", "exactly normalised Phong interpolation, same model"),
-        ("total", "the exact Blinn frame"),
+        ("total", "the exact Blinn frame, one viewing direction"),
     ):
         error = report[f"{name}_error"]
         print(

@@ -1,5 +1,7 @@
 """The shading pipeline: RTL against its twin, pixel by pixel and clock by clock."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -89,22 +91,24 @@ def test_sixteen_lights(normal_pairs):
     assert_pixels(run(ShadingPipelineUnit(parameters), spans, constants, pixels), pixels)
 
 
-def test_clocks(normal_pairs):
+@pytest.mark.parametrize("lights", [1, 3])
+def test_clocks(lights, normal_pairs):
     """One pixel a clock; a span costs its length or the setup interval, whichever is more, and no more.
 
     Spans that the buffer holds ready cost their length alone.
     """
     rng = np.random.default_rng(7)
     lengths = np.r_[rng.integers(1, 40, 500), np.full(50, 1), np.full(50, 7), [4095, 4095, 1, 1]]
-    parameters = ShadingPipeline()
+    parameters = ShadingPipeline(lights=lights)
     unit = ShadingPipelineUnit(parameters)
     spans = make_spans(rng, lengths, normal_pairs)
-    constants = make_constants(rng, 1)
+    constants = make_constants(rng, lights)
     pixels = parameters.compute(spans, constants)
     result = run(unit, spans, constants, pixels)
     starts = np.cumsum(lengths) - lengths
     first_pixels = result.clocks[starts]
     assert first_pixels[0] == result.input_clocks[0] + unit.latency
+    assert unit.latency == 66 + math.ceil(math.log2(2 * lights + 1))
     assert unit.setup_interval <= 8
     taken = np.diff(first_pixels)
     assert np.all(taken >= lengths[:-1])
@@ -159,4 +163,5 @@ def test_span_past_the_last_column_is_flagged(normal_pairs):
         constants = make_constants(rng, 1)
         pixels = parameters.compute(spans, constants)
         result = run(ShadingPipelineUnit(parameters), spans, constants, pixels)
+        assert_pixels(result, pixels)
         assert result.status["overrun"] == flagged
