@@ -73,9 +73,9 @@ class ShadingPipelineUnit(wiring.Component):
     carries the spans' places round it. `golden.pipeline.ShadingPipeline` is the bit-true twin.
 
     The first pixel of a span leaves `latency` clocks after an idle pipeline has taken it, 66 and the depth
-    of the adder tree: ``66 + ceil(log2(2 lights + 1))``. Without stalls each span then takes
-    at most ``max(length, 7)`` clocks: one pixel a clock, and a setup interval of 7; three spans are held ready,
-    so that a long one pays for short ones after it. A span of length 0 is taken like any other and
+    of the adder tree: ``66 + ceil(log2(2 lights + 1))``. Without stalls each span then takes at most
+    ``max(length, 7)`` clocks: up to one pixel a clock, and a setup interval of 7; three spans are held
+    ready, so that a long one pays for short ones after it. A span of length 0 is taken like any other and
     gives nothing. 5 multipliers, and 14 a light.
 
     A write is taken when no span is inside, and no span is taken while a write waits, so a frame's constants

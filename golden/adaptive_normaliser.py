@@ -1,0 +1,216 @@
+"""Adaptive normaliser: a span bisected until straight lines will do ([T] figure 2.7)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .bisection import Bisection
+from .difference_setup import DifferenceSetup
+from .fixed import SQ, Fixed
+from .unit_vector import COMPONENT
+
+__all__ = ["AdaptiveNormaliser"]
+
+
+@dataclass(frozen=True)
+class AdaptiveNormaliser:
+    """Normals of a span of m pixels by linear interpolation over ``2^k`` equal arcs of its great circle.
+
+    **Error block.** Over an arc a chord is too short by its sagitta at most:
+    ``d_k = 1 - cos(psi/2^(k+1))`` for ``2^k`` segments, and ``d_(k+1) = d_k/4`` nearly. With
+    ``q = (1 - cos psi)/4``, as the bisection unit gives it, ``d_k <= (q + q^2) / 4^k``: one square, then
+    wired shifts. The right side is over by at most 6.7 % (k = 0 at 90 degrees), never under, so that the
+    first k with ``(q + q^2) / 4^k <= threshold`` keeps its word. `depth` is the k of 90 degrees.
+
+    **Segment ends** ``E_j`` at ``psi j / 2^k``, from the bisection unit, level by level.
+
+    **Linear interpolators.** Pixel i lies at ``i 2^k / (m - 1)`` of a segment's length. The integer part is
+    its segment j, exact by integer arithmetic, whatever m; the first pixel of a segment starts at
+    ``E_j + phi (E_(j+1) - E_j)``, phi its fractional part, and every further one adds
+    ``(E_(j+1) - E_j) 2^k/(m - 1)``. The last pixel is a segment of its own, so that both ends come out as
+    they went in. (The documents take segments of whole pixels and extrapolate the end.)
+
+    A span wider than the bisection's `max_angle` is flagged and not divided: its normals lie on the straight
+    line between its ends (for ends further apart than 1 in a component, near the left one), and mean nothing
+    but at its first and last pixel.
+
+    ================ ========== ==================================================================
+    word             format     why
+    ================ ========== ==================================================================
+    q + q^2          SQ(2, 20)  a threshold of 2^-14 has 6 bits
+    E_j              SQ(1, 17)  the bisection's results
+    E_(j+1) - E_j    SQ(1, 17)  operand; saturates, which a threshold up to 1/8 keeps from happening
+    1/(m - 1)        UQ(0, 17)  table, with the shift of `DifferenceSetup`
+    phi              UQ(0, 17)  operand; cut
+    N                SQ(2, 32)  cut; half a step of the result is added at the start; wraps
+    step             SQ(1, 32)  cut: 2^-32 a pixel, 9.5e-7 after 4095
+    normal           SQ(1, 17)  rounded half up, saturates
+    ================ ========== ==================================================================
+
+    Arithmetic error of a component against straight lines between the exact ends, at most `error`: that of
+    the ends (`end_error`); a difference of ends, at most ``sqrt(8.1 threshold)`` and 0.77, times the 2^-17 of
+    phi and of the reciprocal; drift; the last rounding. Of the ends, the bisection's model error makes them
+    too long or too short, and the next level, which reads their dot product, hands on ``1/(1 + cos)`` of
+    that, 0.586 at most; its arithmetic errors add up, in all levels by a factor of 1.12 at most. The first
+    and the last normal of a span are exact.
+
+    Model error against the great circle: the length is short by at most ``threshold`` (and the 2^-19 of the
+    rounding of q), never long; the direction is off by at most ``0.017 theta^3`` for a segment of angle
+    theta, ``theta^2 <= 8.1 threshold``.
+
+    Parameters
+    ----------
+    threshold : float
+        Largest length error, 2^-14 to 1/8; cut to 20 fraction bits.
+    bisection : Bisection
+        Factor of the bisection unit.
+
+    Raises
+    ------
+    ValueError
+        If the threshold is out of range.
+
+    Source: [T] 2.1, figure 2.7, appendix Г; blocks.md, "Adaptive normaliser".
+    """
+
+    threshold: float = 2.0**-10
+    bisection: Bisection = field(default_factory=Bisection)
+
+    SAGITTA_FORMAT = SQ(2, 20)
+    ACCUMULATOR_FORMAT = SQ(2, 32)
+    STEP_FORMAT = SQ(1, 32)
+    RESULT_FORMAT = COMPONENT
+    LENGTH_BITS = DifferenceSetup.LENGTH_BITS
+
+    def __post_init__(self):
+        if not 2.0**-14 <= self.threshold <= 1 / 8:
+            raise ValueError(f"threshold must be 2^-14 to 1/8, not {self.threshold!r}")
+
+    @property
+    def limits(self) -> Fixed:
+        """``threshold 4^k`` for k under `depth`: each that ``q + q^2`` exceeds asks for one more level."""
+        code = int(np.floor(np.ldexp(self.threshold, self.SAGITTA_FORMAT.fraction_bits)))
+        q = (1 - np.cos(np.radians(self.bisection.max_angle))) / 4
+        largest = (q + q * q) / self.SAGITTA_FORMAT.step
+        count = 0
+        while code << (2 * count) < largest:
+            count += 1
+        return Fixed(self.SAGITTA_FORMAT, code << (2 * np.arange(count, dtype=np.int64)))
+
+    @property
+    def depth(self) -> int:
+        """Largest number of levels k."""
+        return len(self.limits.codes)
+
+    def end_error(self, levels: int, first_step: bool) -> float:
+        """Bound on the error of a component of a segment end, in a span that asks for so many levels."""
+        p = self.bisection
+        length = 0.0
+        for level in range(1, levels + 1):
+            # Widest span of this level: a segment's angle, doubled back to it.
+            widest = np.degrees(np.sqrt(8.1 * self.threshold)) * 2.0 ** (levels - level + 1)
+            first = first_step and level == 1
+            length = max(length, 2 * p.model_error(first, widest) + 0.586 * length)
+        return (
+            length
+            + 1.12 * (levels and p.arithmetic_error(first_step))
+            + 1.12 * max(levels - 1, 0) * p.arithmetic_error(False)
+        )
+
+    def error(self, levels: int, first_step: bool) -> float:
+        """Bound on the error of a component of a normal against straight lines between the exact ends."""
+        difference = min(0.77, np.sqrt(8.1 * self.threshold))
+        return self.end_error(levels, first_step) + difference * 2.0**-16 + 4096 * 2.0**-32 + 2.0**-18
+
+    def levels(self, one_minus_cosine: Fixed, wide: np.ndarray) -> np.ndarray:
+        """Number of levels k of spans, from what the bisection unit says of their ends.
+
+        Parameters
+        ----------
+        one_minus_cosine : Fixed, any shape, SQ(2, 17)
+            ``1 - cos psi``.
+        wide : bool array, same shape
+            Whether the span is too wide to be divided.
+        """
+        operand = one_minus_cosine.saturate(COMPONENT)
+        square = (operand * operand).scale(-4).truncate(20)
+        sagitta = one_minus_cosine.scale(-2).extend(SQ(1, 20)) + square
+        sagitta = sagitta.saturate(self.SAGITTA_FORMAT).codes[..., np.newaxis]
+        return np.where(wide, 0, (sagitta > self.limits.codes).sum(axis=-1))
+
+    def compute(
+        self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
+    ) -> tuple[Fixed, np.ndarray, np.ndarray]:
+        """Bit-true normals, in raster order.
+
+        Parameters
+        ----------
+        normal_left, normal_right : Fixed, shape (spans, 3), SQ(1, 17)
+            Unit normals of the spans' ends.
+        length : int array, shape (spans,)
+            Pixels, 0 to 4095.
+
+        Returns
+        -------
+        normal : Fixed, shape (pixels, 3), SQ(1, 17)
+            Normals of all spans, one after the other.
+        wide : bool array, shape (spans,)
+            Whether the span is wider than the bisection's `max_angle`.
+        levels : int array, shape (spans,)
+            k.
+
+        Raises
+        ------
+        ValueError
+            If an operand has another format or a length is out of range.
+        """
+        length = np.asarray(length, dtype=np.int64)
+        if length.size and not 0 <= length.min() <= length.max() < 1 << self.LENGTH_BITS:
+            raise ValueError(f"lengths must be 0 to {(1 << self.LENGTH_BITS) - 1}")
+        whole = 1 << self.depth
+        ends = np.zeros((len(length), whole + 1, 3), dtype=np.int64)
+        ends[:, 0], ends[:, -1] = normal_left.codes, normal_right.codes
+        _, u, wide = self.bisection.compute(normal_left, normal_right)
+        levels = self.levels(u, wide)
+        for level in range(1, self.depth + 1):
+            active = np.flatnonzero(levels >= level)
+            half = whole >> level
+            before, after = ends[active, : -1 : 2 * half], ends[active, 2 * half :: 2 * half]
+            middle, _, _ = self.bisection.compute(Fixed(COMPONENT, before), Fixed(COMPONENT, after))
+            ends[active, half :: 2 * half] = middle.codes
+
+        span = np.repeat(np.arange(len(length)), length)
+        pixel = np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)
+        steps = np.maximum(length - 1, 1)
+        reciprocal, shift = self.reciprocal(steps)
+        steps, reciprocal, shift, level = (x[span] for x in (steps, reciprocal, shift, levels))
+        segment = (pixel << level) // steps
+        first_pixel = -((-segment * steps) >> level)
+        place = (first_pixel << level) - segment * steps
+        spacing = whole >> level
+        left = Fixed(COMPONENT, ends[span, segment * spacing])
+        right = Fixed(COMPONENT, ends[span, np.minimum(segment + 1, 1 << level) * spacing])
+        difference = (right - left).saturate(COMPONENT)
+        phi = Fixed(COMPONENT, ((place * reciprocal) << 1 >> shift)[:, np.newaxis])
+        start = left + (difference * phi).truncate(32) + self.half_step
+        slope = (difference * Fixed(COMPONENT, reciprocal[:, np.newaxis])).codes
+        slope = Fixed(SQ(2, 34), slope >> np.maximum(shift - 1 - level, 0)[:, np.newaxis]).truncate(32)
+        walked = start.codes + (pixel - first_pixel)[:, np.newaxis] * slope.wrap(self.STEP_FORMAT).codes
+        width = self.ACCUMULATOR_FORMAT.width
+        walked = ((walked & ((1 << width) - 1)) ^ (1 << (width - 1))) - (1 << (width - 1))
+        normal = Fixed(self.ACCUMULATOR_FORMAT, walked).truncate(COMPONENT.fraction_bits)
+        return normal.saturate(COMPONENT), wide, levels
+
+    @property
+    def half_step(self) -> Fixed:
+        """Half a step of the result: rounding half up is then a cut."""
+        return Fixed.round(self.ACCUMULATOR_FORMAT, COMPONENT.step / 2)
+
+    def reciprocal(self, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Code of the table and shift s of ``1/steps = 2 reciprocal 2^-s``, for 1 to 4094 steps."""
+        top = self.LENGTH_BITS - 1
+        position = np.zeros_like(steps)
+        for bit in range(1, self.LENGTH_BITS):
+            position[steps >> bit > 0] = bit
+        address = (steps << (top - position)) & ((1 << top) - 1)
+        return DifferenceSetup().reciprocals.codes[address], position + (address > 0)

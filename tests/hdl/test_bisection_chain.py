@@ -1,0 +1,56 @@
+"""Chain of bisections: RTL against its twin, clock by clock."""
+
+import numpy as np
+import pytest
+
+from golden.bisection import Bisection
+from golden.bisection_chain import BisectionChain
+from golden.fixed import Fixed
+from golden.unit_vector import COMPONENT, quantise
+from hdl.bisection_chain import BisectionChainUnit
+from sim.engine import simulate
+
+
+def spans(normal_pairs, parameters, seed, count):
+    rng = np.random.default_rng(seed)
+    angles = np.r_[0, 45, 90, 180, 10.0 ** rng.uniform(-4, 0, count // 4), rng.uniform(0, 100, count)]
+    left, right = (quantise(normals) for normals in normal_pairs(rng, len(angles), angles))
+    corners = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (count // 4, 6))
+    left, right = np.vstack([left, corners[:, :3]]), np.vstack([right, corners[:, 3:]])
+    order = rng.permutation(len(left))
+    left, right = left[order], right[order]
+    level = rng.integers(1, 16, len(left))
+    normal, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right), level)
+    assert wide.any()
+    assert not wide.all()
+    return {"normal_left": left, "normal_right": right, "level": level}, normal.codes, wide
+
+
+@pytest.mark.parametrize(
+    "bisection", [Bisection(), Bisection(1, 45), Bisection(2, as_documented=True)], ids=str
+)
+def test_equals_twin(normal_pairs, bisection):
+    parameters = BisectionChain(bisection)
+    unit = BisectionChainUnit(parameters)
+    beats, normal, wide = spans(normal_pairs, parameters, 3, 400)
+    count = len(wide)
+    run = simulate(unit, beats, count=count, engine="auto")
+    np.testing.assert_array_equal(run.beats["normal"], normal)
+    np.testing.assert_array_equal(run.beats["wide"], wide)
+    latency = np.array([unit.latency(k) for k in beats["level"].tolist()])
+    np.testing.assert_array_equal(run.clocks - run.input_clocks, latency)
+    np.testing.assert_array_equal(run.input_clocks[1:], run.clocks[:-1] + 1)
+
+    rng = np.random.default_rng(4)
+    stalls = {"input_stalls": rng.random(997) < 0.4, "output_stalls": rng.random(1009) < 0.7}
+    run = simulate(unit, beats, count=count, engine="auto", **stalls)
+    np.testing.assert_array_equal(run.beats["normal"], normal)
+    few = {name: value[:8] for name, value in beats.items()}
+    slow, fast = (simulate(unit, few, count=8, engine=engine, **stalls) for engine in ("pysim", "auto"))
+    np.testing.assert_array_equal(slow.beats["normal"], normal[:8])
+    np.testing.assert_array_equal(slow.clocks, fast.clocks)
+    np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+    # A 4-bit counter that starts at 0 goes round.
+    zero = {name: value[:1] for name, value in beats.items()} | {"level": [0]}
+    run = simulate(unit, zero, count=1, engine="auto")
+    assert run.clocks[0] - run.input_clocks[0] == unit.latency(16)
