@@ -233,7 +233,10 @@ def cli():
     help="Shade them with their normals turned, as they are, or not at all.",
 )
 @click.option(
-    "-o", "--output", type=click.Path(), help="Picture of the simulated frame.  [default: MESH's name, .png]"
+    "-o",
+    "--output",
+    type=click.Path(),
+    help="Picture of the simulated frame.  [default: MESH's name, -blysk.png]",
 )
 @click.option("--compare", "comparison", type=click.Path(), help="Picture: simulated, golden, error map.")
 @click.option("--json", "figures", type=click.Path(), help="Every printed figure.")

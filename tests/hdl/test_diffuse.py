@@ -1,3 +1,4 @@
+# amaranth: UnusedElaboratable=no
 """Diffuse unit: RTL against its twin, clock by clock."""
 
 import numpy as np

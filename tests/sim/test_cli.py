@@ -368,10 +368,10 @@ def test_figures(rendered):
 def test_default_output_is_named_like_the_mesh(capsys):
     Path("my.leaf.obj").write_bytes(CORNERS + b"f 1 2 3\n")
     assert main(["render", "my.leaf.obj", "--size", "16x12"]) == 0
-    assert {str(path) for path in files()} == {"my.leaf.obj", "my.leaf.png"}
+    assert {str(path) for path in files()} == {"my.leaf.obj", "my.leaf-blysk.png"}
     output, errors = capsys.readouterr()
     assert errors == ""
-    assert re.search(r"^frame +my\.leaf\.png$", output, re.MULTILINE)
+    assert re.search(r"^frame +my\.leaf-blysk\.png$", output, re.MULTILINE)
 
 
 def test_repairs_are_counted(capsys):
@@ -412,7 +412,7 @@ def test_unit_of_the_mesh_does_not_matter(capsys):
         Path("a.obj").write_text("\n".join(points))
         assert main(["render", "a.obj", "--size", "16x12"]) == 0
         assert capsys.readouterr().err == ""
-        pictures.append(picture("a.png"))
+        pictures.append(picture("a-blysk.png"))
     assert len(np.unique(pictures[0].reshape(-1, 3), axis=0)) > 1
     assert np.array_equal(pictures[0], pictures[1])
     assert np.array_equal(pictures[0], pictures[2])
@@ -430,7 +430,7 @@ def test_waveforms(capsys):
     ticks = changes.splitlines().count(f"1{clock.pop()}")
     # To the last pixel, and 64 clocks more to see that no other comes.
     assert figures["clocks"] <= ticks <= figures["clocks"] + 70
-    assert set(files()) == {Path("a.vcd"), Path("a.json"), Path("teapot.png")}
+    assert set(files()) == {Path("a.vcd"), Path("a.json"), Path("teapot-blysk.png")}
 
 
 def test_verilog(capsys):
@@ -497,7 +497,7 @@ def test_fallback_without_compiler(capsys, monkeypatch):
     assert re.fullmatch(r"blysk: pysim at 24x9 instead of cxxrtl, no working C\+\+ compiler .+", line)
     figures = json.loads(Path("a.json").read_text())
     assert (figures["engine"], figures["width"], figures["height"]) == ("pysim", 24, 9)
-    assert picture("teapot.png").shape == (9, 24, 3)
+    assert picture("teapot-blysk.png").shape == (9, 24, 3)
     assert "teapot, 24x9" in output
 
 
