@@ -1,5 +1,7 @@
 """What the tests of every hardware unit share: one way to hold RTL against its twin."""
 
+import signal
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -7,6 +9,13 @@ import numpy as np
 import pytest
 
 from sim.engine import simulate
+
+
+@pytest.fixture(scope="session", autouse=True)
+def interrupts():
+    """Interrupts as at a terminal: a shell starts its background jobs with them ignored."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session", autouse=True)
