@@ -1,4 +1,4 @@
-"""The command line: ``blysk render`` and ``blysk verilog``."""
+"""The command line: ``blysk render`` and ``blysk verilog``, and the commands of installed packages."""
 
 import dataclasses
 import math
@@ -8,7 +8,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from contextlib import nullcontext
-from importlib.metadata import version
+from importlib.metadata import entry_points, version
 from pathlib import Path
 from time import perf_counter
 
@@ -164,7 +164,24 @@ def _design(method: str, model: str, lights: int) -> ShadingPipeline:
     return ShadingPipeline(method, model, lights)
 
 
-@click.group(no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"]})
+class _Group(click.Group):
+    """The commands here, and those that an installed package registers under ``blysk.commands``.
+
+    Layers above this one add theirs so; nothing of them is imported before it is asked for.
+    """
+
+    def list_commands(self, ctx):
+        return sorted({*super().list_commands(ctx), *entry_points(group="blysk.commands").names})
+
+    def get_command(self, ctx, cmd_name):
+        command = super().get_command(ctx, cmd_name)
+        if command is None:
+            for entry in entry_points(group="blysk.commands", name=cmd_name):
+                command = entry.load()
+        return command
+
+
+@click.group(cls=_Group, no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(version("blysk"), "--version", prog_name="blysk", message="%(prog)s %(version)s")
 def cli():
     """Phong and Blinn shading by simulated hardware.

@@ -1,0 +1,942 @@
+"""The device table: what every device and variant errs by, how fast it is and what it costs.
+
+``blysk blocks`` prints it. Nothing in it is written down beforehand: errors come from the bit-true twins and
+float64 mathematics, times from the units or a simulation of them, parts from their netlists.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import click
+import numpy as np
+from amaranth.lib.wiring import Component
+from tqdm import tqdm
+
+from golden.adaptive_normaliser import AdaptiveNormaliser
+from golden.angular_setup import AngularSetup
+from golden.arccos import ARCCOS_TABLES, Arccos, HalfChord
+from golden.bisection import Bisection
+from golden.bisection_chain import BisectionChain
+from golden.difference_accumulator import DifferenceAccumulator
+from golden.difference_setup import DifferenceSetup
+from golden.diffuse import Diffuse
+from golden.dot_product import DotProduct
+from golden.fixed import Fixed
+from golden.frame_constants import FrameConstants
+from golden.geometry import normalise
+from golden.gpq import GPQ
+from golden.highlight_cosine import HighlightCosine
+from golden.intensity import Intensity
+from golden.interpolation import interpolate
+from golden.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
+from golden.pipeline import METHODS, ShadingPipeline, Spans
+from golden.power import Power
+from golden.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
+from golden.recurrence import RECURRENCE_FORMS, Recurrence
+from golden.reflection import reflect
+from golden.renormaliser import Renormaliser
+from golden.specular import FURTHER_MODELS, MAX_EXPONENT, SPECULAR_MODELS, Specular
+from golden.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
+from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
+from hdl.angular_setup import AngularSetupUnit
+from hdl.arccos import ArccosUnit, HalfChordUnit
+from hdl.bisection import BisectionUnit
+from hdl.bisection_chain import BisectionChainUnit
+from hdl.cost import Cost, cost_of
+from hdl.difference_accumulator import DifferenceAccumulatorUnit
+from hdl.difference_setup import DifferenceSetupUnit
+from hdl.diffuse import DiffuseUnit
+from hdl.dot_product import DotProductUnit
+from hdl.gpq import GPQUnit
+from hdl.highlight_cosine import HighlightCosineUnit
+from hdl.highlight_gate import HighlightGateUnit
+from hdl.intensity import IntensityUnit
+from hdl.light import LightUnit
+from hdl.middle_normal import MiddleNormalUnit
+from hdl.pipeline import ShadingPipelineUnit
+from hdl.power import PowerUnit
+from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
+from hdl.recurrence import RecurrenceUnit
+from hdl.renormaliser import RenormaliserUnit
+from hdl.specular import SpecularUnit
+from sim.beats import dtype_of
+from sim.engine import simulate
+from sim.errors import InputError
+from sim.output import check_writable, write_json
+
+__all__ = ["BLOCKS", "Block", "Row", "Sample", "command", "rows", "table"]
+
+SAMPLES = 100_000
+SEED = 1
+
+_STEP = COMPONENT.step
+_SCALE = ONE * _STEP
+"""Length of a unit vector, read as a number."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What a device gave, and what it should have given.
+
+    Parameters
+    ----------
+    found : array
+        Values of the bit-true twin.
+    exact : array, same shape
+        The exact function of the same operands in float64.
+    formula : array, same shape, optional
+        The formula that the device approximates it by, in float64; `None` where its tables cannot be told
+        from its arithmetic.
+    """
+
+    found: np.ndarray
+    exact: np.ndarray
+    formula: np.ndarray | None = None
+
+    @property
+    def errors(self) -> tuple[float | None, float | None, float]:
+        """Largest model, arithmetic and total error."""
+
+        def largest(a, b):
+            return float(np.abs(np.asarray(a) - b).max())
+
+        total = largest(self.found, self.exact)
+        if self.formula is None:
+            return None, None, total
+        return largest(self.formula, self.exact), largest(self.found, self.formula), total
+
+
+@dataclass(frozen=True)
+class Block:
+    """An entry of the table: a device in one variant.
+
+    Parameters
+    ----------
+    device, variant : str
+        Names.
+    source : str
+        Document and figure.
+    unit : callable
+        Makes the unit.
+    measure : callable or None
+        Takes a random generator and a number of samples, gives a `Sample`; `None` for a device without a
+        number as its result, of which `note` says what holds.
+    domain : str
+        Operands over which errors are measured.
+    scale : str
+        Unit of the errors: nothing (1 is a full term or the length of a vector), ``rad``, ``turn`` or
+        ``LSB``.
+    exhaustive : bool
+        Every operand of the domain is measured, whatever the number of samples.
+    beat : dict
+        Fields of the input beats of the simulation that finds the times, where the unit does not state
+        them; others are 0.
+    note : str
+        What else there is to say.
+    """
+
+    device: str
+    variant: str
+    source: str
+    unit: Callable[[], Component]
+    measure: Callable[[np.random.Generator, int], Sample] | None
+    domain: str
+    scale: str = ""
+    exhaustive: bool = False
+    beat: dict[str, Any] = field(default_factory=dict)
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the table.
+
+    Parameters
+    ----------
+    block : Block
+        The entry.
+    samples : int
+        Results that were compared, a component of a vector being one.
+    errors : tuple of float or None
+        Model, arithmetic and total error.
+    latency : int
+        Clocks from an input to its first result.
+    interval : int
+        Clocks from a result to the next.
+    cost : Cost
+        Parts.
+    """
+
+    block: Block
+    samples: int
+    errors: tuple[float | None, float | None, float | None]
+    latency: int
+    interval: int
+    cost: Cost
+
+    def as_dict(self) -> dict[str, Any]:
+        """The line under stable names."""
+        block, cost = self.block, self.cost
+        model, arithmetic, total = self.errors
+        return {
+            "device": block.device,
+            "variant": block.variant,
+            "source": block.source,
+            "domain": block.domain,
+            "exhaustive": block.exhaustive,
+            "samples": self.samples,
+            "error_unit": block.scale or "1",
+            "model_error": model,
+            "arithmetic_error": arithmetic,
+            "total_error": total,
+            "latency": self.latency,
+            "initiation_interval": self.interval,
+            "multipliers": {f"{a}x{b}": count for (a, b), count in sorted(cost.multipliers.items())},
+            "constant_multipliers": cost.constant_multipliers,
+            "rom_bits": cost.rom_bits,
+            "ram_bits": cost.ram_bits,
+            "register_bits": cost.register_bits,
+            "note": block.note,
+        }
+
+
+# Operands.
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("...i,...i->...", a, b)
+
+
+def _sphere(rng: np.random.Generator, count: int) -> np.ndarray:
+    return normalise(rng.normal(size=(count, 3)))
+
+
+def _turned(rng: np.random.Generator, vectors: np.ndarray, degrees: np.ndarray) -> np.ndarray:
+    """Vectors at given angles from others, in any direction."""
+    across = rng.normal(size=vectors.shape)
+    across = normalise(across - _dot(across, vectors)[:, np.newaxis] * vectors)
+    angle = np.radians(degrees)[:, np.newaxis]
+    return vectors * np.cos(angle) + across * np.sin(angle)
+
+
+def _angles(rng: np.random.Generator, count: int, widest: float) -> np.ndarray:
+    """Degrees: both ends, half spread evenly, half by their logarithm."""
+    angles = rng.uniform(0, widest, count)
+    angles[::2] = widest * 10.0 ** rng.uniform(-6, 0, len(angles[::2]))
+    angles[: count // 20] = 0
+    angles[count // 20 : count // 10] = widest
+    return angles
+
+
+def _ends(rng: np.random.Generator, count: int, widest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Codes of the ends of spans up to ``widest`` degrees, some along an axis."""
+    left = _sphere(rng, count)
+    left[: count // 20] = np.eye(3)[np.arange(count // 20) % 3]
+    right = _turned(rng, left, rng.permutation(_angles(rng, count, widest)))
+    return quantise(left), quantise(right)
+
+
+def _vectors(*codes: np.ndarray) -> tuple[Fixed, ...]:
+    return tuple(Fixed(COMPONENT, vector) for vector in codes)
+
+
+def _lengths(rng: np.random.Generator, count: int, least: int = 1) -> np.ndarray:
+    lengths = np.floor(least * (4096 / least) ** rng.random(count)).astype(np.int64)
+    edges = [least, least + 1, 4094, 4095]
+    lengths[: len(edges)] = edges[:count]
+    return lengths
+
+
+def _pixels(rng: np.random.Generator, length: np.ndarray) -> np.ndarray:
+    """A pixel of each span; of every fourth the last."""
+    pixel = np.floor(rng.random(len(length)) * length).astype(np.int64)
+    pixel[::4] = length[::4] - 1
+    return pixel
+
+
+def _curves(rng: np.random.Generator, count: int) -> tuple[Fixed, Fixed, Fixed]:
+    """Coefficients of the quadratic curves of spans."""
+    left, right = _vectors(*_ends(rng, count, MAX_SPAN_ANGLE))
+    return GPQ().compute(left, MiddleNormal().compute(left, right)[0], right)
+
+
+def _exponents(rng: np.random.Generator, count: int) -> Iterator[tuple[int, int]]:
+    """Exponents, and how many samples each has."""
+    exponents = [1, 2, 3, 10, 100, 500, 999, MAX_EXPONENT]
+    exponents += rng.integers(1, MAX_EXPONENT + 1, 32).tolist()
+    for exponent in exponents:
+        yield exponent, max(count // len(exponents), 16)
+
+
+def _joined(samples: Iterable[Sample]) -> Sample:
+    samples = list(samples)
+    parts = [
+        None
+        if any(getattr(s, name) is None for s in samples)
+        # A sample may have its own shape.
+        else np.concatenate([np.ravel(getattr(s, name)) for s in samples])
+        for name in ("found", "exact", "formula")
+    ]
+    return Sample(*parts)
+
+
+# What is measured: `rng, count -> Sample`, a function a device.
+
+
+def _dot_product(rng, count):
+    a, b = (rng.integers(-ONE - 1, ONE + 1, (count, 3)) for _ in range(2))
+    edges = [-ONE - 1, ONE, 0]
+    a[:3], b[:3] = np.transpose([edges] * 3), -ONE - 1
+    exact = _dot(a * _STEP, b * _STEP)
+    return Sample(DotProduct().compute(*_vectors(a, b)).values, exact, exact)
+
+
+def _halves(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Exact middle of code vectors as long as a unit vector, and their cosine."""
+    cosine = _dot(left, right) / ONE**2
+    return (left + right) * _STEP / np.sqrt(2 + 2 * cosine)[:, np.newaxis], cosine
+
+
+def _middle_normal(rng, count):
+    unit = MiddleNormal()
+    left, right = _ends(rng, count, MAX_SPAN_ANGLE)
+    found, _ = unit.compute(*_vectors(left, right))
+    exact, cosine = _halves(left, right)
+    factor = np.polynomial.polynomial.polyval((1 - cosine) * _SCALE**2, np.r_[0.5, unit.coefficients.values])
+    return Sample(found.values, exact, (left + right) * _STEP * factor[:, np.newaxis])
+
+
+def _gpq(rng, count):
+    left, right = _vectors(*_ends(rng, count, MAX_SPAN_ANGLE))
+    middle, _ = MiddleNormal().compute(left, right)
+    found = GPQ().compute(left, middle, right)
+    n_l, n_c, n_r = left.values, middle.values, right.values
+    exact = np.stack([2 * n_r - 4 * n_c + 2 * n_l, 4 * n_c - n_r - 3 * n_l, n_l])
+    return Sample(np.stack([word.values for word in found]), exact, exact)
+
+
+def _difference_setup(rng, count):
+    g, p, _ = _curves(rng, count)
+    length = _lengths(rng, count, 2)
+    first, second = DifferenceSetup().compute(g, p, length)
+    k = _pixels(rng, length)[:, np.newaxis]
+    t = k / (length - 1)[:, np.newaxis]
+    exact = (g.values * t + p.values) * t
+    return Sample(k * first.values + k * (k - 1) / 2 * second.values, exact, exact)
+
+
+def _difference_accumulator(rng, count):
+    g, p, q = _curves(rng, count)
+    length = _lengths(rng, count)
+    first, second = DifferenceSetup().compute(g, p, length)
+    pixel = _pixels(rng, length)
+    found = DifferenceAccumulator().compute(q, first, second, np.arange(count), pixel)
+    k = pixel[:, np.newaxis]
+    exact = q.values + k * first.values + k * (k - 1) / 2 * second.values
+    return Sample(found.values, exact, exact)
+
+
+def _quadratic_evaluator(rng, count, form):
+    g, p, q = _curves(rng, count)
+    length = _lengths(rng, count, 2)
+    pixel = _pixels(rng, length)
+    found = QuadraticEvaluator(form).compute(g, p, q, length, np.arange(count), pixel)
+    t = (pixel / (length - 1))[:, np.newaxis]
+    exact = (g.values * t + p.values) * t + q.values
+    return Sample(found.values, exact, exact)
+
+
+def _cosines(rng: np.random.Generator, count: int, exponent: int) -> np.ndarray:
+    """Codes of cosines from 0 to 1: of the highlight, about where it ends, and anywhere."""
+    away = rng.uniform(0, 1, count)
+    away[::2] = np.minimum(rng.uniform(0, 16, len(away[::2])) / exponent, 1)
+    away[: count // 20] = 0
+    return np.floor(ONE_SQUARED.codes * (1 - away)).astype(np.int64)
+
+
+def _highlight(rng, count, unit, model):
+    def samples():
+        for exponent, share in _exponents(rng, count):
+            codes = _cosines(rng, share, exponent)
+            cosine = codes / ONE_SQUARED.codes
+            found = unit.compute(Fixed(unit.operand_format, codes), np.zeros(share, bool), exponent)
+            exact = reflect("blinn", cosine, exponent)
+            yield Sample(found.values, exact, reflect(model, cosine, exponent))
+
+    return _joined(samples())
+
+
+def _diffuse(rng, count):
+    unit = Diffuse()
+    codes = rng.integers(-ONE * ONE, ONE * ONE + 1, count)
+    codes[:3] = -ONE * ONE, 0, ONE * ONE
+    cosine = Fixed(unit.OPERAND_FORMAT, codes)
+    return Sample(unit.compute(cosine).values, np.maximum(codes / ONE**2, 0), np.maximum(cosine.values, 0))
+
+
+def _intensity(rng, count):
+    unit = Intensity()
+    colors = rng.random((3, 64, 3))
+    pick = rng.integers(0, 64, count)
+    terms = rng.integers(0, 1 << 17, (2, count))
+    terms[:, :2] = 0, (1 << 17) - 1
+    found = np.empty((count, 3))
+    for k, color in enumerate(colors.transpose(1, 0, 2)):
+        ambient, diffuse, specular = (Fixed(unit.COLOR_FORMAT, unit.color(c)) for c in color)
+        chosen = pick == k
+        found[chosen] = unit.compute(
+            ambient,
+            diffuse[np.newaxis],
+            specular[np.newaxis],
+            *(Fixed(unit.TERM_FORMAT, term[chosen][:, np.newaxis]) for term in terms),
+        )
+    weights = np.stack([np.ones(count), *(terms * 2.0**-17)])
+    exact = np.minimum(255 * np.einsum("wp,wpc->pc", weights, colors[:, pick]), 255)
+    return Sample(found, exact, exact)
+
+
+def _light(rng, count, model):
+    unit, dot = Specular(model), DotProduct()
+
+    def samples():
+        for exponent, share in _exponents(rng, count):
+            viewer, light = _sphere(rng, share), _sphere(rng, share)
+            halfway = normalise(viewer + light)
+            normal = _turned(rng, halfway, np.minimum(_angles(rng, share, 90), 89))
+            # A viewer sees the front: N.V > 0, and so N.H > 0 wherever there is light.
+            kept = _dot(normal, viewer) > 0.01
+            normal, light, halfway = (quantise(v[kept]) for v in (normal, light, halfway))
+            cosine = dot.compute(*_vectors(normal, light))
+            dark = Diffuse().dark(cosine)
+            specular = unit.compute(dot.compute(*_vectors(normal, halfway)), dark, exponent)
+            diffuse = np.maximum(_dot(normal, light) / ONE**2, 0)
+            exact, formula = (
+                np.stack([diffuse, reflect(name, _dot(normal, halfway) / ONE**2, exponent) * ~dark])
+                for name in ("blinn", model)
+            )
+            yield Sample(np.stack([Diffuse().compute(cosine).values, specular.values]), exact, formula)
+
+    return _joined(samples())
+
+
+def _factor(p: Bisection, cosine: np.ndarray, one_minus: np.ndarray, first_step: np.ndarray) -> np.ndarray:
+    """``e`` of the bisection's polynomials in float64."""
+    parts = []
+    for first in (False, True):
+        constant, rest = p.polynomial(first)
+        x = (cosine if p.reads_cosine(first) else one_minus) * _SCALE**2
+        parts.append(np.polynomial.polynomial.polyval(x, np.r_[constant.values, rest.values]))
+    return np.where(first_step, parts[1], parts[0])
+
+
+def _bisection(rng, count, p):
+    left, right = _ends(rng, count, p.max_angle)
+    found, u, _ = p.compute(*_vectors(left, right))
+    exact, cosine = _halves(left, right)
+    first_step = (u > p.widest_narrow) & (p.max_angle == 90)
+    formula = (left + right) * _STEP * (0.5 + _factor(p, cosine, 1 - cosine, first_step))[:, np.newaxis]
+    # A factor that is too large takes a component near 1 out of the word.
+    return Sample(found.values, exact, np.clip(formula, -1, _SCALE))
+
+
+def _chain_weights(chain: BisectionChain, cosine: np.ndarray, level: np.ndarray, limit: float):
+    """Weights ``l`` and ``m`` by the polynomials in float64; beyond the limit of u that of wide spans."""
+    p = chain.bisection
+    u = 1 - cosine
+    weight_l, weight_m = np.zeros(len(u)), np.ones(len(u))
+    for k in range(1, 1 << chain.LEVEL_BITS):
+        e = _factor(p, cosine, u, (u * _SCALE**2 > limit) & (p.max_angle == 90))
+        weight_l = np.where(k <= level, (weight_l + 1) * (0.5 + e), weight_l)
+        weight_m = np.where(k <= level, weight_m * (0.5 + e), weight_m)
+        u = u / 2 - (1 + cosine) * e
+        cosine = 1 - u
+    return weight_l, weight_m
+
+
+def _bisection_chain(rng, count, chain):
+    p = chain.bisection
+    left, right = _ends(rng, count, p.max_angle)
+    level = rng.integers(1, 1 << chain.LEVEL_BITS, count)
+    found, _ = chain.compute(*_vectors(left, right), level)
+    a, b = left / ONE, right / ONE
+
+    def vectors(of_left, of_right):
+        return _SCALE * (of_left[:, np.newaxis] * a + of_right[:, np.newaxis] * b)
+
+    # Slerp by the chain's own weights, as code vectors are not quite as long as each other.
+    psi = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), _dot(a, b))
+    part = psi * 2.0**-level
+    apart = psi > 0
+    sine = np.where(apart, np.sin(psi), 1)
+    exact = vectors(
+        np.where(apart, np.sin(psi - part) / sine, 1 - 2.0**-level),
+        np.where(apart, np.sin(part) / sine, 2.0**-level),
+    )
+    # At the limit between the polynomials rounding decides, and the one that the unit took counts.
+    limits = p.widest_narrow.values + np.array([-8, 8]) * p.ANGLE_FORMAT.step
+    early, late = (
+        np.clip(vectors(*_chain_weights(chain, _dot(a, b), level, limit)), -1, _SCALE) for limit in limits
+    )
+    of_early, of_late = (np.abs(found.values - formula).max(axis=1) for formula in (early, late))
+    return Sample(found.values, exact, np.where((of_early < of_late)[:, np.newaxis], early, late))
+
+
+def _adaptive_normaliser(rng, count, p):
+    length = _lengths(rng, max(count // 400, 8))
+    left, right = _ends(rng, len(length), p.bisection.max_angle)
+    found, wide, levels = p.compute(*_vectors(left, right), length)
+    span = np.repeat(np.arange(len(length)), length)
+    pixel = np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)
+    t = pixel / np.maximum(length - 1, 1)[span]
+    parts = 2.0 ** levels[span]
+    a, b = left[span] / ONE, right[span] / ONE
+    segment = np.minimum(np.floor(t * parts), parts - 1)
+    before, after = (interpolate("slerp", a, b, (segment + k) / parts) for k in (0, 1))
+    after = np.where((segment + 1 == parts)[:, np.newaxis], b, after)
+    lines = before + (t * parts - segment)[:, np.newaxis] * (after - before)
+    # slerp has the length of its left end; the last pixel has that of the right one.
+    exact = np.where((t == 1)[:, np.newaxis], b, interpolate("slerp", a, b, t))
+    kept = ~wide[span]
+    return Sample(found.values[kept], exact[kept] * _SCALE, lines[kept] * _SCALE)
+
+
+def _recurrence(rng, count, form):
+    unit = Recurrence(form)
+    length = _lengths(rng, max(count // 500, 8), 2)
+    psi = np.radians(_angles(rng, len(length), 90.0))
+    step = psi / (length - 1)
+    phase = psi * rng.uniform(0, 1, len(length))
+    amplitude = rng.uniform(0.5, 1 - 2.0**-16, len(length))
+    states = unit.states(*unit.start(amplitude, phase, step), *unit.coefficient(step), int(length.max()))
+    k = np.arange(len(states.codes))[:, np.newaxis]
+    inside = k < length
+    exact = (amplitude * np.cos(phase - k * step))[inside]
+    return Sample(unit.result(states).values[inside], exact, exact)
+
+
+def _renormaliser(rng, count):
+    unit = Renormaliser()
+    longest = np.sqrt(unit.HIGH) - 2.0**-15
+    length = rng.uniform(np.sqrt(unit.LOW) + 2.0**-15, longest, count)
+    vector = np.clip(np.rint(_sphere(rng, count) * (length / _STEP)[:, np.newaxis]), -ONE - 1, ONE)
+    vector = vector.astype(np.int64)
+    found, outside = unit.compute(*_vectors(vector))
+    value = vector * _STEP
+    square = _dot(value, value)
+    place = (square - unit.LOW) * 2**unit.SEGMENT_BITS
+    segment = np.clip(np.floor(place).astype(np.int64), 0, unit.SEGMENTS - 1)
+    u = (place - segment) / 2**unit.SEGMENT_BITS
+    c0, c1, c2 = (c.values[segment] for c in unit.coefficients)
+    formula = value * (1 + c0 - u * (c1 - u * c2))[:, np.newaxis]
+    exact = value * (_SCALE / np.sqrt(square))[:, np.newaxis]
+    kept = ~outside
+    return Sample(found.values[kept], exact[kept], formula[kept])
+
+
+def _arccos(rng, count, table):
+    unit = Arccos(table)
+    one = unit.MAGNITUDE_FORMAT.code(1)
+    x = Fixed(unit.OPERAND_FORMAT, np.arange(-one, one + 1))
+    return Sample(unit.compute(x)[0].values, np.arccos(x.values), unit.polynomial(x.values))
+
+
+def _half_chord(rng, count):
+    left, right = _ends(rng, count, 180.0)
+    obtuse = _dot(left, right) < 0
+    across = np.where(obtuse[:, np.newaxis], left + right, left - right)
+    chord = np.minimum(_dot(across, across), 2 << 34)
+    found = HalfChord().compute(Fixed(HalfChord.OPERAND_FORMAT, chord), obtuse)
+    turns = np.arcsin(np.sqrt(chord) / (2 * ONE)) / np.pi
+    return Sample(found.values, np.where(obtuse, 0.5 - turns, turns))
+
+
+def _highlight_cosine(rng, count, unit):
+    length = _lengths(rng, count)
+    pixel = _pixels(rng, length)
+    phase = rng.integers(-(1 << 39), 1 << 39, count)
+    step = np.floor(rng.uniform(0, 0.5, count) / np.maximum(length - 1, 1) * 2**40).astype(np.int64)
+    beta = rng.integers(0, (1 << 25) + 1, count)
+    beta[::4] = 1 << 25
+    phase[::8] = (pixel * step)[::8] % (1 << 39)
+    words = (
+        Fixed(unit.PHASE_FORMAT, phase),
+        Fixed(unit.STEP_FORMAT, step),
+        Fixed(unit.COS_BETA_FORMAT, beta),
+    )
+    found = unit.compute(*words, np.arange(count), pixel)
+    exact = 1 - beta * 2.0**-25 * np.cos(2 * np.pi * (phase - pixel * step) / 2.0**40)
+    return Sample(found.values, np.minimum(exact, unit.RESULT_FORMAT.max_code * unit.RESULT_FORMAT.step))
+
+
+def _angular_setup(rng, count):
+    left, right = _ends(rng, count, 150.0)
+    vector = _sphere(rng, count)
+    vector[::2] = normalise((0.7 * left + 0.3 * right)[::2] / ONE + vector[::2] * 1e-3)
+    vector = quantise(vector)
+    length = _lengths(rng, count, 2)
+    pixel = _pixels(rng, length)
+    _, phase, step, cos_beta, _ = AngularSetup().compute(*_vectors(left, right, vector), length)
+    found = cos_beta.values * np.cos(2 * np.pi * (phase.values - pixel * step.values))
+    a, b = (_dot(normal, vector) / ONE**2 for normal in (left, right))
+    chord, across = (_dot(v, v) / ONE**2 for v in (right - left, right + left))
+    # Of the two half-angle functions the smaller is the well-conditioned one.
+    acute = across >= chord
+    sine = np.where(acute, np.sqrt(chord) / 2, np.sqrt(np.maximum(1 - across / 4, 0)))
+    cosine = np.where(acute, np.sqrt(np.maximum(1 - chord / 4, 0)), np.sqrt(across) / 2)
+    y = np.divide(_dot(right - left, vector) / ONE**2 / 2, sine, out=np.zeros(count), where=sine > 0)
+    turned = (pixel / (length - 1) - 0.5) * 2 * np.arctan2(sine, cosine)
+    return Sample(found, (a + b) / 2 / cosine * np.cos(turned) + y * np.sin(turned))
+
+
+def _pipeline(rng, count, model):
+    design = ShadingPipeline(model=model)
+    reflection = {"ambient": 0.1, "diffuse": 0.5, "specular": 0.4}
+    ambient, k_d, k_s = reflection.values()
+
+    def samples():
+        for exponent in (1, 10, 100, MAX_EXPONENT):
+            length = rng.integers(2, 200, max(count // 400, 4))
+            light, viewer = normalise(np.array([[-0.5, 0.8, 0.7], [0, 0, 1.0]]))
+            light, halfway = quantise(light), quantise(normalise(light + viewer))
+            angles = rng.permutation(_angles(rng, len(length), MAX_SPAN_ANGLE))
+            left = _turned(rng, np.tile(normalise(halfway / ONE), (len(length), 1)), rng.permutation(angles))
+            left, right = quantise(left), quantise(_turned(rng, left, angles))
+            grey = {name: np.tile(Intensity.color(k), 3) for name, k in reflection.items()}
+            constants = FrameConstants(
+                exponent,
+                grey["ambient"],
+                light[np.newaxis],
+                halfway[np.newaxis],
+                grey["diffuse"][np.newaxis],
+                grey["specular"][np.newaxis],
+            )
+            place = np.zeros_like(length)
+            found = design.compute(Spans(place, place, length, left, right), constants).color[:, 0]
+            span = np.repeat(np.arange(len(length)), length)
+            t = (np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)) / (length - 1)[span]
+            shades = []
+            for curve, name in (("normalised", "blinn"), ("quadratic", model)):
+                normal = interpolate(curve, *(normalise(end / ONE)[span] for end in (left, right)), t)
+                cosine = normal @ light / ONE
+                highlight = reflect(name, normal @ halfway / ONE, exponent) * (cosine > 0)
+                shades.append(255 * np.minimum(ambient + k_d * np.maximum(cosine, 0) + k_s * highlight, 1))
+            # Behind the light the highlight is cut off at once, wherever rounding puts that.
+            kept = cosine > 1 / 16
+            yield Sample(found[kept].astype(np.float64), shades[0][kept], shades[1][kept])
+
+    return _joined(samples())
+
+
+# The table.
+
+_SPANS_45 = "spans to 45 degrees"
+_HIGHLIGHTS = "n 1 to 1000, N.H 0 to 1"
+_LONG = "2 to 4095 pixels"
+_Z_AXIS = [0, 0, ONE]
+
+
+def _blocks() -> Iterator[Block]:
+    yield Block(
+        "dot_product", "", "[T] 2.5", DotProductUnit, _dot_product, "all vectors of SQ(1, 17)", note="exact"
+    )
+    yield Block("middle_normal", "", "[T] 2.2", MiddleNormalUnit, _middle_normal, _SPANS_45)
+    yield Block("gpq", "", "[T] 2.8", GPQUnit, _gpq, _SPANS_45, note="exact")
+    yield Block(
+        "difference_setup",
+        "",
+        "[T] 2.11",
+        DifferenceSetupUnit,
+        _difference_setup,
+        f"{_SPANS_45}, {_LONG}",
+        note="of the curve at any pixel that the differences lead to",
+    )
+    yield Block(
+        "difference_accumulator",
+        "",
+        "[T] 2.10",
+        DifferenceAccumulatorUnit,
+        _difference_accumulator,
+        f"{_SPANS_45}, 1 to 4095 pixels",
+        beat={"length": 64},
+    )
+    for form, figure in zip(QUADRATIC_FORMS, "ab", strict=True):
+        yield Block(
+            "quadratic_evaluator",
+            form,
+            f"[T] 2.9 {figure}",
+            lambda form=form: QuadraticEvaluatorUnit(QuadraticEvaluator(form)),
+            partial(_quadratic_evaluator, form=form),
+            f"{_SPANS_45}, {_LONG}",
+            beat={"length": 64},
+        )
+    for degree in (1, 2):
+        for max_angle, documented in ((90, False), (45, False), (90, True), (45, True)):
+            p = Bisection(degree, max_angle, documented)
+            yield Block(
+                "bisection",
+                f"{degree}, {max_angle}" + ", documented" * documented,
+                "[T] 2.6",
+                lambda p=p: BisectionUnit(p),
+                partial(_bisection, p=p),
+                f"spans to {max_angle} degrees",
+                note=f"degree {degree}",
+            )
+    for documented in (False, True):
+        chain = BisectionChain(Bisection(as_documented=documented))
+        yield Block(
+            "bisection_chain",
+            "documented" if documented else "",
+            "[T] 2.1",
+            lambda chain=chain: BisectionChainUnit(chain),
+            partial(_bisection_chain, chain=chain),
+            "spans to 90 degrees, levels 1 to 15",
+            beat={"normal_left": _Z_AXIS, "normal_right": _Z_AXIS, "level": 1},
+            note="times of level 1",
+        )
+    for exponent in (6, 10, 14):
+        p = AdaptiveNormaliser(2.0**-exponent)
+        yield Block(
+            "adaptive_normaliser",
+            f"threshold 2^-{exponent}",
+            "[T] 2.7",
+            lambda p=p: AdaptiveNormaliserUnit(p),
+            partial(_adaptive_normaliser, p=p),
+            "spans to 90 degrees, 1 to 4095 pixels",
+            beat={"normal_left": _Z_AXIS, "normal_right": _Z_AXIS, "length": 64},
+            note="model: straight lines; the bisection's fit counts as arithmetic; latency of equal normals",
+        )
+    yield Block("renormaliser", "", "numbers.md", RenormaliserUnit, _renormaliser, "lengths 0.685 to 1.0155")
+    for table in ARCCOS_TABLES:
+        for form in ("pipelined", "sequential"):
+            yield Block(
+                "arccos",
+                f"{table}, {form}",
+                "[T] t. 3.1",
+                lambda table=table, form=form: ArccosUnit(Arccos(table), form),
+                partial(_arccos, table=table),
+                "x -1 to 1",
+                "rad",
+                exhaustive=True,
+            )
+    yield Block("half_chord", "", "[T] 3.3", HalfChordUnit, _half_chord, "angles 0 to 180 degrees", "turn")
+    for interpolated in (True, False):
+        unit = HighlightCosine(interpolated=interpolated)
+        yield Block(
+            "highlight_cosine",
+            "interpolated" if interpolated else "table alone",
+            "[T] 3.2",
+            lambda unit=unit: HighlightCosineUnit(unit),
+            partial(_highlight_cosine, unit=unit),
+            "all angles, cos beta 0 to 1",
+            beat={"length": 64},
+        )
+    yield Block(
+        "angular_setup",
+        "",
+        "[T] 3.1",
+        AngularSetupUnit,
+        _angular_setup,
+        f"spans to 150 degrees, {_LONG}",
+        note="of cos gamma at any pixel",
+    )
+    for form in RECURRENCE_FORMS:
+        yield Block(
+            "recurrence",
+            form,
+            "[T] 3.5",
+            lambda form=form: RecurrenceUnit(Recurrence(form)),
+            partial(_recurrence, form=form),
+            f"spans to 90 degrees, {_LONG}",
+            beat={"length": 64},
+        )
+    yield Block("diffuse", "", "[B] 4", DiffuseUnit, _diffuse, "N.L -1 to 1")
+    sources = dict.fromkeys(SPECULAR_MODELS + FURTHER_MODELS, "Lyon 1993")
+    sources |= {"cosquad": "[T] 3.6", "cosquad7": "[T] 3.7", "cosquad_lin": "[C]", "cosquad_q": "[C]"}
+    sources |= {"exp": "models.md"}
+    for model, source in sources.items():
+        yield Block(
+            "specular",
+            model,
+            source,
+            lambda model=model: SpecularUnit(Specular(model)),
+            partial(_highlight, unit=Specular(model), model=model),
+            _HIGHLIGHTS,
+        )
+    for form in ("pipelined", "sequential"):
+        yield Block(
+            "power",
+            form,
+            "[B] 3",
+            lambda form=form: PowerUnit(form=form),
+            partial(_highlight, unit=Power(), model="blinn"),
+            _HIGHLIGHTS,
+        )
+    yield Block(
+        "light", "cosquad", "[T] 4.10", LightUnit, partial(_light, model="cosquad"), "n 1 to 1000, N.V > 0"
+    )
+    yield Block(
+        "highlight_gate",
+        "conservative",
+        "[T] 4.10",
+        HighlightGateUnit,
+        None,
+        "all spans",
+        note="suppresses no lit pixel",
+    )
+    yield Block("intensity", "1 light", "[T] 4.10", IntensityUnit, _intensity, "all terms", "LSB")
+    for model in METHODS["quadratic"]:
+        yield Block(
+            "pipeline",
+            f"{model}, 1 light",
+            "[T] 4.10",
+            lambda model=model: ShadingPipelineUnit(ShadingPipeline(model=model)),
+            partial(_pipeline, model=model),
+            f"{_SPANS_45}, n 1 to 1000, N.L > 1/16",
+            "LSB",
+            beat={"length": 64},
+            note="against normalised Phong interpolation with Blinn's power",
+        )
+
+
+BLOCKS: tuple[Block, ...] = tuple(_blocks())
+"""Every device and variant, in the order of the table."""
+
+
+def _times(block: Block, unit: Component) -> tuple[int, int]:
+    """Latency, and clocks from a result to the next: stated by the unit, else found by simulation."""
+    latency = getattr(unit, "latency", None)
+    interval = getattr(unit, "initiation_interval", None)
+    if isinstance(latency, int) and isinstance(interval, int):
+        return latency, interval
+    beats = np.zeros(3, dtype_of(unit.i.payload.shape()))
+    for name, value in block.beat.items():
+        beats[name] = value
+    run = simulate(unit, beats, count=3 * block.beat.get("length", 1), engine="pysim")
+    return int(run.clocks[0] - run.input_clocks[0]), int(np.median(np.diff(run.clocks)))
+
+
+def rows(blocks: Sequence[Block] = BLOCKS, samples: int = SAMPLES, seed: int = SEED) -> Iterator[Row]:
+    """Lines of the table, one after the other.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        Entries.
+    samples : int
+        About how many random operands; 40 or more.
+    seed : int
+        Of the operands. Every entry starts from it, so that a line does not depend on the others.
+    """
+    for block in blocks:
+        count, errors = 0, (None, None, None)
+        if block.measure:
+            sample = block.measure(np.random.default_rng(seed), samples)
+            count, errors = np.size(sample.found), sample.errors
+        unit = block.unit()
+        yield Row(block, count, errors, *_times(block, unit), cost_of(unit))
+
+
+_HEAD = (
+    "device",
+    "variant",
+    "source",
+    "",
+    "model",
+    "arithm",
+    "total",
+    "lat",
+    "int",
+    "ROM",
+    "regs",
+    "multipliers",
+)
+
+
+def _figure(error: float | None) -> str:
+    if error is None:
+        return "-"
+    if error == 0 or 0.1 <= error < 100:
+        return f"{error:.2g}"
+    return f"{error:.1e}".replace("e-0", "e-")
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    cost = row.cost
+    errors = map(_figure, row.errors)
+    widths = sorted(cost.multipliers.items(), reverse=True)
+    multipliers = [f"{count}*{a}" if a == b else f"{count}*{a}x{b}" for (a, b), count in widths]
+    if cost.constant_multipliers:
+        multipliers.append(f"{cost.constant_multipliers}*c")
+    return (
+        row.block.device,
+        row.block.variant,
+        row.block.source,
+        row.block.scale,
+        *errors,
+        *map(str, (row.latency, row.interval, cost.rom_bits, cost.register_bits)),
+        " ".join(multipliers) or "-",
+    )
+
+
+def table(lines: Sequence[Row]) -> str:
+    """The table as aligned text."""
+    cells = [_HEAD, *map(_cells, lines)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    left = {0, 1, 2, 3, len(_HEAD) - 1}
+    return "\n".join(
+        " ".join(
+            text.ljust(width) if k in left else text.rjust(width)
+            for k, (text, width) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
+        for line in cells
+    )
+
+
+class _Count(click.ParamType):
+    """A whole number in a range."""
+
+    name = "number"
+
+    def __init__(self, least: int, most: int):
+        self.least, self.most = least, most
+
+    def convert(self, value, param, ctx):
+        remedy = f"give a whole number from {self.least} to {self.most}"
+        if not re.fullmatch("[+-]?[0-9]{1,18}", str(value)):
+            raise InputError(f"{param.opts[0]} {value}", "not a whole number", remedy)
+        if not self.least <= int(value) <= self.most:
+            raise InputError(f"{param.opts[0]} {value}", "out of range", remedy)
+        return int(value)
+
+
+@click.command(short_help="Table of the devices: errors, times, parts.")
+@click.option(
+    "--samples", type=_Count(1000, 10_000_000), default=SAMPLES, show_default=True, help="Of each device."
+)
+@click.option("--seed", type=_Count(0, 2**32 - 1), default=SEED, show_default=True, help="Of the operands.")
+@click.option("--json", "figures", type=click.Path(), help="Every figure, with domains and notes.")
+def command(samples, seed, figures):
+    """Measure every device and variant, and print a table.
+
+    Errors are the largest found: of the model, the device's formula in float64 against the exact function;
+    of the arithmetic, the device against that formula; and in total. Where tables make the first two one,
+    there is the total alone. They are in units of a full term or a vector's length, or as the fourth column
+    says. lat: clocks from an input to its first result; int: clocks from a result to the next; ROM and regs
+    in bits; multipliers: 3*18 are three of 18x18 bits, 1*c is one by a constant. Of a bisection the variant
+    is the degree and the widest span in degrees.
+
+    \b
+    Example:
+        blysk blocks --samples 1000000 --json blocks.json
+    """
+    if figures:
+        check_writable(figures)
+    lines = list(
+        tqdm(rows(BLOCKS, samples, seed), total=len(BLOCKS), unit=" rows", leave=False, disable=None)
+    )
+    if figures:
+        write_json(figures, {"samples": samples, "seed": seed, "blocks": [row.as_dict() for row in lines]})
+    click.echo(table(lines))
