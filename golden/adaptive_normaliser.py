@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .bisection import Bisection
-from .difference_setup import DifferenceSetup
+from .difference_setup import DifferenceSetup, reciprocal_place
 from .fixed import SQ, Fixed
 from .unit_vector import COMPONENT
 
@@ -208,9 +208,5 @@ class AdaptiveNormaliser:
 
     def reciprocal(self, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Code of the table and shift s of ``1/steps = 2 reciprocal 2^-s``, for 1 to 4094 steps."""
-        top = self.LENGTH_BITS - 1
-        position = np.zeros_like(steps)
-        for bit in range(1, self.LENGTH_BITS):
-            position[steps >> bit > 0] = bit
-        address = (steps << (top - position)) & ((1 << top) - 1)
-        return DifferenceSetup().reciprocals.codes[address], position + (address > 0)
+        address, shift = reciprocal_place(steps)
+        return DifferenceSetup().reciprocals.codes[address], shift

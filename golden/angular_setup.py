@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from .arccos import HalfChord
-from .difference_setup import DifferenceSetup
+from .difference_setup import DifferenceSetup, reciprocal_place
 from .dot_product import DotProduct
 from .fixed import SQ, UQ, Fixed, Format
 from .highlight_cosine import HighlightCosine
@@ -270,13 +270,8 @@ class AngularSetup:
 
     def _step(self, angle: Fixed, shift: np.ndarray, length: np.ndarray) -> Fixed:
         """``psi/(m-1)``, cut to 40 fraction bits; the reciprocal is that of `DifferenceSetup`."""
-        top = DifferenceSetup.LENGTH_BITS - 1
-        steps = length - 1
-        position = np.zeros_like(steps)
-        for bit in range(1, top + 1):
-            position[steps >> bit > 0] = bit
-        address = (steps << (top - position)) & ((1 << top) - 1)
+        address, halvings = reciprocal_place(length - 1)
         leading = Fixed(UQ(18, 36), angle.codes << shift).round_half_up(18).saturate(self.MANTISSA_FORMAT)
         product = leading * DifferenceSetup().reciprocals[address]
         # The table holds half of 1/f, and the product has 35 fraction bits.
-        return Fixed(self.STEP_FORMAT, product.codes << 6 >> (shift + position + (address > 0)))
+        return Fixed(self.STEP_FORMAT, product.codes << 6 >> (shift + halvings))

@@ -5,11 +5,43 @@ from functools import cached_property
 
 import numpy as np
 
-from .fixed import SQ, UQ, Fixed
+from .fixed import SQ, UQ, Fixed, Format
 from .gpq import GPQ
 from .unit_vector import COMPONENT
 
-__all__ = ["DifferenceSetup"]
+__all__ = ["LENGTH_BITS", "DifferenceSetup", "reciprocal_place", "reciprocal_table"]
+
+LENGTH_BITS = 12
+"""Bits of a span's length."""
+
+
+def reciprocal_table(format: Format) -> Fixed:
+    """``1/(1 + k/2048)`` at address k, rounded half up, and 1/2 at address 0, as no format here holds 1."""
+    size = 1 << (LENGTH_BITS - 1)
+    values = 1 / (1 + np.arange(size) / size)
+    values[0] = 0.5
+    return Fixed.round(format, values)
+
+
+def reciprocal_place(steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Address in the reciprocal table, and the shift s of ``1/steps = 2 reciprocal 2^-s``.
+
+    Parameters
+    ----------
+    steps : int64 array
+        0 to 4094; 0 counts as 1.
+
+    Returns
+    -------
+    address, shift : int64 arrays
+        0 to 2047, and 0 to 12.
+    """
+    top = LENGTH_BITS - 1
+    position = np.zeros_like(steps)
+    for bit in range(1, LENGTH_BITS):
+        position[steps >> bit > 0] = bit
+    address = (steps << (top - position)) & ((1 << top) - 1)
+    return address, position + (address > 0)
 
 
 @dataclass(frozen=True)
@@ -41,15 +73,12 @@ class DifferenceSetup:
 
     RECIPROCAL_FORMAT = UQ(0, 17)
     FORMAT = SQ(2, 42)
-    LENGTH_BITS = 12
+    LENGTH_BITS = LENGTH_BITS
 
     @cached_property
     def reciprocals(self) -> Fixed:
         """The table: ``1/(1 + k/2048)`` at address k; 1/2 at address 0."""
-        size = 1 << (self.LENGTH_BITS - 1)
-        values = 1 / (1 + np.arange(size) / size)
-        values[0] = 0.5
-        return Fixed.round(self.RECIPROCAL_FORMAT, values)
+        return reciprocal_table(self.RECIPROCAL_FORMAT)
 
     def compute(self, g: Fixed, p: Fixed, length: np.ndarray) -> tuple[Fixed, Fixed]:
         """Bit-true first and second difference.
@@ -78,14 +107,8 @@ class DifferenceSetup:
             )
         if length.size and not 1 <= length.min() <= length.max() < 1 << self.LENGTH_BITS:
             raise ValueError(f"lengths must be 1 to {(1 << self.LENGTH_BITS) - 1}")
-        steps = length - 1
-        top = self.LENGTH_BITS - 1
-        position = np.zeros_like(steps)
-        for bit in range(1, self.LENGTH_BITS):
-            position[steps >> bit > 0] = bit
-        address = (steps << (top - position)) & ((1 << top) - 1)
         # dt = 2 * reciprocal * 2**-shift
-        shift = position + (address > 0)
+        address, shift = reciprocal_place(length - 1)
         reciprocal = self.reciprocals[address]
         square = reciprocal * reciprocal
         small = square < Fixed(UQ(0, 1), 1)

@@ -67,7 +67,6 @@ class HighlightCosine:
     COS_BETA_FORMAT = UQ(1, 25)
     TABLE_VALUE_FORMAT = UQ(0, 22)
     FRACTION_BITS = 14
-    NEAR_FORMAT = UQ(-5, 22)
     FAR_FORMAT = UQ(0, 17)
     FACTOR_FORMAT = UQ(1, 16)
     RESULT_FORMAT = UQ(1, 25)

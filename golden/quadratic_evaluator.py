@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from .difference_setup import LENGTH_BITS, reciprocal_place, reciprocal_table
 from .fixed import SQ, UQ, Fixed
 from .gpq import GPQ
 from .unit_vector import COMPONENT
@@ -65,7 +66,7 @@ class QuadraticEvaluator:
     SUM_FORMAT = SQ(1, 29)
     PARAMETER_FORMAT = COMPONENT
     RESULT_FORMAT = COMPONENT
-    LENGTH_BITS = 12
+    LENGTH_BITS = LENGTH_BITS
 
     def __post_init__(self):
         if self.form not in QUADRATIC_FORMS:
@@ -79,10 +80,7 @@ class QuadraticEvaluator:
     @cached_property
     def reciprocals(self) -> Fixed:
         """The table: ``1/(1 + k/2048)`` at address k; 1/2 at address 0."""
-        size = 1 << (self.LENGTH_BITS - 1)
-        values = 1 / (1 + np.arange(size) / size)
-        values[0] = 0.5
-        return Fixed.round(self.RECIPROCAL_FORMAT, values)
+        return reciprocal_table(self.RECIPROCAL_FORMAT)
 
     def step(self, length: np.ndarray) -> Fixed:
         """Bit-true ``dt = 1/(m - 1)``; 1 for a span of one pixel, which has no dt and reads none.
@@ -104,14 +102,9 @@ class QuadraticEvaluator:
         length = np.asarray(length, dtype=np.int64)
         if length.size and not 1 <= length.min() <= length.max() < 1 << self.LENGTH_BITS:
             raise ValueError(f"lengths must be 1 to {(1 << self.LENGTH_BITS) - 1}")
-        steps = length - 1
-        top = self.LENGTH_BITS - 1
-        position = np.zeros_like(steps)
-        for bit in range(1, self.LENGTH_BITS):
-            position[steps >> bit > 0] = bit
-        address = (steps << (top - position)) & ((1 << top) - 1)
+        address, shift = reciprocal_place(length - 1)
         scaled = self.reciprocals[address].scale(1).extend(self.STEP_FORMAT)
-        return Fixed(self.STEP_FORMAT, scaled.codes >> (position + (address > 0)))
+        return Fixed(self.STEP_FORMAT, scaled.codes >> shift)
 
     def parameter(self, step: Fixed, index: np.ndarray) -> Fixed:
         """Bit-true ``-t`` of pixels.
