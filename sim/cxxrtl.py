@@ -1,14 +1,15 @@
 """The compiled engine: a component through CXXRTL to C++, compiled, cached, and driven by compiled code.
 
-Amaranth gives RTLIL, Yosys' CXXRTL a C++ class, and `cxxrtl_driver.cc` the loop over the clocks; Python is
-called once in a million clocks. The first run of a newly built model is compared with pysim over its first
-clocks, before the model goes into the cache.
+Amaranth gives RTLIL, Yosys' CXXRTL a C++ class that `guards` rewrites, and `cxxrtl_driver.cc` the loop over
+the clocks; Python is called once in a million clocks. The first run of a newly built model is compared with
+pysim over its first clocks, before the model goes into the cache.
 """
 
 import atexit
 import contextlib
 import ctypes
 import functools
+import gc
 import hashlib
 import importlib.util
 import os
@@ -34,6 +35,7 @@ from amaranth.lib.wiring import Component
 
 from .beats import word_count
 from .engine import CompilerMissing, End, Ports, SimulationError, Stimulus, Trace
+from .guards import group_registers
 from .pysim import Model as Interpreted
 
 __all__ = ["Compiler", "Model", "cache_folder", "find_compilers"]
@@ -43,6 +45,7 @@ _Yosys = _BuiltinYosys
 # No `opt`, nor `opt_clean`: they make wires of registers and combinational fields, which CXXRTL would buffer.
 _SCRIPT = "hierarchy -auto-top; proc; flatten; write_cxxrtl -O6 -g0"
 _BATCH = 1_000_000
+_ROOM = 1 << 24
 _CHECK_BEATS = 64
 _CHECK_CLOCKS = 512
 _REMEDY = "install one, or pip install 'blysk[native]', or use the engine pysim"
@@ -230,6 +233,10 @@ def _load(path: Path, key: str) -> ctypes.CDLL:
     return library
 
 
+def _source(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
 def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
@@ -242,6 +249,18 @@ def _entry(folder: Path, key: str) -> ctypes.CDLL | None:
                 return _load(path, key)
         path.unlink(missing_ok=True)
     return None
+
+
+@contextlib.contextmanager
+def _without_collection() -> Iterator[None]:
+    """Keep the garbage collector from a netlist's many small objects, which stay: a third of the time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def _check_netlist(component: Component, netlist: str) -> None:
@@ -287,7 +306,7 @@ def _generate(netlist: str) -> str:
                 f"Yosys: {str(warning.message).strip()} A combinational signal depends on itself, "
                 "or one field of a structure on another: give each its own signal, or use the engine pysim"
             )
-    return text
+    return group_registers(text)
 
 
 def _members(ports: Ports) -> str:
@@ -323,12 +342,17 @@ def _build(netlist: str, driver: str, compiler: Compiler, key: str, target: Path
     return None
 
 
+def _room(width: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places for so many output beats and their clocks."""
+    return np.empty((count, width), dtype=np.uint32), np.empty(count, dtype=np.int64)
+
+
 class Model:
     """A component compiled to machine code.
 
     The library comes from the cache, or is built; a built one is compared with pysim on its first run and
-    only then put into the cache. Entries are named by the hash of netlist, Yosys script, driver, compiler and
-    flags and by that of their own content, and appear whole (written aside, then renamed).
+    only then put into the cache. Entries are named by the hash of netlist, Yosys script, `guards`, driver,
+    compiler and flags and by that of their own content, and appear whole (written aside, then renamed).
 
     Parameters
     ----------
@@ -348,9 +372,10 @@ class Model:
 
     def __init__(self, component: Component):
         self.ports = Ports(component)
-        netlist = rtlil.convert(component, name="top", emit_src=False)
+        with _without_collection():
+            netlist = rtlil.convert(component, name="top", emit_src=False)
         _check_netlist(component, netlist)
-        driver = _members(self.ports) + resources.files(__package__).joinpath("cxxrtl_driver.cc").read_text()
+        driver = _members(self.ports) + _source("cxxrtl_driver.cc")
         folder = cache_folder()
         self._unchecked: tuple[Component, Path, Path] | None = None
         failures: list[str] = []
@@ -358,6 +383,7 @@ class Model:
             parts = (
                 netlist,
                 _SCRIPT,
+                _source("guards.py"),
                 driver,
                 compiler.identity,
                 repr(compiler.compile[1:] + compiler.link[1:]),
@@ -439,23 +465,23 @@ class Model:
             settle=stimulus.settle,
             last=-1,
         )
-        outputs, clocks = [np.empty((0, width), dtype=np.uint32)], [np.empty(0, dtype=np.int64)]
+        output, clocks = _room(width, _BATCH if stimulus.count is None else min(stimulus.count, _ROOM))
         handle = self._library.blysk_open()
         try:
             end = End.LIMIT
             while end == End.LIMIT and job.clock != stimulus.limit:
                 batch = _BATCH if stimulus.limit is None else min(_BATCH, stimulus.limit - job.clock)
                 # At most one beat a clock.
-                room = batch if stimulus.count is None else min(batch, stimulus.count - job.given)
-                output, batch_clocks = (
-                    np.empty((room, width), dtype=np.uint32),
-                    np.empty(room, dtype=np.int64),
-                )
-                job.output, job.clocks = output.ctypes.data, batch_clocks.ctypes.data
-                before = job.given
+                most = job.given + batch if stimulus.count is None else min(job.given + batch, stimulus.count)
+                if most > len(output):
+                    more = _room(width, max(batch, len(output)))
+                    output, clocks = (
+                        np.concatenate([old[: job.given], new])
+                        for old, new in zip((output, clocks), more, strict=True)
+                    )
+                job.output = output[job.given :].ctypes.data
+                job.clocks = clocks[job.given :].ctypes.data
                 end = End(self._library.blysk_run(handle, ctypes.byref(job), batch))
-                outputs.append(output[: job.given - before])
-                clocks.append(batch_clocks[: job.given - before])
                 if progress:
                     progress(job.given)
         finally:
@@ -465,8 +491,8 @@ class Model:
             clock=job.clock,
             total_clocks=job.last + 1,
             write_count=job.written,
-            output=np.concatenate(outputs),
-            clocks=np.concatenate(clocks),
+            output=output[: job.given],
+            clocks=clocks[: job.given],
             input_clocks=input_clocks[: job.taken],
             status=status,
         )

@@ -10,6 +10,8 @@ from amaranth.lib.wiring import Component, In, Out
 
 import bench.engines
 from bench.engines import Speed, main, measure
+from sim.beats import pack
+from sim.engine import Ports, simulate
 
 
 class Powers(Component):
@@ -63,39 +65,70 @@ def test_measure():
     # The promise of the compiled engine, which is kept by a wide margin.
     assert speed.ratio > 200
     assert speed.build > 0
+    assert speed.verilator_beats is None
     # A beat a clock.
     assert speed.cxxrtl_beats == pytest.approx(speed.cxxrtl, rel=0.01)
 
 
 @pytest.mark.parametrize(
-    ("cxxrtl", "pysim", "missed"),
+    ("cxxrtl", "pysim", "verilator", "missed"),
     [
-        (7.5e6, 2500.0, None),
-        (4.9e6, 2500.0, "5,000,000 clocks a second"),
-        (7.5e6, 40e3, "200 times pysim"),
-        (4.9e6, 40e3, "5,000,000 clocks a second, 200 times pysim"),
+        (7.5e6, 2500.0, 5e6, None),
+        (4.9e6, 2500.0, 4e6, "5,000,000 pixels a second"),
+        (7.5e6, 40e3, 5e6, "200 times pysim"),
+        (7.5e6, 2500.0, 7.6e6, "1 times Verilator"),
+        (4.9e6, 40e3, 6e6, "5,000,000 pixels a second, 200 times pysim, 1 times Verilator"),
     ],
 )
-def test_targets(monkeypatch, capsys, cxxrtl, pysim, missed):
+def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, missed):
     """The spans, the pixels expected of them, the table and the exit status, without the runs."""
     asked = {}
 
     def measured(component, beats, **others):
         asked.update(others, beats=beats)
-        return Speed(cxxrtl, pysim, cxxrtl * 0.75, pysim * 0.75, build=4.25, clocks=9000)
+        return Speed(cxxrtl, pysim, cxxrtl, pysim, build=4.25, clocks=9000, verilator_beats=verilator)
 
     monkeypatch.setattr(bench.engines, "measure", measured)
     # Amaranth complains of components that are made and not used.
     monkeypatch.setattr(bench.engines, "ShadingPipelineUnit", lambda design: None)
-    assert main(64, 48) == (0 if missed is None else 1)
+    assert main(1000, 750) == (0 if missed is None else 1)
     lines = capsys.readouterr().out.splitlines()
     pixels = asked["beats"]["length"].sum()
-    assert pixels == len(asked["expected"]["r"]) > 64 * 48 / 10
+    assert asked["beats"]["length"].min() >= bench.engines.LEAST_LENGTH
+    assert asked["rival"]
+    assert pixels == len(asked["expected"]["r"]) > 1000
     spans = len(asked["beats"]["x"])
-    assert lines[0] == f"teapot at 64x48, {spans:,} spans: {pixels:,} pixels, 9,000 clocks"
-    assert lines[2].split() == ["cxxrtl", f"{cxxrtl:,.0f}", f"{cxxrtl * 0.75:,.0f}"]
-    assert lines[4].split() == ["ratio", *[f"{cxxrtl / pysim:,.0f}"] * 2]
+    assert lines[0] == f"teapot at 1000x750, {spans:,} spans: {pixels:,} pixels, 9,000 clocks"
+    assert lines[2].split() == ["cxxrtl", f"{cxxrtl:,.0f}", "1.00x"]
+    assert lines[3].split() == ["verilator", f"{verilator:,.0f}", f"{cxxrtl / verilator:,.2f}x"]
+    assert lines[4].split() == ["pysim", f"{pysim:,.0f}", f"{cxxrtl / pysim:,.2f}x"]
     assert lines[-1] == ("every target met" if missed is None else f"missed: {missed}")
+
+
+class Rival:
+    """Stands for Verilator's model: what the engine gives, and one beat or clock changed."""
+
+    def __init__(self, component, beat, clock):
+        self.ports = Ports(component)
+        self.component, self.beat, self.clock = component, beat, clock
+
+    def run(self, stimulus):
+        run = simulate(self.component, stimulus.input[:, 0].astype(np.int64), count=stimulus.count)
+        output, clocks = pack(self.ports.o, run.beats), run.clocks.copy()
+        output[3] ^= self.beat
+        clocks[5] += self.clock
+        return output, clocks
+
+
+def test_rival(monkeypatch):
+    beats = np.arange(200)
+    component = Pair()
+    monkeypatch.setattr(bench.engines, "Verilated", lambda unit, folder: Rival(unit, 0, 0))
+    assert measure(component, beats, rival=True).verilator_beats > 0
+    for beat, clock in ((1, 0), (0, 1)):
+        monkeypatch.setattr(bench.engines, "Verilated", lambda unit, folder, c=(beat, clock): Rival(unit, *c))
+        with pytest.raises(ValueError, match=r"^Verilator's model and the compiled engine differ$"):
+            measure(component, beats, rival=True)
 
 
 def test_other_beats_than_expected_are_no_measure():

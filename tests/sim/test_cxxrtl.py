@@ -1,6 +1,7 @@
 """The compiled engine's own affairs: compilers, the cache, the check of a new model, batches."""
 
 import functools
+import gc
 import importlib.util
 import operator
 import os
@@ -22,6 +23,7 @@ from amaranth.lib import data, stream
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Component, In, Out
 
+import sim.engine
 from sim import cxxrtl
 from sim.engine import CompilerMissing, SimulationError, simulate
 
@@ -433,10 +435,13 @@ def test_cached_model_needs_neither_yosys_nor_pysim(filled, monkeypatch):
         scaled(5)
 
 
-@pytest.mark.parametrize("what", ["compiler", "script"])
+@pytest.mark.parametrize("what", ["compiler", "script", "rewriting"])
 def test_another_compiler_or_script_is_another_entry(filled, builds, monkeypatch, what):
     if what == "compiler":
         monkeypatch.setenv("CXX", f"{os.environ['CXX']} -DOTHER")
+    elif what == "rewriting":
+        source = cxxrtl._source
+        monkeypatch.setattr(cxxrtl, "_source", lambda name: source(name) + "\n")
     else:
         monkeypatch.setattr(cxxrtl, "_SCRIPT", cxxrtl._SCRIPT.replace("flatten;", "flatten; opt_expr;"))
     assert scaled() == (3 * BEATS).tolist()
@@ -660,12 +665,14 @@ def test_interrupt_between_batches(filled):
     component = Scale()
     simulate(component, BEATS, count=4)
     beats = np.zeros(100, dtype=int)
+    # One beat in 100 million clocks.
+    stalls = np.ones(10**8, dtype=bool)
+    stalls[5] = False
     started = time.monotonic()
     timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        # One beat in 100 million clocks.
-        simulate(component, beats, count=100, input_stalls=np.arange(10**8) != 5, patience=10**10)
+        simulate(component, beats, count=100, input_stalls=stalls, patience=10**10)
     assert time.monotonic() - started < 5
     timer.join()
     assert simulate(component, BEATS, count=4).beats.tolist() == (3 * BEATS).tolist()
@@ -677,3 +684,46 @@ def test_an_exception_in_progress_ends_the_run(filled):
 
     with pytest.raises(RuntimeError, match=r"^stop at 4$"):
         scaled(progress=stop)
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_garbage_collection_is_as_before(enabled, filled, monkeypatch):
+    """Off while a netlist is made, also when that fails; then as the caller has it."""
+    seen = []
+    convert = cxxrtl.rtlil.convert
+
+    def watched(*arguments, **options):
+        seen.append(gc.isenabled())
+        return convert(*arguments, **options)
+
+    monkeypatch.setattr(cxxrtl.rtlil, "convert", watched)
+    before = gc.isenabled()
+    try:
+        (gc.enable if enabled else gc.disable)()
+        assert scaled() == (3 * BEATS).tolist()
+        assert gc.isenabled() == enabled
+        with pytest.raises(ZeroDivisionError), cxxrtl._without_collection():
+            raise ZeroDivisionError
+        assert gc.isenabled() == enabled
+    finally:
+        (gc.enable if before else gc.disable)()
+    assert seen == [False]
+
+
+@pytest.mark.parametrize("count", [None, 300])
+@pytest.mark.parametrize(("batch", "room"), [(1, 1), (7, 2), (1000, 1), (50, 1 << 24)])
+def test_room_for_the_output_grows(filled, monkeypatch, count, batch, room):
+    monkeypatch.setattr(cxxrtl, "_BATCH", batch)
+    monkeypatch.setattr(cxxrtl, "_ROOM", room)
+    beats = np.arange(-150, 150)
+    run = simulate(Scale(), beats, count=count, patience=100)
+    assert run.beats.tolist() == (3 * beats).tolist()
+    assert run.clocks.tolist() == list(range(1, 301))
+
+
+@pytest.mark.parametrize("piece", [1, 7, 300, 301])
+def test_beats_are_unpacked_in_pieces(filled, monkeypatch, piece):
+    monkeypatch.setattr(sim.engine, "_PIECE", piece)
+    beats = np.arange(-150, 150)
+    assert simulate(Scale(), beats, count=300).beats.tolist() == (3 * beats).tolist()
+    assert simulate(Scale(), beats[:0], count=0).beats.tolist() == []
