@@ -9,7 +9,7 @@ COMMA := ,
 # The tests compile their models; without a C++ compiler one comes from PyPI.
 TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang++),[test],[test$(COMMA)native])
 
-.PHONY: demo test test-all bench lint clean
+.PHONY: demo test test-all bench pages lint clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
@@ -22,8 +22,12 @@ test-all: $(VENV)/.installed-test lint
 
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m bench.engines
+	$(BIN)/python -m bench.throughput
 	$(BIN)/python -m bench.renderer
 	$(BIN)/python -m bench.accuracy
+
+pages: $(VENV)/.installed
+	$(BIN)/blysk pages docs/blocks
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .

@@ -6,7 +6,7 @@ float64 mathematics, times from the units or a simulation of them, parts from th
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -20,6 +20,8 @@ from golden.angular_setup import AngularSetup
 from golden.arccos import ARCCOS_TABLES, Arccos, HalfChord
 from golden.bisection import Bisection
 from golden.bisection_chain import BisectionChain
+from golden.chord import Chord
+from golden.chord_setup import ChordSetup
 from golden.difference_accumulator import DifferenceAccumulator
 from golden.difference_setup import DifferenceSetup
 from golden.diffuse import Diffuse
@@ -31,12 +33,13 @@ from golden.gpq import GPQ
 from golden.highlight_cosine import HighlightCosine
 from golden.intensity import Intensity
 from golden.interpolation import interpolate
-from golden.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
+from golden.interpolator import pixels_of
+from golden.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
 from golden.pipeline import METHODS, ShadingPipeline, Spans
 from golden.power import Power
 from golden.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
 from golden.recurrence import RECURRENCE_FORMS, Recurrence
-from golden.reflection import reflect
+from golden.reflection import COSCOS_MODELS, reflect
 from golden.renormaliser import Renormaliser
 from golden.specular import FURTHER_MODELS, MAX_EXPONENT, SPECULAR_MODELS, Specular
 from golden.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
@@ -45,6 +48,8 @@ from hdl.angular_setup import AngularSetupUnit
 from hdl.arccos import ArccosUnit, HalfChordUnit
 from hdl.bisection import BisectionUnit
 from hdl.bisection_chain import BisectionChainUnit
+from hdl.chord import ChordUnit
+from hdl.chord_setup import ChordSetupUnit
 from hdl.cost import Cost, cost_of
 from hdl.difference_accumulator import DifferenceAccumulatorUnit
 from hdl.difference_setup import DifferenceSetupUnit
@@ -56,10 +61,11 @@ from hdl.highlight_gate import HighlightGateUnit
 from hdl.intensity import IntensityUnit
 from hdl.light import LightUnit
 from hdl.middle_normal import MiddleNormalUnit
-from hdl.pipeline import ShadingPipelineUnit
+from hdl.pipeline import INTERPOLATORS, ShadingPipelineUnit
 from hdl.power import PowerUnit
 from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
 from hdl.recurrence import RecurrenceUnit
+from hdl.recurrence_setup import RecurrenceSetupUnit
 from hdl.renormaliser import RenormaliserUnit
 from hdl.specular import SpecularUnit
 from sim.beats import dtype_of
@@ -67,7 +73,7 @@ from sim.engine import simulate
 from sim.errors import InputError
 from sim.output import check_writable, write_json
 
-__all__ = ["BLOCKS", "Block", "Row", "Sample", "command", "rows", "table"]
+__all__ = ["BLOCKS", "Block", "Row", "Sample", "cells_of", "command", "row_of", "rows", "sample_of", "table"]
 
 SAMPLES = 100_000
 SEED = 1
@@ -90,11 +96,14 @@ class Sample:
     formula : array, same shape, optional
         The formula that the device approximates it by, in float64; `None` where its tables cannot be told
         from its arithmetic.
+    at : array, broadcast to the same shape, optional
+        The operand that an error is drawn against, named by the entry's ``axis``.
     """
 
     found: np.ndarray
     exact: np.ndarray
     formula: np.ndarray | None = None
+    at: np.ndarray | None = None
 
     @property
     def errors(self) -> tuple[float | None, float | None, float]:
@@ -136,6 +145,10 @@ class Block:
         them; others are 0.
     note : str
         What else there is to say.
+    axis : str
+        What errors are drawn against, the ``at`` of the sample; empty for nothing.
+    logarithmic : bool
+        It is drawn on a logarithmic axis.
     """
 
     device: str
@@ -148,6 +161,8 @@ class Block:
     exhaustive: bool = False
     beat: dict[str, Any] = field(default_factory=dict)
     note: str = ""
+    axis: str = ""
+    logarithmic: bool = False
 
 
 @dataclass(frozen=True)
@@ -272,13 +287,15 @@ def _exponents(rng: np.random.Generator, count: int) -> Iterator[tuple[int, int]
 
 
 def _joined(samples: Iterable[Sample]) -> Sample:
-    samples = list(samples)
+    samples = [
+        s if s.at is None else replace(s, at=np.broadcast_to(s.at, np.shape(s.found))) for s in samples
+    ]
     parts = [
         None
         if any(getattr(s, name) is None for s in samples)
         # A sample may have its own shape.
         else np.concatenate([np.ravel(getattr(s, name)) for s in samples])
-        for name in ("found", "exact", "formula")
+        for name in ("found", "exact", "formula", "at")
     ]
     return Sample(*parts)
 
@@ -291,7 +308,13 @@ def _dot_product(rng, count):
     edges = [-ONE - 1, ONE, 0]
     a[:3], b[:3] = np.transpose([edges] * 3), -ONE - 1
     exact = _dot(a * _STEP, b * _STEP)
-    return Sample(DotProduct().compute(*_vectors(a, b)).values, exact, exact)
+    return Sample(DotProduct().compute(*_vectors(a, b)).values, exact, exact, exact)
+
+
+def _degrees(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Angles between code vectors, as a column."""
+    sine = np.linalg.norm(np.cross(left / ONE, right / ONE), axis=1)
+    return np.degrees(np.arctan2(sine, _dot(left, right) / ONE**2))[:, np.newaxis]
 
 
 def _halves(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -300,13 +323,17 @@ def _halves(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return (left + right) * _STEP / np.sqrt(2 + 2 * cosine)[:, np.newaxis], cosine
 
 
-def _middle_normal(rng, count):
-    unit = MiddleNormal()
+def _middle_normal(rng, count, unit):
     left, right = _ends(rng, count, MAX_SPAN_ANGLE)
     found, _ = unit.compute(*_vectors(left, right))
     exact, cosine = _halves(left, right)
-    factor = np.polynomial.polynomial.polyval((1 - cosine) * _SCALE**2, np.r_[0.5, unit.coefficients.values])
-    return Sample(found.values, exact, (left + right) * _STEP * factor[:, np.newaxis])
+    u = (1 - cosine) * _SCALE**2
+    factor = np.polynomial.polynomial.polyval(u, np.r_[0.5 + unit.constant.values, unit.coefficients.values])
+    # A factor that is too large takes a component near 1 out of the word.
+    formula = np.clip(
+        (left + right) * _STEP * factor[:, np.newaxis], -1, unit.FORMAT.max_code * unit.FORMAT.step
+    )
+    return Sample(found.values, exact, formula, _degrees(left, right))
 
 
 def _gpq(rng, count):
@@ -315,17 +342,17 @@ def _gpq(rng, count):
     found = GPQ().compute(left, middle, right)
     n_l, n_c, n_r = left.values, middle.values, right.values
     exact = np.stack([2 * n_r - 4 * n_c + 2 * n_l, 4 * n_c - n_r - 3 * n_l, n_l])
-    return Sample(np.stack([word.values for word in found]), exact, exact)
+    return Sample(np.stack([word.values for word in found]), exact, exact, _degrees(left.codes, right.codes))
 
 
-def _difference_setup(rng, count):
+def _difference_setup(rng, count, unit):
     g, p, _ = _curves(rng, count)
     length = _lengths(rng, count, 2)
-    first, second = DifferenceSetup().compute(g, p, length)
+    first, second = unit.compute(g, p, length)
     k = _pixels(rng, length)[:, np.newaxis]
     t = k / (length - 1)[:, np.newaxis]
     exact = (g.values * t + p.values) * t
-    return Sample(k * first.values + k * (k - 1) / 2 * second.values, exact, exact)
+    return Sample(k * first.values + k * (k - 1) / 2 * second.values, exact, exact, k)
 
 
 def _difference_accumulator(rng, count):
@@ -336,7 +363,7 @@ def _difference_accumulator(rng, count):
     found = DifferenceAccumulator().compute(q, first, second, np.arange(count), pixel)
     k = pixel[:, np.newaxis]
     exact = q.values + k * first.values + k * (k - 1) / 2 * second.values
-    return Sample(found.values, exact, exact)
+    return Sample(found.values, exact, exact, k)
 
 
 def _quadratic_evaluator(rng, count, form):
@@ -346,7 +373,7 @@ def _quadratic_evaluator(rng, count, form):
     found = QuadraticEvaluator(form).compute(g, p, q, length, np.arange(count), pixel)
     t = (pixel / (length - 1))[:, np.newaxis]
     exact = (g.values * t + p.values) * t + q.values
-    return Sample(found.values, exact, exact)
+    return Sample(found.values, exact, exact, pixel[:, np.newaxis])
 
 
 def _cosines(rng: np.random.Generator, count: int, exponent: int) -> np.ndarray:
@@ -364,7 +391,7 @@ def _highlight(rng, count, unit, model):
             cosine = codes / ONE_SQUARED.codes
             found = unit.compute(Fixed(unit.operand_format, codes), np.zeros(share, bool), exponent)
             exact = reflect("blinn", cosine, exponent)
-            yield Sample(found.values, exact, reflect(model, cosine, exponent))
+            yield Sample(found.values, exact, reflect(model, cosine, exponent), exponent * (1 - cosine))
 
     return _joined(samples())
 
@@ -373,8 +400,13 @@ def _diffuse(rng, count):
     unit = Diffuse()
     codes = rng.integers(-ONE * ONE, ONE * ONE + 1, count)
     codes[:3] = -ONE * ONE, 0, ONE * ONE
-    cosine = Fixed(unit.OPERAND_FORMAT, codes)
-    return Sample(unit.compute(cosine).values, np.maximum(codes / ONE**2, 0), np.maximum(cosine.values, 0))
+    cosine = Fixed(unit.operand_format, codes)
+    return Sample(
+        unit.compute(cosine).values,
+        np.maximum(codes / ONE**2, 0),
+        np.maximum(cosine.values, 0),
+        codes / ONE**2,
+    )
 
 
 def _intensity(rng, count):
@@ -395,7 +427,7 @@ def _intensity(rng, count):
         )
     weights = np.stack([np.ones(count), *(terms * 2.0**-17)])
     exact = np.minimum(255 * np.einsum("wp,wpc->pc", weights, colors[:, pick]), 255)
-    return Sample(found, exact, exact)
+    return Sample(found, exact, exact, exact)
 
 
 def _light(rng, count, model):
@@ -417,7 +449,8 @@ def _light(rng, count, model):
                 np.stack([diffuse, reflect(name, _dot(normal, halfway) / ONE**2, exponent) * ~dark])
                 for name in ("blinn", model)
             )
-            yield Sample(np.stack([Diffuse().compute(cosine).values, specular.values]), exact, formula)
+            found = np.stack([Diffuse().compute(cosine).values, specular.values])
+            yield Sample(found, exact, formula, exponent * (1 - _dot(normal, halfway) / ONE**2))
 
     return _joined(samples())
 
@@ -439,7 +472,7 @@ def _bisection(rng, count, p):
     first_step = (u > p.widest_narrow) & (p.max_angle == 90)
     formula = (left + right) * _STEP * (0.5 + _factor(p, cosine, 1 - cosine, first_step))[:, np.newaxis]
     # A factor that is too large takes a component near 1 out of the word.
-    return Sample(found.values, exact, np.clip(formula, -1, _SCALE))
+    return Sample(found.values, exact, np.clip(formula, -1, _SCALE), _degrees(left, right))
 
 
 def _chain_weights(chain: BisectionChain, cosine: np.ndarray, level: np.ndarray, limit: float):
@@ -481,7 +514,8 @@ def _bisection_chain(rng, count, chain):
         np.clip(vectors(*_chain_weights(chain, _dot(a, b), level, limit)), -1, _SCALE) for limit in limits
     )
     of_early, of_late = (np.abs(found.values - formula).max(axis=1) for formula in (early, late))
-    return Sample(found.values, exact, np.where((of_early < of_late)[:, np.newaxis], early, late))
+    formula = np.where((of_early < of_late)[:, np.newaxis], early, late)
+    return Sample(found.values, exact, formula, _degrees(left, right))
 
 
 def _adaptive_normaliser(rng, count, p):
@@ -500,11 +534,11 @@ def _adaptive_normaliser(rng, count, p):
     # slerp has the length of its left end; the last pixel has that of the right one.
     exact = np.where((t == 1)[:, np.newaxis], b, interpolate("slerp", a, b, t))
     kept = ~wide[span]
-    return Sample(found.values[kept], exact[kept] * _SCALE, lines[kept] * _SCALE)
+    angle = _degrees(left, right)[span[kept]]
+    return Sample(found.values[kept], exact[kept] * _SCALE, lines[kept] * _SCALE, angle)
 
 
-def _recurrence(rng, count, form):
-    unit = Recurrence(form)
+def _recurrence(rng, count, unit):
     length = _lengths(rng, max(count // 500, 8), 2)
     psi = np.radians(_angles(rng, len(length), 90.0))
     step = psi / (length - 1)
@@ -514,7 +548,8 @@ def _recurrence(rng, count, form):
     k = np.arange(len(states.codes))[:, np.newaxis]
     inside = k < length
     exact = (amplitude * np.cos(phase - k * step))[inside]
-    return Sample(unit.result(states).values[inside], exact, exact)
+    pixel = np.broadcast_to(k, inside.shape)[inside]
+    return Sample(unit.result(states).values[inside], exact, exact, pixel)
 
 
 def _renormaliser(rng, count):
@@ -533,14 +568,14 @@ def _renormaliser(rng, count):
     formula = value * (1 + c0 - u * (c1 - u * c2))[:, np.newaxis]
     exact = value * (_SCALE / np.sqrt(square))[:, np.newaxis]
     kept = ~outside
-    return Sample(found.values[kept], exact[kept], formula[kept])
+    return Sample(found.values[kept], exact[kept], formula[kept], np.sqrt(square)[kept, np.newaxis])
 
 
 def _arccos(rng, count, table):
     unit = Arccos(table)
     one = unit.MAGNITUDE_FORMAT.code(1)
     x = Fixed(unit.OPERAND_FORMAT, np.arange(-one, one + 1))
-    return Sample(unit.compute(x)[0].values, np.arccos(x.values), unit.polynomial(x.values))
+    return Sample(unit.compute(x)[0].values, np.arccos(x.values), unit.polynomial(x.values), x.values)
 
 
 def _half_chord(rng, count):
@@ -550,7 +585,8 @@ def _half_chord(rng, count):
     chord = np.minimum(_dot(across, across), 2 << 34)
     found = HalfChord().compute(Fixed(HalfChord.OPERAND_FORMAT, chord), obtuse)
     turns = np.arcsin(np.sqrt(chord) / (2 * ONE)) / np.pi
-    return Sample(found.values, np.where(obtuse, 0.5 - turns, turns))
+    exact = np.where(obtuse, 0.5 - turns, turns)
+    return Sample(found.values, exact, at=360 * exact)
 
 
 def _highlight_cosine(rng, count, unit):
@@ -567,18 +603,20 @@ def _highlight_cosine(rng, count, unit):
         Fixed(unit.COS_BETA_FORMAT, beta),
     )
     found = unit.compute(*words, np.arange(count), pixel)
-    exact = 1 - beta * 2.0**-25 * np.cos(2 * np.pi * (phase - pixel * step) / 2.0**40)
-    return Sample(found.values, np.minimum(exact, unit.RESULT_FORMAT.max_code * unit.RESULT_FORMAT.step))
+    turns = (phase - pixel * step) / 2.0**40
+    exact = 1 - beta * 2.0**-25 * np.cos(2 * np.pi * turns)
+    exact = np.minimum(exact, unit.RESULT_FORMAT.max_code * unit.RESULT_FORMAT.step)
+    return Sample(found.values, exact, at=360 * (turns % 1))
 
 
-def _angular_setup(rng, count):
+def _angular_setup(rng, count, unit):
     left, right = _ends(rng, count, 150.0)
     vector = _sphere(rng, count)
     vector[::2] = normalise((0.7 * left + 0.3 * right)[::2] / ONE + vector[::2] * 1e-3)
     vector = quantise(vector)
     length = _lengths(rng, count, 2)
     pixel = _pixels(rng, length)
-    _, phase, step, cos_beta, _ = AngularSetup().compute(*_vectors(left, right, vector), length)
+    _, phase, step, cos_beta, _ = unit.compute(*_vectors(left, right, vector), length)
     found = cos_beta.values * np.cos(2 * np.pi * (phase.values - pixel * step.values))
     a, b = (_dot(normal, vector) / ONE**2 for normal in (left, right))
     chord, across = (_dot(v, v) / ONE**2 for v in (right - left, right + left))
@@ -588,11 +626,65 @@ def _angular_setup(rng, count):
     cosine = np.where(acute, np.sqrt(np.maximum(1 - chord / 4, 0)), np.sqrt(across) / 2)
     y = np.divide(_dot(right - left, vector) / ONE**2 / 2, sine, out=np.zeros(count), where=sine > 0)
     turned = (pixel / (length - 1) - 0.5) * 2 * np.arctan2(sine, cosine)
-    return Sample(found, (a + b) / 2 / cosine * np.cos(turned) + y * np.sin(turned))
+    exact = (a + b) / 2 / cosine * np.cos(turned) + y * np.sin(turned)
+    return Sample(found, exact, at=_degrees(left, right)[:, 0])
 
 
-def _pipeline(rng, count, model):
-    design = ShadingPipeline(model=model)
+def _chord(rng, count):
+    left, right = _ends(rng, count, 180.0)
+    exact = _dot(right - left, right - left) / 2 * _STEP**2
+    found = Chord().operand(*_vectors(left, right)).values
+    limit = Chord.ARGUMENT_FORMAT.max_code * Chord.ARGUMENT_FORMAT.step
+    return Sample(found, np.minimum(exact, limit), at=_degrees(left, right)[:, 0])
+
+
+def _interpolator(rng, count, method):
+    """``1 - N.H`` along spans."""
+    p = METHODS[method]
+    length = rng.integers(1, 64, max(count // 32, 8))
+    length[:4] = 1, 2, 4094, 4095
+    left, right = _ends(rng, len(length), min(p.MAX_ANGLE, 45.0))
+    vector = quantise(_sphere(rng, 1))
+    normals = _vectors(left, right)
+    operands = p.compute(*normals, length, *_vectors(vector, vector))
+    highlight = operands.highlight.values[:, 0]
+    found = highlight if p.operand == "one_minus_cosine" else ONE_SQUARED.values - highlight
+    span, pixel = pixels_of(length)
+    t = pixel / np.maximum(length - 1, 1)[span]
+    ends = [normalise(end / ONE)[span] for end in (left, right)]
+    vector = normalise(vector[0] / ONE)
+    exact, formula = (
+        1 - normals @ vector for normals in (interpolate("normalised", *ends, t), p.exact_normals(*ends, t))
+    )
+    kept = ~operands.wide[span]
+    return Sample(found[kept], exact[kept], formula[kept], _degrees(left, right)[span[kept], 0])
+
+
+def _chord_setup(rng, count):
+    """U and N.L at any pixel that the differences lead to."""
+    length = _lengths(rng, count, 2)
+    left, right = _ends(rng, count, ChordSetup.MAX_ANGLE)
+    light, halfway = quantise(_sphere(rng, 2))
+    pixel = _pixels(rng, length)
+    diffuse, highlight, _ = ChordSetup().compute(
+        *_vectors(left, right, light[np.newaxis], halfway[np.newaxis]), length
+    )
+    t = pixel / (length - 1)
+    ends = [normalise(end / ONE) for end in (left, right)]
+    normals = interpolate("quadratic", *ends, t)
+    exact = [normals @ normalise(light / ONE), 1 - normals @ normalise(halfway / ONE)]
+    k = pixel.astype(np.float64)
+    found = [
+        (w.start.values + k[:, np.newaxis] * w.first.values)[:, 0] + (k * (k - 1) / 2) * w.second.values[:, 0]
+        for w in (diffuse, highlight)
+    ]
+    exact = np.stack(exact)
+    return Sample(np.stack(found), exact, exact, _degrees(left, right)[:, 0])
+
+
+def _pipeline(rng, count, method, model):
+    design = ShadingPipeline(method, model)
+    interpolator = design.interpolator
     reflection = {"ambient": 0.1, "diffuse": 0.5, "specular": 0.4}
     ambient, k_d, k_s = reflection.values()
 
@@ -601,7 +693,8 @@ def _pipeline(rng, count, model):
             length = rng.integers(2, 200, max(count // 400, 4))
             light, viewer = normalise(np.array([[-0.5, 0.8, 0.7], [0, 0, 1.0]]))
             light, halfway = quantise(light), quantise(normalise(light + viewer))
-            angles = rng.permutation(_angles(rng, len(length), MAX_SPAN_ANGLE))
+            widest = min(interpolator.widest_span(exponent), MAX_SPAN_ANGLE)
+            angles = rng.permutation(_angles(rng, len(length), widest))
             left = _turned(rng, np.tile(normalise(halfway / ONE), (len(length), 1)), rng.permutation(angles))
             left, right = quantise(left), quantise(_turned(rng, left, angles))
             grey = {name: np.tile(Intensity.color(k), 3) for name, k in reflection.items()}
@@ -615,17 +708,21 @@ def _pipeline(rng, count, model):
             )
             place = np.zeros_like(length)
             found = design.compute(Spans(place, place, length, left, right), constants).color[:, 0]
-            span = np.repeat(np.arange(len(length)), length)
-            t = (np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)) / (length - 1)[span]
+            span, pixel = pixels_of(length)
+            t = pixel / (length - 1)[span]
+            ends = [normalise(end / ONE)[span] for end in (left, right)]
             shades = []
-            for curve, name in (("normalised", "blinn"), ("quadratic", model)):
-                normal = interpolate(curve, *(normalise(end / ONE)[span] for end in (left, right)), t)
+            for normal, name in (
+                (interpolate("normalised", *ends, t), "blinn"),
+                (interpolator.exact_normals(*ends, t), model),
+            ):
                 cosine = normal @ light / ONE
                 highlight = reflect(name, normal @ halfway / ONE, exponent) * (cosine > 0)
                 shades.append(255 * np.minimum(ambient + k_d * np.maximum(cosine, 0) + k_s * highlight, 1))
             # Behind the light the highlight is cut off at once, wherever rounding puts that.
             kept = cosine > 1 / 16
-            yield Sample(found[kept].astype(np.float64), shades[0][kept], shades[1][kept])
+            angle = _degrees(left, right)[span[kept], 0]
+            yield Sample(found[kept].astype(np.float64), shades[0][kept], shades[1][kept], angle)
 
     return _joined(samples())
 
@@ -636,23 +733,73 @@ _SPANS_45 = "spans to 45 degrees"
 _HIGHLIGHTS = "n 1 to 1000, N.H 0 to 1"
 _LONG = "2 to 4095 pixels"
 _Z_AXIS = [0, 0, ONE]
+_SPAN = {"normal_left": _Z_AXIS, "normal_right": _Z_AXIS, "length": 64}
+_METHOD_SOURCES = dict.fromkeys(METHODS, "[T] 2.2") | {
+    "linear": "[T] 2.1",
+    "bisection": "[T] 2.7",
+    "angular": "[T] 3.1",
+    "recurrence": "[T] 3.3",
+    "renormalise": "numbers.md",
+    "chord": "chord.md",
+}
+
+_AXES = {
+    "dot_product": ("a · b", False),
+    "difference_setup": ("pixel of the span", True),
+    "difference_accumulator": ("pixel of the span", True),
+    "quadratic_evaluator": ("pixel of the span", True),
+    "recurrence": ("pixel of the span", True),
+    "renormaliser": ("length of the vector", False),
+    "arccos": ("x", False),
+    "half_chord": ("angle, degrees", False),
+    "highlight_cosine": ("angle, degrees", False),
+    "diffuse": ("N · L", False),
+    "specular": ("n (1 - cos γ)", True),
+    "power": ("n (1 - cos γ)", True),
+    "light": ("n (1 - cos γ)", True),
+    "intensity": ("exact sum, LSB", False),
+}
+"""What errors are drawn against, and whether by its logarithm; where nothing is said, the span's angle."""
 
 
 def _blocks() -> Iterator[Block]:
     yield Block(
         "dot_product", "", "[T] 2.5", DotProductUnit, _dot_product, "all vectors of SQ(1, 17)", note="exact"
     )
-    yield Block("middle_normal", "", "[T] 2.2", MiddleNormalUnit, _middle_normal, _SPANS_45)
-    yield Block("gpq", "", "[T] 2.8", GPQUnit, _gpq, _SPANS_45, note="exact")
+    for fit in MIDDLE_NORMAL_FITS:
+        unit = MiddleNormal(fit)
+        yield Block(
+            "middle_normal",
+            fit,
+            "[T] 2.2",
+            lambda unit=unit: MiddleNormalUnit(unit),
+            partial(_middle_normal, unit=unit),
+            _SPANS_45,
+        )
     yield Block(
-        "difference_setup",
-        "",
-        "[T] 2.11",
-        DifferenceSetupUnit,
-        _difference_setup,
-        f"{_SPANS_45}, {_LONG}",
-        note="of the curve at any pixel that the differences lead to",
+        "middle_normal",
+        "exact, interval 1",
+        "[T] 2.2",
+        lambda: MiddleNormalUnit(initiation_interval=1),
+        partial(_middle_normal, unit=MiddleNormal()),
+        _SPANS_45,
     )
+    yield Block("gpq", "", "[T] 2.8", GPQUnit, _gpq, _SPANS_45, note="exact")
+    for variant, documented, interval in (
+        ("", False, None),
+        ("interval 1", False, 1),
+        ("documented", True, None),
+    ):
+        unit = DifferenceSetup(documented)
+        yield Block(
+            "difference_setup",
+            variant,
+            "[T] 2.11",
+            lambda unit=unit, interval=interval: DifferenceSetupUnit(unit, interval),
+            partial(_difference_setup, unit=unit),
+            f"{_SPANS_45}, {_LONG}",
+            note="of the curve at any pixel that the differences lead to",
+        )
     yield Block(
         "difference_accumulator",
         "",
@@ -705,7 +852,7 @@ def _blocks() -> Iterator[Block]:
             lambda p=p: AdaptiveNormaliserUnit(p),
             partial(_adaptive_normaliser, p=p),
             "spans to 90 degrees, 1 to 4095 pixels",
-            beat={"normal_left": _Z_AXIS, "normal_right": _Z_AXIS, "length": 64},
+            beat=_SPAN,
             note="model: straight lines; the bisection's fit counts as arithmetic; latency of equal normals",
         )
     yield Block("renormaliser", "", "numbers.md", RenormaliserUnit, _renormaliser, "lengths 0.685 to 1.0155")
@@ -733,29 +880,34 @@ def _blocks() -> Iterator[Block]:
             "all angles, cos beta 0 to 1",
             beat={"length": 64},
         )
-    yield Block(
-        "angular_setup",
-        "",
-        "[T] 3.1",
-        AngularSetupUnit,
-        _angular_setup,
-        f"spans to 150 degrees, {_LONG}",
-        note="of cos gamma at any pixel",
-    )
-    for form in RECURRENCE_FORMS:
+    setups = {"half chord": AngularSetup()}
+    setups |= {f"arccos {table}": AngularSetup("arccos", Arccos(table)) for table in ARCCOS_TABLES}
+    for variant, unit in setups.items():
         yield Block(
-            "recurrence",
-            form,
-            "[T] 3.5",
-            lambda form=form: RecurrenceUnit(Recurrence(form)),
-            partial(_recurrence, form=form),
-            f"spans to 90 degrees, {_LONG}",
-            beat={"length": 64},
+            "angular_setup",
+            variant,
+            "[T] 3.1",
+            lambda unit=unit: AngularSetupUnit(unit),
+            partial(_angular_setup, unit=unit),
+            f"spans to 150 degrees, {_LONG}",
+            note="of cos gamma at any pixel",
         )
+    for form in RECURRENCE_FORMS:
+        for interleave in (1, 4):
+            unit = Recurrence(form, interleave=interleave)
+            yield Block(
+                "recurrence",
+                form + ", interleaved" * (interleave > 1),
+                "[T] 3.5",
+                lambda unit=unit: RecurrenceUnit(unit),
+                partial(_recurrence, unit=unit),
+                f"spans to 90 degrees, {_LONG}",
+                beat={"length": 64},
+            )
     yield Block("diffuse", "", "[B] 4", DiffuseUnit, _diffuse, "N.L -1 to 1")
     sources = dict.fromkeys(SPECULAR_MODELS + FURTHER_MODELS, "Lyon 1993")
     sources |= {"cosquad": "[T] 3.6", "cosquad7": "[T] 3.7", "cosquad_lin": "[C]", "cosquad_q": "[C]"}
-    sources |= {"exp": "models.md"}
+    sources |= {"exp": "models.md", **dict.fromkeys(COSCOS_MODELS, "[T] 3.1")}
     for model, source in sources.items():
         yield Block(
             "specular",
@@ -764,6 +916,25 @@ def _blocks() -> Iterator[Block]:
             lambda model=model: SpecularUnit(Specular(model)),
             partial(_highlight, unit=Specular(model), model=model),
             _HIGHLIGHTS,
+        )
+    yield Block(
+        "specular",
+        "cosquad, interval 2",
+        sources["cosquad"],
+        lambda: SpecularUnit(initiation_interval=2),
+        partial(_highlight, unit=Specular(), model="cosquad"),
+        _HIGHLIGHTS,
+    )
+    for model in SPECULAR_MODELS:
+        unit = Specular(model, as_documented=True)
+        yield Block(
+            "specular",
+            f"{model}, documented",
+            sources[model],
+            lambda unit=unit: SpecularUnit(unit),
+            partial(_highlight, unit=unit, model=model),
+            _HIGHLIGHTS,
+            note="comparator on the square, so that the parabola's second lobe shows",
         )
     for form in ("pipelined", "sequential"):
         yield Block(
@@ -786,29 +957,80 @@ def _blocks() -> Iterator[Block]:
         "all spans",
         note="suppresses no lit pixel",
     )
-    yield Block("intensity", "1 light", "[T] 4.10", IntensityUnit, _intensity, "all terms", "LSB")
-    for model in METHODS["quadratic"]:
+    for style in ("throughput", "compact"):
+        yield Block(
+            "intensity",
+            f"1 light, {style}",
+            "[T] 4.10",
+            lambda style=style: IntensityUnit(style=style),
+            _intensity,
+            "all terms",
+            "LSB",
+        )
+    yield Block("chord", "", "chord.md", ChordUnit, _chord, "angles 0 to 180 degrees")
+    for interval in (1, 4, 26):
+        yield Block(
+            "chord_setup",
+            f"interval {interval}",
+            "chord.md",
+            lambda interval=interval: ChordSetupUnit(1, interval),
+            _chord_setup,
+            f"spans to 22.5 degrees, {_LONG}",
+            note="of N.L and u at any pixel that the differences lead to",
+        )
+    yield Block(
+        "recurrence_setup",
+        "interval 4",
+        "[T] 3.3",
+        RecurrenceSetupUnit,
+        None,
+        "spans to 90 degrees, 1 to 4095 pixels",
+        note="its errors are those of recurrence_interpolator",
+    )
+    for method, p in METHODS.items():
+        unit = INTERPOLATORS[type(p)]
+        yield Block(
+            unit.__module__.removeprefix("hdl."),
+            method,
+            _METHOD_SOURCES[method],
+            lambda unit=unit, p=p: unit(p, 1),
+            partial(_interpolator, method=method),
+            f"spans to {min(p.MAX_ANGLE, 45):g} degrees, 1 to 4095 pixels",
+            beat=_SPAN,
+            note="of 1 - N.H, one light; exact: normalised interpolation",
+        )
+    designs = [("quadratic", model) for model in SPECULAR_MODELS]
+    designs += [(method, "cosquad") for method in METHODS if method != "quadratic"]
+    designs += [("chord", "exp"), ("chord", "blinn")]
+    for method, model in designs:
         yield Block(
             "pipeline",
-            f"{model}, 1 light",
+            f"{method}, {model}",
             "[T] 4.10",
-            lambda model=model: ShadingPipelineUnit(ShadingPipeline(model=model)),
-            partial(_pipeline, model=model),
-            f"{_SPANS_45}, n 1 to 1000, N.L > 1/16",
+            lambda method=method, model=model: ShadingPipelineUnit(ShadingPipeline(method, model)),
+            partial(_pipeline, method=method, model=model),
+            "spans to what the method asks for, 45 degrees at most, n 1 to 1000, N.L > 1/16",
             "LSB",
-            beat={"length": 64},
-            note="against normalised Phong interpolation with Blinn's power",
+            beat=_SPAN,
+            note="one light, against normalised Phong interpolation with Blinn's power",
         )
 
 
-BLOCKS: tuple[Block, ...] = tuple(_blocks())
+def _with_axis(block: Block) -> Block:
+    if block.measure is None:
+        return block
+    axis, logarithmic = _AXES.get(block.device, ("angle of the span, degrees", False))
+    return replace(block, axis=axis, logarithmic=logarithmic)
+
+
+BLOCKS: tuple[Block, ...] = tuple(map(_with_axis, _blocks()))
 """Every device and variant, in the order of the table."""
 
 
 def _times(block: Block, unit: Component) -> tuple[int, int]:
     """Latency, and clocks from a result to the next: stated by the unit, else found by simulation."""
     latency = getattr(unit, "latency", None)
-    interval = getattr(unit, "initiation_interval", None)
+    interval = getattr(unit, "initiation_interval", getattr(unit, "clocks_per_pixel", None))
     if isinstance(latency, int) and isinstance(interval, int):
         return latency, interval
     beats = np.zeros(3, dtype_of(unit.i.payload.shape()))
@@ -831,12 +1053,19 @@ def rows(blocks: Sequence[Block] = BLOCKS, samples: int = SAMPLES, seed: int = S
         Of the operands. Every entry starts from it, so that a line does not depend on the others.
     """
     for block in blocks:
-        count, errors = 0, (None, None, None)
-        if block.measure:
-            sample = block.measure(np.random.default_rng(seed), samples)
-            count, errors = np.size(sample.found), sample.errors
-        unit = block.unit()
-        yield Row(block, count, errors, *_times(block, unit), cost_of(unit))
+        yield row_of(block, sample_of(block, samples, seed))
+
+
+def sample_of(block: Block, samples: int = SAMPLES, seed: int = SEED) -> Sample | None:
+    """Measure an entry; `None` where it has no number as its result."""
+    return block.measure(np.random.default_rng(seed), samples) if block.measure else None
+
+
+def row_of(block: Block, sample: Sample | None) -> Row:
+    """Line of an entry whose errors have been measured."""
+    count, errors = (0, (None, None, None)) if sample is None else (np.size(sample.found), sample.errors)
+    unit = block.unit()
+    return Row(block, count, errors, *_times(block, unit), cost_of(unit))
 
 
 _HEAD = (
@@ -863,7 +1092,8 @@ def _figure(error: float | None) -> str:
     return f"{error:.1e}".replace("e-0", "e-")
 
 
-def _cells(row: Row) -> tuple[str, ...]:
+def cells_of(row: Row) -> tuple[str, ...]:
+    """A line's cells, as the printed table has them."""
     cost = row.cost
     errors = map(_figure, row.errors)
     widths = sorted(cost.multipliers.items(), reverse=True)
@@ -883,7 +1113,7 @@ def _cells(row: Row) -> tuple[str, ...]:
 
 def table(lines: Sequence[Row]) -> str:
     """The table as aligned text."""
-    cells = [_HEAD, *map(_cells, lines)]
+    cells = [_HEAD, *map(cells_of, lines)]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     left = {0, 1, 2, 3, len(_HEAD) - 1}
     return "\n".join(

@@ -28,7 +28,15 @@ class AdaptiveNormaliser:
     its segment j, exact by integer arithmetic, whatever m; the first pixel of a segment starts at
     ``E_j + phi (E_(j+1) - E_j)``, phi its fractional part, and every further one adds
     ``(E_(j+1) - E_j) 2^k/(m - 1)``. The last pixel is a segment of its own, so that both ends come out as
-    they went in. (The documents take segments of whole pixels and extrapolate the end.)
+    they went in.
+
+    The documents extrapolate instead: ``N_l + g (N_r - N_l)`` stands for the pixel at the next power of two,
+    g = 2^p/(m - 1), so that segments are whole pixels and divisions shifts. That is no variant here, because
+    it does not fit the bisection unit. The new end is not of unit length (up to 1.03 for 10 degrees, 1.47
+    for 45) and does not fit the word; `Renormaliser` has eight multipliers, this whole unit three; and 90
+    degrees become up to 116, too wide to bisect. Even normalised it stands on the chord's continuation, not
+    where the great circle has its pixel, so that the last pixel misses N_r, by up to 0.00015 degrees for 1,
+    0.15 for 10 and 8.2 for 45. Here it misses by nothing.
 
     A span wider than the bisection's `max_angle` is flagged and not divided: its normals lie on the straight
     line between its ends (for ends further apart than 1 in a component, near the left one), and mean nothing

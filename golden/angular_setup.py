@@ -1,19 +1,23 @@
 """Angular setup ([T] 3.1): the great circle of a span as seen from a fixed vector."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
-from .arccos import HalfChord
+from .arccos import SEGMENT_BOUNDS, Arccos, HalfChord
 from .difference_setup import DifferenceSetup, reciprocal_place
 from .dot_product import DotProduct
 from .fixed import SQ, UQ, Fixed, Format
 from .highlight_cosine import HighlightCosine
 from .unit_vector import COMPONENT, ONE_SQUARED
 
-__all__ = ["AngularSetup"]
+__all__ = ["SPAN_ANGLES", "AngularSetup"]
+
+SPAN_ANGLES = ("half_chord", "arccos")
+"""Units that psi may come from."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +63,40 @@ class AngularSetup:
     above in exact arithmetic on the same codes: `error`. Largest found: 5e-7 up to 0.1 degrees, 9e-7 at 1,
     3e-6 at 10, 1.3e-5 at 45, 3.3e-5 from 90 on.
 
+    **By arccos**, as drawn: ``angle="arccos"`` takes psi from `Arccos` on ``N_l.N_r``, the square of the code
+    of length 1 divided out by ``r + r/2^16``, rounded to SQ(2, 16). psi is rounded to UQ(2, 15) radians and
+    brought to turns by a product with ``1/(2 pi)`` in UQ(-2, 19); ``psi/(m-1)`` reads the first 17 bits of
+    it. x and y stay as above (the printed ``tan lambda`` is 0/0 for equal normals), so that what is lost is
+    what arccos loses: `arccos_error`. Largest error of cos gamma found, by the span angle in degrees:
+
+    ================= ====== ====== ====== ======
+    psi from          1e-4   1      10     45
+    ================= ====== ====== ====== ======
+    half chord        5.0e-7 7.4e-7 3.8e-6 1.3e-5
+    arccos, refitted  0.0095 0.0012 0.0049 2.6e-4
+    arccos, corrected 0.042  0.034  3.5e-4 5.0e-4
+    arccos, printed   0.088  0.078  0.045  5.0e-4
+    ================= ====== ====== ====== ======
+
     The vectors must be of unit length to within their rounding; words of others saturate or wrap.
+
+    Parameters
+    ----------
+    angle : str
+        One of `SPAN_ANGLES`.
+    arccos : Arccos
+        Table of ``"arccos"``.
+
+    Raises
+    ------
+    ValueError
+        If the angle's unit is unknown.
 
     Source: [T] 3.1; blocks.md, "Highlight-cosine unit".
     """
+
+    angle: Literal["half_chord", "arccos"] = "half_chord"
+    arccos: Arccos = field(default_factory=Arccos)
 
     CHORD_FORMAT = HalfChord.OPERAND_FORMAT
     CORRECTION_FORMAT = UQ(-1, 18)
@@ -84,10 +118,16 @@ class AngularSetup:
     FRACTION_BITS = 14
     CORDIC_STEPS = 22
     GAIN_BITS = 30
+    RADIANS_FORMAT = UQ(2, 15)
+    TURNS_PER_RADIAN = Fixed.round(UQ(-2, 19), 1 / (2 * np.pi))
+
+    def __post_init__(self):
+        if self.angle not in SPAN_ANGLES:
+            raise ValueError(f"angle must be {' or '.join(SPAN_ANGLES)}, not {self.angle!r}")
 
     @staticmethod
     def error(angle: np.ndarray) -> np.ndarray:
-        """Bound of the error of cos gamma, by the span angle in degrees.
+        """Bound of the error of cos gamma with the half chord, by the span angle in degrees.
 
         x has the correction's errors (fit 2.5e-7, table 2^-22, rounding 2^-19), times at most 1, and the
         cut of its factor, 2^-18 times 0.42; y has the rounding of its factor, 2^-17, and twice T's errors
@@ -104,6 +144,29 @@ class AngularSetup:
         ends = ends + 2 * half * (2.0**-19 / 0.159 + 2.0**-17)
         acute = half <= np.pi / 4 * (1 + 1e-6)
         return x + np.where(acute, np.sin(half), 1) * y + cordic + ends + 2 * np.pi * 4095 * 2.0**-40
+
+    def arccos_error(self, angle: float) -> float:
+        """Bound of the error of cos gamma with ``angle="arccos"``, for one span angle in degrees.
+
+        To `error` come the error of psi, half of which counts at either end, times cos beta, and the rounding
+        of psi for its step, 2^-19 turns. cos beta is at most 1, and a length that differs by 2^-17 adds its
+        quotient by the chord, up to sqrt 2. The cosine is off by 2^-17, its rounding, and by 2^-18 for either
+        length; psi has that, by arccos itself; the largest model error of the segments that such a cosine
+        may fall into, and their arithmetic error; 2^-16 for its last rounding and a relative ``2^-20 2 pi``
+        for that of ``1/(2 pi)``.
+        """
+        psi = np.radians(angle)
+        around = np.clip(np.cos(psi) + np.array([-1, 0, 1]) * (2.0**-16 + 2.0**-30), -1, 1)
+        segments = self.arccos._segment(np.abs(around), SEGMENT_BOUNDS[1:-1])
+        x = np.linspace(SEGMENT_BOUNDS[:-1], SEGMENT_BOUNDS[1:], 20001, axis=1)
+        x[:, -1] -= 2.0**-40
+        model = np.abs(self.arccos.polynomial(x) - np.arccos(x)).max(axis=1)
+        table = (model + self.arccos.arithmetic_error)[segments.min() : segments.max() + 1].max()
+        off = np.abs(np.arccos(around) - psi).max() + table + 2.0**-16
+        off += (psi + off) * 2.0**-20 * 2 * np.pi
+        chord = 2 * min(np.sin(psi / 2), np.cos(psi / 2))
+        cos_beta = min(1 + 2.0**-17 / max(chord, 2.0**-18), np.sqrt(2))
+        return self.error(angle) + cos_beta * (off / 2 + 2 * np.pi * 2.0**-19 + off * 2.0**-17)
 
     @cached_property
     def corrections(self) -> tuple[Fixed, Fixed]:
@@ -215,13 +278,23 @@ class AngularSetup:
         x, y = np.where(obtuse, y, x), np.where(obtuse, x, y)
         radius, direction = self._polar(x, y)
 
-        angle = HalfChord().compute(chord, obtuse)
+        if self.angle == "half_chord":
+            angle, angle_shift = HalfChord().compute(chord, obtuse), np.where(obtuse, 0, shift)
+        else:
+            angle, angle_shift = self._by_arccos(cross), np.zeros_like(shift)
         cos_beta = sum(sign * (radius << 4 >> places) for sign, places in self.gain_terms)
         cos_beta = Fixed(SQ(4, self.GAIN_BITS), cos_beta).round_half_up(25).saturate(self.COS_BETA_FORMAT)
         half = angle.scale(-1).extend(UQ(0, 40))
         phase = (direction.extend(self.PHASE_FORMAT) + half).wrap(self.PHASE_FORMAT)
-        step = self._step(angle, np.where(obtuse, 0, shift), length)
+        step = self._step(angle, angle_shift, length)
         return angle, phase, step, cos_beta, obtuse & (chord.codes == 0)
+
+    def _by_arccos(self, cross: Fixed) -> Fixed:
+        """Psi in turns, from the exact dot product of the normals."""
+        cosine = Fixed(cross.format, cross.codes + (cross.codes >> 16)).round_half_up(16)
+        radians, _ = self.arccos.compute(cosine.saturate(Arccos.OPERAND_FORMAT))
+        radians = radians.round_half_up(15).saturate(self.RADIANS_FORMAT)
+        return (radians * self.TURNS_PER_RADIAN).extend(self.ANGLE_FORMAT)
 
     @staticmethod
     def _shift(chord: Fixed) -> np.ndarray:

@@ -37,6 +37,10 @@ class Bisection:
     A span wider than `max_angle` by more than the rounding of its normals is flagged; its result means
     nothing.
 
+    Ends that are no unit vectors: of length ``1 + x`` they give a middle of length ``1 + x/(1 + r)``, so up
+    to 45 degrees a half to 0.59 of the error is left. An end of length 0 is taken for one at 90 degrees:
+    flagged where `max_angle` is 45, else the result is 0.7071 times the other end.
+
     ============= ========== ================================================================
     word          format     why
     ============= ========== ================================================================

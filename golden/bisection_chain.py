@@ -55,6 +55,9 @@ class BisectionChain:
     With the documented coefficients of degree 2 the errors stay: every factor of a small angle is 0.2 % too
     small, and l tends to 0.9973 in place of 1.
 
+    Ends of length ``1 + x`` give normals whose length is off by x/2 to x; an end of length 0 is taken for one
+    at 90 degrees, as in `Bisection`.
+
     Parameters
     ----------
     bisection : Bisection

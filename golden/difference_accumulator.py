@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .difference_setup import DifferenceSetup
-from .fixed import Fixed
+from .fixed import Fixed, Format
 from .unit_vector import COMPONENT
 
 __all__ = ["DifferenceAccumulator"]
@@ -22,6 +22,8 @@ class DifferenceAccumulator:
     normal SQ(1, 17)    18 bits for the multipliers that follow
     ====== ============ =====================================================================
 
+    These are the formats of a component of a normal; the parameters make it serve other quadratics.
+
     Half a step of the output is added to N once, at the start, so that rounding half up is a cut; a value
     past the end of ``SQ(1, 17)`` saturates. The sums themselves are exact. Up to 45 degrees no value that is
     used leaves ``SQ(2, 42)``; a wider, flagged span may wrap there.
@@ -30,20 +32,33 @@ class DifferenceAccumulator:
     it saturates. Drift
     from the rounding of the differences is bounded in `DifferenceSetup`.
 
+    Parameters
+    ----------
+    start_format : Format
+        Of the first value Q.
+    format : Format
+        Of the sum N.
+    difference_format : Format
+        Of W and the second difference.
+    result_format : Format
+        Of a pixel's value.
+
     Source: [T] figure 2.10; numbers.md, "Recurrences in fixed point".
     """
 
-    FORMAT = DifferenceSetup.FORMAT
-    RESULT_FORMAT = COMPONENT
+    start_format: Format = COMPONENT
+    format: Format = DifferenceSetup.FORMAT
+    difference_format: Format = DifferenceSetup.FORMAT
+    result_format: Format = COMPONENT
 
     def compute(self, start: Fixed, first: Fixed, second: Fixed, span: np.ndarray, step: np.ndarray) -> Fixed:
         """Bit-true normals, in closed form.
 
         Parameters
         ----------
-        start : Fixed, shape (spans, 3), SQ(1, 17)
-            Normals at the first pixel.
-        first, second : Fixed, shape (spans, 3), SQ(2, 42)
+        start : Fixed, shape (spans, components), `start_format`
+            Values at the first pixel.
+        first, second : Fixed, shape (spans, components), `difference_format`
             Differences.
         span : int array, shape (pixels,)
             Span of each pixel.
@@ -52,24 +67,27 @@ class DifferenceAccumulator:
 
         Returns
         -------
-        Fixed, shape (pixels, 3), SQ(1, 17)
+        Fixed, shape (pixels, components), `result_format`
 
         Raises
         ------
         ValueError
             If an operand has another format.
         """
-        if (start.format, first.format, second.format) != (COMPONENT, self.FORMAT, self.FORMAT):
-            raise ValueError(f"operands must be {COMPONENT}, {self.FORMAT}, {self.FORMAT}")
-        shift = self.FORMAT.fraction_bits - COMPONENT.fraction_bits
+        wanted = (self.start_format, self.difference_format, self.difference_format)
+        if (start.format, first.format, second.format) != wanted:
+            raise ValueError(f"operands must be {', '.join(map(str, wanted))}")
+        fraction_bits = self.format.fraction_bits
+        shift = fraction_bits - self.start_format.fraction_bits
         step = np.asarray(step, dtype=np.int64)[:, np.newaxis]
-        # An int64 wraps modulo 2^64, the hardware modulo 2^44: the low 44 bits agree whatever the size.
+        # An int64 wraps modulo 2^64, the hardware modulo its width: the low bits agree whatever the size.
         total = (
             (start.codes[span] << shift)
-            + (1 << (shift - 1))
+            + (1 << (fraction_bits - self.result_format.fraction_bits - 1))
             + step * first.codes[span]
             + step * (step - 1) // 2 * second.codes[span]
         )
-        width = self.FORMAT.width
+        width = self.format.width
         total = ((total & ((1 << width) - 1)) ^ (1 << (width - 1))) - (1 << (width - 1))
-        return Fixed(self.FORMAT, total).truncate(COMPONENT.fraction_bits).saturate(COMPONENT)
+        result = self.result_format
+        return Fixed(self.format, total).truncate(result.fraction_bits).saturate(result)

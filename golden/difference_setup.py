@@ -68,10 +68,25 @@ class DifferenceSetup:
 
     A span of one pixel has no dt; it gets dt = 1, which nothing reads.
 
+    With ``as_documented`` the order of figure 2.11 is kept, ``W_0 = (G dt + P) dt`` and ``2 (G dt) dt``: nine
+    products in place of seven. With ``dt = 2 f' 2^-s``, f' the word of the table, ``G f'`` is rounded to
+    ``SQ(0, 18)``, and ``G dt + P`` to ``SQ(1, 17)``, where it saturates; it is the mean slope of the first
+    step, under 0.84 up to 45 degrees. dt^2 then is the square of the same dt, off by 2^-16 + 2^-34.
+    Over the span the end moves by under ``2^-17 |P| + (2^-16 + 2^-34) |G|``, 2^-18 for the rounding of
+    ``G dt + P``, 2^-18 for that of ``G f'`` (each with 2^-17 of it), and the rounding of the differences.
+
+    Parameters
+    ----------
+    as_documented : bool
+        Keep the order of the products of [T].
+
     Source: [T] 2.3, figure 2.11; numbers.md, "Recurrences in fixed point".
     """
 
+    as_documented: bool = False
+
     RECIPROCAL_FORMAT = UQ(0, 17)
+    SLOPE_FORMAT = SQ(0, 18)
     FORMAT = SQ(2, 42)
     LENGTH_BITS = LENGTH_BITS
 
@@ -107,20 +122,47 @@ class DifferenceSetup:
             )
         if length.size and not 1 <= length.min() <= length.max() < 1 << self.LENGTH_BITS:
             raise ValueError(f"lengths must be 1 to {(1 << self.LENGTH_BITS) - 1}")
-        # dt = 2 * reciprocal * 2**-shift
-        address, shift = reciprocal_place(length - 1)
-        reciprocal = self.reciprocals[address]
-        square = reciprocal * reciprocal
-        small = square < Fixed(UQ(0, 1), 1)
-        square = (
-            Fixed(square.format, square.codes << small).round_half_up(17).saturate(self.RECIPROCAL_FORMAT)
-        )
+        reciprocal, shift, square, square_shift = self.steps(length)
+        if self.as_documented:
+            bend = g.extend(COMPONENT) * Fixed(reciprocal.format, reciprocal.codes[:, np.newaxis])
+            bend = bend.round_half_up(18).wrap(self.SLOPE_FORMAT)
+            step = Fixed(SQ(1, 29), (bend.codes << 12) >> shift[:, np.newaxis])
+            slope = (step + p).round_half_up(17).saturate(COMPONENT)
+            second_order = self._shifted(bend.scale(1), reciprocal, 2 * shift + 1)
+            return (
+                self._shifted(slope, reciprocal, shift + 1),
+                second_order.scale(1).extend(SQ(3, 42)).wrap(self.FORMAT),
+            )
         first_order = self._shifted(p, reciprocal, shift + 1)
-        second_order = self._shifted(g.extend(COMPONENT), square, 2 * shift + small)
+        second_order = self._shifted(g.extend(COMPONENT), square, square_shift)
         return (
             (first_order + second_order).wrap(self.FORMAT),
             second_order.scale(1).extend(SQ(3, 42)).wrap(self.FORMAT),
         )
+
+    def steps(self, length: np.ndarray) -> tuple[Fixed, np.ndarray, Fixed, np.ndarray]:
+        """Bit-true ``dt = 2 reciprocal 2^-shift`` and ``dt^2 = 4 square 2^-square_shift``.
+
+        Parameters
+        ----------
+        length : int64 array, any shape
+            Pixels, 1 to 4095.
+
+        Returns
+        -------
+        reciprocal : Fixed, same shape, UQ(0, 17)
+        shift : int64 array, same shape
+            0 to 12.
+        square : Fixed, same shape, UQ(0, 17)
+        square_shift : int64 array, same shape
+            0 to 25.
+        """
+        address, shift = reciprocal_place(length - 1)
+        reciprocal = self.reciprocals[address]
+        square = reciprocal * reciprocal
+        small = square < Fixed(UQ(0, 1), 1)
+        square = Fixed(square.format, square.codes << small).round_half_up(17)
+        return reciprocal, shift, square.saturate(self.RECIPROCAL_FORMAT), 2 * shift + small
 
     def _shifted(self, operand: Fixed, factor: Fixed, shift: np.ndarray) -> Fixed:
         """``4 * operand * factor * 2**-shift``, rounded half up to 42 fraction bits."""

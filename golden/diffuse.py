@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .dot_product import DotProduct
-from .fixed import UQ, Fixed
+from .fixed import UQ, Fixed, Format
 
 __all__ = ["Diffuse"]
 
@@ -17,10 +17,16 @@ class Diffuse:
     17 bits, an operand of the colour multipliers. Unit vectors have the length ``ONE / 2^17``, so the term is
     short by a relative 2^-16 (0.004 LSB of a full channel); the rounding adds 2^-18.
 
+    Parameters
+    ----------
+    operand_format : Format
+        Of ``N . L``, signed.
+
     Source: [B] 4, [T] 6.
     """
 
-    OPERAND_FORMAT = DotProduct().result_format
+    operand_format: Format = DotProduct().result_format
+
     RESULT_FORMAT = UQ(0, 17)
 
     def compute(self, cosine: Fixed) -> Fixed:
@@ -28,7 +34,7 @@ class Diffuse:
 
         Parameters
         ----------
-        cosine : Fixed, any shape, SQ(4, 34)
+        cosine : Fixed, any shape, `operand_format`
             ``N . L`` of two unit vectors.
 
         Raises
@@ -36,8 +42,8 @@ class Diffuse:
         ValueError
             If the operand has another format.
         """
-        if cosine.format != self.OPERAND_FORMAT:
-            raise ValueError(f"operand must be {self.OPERAND_FORMAT}, not {cosine.format}")
+        if cosine.format != self.operand_format:
+            raise ValueError(f"operand must be {self.operand_format}, not {cosine.format}")
         return cosine.round_half_up(17).saturate(self.RESULT_FORMAT)
 
     @staticmethod

@@ -4,18 +4,33 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .intensity import MAX_LIGHTS, Intensity
+from .intensity import MAX_INTENSITY, MAX_LIGHTS, Intensity
 from .lighting import halfway_vector
+from .reflection import energy_factor
 from .scene import Scene
 from .unit_vector import quantise
 
-__all__ = ["FIELDS_OF_A_FRAME", "FIELDS_OF_A_LIGHT", "LIGHT_STRIDE", "FrameConstants", "address_table"]
+__all__ = [
+    "FIELDS_OF_A_FRAME",
+    "FIELDS_OF_A_LIGHT",
+    "LIGHT_STRIDE",
+    "MATERIAL_ADDRESS",
+    "MAX_MATERIALS",
+    "FrameConstants",
+    "address_table",
+]
 
 FIELDS_OF_A_FRAME = {"exponent": (0, 1), "ambient": (1, 3)}
 """First address and number of words of what a frame has once."""
 
 FIELDS_OF_A_LIGHT = {"direction": (0, 3), "halfway": (3, 3), "diffuse": (6, 3), "specular": (9, 3)}
 """The same of what it has for each light, from ``(light + 1) * LIGHT_STRIDE`` on."""
+
+MATERIAL_ADDRESS = 4
+"""Address of the index of the material that the constants written next belong to, where there are several."""
+
+MAX_MATERIALS = 1024
+"""Most materials of a pipeline."""
 
 LIGHT_STRIDE = 16
 """Addresses from one light to the next."""
@@ -45,17 +60,44 @@ class FrameConstants:
     specular: np.ndarray
 
     @classmethod
-    def of(cls, scene: Scene, lights: int | None = None) -> "FrameConstants":
-        """Constants of a scene, for a pipeline with ``lights`` lights.
+    def of(
+        cls, scene: Scene, lights: int | None = None, energy: str | None = None, index: int = 0
+    ) -> "FrameConstants":
+        """Constants of a scene and one of its materials, for a pipeline with ``lights`` lights.
 
         Lights that the scene does not have are black. A light straight behind the surface that faces the
         viewer (``L = -V``) has no half-way vector, and no specular light.
 
+        With ``energy`` the highlight is that of the energy-normalised form: the factor of
+        `golden.reflection.energy_factor` multiplies k_s here, once a frame, and the specular unit stays as it
+        is. Its error counts as many times. A colour operand holds ``k_s I_i`` times the factor up to 8, which
+        with ``k_s I_i = 1`` allows exponents up to 48 (``phong``), 195 (``blinn``) and 36 (``cosquad_lin``);
+        higher ones need a darker k_s.
+
+        Parameters
+        ----------
+        scene : Scene
+            Material, lights and viewer.
+        lights : int, optional
+            Lights of the pipeline; by default as many as the scene has, at least 1.
+        energy : str, optional
+            Model whose factor it is, ``"phong"``, ``"blinn"`` or ``"cosquad_lin"``. An approximation of
+            Blinn's power may take Blinn's.
+        index : int
+            Of the material.
+
         Raises
         ------
         ValueError
-            If the scene has more lights than the pipeline, or a term is brighter than 8.
+            If the scene has more lights than the pipeline, a term is brighter than 8, or there is no factor
+            for the model.
+
+        Notes
+        -----
+        Source of the factors: [C].
         """
+        material = scene.materials[index]
+        factor = 1.0 if energy is None else energy_factor(energy, material.exponent)
         count = max(len(scene.lights), 1) if lights is None else lights
         if not len(scene.lights) <= count <= MAX_LIGHTS:
             raise ValueError(f"the pipeline has {count} lights, the scene {len(scene.lights)}")
@@ -63,17 +105,30 @@ class FrameConstants:
         halfway, diffuse, specular = np.zeros((3, count, 3), dtype=np.int64)
         for index, light in enumerate(scene.lights):
             direction[index] = quantise(np.asarray(light.direction))
-            diffuse[index] = Intensity.color(np.multiply(scene.material.diffuse, light.color))
+            diffuse[index] = Intensity.color(np.multiply(material.diffuse, light.color))
             between = halfway_vector(light.direction, scene.camera.viewer)
             if np.any(between):
                 halfway[index] = quantise(between)
-                specular[index] = Intensity.color(np.multiply(scene.material.specular, light.color))
-        ambient = Intensity.color(np.multiply(scene.material.ambient, scene.ambient_light))
-        return cls(scene.material.exponent, ambient, direction, halfway, diffuse, specular)
+                highlight = factor * np.multiply(material.specular, light.color)
+                if energy is not None and highlight.max() > MAX_INTENSITY:
+                    raise ValueError(
+                        f"the energy factor {factor:.4g} of {energy} with exponent {material.exponent} "
+                        f"makes a specular term of {highlight.max():.4g}, over {MAX_INTENSITY}; lower the "
+                        "exponent, the specular coefficient or the light"
+                    )
+                specular[index] = Intensity.color(highlight)
+        ambient = Intensity.color(np.multiply(material.ambient, scene.ambient_light))
+        return cls(material.exponent, ambient, direction, halfway, diffuse, specular)
 
-    def writes(self) -> dict[str, np.ndarray]:
-        """Beats for the write port: ``address`` and ``data``, 18 bits of each code."""
-        address, data = [], []
+    def writes(self, index: int | None = None) -> dict[str, np.ndarray]:
+        """Beats for the write port: ``address`` and ``data``, 18 bits of each code.
+
+        Parameters
+        ----------
+        index : int, optional
+            Of the material, for a pipeline with several.
+        """
+        address, data = ([], []) if index is None else ([MATERIAL_ADDRESS], [index])
         for name, (first, count) in FIELDS_OF_A_FRAME.items():
             address += range(first, first + count)
             data += np.ravel(getattr(self, name)).tolist()
@@ -88,6 +143,7 @@ class FrameConstants:
 _MEANINGS = {
     "exponent": "specular exponent, 1 to 1000",
     "ambient": "ambient colour, red green blue, UQ(11, 6) in LSB of the channel",
+    "material": "index of the material that exponent and colours written next belong to",
     "direction": "unit vector to the light, SQ(1, 17)",
     "halfway": "unit half-way vector, SQ(1, 17)",
     "diffuse": "diffuse colour, red green blue, UQ(11, 6)",
@@ -95,9 +151,11 @@ _MEANINGS = {
 }
 
 
-def address_table(lights: int) -> list[str]:
-    """Lines that tell the address of every constant of a pipeline with so many lights."""
+def address_table(lights: int, materials: int = 1) -> list[str]:
+    """Lines that tell the address of every constant of a pipeline with so many lights and materials."""
     rows = [(first, count, name) for name, (first, count) in FIELDS_OF_A_FRAME.items()]
+    if materials > 1:
+        rows.append((MATERIAL_ADDRESS, 1, "material"))
     for light in range(lights):
         base = (light + 1) * LIGHT_STRIDE
         rows += [(base + first, count, name) for name, (first, count) in FIELDS_OF_A_LIGHT.items()]

@@ -21,6 +21,8 @@ class Mesh:
         Vertex indices, anticlockwise seen from outside.
     normals : float64 array, shape (V, 3)
         Unit vertex normals.
+    material : int64 array, shape (F,), optional
+        Index of the material of each face, 0 or more. ``None``: 0 for all.
 
     Raises
     ------
@@ -31,6 +33,7 @@ class Mesh:
     vertices: np.ndarray
     faces: np.ndarray
     normals: np.ndarray
+    material: np.ndarray | None = None
 
     def __post_init__(self):
         for name, array in (("vertices", self.vertices), ("faces", self.faces), ("normals", self.normals)):
@@ -44,6 +47,12 @@ class Mesh:
             raise ValueError(f"faces must index the {len(self.vertices)} vertices")
         if not (np.isfinite(self.vertices).all() and np.isfinite(self.normals).all()):
             raise ValueError("vertices and normals must be finite")
+        if self.material is None:
+            object.__setattr__(self, "material", np.zeros(len(self.faces), dtype=np.int64))
+        if self.material.shape != (len(self.faces),) or (self.material.size and self.material.min() < 0):
+            raise ValueError(
+                f"material must be an index of 0 or more for each of the {len(self.faces)} faces"
+            )
 
 
 def normalise(vectors: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 
 from .dot_product import DotProduct
 from .fixed import SQ, UQ, Fixed, Format
-from .middle_normal import MAX_SPAN_ANGLE
+from .middle_normal import MAX_SPAN_ANGLE, MiddleNormal
 from .specular import MAX_EXPONENT, Specular
 
 __all__ = ["HighlightGate"]
@@ -65,14 +65,19 @@ class HighlightGate:
     4. *The comparison.* T and w are cut, everything else is exact, so not lit gives ``m^2 < T``, also where m
        is at an end. T is at most ``tau^2``, so ``m < tau`` and ``N(t).H < tau`` on the exact curve.
     5. *The pipeline.* A pixel's N differs from the exact curve, along a vector H of length 1 at most, by
-       under ``sqrt(3) e`` for the middle normal, e = `MiddleNormal.ERROR`; ``2^-17 |P| + (2^-16 + 2^-17
+       under ``sqrt(3) e`` for the middle normal, e = `MiddleNormal.error`; ``2^-17 |P| + (2^-16 + 2^-17
        + 2^-34) |G|`` for the reciprocal of the length, with |P| <= 0.83 and |G| <= 0.305; ``sqrt(3) 2^-42
        (k + k^2/2)`` for the rounding of the differences at pixel k, to 4094; ``sqrt(3) 2^-18`` for its own:
-       together 4.4 steps of 2^-17. Saturation only brings a component nearer to one of a unit vector. tau is
-       `MARGIN`, 5 steps, below the largest N·H that the specular unit shades 0, which follows from its PROM
-       in integers. The dot product is exact, and the unit's argument falls with it: the term is 0. ∎
+       together 4.4 steps of 2^-17 for its default fit. Saturation only brings a component nearer to one of a
+       unit vector. tau is `margin`, the sum in whole steps rounded up (5, `MARGIN`; 135 to 875 for the other
+       fits, whose normals may be too long), below the largest N·H that the specular unit shades 0, which
+       follows from its PROM in integers. The dot product is exact, and the unit's argument falls with it: the
+       term is 0. ∎
 
     The margins cost little: a span is let through only if ``M^2 >= tau^2 - 10 * 2^-17``.
+
+    The proof is one for quadratic normals by `DifferenceSetup` and `DifferenceAccumulator`. Normals by
+    another method are off the exact curve by more or less than step 5 has it, and need a sum of their own.
 
     An exponent under which the unit shades nothing 0 up to N·H = tau <= 0 (1; 2 and 3 for wide models) has
     T = 0.
@@ -83,6 +88,8 @@ class HighlightGate:
         The unit that is gated: its model and PROM.
     fraction_bits : int
         F, 5 to 17.
+    middle_normal : MiddleNormal
+        The unit that the pipeline has; its error is part of the margin.
 
     Raises
     ------
@@ -94,12 +101,24 @@ class HighlightGate:
 
     specular: Specular = field(default_factory=Specular)
     fraction_bits: int = 17
+    middle_normal: MiddleNormal = field(default_factory=MiddleNormal)
 
     MARGIN = 5 * 2.0**-17
+    """`margin` with the default middle normal."""
 
     def __post_init__(self):
         if not 5 <= self.fraction_bits <= 17:
             raise ValueError(f"fraction_bits must be 5 to 17, not {self.fraction_bits}")
+
+    @property
+    def margin(self) -> float:
+        """Step 5's sum in whole steps of 2^-17: how far a pixel's N·H may be over the exact curve's."""
+        k, middle = 4094, np.sqrt(3) * self.middle_normal.error
+        # G and P have four times the middle normal.
+        p, g = 0.83 + 4 * middle, 0.305 + 4 * middle
+        reciprocal = 2.0**-17 * p + (2.0**-16 + 2.0**-17 + 2.0**-34) * g
+        total = middle + reciprocal + np.sqrt(3) * (2.0**-42 * (k + k * k / 2) + 2.0**-18)
+        return float(np.ceil(total * 2.0**17) * 2.0**-17)
 
     @property
     def component_format(self) -> Format:
@@ -144,7 +163,7 @@ class HighlightGate:
         argument[boundary == unit.SHIFTED_FORMAT.max_code] = 1 << 27
         one = Specular("cosquad").operand_format
         level = HighlightGate(unit).one_squared.codes - ((argument + 1) << (one.fraction_bits - 25))
-        level -= round(self.MARGIN * 2**one.fraction_bits)
+        level -= round(self.margin * 2**one.fraction_bits)
         # Squares of 34 bits outgrow an int64.
         codes = [max(code, 0) ** 2 >> (68 - self.fraction_bits) for code in level.tolist()]
         return Fixed(self.level_format, codes)

@@ -6,7 +6,10 @@ import numpy as np
 
 from .fixed import UQ, Fixed
 
-__all__ = ["MAX_LIGHTS", "Intensity"]
+__all__ = ["MAX_INTENSITY", "MAX_LIGHTS", "Intensity"]
+
+MAX_INTENSITY = 8
+"""Largest intensity of a term; 1 is the full channel."""
 
 MAX_LIGHTS = 16
 """Largest number of lights."""
@@ -53,8 +56,8 @@ class Intensity:
             If an intensity is negative, not finite, or over 8.
         """
         intensity = np.asarray(intensity, dtype=np.float64)
-        if not np.all((intensity >= 0) & (intensity <= 8)):
-            raise ValueError("the intensity of a term must be 0 to 8")
+        if not np.all((intensity >= 0) & (intensity <= MAX_INTENSITY)):
+            raise ValueError(f"the intensity of a term must be 0 to {MAX_INTENSITY}")
         return Fixed.round(cls.COLOR_FORMAT, intensity * 255).codes
 
     def compute(
@@ -92,3 +95,19 @@ class Intensity:
         total = total + (ambient.codes << self.TERM_FORMAT.fraction_bits)
         total = Fixed(UQ(17, fraction_bits), total).round_half_up(0).saturate(self.RESULT_FORMAT)
         return total.codes.astype(np.uint8)
+
+    @staticmethod
+    def clocks(diffuse: Fixed, specular: Fixed) -> np.ndarray:
+        """Clocks that each pixel takes in the unit's compact style: ``3 max(1, terms that are not 0)``.
+
+        Parameters
+        ----------
+        diffuse, specular : Fixed, shape (pixels, lights), UQ(0, 17)
+            Terms of each light.
+
+        Returns
+        -------
+        int64 array, shape (pixels,)
+        """
+        terms = np.concatenate([diffuse.codes, specular.codes], axis=-1)
+        return 3 * np.maximum(np.count_nonzero(terms, axis=-1), 1)

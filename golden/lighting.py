@@ -146,6 +146,7 @@ def intensity(
     ambient_light: Sequence[float],
     viewer: Sequence[float],
     model: str,
+    chord: bool = False,
 ) -> np.ndarray:
     """Intensity of the three channels at every normal, not saturated.
 
@@ -167,6 +168,8 @@ def intensity(
         Unit vector V to the viewer, constant over the frame.
     model : str
         One of `golden.reflection.REFLECTION_MODELS`.
+    chord : bool
+        Whether ``1 - |N - H|^2 / 2`` takes the place of N·H, which it equals for unit normals (chord.md).
 
     Returns
     -------
@@ -193,6 +196,8 @@ def intensity(
             continue
         if model == "phong":
             highlight_cosine = 2 * cosine * (normals @ viewer) - direction @ viewer
+        elif chord:
+            highlight_cosine = 1 - np.square(normals - halfway).sum(axis=-1) / 2
         else:
             highlight_cosine = normals @ halfway
         highlight = np.where(cosine > 0, reflect(model, highlight_cosine, material.exponent), 0.0)

@@ -69,8 +69,9 @@ def minimax(
     target = function(x) - powers @ coefficients
     # The programme is solved in units of the residual's size, to stay above the solver's tolerance.
     unit = np.abs(target).max() or 1.0
-    scale = np.abs(powers[:, free]).max(axis=0)
-    matrix = powers[:, free] / scale
+    # On a narrow domain far from 0 the powers are all but parallel; solved in them, the fit would be poor.
+    basis, triangle = np.linalg.qr(powers[:, free])
+    matrix = basis * np.sqrt(GRID)
     ones = np.ones((len(x), 1))
     tighter = 1.0
     for _ in range(2):
@@ -81,7 +82,7 @@ def minimax(
             bounds=[(None, None)] * (len(free) + 1),
             method="highs",
         )
-        step = fit.x[:-1] * unit * tighter / scale
+        step = np.linalg.solve(triangle, fit.x[:-1] * unit * tighter * np.sqrt(GRID))
         coefficients[free] += step
         target = target - powers[:, free] @ step
         tighter = np.abs(target).max() / unit or 1.0

@@ -5,16 +5,14 @@ from typing import Literal
 
 import numpy as np
 
-from .dot_product import DotProduct
-from .fixed import UQ, Fixed, Format
-from .specular import MAX_EXPONENT, Specular
-from .unit_vector import ONE_SQUARED
+from .fixed import SQ, UQ, Fixed
+from .specular import HighlightOperand
 
 __all__ = ["Power"]
 
 
 @dataclass(frozen=True)
-class Power:
+class Power(HighlightOperand):
     """``max(cos gamma, 0)^n`` for n of 10 bits, by squares and products over the bits of n.
 
     Computed on complements, ``x = 1 - c``: near the peak, where c^n turns a relative error of c into n times
@@ -38,8 +36,7 @@ class Power:
     Parameters
     ----------
     operand : str
-        ``"cosine"``: the unit takes ``N . H`` of two unit vectors in ``SQ(4, 34)`` and subtracts it from 1.
-        ``"one_minus_cosine"``: it takes ``1 - cos gamma`` in ``UQ(1, 25)``.
+        ``"cosine"`` or ``"one_minus_cosine"``; see `golden.specular.HighlightOperand`.
 
     Raises
     ------
@@ -53,18 +50,7 @@ class Power:
 
     COMPLEMENT_FORMAT = UQ(0, 34)
     FACTOR_FORMAT = UQ(0, 17)
-    RESULT_FORMAT = UQ(0, 17)
-    EXPONENT_BITS = Specular.EXPONENT_BITS
     ERROR = 6 * 2.0**-17
-
-    def __post_init__(self):
-        if self.operand not in ("cosine", "one_minus_cosine"):
-            raise ValueError(f"operand must be 'cosine' or 'one_minus_cosine', not {self.operand!r}")
-
-    @property
-    def operand_format(self) -> Format:
-        """Format of the input."""
-        return DotProduct().result_format if self.operand == "cosine" else Specular.ARGUMENT_FORMAT
 
     def compute(self, operand: Fixed, dark: np.ndarray, exponent: int) -> Fixed:
         """Bit-true specular terms.
@@ -87,11 +73,7 @@ class Power:
         ValueError
             If the operand has another format or the exponent is out of range.
         """
-        if operand.format != self.operand_format:
-            raise ValueError(f"operand must be {self.operand_format}, not {operand.format}")
-        if not 1 <= exponent <= MAX_EXPONENT:
-            raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {exponent}")
-        x = ONE_SQUARED - operand if self.operand == "cosine" else operand.extend(UQ(1, 34))
+        x = self.one_minus(operand, exponent).extend(SQ(5, 34))
         format = self.COMPLEMENT_FORMAT
         x = Fixed(format, np.where(dark, format.max_code, x.saturate(format).codes))
         s = Fixed(format, np.zeros_like(x.codes))

@@ -43,8 +43,11 @@ class QuadraticEvaluator:
 
     Arithmetic error of a component for spans to 45 degrees, where ``|2 G t + P| <= 0.83`` and
     ``|G| <= 0.305``, at most `error`: t is off by 2^-18 for its table and 2^-18 for its rounding, t^2 by
-    2^-18 (``direct``) or the inner sum by 2^-18 (``horner``), the result by 2^-18. A wider, flagged span has
-    saturated coefficients.
+    2^-18 (``direct``) or the inner sum by 2^-18 (``horner``), the result by 2^-18.
+
+    Wider spans are flagged by the middle normal and must be cut in two before they come here. P saturates
+    from 53 degrees on and G from 57; the curve then keeps its start and misses its end, by up to 0.1 at 60
+    degrees, 0.48 at 90, 0.78 at 120 and 1.05 at 180 (length of the error vector), and stays in its words.
 
     Parameters
     ----------

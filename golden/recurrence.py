@@ -1,6 +1,6 @@
 """Recurrence unit: cosines of equal steps by a recurrence of second order ([T] 3.3, figure 3.5)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -50,8 +50,10 @@ class Recurrence:
     coefficient     K UQ(0, F + 1), s 6 bits     ``-2 cos d`` SQ(2, F), which holds -2; cut
     operand         x rounded to SQ(2, F)        x
     product         cut to F + E fraction bits   rounded
-    result          SQ(1, 17): rounded, saturates
-    =============== ========================================================================
+    result          rounded, saturates           rounded, saturates
+    =============== ============================ ===========================================
+
+    The result has the format `result_format`.
 
     With d to 90 degrees and ``|A| <= 1 - 2^-16``, the product of two unit vectors, nothing wraps or saturates
     (|D| <= sqrt 2).
@@ -68,6 +70,20 @@ class Recurrence:
     bits at most 5.7e-5 and, F = 24, 2.3e-7. A rounded coefficient gives ``direct`` under 0.1 in the second
     and third case, by luck: ``2^F (2 - 2 cos d)`` is 1.1 there, close to a whole number.
 
+    **Interleaved**, for one pixel a clock: the loop holds a product, which takes several clocks, so four
+    recurrences share it. Phase j has pixels j, j + 4, j + 8, ...: ``x(k+4) = 2 cos(4d) x(k) - x(k-4)``, the
+    same recurrence with a step of 4d and start values of its own. It runs through ``ceil(m/4)`` values, so
+    that `error` is that of so many pixels 4d apart: the same ``psi^2/2 2^-F``, a sixteenth of the cut's drift
+    (3.0e-8), and for ``direct`` a sixteenth of its growth. The coefficient is read from pixel 8 on and the
+    second values from pixel 4 on, so 4d is held to 90 degrees: a span of up to 90 degrees has a larger one
+    only where nothing reads it. Other spans must have d up to 22.5 degrees if they have over 4 pixels.
+
+    A setup makes the start values from x(0), D(0) and the coefficient of d by seven steps of the recurrence
+    itself (`prologue`), in the loop that is there with ``interleave`` 1; these few steps add at most
+    `prologue_error`, in which nothing grows with the square of the length. Or from 17-bit cosines and sines,
+    as the highlight-cosine unit gives them: ``D = 2 sin(2d) A sin(phase - (j+2) d)`` is a small number times
+    a sine, so an error e of the sine counts ``psi e`` at the end of the span.
+
     Parameters
     ----------
     form : str
@@ -76,11 +92,17 @@ class Recurrence:
         8 to 32. Up to 16 a multiplier of 18x18 bits is enough.
     guard_bits : int
         10 to 28, of ``reinsch`` alone.
+    interleave : int
+        1, as drawn, or 4 phases. 1 is the default: a span then needs two start values a copy and not eight,
+        and registers for one phase; 4 is for who wants a pixel a clock.
+    result_format : Format
+        Of the cosines; one of 25 fraction bits leaves the last rounding out of the error.
 
     Raises
     ------
     ValueError
-        If the form is unknown or a number of bits is out of range.
+        If the form or the number of phases is unknown, a number of bits is out of range, or the result's
+        format is unsigned or has more fraction bits than the state of ``reinsch``.
 
     Source: [T] 3.3, figure 3.5; C. Reinsch's form of Goertzel's algorithm; numbers.md.
     """
@@ -88,8 +110,9 @@ class Recurrence:
     form: Literal["reinsch", "direct"] = "reinsch"
     fraction_bits: int = 16
     guard_bits: int = 28
+    interleave: Literal[1, 4] = 1
+    result_format: Format = COMPONENT
 
-    RESULT_FORMAT = COMPONENT
     SHIFT_BITS = 6
     LENGTH_BITS = 12
     MAX_STEP = np.pi / 2
@@ -101,6 +124,13 @@ class Recurrence:
             raise ValueError(f"fraction_bits must be 8 to 32, not {self.fraction_bits}")
         if not 10 <= self.guard_bits <= 28:
             raise ValueError(f"guard_bits must be 10 to 28, not {self.guard_bits}")
+        if self.interleave not in (1, 4):
+            raise ValueError(f"interleave must be 1 or 4, not {self.interleave!r}")
+        most = self.fraction_bits + self.guard_bits
+        if not self.result_format.signed or self.result_format.fraction_bits > most:
+            raise ValueError(
+                f"result_format must be signed, of at most {most} fraction bits, not {self.result_format}"
+            )
 
     @property
     def state_format(self) -> Format:
@@ -133,10 +163,9 @@ class Recurrence:
         float64 array
             3 where ``direct`` has no bound but that of its words.
         """
-        steps = np.asarray(length, dtype=np.float64) - 1
-        angle = np.asarray(angle, dtype=np.float64)
+        steps, angle = self._phase_span(length, angle)
         sums = steps * np.maximum(steps - 1, 0) / 2
-        word, rounding = 2.0**-self.fraction_bits, COMPONENT.step / 2
+        word, rounding = 2.0**-self.fraction_bits, self.result_format.step / 2
         if self.form == "reinsch":
             cut = self.state_format.step
             # The state stays under 1.01. A step too small for the largest shift is held to 2^-(F + 47).
@@ -144,8 +173,35 @@ class Recurrence:
             return sums * (bend * word + cut) + (steps + 2) * cut / 2 + rounding
         growth = sums * word
         with np.errstate(divide="ignore"):
-            grown = (1.5 * growth + steps * word) / np.maximum(1 - growth, 0) + rounding
+            grown = (1.5 * growth + np.maximum(steps, 0.5) * word) / np.maximum(1 - growth, 0) + rounding
         return np.minimum(grown, 3.0)
+
+    def _phase_span(self, length: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Steps of the longest phase, and the angle that they go through."""
+        length = np.asarray(length, dtype=np.float64)
+        steps = np.ceil(length / self.interleave) - 1
+        return steps, np.asarray(angle, dtype=np.float64) * self.interleave * steps / np.maximum(
+            length - 1, 1
+        )
+
+    def prologue_error(self, length: np.ndarray, angle: np.ndarray) -> np.ndarray:
+        """What start values from `prologue` add to `error`, in ``reinsch``, for spans of up to 90 degrees.
+
+        A step d adds ``b = 4 sin^2(d/2) 2^-F + 2^-(F+E)`` at most to the difference, whose first value is
+        rounded by ``e = 2^-(F+E+1)``. So x(j) is off by ``b j (j-1)/2 + (j+1) e``, and ``x(j+4) - x(j)``, a
+        sum of four differences, by ``b (4j + 6) + 4 e``, which counts once for every step of its phase.
+
+        Parameters
+        ----------
+        length, angle
+            As for `error`.
+        """
+        steps, _ = self._phase_span(length, angle)
+        step = np.asarray(angle, dtype=np.float64) / np.maximum(np.asarray(length) - 1, 1)
+        cut = self.state_format.step
+        bend = (1.01 * np.square(step) + 2.0**-47) * 2.0**-self.fraction_bits + cut
+        # A wrong first value comes back up to 1/cos(2d) times, d being 11.25 degrees where it comes back.
+        return 1.09 * (3 * bend + 2 * cut) + steps * (18 * bend + 2 * cut)
 
     def coefficient(self, step: np.ndarray) -> tuple[Fixed, np.ndarray]:
         """Coefficient of a step, as a setup has to deliver it.
@@ -158,7 +214,7 @@ class Recurrence:
         Returns
         -------
         coefficient : Fixed, same shape, `coefficient_format`
-            K, or ``-2 cos d``.
+            K, or ``-2 cos d``; interleaved, those of 4d, up to 90 degrees.
         shift : int array, same shape
             s, 0 to 47; 0 in ``direct``.
 
@@ -170,6 +226,7 @@ class Recurrence:
         step = np.asarray(step, dtype=np.float64)
         if not np.all((step >= 0) & (step <= self.MAX_STEP)):
             raise ValueError("steps must be 0 to 90 degrees")
+        step = self._phase_step(step)
         format = self.coefficient_format
         if self.form == "direct":
             codes = np.ceil(np.ldexp(-2 * np.cos(step), format.fraction_bits))
@@ -192,8 +249,12 @@ class Recurrence:
         Returns
         -------
         first, second : Fixed, `state_format`
-            ``x(0)``; ``x(1)`` in ``direct``, ``x(1) - x(0)`` in ``reinsch``.
+            ``x(0)``; ``x(1)`` in ``direct``, ``x(1) - x(0)`` in ``reinsch``. Interleaved with a last axis
+            more, of the four phases: ``x(j)``; ``x(j+4)``, or ``x(j+4) - x(j)``.
         """
+        if self.interleave > 1:
+            amplitude, phase, step = (np.asarray(x)[..., np.newaxis] for x in (amplitude, phase, step))
+            phase, step = phase - np.arange(self.interleave) * step, self._phase_step(step)
         first = amplitude * np.cos(phase)
         if self.form == "direct":
             second = amplitude * np.cos(np.subtract(phase, step))
@@ -201,15 +262,45 @@ class Recurrence:
             second = 2 * amplitude * np.sin(np.divide(step, 2)) * np.sin(phase - np.divide(step, 2))
         return Fixed.round(self.state_format, first), Fixed.round(self.state_format, second)
 
+    def _phase_step(self, step: np.ndarray) -> np.ndarray:
+        """Step of one phase; interleaved, up to 90 degrees."""
+        return step if self.interleave == 1 else np.minimum(self.interleave * step, self.MAX_STEP)
+
+    def prologue(
+        self, first: Fixed, second: Fixed, coefficient: Fixed, shift: np.ndarray
+    ) -> tuple[Fixed, Fixed]:
+        """Bit-true start values of the four phases, from those of the recurrence that is not interleaved.
+
+        Parameters
+        ----------
+        first, second, coefficient, shift
+            As for `states` with ``interleave`` 1, shape (spans,), the coefficient that of d.
+
+        Returns
+        -------
+        first, second : Fixed, shape (spans, 4), `state_format`
+            As `start` gives them. Second values after the last pixel may have wrapped.
+        """
+        codes = replace(self, interleave=1).states(first, second, coefficient, shift, 8).codes.T
+        start, following = codes[:, :4], codes[:, 4:]
+        if self.form == "reinsch":
+            # The register's half step.
+            start, following = self._wrap(start - self._half_operand), self._wrap(following - start)
+        return Fixed(self.state_format, start), Fixed(self.state_format, following)
+
+    @property
+    def _half_operand(self) -> int:
+        return 1 << (self.guard_bits - 1)
+
     def states(self, first: Fixed, second: Fixed, coefficient: Fixed, shift: np.ndarray, steps: int) -> Fixed:
         """Bit-true values of x, in the words of the state.
 
         Parameters
         ----------
-        first, second : Fixed, shape (spans,), `state_format`
+        first, second : Fixed, shape (spans,) or interleaved (spans, 4), `state_format`
             Start values, see `start`.
         coefficient : Fixed, shape (spans,), `coefficient_format`
-            K, or ``-2 cos d``.
+            See `coefficient`.
         shift : int array, shape (spans,)
             s, 0 to 63.
         steps : int
@@ -237,14 +328,18 @@ class Recurrence:
         # Products of more than 63 bits, which no default has, need Python's integers.
         kind = object if self.fraction_bits > 29 else np.int64
         x, y, factor = (word.codes.astype(kind) for word in (first, second, coefficient))
-        found = np.empty((steps, len(x)), dtype=np.int64)
+        if self.interleave > 1:
+            factor, shift = factor[:, np.newaxis], shift[:, np.newaxis]
+        found = np.empty((-(-steps // self.interleave), *x.shape), dtype=np.int64)
         step = self._reinsch if self.form == "reinsch" else self._direct
         if self.form == "reinsch":
-            x = self._wrap(x + (1 << (self.guard_bits - 1)))
+            x = self._wrap(x + self._half_operand)
         # Every step rounds, so that there is no closed form: the loop is over time, not over spans.
-        for k in range(steps):
+        for k in range(len(found)):
             found[k] = x
             x, y = step(x, y, factor, shift, k == 0)
+        if self.interleave > 1:
+            found = np.moveaxis(found, 2, 1).reshape(-1, found.shape[1])[:steps]
         return Fixed(self.state_format, found)
 
     def _reinsch(self, x, difference, factor, shift, is_first):
@@ -280,7 +375,7 @@ class Recurrence:
         Parameters
         ----------
         first, second, coefficient, shift
-            As for `states`, shape (spans,).
+            As for `states`.
         span : int array, shape (pixels,)
             Span of each pixel.
         index : int array, shape (pixels,)
@@ -288,7 +383,7 @@ class Recurrence:
 
         Returns
         -------
-        Fixed, shape (pixels,), SQ(1, 17)
+        Fixed, shape (pixels,), `result_format`
 
         Raises
         ------
@@ -302,18 +397,19 @@ class Recurrence:
 
     def result(self, states: Fixed) -> Fixed:
         """Bit-true results of states, rounded half up and saturated."""
-        bits = COMPONENT.fraction_bits
+        bits = self.result_format.fraction_bits
         if self.form == "reinsch":
             # The register's half step gives way to that of the result.
             states = states + self.exchange
-            return states.truncate(bits).saturate(COMPONENT)
+            return states.truncate(bits).saturate(self.result_format)
         if states.format.fraction_bits < bits:
             states = states.extend(SQ(2, bits))
-        return states.round_half_up(bits).saturate(COMPONENT)
+        return states.round_half_up(bits).saturate(self.result_format)
 
     @property
     def exchange(self) -> Fixed:
         """Half a step of the result less half a step of the operand of ``reinsch``."""
         return Fixed.round(
-            SQ(0, self.state_format.fraction_bits), 2.0**-18 - 2.0 ** -(self.fraction_bits + 1)
+            SQ(0, self.state_format.fraction_bits),
+            (self.result_format.step - 2.0**-self.fraction_bits) / 2,
         )

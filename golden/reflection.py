@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq
 
 __all__ = [
+    "COSCOS_MODELS",
     "LINE_MODELS",
     "REFLECTION_MODELS",
     "coscos_scale",
@@ -32,18 +34,18 @@ _LINES: dict[str, tuple[Callable[[float], float], int]] = {
     "lyon3_refitted": (lambda n: 0.1150 * n + 0.0799, 8),
 }
 
-# Power k, and how the scale a follows from the exponent.
-_COSCOS = {
+COSCOS_MODELS = {
     "coscos2": (2, "taylor"),
     "coscos4": (4, "taylor"),
     "coscos2_integral": (2, "integral"),
     "coscos4_integral": (4, "integral"),
 }
+"""Power k of the models ``cos^k(a gamma)``, and the rule by which `coscos_scale` finds a."""
 
 LINE_MODELS = tuple(_LINES)
 """Names of the models that raise a line to a power, which `slope` knows."""
 
-REFLECTION_MODELS = ("phong", "blinn", *LINE_MODELS, *_COSCOS, "exp")
+REFLECTION_MODELS = ("phong", "blinn", *LINE_MODELS, *COSCOS_MODELS, "exp")
 """Names of the models. ``phong`` takes the cosine R·V, all others N·H."""
 
 
@@ -93,6 +95,9 @@ def slope(model: str, exponent: float) -> float:
     return _LINES[model][0](exponent)
 
 
+_gauss = cache(np.polynomial.legendre.leggauss)
+
+
 def coscos_scale(exponent: float, power: int, rule: str = "taylor") -> float:
     """Scale a of the model ``cos^k(a gamma)``, which stands for ``cos^n gamma``.
 
@@ -134,7 +139,7 @@ def coscos_scale(exponent: float, power: int, rule: str = "taylor") -> float:
     if power == 4 and exponent < 0.5:
         raise ValueError(f"equal integrals with power 4 need an exponent of at least 0.5, not {exponent}")
     # Gauss-Legendre on an interval of at most pi: exact to rounding for a trigonometric polynomial.
-    nodes, weights = np.polynomial.legendre.leggauss(40)
+    nodes, weights = _gauss(40)
 
     def excess(scale: float) -> float:
         half = math.pi / (4 * scale)
@@ -194,8 +199,8 @@ def reflect(model: str, cosine: np.ndarray, exponent: float) -> np.ndarray:
         while power > 1:
             base, power = base * base, power // 2
         return base
-    if model in _COSCOS:
-        power, rule = _COSCOS[model]
+    if model in COSCOS_MODELS:
+        power, rule = COSCOS_MODELS[model]
         angle = coscos_scale(exponent, power, rule) * np.arccos(np.maximum(cosine, -1.0))
         return np.cos(np.minimum(angle, math.pi / 2)) ** power * (angle < math.pi / 2)
     if model == "exp":

@@ -28,8 +28,8 @@ class Scene:
         The viewer.
     width, height : int
         Pixels, 1 to 4095 each.
-    material : Material
-        The surface's coefficients.
+    material : Material or sequence of Material
+        The surface's coefficients; several by the mesh's index of each face, stored as a tuple.
     lights : sequence of Light
         Any number of directional lights; stored as a tuple.
     ambient_light : three floats
@@ -43,16 +43,16 @@ class Scene:
     Raises
     ------
     ValueError
-        If a value is out of range.
+        If a value is out of range, or the mesh has faces of a material that there is not.
     TypeError
-        If a size is not an integer or a light is not a `Light`.
+        If a size is not an integer, a light is not a `Light` or a material is not a `Material`.
     """
 
     mesh: Mesh
     camera: Camera
     width: int
     height: int
-    material: Material
+    material: Material | tuple[Material, ...]
     lights: tuple[Light, ...]
     ambient_light: Triple = (1.0, 1.0, 1.0)
     background: Triple = (0.0, 0.0, 0.0)
@@ -68,7 +68,20 @@ class Scene:
         for light in self.lights:
             if not isinstance(light, Light):
                 raise TypeError(f"a scene's lights must be Light, not {type(light).__name__}")
+        if not isinstance(self.material, Material):
+            object.__setattr__(self, "material", tuple(self.material))
+        for material in self.materials:
+            if not isinstance(material, Material):
+                raise TypeError(f"a scene's materials must be Material, not {type(material).__name__}")
+        used = 1 + self.mesh.material.max(initial=0)
+        if len(self.materials) < used:
+            raise ValueError(f"the mesh has faces of {used} materials, the scene {len(self.materials)}")
         object.__setattr__(self, "ambient_light", triple("a scene's ambient_light", self.ambient_light, 0))
         object.__setattr__(self, "background", triple("a scene's background", self.background, 0, 1))
         if self.back_faces not in BACK_FACES:
             raise ValueError(f"back_faces must be one of {', '.join(BACK_FACES)}, not {self.back_faces!r}")
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """The material, or all of them."""
+        return (self.material,) if isinstance(self.material, Material) else self.material

@@ -9,10 +9,10 @@ import numpy as np
 
 from .dot_product import DotProduct
 from .fixed import UQ, Fixed, Format
-from .reflection import slope
+from .reflection import COSCOS_MODELS, coscos_scale, slope
 from .unit_vector import ONE_SQUARED
 
-__all__ = ["FURTHER_MODELS", "MAX_EXPONENT", "SPECULAR_MODELS", "Specular"]
+__all__ = ["FURTHER_MODELS", "MAX_EXPONENT", "SPECULAR_MODELS", "Chords", "HighlightOperand", "Specular"]
 
 MAX_EXPONENT = 1000
 """Largest specular exponent."""
@@ -20,31 +20,127 @@ MAX_EXPONENT = 1000
 SPECULAR_MODELS = ("cosquad", "cosquad7", "cosquad_lin")
 """Reflection models of the documents that the unit serves, all of one latency."""
 
-# a and b of the slope k = a n + b, and how often the base is squared; exp takes a table for the squarers.
-_LINES = {
-    "cosquad": (1 / 2, 0.0, 1),
-    "cosquad7": (7 / 16, 0.0, 1),
-    "cosquad_lin": (0.448, 0.099, 1),
-    "lyon1_refitted": (0.3557, 0.2457, 1),
-    "lyon2": (1 / 4, 0.0, 2),
-    "lyon2_refitted": (0.2113, 0.1468, 2),
-    "lyon3": (1 / 8, 0.0, 3),
-    "lyon3_refitted": (0.1150, 0.0799, 3),
-    "exp": (math.log2(math.e) / 16, 0.0, 0),
+# a and b of the slope k = a n + b, None where a table holds k; and how often the base is squared.
+_MODELS = {
+    "cosquad": ((1 / 2, 0.0), 1),
+    "cosquad7": ((7 / 16, 0.0), 1),
+    "cosquad_lin": ((0.448, 0.099), 1),
+    "cosquad_q": (None, 1),
+    "lyon1_refitted": ((0.3557, 0.2457), 1),
+    "lyon2": ((1 / 4, 0.0), 2),
+    "lyon2_refitted": ((0.2113, 0.1468), 2),
+    "lyon3": ((1 / 8, 0.0), 3),
+    "lyon3_refitted": ((0.1150, 0.0799), 3),
+    "exp": ((math.log2(math.e) / 16, 0.0), 0),
+    "coscos2": ((4 / math.pi**2, 0.0), 1),
+    "coscos4": ((2 / math.pi**2, 0.0), 2),
+    "coscos2_integral": (None, 1),
+    "coscos4_integral": (None, 2),
 }
 
-FURTHER_MODELS = ("cosquad_q", *(model for model in _LINES if model not in SPECULAR_MODELS))
-"""Reflection models that the unit serves beside those: a table of slopes, more squarers, a table for exp."""
+FURTHER_MODELS = tuple(model for model in _MODELS if model not in SPECULAR_MODELS)
+"""Reflection models that the unit serves beside those: more squarers, tables of a slope or a curve."""
+
+
+class HighlightOperand:
+    """What the units of a highlight share: their operand, and what they refuse.
+
+    A subclass has a field ``operand``. ``"cosine"``: the unit takes ``N . H`` of two unit vectors in
+    ``SQ(4, 34)`` and subtracts it from `ONE_SQUARED`. ``"one_minus_cosine"``: it takes ``1 - cos gamma`` in
+    ``UQ(1, 25)``.
+    """
+
+    operand: str
+
+    ARGUMENT_FORMAT = UQ(1, 25)
+    RESULT_FORMAT = UQ(0, 17)
+    EXPONENT_BITS = 10
+
+    def __post_init__(self):
+        if self.operand not in ("cosine", "one_minus_cosine"):
+            raise ValueError(f"operand must be 'cosine' or 'one_minus_cosine', not {self.operand!r}")
+
+    @property
+    def operand_format(self) -> Format:
+        """Format of the input."""
+        return DotProduct().result_format if self.operand == "cosine" else self.ARGUMENT_FORMAT
+
+    def one_minus(self, operand: Fixed, exponent: int) -> Fixed:
+        """One minus the cosine, exact, of an operand and an exponent that are in range.
+
+        Raises
+        ------
+        ValueError
+            If the operand has another format or the exponent is out of range.
+        """
+        if operand.format != self.operand_format:
+            raise ValueError(f"operand must be {self.operand_format}, not {operand.format}")
+        if not 1 <= exponent <= MAX_EXPONENT:
+            raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {exponent}")
+        return ONE_SQUARED - operand if self.operand == "cosine" else operand
 
 
 @dataclass(frozen=True)
-class Specular:
+class Chords:
+    """A monotone function by chords: a table of starts and steps, between which 11 bits interpolate.
+
+    Parameters
+    ----------
+    start, step : Fixed, shape (entries,)
+        Value at the start of each interval, and how far it is to the next; as many fraction bits.
+    rising : bool
+        Whether the steps are added, else subtracted.
+    """
+
+    start: Fixed
+    step: Fixed
+    rising: bool
+
+    INTERPOLATION_FORMAT = UQ(0, 11)
+
+    @classmethod
+    def of(cls, ends: np.ndarray, start_format: Format, step_format: Format) -> "Chords":
+        """Chords between the values at the ends of equal intervals."""
+        codes = Fixed.round(start_format, ends).codes
+        rising = bool(codes[-1] > codes[0])
+        return cls(
+            Fixed(start_format, codes[:-1]),
+            Fixed(step_format, np.diff(codes) if rising else -np.diff(codes)),
+            rising,
+        )
+
+    def compute(self, code: np.ndarray) -> Fixed:
+        """Bit-true values: the code's low 11 bits interpolate, those above are the address."""
+        format = self.INTERPOLATION_FORMAT
+        address = code >> format.width
+        way = self.step[address] * Fixed(format, code & format.max_code)
+        way = way.truncate(self.start.format.fraction_bits).codes
+        start = self.start.codes[address]
+        return Fixed(self.start.format, start + way if self.rising else start - way)
+
+
+def _lowered(function, entries: int) -> np.ndarray:
+    """Ends of chords of a convex function on [0, 1], lowered by half of what the chords are too high."""
+    ends = function(np.arange(entries + 1) / entries)
+    high = (ends[1:] + ends[:-1]) / 2 - function((np.arange(entries) + 0.5) / entries)
+    return np.maximum(ends - (np.r_[high[0], high] + np.r_[high, high[-1]]) / 4, 0)
+
+
+@dataclass(frozen=True)
+class Specular(HighlightOperand):
     """``max(1 - k (1 - cos gamma), 0)^p`` with ``k = a n + b`` and p = 2, 4 or 8, by model and exponent n.
 
     ``cosquad_q`` reads k from a table of 1024 words; the models of Lyon square once, twice or three times.
     ``exp`` is ``exp(-n (1 - cos gamma)) = 2^(-16 p)`` with ``p = k (1 - cos gamma)``, ``k = n log2(e)/16``:
     the whole part of 16 p is a shift, its fraction addresses a table of 64 values of ``2^-f`` between
     which 11 bits interpolate.
+
+    ``coscos2`` and ``coscos4`` are ``cos^k(a gamma)``, of a base ``cos(a gamma) = cos(pi/2 sqrt w)`` with
+    ``w = (2 a gamma / pi)^2``: no root and no arccos, because both the square of gamma and the cosine of a
+    root are smooth. ``gamma^2 = 2 x (1 + e)`` with ``x = 1 - cos gamma``, and e, 0 at the peak, comes from a
+    table of 128 chords over x in [0, 2). So ``w = p + p e`` with ``p = k x``, ``k = 8 a^2 / pi^2``: by
+    Taylor's rule ``4 n / pi^2`` and ``2 n / pi^2``, by equal integrals from a table of 1024 words. The base
+    is 64 chords over w in [0, 1); from w = 1 on the term is 0.
 
     The slope is normalised to ``k = K 2^s`` with K in [1/2, 1), and ``1 - cos gamma`` shifted by s before
     the multiplier, so that both its operands keep their 17 bits at every exponent.
@@ -59,15 +155,17 @@ class Specular:
     base          UQ(0, 17)  ``1 - 2^-17 - p`` is the product p, cut, with its bits inverted
     squares       UQ(0, 17)  cut
     16 p          UQ(5, 17)  of ``exp``
-    table         UQ(0, 19)  of ``exp``: chords of ``2^-f``, lowered by half of what they are too high
+    table         UQ(0, 19)  chords of ``2^-f`` or the cosine, lowered by half of what they are too high
+    e             UQ(1, 18)  chords; multiplier operand, cut to UQ(1, 16)
+    p, w          UQ(0, 17)  of ``coscos``; cut
     result        UQ(0, 17)  operand of the colour multipliers; cut
     ============= ========== ===================================================================
 
     The PROM holds for each exponent the largest shifted argument whose base reaches the cutoff: `CUTOFF`
-    where the base is squared once, for the others what gives a term of 2^-14 too. It is
-    compared with the argument of the square, never with the square, so the parabola's second lobe cannot
-    come through. What it drops is under ``CUTOFF^2 = 2^-14``: 1/64 LSB at intensity 1, 1/8 LSB at the
-    largest, 8.
+    where the base is squared once, for the others what gives a term of 2^-14 too. A lit base has ``p < 1``
+    and ``w < 1``, so that nothing wraps. The comparison is made before the square, never on it, so the
+    parabola's second lobe cannot come through. What it drops is under ``CUTOFF^2 = 2^-14``: 1/64 LSB at
+    intensity 1, 1/8 LSB at the largest, 8.
 
     Arithmetic error of the result for an exact argument, at most `ERROR`: base is off by 2^-16 each from
     the argument, its shift and K, and by 2^-17 from the product; the square doubles it; the result adds
@@ -77,55 +175,65 @@ class Specular:
     the cuts of the argument and its shift, under ``2^-16 + 2^-18``, times ``16 ln 2``, are 2.2e-4; the chords
     add 7.3e-6, roundings and the rest under 2e-5: at most ``2^-12 + 2^-15``.
 
+    Error of ``coscos``: every cut makes w smaller, together by less than ``2^-16 K (1 + e) + 2^-17 (1 + e) +
+    2^-17 w / K + 2^-16 p + 2^-17`` and what the slope is off by, which is 2^-15 at the peak. There the term
+    falls fastest with w, by 2.47 (k = 2) or 4.93 (k = 4); the chords of the base are too high by at most
+    1.11e-5, which counts two or four times. The sum is largest next to the peak, 9.8e-5 and 2.0e-4: at most
+    2^-13 and 2^-12. The chords of e make w larger, by less than 1.1e-5 up to a right angle and 8e-5 up to
+    x = 1.7, where the term falls slowly. Towards x = 2 they fail, as e has a root's end there; only n = 1
+    with k = 4 has light beyond 1.7, under 0.03, and the fourth power makes the error small again: measured,
+    8e-6.
+
     Parameters
     ----------
     model : str
         One of `SPECULAR_MODELS` or `FURTHER_MODELS`.
     operand : str
-        ``"cosine"``: the unit takes ``N . H`` of two unit vectors in ``SQ(4, 34)`` and subtracts it from 1.
-        ``"one_minus_cosine"``: it takes ``1 - cos gamma`` in ``UQ(1, 25)``.
+        ``"cosine"`` or ``"one_minus_cosine"``; see `HighlightOperand`.
+    as_documented : bool
+        The comparator of figure 3.6 as drawn, for `SPECULAR_MODELS`: it compares the *square*, with 2^-14 at
+        every exponent. Up to the base's zero the terms are those of the default to the bit. Past it the
+        parabola rises again and its second lobe comes through; squares over 1 saturate, so that from
+        ``k (1 - cos gamma) = 2`` on the surface is as bright as at the peak: at n = 20 from 37 degrees on.
+        A highlight gate for such a unit lets every span through.
 
     Raises
     ------
     ValueError
-        If the model is not one of those, or the operand is unknown.
+        If the model is not one of those or not one that is documented so, or the operand is unknown.
 
-    Source: [T] 3.4, figures 3.6 and 3.7; [C] for ``cosquad_lin`` and ``cosquad_q``; Lyon 1993; numbers.md,
-    "Traps in the documents".
+    Source: [T] 3.1 and 3.4, figures 3.6 and 3.7; [C] for ``cosquad_lin`` and ``cosquad_q``; Lyon 1993;
+    numbers.md, "Traps in the documents".
     """
 
     model: str = "cosquad"
     operand: Literal["cosine", "one_minus_cosine"] = "cosine"
+    as_documented: bool = False
 
-    ARGUMENT_FORMAT = UQ(1, 25)
     SLOPE_FORMAT = UQ(9, 18)
     SCALE_FORMAT = UQ(0, 17)
     SHIFTED_FORMAT = UQ(1, 16)
+    WIDE_FORMAT = UQ(2, 16)
     BASE_FORMAT = UQ(0, 17)
-    RESULT_FORMAT = UQ(0, 17)
-    VALUE_FORMAT = UQ(0, 19)
-    DROP_FORMAT = UQ(-6, 19)
-    INTERPOLATION_FORMAT = UQ(0, 11)
-    EXPONENT_BITS = 10
     CUTOFF = 1 / 128
     ERROR = 2.0**-13
 
     def __post_init__(self):
-        served = SPECULAR_MODELS + FURTHER_MODELS
-        if self.model not in served:
-            raise ValueError(f"the specular unit serves {', '.join(served)}, not {self.model!r}")
-        if self.operand not in ("cosine", "one_minus_cosine"):
-            raise ValueError(f"operand must be 'cosine' or 'one_minus_cosine', not {self.operand!r}")
+        if self.model not in _MODELS:
+            raise ValueError(f"the specular unit serves {', '.join(_MODELS)}, not {self.model!r}")
+        if self.as_documented and self.model not in SPECULAR_MODELS:
+            raise ValueError(f"as_documented is of {', '.join(SPECULAR_MODELS)}, not of {self.model}")
+        super().__post_init__()
 
     @property
-    def operand_format(self) -> Format:
-        """Format of the input."""
-        return DotProduct().result_format if self.operand == "cosine" else self.ARGUMENT_FORMAT
+    def is_coscos(self) -> bool:
+        """Whether the model is a power of ``cos(a gamma)``."""
+        return self.model in COSCOS_MODELS
 
     @property
     def squarings(self) -> int:
         """How often the base is squared: 1 to 3, 0 for ``exp``."""
-        return 1 if self.model == "cosquad_q" else _LINES[self.model][2]
+        return _MODELS[self.model][1]
 
     @property
     def error(self) -> float:
@@ -141,10 +249,11 @@ class Specular:
 
     @property
     def slope_terms(self) -> tuple[Fixed, Fixed] | None:
-        """``a`` and ``b`` of the slope ``k = a n + b``, in words of the hardware; None for ``cosquad_q``."""
-        if self.model == "cosquad_q":
+        """``a`` and ``b`` of the slope ``k = a n + b``, in words of the hardware; None: a table holds k."""
+        line, _ = _MODELS[self.model]
+        if line is None:
             return None
-        a, b, _ = _LINES[self.model]
+        a, b = line
         return Fixed.round(UQ(0, 19), a), Fixed.round(UQ(0, 18), b)
 
     @cached_property
@@ -152,11 +261,15 @@ class Specular:
         """Slope k for exponents 0 to 1023; 0 at 0 where a table holds it."""
         exponents = np.arange(1 << self.EXPONENT_BITS)
         if self.slope_terms is None:
-            values = [0.0] + [slope(self.model, exponent) for exponent in exponents[1:].tolist()]
-            return Fixed.round(self.SLOPE_FORMAT, values)
+            return Fixed.round(self.SLOPE_FORMAT, [0.0, *map(self._slope, exponents[1:].tolist())])
         a, b = self.slope_terms
         total = (a * Fixed(UQ(self.EXPONENT_BITS, 0), exponents)).truncate(18) + b
         return total.wrap(self.SLOPE_FORMAT)
+
+    def _slope(self, exponent: int) -> float:
+        if self.is_coscos:
+            return 8 * (coscos_scale(exponent, *COSCOS_MODELS[self.model]) / math.pi) ** 2
+        return slope(self.model, exponent)
 
     def scale(self, exponent: np.ndarray) -> tuple[Fixed, np.ndarray]:
         """``K`` and ``s`` of the slope ``k = K 2^s``, for exponents 0 to 1023.
@@ -175,20 +288,41 @@ class Specular:
         return Fixed(self.SCALE_FORMAT, (code << (9 - shift) >> 10) & self.SCALE_FORMAT.max_code), shift
 
     @cached_property
-    def chords(self) -> tuple[Fixed, Fixed]:
-        """Table of ``exp``: value at the start of each 64th of ``2^-f``, and how far it drops to the next."""
-        ends = 2.0 ** -(np.arange(65) / 64)
-        # A chord is too high by at most (ln 2 / 64)^2 / 8 of its value.
-        values = Fixed.round(self.VALUE_FORMAT, ends * (1 - (math.log(2) / 64) ** 2 / 16))
-        return values[:-1], Fixed(self.DROP_FORMAT, -np.diff(values.codes))
+    def chords(self) -> Chords:
+        """Table of ``exp``, ``2^-f``, or of ``coscos``, ``cos(pi/2 sqrt w)``: 64 chords."""
+        if self.model == "exp":
+            return Chords.of(_lowered(lambda f: 2.0**-f, 64), UQ(0, 19), UQ(-6, 19))
+        return Chords.of(_lowered(lambda w: np.cos(math.pi / 2 * np.sqrt(w)), 64), UQ(0, 19), UQ(-5, 19))
+
+    @cached_property
+    def excess(self) -> Chords:
+        """Table of ``coscos``: ``e = gamma^2 / (2 x) - 1``, 128 chords over x in [0, 2)."""
+        x = np.arange(1, 129) / 64
+        return Chords.of(np.r_[0, np.arccos(1 - x) ** 2 / (2 * x) - 1], UQ(1, 18), UQ(-1, 18))
 
     @cached_property
     def boundaries(self) -> Fixed:
-        """The PROM: largest shifted argument that is not cut off, for exponents 0 to 1023."""
-        scale, _ = self.scale(np.arange(1 << self.EXPONENT_BITS))
-        largest = self.BASE_FORMAT.max_code - self.cutoff.codes
-        codes = (((largest + 1) << 16) - 1) // np.maximum(scale.codes, 1)
-        return Fixed(self.SHIFTED_FORMAT, np.minimum(codes, self.SHIFTED_FORMAT.max_code))
+        """The PROM: largest shifted argument that is not cut off, for exponents 0 to 1023.
+
+        As documented no argument is cut off for certain, and the unit has no PROM.
+        """
+        format = self.SHIFTED_FORMAT
+        exponent = np.arange(1 << self.EXPONENT_BITS)
+        scale, shift = self.scale(exponent)
+        if self.as_documented:
+            return Fixed(format, np.full(exponent.shape, format.max_code))
+        if not self.is_coscos:
+            largest = self.BASE_FORMAT.max_code - self.cutoff.codes
+            codes = (((largest + 1) << 16) - 1) // np.maximum(scale.codes, 1)
+            return Fixed(format, np.minimum(codes, format.max_code))
+        # By halving: the base falls with the argument, of which the last that gives a shifted one counts.
+        boundary = np.zeros_like(exponent)
+        for bit in reversed(range(format.width)):
+            shifted = boundary | 1 << bit
+            last = np.minimum(((shifted + 1 << 10) - 1) >> (shift + 1), self.ARGUMENT_FORMAT.max_code)
+            base = self._cosine(Fixed(self.ARGUMENT_FORMAT, last), Fixed(format, shifted) * scale)
+            boundary = np.where(base >= self.cutoff.codes, shifted, boundary)
+        return Fixed(format, boundary)
 
     def compute(self, operand: Fixed, dark: np.ndarray, exponent: int) -> Fixed:
         """Bit-true specular terms.
@@ -211,28 +345,42 @@ class Specular:
         ValueError
             If the operand has another format or the exponent is out of range.
         """
-        if operand.format != self.operand_format:
-            raise ValueError(f"operand must be {self.operand_format}, not {operand.format}")
-        if not 1 <= exponent <= MAX_EXPONENT:
-            raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {exponent}")
-        if self.operand == "cosine":
-            operand = (ONE_SQUARED - operand).truncate(25).saturate(self.ARGUMENT_FORMAT)
+        argument = self.one_minus(operand, exponent).truncate(25).saturate(self.ARGUMENT_FORMAT)
         scale, shift = self.scale(np.int64(exponent))
-        shifted = Fixed(UQ(10, 26), operand.codes << (shift + 1)).truncate(16).saturate(self.SHIFTED_FORMAT)
-        lit = (shifted <= self.boundaries[exponent]) & ~np.asarray(dark, dtype=bool)
+        shifted = Fixed(UQ(10, 26), argument.codes << (shift + 1)).truncate(16)
+        lit = ~np.asarray(dark, dtype=bool)
+        if self.as_documented:
+            return self._drawn(shifted.saturate(self.WIDE_FORMAT) * scale, lit)
+        shifted = shifted.saturate(self.SHIFTED_FORMAT)
+        lit &= shifted <= self.boundaries[exponent]
         product = shifted * scale
         if self.model == "exp":
             return self._exponential(product.truncate(21).scale(4), lit)
-        base = np.where(lit, self.BASE_FORMAT.max_code - product.truncate(17).codes, 0)
-        base = Fixed(self.BASE_FORMAT, base)
+        if self.is_coscos:
+            base = self._cosine(argument, product)
+        else:
+            base = self.BASE_FORMAT.max_code - product.truncate(17).codes
+        base = Fixed(self.BASE_FORMAT, np.where(lit, base, 0))
         for _ in range(self.squarings):
             base = (base * base).truncate(17)
         return base
 
+    def _drawn(self, product: Fixed, lit: np.ndarray) -> Fixed:
+        """Square of a base of either sign, where the square reaches the cutoff's."""
+        p, largest = product.truncate(17).codes, self.BASE_FORMAT.max_code
+        base = np.where(p <= largest, largest - p, np.minimum(p - largest - 1, largest))
+        base = Fixed(self.BASE_FORMAT, np.where(lit, base, 0))
+        square = (base * base).truncate(17)
+        return Fixed(self.RESULT_FORMAT, np.where(square.values >= self.CUTOFF**2, square.codes, 0))
+
+    def _cosine(self, argument: Fixed, product: Fixed) -> np.ndarray:
+        """Codes of ``cos(a gamma)``, from ``w = p + p e``; that of the largest w beyond it."""
+        p = product.truncate(17).saturate(self.BASE_FORMAT)
+        e = self.excess.compute(argument.codes >> 8).truncate(16)
+        w = (p + p * e).truncate(17).saturate(self.BASE_FORMAT)
+        return self.chords.compute(w.codes).truncate(17).codes
+
     def _exponential(self, power: Fixed, lit: np.ndarray) -> Fixed:
         """``2^-power`` where lit, else 0."""
-        start, drop = self.chords
-        whole, address = power.codes >> 17, power.codes >> 11 & 63
-        within = Fixed(self.INTERPOLATION_FORMAT, power.codes & self.INTERPOLATION_FORMAT.max_code)
-        value = start[address].codes - (drop[address] * within).truncate(19).codes
-        return Fixed(self.RESULT_FORMAT, np.where(lit, value >> (whole + 2), 0))
+        whole, value = power.codes >> 17, self.chords.compute(power.codes & 0x1FFFF)
+        return Fixed(self.RESULT_FORMAT, np.where(lit, value.codes >> (whole + 2), 0))

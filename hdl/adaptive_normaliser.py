@@ -11,7 +11,7 @@ from golden.difference_setup import DifferenceSetup
 from golden.fixed import SQ
 from golden.unit_vector import COMPONENT
 
-from .bisection import BisectionUnit, multiplier_turns
+from .bisection import BisectionUnit
 from .fixed import FixedShape, FixedValue
 from .middle_normal import normal_shape
 
@@ -31,11 +31,11 @@ class AdaptiveNormaliserUnit(wiring.Component):
     works out start, step and length of every segment, one in 14 clocks (3 for a segment without a pixel), and
     puts them into a FIFO. The back gives one normal a clock from a span's first to its last, unless the
     output waits; it begins a span when all of its segments are there. `preparation` is the number of clocks
-    from taking a span in to its first normal, where the back is free by then: 70 for k = 0, 84 for k = 1, 150
+    from taking a span in to its first normal, where the back is free by then: 69 for k = 0, 83 for k = 1, 148
     for k = 2. The next span is taken in two clocks before that, so spans of more pixels follow each other
     without a gap. A span of length 0 takes one clock and gives nothing.
 
-    Five multipliers: four in the bisection unit and one for the square of the error block and the segments.
+    Three multipliers: two in the bisection unit and one for the square of the error block and the segments.
     The segment ends are held in a memory of ``2^(depth + 1)`` words of 54 bits, the segments in a FIFO of as
     many; a table of 2048 words of 17 bits holds the reciprocals.
 
@@ -48,14 +48,16 @@ class AdaptiveNormaliserUnit(wiring.Component):
     -------
     i : :py:`In(stream.Signature(StructLayout({"normal_left", "normal_right", "length": 12})))`
         Unit normals, three components ``SQ(1, 17)`` each; pixels.
-    o : :py:`Out(stream.Signature(StructLayout({"normal", "wide": 1})))`
-        Normals, three components ``SQ(1, 17)``; ``wide``: of a span wider than the bisection's ``max_angle``.
+    o : :py:`Out(stream.Signature(StructLayout({"normal", "wide": 1, "last": 1})))`
+        Normals, three components ``SQ(1, 17)``; ``wide``: of a span wider than the bisection's ``max_angle``;
+        ``last``: the last of its span.
 
     Source: [T] 2.1, figure 2.7.
     """
 
     def __init__(self, parameters: AdaptiveNormaliser | None = None):
         self.parameters = parameters or AdaptiveNormaliser()
+        self._bisection = BisectionUnit(self.parameters.bisection)
         super().__init__(
             {
                 "i": In(
@@ -70,7 +72,11 @@ class AdaptiveNormaliserUnit(wiring.Component):
                     )
                 ),
                 "o": Out(
-                    stream.Signature(data.StructLayout({"normal": normal_shape(), "wide": unsigned(1)}))
+                    stream.Signature(
+                        data.StructLayout(
+                            {"normal": normal_shape(), "wide": unsigned(1), "last": unsigned(1)}
+                        )
+                    )
                 ),
             }
         )
@@ -78,10 +84,9 @@ class AdaptiveNormaliserUnit(wiring.Component):
     def preparation(self, levels: int) -> int:
         """Clocks from taking a span in to its first normal, if it has at least ``2^levels + 1`` pixels.
 
-        A span of one pixel has a single segment, and the way through the FIFO takes one clock more: 57.
+        A span of one pixel has a single segment, and the way through the FIFO takes one clock more: 56.
         """
-        turns = multiplier_turns(self.parameters.bisection.steps)
-        latency, interval = turns[-1] + 5, len(turns)
+        latency, interval = self._bisection.latency, self._bisection.initiation_interval
         further = sum(latency + 4 + interval * ((1 << level) - 1) for level in range(1, levels))
         return latency + 14 + further + SEGMENT_CLOCKS * ((1 << levels) + 1)
 
@@ -116,7 +121,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
         m.submodules.ends = ends = Memory(shape=normal_shape(), depth=2 * whole, init=[])
         read, write = ends.read_port(), ends.write_port()
-        m.submodules.bisection = bisection = BisectionUnit(p.bisection)
+        m.submodules.bisection = bisection = self._bisection
         m.d.comb += bisection.o.ready.eq(1)
 
         # The reciprocal of m - 1 has the whole first bisection to come.
@@ -342,7 +347,11 @@ class AdaptiveNormaliserUnit(wiring.Component):
             fifo.r_en.eq(load),
         ]
         with m.If(advance):
-            m.d.sync += [self.o.valid.eq(remaining != 0), self.o.payload.wide.eq(wide)]
+            m.d.sync += [
+                self.o.valid.eq(remaining != 0),
+                self.o.payload.wide.eq(wide),
+                self.o.payload.last.eq((remaining == 1) & ~inside),
+            ]
             with m.If(load):
                 m.d.sync += [
                     remaining.eq(segment.count),

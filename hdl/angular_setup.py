@@ -1,16 +1,19 @@
-"""Angular setup ([T] 3.1): a dot product, a half-chord unit, one more multiplier, and CORDIC."""
+"""Angular setup ([T] 3.1): dot products, the angle of a span, and CORDIC, on shared multipliers."""
 
-from amaranth.hdl import Cat, Const, Mux, Signal, Value, signed, unsigned
+from collections.abc import Sequence
+
+from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
 from amaranth.lib import data
-from amaranth.lib.memory import Memory
 
 from golden.angular_setup import AngularSetup
+from golden.arccos import Arccos, HalfChord
 from golden.difference_setup import DifferenceSetup
 from golden.fixed import SQ, UQ
 from golden.unit_vector import COMPONENT
 
-from .arccos import HalfChordUnit
-from .dot_product import DotProductUnit
+from .arccos import ArccosUnit, half_chord_words, normalised_words
+from .dataflow import Dataflow, Word, checked_interval, dot, shared_sums
+from .difference_setup import reciprocal_words
 from .fixed import FixedShape, FixedValue
 from .middle_normal import normal_shape
 from .stream import PipelinedUnit
@@ -24,15 +27,35 @@ class AngularSetupUnit(PipelinedUnit):
     Equations, tables, formats and error bound are those of `golden.angular_setup.AngularSetup`, the bit-true
     twin.
 
-    The latency is 55 clocks and the initiation interval 6. Five multipliers of 18 x 18 bits at most: three in
-    the dot product (five products of vectors a span), one in the half-chord unit, and one for the two other
-    interpolations, x, y and the step. Four tables: 512 words of 36 bits twice and of 34 once, and 2048 of 17.
-    CORDIC is unrolled, 22 steps of three adders, as is the sum that takes back its gain.
+    Twenty-six multiplications: five dot products of three, six of the half chord, two more interpolations, x,
+    y and the step. With an initiation interval I, ``ceil(26/I)`` multipliers take turns at them
+    (`hdl.dataflow`). With ``angle="arccos"`` the pipelined arccos unit, which has two multipliers, takes the
+    place of the half chord, and one multiplication that of its six, to bring psi to turns: ``2 + ceil(21/I)``
+    multipliers. The results are the same to the bit.
+
+    =================== == == == == == ==
+    initiation interval 1  2  3  4  5  6
+    =================== == == == == == ==
+    latency             50 53 53 53 53 56
+    multipliers         26 13 9  7  6  5
+    by arccos: latency  50 53 54 53 53 57
+    multipliers         23 13 9  8  7  6
+    =================== == == == == == ==
+
+    Four tables: 512 words of 36 bits twice (once by arccos) and of 34 once, and 2048 of 17. CORDIC is
+    unrolled, 22 steps of three adders, as is the sum that takes back its gain.
 
     Parameters
     ----------
     parameters : AngularSetup
-        Tables and formats.
+        Where psi comes from, tables and formats.
+    initiation_interval : int or None
+        1 to 26, or to 21 by arccos: distance in clocks of two inputs. ``None``: 6.
+
+    Raises
+    ------
+    ValueError
+        If `initiation_interval` is none of those.
 
     Members
     -------
@@ -45,8 +68,12 @@ class AngularSetupUnit(PipelinedUnit):
     Source: [T] 3.1.
     """
 
-    def __init__(self, parameters: AngularSetup | None = None):
-        self.parameters = parameters or AngularSetup()
+    def __init__(self, parameters: AngularSetup | None = None, initiation_interval: int | None = None):
+        self.parameters = p = parameters or AngularSetup()
+        uses = 26 if p.angle == "half_chord" else 21
+        interval = checked_interval(initiation_interval, uses, 6)
+        self._graph = Dataflow(interval, uses)
+        self._words = self._describe()
         super().__init__(
             data.StructLayout(
                 {
@@ -66,240 +93,273 @@ class AngularSetupUnit(PipelinedUnit):
                     "opposite": unsigned(1),
                 }
             ),
-            latency=55,
-            initiation_interval=6,
+            latency=max(word.age for word in self._words.values()),
+            initiation_interval=interval,
         )
 
     def datapath(self, m, operands):
-        """Ages: dot products 1 to 9, chord at 10, x at 22, y at 25, psi at 36, polar at 49."""
-        p, at, register = self.parameters, self.at, self.register
-        chord, obtuse, major, minor = self._products(m, operands)
-        m.submodules.half_chord = half_chord = HalfChordUnit()
-        m.d.comb += [
-            half_chord.i.valid.eq(at(10)),
-            half_chord.i.payload.chord_squared.eq(chord),
-            half_chord.i.payload.supplement.eq(obtuse),
-            half_chord.o.ready.eq(1),
-        ]
-        angle = half_chord.o.payload
-        opposite = register(m, obtuse & ~Value.cast(chord).any(), "opposite", when=at(10))
-
-        shift = Signal(5, name="shift")
-        with m.If(at(10)):
-            for j in range(17, -1, -1):
-                with m.If(Value.cast(chord)[34 - 2 * j :].any() if j < 17 else Const(1)):
-                    m.d.sync += shift.eq(j)
-        minor_operand = self._shifted_minor(m, minor, shift)
-        half_operand = register(
-            m, major.scale(-1).truncate(17).saturate(COMPONENT), "half_operand", when=at(12)
-        )
-
-        # One multiplier, of 17 unsigned and 18 signed bits, for what is issued to it below.
-        factor, operand = Signal(17, name="factor"), Signal(signed(18), name="operand")
-        product = register(m, factor * operand, "product")
-
-        bits = Value.cast(chord)
-        bits = register(m, Mux(bits[35], (1 << 35) - 1, bits[:35]), "correction_bits", when=at(10))
-        value, rise = self._entry(m, "corrections", p.corrections, bits, 12)
-        change = FixedValue(UQ(-9, 36), product[:27]).round_half_up(22)
-        correction = register(m, value + change, "correction_sum", when=at(15))
-        correction = register(m, correction.round_half_up(18), "correction_rounded", when=at(16))
-        correction = register(m, correction.saturate(p.CORRECTION_FORMAT), "correction", when=at(17))
-        x_product = register(m, FixedValue(SQ(0, 35), product).round_half_up(26), "x_product", when=at(20))
-        half = self._hold(m, major, "major", 11, 21).scale(-1).truncate(26)
-        x = register(m, (half + x_product).wrap(p.AXIS_FORMAT), "x", when=at(21))
-
-        coarse = register(m, (Value.cast(chord) << Cat(Const(0, 3), shift[2:]))[:36], "v_coarse", when=at(11))
-        v = register(m, (coarse << Cat(Const(0, 1), shift[:2]))[:36], "v", when=at(12))
-        start, fall = self._entry(m, "reciprocals", p.reciprocals, v, 14)
-        change = FixedValue(UQ(-8, 36), product[:28]).round_half_up(22)
-        reciprocal = register(m, start - change, "reciprocal_sum", when=at(17))
-        reciprocal = register(m, reciprocal.round_half_up(17), "reciprocal_rounded", when=at(18))
-        reciprocal = register(m, reciprocal.saturate(p.RECIPROCAL_FORMAT), "reciprocal", when=at(19))
-        y_rounded = FixedValue(SQ(2, 33), product).round_half_up(26)
-        y = register(m, y_rounded.wrap(p.AXIS_FORMAT), "y", when=at(24))
-
-        leading, step_reciprocal, places = self._step_operands(m, operands.length, angle, shift, obtuse)
-        step = register(
-            m,
-            (Cat(Const(0, 6), product[:34]) >> Cat(Const(0, 3), places[3:]))[:40],
-            "step_coarse",
-            when=at(43),
-        )
-        places_late = self._hold(m, places, "places", 40, 44)
-        step = register(m, (step >> places_late[:3])[:40], "step", when=at(44))
-
-        for age, a, b in (
-            (13, self._fraction(bits), rise),
-            (15, self._fraction(v), fall),
-            (18, Value.cast(correction), Value.cast(half_operand)),
-            (22, Value.cast(reciprocal), Value.cast(self._hold(m, minor_operand, "minor_operand", 15, 22))),
-            (41, leading, step_reciprocal),
-        ):
-            with m.If(at(age)):
-                m.d.sync += [factor.eq(a), operand.eq(b)]
-
-        swap = self._hold(m, obtuse, "obtuse", 8, 25)
-        cos_beta, direction = self._polar(m, x, y, swap)
-        half_angle = self._hold(m, angle, "angle", 36, 50).scale(-1).extend(UQ(0, 40))
-        phase = (direction.extend(p.PHASE_FORMAT) + half_angle).wrap(p.PHASE_FORMAT)
-        phase = register(m, phase, "phase", when=at(50))
-
+        """The graph, read at the age of its last word."""
+        self._m = m
+        value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
-        m.d.comb += [
-            result.angle.eq(self._hold(m, angle, "angle_out", 36, 55)),
-            result.phase.eq(phase),
-            result.step.eq(FixedValue(p.STEP_FORMAT, self._hold(m, step, "step", 45, 55))),
-            result.cos_beta.eq(cos_beta),
-            result.length.eq(self._hold(m, operands.length, "length_out", 1, 55)),
-            result.opposite.eq(self._hold(m, opposite, "opposite", 11, 55)),
-        ]
+        for name, word in self._words.items():
+            read = value(word, self.latency)
+            format = getattr(AngularSetup, f"{name.upper()}_FORMAT", None)
+            m.d.comb += result[name].eq(FixedValue(format, read) if format else read)
         return result
 
-    def _hold(self, m, value, name, since, until):
-        """A value that stays for six ages from ``since``, copied on until it can be read at ``until``."""
-        interval = self.initiation_interval
-        while until >= since + interval:
-            since += interval
-            value = self.register(m, value, f"{name}_{since}", when=self.at(since - 1))
-        return value
-
-    def _products(self, m, operands):
-        """Squared chord (from age 10), whether it is the supplement's (8), and both numerators (11)."""
-        p, at, register = self.parameters, self.at, self.register
-        m.submodules.dot_product = unit = DotProductUnit()
-        a, b = Signal(normal_shape(), name="dot_a"), Signal(normal_shape(), name="dot_b")
-        left, right, vector = operands.normal_left, operands.normal_right, operands.vector
+    def _describe(self) -> dict:
+        """Words of the results."""
+        g, p = self._graph, self.parameters
+        left, right, vector, length = (
+            g.input(name, lambda operands, name=name: operands[name])
+            for name in ("normal_left", "normal_right", "vector", "length")
+        )
+        sums = shared_sums(g, 5, COMPONENT * COMPONENT)
         pairs = ((left, left), (right, right), (left, right), (left, vector), (right, vector))
-        for age, (first, second) in enumerate(pairs, start=1):
-            with m.If(at(age)):
-                m.d.sync += [a.eq(first), b.eq(second)]
-        m.d.comb += [
-            unit.i.payload.a.eq(a),
-            unit.i.payload.b.eq(b),
-            unit.i.valid.eq(1),
-            unit.o.ready.eq(1),
-        ]
-        dot = unit.o.payload
-        code = Value.cast(dot)
-        own = register(m, dot, "own_left", when=at(5))
-        own = register(m, own + dot, "own", when=at(6))
-        obtuse = register(m, code[-1], "obtuse", when=at(7))
-        cross = register(m, Mux(code[-1], -code, code)[:39].as_signed(), "cross", when=at(7))
-        cross = FixedValue(SQ(5, 34), cross).scale(1).extend(SQ(6, 34))
-        chord = register(m, own - cross, "chord_wide", when=at(8))
-        chord = register(m, chord.saturate(p.CHORD_FORMAT), "chord", when=at(9))
-        first = register(m, dot, "dot_left", when=at(8))
-        total = register(m, first + dot, "dot_sum", when=at(9))
-        difference = register(m, dot - first, "dot_difference", when=at(9))
+        own_left, own_right, cross, dot_left, dot_right = (
+            dot(g, f"dot_{k}", a, b, sums) for k, (a, b) in enumerate(pairs)
+        )
+
+        own = g.register("own", lambda a, b: a + b, own_left, own_right)
+        obtuse = g.register("obtuse", lambda cross: Value.cast(cross)[-1], cross)
+        size = g.register("cross", _magnitude, cross)
+        chord = g.register("chord_wide", lambda own, size: own - size.scale(1).extend(SQ(6, 34)), own, size)
+        chord = g.register("chord", lambda chord: chord.saturate(p.CHORD_FORMAT), chord)
+        total = g.register("dot_sum", lambda a, b: a + b, dot_left, dot_right)
+        difference = g.register("dot_difference", lambda a, b: b - a, dot_left, dot_right)
         major, minor = (
-            register(m, _choice(obtuse, x, y), name, when=at(10))
-            for name, x, y in (("major", difference, total), ("minor", total, difference))
+            g.register(name, lambda *words: _choice(*words), obtuse, *words)
+            for name, words in (("major", (difference, total)), ("minor", (total, difference)))
         )
-        return chord, obtuse, major, minor
-
-    def _shifted_minor(self, m, minor, shift):
-        """``minor 2^j`` as an operand, from age 15."""
-        p, at, register = self.parameters, self.at, self.register
-        coarse = register(
-            m, (Value.cast(minor) << Cat(Const(0, 2), shift[2:]))[:37], "minor_coarse", when=at(11)
+        opposite = g.register(
+            "opposite", lambda obtuse, chord: obtuse & ~Value.cast(chord).any(), obtuse, chord
         )
-        shifted = register(m, (coarse << shift[:2])[:37], "minor_shifted", when=at(12))
-        rounded = FixedValue(SQ(3, 34), shifted).round_half_up(16)
-        rounded = register(m, rounded, "minor_rounded", when=at(13))
-        return register(m, rounded.saturate(p.MINOR_FORMAT), "minor_operand", when=at(14))
+        shift, v = normalised_words(g, chord)
 
-    def _fraction(self, bits):
-        """Bits below the address of a table."""
-        p = self.parameters
-        below = len(bits) - p.ADDRESS_BITS
-        return bits[below - p.FRACTION_BITS : below]
+        y = self._minor(minor, shift, v)
+        x = self._major(major, chord)
+        cos_beta, direction = self._polar(x, y, obtuse)
+        if p.angle == "half_chord":
+            angle = half_chord_words(g, HalfChord(), chord, obtuse, shift, v)
+        else:
+            angle = self._by_arccos(cross)
+        phase = g.register(
+            "phase",
+            lambda direction, angle: (
+                direction.extend(p.PHASE_FORMAT)
+                + FixedValue(p.ANGLE_FORMAT, angle).scale(-1).extend(UQ(0, 40))
+            ).wrap(p.PHASE_FORMAT),
+            direction,
+            angle,
+        )
+        return {
+            "angle": angle,
+            "phase": phase,
+            "step": self._step(angle, obtuse, shift, length),
+            "cos_beta": cos_beta,
+            "length": length,
+            "opposite": opposite,
+        }
 
-    def _entry(self, m, name, table, bits, age):
-        """Value and change of a table's word, in registers that are loaded at ``age``."""
+    def _by_arccos(self, cross: Word) -> Word:
+        """Psi by arccos, and the product that brings it to turns."""
+        g, p = self._graph, self.parameters
+
+        def exact(cross):
+            # The square of the code of length 1 is 2^-16 under 1.
+            code = Value.cast(cross)
+            return FixedValue(cross.format, (code + (code >> 16))[: len(code)].as_signed())
+
+        unit = ArccosUnit(p.arccos)
+
+        def arccos(register, cosine):
+            self._m.submodules.arccos = unit
+            self._m.d.comb += [unit.i.valid.eq(1), unit.i.payload.eq(cosine), unit.o.ready.eq(1)]
+            return unit.o.payload.angle
+
+        cosine = g.register("cosine_exact", exact, cross)
+        cosine = g.register("cosine_rounded", lambda cosine: cosine.round_half_up(16), cosine)
+        operator = g.share("arccos", 1, [FixedShape(Arccos.OPERAND_FORMAT)], unit.latency, arccos)
+        radians = g.use(
+            operator, "radians_exact", [cosine], lambda cosine: [cosine.saturate(Arccos.OPERAND_FORMAT)]
+        )
+        radians = g.register(
+            "radians", lambda radians: radians.round_half_up(15).saturate(p.RADIANS_FORMAT), radians
+        )
+        factor = FixedValue.constant(p.TURNS_PER_RADIAN.format, p.TURNS_PER_RADIAN.values.item())
+        turns = g.multiply("turns_exact", radians, radians, right=lambda _: factor)
+        return g.register("turns", lambda turns: Value.cast(turns.extend(p.ANGLE_FORMAT)), turns)
+
+    def _looked_up(self, name: str, table, address: Word, fraction: Word, sign: int, format) -> Word:
+        """Interpolated word of a table, rounded to a format of a binary place less: seven clocks at least."""
+        g = self._graph
         values, changes = table
         width = changes.format.width
-        m.submodules[name] = memory = Memory(
-            shape=values.format.width + width,
-            depth=len(values.codes),
-            init=(values.codes << width | changes.codes).tolist(),
+        words = (values.codes << width | changes.codes).tolist()
+        entry = g.look_up(name, words, values.format.width + width, address)
+        entry = g.register(f"{name}_entry", lambda entry: entry, entry)
+        value = g.wire(f"{name}_value", lambda entry: FixedValue(values.format, entry[width:]), entry)
+        change = g.wire(f"{name}_change", lambda entry: FixedValue(changes.format, entry[:width]), entry)
+        fraction_format = UQ(0, self.parameters.FRACTION_BITS)
+        product = g.multiply(
+            f"{name}_product", fraction, change, lambda fraction: FixedValue(fraction_format, fraction)
         )
-        port = memory.read_port()
-        m.d.comb += port.addr.eq(bits[len(bits) - self.parameters.ADDRESS_BITS :])
-        entry = self.register(m, port.data, f"{name}_entry", when=self.at(age))
-        return FixedValue(values.format, entry[width:]), entry[:width]
 
-    def _step_operands(self, m, length, angle, shift, obtuse):
-        """Leading bits of psi, the reciprocal's word, and the shift of their product; all from age 40."""
-        p, at, register = self.parameters, self.at, self.register
-        bits = DifferenceSetup.LENGTH_BITS
-        shift = register(m, Mux(obtuse, 0, shift), "angle_shift", when=at(12))
-        shift = self._hold(m, shift, "angle_shift", 13, 36)
-        coarse = register(
-            m, (Value.cast(angle) << Cat(Const(0, 2), shift[2:]))[:36], "psi_coarse", when=at(36)
-        )
-        shift = self._hold(m, shift, "angle_shift_late", 31, 37)
-        leading = register(m, (coarse << shift[:2])[:36], "psi_shifted", when=at(37))
-        leading = register(m, FixedValue(UQ(0, 36), leading).round_half_up(18), "psi_rounded", when=at(38))
-        leading = register(m, leading.saturate(p.MANTISSA_FORMAT), "psi_leading", when=at(39))
+        def moved(value, product):
+            product = product.round_half_up(22)
+            return value + product if sign > 0 else value - product
 
-        length = self._hold(m, length, "length", 1, 35)
-        steps = register(m, (length - 1)[:bits], "steps", when=at(35))
-        position, below_top = Signal(range(bits)), Signal(range(bits))
-        with m.If(at(36)):
-            m.d.sync += [position.eq(0), below_top.eq(bits - 1)]
-            for bit in range(bits):
-                with m.If(steps[bit]):
-                    m.d.sync += [position.eq(bit), below_top.eq(bits - 1 - bit)]
-        address = register(m, (steps << below_top)[: bits - 1], "address", when=at(37))
-        table = DifferenceSetup().reciprocals
-        m.submodules.lengths = memory = Memory(
-            shape=table.format.width, depth=len(table.codes), init=table.codes.tolist()
+        total = g.register(f"{name}_sum", moved, value, product)
+        rounded = g.register(
+            f"{name}_rounded", lambda total: total.round_half_up(format.fraction_bits), total
         )
-        port = memory.read_port()
-        m.d.comb += port.addr.eq(address)
-        reciprocal = register(m, port.data, "length_reciprocal", when=at(39))
-        places = register(m, position + address.any(), "length_places", when=at(38))
-        places = register(m, (places + shift)[:5], "places", when=at(39))
-        return Value.cast(leading), reciprocal, places
+        return g.register(f"{name}_result", lambda rounded: rounded.saturate(format), rounded)
 
-    def _polar(self, m, x, y, swap):
-        """CORDIC: one step a clock from age 27 on; cos beta at age 55, the direction from 50."""
-        p, at, register = self.parameters, self.at, self.register
-        width = p.ROTATED_FORMAT.width
-        pairs = {"x_26": (y, x), "y_26": (x, y)}
-        first, second = (
-            Value.cast(register(m, _choice(swap, *pair).extend(p.ROTATED_FORMAT), name))
-            for name, pair in pairs.items()
+    def _places(self, name: str, bits: Word, width: int) -> tuple[Word, Word]:
+        """Address of a table, from the top bits, and the bits below it."""
+        g, p = self._graph, self.parameters
+        below = width - p.ADDRESS_BITS
+        return (
+            g.wire(f"{name}_address", lambda bits: bits[below:], bits),
+            g.wire(f"{name}_fraction", lambda bits: bits[below - p.FRACTION_BITS : below], bits),
         )
-        behind = first[-1]
-        turned = FixedValue(p.DIRECTION_FORMAT, Mux(behind, p.DIRECTION_FORMAT.min_code, 0)[:28].as_signed())
-        direction = Value.cast(register(m, turned, "direction"))
-        across = register(m, Mux(behind, -second, second)[:width].as_signed(), "across")
-        along = register(m, Mux(behind, -first, first)[:width].as_signed(), "along")
-        for i, turn in enumerate(p.directions.codes.tolist()):
-            below = across[-1]
-            rotated = {
-                "along": _added(along, _halved(across, i), below),
-                "across": _added(across, _halved(along, i), ~below),
-                "direction": (direction + Mux(below, -turn, turn))[: len(direction)],
-            }
-            along, across, direction = (
-                register(m, value.as_signed(), f"{name}_{i}") for name, value in rotated.items()
+
+    def _major(self, major: Word, chord: Word) -> Word:
+        """The x before the exchange, ``major/2 (1 + e)``."""
+        g, p = self._graph, self.parameters
+
+        def clamped(chord):
+            bits = Value.cast(chord)
+            return Mux(bits[35], (1 << 35) - 1, bits[:35])[35 - p.ADDRESS_BITS - p.FRACTION_BITS :]
+
+        bits = g.register("correction_bits", clamped, chord)
+        places = self._places("correction", bits, p.ADDRESS_BITS + p.FRACTION_BITS)
+        correction = self._looked_up("corrections", p.corrections, *places, 1, p.CORRECTION_FORMAT)
+        half = g.wire("major_half", lambda major: major.scale(-1).truncate(26), major)
+        operand = g.register(
+            "half_operand", lambda major: major.scale(-1).truncate(17).saturate(COMPONENT), major
+        )
+        product = g.multiply("x_exact", correction, operand)
+        product = g.register("x_product", lambda product: product.round_half_up(26), product)
+        return g.register("x", lambda half, x: (half + x).wrap(p.AXIS_FORMAT), half, product)
+
+    def _minor(self, minor: Word, shift: Word, v: Word) -> Word:
+        """The y before the exchange, ``minor 2^j T``."""
+        g, p = self._graph, self.parameters
+        places = self._places("reciprocal", v, 36)
+        reciprocal = self._looked_up("inverse_roots", p.reciprocals, *places, -1, p.RECIPROCAL_FORMAT)
+        code = g.register(
+            "minor_coarse",
+            lambda minor, shift: (Value.cast(minor) << Cat(Const(0, 2), shift[2:]))[:37],
+            minor,
+            shift,
+        )
+        code = g.register("minor_shifted", lambda minor, shift: (minor << shift[:2])[:37], code, shift)
+        operand = g.register(
+            "minor_rounded", lambda code: FixedValue(SQ(3, 34), code).round_half_up(16), code
+        )
+        operand = g.register("minor_operand", lambda operand: operand.saturate(p.MINOR_FORMAT), operand)
+        product = g.multiply("y_exact", reciprocal, operand)
+        return g.register("y", lambda y: y.round_half_up(26).wrap(p.AXIS_FORMAT), product)
+
+    def _step(self, angle: Word, obtuse: Word, shift: Word, length: Word) -> Word:
+        """Bits of ``psi/(m-1)``."""
+        g, p = self._graph, self.parameters
+        leading = angle
+        if p.angle == "half_chord":
+            shift = g.register("angle_shift", lambda obtuse, shift: Mux(obtuse, 0, shift)[:5], obtuse, shift)
+            leading = g.register(
+                "psi_coarse", lambda psi, shift: (psi << Cat(Const(0, 2), shift[2:]))[:36], leading, shift
             )
-        direction = register(m, FixedValue(p.DIRECTION_FORMAT, direction), "direction_held", when=at(49))
+            leading = g.register("psi_shifted", lambda psi, shift: (psi << shift[:2])[:36], leading, shift)
+        leading = g.register(
+            "psi_rounded", lambda psi: FixedValue(p.ANGLE_FORMAT, psi).round_half_up(18), leading
+        )
+        leading = g.register("psi_leading", lambda psi: psi.saturate(p.MANTISSA_FORMAT), leading)
+        reciprocal, places = reciprocal_words(g, length, since=leading.age - 4)
+        if p.angle == "half_chord":
+            places = g.register("places_sum", lambda a, b: (a + b)[:5], places, shift)
+        else:
+            places = g.wire("places_sum", lambda places: Cat(places, Const(0, 1))[:5], places)
+        product = g.multiply("step_exact", leading, reciprocal)
+        step = g.register(
+            "step_coarse",
+            lambda product, places: (Cat(Const(0, 6), product) >> Cat(Const(0, 3), places[3:]))[:40],
+            product,
+            places,
+        )
+        return g.register("step", lambda step, places: (step >> places[:3])[:40], step, places)
+
+    def _polar(self, x: Word, y: Word, obtuse: Word) -> tuple[Word, Word]:
+        """Cos beta and the direction, by CORDIC, one step a clock."""
+        g, p = self._graph, self.parameters
+        width, turns = p.ROTATED_FORMAT.width, p.DIRECTION_FORMAT.width
+        first, second = (
+            g.register(
+                name, lambda *words: Value.cast(_choice(*words).extend(p.ROTATED_FORMAT)), obtuse, *words
+            )
+            for name, words in (("x_turned", (y, x)), ("y_turned", (x, y)))
+        )
+
+        def turned(value, behind):
+            return Mux(behind[-1], -value, value)[:width].as_signed()
+
+        across = g.register("across", turned, second, first)
+        along = g.register("along", turned, first, first)
+        direction = g.register(
+            "direction",
+            lambda x: Mux(x[-1], p.DIRECTION_FORMAT.min_code, 0)[:turns].as_signed(),
+            first,
+        )
+        for i, turn in enumerate(p.directions.codes.tolist()):
+
+            def rotate(a, b, across, opposed, i=i):
+                below = across[-1]
+                return _added(a, _halved(b, i), ~below if opposed else below).as_signed()
+
+            direction = g.register(
+                f"direction_{i}",
+                lambda direction, across, turn=turn: (direction + Mux(across[-1], -turn, turn))[
+                    :turns
+                ].as_signed(),
+                direction,
+                across,
+            )
+            along, across = (
+                g.register(f"along_{i}", lambda a, b, r=rotate: r(a, b, b, False), along, across),
+                g.register(f"across_{i}", lambda a, b, r=rotate: r(a, b, a, True), across, along),
+            )
         # The gain is taken back by a tree of additions.
-        wide = Cat(Const(0, p.GAIN_BITS - p.ROTATED_FORMAT.fraction_bits), along).as_signed()
-        terms = [wide >> places if sign > 0 else -(wide >> places) for sign, places in p.gain_terms]
-        stage = 0
+        zeros = p.GAIN_BITS - p.ROTATED_FORMAT.fraction_bits
+
+        def term(along, sign, places):
+            wide = Cat(Const(0, zeros), along).as_signed()
+            return wide >> places if sign > 0 else -(wide >> places)
+
+        terms = [
+            g.wire(f"gain_{places}", lambda along, t=(sign, places): term(along, *t), along)
+            for sign, places in p.gain_terms
+        ]
         while len(terms) > 1:
-            stage += 1
-            sums = [Signal(signed(len(wide)), name=f"gain_{stage}_{k}") for k in range((len(terms) + 1) // 2)]
-            m.d.sync += [total.eq(sum(terms[2 * k : 2 * k + 2])) for k, total in enumerate(sums)]
-            terms = sums
-        cos_beta = FixedValue(SQ(4, p.GAIN_BITS), terms[0]).round_half_up(25)
-        cos_beta = register(m, cos_beta, "cos_beta_rounded")
-        return register(m, cos_beta.saturate(p.COS_BETA_FORMAT), "cos_beta"), direction
+            terms = [
+                g.register(f"{terms[k].name}_sum", lambda *pair: _sum(pair, zeros + width), *terms[k : k + 2])
+                for k in range(0, len(terms), 2)
+            ]
+        cos_beta = g.register(
+            "cos_beta_rounded", lambda x: FixedValue(SQ(4, p.GAIN_BITS), x).round_half_up(25), terms[0]
+        )
+        cos_beta = g.register("cos_beta", lambda x: x.saturate(p.COS_BETA_FORMAT), cos_beta)
+        return cos_beta, g.wire("direction", lambda x: FixedValue(p.DIRECTION_FORMAT, x), direction)
+
+
+def _magnitude(cross: FixedValue) -> FixedValue:
+    code = Value.cast(cross)
+    return FixedValue(SQ(5, 34), Mux(code[-1], -code, code)[:39].as_signed())
+
+
+def _sum(terms: Sequence[Value], width: int) -> Value:
+    return sum(terms)[:width].as_signed()
 
 
 def _choice(condition, a, b):

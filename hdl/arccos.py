@@ -5,16 +5,16 @@ from typing import Literal
 import numpy as np
 from amaranth.hdl import Array, Cat, Const, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data
-from amaranth.lib.memory import Memory
 
 from golden.arccos import Arccos, HalfChord
 from golden.fixed import UQ
 from golden.unit_vector import COMPONENT
 
+from .dataflow import Dataflow, Word, checked_interval
 from .fixed import FixedShape, FixedValue
 from .stream import PipelinedUnit
 
-__all__ = ["ArccosUnit", "HalfChordUnit"]
+__all__ = ["ArccosUnit", "HalfChordUnit", "half_chord_words", "normalised_words"]
 
 
 class ArccosUnit(PipelinedUnit):
@@ -178,14 +178,29 @@ class HalfChordUnit(PipelinedUnit):
 
     Table, coefficients, formats and error bound are those of `golden.arccos.HalfChord`, the bit-true twin.
 
-    The latency is 26 clocks and the initiation interval 6. One multiplier of 18 x 17 bits does the
-    interpolation of the root, four Horner steps and the last product in turn, busy on every clock. The table
-    is 512 words of 36 bits, one block RAM.
+    Six multiplications of 18 x 17 bits a beat: the interpolation of the root, four Horner steps and the last
+    product, which take turns at ``ceil(6/I)`` multipliers for an initiation interval I (`hdl.dataflow`). By
+    default one does all, busy on every clock. The results are the same to the bit. The table is 512 words of
+    36 bits, one block RAM.
+
+    =================== == == == == == ==
+    initiation interval 1  2  3  4  5  6
+    =================== == == == == == ==
+    latency             20 22 22 21 22 22
+    multipliers         6  3  2  2  2  1
+    =================== == == == == == ==
 
     Parameters
     ----------
     parameters : HalfChord
         Table and coefficients.
+    initiation_interval : int or None
+        1 to 6, which ``None`` stands for: distance in clocks of two inputs.
+
+    Raises
+    ------
+    ValueError
+        If `initiation_interval` is none of those.
 
     Members
     -------
@@ -197,88 +212,146 @@ class HalfChordUnit(PipelinedUnit):
     Source: [T] 3.3; numbers.md, "arccos".
     """
 
-    def __init__(self, parameters: HalfChord | None = None):
+    def __init__(self, parameters: HalfChord | None = None, initiation_interval: int | None = None):
         self.parameters = parameters or HalfChord()
+        interval = checked_interval(initiation_interval, 6)
+        self._graph = Dataflow(interval, 6)
+        self._angle = self._describe()
         super().__init__(
             data.StructLayout(
                 {"chord_squared": FixedShape(HalfChord.OPERAND_FORMAT), "supplement": unsigned(1)}
             ),
             FixedShape(HalfChord.RESULT_FORMAT),
-            latency=26,
-            initiation_interval=6,
+            latency=self._angle.age,
+            initiation_interval=interval,
         )
 
     def datapath(self, m, operands):
-        """Ages: table at 4, interpolation at 6, Horner steps at 7, 10, 14, 17, product at 21, shift at 23."""
-        p, at, register = self.parameters, self.at, self.register
-        z = operands.chord_squared.scale(-2)
-        code = Value.cast(z)
-        shift = Signal(5, name="shift_2")
-        for j in range(17, -1, -1):
-            with m.If(code[34 - 2 * j :].any() if j < 17 else Const(1)):
-                m.d.sync += shift.eq(j)
-        coarse = register(m, (code << Cat(Const(0, 3), shift[2:]))[:36], "v_coarse")
-        shift = register(m, shift, "shift_3", when=at(2))
-        v = register(m, (coarse << Cat(Const(0, 1), shift[:2]))[:36], "v", when=at(3))
-        for age in (8, 14, 20):
-            shift = register(m, shift, f"shift_{age + 1}", when=at(age))
-        supplement = operands.supplement
-        for age in (6, 12, 18, 24):
-            supplement = register(m, supplement, f"supplement_{age + 1}", when=at(age))
-        rounded = register(m, z.round_half_up(18), "z_rounded")
-        z = [register(m, rounded.saturate(p.SQUARE_FORMAT), "z_4", when=at(3))]
-        for age in (9, 15):
-            z.append(register(m, z[-1], f"z_{age + 1}", when=at(age)))
+        """The graph."""
+        angle = self._graph.build(m, self, operands)(self._angle, self.latency)
+        return FixedValue(self.parameters.RESULT_FORMAT, angle)
 
-        values, slopes = p.roots
-        bits = p.TABLE_SLOPE_FORMAT.width
-        m.submodules.roots = table = Memory(
-            shape=p.TABLE_VALUE_FORMAT.width + bits,
-            depth=1 << p.ADDRESS_BITS,
-            init=(values.codes << bits | slopes.codes).tolist(),
+    def _describe(self) -> Word:
+        """Word of the result."""
+        g = self._graph
+        chord = g.input("chord_squared", lambda operands: operands.chord_squared)
+        supplement = g.input("supplement", lambda operands: operands.supplement)
+        return half_chord_words(g, self.parameters, chord, supplement, *normalised_words(g, chord))
+
+
+def normalised_words(graph: Dataflow, chord_squared: Word) -> tuple[Word, Word]:
+    """``v = z 4^j`` in [1/4, 1) and j, for ``z = chord_squared / 4``: three clocks.
+
+    Parameters
+    ----------
+    graph : Dataflow
+        Graph that gets the words.
+    chord_squared : Word
+        ``UQ(2, 34)``.
+
+    Returns
+    -------
+    shift, v : Word
+        j, 0 to 17; the bits of v in ``UQ(0, 36)``.
+    """
+
+    def pairs_of_zeros(chord):
+        code, count = Value.cast(chord), Const(17, 5)
+        for j in range(16, -1, -1):
+            count = Mux(code[34 - 2 * j :].any(), Const(j, 5), count)
+        return count
+
+    shift = graph.register("shift", pairs_of_zeros, chord_squared)
+    coarse = graph.register(
+        "v_coarse",
+        lambda chord, shift: (Value.cast(chord) << Cat(Const(0, 3), shift[2:]))[:36],
+        chord_squared,
+        shift,
+    )
+    v = graph.register("v", lambda v, shift: (v << Cat(Const(0, 1), shift[:2]))[:36], coarse, shift)
+    return shift, v
+
+
+def half_chord_words(
+    graph: Dataflow, p: HalfChord, chord_squared: Word, supplement: Word, shift: Word, v: Word
+) -> Word:
+    """Bits of ``psi`` in ``UQ(0, 36)``, in turns: six multiplications of the graph.
+
+    Parameters
+    ----------
+    graph : Dataflow
+        Graph that gets the words.
+    p : HalfChord
+        Table and coefficients.
+    chord_squared, supplement : Word
+        As `HalfChordUnit` takes them.
+    shift, v : Word
+        From `normalised_words`.
+    """
+    rounded = graph.register("z_rounded", lambda chord: chord.scale(-2).round_half_up(18), chord_squared)
+    z = graph.register("z", lambda z: z.saturate(p.SQUARE_FORMAT), rounded)
+
+    values, slopes = p.roots
+    bits, unread = p.TABLE_SLOPE_FORMAT.width, 36 - p.ADDRESS_BITS - p.FRACTION_BITS
+    entry = graph.look_up(
+        "roots",
+        (values.codes << bits | slopes.codes).tolist(),
+        p.TABLE_VALUE_FORMAT.width + bits,
+        graph.wire("root_address", lambda v: v[36 - p.ADDRESS_BITS :], v),
+    )
+    entry = graph.register("entry", lambda entry: entry, entry)
+    value = graph.wire("value", lambda entry: FixedValue(p.TABLE_VALUE_FORMAT, entry[bits:]), entry)
+    slope = graph.wire("slope", lambda entry: FixedValue(p.TABLE_SLOPE_FORMAT, entry[:bits]), entry)
+    fraction = graph.wire("fraction", lambda v: v[unread:][: p.FRACTION_BITS], v)
+
+    c1, c2, c3, c4 = (FixedValue.constant(p.SUM_FORMAT, value) for value in p.coefficients.values.tolist())
+    constant = FixedValue.constant(p.constant.format, p.constant.values.item())
+    product = graph.multiply("product_4", z, z, lambda z: z.scale(1), lambda _: c4.scale(2))
+    for power, c in ((3, c3), (2, c2), (1, c1)):
+        total = graph.register(
+            f"total_{power}",
+            lambda x, c=c: (_unsigned(x).scale(-3).round_half_up(19) + c).wrap(p.SUM_FORMAT),
+            product,
         )
-        port = table.read_port()
-        m.d.comb += port.addr.eq(v[36 - p.ADDRESS_BITS :])
-        entry = register(m, port.data, "entry", when=at(5))
-        value = FixedValue(p.TABLE_VALUE_FORMAT, entry[bits:])
-        fraction = v[36 - p.ADDRESS_BITS - p.FRACTION_BITS : 36 - p.ADDRESS_BITS]
-
-        # One multiplier, of 17 unsigned and 18 signed bits; wired shifts align what it is given.
-        factor = Signal(FixedShape(UQ(0, 17)))
-        operand = Signal(FixedShape(COMPONENT))
-        product = register(m, factor * operand, "product")
-        unsigned_product = FixedValue(UQ(0, 34), Value.cast(product)[:34])
-        rise = unsigned_product.scale(-p.ADDRESS_BITS).truncate(21).wrap(p.TABLE_VALUE_FORMAT)
-        horner = FixedValue(UQ(-3, 37), Value.cast(unsigned_product.scale(-3))).round_half_up(19)
-        root = register(m, value + rise, "root_sum", when=at(8))
-        root = register(m, root.round_half_up(17), "root_rounded", when=at(9))
-        root = register(m, root.saturate(p.ROOT_FORMAT), "root", when=at(10))
-        root = register(m, root, "root_late", when=at(16))
-
-        c1, c2, c3, c4 = (
-            FixedValue.constant(p.SUM_FORMAT, value) for value in p.coefficients.values.tolist()
+        product = graph.multiply(
+            f"product_{power}", z, total, lambda z: z.scale(1), lambda total: total.scale(2)
         )
-        total_9, total_12, total_16 = (
-            register(m, (horner + c).wrap(p.SUM_FORMAT), f"total_{age}", when=at(age))
-            for age, c in ((9, c3), (12, c2), (16, c1))
-        )
-        constant = FixedValue.constant(p.constant.format, p.constant.values.item())
-        total_19 = register(m, (horner + constant).round_half_up(17), "total_19", when=at(19))
-        last = register(m, total_19.saturate(p.FACTOR_FORMAT), "factor_last", when=at(20))
-        issues = [
-            (6, FixedValue(UQ(0, 17), fraction << 3), FixedValue(UQ(0, 15), entry[:bits]).extend(COMPONENT)),
-            (7, z[0].scale(1), c4.scale(2)),
-            (10, z[1].scale(1), total_9.scale(2)),
-            (14, z[1].scale(1), total_12.scale(2)),
-            (17, z[2].scale(1), total_16.scale(2)),
-            (21, root, last),
-        ]
-        for age, a, b in issues:
-            with m.If(at(age)):
-                m.d.sync += [factor.eq(a), operand.eq(b)]
+    total = graph.register(
+        "total",
+        lambda x: (_unsigned(x).scale(-3).round_half_up(19) + constant).round_half_up(17),
+        product,
+    )
+    factor = graph.register("factor", lambda total: total.saturate(p.FACTOR_FORMAT), total)
 
-        wide = Cat(Const(0, 1), Value.cast(unsigned_product))
-        coarse = register(m, (wide >> Cat(Const(0, 2), shift[2:]))[:36], "angle_coarse", when=at(23))
-        angle = register(m, (coarse >> shift[:2])[:36], "angle", when=at(24))
-        turned = register(m, Mux(supplement, (1 << 35) - angle, angle)[:36], "angle_turned", when=at(25))
-        return FixedValue(p.RESULT_FORMAT, turned)
+    # 17 unsigned and 18 signed bits; wired shifts align what the multipliers are given.
+    def aligned(fraction):
+        return FixedValue(UQ(0, 17), Cat(Const(0, 17 - p.FRACTION_BITS), fraction))
+
+    rise = graph.multiply("rise", fraction, slope, aligned, lambda slope: slope.extend(COMPONENT))
+    root = graph.register(
+        "root_sum",
+        lambda value, rise: (
+            value + _unsigned(rise).scale(-p.ADDRESS_BITS).truncate(21).wrap(p.TABLE_VALUE_FORMAT)
+        ),
+        value,
+        rise,
+    )
+    root = graph.register("root_rounded", lambda root: root.round_half_up(17), root)
+    root = graph.register("root", lambda root: root.saturate(p.ROOT_FORMAT), root)
+
+    product = graph.multiply("angle_exact", root, factor)
+    coarse = graph.register(
+        "angle_coarse",
+        lambda x, shift: Cat(Const(0, 1), Value.cast(_unsigned(x))) >> Cat(Const(0, 2), shift[2:]),
+        product,
+        shift,
+    )
+    angle = graph.register("angle", lambda angle, shift: angle >> shift[:2], coarse, shift)
+    return graph.register(
+        "angle_turned", lambda angle, other: Mux(other, (1 << 35) - angle, angle)[:36], angle, supplement
+    )
+
+
+def _unsigned(product: FixedValue) -> FixedValue:
+    """A product of two numbers in [0, 1)."""
+    return FixedValue(UQ(0, 34), Value.cast(product)[:34])

@@ -2,9 +2,16 @@
 
 from amaranth.hdl import Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
+from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from golden.frame_constants import FIELDS_OF_A_FRAME, FIELDS_OF_A_LIGHT, LIGHT_STRIDE
+from golden.frame_constants import (
+    FIELDS_OF_A_FRAME,
+    FIELDS_OF_A_LIGHT,
+    LIGHT_STRIDE,
+    MATERIAL_ADDRESS,
+    MAX_MATERIALS,
+)
 from golden.specular import Specular
 
 from .intensity import color_shape
@@ -48,16 +55,29 @@ class FrameConstantsUnit(wiring.Component):
     ======================== ==========================================================
     0                        exponent, 1 to 1000
     1 to 3                   ambient red, green, blue, ``UQ(11, 6)`` LSB
+    4                        index of a material, where there are several
     16 (light + 1) + 0 to 2  direction to the light, ``SQ(1, 17)``
     16 (light + 1) + 3 to 5  half-way vector, ``SQ(1, 17)``
     16 (light + 1) + 6 to 8  diffuse red, green, blue, ``UQ(11, 6)`` LSB
     16 (light + 1) + 9 to 11 specular red, green, blue, ``UQ(11, 6)`` LSB
     ======================== ==========================================================
 
+    With several materials the exponent and the colours stand in memories of a word each, written for the
+    material whose index was last written to address 4 and read for that of ``material``: they follow it 1
+    clock behind, and a write 2. Writes for an index past the last material are lost. Memories are not cleared
+    by reset.
+
     Parameters
     ----------
     lights : int
         Number of lights.
+    materials : int
+        Number of materials, 1 to `MAX_MATERIALS`.
+
+    Raises
+    ------
+    ValueError
+        If the number of materials is out of range.
 
     Members
     -------
@@ -65,39 +85,67 @@ class FrameConstantsUnit(wiring.Component):
         Writes.
     hold : :py:`In(1)`
         Whether the constants must not change.
+    material : :py:`In(range(materials))`
+        Only where there are several: the material whose constants are given.
     constants : :py:`Out(frame_constants_shape(lights))`
         The constants.
 
     Source: pipeline.md, "Span stream".
     """
 
-    def __init__(self, lights: int):
+    def __init__(self, lights: int, materials: int = 1):
+        if not 1 <= materials <= MAX_MATERIALS:
+            raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {materials}")
         self.lights = lights
-        super().__init__(
-            {
-                "write": In(stream.Signature(write_shape())),
-                "hold": In(1),
-                "constants": Out(frame_constants_shape(lights)),
-            }
-        )
+        self.materials = materials
+        members = {
+            "write": In(stream.Signature(write_shape())),
+            "hold": In(1),
+            "constants": Out(frame_constants_shape(lights)),
+        }
+        if materials > 1:
+            members["material"] = In(range(materials))
+        super().__init__(members)
 
     def elaborate(self, platform):
-        """One decoded register a word."""
+        """One decoded register, or memory, a word."""
         m = Module()
         m.d.comb += self.write.ready.eq(~self.hold)
-        words = {}
+        words, of_material = {}, set()
         for name, (first, count) in FIELDS_OF_A_FRAME.items():
             field = self.constants[name]
             words |= {first + k: field[k] if count > 1 else field for k in range(count)}
+            of_material |= set(range(first, first + count))
         for light in range(self.lights):
             base = (light + 1) * LIGHT_STRIDE
             for name, (first, count) in FIELDS_OF_A_LIGHT.items():
-                words |= {base + first + k: self.constants.lights[light][name][k] for k in range(count)}
+                addresses = range(base + first, base + first + count)
+                words |= dict(zip(addresses, self.constants.lights[light][name], strict=True))
+                if name in ("diffuse", "specular"):
+                    of_material |= set(addresses)
         taken = self.write.valid & self.write.ready
+        word_data = self.write.payload.data
+        if self.materials > 1:
+            index = Signal(range(self.materials))
+            with m.If(taken & (self.write.payload.address == MATERIAL_ADDRESS)):
+                m.d.sync += index.eq(word_data)
         for address, word in words.items():
             code = Value.cast(word)
-            register = Signal(len(code), name=f"word_{address}")
-            m.d.comb += code.eq(register)
-            with m.If(taken & (self.write.payload.address == address)):
-                m.d.sync += register.eq(self.write.payload.data[: len(code)])
+            written = taken & (self.write.payload.address == address)
+            if self.materials > 1 and address in of_material:
+                memory = Memory(shape=len(code), depth=self.materials, init=[])
+                m.submodules[f"word_{address}"] = memory
+                write, read = memory.write_port(), memory.read_port()
+                m.d.comb += [
+                    write.addr.eq(index),
+                    write.data.eq(word_data[: len(code)]),
+                    write.en.eq(written),
+                    read.addr.eq(self.material),
+                    code.eq(read.data),
+                ]
+            else:
+                register = Signal(len(code), name=f"word_{address}")
+                m.d.comb += code.eq(register)
+                with m.If(written):
+                    m.d.sync += register.eq(word_data[: len(code)])
         return m

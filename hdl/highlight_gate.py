@@ -1,16 +1,21 @@
 """Highlight gate ([T] figure 4.10): which spans can hold a visible highlight."""
 
-from amaranth.hdl import Mux, Signal, Value, signed, unsigned
+from amaranth.hdl import Mux, Value, unsigned
 from amaranth.lib import data
 from amaranth.lib.memory import Memory
 
+from golden.fixed import UQ
 from golden.highlight_gate import HighlightGate
 
-from .dot_product import DotProductUnit
+from .dataflow import Dataflow, Word, checked_interval, dot, shared_sums
 from .fixed import FixedShape, FixedValue
 from .stream import PipelinedUnit
 
 __all__ = ["HighlightGateUnit"]
+
+
+_MULTIPLICATIONS = 15
+"""Nine of the dot products; T u, a b, u w, the larger one's square and product with u, and d squared."""
 
 
 class HighlightGateUnit(PipelinedUnit):
@@ -19,14 +24,30 @@ class HighlightGateUnit(PipelinedUnit):
     The comparisons, the formats and the proof are those of `golden.highlight_gate.HighlightGate`, the
     bit-true twin.
 
-    The latency is 18 clocks and the initiation interval 6. Four multipliers: three in a dot product that
-    takes ``N_l . N_r``, ``N_l . H`` and ``N_r . H`` in turn, and one of 17 by 17 bits that makes the six
-    products of the comparisons, busy on every clock. The PROM holds 1024 words of 17 bits.
+    Fifteen multiplications: three of each of ``N_l . N_r``, ``N_l . H`` and ``N_r . H``, and the six products
+    of the comparisons. With an initiation interval I, ``ceil(15/I)`` multipliers take turns at them
+    (`hdl.dataflow`). The decisions are the same.
+
+    =================== == == == == == == == == == == == == == == ==
+    initiation interval 1  2  3  4  5  6  7  8  9  10 11 12 13 14 15
+    =================== == == == == == == == == == == == == == == ==
+    latency             16 18 19 19 19 20 22 27 28 24 22 23 23 24 33
+    multipliers         15 8  5  4  3  3  3  2  2  2  2  2  2  2  1
+    =================== == == == == == == == == == == == == == == ==
+
+    The PROM holds 1024 words of 17 bits.
 
     Parameters
     ----------
     parameters : HighlightGate
         Reflection model and width.
+    initiation_interval : int or None
+        1 to 15: distance in clocks of two inputs. ``None``: 6.
+
+    Raises
+    ------
+    ValueError
+        If `initiation_interval` is none of those.
 
     Members
     -------
@@ -40,82 +61,110 @@ class HighlightGateUnit(PipelinedUnit):
     Source: [T] 4.2, figure 4.10.
     """
 
-    def __init__(self, parameters: HighlightGate | None = None):
+    def __init__(self, parameters: HighlightGate | None = None, initiation_interval: int | None = None):
         self.parameters = p = parameters or HighlightGate()
+        interval = checked_interval(initiation_interval, _MULTIPLICATIONS, 6)
+        self._graph = Dataflow(interval, _MULTIPLICATIONS)
+        self._lit = self._describe()
         normal = data.ArrayLayout(FixedShape(p.component_format), 3)
         super().__init__(
             data.StructLayout({"normal_left": normal, "normal_right": normal}),
             unsigned(1),
-            latency=18,
-            initiation_interval=6,
+            latency=self._lit.age,
+            initiation_interval=interval,
             constants=data.StructLayout({"halfway": normal, "exponent": unsigned(p.specular.EXPONENT_BITS)}),
         )
 
     def datapath(self, m, operands):
-        """Ages: dot products 1 to 7, u and the levels to 9, products at 9 to 14, decision at 17."""
-        p, at, register = self.parameters, self.at, self.register
-        f = p.fraction_bits
-
+        """The PROM, which follows the exponent, and the graph."""
+        p = self.parameters
         m.submodules.thresholds = prom = Memory(
-            shape=f, depth=1 << p.specular.EXPONENT_BITS, init=p.thresholds.codes.tolist()
+            shape=p.fraction_bits, depth=1 << p.specular.EXPONENT_BITS, init=p.thresholds.codes.tolist()
         )
         port = prom.read_port()
         m.d.comb += port.addr.eq(self.constants.exponent)
-        threshold = register(m, port.data, "threshold")
+        self._threshold = self.register(m, port.data, "threshold")
+        return self._graph.build(m, self, operands)(self._lit, self.latency)
 
-        m.submodules.dot_product = dot = DotProductUnit(p.dot_product)
-        m.d.comb += [dot.i.valid.eq(1), dot.o.ready.eq(1)]
-        first = Signal(operands.normal_left.shape(), name="first_operand")
-        second = Signal(operands.normal_left.shape(), name="second_operand")
-        m.d.comb += [dot.i.payload.a.eq(first), dot.i.payload.b.eq(second)]
-        for age, a, b in (
-            (1, operands.normal_left, operands.normal_right),
-            (2, operands.normal_left, self.constants.halfway),
-            (3, operands.normal_right, self.constants.halfway),
-        ):
-            with m.If(at(age)):
-                m.d.sync += [first.eq(a), second.eq(b)]
+    def _describe(self) -> Word:
+        """Word of the decision."""
+        g, p = self._graph, self.parameters
+        f, angle = p.fraction_bits, p.angle_format
+        left, right = (
+            g.input(name, lambda operands, name=name: operands[name])
+            for name in ("normal_left", "normal_right")
+        )
 
-        # The dot products come out at ages 5, 6 and 7.
-        angle = p.angle_format
+        sums = shared_sums(g, 3, p.component_format * p.component_format)
         one = FixedValue.constant(p.one_squared.format, p.one_squared.values.item())
-        difference = register(m, one - dot.o.payload, "difference", when=at(5))
-        cut = register(m, difference.truncate(angle.fraction_bits).saturate(angle), "cut", when=at(6))
-        sum_u = Value.cast(cut) + 3
-        u = register(m, Mux(sum_u[f], angle.max_code, sum_u[:f])[:f], "u", when=at(7))
-        u_late = register(m, u, "u_late", when=at(13))
-        wide = register(m, Value.cast(cut) > p.widest.codes.item(), "wide", when=at(7))
-        wide = register(m, wide, "wide_late", when=at(13))
-        step = FixedValue.constant(p.level_format, p.level_format.step)
-        level = register(m, dot.o.payload.truncate(f) + step, "level").saturate(p.level_format)
-        a, b = (register(m, Value.cast(level), name, when=at(age)) for name, age in (("a", 7), ("b", 8)))
-        minus = register(m, a - b, "a_minus_b", when=at(9))
-        is_negative = minus[-1]
-        large = register(m, Mux(is_negative, b, a), "large", when=at(10))
-        span = register(m, Mux(is_negative, -minus, minus)[:f], "absolute_difference", when=at(10))
+        difference = g.register(
+            "difference", lambda cosine: one - cosine, dot(g, "cosine", left, right, sums)
+        )
+        cut = g.register(
+            "cut", lambda x: Value.cast(x.truncate(angle.fraction_bits).saturate(angle)), difference
+        )
+        wide = g.register("wide", lambda cut: cut > p.widest.codes.item(), cut)
+        u = g.register("u", lambda cut: Mux((cut + 3)[f], angle.max_code, (cut + 3)[:f])[:f], cut)
 
-        factors = [Signal(f, name=f"factor_{k}") for k in range(2)]
-        product = register(m, factors[0] * factors[1], "product")
-        slack = Signal(f)
-        issues = [(9, threshold, u), (10, a, b), (11, large, large), (12, large, u), (13, span, span)]
-        for age, x, y in [*issues, (14, u_late, slack)]:
-            with m.If(at(age)):
-                m.d.sync += [factors[0].eq(x), factors[1].eq(y)]
+        step = FixedValue.constant(p.level_format, p.level_format.step)
+        levels = []
+        for name, normal in (("a", left), ("b", right)):
+            level = dot(g, f"dot_{name}", normal, lambda _: self.constants.halfway, sums)
+            level = g.register(f"level_{name}", lambda dot: dot.truncate(f) + step, level)
+            level = g.register(name, lambda level: Value.cast(level.saturate(p.level_format)), level)
+            levels.append(level)
+        a, b = levels
+
+        factor = UQ(0, f)
+
+        def multiply(name, x, y, left=lambda x: x, since=0):
+            return g.multiply(
+                name,
+                x,
+                y,
+                lambda x: FixedValue(factor, left(x)),
+                lambda y: FixedValue(factor, y),
+                since=since,
+            )
 
         # w = 2 T - T u - 2 a b, with 2 F + 1 fraction bits.
-        partial = Signal(signed(2 * f + 3))
-        total = Signal(signed(2 * f + 3))
-        with m.If(at(11)):
-            m.d.sync += partial.eq((threshold << (f + 2)) - product)
-        with m.If(at(12)):
-            m.d.sync += total.eq(partial - (product << 2))
-        kept = total[f + 2 :]
-        exceeded = register(m, kept[-1] | ~kept.any(), "exceeded", when=at(13))
-        with m.If(at(13)):
-            m.d.sync += slack.eq(kept)
+        product = multiply("threshold_u", u, u, lambda _: self._threshold)
+        partial = g.register(
+            "partial", lambda x: ((self._threshold << (f + 2)) - Value.cast(x)).as_signed(), product
+        )
+        total = g.register(
+            "total",
+            lambda partial, x: (partial - (Value.cast(x) << 2))[: 2 * f + 3].as_signed(),
+            partial,
+            multiply("a_b", a, b, since=partial.age),
+        )
+        exceeded = g.register("exceeded", lambda w: w[-1] | ~w[f + 2 :].any(), total)
+        slack = g.register("slack", lambda w: w[f + 2 :][:f], total)
 
-        bright = register(m, product >= (threshold << f), "bright", when=at(13))
-        inside = register(m, product > (span << (f + 1)), "inside", when=at(14))
-        square = register(m, product, "square", when=at(15))
-        reached = register(m, square >= product, "reached", when=at(16))
-        return register(m, wide | bright | (inside & (exceeded | reached)), "lit")
+        minus = g.register("a_minus_b", lambda a, b: a - b, a, b)
+        large = g.register("large", lambda minus, a, b: Mux(minus[-1], b, a), minus, a, b)
+        span = g.register("absolute_difference", lambda minus: Mux(minus[-1], -minus, minus)[:f], minus)
+        product = multiply("u_slack", u, slack)
+        square = multiply("square", span, span, since=product.age)
+        bright = g.register(
+            "bright",
+            lambda x: Value.cast(x) >= (self._threshold << f),
+            multiply("large_square", large, large),
+        )
+        inside = g.register(
+            "inside",
+            lambda x, span: Value.cast(x) > (span << (f + 1)),
+            multiply("large_u", large, u),
+            span,
+        )
+        reached = g.register(
+            "reached",
+            lambda square, x: Value.cast(square) >= Value.cast(x),
+            square,
+            product,
+        )
+        return g.register(
+            "lit",
+            lambda wide, bright, inside, exceeded, reached: wide | bright | (inside & (exceeded | reached)),
+            *(wide, bright, inside, exceeded, reached),
+        )

@@ -1,13 +1,12 @@
-"""Middle normal of a span through the h polynomial ([T] 2.2): a dot product and one shared multiplier."""
+"""Middle normal of a span through the h polynomial ([T] 2.2) on shared multipliers."""
 
 from amaranth.hdl import Signal, unsigned
 from amaranth.lib import data
 
-from golden.fixed import UQ
 from golden.middle_normal import MiddleNormal
 from golden.unit_vector import COMPONENT, ONE_SQUARED
 
-from .dot_product import DotProductUnit
+from .dataflow import Dataflow, checked_interval, dot
 from .fixed import FixedShape, FixedValue
 from .stream import PipelinedUnit
 
@@ -19,18 +18,38 @@ def normal_shape() -> data.ArrayLayout:
     return data.ArrayLayout(FixedShape(COMPONENT), 3)
 
 
+_MULTIPLICATIONS = 9
+"""Three of the dot product, three Horner steps, three scalings by e."""
+
+
 class MiddleNormalUnit(PipelinedUnit):
-    """``N_c = h(r) (N_l + N_r)`` with ``h = 1/sqrt(2 (1 + r))`` as a polynomial that is exact at angle 0.
+    """``N_c = h(r) (N_l + N_r)`` with ``h = 1/sqrt(2 (1 + r))`` as a polynomial.
 
-    Formats, error bound and the flag are those of `golden.middle_normal.MiddleNormal`, the bit-true twin.
+    Formats, fits (that of the default is exact at angle 0), error bound and the flag are those of
+    `golden.middle_normal.MiddleNormal`, the bit-true twin.
 
-    The latency is 25 clocks and the initiation interval 6. Four multipliers: three in the dot product, and
-    one that does the three Horner steps and the three scalings of a span in turn, busy on every clock.
+    Nine multiplications: three of the dot product, three Horner steps, three scalings. With an initiation
+    interval I, ``ceil(9 / I)`` multipliers take turns at them (`hdl.dataflow`); with an interval of 1 each
+    has one task. The results are the same to the bit.
+
+    =========== == == == == == == == == ==
+    interval    1  2  3  4  5  6  7  8  9
+    =========== == == == == == == == == ==
+    latency     21 24 25 22 29 26 24 24 29
+    multipliers 9  5  3  3  2  2  2  2  1
+    =========== == == == == == == == == ==
 
     Parameters
     ----------
     parameters : MiddleNormal
-        Coefficients and formats.
+        Fit of h and formats.
+    initiation_interval : int or None
+        1 to 9: distance in clocks of two inputs. ``None``: 6.
+
+    Raises
+    ------
+    ValueError
+        If `initiation_interval` is none of those.
 
     Members
     -------
@@ -43,8 +62,11 @@ class MiddleNormalUnit(PipelinedUnit):
     Source: [T] 2.2; the fit of numbers.md.
     """
 
-    def __init__(self, parameters: MiddleNormal | None = None):
+    def __init__(self, parameters: MiddleNormal | None = None, initiation_interval: int | None = None):
         self.parameters = parameters or MiddleNormal()
+        interval = checked_interval(initiation_interval, _MULTIPLICATIONS, 6)
+        self._graph = Dataflow(interval, _MULTIPLICATIONS)
+        self._words = self._describe()
         ends = {"normal_left": normal_shape(), "normal_right": normal_shape()}
         super().__init__(
             data.StructLayout(ends),
@@ -55,69 +77,65 @@ class MiddleNormalUnit(PipelinedUnit):
                     "wide": unsigned(1),
                 }
             ),
-            latency=25,
-            initiation_interval=6,
+            latency=max(word.age for word in self._words.values()),
+            initiation_interval=interval,
         )
 
     def datapath(self, m, operands):
-        """Ages: dot product 1 to 4, u at 6, Horner steps at 6, 10, 14, e at 17, scalings at 17, 19, 21."""
-        p = self.parameters
-        at, register = self.at, self.register
-        m.submodules.dot_product = dot_product = DotProductUnit()
-        m.d.comb += [
-            dot_product.i.payload.a.eq(operands.normal_left),
-            dot_product.i.payload.b.eq(operands.normal_right),
-            dot_product.i.valid.eq(1),
-            dot_product.o.ready.eq(1),
-        ]
-        # Normals and u outlive their register by being copied on before the next beat overwrites it.
-        ends = [operands]
-        for age in (6, 11, 16, 22):
-            ends.append(register(m, ends[-1], f"ends_{age}", when=at(age)))
-        one = FixedValue.constant(ONE_SQUARED.format, ONE_SQUARED.values.item())
-        difference = register(m, one - dot_product.o.payload, "difference")
-        u_first = register(
-            m, difference.truncate(p.ANGLE_FORMAT.fraction_bits).saturate(p.ANGLE_FORMAT), "u", when=at(5)
-        )
-        u_last = register(m, u_first, "u_last", when=at(11))
-        widest = FixedValue.constant(p.ANGLE_FORMAT, p.widest.values.item())
-        wide = register(m, u_first > widest, "wide_7", when=at(7))
-        for age in (13, 19):
-            wide = register(m, wide, f"wide_{age}", when=at(age))
-
-        c1, c2, c3 = (FixedValue.constant(p.SUM_FORMAT, value) for value in p.coefficients.values.tolist())
-        total = Signal(FixedShape(p.SUM_FORMAT))
-        e = Signal(FixedShape(p.FACTOR_FORMAT))
-        half_sum = [(ends[3].normal_left[c] + ends[3].normal_right[c]).scale(-1) for c in range(3)]
-        half_sum_late = (ends[4].normal_left[2] + ends[4].normal_right[2]).scale(-1)
-
-        # The shared multiplier takes 17 unsigned and 18 signed bits; wired shifts align what it is given.
-        factor = Signal(FixedShape(UQ(0, 17)))
-        operand = Signal(FixedShape(COMPONENT))
-        product = register(m, factor * operand, "product")
-        horner, scaled = product.scale(-3), product.scale(-3)
-        issues = [(6, u_first.scale(1), c3.scale(2)), (10, u_first.scale(1), total.scale(2))]
-        issues += [(14, u_last.scale(1), total.scale(2))]
-        issues += [(17 + 2 * c, e.scale(4), half_sum[c].truncate(17).saturate(COMPONENT)) for c in range(3)]
-        for age, a, b in issues:
-            with m.If(at(age)):
-                m.d.sync += [factor.eq(a), operand.eq(b)]
-        with m.If(at(8)):
-            m.d.sync += total.eq((horner.round_half_up(19) + c2).wrap(p.SUM_FORMAT))
-        with m.If(at(12)):
-            m.d.sync += total.eq((horner.round_half_up(19) + c1).wrap(p.SUM_FORMAT))
-        with m.If(at(16)):
-            m.d.sync += e.eq(horner.round_half_up(21).saturate(p.FACTOR_FORMAT))
-        middle = []
-        for c, half in enumerate((half_sum[0], half_sum[1], half_sum_late)):
-            total_c = register(m, half + scaled.round_half_up(19), f"middle_sum_{c}", when=at(19 + 2 * c))
-            middle.append(register(m, total_c.saturate(p.FORMAT), f"middle_{c}", when=at(20 + 2 * c)))
-
+        """The graph, read at the age of its last word."""
+        value = self._graph.build(m, self, operands)
+        read = {name: value(word, self.latency) for name, word in self._words.items()}
         result = Signal(self.o.payload.shape())
         m.d.comb += [
-            result.normal_left.eq(ends[4].normal_left),
-            result.normal_right.eq(ends[4].normal_right),
-            result.wide.eq(wide),
-            *(result.normal_middle[c].eq(middle[c]) for c in range(3)),
+            *(result[name].eq(read[name]) for name in ("normal_left", "normal_right", "wide")),
+            *(result.normal_middle[c].eq(read[c]) for c in range(3)),
         ]
         return result
+
+    def _describe(self) -> dict:
+        """Words of the results."""
+        g, p = self._graph, self.parameters
+        left, right = (
+            g.input(name, lambda operands, name=name: operands[name])
+            for name in ("normal_left", "normal_right")
+        )
+        cosine = dot(g, "cosine", left, right)
+        one = FixedValue.constant(ONE_SQUARED.format, ONE_SQUARED.values.item())
+        difference = g.register("difference", lambda cosine: one - cosine, cosine)
+        bits = p.ANGLE_FORMAT.fraction_bits
+        u = g.register("u", lambda x: x.truncate(bits).saturate(p.ANGLE_FORMAT), difference)
+        widest = FixedValue.constant(p.ANGLE_FORMAT, p.widest.values.item())
+        wide = g.register("wide", lambda u: u > widest, u)
+
+        # A multiplier takes at most 18 signed bits twice; wired shifts align what it is given.
+        c1, c2, c3 = (FixedValue.constant(p.SUM_FORMAT, value) for value in p.coefficients.values.tolist())
+        product = g.multiply("product_3", u, u, right=lambda _: c3)
+        for power, c in ((2, c2), (1, c1)):
+            rounded = g.register(f"rounded_{power}", lambda product: product.round_half_up(19), product)
+            total = g.register(f"total_{power}", lambda x, c=c: (x + c).wrap(p.SUM_FORMAT), rounded)
+            product = g.multiply(f"product_{power}", u, total)
+
+        def factor(product):
+            e = product.round_half_up(21)
+            if constant := p.constant.values.item():
+                e = e + FixedValue.constant(p.factor_format, constant)
+            return e.saturate(p.factor_format)
+
+        e = g.register("e", factor, product)
+        words = {"normal_left": left, "normal_right": right, "wide": wide}
+        for c in range(3):
+            half_sum = g.register(
+                f"half_sum_{c}", lambda a, b, c=c: (a[c] + b[c]).scale(-1), left, right, since=e.age
+            )
+            product = g.multiply(f"scaled_{c}", e, half_sum, right=_cut)
+            middle = g.register(f"middle_sum_{c}", _corrected, half_sum, product)
+            words[c] = g.register(f"middle_{c}", lambda middle: middle.saturate(p.FORMAT), middle)
+        return words
+
+
+def _cut(half_sum: FixedValue) -> FixedValue:
+    return half_sum.truncate(17).saturate(COMPONENT)
+
+
+def _corrected(half_sum: FixedValue, product: FixedValue) -> FixedValue:
+    return half_sum + product.scale(1).round_half_up(19)

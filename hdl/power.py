@@ -7,11 +7,11 @@ from typing import Literal
 from amaranth.hdl import Mux, Signal, Value, unsigned
 from amaranth.lib import data
 
-from golden.fixed import UQ
+from golden.fixed import SQ
 from golden.power import Power
-from golden.unit_vector import ONE_SQUARED
 
 from .fixed import FixedShape, FixedValue
+from .specular import highlight_shape, one_minus
 from .stream import PipelinedUnit
 
 __all__ = ["PowerUnit"]
@@ -58,7 +58,7 @@ class PowerUnit(PipelinedUnit):
         self.parameters = p = parameters or Power()
         self.form = form
         super().__init__(
-            data.StructLayout({"operand": FixedShape(p.operand_format), "dark": unsigned(1)}),
+            highlight_shape(p),
             FixedShape(p.RESULT_FORMAT),
             latency=32 if form == "pipelined" else 44,
             initiation_interval=1 if form == "pipelined" else 42,
@@ -68,11 +68,8 @@ class PowerUnit(PipelinedUnit):
     def datapath(self, m, operands):
         """The complement of the cosine takes two clocks; then the bits of the exponent, lowest first."""
         p, register = self.parameters, self.register
-        if p.operand == "cosine":
-            one = FixedValue.constant(ONE_SQUARED.format, ONE_SQUARED.values.item())
-            complement = register(m, one - operands.operand, "one_minus_cosine")
-        else:
-            complement = register(m, operands.operand.extend(UQ(1, 34)), "operand")
+        complement = one_minus(p, operands.operand).extend(SQ(5, 34))
+        complement = register(m, complement, "one_minus_cosine")
         dark = register(m, operands.dark, "dark")
         start = Mux(dark, p.COMPLEMENT_FORMAT.max_code, Value.cast(complement.saturate(p.COMPLEMENT_FORMAT)))
         start = FixedValue(p.COMPLEMENT_FORMAT, start[: p.COMPLEMENT_FORMAT.width])

@@ -2,7 +2,6 @@
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
-from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from golden.fixed import SQ, UQ
@@ -10,6 +9,8 @@ from golden.gpq import GPQ
 from golden.quadratic_evaluator import QuadraticEvaluator
 from golden.unit_vector import COMPONENT
 
+from .dataflow import Dataflow
+from .difference_setup import reciprocal_words
 from .fixed import FixedShape, FixedValue
 from .middle_normal import normal_shape
 from .stream import PipelinedUnit, connect
@@ -116,40 +117,37 @@ class _StepUnit(PipelinedUnit):
     def __init__(self, parameters: QuadraticEvaluator):
         self.parameters = parameters
         span = {**_coefficients(), "length": unsigned(12)}
+        self._graph = Dataflow(7)
+        self._words = self._describe(span)
         super().__init__(
             data.StructLayout(span),
             data.StructLayout({**span, "step": FixedShape(parameters.STEP_FORMAT)}),
-            latency=8,
+            latency=self._words["step"].age,
             initiation_interval=7,
         )
 
     def datapath(self, m, operands):
-        """Ages: m - 1 at 1, leading one at 2, address at 3, table at 4 and 5, shift at 6 and 7."""
-        p, register = self.parameters, self.register
-        bits = p.LENGTH_BITS
-        steps = register(m, (operands.length - 1)[:bits], "steps")
-        # The leading one of m - 1, and how far it stands from the top; a span of one pixel has none.
-        position, below_top = Signal(range(bits)), Signal(range(bits))
-        m.d.sync += [position.eq(0), below_top.eq(bits - 1)]
-        for bit in range(bits):
-            with m.If(steps[bit]):
-                m.d.sync += [position.eq(bit), below_top.eq(bits - 1 - bit)]
-        address = register(m, (steps << below_top)[: bits - 1], "address")
-        m.submodules.reciprocals = table = Memory(
-            shape=p.RECIPROCAL_FORMAT.width, depth=1 << (bits - 1), init=p.reciprocals.codes.tolist()
-        )
-        port = table.read_port()
-        m.d.comb += port.addr.eq(address)
-        reciprocal = register(m, FixedValue(p.RECIPROCAL_FORMAT, port.data), "reciprocal")
-        shift = register(m, (position + address.any())[:4], "shift")
-        scaled = reciprocal.scale(1).extend(p.STEP_FORMAT)
-        coarse = register(m, Value.cast(scaled) >> Cat(Const(0, 2), shift[2:]), "coarse")
-        step = register(m, coarse >> shift[:2], "step")
-        held = register(m, operands, "held", when=self.at(7))
+        """The graph, read at the age of the step."""
+        value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
-        m.d.comb += [result[name].eq(held[name]) for name in ("g", "p", "q", "length")]
-        m.d.comb += result.step.eq(FixedValue(p.STEP_FORMAT, step))
+        m.d.comb += [result[name].eq(value(word, self.latency)) for name, word in self._words.items()]
         return result
+
+    def _describe(self, span) -> dict:
+        """Words of the results: the reciprocal, shifted in two stages, and the operands."""
+        g, p = self._graph, self.parameters
+        words = {name: g.input(name, lambda operands, name=name: operands[name]) for name in span}
+        reciprocal, shift = reciprocal_words(g, words["length"], p.reciprocals)
+        coarse = g.register(
+            "coarse",
+            lambda x, shift: Value.cast(x.scale(1).extend(p.STEP_FORMAT)) >> Cat(Const(0, 2), shift[2:]),
+            reciprocal,
+            shift,
+        )
+        words["step"] = g.register(
+            "step", lambda x, shift: FixedValue(p.STEP_FORMAT, x >> shift[:2]), coarse, shift
+        )
+        return words
 
 
 def _pixel_shape() -> data.StructLayout:

@@ -6,9 +6,9 @@ from amaranth.lib.wiring import In, Out
 
 from golden.fixed import SQ, UQ
 from golden.recurrence import Recurrence
-from golden.unit_vector import COMPONENT
 
 from .fixed import FixedShape, FixedValue
+from .stream import PipelinedUnit
 
 __all__ = ["RecurrenceUnit"]
 
@@ -21,11 +21,17 @@ class RecurrenceUnit(wiring.Component):
     The two copies share the coefficient register and the counter, which marks the last pixel of a span.
     Forms, formats and error bound are those of `golden.recurrence.Recurrence`, the bit-true twin.
 
-    Every pixel needs the one before, so that the registers of the loop cannot be filled with other pixels:
-    ``reinsch`` gives a pixel every 4 clocks (product, two stages of shift, sums), ``direct`` every 3
-    (product, sum, saturation). A span of m pixels gives its first pixel 3 clocks after it was taken in; the
-    next span is taken in ``4 (m - 1) + 1`` (``3 (m - 1) + 1``) clocks after it. A span of length 0 takes one
-    clock and gives nothing. Two multipliers, one a copy.
+    With ``interleave`` 1, every pixel needs the one before, so that the registers of the loop cannot be
+    filled with other pixels: ``reinsch`` gives a pixel every 4 clocks (product, two stages of shift, sums),
+    ``direct`` every 3 (product, sum, saturation). The next span is taken in ``4 (m - 1) + 1``
+    (``3 (m - 1) + 1``) clocks after one of m pixels.
+
+    With ``interleave`` 4, every pixel needs the one four before. The four phases follow each other through
+    the loop's four registers, so there is a pixel on every clock; a span takes m clocks, and the next follows
+    without a gap.
+
+    Either way the first pixel comes 3 clocks after its span was taken in, and a span of length 0 takes one
+    clock and gives nothing. Two multipliers, one a copy: 18 x 18 bits with the defaults.
 
     Parameters
     ----------
@@ -36,9 +42,10 @@ class RecurrenceUnit(wiring.Component):
     -------
     i : :py:`In(stream.Signature(StructLayout({"diffuse", "highlight", "coefficient", "shift", "length"})))`
         Of each copy ``first`` and ``second`` in `Recurrence.state_format`: x(0), and x(1) - x(0) in
-        ``reinsch``, x(1) in ``direct``. Coefficient; shift, in ``reinsch`` alone; length 0 to 4095.
+        ``reinsch``, x(1) in ``direct``; interleaved, arrays of four, see `Recurrence.start`. Coefficient;
+        shift, in ``reinsch`` alone; length 0 to 4095.
     o : :py:`Out(stream.Signature(StructLayout({"diffuse", "highlight", "last"})))`
-        Both cosines in ``SQ(1, 17)``; whether this is the last pixel of its span.
+        Both cosines in `Recurrence.result_format`; whether this is the last pixel of its span.
 
     Source: [T] 3.3, figure 3.5.
     """
@@ -47,13 +54,16 @@ class RecurrenceUnit(wiring.Component):
 
     def __init__(self, parameters: Recurrence | None = None):
         self.parameters = p = parameters or Recurrence()
-        self.clocks_per_pixel = 4 if p.form == "reinsch" else 3
-        start = data.StructLayout(dict.fromkeys(("first", "second"), FixedShape(p.state_format)))
+        self.clocks_per_pixel = 1 if p.interleave > 1 else {"reinsch": 4, "direct": 3}[p.form]
+        word = FixedShape(p.state_format)
+        if p.interleave > 1:
+            word = data.ArrayLayout(word, p.interleave)
+        start = data.StructLayout(dict.fromkeys(("first", "second"), word))
         span = {**dict.fromkeys(_COPIES, start), "coefficient": FixedShape(p.coefficient_format)}
         if p.form == "reinsch":
             span["shift"] = unsigned(p.SHIFT_BITS)
         span["length"] = unsigned(p.LENGTH_BITS)
-        pixel = {**dict.fromkeys(_COPIES, FixedShape(COMPONENT)), "last": unsigned(1)}
+        pixel = {**dict.fromkeys(_COPIES, FixedShape(p.result_format)), "last": unsigned(1)}
         super().__init__(
             {
                 "i": In(stream.Signature(data.StructLayout(span))),
@@ -74,6 +84,9 @@ class RecurrenceUnit(wiring.Component):
             load.eq(self.i.valid & self.i.ready),
         ]
         ends = phase == self.clocks_per_pixel - 1
+        # Interleaved: which of the next pixels are the first of their phases.
+        first_to_come = Signal(p.interleave - 1)
+        starts = load | first_to_come[0] if p.interleave > 1 else load
         rounded_valid, rounded_last = Signal(), Signal()
         coefficient = Signal(FixedShape(p.coefficient_format))
         shift = Signal(p.SHIFT_BITS)
@@ -88,7 +101,6 @@ class RecurrenceUnit(wiring.Component):
                 m.d.sync += [
                     active.eq(span.length != 0),
                     after.eq(Mux(span.length == 0, 0, span.length - 1)),
-                    is_first.eq(1),
                     coefficient.eq(span.coefficient),
                 ]
                 if p.form == "reinsch":
@@ -98,19 +110,55 @@ class RecurrenceUnit(wiring.Component):
             with m.Else():
                 m.d.sync += phase.eq(Mux(ends, 0, phase + 1))
                 with m.If(ends):
-                    m.d.sync += [after.eq(after - 1), is_first.eq(0)]
+                    m.d.sync += after.eq(after - 1)
+            with m.If(starts | ends):
+                m.d.sync += is_first.eq(starts)
+            if p.interleave > 1:
+                m.d.sync += first_to_come.eq(Mux(load, (1 << (p.interleave - 1)) - 1, first_to_come >> 1))
+            is_first = self._late(m, is_first, 2 if p.form == "reinsch" else 3, "is_first")
             for name in _COPIES:
+                start = self._start(m, name, load)
                 if p.form == "reinsch":
-                    rounded = self._reinsch(m, name, load, ends, is_first, coefficient, shift)
+                    rounded = self._reinsch(m, name, start, starts, ends, is_first, coefficient, shift)
                 else:
-                    rounded = self._direct(m, name, load, ends, is_first, coefficient)
+                    rounded = self._direct(m, name, start, starts, ends, is_first, coefficient)
                 register = Signal(rounded.shape(), name=f"{name}_rounded")
-                m.d.sync += [register.eq(rounded), self.o.payload[name].eq(register.saturate(COMPONENT))]
+                m.d.sync += [
+                    register.eq(rounded),
+                    self.o.payload[name].eq(register.saturate(p.result_format)),
+                ]
         return m
 
-    def _reinsch(self, m, name, load, ends, is_first, coefficient, shift):
+    def _start(self, m, name, load):
+        """First and second value of the pixel that comes next: the input's, then those held of it."""
+        p, payload = self.parameters, self.i.payload[name]
+        if p.interleave == 1:
+            return payload.first, payload.second
+        words = []
+        for which in ("first", "second"):
+            held = [
+                Signal(FixedShape(p.state_format), name=f"{name}_{which}_{phase}")
+                for phase in range(1, p.interleave)
+            ]
+            for place, word in enumerate(held):
+                following = held[min(place + 1, len(held) - 1)]
+                given = payload[which][place + 1]
+                m.d.sync += Value.cast(word).eq(Mux(load, Value.cast(given), Value.cast(following)))
+            chosen = Mux(load, Value.cast(payload[which][0]), Value.cast(held[0]))
+            words.append(FixedValue(p.state_format, chosen))
+        return words
+
+    def _late(self, m, value, clocks, name):
+        """Interleaved, ``value`` so many clocks on; else it has stayed for the whole of its pixel."""
+        if self.parameters.interleave > 1:
+            for clock in range(clocks):
+                value = PipelinedUnit.register(m, value, f"{name}_late_{clock}")
+        return value
+
+    def _reinsch(self, m, name, start, starts, ends, is_first, coefficient, shift):
         """``D -= K 2^(2-s) x; x += D``, with x + D, for the old D, summed up beforehand."""
-        p, start = self.parameters, self.i.payload[name]
+        p = self.parameters
+        first, second = start
         state = p.state_format
         x, difference, total = (
             Signal(FixedShape(state), name=f"{name}_{word}") for word in ("x", "difference", "sum")
@@ -130,17 +178,20 @@ class RecurrenceUnit(wiring.Component):
             Value.cast(fine).eq(Mux(is_first, 0, Value.cast(fine_shift))),
             total.eq((x + difference).wrap(state)),
         ]
+        total = self._late(m, total, 2, f"{name}_sum")
+        kept = self._late(m, difference, 3, f"{name}_difference")
         half_step = FixedValue.constant(state, 2.0 ** -(p.fraction_bits + 1))
-        with m.If(load):
-            m.d.sync += [x.eq((start.first + half_step).wrap(state)), difference.eq(start.second)]
+        with m.If(starts):
+            m.d.sync += [x.eq((first + half_step).wrap(state)), difference.eq(second)]
         with m.Elif(ends):
-            m.d.sync += [x.eq((total - step).wrap(state)), difference.eq((difference - step).wrap(state))]
+            m.d.sync += [x.eq((total - step).wrap(state)), difference.eq((kept - step).wrap(state))]
         exchange = FixedValue.constant(p.exchange.format, p.exchange.values.item())
-        return (x + exchange).truncate(COMPONENT.fraction_bits)
+        return (x + exchange).truncate(p.result_format.fraction_bits)
 
-    def _direct(self, m, name, load, ends, is_first, coefficient):
+    def _direct(self, m, name, start, starts, ends, is_first, coefficient):
         """``x(k+1) = -(-2 cos d) x(k) - x(k-1)``; for the first pixel the other register holds x(1)."""
-        p, start = self.parameters, self.i.payload[name]
+        p = self.parameters
+        first, second = start
         state = p.state_format
         x, other = (Signal(FixedShape(state), name=f"{name}_{word}") for word in ("x", "other"))
         product = Signal(FixedShape(state * p.coefficient_format), name=f"{name}_product")
@@ -148,14 +199,18 @@ class RecurrenceUnit(wiring.Component):
         base = Signal((half_step - other).shape(), name=f"{name}_base")
         total = Signal((base - product).shape(), name=f"{name}_sum")
         m.d.sync += [product.eq(x * coefficient), base.eq(half_step - other), total.eq(base - product)]
-        with m.If(load):
-            m.d.sync += [x.eq(start.first), other.eq(start.second)]
+        following = total.truncate(state.fraction_bits).saturate(state)
+        # Four phases fill four registers; the loop has three of its own.
+        following = self._late(m, following, 1, f"{name}_following")
+        given = self._late(m, other, 3, f"{name}_other")
+        before = self._late(m, x, 3, f"{name}_x")
+        with m.If(starts):
+            m.d.sync += [x.eq(first), other.eq(second)]
         with m.Elif(ends):
-            following = total.truncate(state.fraction_bits).saturate(state)
             m.d.sync += [
-                Value.cast(x).eq(Mux(is_first, Value.cast(other), Value.cast(following))),
-                other.eq(x),
+                Value.cast(x).eq(Mux(is_first, Value.cast(given), Value.cast(following))),
+                other.eq(before),
             ]
-        bits = COMPONENT.fraction_bits
+        bits = p.result_format.fraction_bits
         value = x.extend(SQ(2, bits)) if state.fraction_bits < bits else x
         return value.round_half_up(bits)

@@ -6,32 +6,49 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from importlib.metadata import entry_points, version
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import click
 import numpy as np
+from click.core import ParameterSource
 from tqdm import tqdm
 
 from golden.camera import PROJECTIONS, Camera
-from golden.frame_constants import FrameConstants, address_table
+from golden.frame_constants import MAX_MATERIALS, FrameConstants, address_table
+from golden.geometry import normalise
 from golden.intensity import MAX_LIGHTS
 from golden.lighting import Light, Material
-from golden.pipeline import METHODS, ShadingPipeline
+from golden.pipeline import METHODS, MODELS, ShadingPipeline
 from golden.reflection import REFLECTION_MODELS
 from golden.scene import BACK_FACES, LARGEST_SIDE, Scene
 from golden.specular import MAX_EXPONENT
-from hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit
+from hdl.pipeline import INTERPOLATORS, PORT_DESCRIPTIONS, ShadingPipelineUnit
 from hdl.verilog import emit
+from sim.animation import (
+    Film,
+    check_address,
+    cluster,
+    equal_distance,
+    process_pool,
+    processors,
+    shoot,
+    turned,
+    turntable,
+    write_gif,
+)
 from sim.engine import CompilerMissing, SimulationError
 from sim.errors import InputError
-from sim.frame import Comparison, FrameSimulator, SimulatedFrame, compare
-from sim.mesh import load_mesh
+from sim.frame import FrameSimulator, SimulatedFrame, compare
+from sim.mesh import LoadedMesh, load_mesh, surfaces
 from sim.output import atomic_writer, check_writable, write_json, write_text
 from sim.picture import check_image_path, write_comparison, write_image
+from sim.report import frame_figures, print_counts, print_errors, print_figures, worst_errors
+from sim.scene_file import HIGHLIGHTS, read_scene_file
 
 __all__ = ["main"]
 
@@ -41,6 +58,11 @@ DEFAULT_SIZE = (640, 480)
 
 SLOW_SIZE = (160, 120)
 """Largest picture of the slow engine when it stands in for the compiled one, or writes waveforms unasked."""
+
+DEFAULT_LIGHTS = (Light((-0.5, 0.8, 0.7)),)
+
+MAX_FRAMES = 9999
+"""Most frames of a turntable: four digits in their names."""
 
 
 class _Choice(click.ParamType):
@@ -138,30 +160,121 @@ class _Color(_Numbers):
         return numbers * 3 if len(numbers) == 1 else numbers
 
 
+_OPERANDS = dict(zip(HIGHLIGHTS, ("cosine", "one_minus_cosine"), strict=True))
+
+
 def _design_options(command):
     """Options of the pipeline's design, shared by the commands."""
-    served = "; ".join(f"{method} serves {', '.join(models)}" for method, models in METHODS.items())
-    command = click.option(
-        "--model",
-        type=_Choice("reflection model", REFLECTION_MODELS),
-        default="cosquad",
-        show_default=True,
-        help=f"Reflection model; {served}.",
-    )(command)
-    return click.option(
-        "--method",
-        type=_Choice("method", METHODS),
-        default="quadratic",
-        show_default=True,
-        help="Normal interpolation along a span.",
-    )(command)
+    for option in (
+        click.option(
+            "--setup-interval",
+            type=_Whole(1, 26),
+            help="Clocks from a span to the next at the closest; less takes more multipliers.  [default: 4]",
+        ),
+        click.option(
+            "--highlight",
+            type=_Choice("form", HIGHLIGHTS),
+            help="Form of the specular argument, for methods that find normals.  [default: dot]",
+        ),
+        click.option(
+            "--model",
+            type=_Choice("reflection model", REFLECTION_MODELS),
+            default="cosquad",
+            show_default=True,
+            help="Reflection model; every method serves all but phong.",
+        ),
+        click.option(
+            "--method",
+            type=_Choice("method", METHODS),
+            default="quadratic",
+            show_default=True,
+            help="Interpolation along a span.",
+        ),
+    ):
+        command = option(command)
+    return command
 
 
-def _design(method: str, model: str, lights: int) -> ShadingPipeline:
-    if model not in METHODS[method]:
-        served = ", ".join(METHODS[method])
-        raise InputError(f"--model {model}", f"method {method} cannot serve it", f"use one of {served}")
-    return ShadingPipeline(method, model, lights)
+class _Settings(dict):
+    """What to render, by the names of the options, and where each value comes from.
+
+    Parameters
+    ----------
+    values : dict
+        The values.
+    origins : dict
+        What a message calls those that do not come from the option of the same name.
+    """
+
+    def __init__(self, values: Mapping[str, Any], origins: Mapping[str, str] | None = None):
+        super().__init__(values)
+        self.origins = origins or {}
+
+    def place(self, name: str) -> str:
+        """What a message calls a value: the option, or the file and the key."""
+        option = "light" if name == "lights" else name.replace("_", "-")
+        return self.origins.get(name, f"--{option}")
+
+    def refuse(self, name: str, reason: str, remedy: str, value: str | None = None) -> InputError:
+        """The error that names the value and where it stands."""
+        place = self.place(name)
+        if value is None:
+            value = self[name]
+            value = ",".join(f"{part:g}" for part in value) if isinstance(value, tuple) else str(value)
+        thing = place if name in self.origins or not value else f"{place} {value}"
+        return InputError(thing, reason, remedy)
+
+
+def _read_settings(context: click.Context, mesh: str, options: dict) -> _Settings:
+    """The options, over those of the scene file if MESH is one, over the defaults."""
+    if not Path(mesh).stem:
+        raise InputError(f"MESH {mesh!r}", "is no file's name", "give a mesh or scene file, or teapot")
+    if not any(options["view"]):
+        raise InputError("--view 0,0,0", "no direction", "give a vector other than 0")
+    if len(options["lights"]) > MAX_LIGHTS:
+        raise InputError("--light", f"{len(options['lights'])} lights", f"give at most {MAX_LIGHTS}")
+    options = {
+        **options,
+        "crease": _angle(options["crease"][0]),
+        "lights": tuple(_light(numbers) for numbers in options["lights"]) or DEFAULT_LIGHTS,
+    }
+    settings = _over_file(context, mesh, options)
+    if settings["triangles"] is not None and settings["mesh"] != "teapot":
+        raise settings.refuse("triangles", "only the teapot is tessellated", "leave it out for a file")
+    return settings
+
+
+def _over_file(context: click.Context, mesh: str, options: dict) -> _Settings:
+    given = {name for name in options if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
+    if Path(mesh).suffix.lower() != ".toml":
+        return _Settings({**options, "mesh": mesh, "given": given})
+    file = read_scene_file(mesh)
+    if "view" in given:
+        given |= {"position", "target"}
+    values = {name: value for name, value in file.values.items() if name not in given}
+    if "lights" in values:
+        values["lights"] = tuple(Light(numbers[:3], numbers[3:]) for numbers in values["lights"])
+    if "position" in values:
+        options = {**options, "view": None}
+    shown = "".join(c if c.isprintable() else "?" for c in mesh)
+    origins = {name: f"{shown}, {file.keys[name]}" for name in values}
+    return _Settings({**options, **values, "given": given | set(file.values)}, origins)
+
+
+def _design(settings: _Settings, lights: int) -> ShadingPipeline:
+    if settings["model"] not in MODELS:
+        raise settings.refuse("model", "the pipeline finds N.H, not R.V", f"use one of {', '.join(MODELS)}")
+    try:
+        design = ShadingPipeline(
+            settings["method"], settings["model"], lights, _OPERANDS.get(settings["highlight"])
+        )
+    except ValueError as error:
+        raise settings.refuse("highlight", str(error), "leave it out") from None
+    served = INTERPOLATORS[type(design.interpolator)].setup_intervals(design.interpolator)
+    if settings["setup_interval"] not in (None, *served):
+        remedy = f"give 1 to {max(served)}" if served else "leave it out"
+        raise settings.refuse("setup_interval", f"method {design.method} is not built for it", remedy)
+    return design
 
 
 class _Group(click.Group):
@@ -192,7 +305,7 @@ def cli():
     """
 
 
-@cli.command(short_help="Render a mesh through the simulated pipeline.")
+@cli.command(short_help="Render a mesh or a scene file through the simulated pipeline.")
 @click.argument("mesh")
 @_design_options
 @click.option(
@@ -236,6 +349,13 @@ def cli():
     help="Direction to a light, and its colour, 1,1,1 if left out; repeat for more lights.  "
     "[default: -0.5,0.8,0.7]",
 )
+@click.option(
+    "--materials",
+    type=_Choice("source of materials", ("file", "one")),
+    default="file",
+    show_default=True,
+    help="Colours of the mesh file, where it has some and no option gives them, or of the options alone.",
+)
 @click.option("--ambient", type=_Color(), default="0.08,0.05,0.03", show_default=True, help="Reflection k_a.")
 @click.option("--diffuse", type=_Color(), default="0.75,0.42,0.2", show_default=True, help="Reflection k_d.")
 @click.option("--specular", type=_Color(), default="0.6", show_default=True, help="Reflection k_s.")
@@ -258,77 +378,100 @@ def cli():
 @click.option("--compare", "comparison", type=click.Path(), help="Picture: simulated, golden, error map.")
 @click.option("--json", "figures", type=click.Path(), help="Every printed figure.")
 @click.option("--vcd", type=click.Path(), help="Waveforms; implies --engine pysim.")
-def render(
-    mesh, method, model, exponent, size, engine, triangles, output, comparison, figures, vcd, **options
-):
-    """Render MESH through the simulated pipeline: a file (OBJ, PLY, STL, GLB, glTF), or `teapot`.
+@click.option(
+    "--frames",
+    type=_Whole(1, MAX_FRAMES),
+    help="Turntable: so many pictures, OUTPUT-0001.png and on, and OUTPUT.gif.",
+)
+@click.option("--jobs", type=_Whole(1, 1024), help="Processes that draw the frames.  [default: processors]")
+@click.option(
+    "--cluster", "address", metavar="ADDRESS", help="Dask scheduler whose workers draw them: tcp://host:8786."
+)
+@click.pass_context
+def render(context, mesh, output, comparison, figures, vcd, frames, jobs, address, **options):
+    """Render MESH through the simulated pipeline.
+
+    MESH is a file (OBJ, PLY, STL, GLB, glTF), or `teapot`, or a scene file (TOML) that names one beside
+    camera, lights, material, size and method; options given here go before those of the file.
 
     \b
     Examples:
         blysk render teapot -o teapot.png
         blysk render model.obj --model cosquad_lin --exponent 200 --size 1280x720 --compare both.png
+        blysk render scene.toml --exponent 100
+        blysk render scene.toml --frames 36 -o turntable.gif
+
+    \b
+    Keys of a scene file, all but mesh.file optional:
+        size, background, ambient_light, back_faces
+        [mesh]      file, triangles, crease, materials
+        [camera]    projection, view or position and target, up, field_of_view
+        [[lights]]  direction, color
+        [material]  ambient, diffuse, specular, exponent
+        [pipeline]  method, model, highlight, setup_interval
     """
     start = perf_counter()
-    if vcd and engine == "cxxrtl":
+    settings = _read_settings(context, mesh, options)
+    if vcd and settings["engine"] == "cxxrtl":
         raise InputError("--vcd", "the engine cxxrtl writes no waveforms", "use --engine pysim")
-    if not any(options["view"]):
-        raise InputError("--view 0,0,0", "no direction", "give a vector other than 0")
-    crease = _angle(options["crease"][0])
-    lights = [_light(numbers) for numbers in options["lights"] or ((-0.5, 0.8, 0.7),)]
-    if len(lights) > MAX_LIGHTS:
-        raise InputError("--light", f"{len(lights)} lights", f"give at most {MAX_LIGHTS}")
-    design = _design(method, model, len(lights))
-    if not Path(mesh).stem:
-        raise InputError(f"MESH {mesh!r}", "is no file's name", "give a mesh file, or teapot")
-    if triangles is not None and mesh != "teapot":
-        raise InputError(
-            f"--triangles {triangles}", "only the teapot is tessellated", "leave it out for a file"
-        )
+    if vcd:
+        settings["engine"] = "pysim"
+    design = _design(settings, max(1, len(settings["lights"])))
     if not (output or comparison):
-        output = f"{Path(mesh).stem}-blysk.png"
-    _check_outputs(mesh, pictures=[output, comparison], others=[figures, vcd])
+        output = f"{Path(mesh).stem}-blysk.{'gif' if frames else 'png'}"
+    inputs = [mesh, settings["mesh"]]
+    if frames:
+        pictures, animation = _film_paths(output, frames, {"--compare": comparison, "--vcd": vcd})
+        if address is not None:
+            check_address(address)
+        if jobs and address:
+            raise InputError("--jobs", "a cluster has its own workers", "leave out --jobs or --cluster")
+        _check_outputs(inputs, pictures=[animation, *pictures], others=[figures])
+    elif jobs or address is not None:
+        raise InputError("--jobs" if jobs else "--cluster", "is for many frames", "give --frames, too")
+    else:
+        _check_outputs(inputs, pictures=[output, comparison], others=[figures, vcd])
+    settings["size"] = settings["size"] or (SLOW_SIZE if vcd else DEFAULT_SIZE)
     with tqdm(bar_format="{desc}", leave=False, disable=None) as stage:
         stage.set_description_str("loading the mesh")
-        loaded = load_mesh(mesh, triangles=triangles or 10_000, crease_angle=crease)
-        loading = perf_counter() - start
-        size = size or (SLOW_SIZE if vcd else DEFAULT_SIZE)
-        scene = _scene(loaded.mesh, size, exponent, lights, options)
+        loaded = _load(settings)
+        design = dataclasses.replace(design, materials=len(loaded.materials))
+        seconds = {"load": perf_counter() - start}
+        _scenes(loaded, settings, frames or 1)  # Bad input is found before the model is built.
         stage.set_description_str("building the model")
-        simulator, note = _simulator(design, "pysim" if vcd else engine)
-        if note:
-            size = _at_most(size, SLOW_SIZE)
-            scene = _scene(loaded.mesh, size, exponent, lights, options)
-            tqdm.write(f"blysk: pysim at {size[0]}x{size[1]} instead of cxxrtl, {note}", file=sys.stderr)
+        simulator = _simulator(design, settings, address)
+        seconds["build"] = perf_counter() - start - seconds["load"]
         stage.set_description_str("rasterising and simulating")
-        with (
-            atomic_writer(vcd) if vcd else nullcontext() as waves,
-            tqdm(unit=" pixels", unit_scale=True, delay=1, leave=False, disable=None) as bar,
-        ):
-            frame = simulator.render(
-                scene,
-                progress=lambda done, count: _show(bar, done, count),
-                vcd=waves and str(waves),
-            )
-        stage.set_description_str("comparing with the golden renderer")
-        result = compare(scene, design, frame)
-        seconds = {
-            "load": loading,
-            "raster": frame.seconds["raster"],
-            "golden": result.seconds,
-            "build": simulator.build_seconds,
-            "simulate": frame.seconds["simulate"],
-        }
-        report = _report(loaded, design, scene, frame, result, seconds)
-        stage.set_description_str("writing")
-        if output:
-            write_image(output, frame.image)
-        if comparison:
-            write_comparison(comparison, frame.image, result.golden, **_captions(report))
+        scenes = _scenes(loaded, settings, frames or 1)
+        if frames:
+            film = Film(scenes[0], design, settings["engine"], settings["setup_interval"])
+            cameras = [scene.camera for scene in scenes]
+            report = _shoot_film(loaded, film, cameras, pictures, seconds, jobs, address)
+            stage.set_description_str("writing the animation")
+            write_gif(animation, pictures)
+            seconds["animation"] = perf_counter() - start - sum(seconds.values())
+        else:
+            frame = _simulate(simulator, scenes[0], vcd)
+            stage.set_description_str("comparing with the golden renderer")
+            result = compare(scenes[0], design, frame)
+            report = _with_mesh(loaded, frame_figures(scenes[0], design, frame, result), seconds)
+            stage.set_description_str("writing")
+            if output:
+                write_image(output, frame.image)
+            if comparison:
+                write_comparison(comparison, frame.image, result.golden, **_captions(report))
         report["seconds"]["total"] = perf_counter() - start
         if figures:
             write_json(figures, report)
-    _print_report(report)
-    for name, path in (("frame", output), ("comparison", comparison), ("figures", figures), ("waves", vcd)):
+    if frames:
+        _print_film(report)
+        written = {"frames": f"{pictures[0]} to {pictures[-1]}", "animation": animation}
+    else:
+        print_figures(report)
+        for text in loaded.ignored:
+            print(f"{'ignored':<12}{text}")
+        written = {"frame": output, "comparison": comparison}
+    for name, path in {**written, "figures": figures, "waves": vcd}.items():
         if path:
             print(f"{name:<12}{path}")
 
@@ -336,9 +479,16 @@ def render(
 @cli.command(short_help="Emit the pipeline as Verilog.")
 @_design_options
 @click.option("--lights", type=_Whole(1, MAX_LIGHTS), default=1, show_default=True, help="Number of lights.")
+@click.option(
+    "--materials",
+    type=_Whole(1, MAX_MATERIALS),
+    default=1,
+    show_default=True,
+    help="Number of materials.",
+)
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
 @click.option("-o", "--output", type=click.Path(), help="Verilog file.  [default: standard output]")
-def verilog(method, model, lights, name, output):
+def verilog(method, model, highlight, setup_interval, lights, materials, name, output):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
     \b
@@ -347,21 +497,30 @@ def verilog(method, model, lights, name, output):
     """
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise InputError(f"--name {name}", "no Verilog name", "use letters, digits and underscores")
-    design = _design(method, model, lights)
+    design = _design(
+        _Settings(
+            {"method": method, "model": model, "highlight": highlight, "setup_interval": setup_interval}
+        ),
+        lights,
+    )
+    design = dataclasses.replace(design, materials=materials)
     if output:
         check_writable(output)
-    unit = ShadingPipelineUnit(design)
+    unit = ShadingPipelineUnit(design, setup_interval)
     header = [
         f"blysk {version('blysk')} shading pipeline",
-        f"method {method}, model {model}, lights {lights}",
-        f"latency {unit.latency} clocks, one pixel a clock",
-        f"a span takes at most max(length, {unit.setup_interval}) clocks",
+        f"method {method}, model {model}, lights {lights}, materials {materials}",
+        f"latency {unit.latency} clocks, {unit.clocks_per_pixel} a pixel",
+        f"a span takes at most max({unit.clocks_per_pixel} length, {unit.setup_interval}) clocks",
         "",
         "Frame constants, through the write port:",
-        *address_table(lights),
+        *address_table(lights, materials),
     ]
+    descriptions = {
+        port: text for port, text in PORT_DESCRIPTIONS.items() if port != "i_material" or design.materials > 1
+    }
     try:
-        text = emit(unit, name, header=header, descriptions=PORT_DESCRIPTIONS)
+        text = emit(unit, name, header=header, descriptions=descriptions)
     except ValueError as error:
         raise InputError(f"--name {name}", str(error), "choose another name") from None
     if output:
@@ -386,8 +545,8 @@ def _angle(degrees: float) -> float:
     return degrees
 
 
-def _check_outputs(mesh: str, pictures: list[str | None], others: list[str | None]) -> None:
-    seen = {os.path.realpath(mesh)}
+def _check_outputs(inputs: list[str], pictures: list[str | None], others: list[str | None]) -> None:
+    seen = {os.path.realpath(path) for path in inputs}
     for path in [*pictures, *others]:
         if path:
             if os.path.realpath(path) in seen:
@@ -396,14 +555,55 @@ def _check_outputs(mesh: str, pictures: list[str | None], others: list[str | Non
             (check_image_path if path in pictures else check_writable)(path)
 
 
-def _simulator(design: ShadingPipeline, engine: str) -> tuple[FrameSimulator, str]:
-    """The frame simulator, and why it is not the compiled one where that was wanted."""
+def _film_paths(output: str | None, count: int, others: Mapping[str, str | None]) -> tuple[list[str], str]:
+    """Files of the frames and of the animation."""
+    for option, path in others.items():
+        if path:
+            raise InputError(f"{option} {path}", "is for one frame", "leave it out, or --frames")
+    stem, suffix = os.path.splitext(output)
+    if suffix.lower() not in (".gif", ".png"):
+        raise InputError(output, "the frames are PNG, the animation GIF", "use .gif or .png")
+    return [f"{stem}-{number:04}.png" for number in range(1, count + 1)], f"{stem}.gif"
+
+
+def _load(settings: _Settings) -> LoadedMesh:
     try:
-        return FrameSimulator(design, "pysim" if engine == "pysim" else "cxxrtl"), ""
-    except CompilerMissing as error:
-        if engine != "auto":
+        return load_mesh(
+            settings["mesh"],
+            triangles=settings["triangles"] or 10_000,
+            crease_angle=settings["crease"],
+            materials=settings["materials"] == "file",
+        )
+    except InputError as error:
+        if "mesh" not in settings.origins:
             raise
-        return FrameSimulator(design, "pysim"), str(error)
+        raise settings.refuse("mesh", f"{error.thing}, {error.reason}", error.remedy) from error
+
+
+def _simulator(
+    design: ShadingPipeline, settings: _Settings, address: str | None = None
+) -> FrameSimulator | None:
+    """The frame simulator; ``None`` if only a cluster's workers can build it.
+
+    Where the slow engine stands in, the settings become its own.
+    """
+    interval = settings["setup_interval"]
+    if settings["engine"] == "pysim":
+        return FrameSimulator(design, "pysim", interval)
+    try:
+        simulator = FrameSimulator(design, "cxxrtl", interval)
+    except CompilerMissing as error:
+        if address:
+            simulator = None
+        elif settings["engine"] == "auto":
+            settings["size"] = width, height = _at_most(settings["size"], SLOW_SIZE)
+            settings["engine"] = "pysim"
+            tqdm.write(f"blysk: pysim at {width}x{height} instead of cxxrtl, {error}", file=sys.stderr)
+            return FrameSimulator(design, "pysim", interval)
+        else:
+            raise
+    settings["engine"] = "cxxrtl"
+    return simulator
 
 
 def _at_most(size: tuple[int, int], largest: tuple[int, int]) -> tuple[int, int]:
@@ -411,26 +611,153 @@ def _at_most(size: tuple[int, int], largest: tuple[int, int]) -> tuple[int, int]
     return tuple(max(1, round(side * share)) for side in size)
 
 
-def _scene(mesh, size: tuple[int, int], exponent: int, lights: list[Light], options: dict) -> Scene:
-    width, height = size
+def _materials(loaded: LoadedMesh, settings: _Settings) -> tuple[Material, ...]:
+    """Those of the file, but for what an option or the scene file gives."""
+    names = ("ambient", "diffuse", "specular", "exponent")
+    default = Material(*(settings[name] for name in names))
+    return surfaces(loaded.materials, default, settings["given"].intersection(names))
+
+
+def _scenes(loaded: LoadedMesh, settings: _Settings, count: int = 1) -> list[Scene]:
+    """The scene, or those of a turntable, which differ in the camera only."""
     # The camera frames the mesh whatever its unit is; products of huge or tiny coordinates would overflow.
-    largest = np.frexp(np.abs(mesh.vertices).max())[1]
-    mesh = dataclasses.replace(mesh, vertices=np.ldexp(mesh.vertices, -largest))
+    mesh = loaded.mesh
+    shift = -int(np.frexp(np.abs(mesh.vertices).max())[1])
+    mesh = dataclasses.replace(mesh, vertices=np.ldexp(mesh.vertices, shift))
+    width, height = settings["size"]
+    cameras = _cameras(mesh.vertices, shift, settings, count)
     scene = Scene(
         mesh=mesh,
-        camera=Camera.framing(mesh.vertices, options["view"], options["projection"], width / height),
+        camera=cameras[0],
         width=width,
         height=height,
-        material=Material(options["ambient"], options["diffuse"], options["specular"], exponent),
-        lights=lights,
-        background=options["background"],
-        back_faces=options["back_faces"],
+        material=_materials(loaded, settings),
+        lights=settings["lights"],
+        background=settings["background"],
+        back_faces=settings["back_faces"],
+        ambient_light=settings.get("ambient_light", (1.0, 1.0, 1.0)),
     )
     try:
-        FrameConstants.of(scene)
+        for index in range(len(scene.materials)):
+            FrameConstants.of(scene, index=index)
     except ValueError as error:
-        raise InputError("--light", str(error), "make the light darker") from None
-    return scene
+        raise settings.refuse("lights", str(error), "make the light darker", "") from None
+    return [dataclasses.replace(scene, camera=camera) for camera in cameras]
+
+
+def _cameras(vertices: np.ndarray, shift: int, settings: _Settings, count: int) -> list[Camera]:
+    """Cameras of a mesh whose unit has been multiplied by ``2**shift``."""
+    width, height = settings["size"]
+    projection = settings["projection"]
+    field_of_view, up = settings.get("field_of_view", 30.0), settings.get("up", (0.0, 1.0, 0.0))
+    name = "position" if settings.get("position") else "view"
+    try:
+        if name == "view":
+            view = settings["view"]
+            # The first direction is the same to the bit, however many there are.
+            views = [view, *turned(normalise(view), up, count)[1:].tolist()]
+            return equal_distance(
+                [
+                    Camera.framing(vertices, view, projection, width / height, field_of_view, up=up)
+                    for view in views
+                ]
+            )
+        position = tuple(math.ldexp(value, shift) for value in settings["position"])
+        if "target" in settings:
+            target = tuple(math.ldexp(value, shift) for value in settings["target"])
+        else:
+            low, high = vertices.min(axis=0), vertices.max(axis=0)
+            target = tuple((low + (high - low) / 2).tolist())
+        distance = math.dist(position, target)
+        if not 1e-12 < distance < 1e12:
+            raise ValueError(
+                "the camera is at its target" if distance < 1 else "the camera is too far away for the mesh"
+            )
+        camera = Camera(
+            position,
+            target,
+            up,
+            projection,
+            height=2 * distance * math.tan(math.radians(field_of_view) / 2),
+            field_of_view=field_of_view,
+            near=distance / 1000,
+        )
+        return turntable(camera, count)
+    except OverflowError:
+        raise settings.refuse(name, "the camera is too far away for the mesh", "move it nearer") from None
+    except ValueError as error:
+        raise settings.refuse(name, str(error), "choose another direction or place for the camera") from None
+
+
+def _shoot_film(
+    loaded: LoadedMesh,
+    film: Film,
+    cameras: list[Camera],
+    pictures: list[str],
+    seconds: dict[str, float],
+    jobs: int | None,
+    address: str | None,
+) -> dict:
+    """Draw and write the frames; the figures of all."""
+    start = perf_counter()
+    done = {}
+    crew = cluster(film, address) if address else process_pool(film, min(jobs or processors(), len(cameras)))
+    with crew as crew, tqdm(total=len(cameras), unit=" frames", leave=False, disable=None) as bar:
+        for index, shot in shoot(crew, cameras):
+            write_image(pictures[index], shot.image)
+            done[index] = {"picture": pictures[index], **_with_mesh(loaded, shot.figures, {})}
+            bar.update()
+        name = crew.name
+    figures = [done[index] for index in range(len(cameras))]
+    pixels, clocks = (sum(frame[key] for frame in figures) for key in ("pixels", "clocks"))
+    counts = {key: sum(frame["counts"][key] for frame in figures) for key in figures[0]["counts"]}
+    seconds["frames"] = perf_counter() - start
+    same = ("mesh", "method", "model", "exponent", "lights", "materials")
+    same += ("engine", "width", "height", "triangles")
+    return {
+        **{key: figures[0][key] for key in same},
+        "workers": name,
+        "frame_count": len(figures),
+        "visible_pixels": sum(frame["visible_pixels"] for frame in figures),
+        "pixels": pixels,
+        "clocks": clocks,
+        "clocks_per_pixel": clocks / pixels if pixels else math.nan,
+        **worst_errors(figures),
+        "counts": {**counts, **_mesh_counts(loaded)},
+        "frames": figures,
+        "seconds": seconds,
+    }
+
+
+def _print_film(report: dict) -> None:
+    rows = {
+        "mesh": f"{report['mesh']}, {report['width']}x{report['height']}, {report['triangles']:,} triangles",
+        "model": f"{report['model']}, exponent {report['exponent']}, lights {report['lights']}",
+        "method": report["method"],
+        "engine": f"{report['engine']}, {report['workers']}",
+        "turntable": f"{report['frame_count']:,} frames, "
+        f"{report['frame_count'] / report['seconds']['frames']:.2f} a second",
+        "pixels": f"{report['pixels']:,} shaded, {report['visible_pixels']:,} visible",
+        "clocks": f"{report['clocks']:,}",
+    }
+    if report["pixels"]:
+        rows["clocks"] += f", {report['clocks_per_pixel']:.3f} a pixel"
+    for name, value in rows.items():
+        print(f"{name:<12}{value}")
+    print(f"{'errors':<12}the worst of every frame")
+    print_errors(report if report["visible_pixels"] else None)
+    print_counts(report["counts"])
+    print(f"{'seconds':<12}{', '.join(f'{name} {value:.2f}' for name, value in report['seconds'].items())}")
+
+
+def _simulate(simulator: FrameSimulator, scene: Scene, vcd: str | None) -> SimulatedFrame:
+    with (
+        atomic_writer(vcd) if vcd else nullcontext() as waves,
+        tqdm(unit=" pixels", unit_scale=True, delay=1, leave=False, disable=None) as bar,
+    ):
+        return simulator.render(
+            scene, progress=lambda done, count: _show(bar, done, count), vcd=waves and str(waves)
+        )
 
 
 def _show(bar: tqdm, done: int, count: int) -> None:
@@ -453,106 +780,18 @@ def _captions(report: dict) -> dict[str, str]:
     }
 
 
-def _report(
-    loaded, design: ShadingPipeline, scene: Scene, frame: SimulatedFrame, result: Comparison, seconds: dict
-) -> dict:
-    raster = frame.raster
+def _with_mesh(loaded: LoadedMesh, figures: dict, seconds: Mapping[str, float]) -> dict:
+    """Figures of a frame, with what is known of its mesh and the time spent before it."""
     return {
         "mesh": loaded.name,
-        "method": design.method,
-        "model": design.model,
-        "exponent": scene.material.exponent,
-        "lights": design.lights,
-        "engine": frame.engine,
-        "width": scene.width,
-        "height": scene.height,
-        "triangles": raster.triangles,
-        "spans": frame.spans,
-        "pixels": frame.pixels,
-        "visible_pixels": int(np.count_nonzero(frame.cut_raster.visible)),
-        "clocks": frame.clocks,
-        "clocks_per_pixel": frame.clocks / frame.pixels if frame.pixels else math.nan,
-        "simulated_pixels_per_second": frame.pixels / seconds["simulate"],
-        "arithmetic_error": dataclasses.asdict(result.arithmetic_error),
-        "method_error": dataclasses.asdict(result.method_error),
-        "total_error": dataclasses.asdict(result.total_error),
-        "nmse": result.nmse,
-        "mnse_printed": result.mnse_printed,
-        "mnse_printed_share": result.mnse_printed_share,
-        "counts": {
-            "repaired_normals": loaded.repaired_normals,
-            "dropped_faces": loaded.dropped_faces,
-            "degenerate_triangles": raster.degenerate,
-            "culled_triangles": raster.culled,
-            "outside_triangles": raster.outside,
-            "uncovered_triangles": raster.uncovered,
-            "repaired_span_normals": raster.repaired_normals,
-            "hidden_spans": raster.hidden_spans,
-            "cut_spans": frame.spans_cut,
-            "wide_spans": frame.wide_spans,
-        },
-        "seconds": seconds,
+        **figures,
+        "counts": {**_mesh_counts(loaded), **figures["counts"]},
+        "seconds": {**seconds, **figures["seconds"]},
     }
 
 
-_COUNTS = {
-    "repaired_normals": "stored normals repaired",
-    "dropped_faces": "faces without area dropped",
-    "degenerate_triangles": "triangles without area on the screen",
-    "culled_triangles": "back faces left out",
-    "outside_triangles": "triangles outside the picture",
-    "uncovered_triangles": "triangles that hold no pixel centre",
-    "repaired_span_normals": "span ends whose normal was 0",
-    "hidden_spans": "spans wholly hidden, left out",
-    "cut_spans": "spans over 45 degrees, cut",
-    "wide_spans": "spans flagged as too wide by the pipeline",
-}
-
-
-def _print_report(report: dict) -> None:
-    size = f"{report['width']}x{report['height']}"
-    rows = {
-        "mesh": f"{report['mesh']}, {size}",
-        "model": f"{report['model']}, exponent {report['exponent']}, lights {report['lights']}",
-        "method": report["method"],
-        "engine": report["engine"],
-        "triangles": f"{report['triangles']:,}",
-        "spans": f"{report['spans']:,}",
-        "pixels": f"{report['pixels']:,} shaded, {report['visible_pixels']:,} visible",
-        "clocks": f"{report['clocks']:,}",
-    }
-    if report["pixels"]:
-        rows["clocks"] += f", {report['clocks_per_pixel']:.3f} a pixel"
-        rows["simulated"] = f"{report['simulated_pixels_per_second']:,.0f} pixels a second"
-    for name, value in rows.items():
-        print(f"{name:<12}{value}")
-    if report["visible_pixels"]:
-        _print_errors(report)
-    else:
-        print(f"{'error':<12}none, no pixel shows the surface")
-    for key, text in _COUNTS.items():
-        if report["counts"][key]:
-            print(f"{'counted':<12}{text}: {report['counts'][key]:,}")
-    times = ", ".join(f"{name} {value:.2f}" for name, value in report["seconds"].items())
-    print(f"{'seconds':<12}{times}")
-
-
-def _print_errors(report: dict) -> None:
-    print(f"{'error, LSB':<12}{'largest':>9}{'99.9 %':>9}{'RMSE':>9}{'PSNR, dB':>10}   against")
-    for name, against in (
-        ("arithmetic", "the same method and model in float64"),
-        ("method", "exactly normalised Phong interpolation, same model"),
-        ("total", "the exact Blinn frame, one viewing direction"),
-    ):
-        error = report[f"{name}_error"]
-        print(
-            f"  {name:<10}{error['max_lsb']:>9.3f}{error['p999_lsb']:>9.3f}{error['rmse_lsb']:>9.3f}"
-            f"{error['psnr_db']:>10.2f}   {against}"
-        )
-    print(
-        f"{'NMSE':<12}{report['nmse']:.3g} (MNSE as printed {report['mnse_printed']:.3g}, "
-        f"defined for {report['mnse_printed_share']:.1%})"
-    )
+def _mesh_counts(loaded: LoadedMesh) -> dict[str, int]:
+    return {"repaired_normals": loaded.repaired_normals, "dropped_faces": loaded.dropped_faces}
 
 
 def _run(arguments: list[str]) -> int:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -17,7 +17,7 @@ from golden.scene import Scene
 from golden.unit_vector import COMPONENT, quantise
 from hdl.pipeline import ShadingPipelineUnit
 from sim.engine import SimulationError, simulate
-from sim.spans import cut_wide_spans, quantise_spans
+from sim.spans import cut_wide_spans, quantise_spans, sort_by_material
 
 __all__ = ["Comparison", "FrameSimulator", "SimulatedFrame", "compare"]
 
@@ -33,7 +33,8 @@ class SimulatedFrame:
     raster : Raster
         The rasteriser's spans.
     cut_raster : Raster
-        The spans that went into the pipeline, before quantisation: as the former, wide ones cut.
+        The spans that went into the pipeline, before quantisation: as the former, wide ones cut, and in
+        the order of their materials.
     spans_cut : int
         How many were cut.
     clocks : int
@@ -75,6 +76,8 @@ class FrameSimulator:
         Method, reflection model, number of lights.
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
+    setup_interval : int, optional
+        See `hdl.pipeline.ShadingPipelineUnit`.
 
     Attributes
     ----------
@@ -89,25 +92,29 @@ class FrameSimulator:
         If the engine is ``"cxxrtl"`` and no C++ compiler works.
     """
 
-    def __init__(self, design: ShadingPipeline, engine: str = "cxxrtl"):
+    def __init__(self, design: ShadingPipeline, engine: str = "cxxrtl", setup_interval: int | None = None):
         start = perf_counter()
         self.design = design
         self.engine = engine
-        self._unit = ShadingPipelineUnit(design)
-        spans, constants = _sample(design.lights)
+        self._unit = ShadingPipelineUnit(design, setup_interval)
+        spans, constants = _sample(design)
         expected = design.compute(spans, constants)
         run = self._run(spans, constants, len(expected.x))
         if not np.array_equal(_colors(run.beats), expected.color):
             raise SimulationError("the simulated pipeline's pixels are not those of its twin")
         self.build_seconds = perf_counter() - start
 
-    def _run(self, spans: Spans, constants: FrameConstants, count: int, **options):
+    def _run(self, spans: Spans, constants: Sequence[FrameConstants], count: int, **options):
         fields = ("x", "y", "length", "normal_left", "normal_right")
+        writes = [of_material.writes() for of_material in constants]
+        if len(constants) > 1:
+            fields += ("material",)
+            writes = [of_material.writes(index) for index, of_material in enumerate(constants)]
         return simulate(
             self._unit,
             {name: getattr(spans, name) for name in fields},
             count=count,
-            write=constants.writes(),
+            write={name: np.concatenate([beats[name] for beats in writes]) for name in ("address", "data")},
             engine=self.engine,
             **options,
         )
@@ -134,13 +141,21 @@ class FrameSimulator:
         SimulationError
             If the pipeline breaks the stream's rules, stops, or answers with other pixels than asked for.
         ValueError
-            If the scene has more lights than the design, or a term is brighter than 8.
+            If the scene has more lights or other materials than the design, or a term is brighter than 8.
         """
         start = perf_counter()
-        constants = FrameConstants.of(scene, self.design.lights)
+        materials = range(len(scene.materials))
+        if len(materials) != self.design.materials:
+            raise ValueError(
+                f"the pipeline has {self.design.materials} materials, the scene {len(materials)}"
+            )
+        constants = [FrameConstants.of(scene, self.design.lights, index=index) for index in materials]
         raster = rasterise(scene)
-        cut_raster, spans_cut = cut_wide_spans(raster)
-        spans = quantise_spans(cut_raster)
+        exponents = (material.exponent for material in scene.materials)
+        widest = min(map(self.design.interpolator.widest_span, exponents))
+        cut_raster, spans_cut = cut_wide_spans(raster, widest)
+        cut_raster = sort_by_material(cut_raster, scene.mesh.material)
+        spans = quantise_spans(cut_raster, scene.mesh.material)
         rastered = perf_counter()
         count = len(cut_raster.span)
         report = None if progress is None else lambda done: progress(done, count)
@@ -201,7 +216,10 @@ def compare(scene: Scene, design: ShadingPipeline, frame: SimulatedFrame) -> Com
     Of a frame that shows no surface every figure is NaN.
     """
     start = perf_counter()
-    same_method = shade_spans(scene, frame.cut_raster, design.method, design.model)
+    interpolator = design.interpolator
+    same_method = shade_spans(
+        scene, frame.cut_raster, interpolator.exact_normals, design.model, interpolator.uses_chord
+    )
     golden = shade_spans(scene, frame.raster, "normalised", design.model)
     exact = render(scene, "phong", "blinn", raster=frame.raster)
     seconds = perf_counter() - start
@@ -222,8 +240,8 @@ def _colors(beats: np.ndarray) -> np.ndarray:
     return np.stack([beats[channel] for channel in "rgb"], axis=-1)
 
 
-def _sample(lights: int) -> tuple[Spans, FrameConstants]:
-    """A few spans of every kind and lights from all sides, to check a model with."""
+def _sample(design: ShadingPipeline) -> tuple[Spans, list[FrameConstants]]:
+    """A few spans of every kind, lights from all sides and materials, to check a model with."""
     rng = np.random.default_rng(2025)
     length = np.r_[1, 2, 3, rng.integers(0, 24, 37)]
     normals = rng.normal(size=(len(length), 3))
@@ -236,8 +254,14 @@ def _sample(lights: int) -> tuple[Spans, FrameConstants]:
         length=length,
         normal_left=quantise(normals),
         normal_right=quantise(turned),
+        material=np.arange(len(length)) // 5 % design.materials,
     )
-    vectors = rng.integers(-COMPONENT.max_code // 2, COMPONENT.max_code // 2, (2, lights, 3))
-    colors = rng.integers(0, 255 * 64, (3, lights, 3))
-    constants = FrameConstants(7, colors[2, 0] // 8, vectors[0], vectors[1], colors[0], colors[1])
+    half = COMPONENT.max_code // 2
+    vectors = rng.integers(-half, half, (2, design.lights, 3))
+    constants = []
+    for index in range(design.materials):
+        colors = rng.integers(0, 255 * 64, (3, design.lights, 3))
+        constants.append(
+            FrameConstants(7 + index, colors[2, 0] // 8, vectors[0], vectors[1], colors[0], colors[1])
+        )
     return spans, constants

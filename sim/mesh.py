@@ -1,14 +1,16 @@
-"""Meshes by file or by name, with unit vertex normals and every flaw counted or reported."""
+"""Meshes by file or by name, with unit vertex normals, materials, and every flaw counted or reported."""
 
 import importlib.util
 import io
 import json
 import logging
+import math
 import re
 import struct
 import warnings
+from collections.abc import Collection, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -17,11 +19,14 @@ import trimesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from golden.frame_constants import MAX_MATERIALS
 from golden.geometry import Mesh, normalise
+from golden.lighting import Material, Triple
+from golden.specular import MAX_EXPONENT
 from sim.errors import InputError
 from sim.teapot import teapot
 
-__all__ = ["MAX_FACES", "SUFFIXES", "LoadedMesh", "load_mesh"]
+__all__ = ["MAX_FACES", "SUFFIXES", "FileMaterial", "LoadedMesh", "load_mesh", "surfaces"]
 
 SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf")
 MAX_FACES = 20_000_000
@@ -33,8 +38,35 @@ _FLAT = 2.0**-48
 # Slack of the crease test in the cosine: the rounding of vertices stored as float32.
 _COSINE_SLACK = 1e-6
 
+# k_a of a material whose k_d is the file's: most MTL files have a Ka of 1, which would wash the picture out.
+_AMBIENT_SHARE = 0.1
+
+# Bytes of a material file; 100,000 materials take less.
+_MAX_LIBRARY = 16_000_000
+
 _REEXPORT = "check the file or export it again"
+_ONE_MATERIAL = "mend it, or shade the mesh with one material"
 _NEEDS_DECODER = {"EXT_meshopt_compression", "KHR_meshopt_compression"}
+
+
+@dataclass(frozen=True)
+class FileMaterial:
+    """What a file says of a material; ``None`` where it says nothing.
+
+    Parameters
+    ----------
+    name : str
+        Its name; empty for faces that have no material in the file.
+    diffuse, specular : three floats or None
+        Colours, each channel 0 to 1: factors of k_d and k_s, as they stand.
+    exponent : int or None
+        Exponent of the highlight, 1 to 1000.
+    """
+
+    name: str = ""
+    diffuse: Triple | None = None
+    specular: Triple | None = None
+    exponent: int | None = None
 
 
 @dataclass(frozen=True)
@@ -52,15 +84,25 @@ class LoadedMesh:
         file refers to but does not hold.
     dropped_faces : int
         Triangles without area, left out.
+    materials : tuple of FileMaterial
+        Those that the mesh's ``material`` refers to, at least one; each is used by a face, and no two are
+        equal but for the name.
+    ignored : tuple of str
+        What the file holds, or refers to, that the mesh and the materials do not show: textures, vertex
+        colours, a material file that is not there.
     """
 
     mesh: Mesh
     name: str
     repaired_normals: int
     dropped_faces: int
+    materials: tuple[FileMaterial, ...] = (FileMaterial(),)
+    ignored: tuple[str, ...] = ()
 
 
-def load_mesh(source: str, *, triangles: int = 10_000, crease_angle: float = 40.0) -> LoadedMesh:
+def load_mesh(
+    source: str, *, triangles: int = 10_000, crease_angle: float = 40.0, materials: bool = True
+) -> LoadedMesh:
     """Load a mesh from a file, or build the teapot.
 
     Normals stored at the vertices of an OBJ, PLY, GLB or glTF file are kept. Zero, NaN and infinite ones
@@ -71,7 +113,15 @@ def load_mesh(source: str, *, triangles: int = 10_000, crease_angle: float = 40.
 
     All meshes of a scene are put together in world coordinates: vertices by the node's matrix ``M``,
     normals by its inverse transpose, and a mirroring node (``det M < 0``) turns the triangles round.
-    Points and lines beside a mesh are left out, as are materials, textures and colours.
+    Points and lines beside a mesh are left out.
+
+    Materials: of a GLB or glTF file ``pbrMetallicRoughness.baseColorFactor`` without its alpha, white where
+    there is none; of an OBJ file the ``Kd``, ``Ks`` and ``Ns`` (rounded, at least 1) of its ``usemtl``, from
+    the ``mtllib`` files in its folder. The factor of glTF is linear, as k_d is, and the picture is written
+    without a transfer curve: it is used as it stands, as is Kd. Metal, roughness, transparency, emission and
+    ``illum`` are not read. A material file that does not exist, or lacks a name, leaves the colours open
+    (``None``) and is told in ``ignored``, with textures and vertex colours, which are never read either.
+    Materials of no face are left out, and equal ones are one. PLY and STL files have one.
 
     Parameters
     ----------
@@ -82,18 +132,22 @@ def load_mesh(source: str, *, triangles: int = 10_000, crease_angle: float = 40.
         Triangles of the teapot, 64 to 4,000,000; of no effect for a file.
     crease_angle : float
         Degrees, 0 to 180. At 0 only coplanar faces share a normal, at 180 all faces do.
+    materials : bool
+        Whether to look at the file's materials; without, all faces have one that says nothing.
 
     Returns
     -------
     LoadedMesh
-        The mesh and the counts of what was mended.
+        The mesh, its materials, and the counts of what was mended.
 
     Raises
     ------
     InputError
         If a number is out of range, or the file is missing, empty, of unknown type, damaged, refers to
         files outside its folder, needs a decoder that is not installed, or holds no triangle, a vertex
-        that is not finite, an index out of range, or more than 20 million triangles.
+        that is not finite, an index out of range, or more than 20 million triangles; or a material in use
+        has a colour that is not three numbers from 0 to 1 or an exponent over 1000, or there are more than
+        1024 of them.
     """
     if not 0 <= crease_angle <= 180:
         raise InputError(
@@ -107,10 +161,10 @@ def load_mesh(source: str, *, triangles: int = 10_000, crease_angle: float = 40.
     try:
         data = _read(path)
         with _quiet_trimesh():
-            scene = _load_scene(path, data)
+            scene, found = _load_scene(path, data, materials)
         # Overflow and NaN are looked for, and reported, in what comes out.
         with np.errstate(over="ignore", invalid="ignore"):
-            return _assemble(scene, path, data, crease_angle)
+            return _assemble(scene, found, path, data, crease_angle)
     except _Refused as refusal:
         raise InputError(shown, refusal.reason, refusal.remedy) from None
     # The loaders raise whatever a damaged file makes them trip over.
@@ -119,6 +173,57 @@ def load_mesh(source: str, *, triangles: int = 10_000, crease_angle: float = 40.
         kind = type(error).__name__
         reason = f"cannot be read ({kind}: {text})" if text else f"cannot be read ({kind})"
         raise InputError(shown, reason, _REEXPORT) from error
+
+
+def surfaces(
+    materials: Sequence[FileMaterial], default: Material, fixed: Collection[str] = ()
+) -> tuple[Material, ...]:
+    """Reflection coefficients of a mesh's materials: what the file says, before a default.
+
+    The file's diffuse colour is k_d, and a tenth of it k_a; its specular colour is k_s.
+
+    Parameters
+    ----------
+    materials : sequence of FileMaterial
+        Of `load_mesh`.
+    default : Material
+        Coefficients where the file says nothing.
+    fixed : collection of str
+        Fields of ``default`` that hold for all materials, whatever the file says: ``"diffuse"`` and so on.
+    """
+    result = []
+    for material in materials:
+        color = None if "diffuse" in fixed else material.diffuse
+        said = {
+            "ambient": color and tuple(_AMBIENT_SHARE * channel for channel in color),
+            "diffuse": color,
+            "specular": material.specular,
+            "exponent": material.exponent,
+        }
+        said = {name: value for name, value in said.items() if value is not None and name not in fixed}
+        result.append(replace(default, **said))
+    return tuple(result)
+
+
+@dataclass
+class _Found:
+    """A file's materials: number 0 for faces without one, then its own, and what each has that is not read.
+
+    A material's text is read by `read` when a face uses it.
+    """
+
+    names: list[str] = field(default_factory=lambda: [""])
+    texts: list[object] = field(default_factory=lambda: [None])
+    ignored: list[str] = field(default_factory=list)
+
+    def read(self, number: int) -> tuple[FileMaterial, int]:
+        """One material and how many textures it has."""
+        text, shown = self.texts[number], _shown(self.names[number])
+        if text is None:
+            return FileMaterial(shown), 0
+        if isinstance(text, dict):
+            return _gltf_material(text, shown or f"number {number - 1}", shown)
+        return _mtl_material(text, shown)
 
 
 class _Refused(Exception):
@@ -171,14 +276,25 @@ def _read(path: Path) -> bytes:
     return data
 
 
-def _load_scene(path: Path, data: bytes) -> trimesh.Scene:
+def _load_scene(path: Path, data: bytes, materials: bool) -> tuple[trimesh.Scene, _Found]:
     """Check what trimesh does not, and load without touching any file that was not checked."""
     suffix = path.suffix.lower()
-    references, options = {}, {}
+    references, options, found = {}, {"skip_materials": True}, _Found()
     if suffix == ".obj":
+        data, libraries = _split_obj(data, found)
+        if materials and len(found.names) > 1:
+            _find_obj_materials(libraries, path.parent, found)
         data = _tidy_obj(data)
+        if re.search(rb"^v(?: +[^\s]+){6}", data, re.MULTILINE):
+            found.ignored.append("vertex colours")
+        options["split_objects"] = True
     elif suffix == ".ply":
         data = _tidy_ply(data)
+        head = data.partition(b"end_header")[0]
+        if re.search(rb"^\s*property\s+\w+\s+(diffuse_)?red\s*$", head, re.MULTILINE):
+            found.ignored.append("vertex colours")
+        if re.search(rb"^comment\s+TextureFile\b", head, re.MULTILINE):
+            found.ignored.append("1 texture")
         # Cutting the mesh at texture seams would leave the stored normals in the old order.
         options["fix_texture"] = False
     elif suffix == ".stl":
@@ -187,14 +303,19 @@ def _load_scene(path: Path, data: bytes) -> trimesh.Scene:
         document = _gltf_document(data, suffix)
         _check_gltf(document)
         references = _gltf_references(document, path.parent)
-    return trimesh.load_scene(
-        io.BytesIO(data),
-        file_type=suffix[1:],
-        resolver=references,
-        process=False,
-        skip_materials=True,
-        **options,
+        _find_gltf_materials(document, materials, found)
+        data = _plain_gltf(document, data, suffix)
+        options["skip_materials"] = False
+    scene = trimesh.load_scene(
+        io.BytesIO(data), file_type=suffix[1:], resolver=references, process=False, **options
     )
+    return scene, found
+
+
+def _shown(text: str) -> str:
+    """Text of a file in one line, and not too long."""
+    text = "".join(c if c.isprintable() else "?" for c in text)
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _utf8(text: bytes) -> bytes:
@@ -202,9 +323,105 @@ def _utf8(text: bytes) -> bytes:
     return text.decode("utf-8", "replace").encode()
 
 
+def _split_obj(data: bytes, found: _Found) -> tuple[bytes, list[str]]:
+    """An OBJ file with an object for each material, by its number, and its material files' names.
+
+    Two materials must not become one by what looks like a comment: ``usemtl Material #25`` is a name.
+    """
+    numbers = {"": 0}
+    libraries = []
+
+    def replaced(line):
+        keyword, rest = line[1], line[2].decode("utf-8").strip()
+        if keyword == b"mtllib":
+            libraries.append(rest)
+        if keyword != b"usemtl":
+            return b""
+        if rest not in numbers:
+            numbers[rest] = len(numbers)
+            found.names.append(rest)
+            found.texts.append(None)
+        return b"o %d" % numbers[rest]
+
+    data = re.sub(rb"\\\r?\n", b"", _utf8(data))
+    data = re.sub(rb"^[ \t]*(o|usemtl|mtllib)(?![^\s])([^\n]*)", replaced, data, flags=re.MULTILINE)
+    return data, libraries
+
+
+def _find_obj_materials(libraries: list[str], folder: Path, found: _Found) -> None:
+    """Look up the names of materials in the material files; the texts are read where a face uses them."""
+    texts = {}
+    for name in dict.fromkeys(libraries):
+        # A name with spaces, or several names.
+        for part in [name] if _inside(folder, name).is_file() else name.split():
+            target = _inside(folder, part)
+            if not target.is_file():
+                found.ignored.append(f"the material file {_shown(part)!r}, which does not exist")
+                continue
+            if target.stat().st_size > _MAX_LIBRARY:
+                raise _Refused(
+                    f"its material file {_shown(part)!r} is over {_MAX_LIBRARY:,} bytes", "shorten it"
+                )
+            blocks = re.split(
+                r"^[ \t]*newmtl(?!\S)", target.read_text("utf-8-sig", "replace"), flags=re.MULTILINE
+            )
+            for block in blocks[1:]:
+                first, _, text = block.partition("\n")
+                texts.setdefault(first.strip(), text)
+    for number, name in enumerate(found.names[1:], 1):
+        bare = name.partition(" #")[0].strip()
+        found.texts[number] = texts.get(name, texts.get(bare))
+    if missing := found.texts[1:].count(None):
+        found.ignored.append(f"{missing} material name{'s' * (missing > 1)} without a definition")
+
+
+def _mtl_material(text: str, name: str) -> tuple[FileMaterial, int]:
+    """A material of a material file, and how many textures it has."""
+    values, textures = {}, 0
+    for line in text.splitlines():
+        keyword, *words = line.partition("#")[0].split() or [""]
+        if re.match("map_|norm$|bump$|disp$|decal$|refl$", keyword.lower()):
+            textures += 1
+        elif keyword in ("Kd", "Ks", "Ns"):
+            values[keyword] = words
+    colors = {}
+    for keyword in ("Kd", "Ks"):
+        if keyword in values:
+            # One number is for all channels.
+            given = values[keyword] * 3 if len(values[keyword]) == 1 else values[keyword]
+            colors[keyword] = _color([_float(word) for word in given], keyword, name, " ".join(given))
+    exponent = None
+    if "Ns" in values:
+        number = _float(" ".join(values["Ns"]))
+        if not 0 <= number <= MAX_EXPONENT:
+            raise _Refused(
+                f"material {name!r} has Ns {_shown(' '.join(values['Ns']))!r}, not a number from 0 to "
+                f"{MAX_EXPONENT}",
+                _ONE_MATERIAL,
+            )
+        exponent = max(1, math.floor(number + 0.5))
+    return FileMaterial(name, colors.get("Kd"), colors.get("Ks"), exponent), textures
+
+
+def _float(word: str) -> float:
+    """A number, or NaN."""
+    try:
+        return float(word)
+    except ValueError:
+        return math.nan
+
+
+def _color(channels: list[float], what: str, name: str, text: str) -> Triple:
+    if len(channels) != 3 or not all(0 <= channel <= 1 for channel in channels):
+        raise _Refused(
+            f"material {name!r} has {what} {_shown(text)!r}, not three numbers from 0 to 1", _ONE_MATERIAL
+        )
+    return tuple(map(float, channels))
+
+
 def _tidy_obj(data: bytes) -> bytes:
     """An OBJ file in the form that trimesh reads; face lines that it would take wrongly are refused."""
-    data = re.sub(rb"\\\r?\n|#.*", b"", _utf8(data))
+    data = re.sub(rb"#.*", b"", data)
     data = re.sub(rb"^[ \t]*(v|vn|vt|f)[ \t]+", rb"\1 ", data, flags=re.MULTILINE)
     if re.search(rb"^f(?: +[^\s]+){0,2}[ \t]*\r?$", data, re.MULTILINE):
         raise _Refused("a face has fewer than 3 corners")
@@ -293,6 +510,63 @@ def _check_gltf(document: dict) -> None:
                     )
 
 
+def _find_gltf_materials(document: dict, materials: bool, found: _Found) -> None:
+    """Put numbers of materials in place of the materials, and leave out what hangs on textures.
+
+    trimesh then tells the number of each part of a mesh, and there is no image that it could look for.
+    """
+    texts = document.pop("materials", None) or []
+    for unread in ("images", "textures", "samplers"):
+        document.pop(unread, None)
+    colored = False
+    for mesh in document.get("meshes", []):
+        for primitive in mesh["primitives"]:
+            attributes = primitive["attributes"]
+            for name in list(attributes):
+                if name.startswith(("COLOR_", "TEXCOORD_")):
+                    colored |= name.startswith("COLOR_")
+                    del attributes[name]
+            index = primitive.pop("material", None)
+            if index is None or not materials:
+                continue
+            if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(texts):
+                raise _Refused(
+                    f"a mesh refers to material {_shown(str(index))} (from 0), there are {len(texts)}",
+                    _ONE_MATERIAL,
+                )
+            primitive["material"] = index
+    if colored:
+        found.ignored.append("vertex colours")
+    if materials and texts:
+        if not isinstance(texts, list) or not all(isinstance(text, dict) for text in texts):
+            raise _Refused("its materials are no list of objects", _ONE_MATERIAL)
+        found.names += [str(text.get("name", "")) for text in texts]
+        found.texts += texts
+        document["materials"] = [{"name": str(number)} for number in range(1, len(texts) + 1)]
+
+
+def _gltf_material(text: dict, name: str, given_name: str) -> tuple[FileMaterial, int]:
+    """A material of a glTF document, and how many textures it has."""
+    look = text.get("pbrMetallicRoughness", {})
+    factor = look.get("baseColorFactor", [1, 1, 1, 1]) if isinstance(look, dict) else look
+    numbers = factor if isinstance(factor, list) and len(factor) == 4 else []
+    usable = all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers)
+    color = _color(numbers[:3] if usable else [], "baseColorFactor", name, str(factor))
+    textures = sum(key.endswith("Texture") for part in (look, text) for key in part)
+    return FileMaterial(given_name, color), textures
+
+
+def _plain_gltf(document: dict, data: bytes, suffix: str) -> bytes:
+    """A GLB or glTF file with another document."""
+    text = json.dumps(document).encode()
+    if suffix == ".gltf":
+        return text
+    text += b" " * (-len(text) % 4)
+    length, old = struct.unpack_from("<II", data, 8)
+    rest = data[20 + old : length]
+    return data[:8] + struct.pack("<II", 20 + len(text) + len(rest), len(text)) + data[16:20] + text + rest
+
+
 def _gltf_references(document: dict, folder: Path) -> dict[str, bytes]:
     """The files that a glTF document takes its buffers from, by the URI it calls them; all in its folder."""
     references = {}
@@ -300,32 +574,41 @@ def _gltf_references(document: dict, folder: Path) -> dict[str, bytes]:
         uri = buffer.get("uri")
         if uri is None or uri.startswith("data:"):
             continue
-        if re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", uri) or uri.startswith(("/", "\\")):
-            raise _Refused(f"it refers to {uri!r}, outside its folder", "put that file beside it")
-        target = (folder / unquote(uri)).resolve()
-        if ".." in Path(unquote(uri)).parts or not target.is_relative_to(folder.resolve()):
-            raise _Refused(f"it refers to {uri!r}, outside its folder", "put that file beside it")
+        target = _inside(folder, uri, unquote(uri))
         if not target.is_file():
             raise _Refused(f"it refers to {uri!r}, which does not exist", "put that file beside it")
         references[uri] = target.read_bytes()
     return references
 
 
-def _assemble(scene: trimesh.Scene, path: Path, data: bytes, crease_angle: float) -> LoadedMesh:
+def _inside(folder: Path, reference: str, name: str | None = None) -> Path:
+    """The file that a reference means, in the folder or one below; it need not exist."""
+    name = reference if name is None else name
+    target = (folder / name).resolve()
+    outside = re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", reference) or reference.startswith(("/", "\\"))
+    if outside or ".." in Path(name).parts or not target.is_relative_to(folder.resolve()):
+        raise _Refused(f"it refers to {reference!r}, outside its folder", "put that file beside it")
+    return target
+
+
+def _assemble(
+    scene: trimesh.Scene, found: _Found, path: Path, data: bytes, crease_angle: float
+) -> LoadedMesh:
     """All triangles of a scene in world coordinates, as one mesh."""
     nodes = [scene.graph[node] for node in scene.graph.nodes_geometry]
-    nodes = [(matrix, scene.geometry[name]) for matrix, name in nodes]
-    nodes = [(m, g) for m, g in nodes if isinstance(g, trimesh.Trimesh) and len(g.faces)]
+    numbers = {name: _number(name, scene.geometry[name], path) for _, name in nodes}
+    nodes = [(matrix, scene.geometry[name], numbers[name]) for matrix, name in nodes]
+    nodes = [node for node in nodes if isinstance(node[1], trimesh.Trimesh) and len(node[1].faces)]
     if not nodes:
         raise _Refused("it has no faces", "use a mesh of triangles; points and lines are not shaded")
-    if (total := sum(len(g.faces) for _, g in nodes)) > MAX_FACES:
+    if (total := sum(len(geometry.faces) for _, geometry, _ in nodes)) > MAX_FACES:
         raise _Refused(f"it has {total} triangles; the limit is {MAX_FACES}", "simplify it")
 
     # trimesh drops the normals of an OBJ file if one of their indices is missing or out of range.
     promised = path.suffix.lower() == ".obj" and re.search(rb"^f\b.*/-?\d*/-?\d", data, re.MULTILINE)
-    vertices, normals, faces, lost = [], [], [], 0
+    vertices, normals, faces, material, lost = [], [], [], [], 0
     offset = 0
-    for matrix, geometry in nodes:
+    for matrix, geometry, number in nodes:
         part, triangles = np.array(geometry.vertices), np.array(geometry.faces)
         if not 0 <= triangles.min() <= triangles.max() < len(part):
             wrong = triangles.min() if triangles.min() < 0 else triangles.max()
@@ -345,17 +628,54 @@ def _assemble(scene: trimesh.Scene, path: Path, data: bytes, crease_angle: float
             part = part @ rotation.T + matrix[:3, 3]
             stored = _transformed(stored, -cofactors if mirrored else cofactors)
         faces.append((triangles[:, ::-1] if mirrored else triangles) + offset)
+        material.append(np.full(len(triangles), number))
         vertices.append(part)
         normals.append((stored, np.full(len(part), has_normals)))
         offset += len(part)
-    return _finish(
+    loaded = _finish(
         np.concatenate(vertices),
         np.concatenate(faces),
+        np.concatenate(material),
         np.concatenate([stored for stored, _ in normals]),
         np.concatenate([flag for _, flag in normals]),
         path.stem,
         lost,
         crease_angle,
+    )
+    return _with_materials(loaded, found)
+
+
+def _number(name: str, geometry: object, path: Path) -> int:
+    """Number of a part's material."""
+    suffix = path.suffix.lower()
+    if suffix == ".obj":
+        return int(name) if name.isdecimal() else 0
+    material = getattr(getattr(geometry, "visual", None), "material", None)
+    return 0 if material is None or suffix not in (".glb", ".gltf") else int(material.name)
+
+
+def _with_materials(loaded: LoadedMesh, found: _Found) -> LoadedMesh:
+    """The mesh with the materials that its faces use, numbered from 0, equal ones as one."""
+    used, of_face = np.unique(loaded.mesh.material, return_inverse=True)
+    places, materials, of_used, textures = {}, [], [], 0
+    for number in used.tolist():
+        material, its_textures = found.read(number)
+        textures += its_textures
+        place = places.setdefault(replace(material, name=""), len(materials))
+        if place == len(materials):
+            materials.append(material)
+        elif not materials[place].name:
+            materials[place] = material
+        of_used.append(place)
+    if len(materials) > MAX_MATERIALS:
+        raise _Refused(f"it has {len(materials)} materials; the limit is {MAX_MATERIALS}", _ONE_MATERIAL)
+    if textures:
+        found.ignored.append(f"{textures} texture{'s' * (textures > 1)}")
+    return replace(
+        loaded,
+        mesh=replace(loaded.mesh, material=np.array(of_used)[of_face.ravel()]),
+        materials=tuple(materials),
+        ignored=tuple(found.ignored),
     )
 
 
@@ -371,13 +691,14 @@ def _transformed(normals: np.ndarray, cofactors: np.ndarray) -> np.ndarray:
 def _finish(
     vertices: np.ndarray,
     faces: np.ndarray,
+    material: np.ndarray,
     normals: np.ndarray,
     has_normals: np.ndarray,
     name: str,
     lost: int,
     crease_angle: float,
 ) -> LoadedMesh:
-    """Drop faces without area, mend stored normals, compute the others."""
+    """Drop faces without area, mend stored normals, compute the others; materials still by their numbers."""
     used = np.unique(faces)
     broken = len(used) - np.isfinite(vertices[used]).all(axis=1).sum()
     if broken:
@@ -390,7 +711,7 @@ def _finish(
     cross, longest = _face_cross(scaled, faces)
     solid = cross > _FLAT * longest
     dropped = int(len(faces) - solid.sum())
-    faces = faces[solid]
+    faces, material = faces[solid], material[solid]
     if not len(faces):
         raise _Refused("none of its faces has an area")
 
@@ -403,6 +724,7 @@ def _finish(
         vertices=np.concatenate([vertices[own], vertices[corner]]),
         faces=np.concatenate([renumbered, smooth_faces + len(own)]).astype(np.int64),
         normals=np.concatenate([own_normals, smooth_normals]),
+        material=np.concatenate([material[kept], material[~kept]]).astype(np.int64),
     )
     return LoadedMesh(mesh, name, repaired + lost, dropped)
 

@@ -5,15 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from golden.interpolation import interpolate
-from golden.middle_normal import MAX_SPAN_ANGLE
 from golden.pipeline import Spans
 from golden.raster import Raster
 from golden.unit_vector import quantise
 
-__all__ = ["cut_wide_spans", "quantise_spans"]
+__all__ = ["cut_wide_spans", "quantise_spans", "sort_by_material"]
 
 
-def cut_wide_spans(raster: Raster, largest_angle: float = MAX_SPAN_ANGLE) -> tuple[Raster, int]:
+def cut_wide_spans(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
     """Halve spans until the normals at the ends of each are at most an angle apart.
 
     The normals at a cut are those of the span's own curve, ``normalise((1-t) N_l + t N_r)``, at the pixel
@@ -82,12 +81,46 @@ def cut_wide_spans(raster: Raster, largest_angle: float = MAX_SPAN_ANGLE) -> tup
     return result, int(np.count_nonzero(np.bincount(origin, minlength=1) > 1))
 
 
-def quantise_spans(raster: Raster) -> Spans:
-    """The pipeline's input beats for a raster, normals in codes of ``SQ(1, 17)``."""
+def sort_by_material(raster: Raster, material: np.ndarray) -> Raster:
+    """The same spans and fragments, spans of one material after the other.
+
+    Parameters
+    ----------
+    raster : Raster
+        Spans.
+    material : int array
+        Material of each triangle.
+    """
+    of_span = material[raster.triangle]
+    if not np.any(of_span[1:] < of_span[:-1]):
+        return raster
+    spans = np.argsort(of_span, kind="stable")
+    place = np.empty_like(spans)
+    place[spans] = np.arange(len(spans))
+    fragments = np.argsort(place[raster.span], kind="stable")
+    by_span = ("x", "y", "length", "triangle", "normal_left", "normal_right", "back")
+    by_span += ("magnitude_left", "magnitude_right", "weights_left", "weights_right")
+    kept = {name: getattr(raster, name) for name in by_span}
+    moved = {name: values[spans] if len(values) else values for name, values in kept.items()}
+    moved |= {name: getattr(raster, name)[fragments] for name in ("offset", "pixel", "visible")}
+    return replace(raster, **moved, span=place[raster.span][fragments].astype(raster.span.dtype))
+
+
+def quantise_spans(raster: Raster, material: np.ndarray) -> Spans:
+    """The pipeline's input beats for a raster, normals in codes of ``SQ(1, 17)``.
+
+    Parameters
+    ----------
+    raster : Raster
+        Spans.
+    material : int array
+        Material of each triangle.
+    """
     return Spans(
         x=raster.x,
         y=raster.y,
         length=raster.length,
         normal_left=quantise(raster.normal_left),
         normal_right=quantise(raster.normal_right),
+        material=material[raster.triangle],
     )

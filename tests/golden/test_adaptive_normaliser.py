@@ -106,7 +106,7 @@ def test_sagitta_is_never_under():
 
 
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90])
-def test_ends_are_exact(normal_pairs, angle):
+def test_stiff_ends_are_exact(normal_pairs, angle):
     lengths = np.r_[np.arange(1, 70), 127, 128, 129, 255, 256, 257, 1023, 1024, 1025, 4093, 4094, 4095]
     for parameters in (AdaptiveNormaliser(), AdaptiveNormaliser(2.0**-14)):
         left, right, _, _, normal, wide, _ = run(parameters, normal_pairs, 7, angle, lengths)
@@ -116,7 +116,7 @@ def test_ends_are_exact(normal_pairs, angle):
         np.testing.assert_array_equal(normal.codes[last][lengths > 1], right[lengths > 1])
 
 
-def test_equal_normals_stay():
+def test_stiff_equal_normals_stay():
     axes = np.vstack([np.eye(3), -np.eye(3)]).astype(np.int64) * ONE
     lengths = np.array([1, 2, 3, 16, 4095, 100])
     ends = Fixed(COMPONENT, axes)
@@ -126,8 +126,31 @@ def test_equal_normals_stay():
     np.testing.assert_array_equal(normal.codes, np.repeat(axes, lengths, axis=0))
 
 
+@pytest.mark.parametrize(
+    ("degrees", "miss", "length"), [(1, 0.00015, 1.0003), (10, 0.15, 1.03), (45, 8.2, 1.47)]
+)
+def test_what_the_documented_extrapolation_costs(degrees, miss, length):
+    """The end on the chord's continuation at the next power of two, then normalised without an error."""
+    psi = np.radians(degrees)
+    steps = np.arange(1, 4095)
+    g = 2.0 ** np.ceil(np.log2(steps)) / steps
+    end = np.stack([1 - g + g * np.cos(psi), g * np.sin(psi)])
+    assert np.linalg.norm(end, axis=0).max() - 1 == pytest.approx(length - 1, rel=0.02)
+    # The last pixel lies at 1/g of the way to the new end.
+    last = np.degrees(np.arctan2(end[1], end[0])) / g
+    assert (degrees - last).max() == pytest.approx(miss, rel=0.03)
+    assert np.degrees(np.arctan2(2.0, 1 - 2.0)) == pytest.approx(116.6, abs=0.1)
+    # Ours gives the right end itself, to the bit: test_stiff_ends_are_exact.
+    ends = quantise(np.array([[1.0, 0, 0], [np.cos(psi), np.sin(psi), 0]]))
+    length = np.r_[2:300, 513:516, 4095]
+    normal, _, _ = AdaptiveNormaliser().compute(
+        *(Fixed(COMPONENT, np.tile(end, (len(length), 1))) for end in ends), length
+    )
+    assert np.all(normal.codes[np.cumsum(length) - 1] == ends[1])
+
+
 @pytest.mark.parametrize("angle", [90.01, 120, 180])
-def test_too_wide_is_flagged(normal_pairs, angle):
+def test_stiff_too_wide_is_flagged(normal_pairs, angle):
     left, right, _, _, normal, wide, levels = run(
         AdaptiveNormaliser(), normal_pairs, 8, angle, np.full(200, 33)
     )
@@ -135,6 +158,59 @@ def test_too_wide_is_flagged(normal_pairs, angle):
     assert not levels.any()
     np.testing.assert_array_equal(normal.codes[::33], left)
     np.testing.assert_array_equal(normal.codes[32::33], right)
+
+
+@pytest.mark.parametrize("threshold", [1 / 8, 2.0**-10, 2.0**-14])
+@pytest.mark.parametrize("angle", [1, 44.9, 89.9])
+def test_stiff_drift_over_4095_pixels(normal_pairs, threshold, angle):
+    """A step is cut by under 2^-32: over a segment of n pixels its end is low by under n 2^-32."""
+    parameters = AdaptiveNormaliser(threshold)
+    lengths = np.full(6, 4095)
+    left, right, span, pixel, normal, _, levels = run(parameters, normal_pairs, 9, angle, lengths)
+    exact = lines(left[span] / ONE, right[span] / ONE, levels[span], pixel / 4094) * (ONE * COMPONENT.step)
+    error = np.abs(normal.values - exact).max()
+    assert error <= parameters.error(int(levels.max()), angle > 45)
+    # One segment, the longest way to drift, keeps within a step of the word and what its factors round off.
+    if not levels.any():
+        assert error <= 2.0**-18 + 2 * np.sin(np.radians(angle) / 2) * 2.0**-16 + 4095 * 2.0**-32
+
+
+@pytest.mark.parametrize("length", [3, 5, 16, 17, 4095])
+@pytest.mark.parametrize("angle", [1, 45, 89])
+def test_stiff_peaks(length, angle):
+    """N.H with H on a pixel and between two: the sagitta and the rounding are lost, no more."""
+    parameters, half = AdaptiveNormaliser(), np.radians(angle) / 2
+    ends = quantise(np.array([[np.cos(half), -np.sin(half), 0], [np.cos(half), np.sin(half), 0]]))
+    operands = (Fixed(COMPONENT, end[np.newaxis]) for end in ends)
+    normal, _, levels = parameters.compute(*operands, np.array([length]))
+    bound = parameters.threshold + 2.0**-19 + 2 * parameters.error(int(levels[0]), angle > 45) + 2.0**-16
+    for place in ((length - 1) / 2, (length - 1) // 2 + 0.5, 1):
+        turn = (2 * place / (length - 1) - 1) * half
+        found = normal.values @ np.array([np.cos(turn), np.sin(turn), 0])
+        ideal = np.cos((2 * np.arange(length) / (length - 1) - 1) * half - turn)
+        theta = 2 * half / 2.0 ** levels[0]
+        assert np.abs(found - ideal).max() <= bound + 0.017 * theta**3
+
+
+def test_stiff_normals_of_no_unit_length(normal_pairs):
+    """Words of any size come out at both ends as they went in, unless flagged; nothing fails in between."""
+    rng = np.random.default_rng(10)
+    left, right = normal_pairs(rng, 300, 5.0)
+    parameters, lengths = AdaptiveNormaliser(), np.resize([2, 3, 16, 100], 300)
+    corners = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (2, 300, 3))
+    scaled = [[np.rint(v * (1 - 1 / 256) * ONE) for v in (left, right)], np.zeros((2, 300, 3)), corners]
+    for ends in scaled:
+        before, after = (Fixed(COMPONENT, np.asarray(end).astype(np.int64)) for end in ends)
+        normal, wide, _ = parameters.compute(before, after, lengths)
+        last = np.cumsum(lengths) - 1
+        np.testing.assert_array_equal(normal.codes[last - lengths + 1], before.codes)
+        np.testing.assert_array_equal(normal.codes[last], after.codes)
+    # Of the short ones, which are not wide, every normal is as short as they are, and by its sagitta.
+    before, after = (Fixed(COMPONENT, end.astype(np.int64)) for end in scaled[0])
+    normal, wide, _ = parameters.compute(before, after, lengths)
+    assert not wide.any()
+    size = np.linalg.norm(normal.values, axis=1)
+    assert 1 - 3 / 256 < size.min() < 1 - 1 / 256
 
 
 @pytest.mark.long

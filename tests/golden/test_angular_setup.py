@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from golden.angular_setup import AngularSetup
-from golden.arccos import Arccos
+from golden.arccos import ARCCOS_TABLES, Arccos
 from golden.fixed import SQ, Fixed
 from golden.highlight_cosine import HighlightCosine
 from golden.interpolation import interpolate
@@ -31,8 +31,8 @@ def operands(normal_pairs, seed, degrees, count=2000):
     return *(quantise(v) for v in (left, right, vector)), length
 
 
-def setup(left, right, vector, length):
-    return UNIT.compute(*(Fixed(COMPONENT, codes) for codes in (left, right, vector)), length)
+def setup(left, right, vector, length, unit=UNIT):
+    return unit.compute(*(Fixed(COMPONENT, codes) for codes in (left, right, vector)), length)
 
 
 def pixels(length, seed=1):
@@ -62,7 +62,7 @@ def exact(left, right, vector, t):
 
 
 @pytest.mark.parametrize("degrees", ANGLES)
-def test_arithmetic_error(degrees, normal_pairs):
+def test_stiff_span_angles_keep_the_bound(degrees, normal_pairs):
     left, right, vector, length = operands(normal_pairs, 3, degrees)
     pixel = pixels(length)
     found = cosines(setup(left, right, vector, length), pixel)
@@ -71,6 +71,92 @@ def test_arithmetic_error(degrees, normal_pairs):
     assert error <= bound
     if degrees > 20:
         assert error > 0.2 * bound
+
+
+@pytest.mark.parametrize("degrees", ANGLES)
+@pytest.mark.parametrize("table", ARCCOS_TABLES)
+def test_stiff_span_angles_by_arccos(degrees, table, normal_pairs):
+    unit = AngularSetup("arccos", Arccos(table))
+    left, right, vector, length = operands(normal_pairs, 3, degrees)
+    pixel = pixels(length)
+    found = cosines(setup(left, right, vector, length, unit), pixel)
+    error = np.abs(found - exact(left, right, vector, pixel / (length - 1))).max()
+    assert error <= unit.arccos_error(degrees)
+
+
+# The table of the docstring: 1e-4, 1, 10 and 45 degrees.
+@pytest.mark.parametrize(
+    ("unit", "stated"),
+    [
+        (UNIT, [5.0e-7, 7.4e-7, 3.8e-6, 1.3e-5]),
+        (AngularSetup("arccos"), [0.0095, 0.0012, 0.0049, 2.6e-4]),
+        (AngularSetup("arccos", Arccos("corrected")), [0.042, 0.034, 3.5e-4, 5.0e-4]),
+        (AngularSetup("arccos", Arccos("printed")), [0.088, 0.078, 0.045, 5.0e-4]),
+    ],
+    ids=["half_chord", "refitted", "corrected", "printed"],
+)
+def test_error_by_where_psi_comes_from(unit, stated, normal_pairs):
+    for degrees, largest in zip((1e-4, 1, 10, 45), stated, strict=True):
+        left, right, vector, length = operands(normal_pairs, 3, degrees, count=20000)
+        pixel = pixels(length)
+        found = cosines(setup(left, right, vector, length, unit), pixel)
+        error = np.abs(found - exact(left, right, vector, pixel / (length - 1))).max()
+        assert error == pytest.approx(largest, rel=0.06)
+
+
+@pytest.mark.parametrize("degrees", [1e-4, 1, 45, 90, 150])
+@pytest.mark.parametrize("unit", [UNIT, AngularSetup("arccos")], ids=["half_chord", "arccos"])
+def test_stiff_peaks(degrees, unit):
+    """On a pixel, between two, and at an end; the highlight wholly inside the span."""
+    psi, length = np.radians(degrees), 17
+    bound = unit.error(degrees) if unit is UNIT else unit.arccos_error(degrees)
+    for place in (8, 7.5, 0, 16):
+        turn = place / (length - 1) * psi
+        vectors = [[np.cos(a), np.sin(a), 0] for a in (0, psi, turn)]
+        codes = quantise(np.array(vectors))[:, np.newaxis]
+        result = setup(*codes, np.array([length]), unit)
+        pixel = np.arange(length)[:, np.newaxis]
+        found = cosines(result, pixel)
+        assert np.abs(found - exact(*codes, pixel / (length - 1))).max() <= bound
+        # A code is off by under a step in each component, its length by 2^-18; see also test_each_figure.
+        ideal = np.cos(pixel / (length - 1) * psi - turn)
+        assert np.abs(found - ideal).max() <= bound + 4 * 2.0**-17 / np.cos(psi / 2)
+
+
+def test_stiff_normals_of_no_unit_length():
+    """Of length 0 both N.H are 0, and so is cos gamma; by 1 +- 1/256 too long, the ends still hold."""
+    zero = np.zeros((1, 3), dtype=np.int64)
+    halfway = quantise(np.array([[0.6, 0, 0.8]]))
+    for unit in (UNIT, AngularSetup("arccos")):
+        result = setup(zero, zero, halfway, np.array([16]), unit)
+        assert np.abs(cosines(result, np.arange(16)[:, np.newaxis])).max() == 0
+    rng = np.random.default_rng(12)
+    for scale in (1 - 1 / 256, 1 + 1 / 256):
+        # Off the axes, so that no component saturates.
+        middle = np.array([1, 1, 1]) / np.sqrt(3) + rng.uniform(-0.2, 0.2, (500, 3))
+        left = middle / np.linalg.norm(middle, axis=1, keepdims=True)
+        right = left + rng.uniform(-0.1, 0.1, (500, 3))
+        right /= np.linalg.norm(right, axis=1, keepdims=True)
+        codes = [np.rint(scale * v * ONE).astype(np.int64) for v in (left, right)]
+        result = setup(*codes, halfway, np.full(500, 16))
+        for end, pixel in zip(codes, (0, 15), strict=True):
+            assert np.abs(cosines(result, pixel) - dot(end, halfway) / ONE**2).max() <= UNIT.error(20)
+
+
+def test_stiff_words_at_their_ends():
+    """Every corner of the words gives something in range, none an exception."""
+    ends = np.array([COMPONENT.min_code, 0, COMPONENT.max_code])
+    corners = np.stack(np.meshgrid(*[ends] * 9), axis=-1).reshape(-1, 9)[::7]
+    for unit in (UNIT, AngularSetup("arccos", Arccos("printed"))):
+        result = setup(
+            corners[:, :3],
+            corners[:, 3:6],
+            corners[:, 6:],
+            np.resize([1, 2, 3, 16, 4095], len(corners)),
+            unit,
+        )
+        assert result[0].values.max() < 1
+        assert np.abs(result[1].values).max() <= 0.5
 
 
 @pytest.mark.parametrize("degrees", ANGLES)
@@ -122,7 +208,7 @@ def test_each_figure(degrees, normal_pairs):
     assert not opposite.any()
 
 
-def test_equal_normals(normal_pairs):
+def test_stiff_equal_normals(normal_pairs):
     left, _, vector, length = operands(normal_pairs, 7, 0)
     result = setup(left, left, vector, length)
     angle, _, step, _, opposite = result
@@ -132,7 +218,7 @@ def test_equal_normals(normal_pairs):
     assert np.abs(cosines(result, 0) - dot(left, vector) / ONE**2).max() <= UNIT.error(0)
 
 
-def test_normals_one_step_apart(normal_pairs):
+def test_stiff_normals_one_step_apart(normal_pairs):
     """The difference of such normals may point along them; cos beta then goes past 1 and saves the ends."""
     left, _, vector, length = operands(normal_pairs, 8, 0)
     right = left.copy()
@@ -145,7 +231,7 @@ def test_normals_one_step_apart(normal_pairs):
         assert np.abs(cosines(result, pixel) - dot(normal, vector) / ONE**2).max() <= UNIT.error(0.001)
 
 
-def test_opposite_normals_are_flagged(normal_pairs):
+def test_stiff_opposite_normals_are_flagged(normal_pairs):
     left, right, vector, length = operands(normal_pairs, 9, 180)
     right = -left
     result = setup(left, right, vector, length)
@@ -175,7 +261,7 @@ def test_vector_at_right_angles_to_the_circle():
     assert cos_beta.codes == 0
 
 
-def test_short_spans():
+def test_stiff_short_and_long_spans():
     ends = quantise(np.array([[1.0, 0, 0], [np.cos(0.3), np.sin(0.3), 0], [0, 0, 1.0]]))
     for length, share in ((1, 1), (2, 1), (3, 2), (16, 15), (4095, 4094)):
         angle, _, step, _, _ = setup(*ends[:, np.newaxis], np.array([length]))
@@ -230,6 +316,11 @@ def test_length_out_of_range(length):
     vector = np.array([[ONE, 0, 0]])
     with pytest.raises(ValueError, match="lengths must be 1 to 4095"):
         setup(vector, vector, vector, np.array([length]))
+
+
+def test_unknown_angle():
+    with pytest.raises(ValueError, match=r"^angle must be half_chord or arccos, not 'arcsin'$"):
+        AngularSetup("arcsin")
 
 
 def test_wrong_format():

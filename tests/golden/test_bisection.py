@@ -103,6 +103,67 @@ def test_equal_normals_stay(normal_pairs, degree):
     assert not u.codes.any()
 
 
+@pytest.mark.parametrize("parameters", [Bisection(), Bisection(1), Bisection(as_documented=True)], ids=str)
+@pytest.mark.parametrize("angle", [0, 1e-4, 1, 44.9, 45, 45.1, 89.9, 90])
+def test_stiff_angles_within_the_bound(normal_pairs, parameters, angle):
+    left, right = codes(normal_pairs, 11, np.full(4000, angle))
+    middle, _, wide, exact, _ = bisect(parameters, left, right)
+    assert not wide.any()
+    # At 45 degrees the rounding of the normals decides which polynomial is taken.
+    steps = {angle > 45, angle >= 45}
+    assert np.abs(middle.values - exact).max() <= max(parameters.error(step) for step in steps)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("excess", [-1 / 256, 1 / 256])
+@pytest.mark.parametrize("angle", [0, 1e-4, 1, 20, 44])
+def test_stiff_lengths_of_the_ends(normal_pairs, degree, angle, excess):
+    """Ends of length 1 +- 1/256: the bound holds, and the error of the middle's length is halved.
+
+    u may then be negative, to -2/256, where the fit goes on as smoothly as the function.
+    """
+    parameters = Bisection(degree)
+    left, right = normal_pairs(np.random.default_rng(12), 4000, angle)
+    left, right = (np.rint(n * (1 + excess) * ONE).astype(np.int64) for n in (left, right))
+    kept = (np.abs(left) <= ONE).all(axis=1) & (np.abs(right) <= ONE).all(axis=1)
+    left, right = left[kept], right[kept]
+    middle, _, wide, exact, _ = bisect(parameters, left, right)
+    assert not wide.any()
+    assert np.abs(middle.values - np.clip(exact, -1, ONE * COMPONENT.step)).max() <= parameters.error(False)
+    # Of (1 + x)^2 cos(psi/2)^2 in place of cos(psi/2)^2 under the root: x / (1 + r) at first order.
+    inside = np.all(np.abs(middle.codes) < ONE, axis=1)
+    length = np.linalg.norm(middle.codes, axis=1)[inside] / ONE
+    expected = 1 + excess / (1 + np.cos(np.radians(angle)))
+    slack = excess**2 + np.sqrt(3) * (parameters.error(False) + 2 * COMPONENT.step)
+    assert np.abs(length - expected).max() <= slack
+
+
+def test_stiff_normals_of_length_zero(normal_pairs):
+    """Such a normal is taken for one at 90 degrees: a unit up to 45 flags it, one up to 90 scales by h(0)."""
+    (left, _), zero = codes(normal_pairs, 13, np.zeros(2000)), np.zeros((2000, 3), dtype=np.int64)
+    for a, b in ((left, zero), (zero, left), (zero, zero)):
+        assert bisect(Bisection(2, 45), a, b)[2].all()
+        middle, u, wide, exact, _ = bisect(Bisection(), a, b)
+        assert not wide.any()
+        assert np.all(u.codes == Bisection.ONE.codes)
+        assert np.abs(middle.values - exact).max() <= Bisection().error(True)
+
+
+@pytest.mark.parametrize("parameters", VARIANTS, ids=str)
+def test_stiff_every_code_without_silent_wrap(parameters):
+    """Vectors of the words' ends: flagged, or a middle on the side of the sum, of 0.25 to 0.75 of it."""
+    ends = [COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1]
+    corners = np.stack(np.meshgrid(*[ends] * 6), axis=-1).reshape(-1, 6)
+    left, right = corners[:, :3], corners[:, 3:]
+    middle, _, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    dot = (left * right).sum(axis=1) / ONE**2
+    np.testing.assert_array_equal(wide, dot < np.cos(np.radians(parameters.max_angle)) - 1e-3)
+    total, found = (left + right)[~wide], middle.codes[~wide]
+    low, high = np.minimum(0.25 * total, 0.75 * total) - 1, np.maximum(0.25 * total, 0.75 * total) + 1
+    low, high = np.minimum(low, COMPONENT.max_code), np.maximum(high, COMPONENT.min_code)
+    assert np.all((low <= found) & (found <= high))
+
+
 def test_documented_degree_two_shortens_a_flat_face():
     axis = Fixed(COMPONENT, np.array([[0, 0, ONE]]))
     middle, _, _ = Bisection(as_documented=True).compute(axis, axis)
@@ -112,7 +173,7 @@ def test_documented_degree_two_shortens_a_flat_face():
 
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90, 90.01, 120, 180])
 @pytest.mark.parametrize("max_angle", [45, 90])
-def test_flag(normal_pairs, angle, max_angle):
+def test_stiff_angles_flag(normal_pairs, angle, max_angle):
     left, right = codes(normal_pairs, 10, np.full(3000, angle))
     *_, wide = Bisection(2, max_angle).compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
     assert np.all(wide == (angle > max_angle))

@@ -69,10 +69,85 @@ def test_error_statement(level, narrow, first):
 
 
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90, 90.01, 120, 180])
-def test_flag(normal_pairs, angle):
+def test_stiff_angles_flag(normal_pairs, angle):
     left, right = (quantise(normals) for normals in normal_pairs(np.random.default_rng(5), 1000, angle))
     _, wide = BisectionChain().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right), np.full(1000, 3))
     assert np.all(wide == (angle > 90))
+
+
+@pytest.mark.parametrize("angle", [0, 1e-4, 1, 44.9, 45, 45.1, 89.9, 90])
+def test_stiff_angles_within_the_bound(normal_pairs, angle):
+    """Every level: no drift along the chain, as each step halves the error that it finds."""
+    left, right = (quantise(normals) for normals in normal_pairs(np.random.default_rng(6), 2000, angle))
+    a, b = left / ONE, right / ONE
+    psi = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+    chain = BisectionChain()
+    for level in range(1, 16):
+        normal, wide = chain.compute(
+            Fixed(COMPONENT, left), Fixed(COMPONENT, right), np.full(len(left), level)
+        )
+        assert not wide.any()
+        weight_l, weight_m = weights(psi, level)
+        exact = (weight_l[:, np.newaxis] * a + b) / weight_m[:, np.newaxis] * (ONE * COMPONENT.step)
+        # At 45 degrees the rounding of the normals decides which polynomial is taken.
+        bound = max(chain.error(level, step) for step in {angle > 45, angle >= 45})
+        assert np.abs(normal.values - exact).max() <= bound
+        if angle == 0:
+            assert np.abs(normal.codes - left).max() <= 4
+
+
+@pytest.mark.parametrize("excess", [-1 / 256, 1 / 256])
+def test_stiff_lengths_of_the_ends(normal_pairs, excess):
+    """Ends of length 1 + x, x = +- 1/256: the length of a normal is off by |x| at most.
+
+    Its angle is taken as psi', ``cos psi' = (1 + x)^2 cos psi``, for which ``l^2 + m^2 + 2 l m cos psi'``
+    is 1; so the squared length is ``(1 + x)^2 (1 - 2 l m cos psi (2 x + x^2))``, at first order
+    ``1 + 2 x (1 - 2 l m cos psi)``, and ``l m <= 1 / (2 (1 + cos psi'))`` leaves x/2 to x.
+    """
+    left, right = normal_pairs(np.random.default_rng(7), 4000, np.random.default_rng(8).uniform(0, 44, 4000))
+    left, right = (np.rint(n * (1 + excess) * ONE).astype(np.int64) for n in (left, right))
+    kept = (np.abs(left) <= ONE).all(axis=1) & (np.abs(right) <= ONE).all(axis=1)
+    left, right = left[kept], right[kept]
+    for level in (1, 2, 5, 15):
+        slack = np.sqrt(3) * (BisectionChain().error(level, False) + COMPONENT.step)
+        normal, wide = BisectionChain().compute(
+            Fixed(COMPONENT, left), Fixed(COMPONENT, right), np.full(len(left), level)
+        )
+        assert not wide.any()
+        inside = np.all(np.abs(normal.codes) < ONE, axis=1)
+        length = np.linalg.norm(normal.codes[inside], axis=1) / ONE
+        assert np.abs(length - 1).max() <= abs(excess) + 2 * excess**2 + slack
+
+
+def test_stiff_normals_of_length_zero(normal_pairs):
+    """As in one bisection: taken for 90 degrees, flagged by a chain made for 45; zeros stay zero."""
+    left, _ = (quantise(normals) for normals in normal_pairs(np.random.default_rng(9), 1000, 0))
+    zero, level = np.zeros_like(left), np.arange(1000) % 15 + 1
+    for a, b in ((left, zero), (zero, left), (zero, zero)):
+        operands = Fixed(COMPONENT, a), Fixed(COMPONENT, b), level
+        assert BisectionChain(Bisection(2, 45)).compute(*operands)[1].all()
+        normal, wide = BisectionChain().compute(*operands)
+        assert not wide.any()
+    assert not normal.codes.any()
+
+
+def test_stiff_every_code_is_accepted():
+    """The words' ends, unit vectors or not: no weight leaves its word, as each saturates."""
+    ends = [COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1]
+    corners = np.stack(np.meshgrid(*[ends] * 6), axis=-1).reshape(-1, 6)
+    left, right = corners[:, :3], corners[:, 3:]
+    for level in (1, 3, 15):
+        normal, wide = BisectionChain().compute(
+            Fixed(COMPONENT, left), Fixed(COMPONENT, right), np.full(len(left), level)
+        )
+        dot = (left * right).sum(axis=1) / ONE**2
+        np.testing.assert_array_equal(wide, dot < -1e-3)
+        # Where nothing is flagged, a normal is a sum of the ends with weights of 0 to 1 each.
+        low = np.minimum(left, 0) + np.minimum(right, 0) - 2
+        high = np.maximum(left, 0) + np.maximum(right, 0) + 2
+        found = normal.codes
+        inside = (low <= found) & (found <= high)
+        assert inside[~wide].all()
 
 
 def test_refuses():

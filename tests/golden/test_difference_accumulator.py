@@ -12,7 +12,7 @@ from golden.middle_normal import MiddleNormal
 from golden.unit_vector import COMPONENT, ONE, quantise
 
 UNIT, MIDDLE = DifferenceAccumulator(), MiddleNormal()
-FORMAT = UNIT.FORMAT
+FORMAT = UNIT.format
 STEP = 2.0**-17
 UNITS = 2**25
 """Units of the accumulator, ``2^-42``, in a step of the normal."""
@@ -36,7 +36,7 @@ def whole_spans(rng, count, angle, length, normal_pairs):
     return normals, exact, wide, (left, right)
 
 
-def test_closed_form_equals_the_recurrence():
+def test_stiff_closed_form_equals_the_recurrence_and_its_wraps():
     """Wrapping included: start, differences over their whole words, added one by one."""
     rng = np.random.default_rng(1)
     count, length = 200, 500
@@ -56,7 +56,7 @@ def test_closed_form_equals_the_recurrence():
         normal, difference = wrap(normal + difference), wrap(difference + second)
 
 
-def test_drift_of_the_worst_case():
+def test_stiff_drift_of_the_worst_case():
     """The differences rounded up by the most they can be, and the last rounding up by the most it can.
 
     ``G dt^2`` and ``P dt`` are each half a unit, 2^-43, short of their code; the second difference is then a
@@ -84,7 +84,7 @@ def test_drift_of_the_worst_case():
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
-def test_drift_against_the_curve_with_exact_differences(length):
+def test_stiff_drift_against_the_curve_with_exact_differences(length):
     """No worse than one step at any pixel: differences rounded to 42 bits from float64, where t is exact."""
     rng = np.random.default_rng(length)
     count = 40 if length > 100 else 5000
@@ -106,7 +106,7 @@ def test_drift_against_the_curve_with_exact_differences(length):
 
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 20, 45])
-def test_normals_of_whole_spans(angle, length, normal_pairs):
+def test_stiff_whole_spans(angle, length, normal_pairs):
     """From the unquantised ends: every component within the sum of the devices' bounds.
 
     An end is off by under a step a component, and so by ``1 / (2 cos(psi/2))`` of both, under 1.09 steps with
@@ -146,12 +146,38 @@ def test_lengths_of_the_normals(normal_pairs):
     assert ours < curve + 1.5e-5
 
 
-def test_wide_spans_are_flagged_and_stay_in_their_words(normal_pairs):
+def test_stiff_wide_spans_are_flagged_and_stay_in_their_words(normal_pairs):
     rng = np.random.default_rng(10)
     for angle in (45.01, 60, 89.9, 90, 135, 180):
         normals, _, wide, _ = whole_spans(rng, 200, angle, 50, normal_pairs)
         assert wide.all()
         assert COMPONENT.min_code <= normals.codes.min() <= normals.codes.max() <= COMPONENT.max_code
+
+
+@pytest.mark.parametrize("scale", [0, 1 - 1 / 256, 1 + 1 / 256])
+@pytest.mark.parametrize("length", [2, 3, 16, 4095])
+def test_stiff_lengths_of_the_ends(length, scale, normal_pairs):
+    """Ends of another length, or none: every pixel on the quadratic through the three points, within bounds.
+
+    It adds what the setup's docstring says and 2^-18; a curve longer than 1 saturates at the word's end.
+    """
+    rng = np.random.default_rng(11)
+    count = max(20, 40_000 // length)
+    left, right = (n * scale * ONE for n in normal_pairs(rng, count, rng.uniform(0, 44, count)))
+    left, right = (np.clip(np.rint(n), -ONE, ONE).astype(np.int64) for n in (left, right))
+    left, right = Fixed(COMPONENT, left), Fixed(COMPONENT, right)
+    middle, _ = MIDDLE.compute(left, right)
+    g, p, q = GPQ().compute(left, middle, right)
+    span, step = np.repeat(np.arange(count), length), np.tile(np.arange(length), count)
+    normals = UNIT.compute(q, *DifferenceSetup().compute(g, p, np.full(count, length)), span, step)
+    t = (step / (length - 1))[:, np.newaxis]
+    ends = (1 - t) * (1 - 2 * t) * left.values[span] + t * (2 * t - 1) * right.values[span]
+    exact = np.clip(ends + 4 * t * (1 - t) * middle.values[span], -1, ONE * STEP)
+    largest_g, largest_p = (np.abs(word.values).max() for word in (g, p))
+    bound = STEP * largest_p + (3 * STEP + 2.0**-34) * largest_g + 2.0**-42 * (length + length**2 / 2)
+    assert np.abs(normals.values - exact).max() <= bound + 2.0**-18
+    if scale == 0:
+        assert not normals.codes.any()
 
 
 def test_other_operands_are_refused():

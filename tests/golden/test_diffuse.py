@@ -8,7 +8,7 @@ from golden.fixed import SQ, Fixed
 from golden.unit_vector import ONE_SQUARED
 
 UNIT = Diffuse()
-FORMAT = UNIT.OPERAND_FORMAT
+FORMAT = UNIT.operand_format
 
 
 def compute(codes):
@@ -35,12 +35,35 @@ def test_rises_with_the_cosine():
     assert (np.diff(compute(codes).codes) >= 0).all()
 
 
-def test_ends_and_terminator():
+def test_stiff_terminator_and_largest_and_smallest_codes():
     """Nothing from behind, at the terminator itself neither; the smallest positive cosine is not dark."""
     codes = [FORMAT.min_code, -(2**34), -(2**16), -1, 0, 1, 2**16 - 1, 2**16, 2**34, FORMAT.max_code]
     largest = 2**17 - 1
     np.testing.assert_array_equal(compute(codes).codes, [0, 0, 0, 0, 0, 0, 0, 1, largest, largest])
     np.testing.assert_array_equal(UNIT.dark(Fixed(FORMAT, codes)), [True] * 5 + [False] * 5)
+
+
+def test_stiff_terminator_of_a_turning_normal():
+    """N through a right angle to L, in steps of 0.001 degrees: the term sets in where the light does."""
+    angle = np.radians(90 + np.arange(-1000, 1001) * 1e-3)
+    codes = np.rint(ONE_SQUARED.codes * np.cos(angle)).astype(np.int64)
+    term = compute(codes)
+    assert np.abs(term.values - np.maximum(np.cos(angle), 0)).max() <= 2.0**-18 + 2.0**-16 * np.cos(angle[0])
+    assert not term.codes[UNIT.dark(Fixed(FORMAT, codes))].any()
+    # Lit, but darker than half a step, is 0 too: no step at the terminator.
+    assert np.abs(np.diff(term.codes)).max() <= 3
+
+
+def test_stiff_normals_of_wrong_length():
+    """N of length 1 +- 1/256 or 0: the term is that much larger, to 1 at most, or smaller; no other error."""
+    cosine = np.cos(np.radians(np.linspace(0, 180, 20_001)))
+    for length in (0, 1 - 1 / 256, 1 + 1 / 256):
+        codes = np.rint(ONE_SQUARED.codes * length * cosine).astype(np.int64)
+        ideal = np.clip(length * cosine, 0, 1)
+        # Read 2^-16 short, rounded, and what is over the largest number.
+        bound = 2.0**-16 * ideal + 2.0**-18 + 2.0**-17 * (ideal > 1 - 2.0**-17)
+        assert (np.abs(compute(codes).values - ideal) <= bound).all()
+        assert not compute(codes).codes[cosine < 0].any()
 
 
 def test_other_operands_are_refused():

@@ -5,7 +5,7 @@ import pytest
 
 from golden.dot_product import DotProduct
 from golden.fixed import SQ, UQ, Fixed
-from golden.unit_vector import COMPONENT
+from golden.unit_vector import COMPONENT, ONE, quantise
 
 
 def exact(a, b):
@@ -13,7 +13,7 @@ def exact(a, b):
     return (a.astype(object) * b.astype(object)).sum(axis=-1)
 
 
-def test_is_exact_over_the_whole_word():
+def test_stiff_is_exact_over_the_whole_word():
     rng = np.random.default_rng(1)
     a, b = rng.integers(COMPONENT.min_code, COMPONENT.max_code + 1, (2, 100_000, 3))
     ends = [COMPONENT.min_code, COMPONENT.max_code, 0, -1]
@@ -34,6 +34,33 @@ def test_other_formats_and_broadcast():
     assert result.shape == (50, 7)
     assert result.format == unit.result_format
     assert (result.codes == exact(a, b)).all()
+
+
+@pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90, 90.01, 120, 180])
+def test_stiff_angles(normal_pairs, angle):
+    """Of two unit vectors rounded by under a step a component: the cosine, within two times sqrt(3) steps.
+
+    Along the vectors the rounding is far smaller, as `quantise` holds their length.
+    """
+    left, right = (quantise(n) for n in normal_pairs(np.random.default_rng(3), 20_000, angle))
+    cosine = DotProduct().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right)).values * 2**34 / ONE**2
+    slack = 2 * np.sqrt(3) / ONE * (1 + np.sqrt(3) / ONE)
+    assert np.abs(cosine - np.cos(np.radians(angle))).max() <= slack
+    if angle in (0, 180):
+        assert np.abs(np.abs(cosine) - 1).max() < 0.5 * slack
+
+
+@pytest.mark.parametrize("length", [0, 1 - 1 / 256, 1, 1 + 1 / 256])
+def test_stiff_lengths_of_the_vectors(normal_pairs, length):
+    """A vector of another length counts with its length: no normalisation, and no error of its own."""
+    left, right = (n * length * ONE for n in normal_pairs(np.random.default_rng(4), 5000, 30.0))
+    left, right = (
+        np.clip(np.rint(n), COMPONENT.min_code, COMPONENT.max_code).astype(int) for n in (left, right)
+    )
+    result = DotProduct().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    assert (result.codes == exact(left, right)).all()
+    if length == 0:
+        assert not result.codes.any()
 
 
 def test_other_operands_are_refused():

@@ -57,7 +57,7 @@ def test_flat_spans_give_zero(normal_pairs):
     np.testing.assert_array_equal(q.codes, left)
 
 
-def test_saturates_and_never_wraps():
+def test_stiff_every_code_saturates_and_never_wraps():
     """Every end of every word, against integers clipped to the format."""
     ends = [COMPONENT.min_code, -ONE, 0, ONE]
     middles = [MiddleNormal.FORMAT.min_code, 0, MiddleNormal.FORMAT.max_code]
@@ -70,6 +70,35 @@ def test_saturates_and_never_wraps():
         assert whole.min() < low
         assert whole.max() > high
         np.testing.assert_array_equal(result.codes, np.clip(whole, low, high))
+
+
+@pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90, 90.01, 120, 180])
+def test_stiff_angles(normal_pairs, angle):
+    """Exact up to 45 degrees; a wider span, whose middle is flagged and saturated, gives clipped integers."""
+    left, middle, right = spans(np.random.default_rng(4), 20_000, angle, normal_pairs)
+    g, p, q = (coefficient.codes for coefficient in compute(left, middle, right))
+    whole_g, whole_p = 2 * left + 2 * right - middle, middle - right - 3 * left
+    if angle > 45:
+        np.testing.assert_array_equal(g, np.clip(whole_g, -(2**16), 2**16 - 1))
+        np.testing.assert_array_equal(p, np.clip(whole_p, -(2**17), 2**17 - 1))
+        # No span gets that far up to 45 degrees; at 180 most do.
+        assert angle < 180 or (p != whole_p).any(axis=1).mean() > 0.5
+    else:
+        np.testing.assert_array_equal(g, whole_g)
+        np.testing.assert_array_equal(p, whole_p)
+    np.testing.assert_array_equal(q, left)
+
+
+@pytest.mark.parametrize("length", [0, 1 - 1 / 256, 1 + 1 / 256])
+def test_stiff_lengths_of_the_ends(normal_pairs, length):
+    """The curve passes through its three points whatever their lengths: it is linear in them."""
+    rng = np.random.default_rng(5)
+    left, right = (n * length * ONE for n in normal_pairs(rng, 20_000, rng.uniform(0, 44, 20_000)))
+    left, right = (np.clip(np.rint(n), -ONE, ONE).astype(np.int64) for n in (left, right))
+    middle = MIDDLE.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))[0].codes
+    g, p, q = (coefficient.codes for coefficient in compute(left, middle, right))
+    np.testing.assert_array_equal(g + p + q, right)
+    np.testing.assert_array_equal(g + 2 * p + 4 * q, middle)
 
 
 def test_other_operands_are_refused():

@@ -54,7 +54,7 @@ def test_halves_round_up():
         np.testing.assert_array_equal(np.array(results)[:, 0, 0], expected)
 
 
-def test_sixteen_lights_at_their_brightest_saturate():
+def test_stiff_sums_of_the_largest_and_smallest_codes():
     """The largest codes of every word: 255, and no wrap; the same of one light eight times too bright."""
     color, term = COLOR.max_code, TERM.max_code
     for lights in (1, 16):
@@ -79,7 +79,7 @@ def test_ambient_only():
         np.testing.assert_array_equal(compute(codes[triple], black, black, terms, terms)[0], expected)
 
 
-def test_coefficients_that_add_up_to_more_than_one_saturate():
+def test_stiff_coefficients_that_add_up_to_more_than_one():
     """k_a + k_d + k_s = 1.2: the full channel where all terms are 1, unchanged where they are small."""
     ambient, diffuse, specular = (Intensity.color(np.full(3, k)) for k in (0.1, 0.6, 0.5))
     terms = np.array([[TERM.max_code], [2**16], [0]])
@@ -113,3 +113,10 @@ def test_bad_arguments_are_refused():
     for terms in ((other, term), (term, other)):
         with pytest.raises(ValueError, match=r"^terms must be UQ\(0, 17\), not UQ\(12, 5\)$"):
             Intensity().compute(ambient, color, color, *terms)
+
+
+def test_clocks_of_the_compact_style():
+    """Three for each term that is not 0, three for a pixel without any; by hand."""
+    diffuse = Fixed(TERM, [[0, 0], [0, 0], [1, 0], [1, 0], [7, TERM.max_code], [0, 0]])
+    specular = Fixed(TERM, [[0, 0], [0, 5], [0, 0], [1, 0], [3, TERM.max_code], [2, 2]])
+    assert Intensity.clocks(diffuse, specular).tolist() == [3, 3, 3, 6, 12, 6]

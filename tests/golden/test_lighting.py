@@ -5,7 +5,7 @@ import pytest
 
 from golden.geometry import normalise
 from golden.lighting import Light, Material, gram_determinant, halfway_vector, intensity, saturate
-from golden.reflection import REFLECTION_MODELS
+from golden.reflection import REFLECTION_MODELS, reflect
 
 V = np.array([0.0, 0.0, 1.0])
 
@@ -28,6 +28,13 @@ def test_worked_example():
     dark = Material(material.ambient, grey(0), grey(0.5), 10)
     value = intensity(np.array([0.0, 0.0, 1.0]), dark, [light], grey(0.2), V, "phong")
     assert value == pytest.approx(grey(0.02 + 0.002058), abs=0.5e-6)
+    matt = Material(material.ambient, material.diffuse, grey(0), 10)
+    value = intensity(np.array([0.0, 0.0, 1.0]), matt, [light], grey(0.2), V, "phong")
+    assert value == pytest.approx(grey(0.02 + 0.323316), abs=0.5e-6)
+    # [T] 4.1 prints 0.0015 and 0.3445: half of 0.003 for 0.577^10, and the diffuse term to three digits.
+    assert f"{0.577350**10:.6f}" == "0.004115"
+    assert 0.5 * 0.003 == 0.0015
+    assert round(0.02 + 0.323 + 0.0015, 4) == 0.3445
 
 
 # The sum does not depend on the model; test_reflection.py holds each model to its formula.
@@ -82,6 +89,75 @@ def test_light_opposite_to_the_viewer_has_no_highlight(model):
     found = intensity(normals, material, [light], grey(1), direction, model)
     expected = 0.1 + 0.7 * np.maximum(normals @ -direction, 0)
     assert found == pytest.approx(np.repeat(expected[:, np.newaxis], 3, axis=1), abs=1e-14)
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+@pytest.mark.parametrize("n", [1, 2, 3, 10, 100, 500, 1000])
+def test_stiff_exponents(model, n):
+    """The peak is 1 at every exponent, the highlight falls from it, and far from it nothing is left."""
+    material = Material(grey(0), grey(0), grey(1), n)
+    angle = np.linspace(0, np.pi / 2 - 1e-9, 2001)
+    normals = np.stack((np.sin(angle), np.zeros_like(angle), np.cos(angle)), axis=1)
+    value = intensity(normals, material, [Light(V)], grey(0), V, model)[:, 0]
+    assert value[0] == 1
+    assert (np.diff(value) <= 0).all()
+    assert np.isfinite(value).all()
+    # L = V = H: the angle of Blinn's models is that of the normal, Phong's twice it.
+    c = np.cos(2 * angle if model == "phong" else angle)
+    exact = np.array([max(value, 0.0) ** n for value in c.tolist()])
+    # The worst from n = 2 on is exp at 2, then cosquad; at n = 1 the lobes are wider than Blinn's.
+    bound = 1e-12 if model in ("phong", "blinn") else 0.162 if n > 1 else 0.5
+    assert np.abs(value - exact).max() <= bound
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+def test_stiff_terminator(model):
+    """N·L around 0 with ``k_s`` 1: the highlight is cut there, the diffuse term continuous."""
+    material = Material(grey(0), grey(1), grey(1), 1)
+    # Behind the light's edge as seen from V: N·H is far from 0 where N·L is 0.
+    light = Light((1, 0, 0))
+    halfway = halfway_vector(light.direction, V)
+    for tilt in (1e-3, 1e-9, 1e-15, 5e-324):
+        normal = np.array([tilt, 0, 1.0])
+        value = intensity(normal, material, [light], grey(0), V, model)
+        shine = reflect(model, 2 * tilt - 0 if model == "phong" else normal @ halfway, 1)
+        assert value == pytest.approx(np.full(3, tilt + shine), rel=1e-12)
+        assert (intensity(normal * (-1, 1, 1), material, [light], grey(0), V, model) == 0).all()
+    assert (intensity(V, material, [light], grey(0), V, model) == 0).all()
+
+
+def test_stiff_half_way_vectors():
+    """L = V, and L near -V, where L + V is all but 0."""
+    for direction in normalise(np.random.default_rng(11).normal(size=(20, 3))):
+        assert halfway_vector(direction, direction) == pytest.approx(direction, abs=1e-15)
+        assert (halfway_vector(-direction, direction) == 0).all()
+        side = normalise(np.cross(direction, [0.3, 0.5, 0.8]))
+        for angle in (1e-2, 1e-4, 1e-6, 1e-8):
+            opposite = -math.cos(angle) * direction + math.sin(angle) * side
+            half = halfway_vector(opposite, direction)
+            assert np.linalg.norm(half) == pytest.approx(1, abs=1e-14)
+            # H stands at right angles to V but for half the angle; L + V keeps 1e-16/angle of its digits.
+            assert half == pytest.approx(
+                math.cos(angle / 2) * side + math.sin(angle / 2) * direction, abs=1e-15 / angle
+            )
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+def test_stiff_lengths_of_normals(model):
+    """0 gives the ambient term alone; 1 +- 1/256 puts N·L off by 1/256; what is no number stays none."""
+    n = 1000
+    material = Material(grey(0.1), grey(0.5), grey(0.4), n)
+    lights = [Light(V)]
+    assert intensity(np.zeros(3), material, lights, grey(1), V, model) == pytest.approx(grey(0.1), abs=0)
+    assert np.isnan(intensity(np.full(3, np.nan), material, lights, grey(1), V, model)).all()
+    for scale in (1 - 1 / 256, 1 + 1 / 256):
+        value = intensity(V * scale, material, lights, grey(1), V, model)
+        # R·V with R = 2 (N·L) N - L: twice the scale squared, less 1.
+        cosine = min(2 * scale**2 - 1 if model == "phong" else scale, 1.0)
+        expected = 0.1 + 0.5 * scale + 0.4 * float(reflect(model, cosine, n))
+        assert value == pytest.approx(grey(expected), rel=1e-12)
+    # The error that a user gets from a normal 1/256 too short: the highlight of every model is gone.
+    assert float(reflect(model, 1 - 1 / 256, n)) < 0.05
 
 
 def test_halfway_vector():

@@ -3,16 +3,18 @@
 import numpy as np
 import pytest
 
+from golden.chord_setup import ChordSetup, largest_span_angle
 from golden.difference_setup import DifferenceSetup
 from golden.frame_constants import FrameConstants
 from golden.geometry import normalise
 from golden.intensity import Intensity
 from golden.interpolation import interpolate
+from golden.interpolator import pixels_of
 from golden.lighting import Light, Material, halfway_vector, intensity, saturate
 from golden.middle_normal import MiddleNormal
 from golden.pipeline import ShadingPipeline, Spans
-from golden.reflection import slope
-from golden.specular import SPECULAR_MODELS, Specular
+from golden.reflection import reflect, slope
+from golden.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
 from golden.unit_vector import ONE, quantise
 
 AMBIENT, DIFFUSE, SPECULAR = 0.1, 0.6, 0.5
@@ -53,9 +55,9 @@ def error_bounds(model, exponent):
     return cosine, 0.5 + operands + 255 * (DIFFUSE * diffuse + SPECULAR * specular)
 
 
-def random_spans(rng, count, exponent, light, halfway, normal_pairs):
+def random_spans(rng, count, exponent, light, halfway, normal_pairs, largest=LARGEST_ANGLE):
     """Random normals; half of the spans pass near the highlight's peak, a tenth near the terminator."""
-    angle = rng.uniform(0, LARGEST_ANGLE, count)
+    angle = rng.uniform(0, largest, count)
     left, right = normal_pairs(rng, count, angle)
     near = count * 6 // 10
     aim = np.where(np.arange(near)[:, np.newaxis] < count // 2, halfway, 0)
@@ -139,6 +141,173 @@ def test_arithmetic_error_of_ten_million_pixels(model, exponent, normal_pairs):
     assert len(errors) > 9_900_000
     check(errors, ill_posed, model, exponent)
     print(f"{model} n = {exponent}: {errors.max():.3f} LSB, {ill_posed} of {len(errors)} at the terminator")
+
+
+# The chord method.
+
+# Largest |twin - float64 * 255| in LSB against the same fit, over 10^7 pixels, rounded up.
+CHORD_MEASURED = {1: 0.51, 10: 0.51, 100: 0.53, 1000: 0.65}
+
+# Against exactly normalised interpolation, by k_s: the largest over all exponents and models, rounded up.
+NORMALISED_MEASURED = {0.5: 0.65, 1.0: 0.75}
+
+# Largest error of the fit of N.L at the widest span, in LSB of a full channel.
+DIFFUSE_FIT = 0.12
+
+FITTED_MODELS = ("cosquad", "cosquad7", "cosquad_lin", "exp")
+FITTED_MODELS += tuple(model for model in FURTHER_MODELS if model.startswith("lyon"))
+
+
+def fitted(values, t):
+    """The quadratic through values at 0, 1/2 and 1."""
+    left, middle, right = values
+    return (2 * right - 4 * middle + 2 * left) * t**2 + (4 * middle - right - 3 * left) * t + left
+
+
+def chord_cosine_bound(exponent):
+    """Bound of the error of N.L against the same fit in float64.
+
+    `quantise` moves a vector by sqrt(3) steps across; what it moves along itself is in the bounds of
+    `ChordSetup`. The weights of a quadratic's three values add up to 1.25 at most, and the middle moves by
+    ``1/cos(psi/2)`` of the ends' mean.
+    """
+    angle = largest_span_angle(exponent)
+    return moved_by(angle) + ChordSetup().diffuse_error(angle) + 2.0**-16 + 2.0**-26
+
+
+def moved_by(angle):
+    return 1.25 * (1 / np.cos(np.radians(angle) / 2) + 1) * np.sqrt(3) * STEP
+
+
+def chord_bound(model, exponent):
+    """Bound of the error of a channel in LSB, against the same fit in float64.
+
+    u of an end feels a move across times the sine of its angle to H, and its square. An end is up to an angle
+    of the span outside of the cone where ``1 - cos gamma < 1/k``, in which a pixel is lit. Lengths are
+    ONE / 2^17, so u comes out 2^-16 short.
+    """
+    k, angle = slope(model, exponent), largest_span_angle(exponent)
+    outside = min(np.arccos(max(1 - 1 / k, -1)) + np.radians(angle), np.pi)
+    sine = 1.0 if outside > np.pi / 2 else np.sin(outside)
+    square = (2 * np.sqrt(3) * STEP) ** 2
+    highlight = ChordSetup().highlight_error(angle, 1 - np.cos(outside)) + 2.0**-26
+    specular = 2 * k * (moved_by(angle) * sine + square + highlight + 2.0**-16 / k) + Specular.ERROR
+    operands = 3 * Intensity.COLOR_FORMAT.step / 2
+    diffuse = chord_cosine_bound(exponent) + 2.0**-18
+    return 0.5 + operands + 255 * (DIFFUSE * diffuse + SPECULAR * specular)
+
+
+def chord_frame(rng, count, exponent, normal_pairs):
+    """Spans as wide as the chord method should be given, and what shading needs of them in float64.
+
+    Returns the twin's spans and vectors, N.L and u of each pixel by the fit, and the same of exactly
+    normalised interpolation.
+    """
+    light, viewer = normalise(rng.normal(size=(2, 3)))
+    halfway = halfway_vector(light, viewer)
+    angle = largest_span_angle(exponent)
+    left, right, length = random_spans(rng, count, exponent, light, halfway, normal_pairs, angle)
+    zero = np.zeros(count, dtype=int)
+    spans = Spans(zero, zero, length, quantise(left), quantise(right))
+    span, step = pixels_of(length)
+    t = step / np.maximum(length - 1, 1)[span]
+    normals = interpolate("normalised", left[span], right[span], t)
+
+    def of(n):
+        return n @ light, ((n - halfway) ** 2).sum(axis=-1) / 2
+
+    three = zip(*(of(n) for n in (left, normalise(left + right), right)), strict=True)
+    fit = [fitted([value[span] for value in values], t) for values in three]
+    return spans, (quantise(light), quantise(halfway)), fit, of(normals)
+
+
+def chord_errors(frame, model, exponent, reference, diffuse, specular):
+    """Errors of the twin's red in LSB against a reference, of the pixels where N.L is not near 0."""
+    spans, (direction, halfway), *references = frame
+    constants = FrameConstants(
+        exponent,
+        Intensity.color(np.full(3, AMBIENT)),
+        direction[np.newaxis],
+        halfway[np.newaxis],
+        Intensity.color(np.full((1, 3), diffuse)),
+        Intensity.color(np.full((1, 3), specular)),
+    )
+    pixels = ShadingPipeline("chord", model).compute(spans, constants)
+    assert pixels.wide_spans == 0
+    f, u = references[reference]
+    # Where N.L may have either sign, light and highlight may be there or not.
+    band = chord_cosine_bound(exponent) + (reference == NORMALISED) * DIFFUSE_FIT / 255
+    well_posed = np.abs(f) > band
+    exact = AMBIENT + diffuse * np.maximum(f, 0) + specular * reflect(model, 1 - u, exponent) * (f > 0)
+    return np.abs(pixels.color[:, 0] - 255 * np.minimum(exact, 1))[well_posed], well_posed
+
+
+FIT, NORMALISED = 0, 1
+
+
+def chord_sweep(rng, frames, count, model, exponent, normal_pairs):
+    errors, ill_posed = [], 0
+    for _ in range(frames):
+        frame = chord_frame(rng, count, exponent, normal_pairs)
+        error, well_posed = chord_errors(frame, model, exponent, FIT, DIFFUSE, SPECULAR)
+        errors.append(error)
+        ill_posed += np.count_nonzero(~well_posed)
+    return np.concatenate(errors), ill_posed
+
+
+def check_chord(errors, ill_posed, model, exponent):
+    worst, bound = errors.max(), chord_bound(model, exponent)
+    print(f"chord, {model}, n = {exponent}: {worst:.3f} LSB, {bound:.3f} allowed")
+    assert worst <= bound
+    assert worst <= CHORD_MEASURED[exponent]
+    if exponent <= 100:
+        assert bound < 0.75
+    assert bound < 1.5
+    assert worst > 0.5
+    # A tenth of the spans are about the terminator, and the narrower they are the more of each.
+    assert 0 < ill_posed < 4e-3 * len(errors)
+
+
+@pytest.mark.parametrize("model", ["cosquad", "cosquad_lin"])
+@pytest.mark.parametrize("exponent", CHORD_MEASURED)
+def test_arithmetic_error_of_the_chord_method(model, exponent, normal_pairs):
+    """Spans to the widest for the exponent, 1 to 64 pixels, 4e5 pixels a case."""
+    rng = np.random.default_rng(exponent)
+    errors, ill_posed = chord_sweep(rng, 3, 4200, model, exponent, normal_pairs)
+    assert len(errors) > 380_000
+    check_chord(errors, ill_posed, model, exponent)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("model", SPECULAR_MODELS)
+@pytest.mark.parametrize("exponent", CHORD_MEASURED)
+def test_arithmetic_error_of_the_chord_method_over_ten_million_pixels(model, exponent, normal_pairs):
+    rng = np.random.default_rng(exponent + 1)
+    errors, ill_posed = chord_sweep(rng, 62, 5000, model, exponent, normal_pairs)
+    assert len(errors) > 9_900_000
+    check_chord(errors, ill_posed, model, exponent)
+
+
+@pytest.mark.parametrize("exponent", [1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000])
+def test_chord_method_against_normalised_interpolation(exponent, normal_pairs):
+    """Rounding, arithmetic and interpolation together: at most 1 LSB, every model, at half and full k_s.
+
+    Of that rounding is 0.5, and the fit ``0.12 k_d + 0.25 k_s``.
+    """
+    rng = np.random.default_rng(exponent)
+    worst = {}
+    for _ in range(2):
+        frame = chord_frame(rng, 1500, exponent, normal_pairs)
+        for model in FITTED_MODELS:
+            for diffuse, specular in ((0.5, 0.5), (0.0, 1.0)):
+                errors, _ = chord_errors(frame, model, exponent, NORMALISED, diffuse, specular)
+                assert len(errors) > 30_000
+                worst[specular] = max(worst.get(specular, 0), errors.max())
+    print(f"n = {exponent}: {worst[0.5]:.2f} LSB at k_d = k_s = 0.5, {worst[1.0]:.2f} at k_s = 1")
+    assert worst[0.5] <= NORMALISED_MEASURED[0.5]
+    assert worst[1.0] <= NORMALISED_MEASURED[1.0]
+    assert max(worst.values()) <= 1
+    assert min(worst.values()) > 0.5
 
 
 # Stiff cases, one span each.
@@ -267,8 +436,13 @@ def test_empty_spans_give_nothing():
 def test_bad_arguments_are_refused():
     with pytest.raises(ValueError, match=r"^method must be one of .*quadratic.*, not 'unknown'$"):
         ShadingPipeline(method="unknown")
-    with pytest.raises(ValueError, match=r"^method quadratic serves cosquad, .*, not 'blinn'$"):
-        ShadingPipeline(model="blinn")
+    with pytest.raises(ValueError, match=r"^model must be one of cosquad, .*, blinn, not 'phong'$"):
+        ShadingPipeline(model="phong")
+    with pytest.raises(ValueError, match=r"^operand must be 'cosine' or 'one_minus_cosine', not 'sine'$"):
+        ShadingPipeline(operand="sine")
+    for method in ("angular", "chord"):
+        with pytest.raises(ValueError, match=rf"^method {method} finds no normals, and gives 1 - cos gamma$"):
+            ShadingPipeline(method, operand="cosine")
     with pytest.raises(ValueError, match=r"^lights must be 1 to 16, not 0$"):
         ShadingPipeline(lights=0)
     spans = Spans(*np.zeros((3, 1), dtype=int), np.array([[0, 0, ONE]]), np.array([[0, 0, 2**17]]))

@@ -5,6 +5,7 @@ import pytest
 
 from golden.fixed import UQ
 from golden.polynomials import half_angle_factor, largest_error, minimax, minimax_quantised, reciprocal_root
+from golden.reflection import reflect
 
 ROOT = np.sqrt(2)
 
@@ -105,6 +106,25 @@ def test_error_alternates(name):
         assert fit[power] == value
 
 
+@pytest.mark.parametrize("octave", [1, 4, 6])
+@pytest.mark.parametrize("degree", [2, 3, 4])
+def test_narrow_domains_far_from_zero(octave, degree):
+    """arccos near 1, where powers of x are all but parallel: against the same fit in ``1 - x``, scaled."""
+    low, high = 1 - 2.0**-octave, 1 - 2.0 ** -(octave + 1)
+    found = largest_error(np.arccos, minimax(np.arccos, low, high, degree), low, high)[0]
+
+    # 2^-k v with v in [1/2, 1].
+    def scaled(v):
+        return np.arccos(1 - 2.0**-octave * v)
+
+    best = largest_error(scaled, minimax(scaled, 0.5, 1.0, degree), 0.5, 1.0)[0]
+    assert found == pytest.approx(best, rel=1e-3)
+    # Each degree gains nearly a digit.
+    assert (
+        degree == 2 or found < largest_error(scaled, minimax(scaled, 0.5, 1.0, degree - 1), 0.5, 1.0)[0] / 7
+    )
+
+
 @pytest.mark.parametrize(
     ("function", "domain", "printed", "absolute", "relative"),
     [
@@ -123,13 +143,14 @@ def test_printed_digits(function, domain, printed, absolute, relative):
     ("function", "domain", "degree", "relative"),
     [
         (reciprocal_root, (ROOT, 2), 1, "0.122%"),
-        (reciprocal_root, (ROOT, 2), 2, "0.004%"),
+        (reciprocal_root, (ROOT, 2), 2, "0.0040%"),
         (factor_of_cosine, (0, 1), 2, "0.383%"),
         (factor_of_cosine, (0, 1), 3, "0.058%"),
     ],
 )
 def test_relative_errors_of_the_fits(function, domain, degree, relative):
-    assert f"{largest_error(function, minimax(function, *domain, degree), *domain)[1]:.3%}" == relative
+    found = largest_error(function, minimax(function, *domain, degree), *domain)[1]
+    assert f"{found:.{len(relative) - 3}%}" == relative
 
 
 def test_plain_fit_is_worst_where_meshes_live_and_the_printed_one_exact():
@@ -139,6 +160,22 @@ def test_plain_fit_is_worst_where_meshes_live_and_the_printed_one_exact():
     assert sum((0.707, -0.341, 0.193, -0.059)) == pytest.approx(0.5, abs=1e-15)
     held = minimax(half_angle_factor, 0, 1, 3, {0: 0.5})
     assert np.polynomial.polynomial.polyval(0.0, held) == 0.5
+
+
+def test_printed_root_at_its_end():
+    """Degree 2 of [T] at z = 2, equal normals."""
+    assert f"{np.polynomial.polynomial.polyval(2.0, (0.681, -0.119, 0.014)):.3f}" == "0.499"
+
+
+def test_plain_fit_dims_flat_faces():
+    """A flat face's normal is 0.06 % too short; 14 LSB of cosquad at n = 100, 126 at 1000.
+
+    numbers.md shows 125, the same figure cut instead of rounded.
+    """
+    length = 2 * minimax(factor_of_cosine, 0, 1, 3).sum()
+    assert f"{1 - length:.2%}" == "0.06%"
+    loss = [255 * (1 - float(reflect("cosquad", length, n))) for n in (100, 1000)]
+    assert [f"{value:.1f}" for value in loss] == ["14.5", "125.8"]
 
 
 def test_functions():

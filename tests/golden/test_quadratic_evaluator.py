@@ -7,6 +7,7 @@ from golden.difference_accumulator import DifferenceAccumulator
 from golden.difference_setup import DifferenceSetup
 from golden.fixed import Fixed
 from golden.gpq import GPQ
+from golden.interpolation import interpolate
 from golden.middle_normal import MiddleNormal
 from golden.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
 from golden.unit_vector import COMPONENT, quantise
@@ -34,7 +35,7 @@ def exact(coefficients, length, span, index):
     return (g * t + p) * t + q
 
 
-def test_parameter_of_every_pixel_of_every_length():
+def test_stiff_parameter_of_every_pixel_of_every_length():
     evaluator = QuadraticEvaluator()
     for lengths in np.array_split(np.arange(2, 4096), 40):
         span, index = pixels(lengths)
@@ -60,6 +61,87 @@ def test_error_to_45_degrees(normal_pairs, form):
     assert evaluator.error / 2 < error <= evaluator.error
 
 
+STIFF_LENGTHS = np.array([1, 2, 3, 16, 4095])
+
+
+@pytest.mark.parametrize("form", QUADRATIC_FORMS)
+@pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45])
+def test_stiff_angles_and_lengths_that_are_served(normal_pairs, form, degrees):
+    """The bound holds at every one, and the ends are the span's own, to the code."""
+    length = np.tile(STIFF_LENGTHS, 20)
+    left, right, coefficients = curves(normal_pairs, 14, np.full(len(length), degrees))
+    span, index = pixels(length)
+    evaluator = QuadraticEvaluator(form)
+    normals = evaluator.compute(*coefficients, length, span, index)
+    error = np.abs(normals.values - exact(coefficients, length, span, index))
+    assert error.max() <= evaluator.error
+    np.testing.assert_array_equal(normals.codes[index == 0], left.codes)
+    ends = (index == length[span] - 1) & (length[span] > 1)
+    np.testing.assert_array_equal(normals.codes[ends], right.codes[length > 1])
+
+
+@pytest.mark.parametrize("form", QUADRATIC_FORMS)
+@pytest.mark.parametrize("degrees", [45.01, 60, 89.9, 90, 90.01, 135, 179.9, 180])
+def test_stiff_wide_spans_stay_on_their_polynomial(normal_pairs, form, degrees):
+    """Flagged by the middle normal; what comes out is the polynomial of G and P as they saturated.
+
+    Each of t, t^2 or the inner sum, and the result, is rounded as ever; the slope is under 3 (|P| is at most
+    1 and 2 |G| too) and the inner sum saturates, a step short of 1. The curve starts in its left normal.
+    """
+    length = np.tile(STIFF_LENGTHS, 20)
+    left, right = normal_pairs(np.random.default_rng(15), len(length), degrees)
+    left, right = (Fixed(COMPONENT, quantise(normals)) for normals in (left, right))
+    middle, wide = MiddleNormal().compute(left, right)
+    assert wide.all()
+    coefficients = GPQ().compute(left, middle, right)
+    span, index = pixels(length)
+    normals = QuadraticEvaluator(form).compute(*coefficients, length, span, index)
+    np.testing.assert_array_equal(normals.codes[index == 0], left.codes)
+    t = (index / np.maximum(length[span] - 1, 1))[:, np.newaxis]
+    g, p, q = (word.values[span] for word in coefficients)
+    inner = np.clip(g * t + p, -1, 1) if form == "horner" else g * t + p
+    polynomial = np.clip(inner * t + q, -1, 1 - STEP)
+    assert np.abs(normals.values - polynomial).max() <= 2.0**-18 * (2 * 2 + 1 + 1 + 2)
+
+
+@pytest.mark.parametrize(("degrees", "off"), [(46, 2.3e-5), (60, 0.1), (90, 0.48), (120, 0.78), (180, 1.05)])
+def test_stiff_error_that_a_wide_span_gets(normal_pairs, degrees, off):
+    """The docstring's figures: P saturates from 53 degrees on, G from 57, and the curve misses its end."""
+    left, right = normal_pairs(np.random.default_rng(17), 20_000, degrees)
+    codes = [Fixed(COMPONENT, quantise(normals)) for normals in (left, right)]
+    middle, wide = MiddleNormal().compute(*codes)
+    assert wide.all()
+    coefficients = GPQ().compute(codes[0], middle, codes[1])
+    span, index = pixels(np.full(20_000, 5))
+    normals = QuadraticEvaluator().compute(*coefficients, np.full(20_000, 5), span, index)
+    error = np.linalg.norm(
+        normals.values - interpolate("quadratic", left[span], right[span], index / 4), axis=1
+    )
+    assert 0.8 * off < error.max() <= off
+
+
+@pytest.mark.parametrize("form", QUADRATIC_FORMS)
+@pytest.mark.parametrize("size", [1 - 1 / 256, 1 + 1 / 256, 1 / 256, 0])
+def test_stiff_normals_that_are_not_of_unit_length(normal_pairs, form, size):
+    """G, P and Q of a longer curve of 44 degrees are no larger than those of a unit one of 45: same bound."""
+    left, right = normal_pairs(np.random.default_rng(16), 50, 44.0)
+    # Longer components than a word's are cut to it.
+    codes = [np.clip(np.rint(size * quantise(n)), -(2**17), 2**17 - 1).astype(int) for n in (left, right)]
+    left, right = (Fixed(COMPONENT, word) for word in codes)
+    middle = (left.values + right.values) / (2 * np.cos(np.radians(22)))
+    middle = Fixed(MiddleNormal.FORMAT, np.rint(middle * 2**19).astype(int))
+    coefficients = GPQ().compute(left, middle, right)
+    length = np.tile(STIFF_LENGTHS, 10)
+    span, index = pixels(length)
+    evaluator = QuadraticEvaluator(form)
+    normals = evaluator.compute(*coefficients, length, span, index)
+    # Components past the ends of the word saturate.
+    polynomial = np.clip(exact(coefficients, length, span, index), -1, 1 - STEP)
+    assert np.abs(normals.values - polynomial).max() <= evaluator.error
+    if size == 0:
+        assert not normals.codes.any()
+
+
 @pytest.mark.parametrize("form", QUADRATIC_FORMS)
 def test_spans_start_and_end_in_their_normals(normal_pairs, form):
     length = np.arange(1, 4096)
@@ -74,7 +156,7 @@ def test_spans_start_and_end_in_their_normals(normal_pairs, form):
 
 
 @pytest.mark.parametrize("form", QUADRATIC_FORMS)
-def test_equal_normals_stay(normal_pairs, form):
+def test_stiff_equal_normals_stay(normal_pairs, form):
     length = np.array([1, 2, 3, 16, 4095])
     left, _, coefficients = curves(normal_pairs, 6, np.zeros(5))
     span, index = pixels(length)
@@ -130,7 +212,7 @@ def test_published_distance_from_the_great_circle(normal_pairs, degrees, publish
 
 
 @pytest.mark.parametrize("form", QUADRATIC_FORMS)
-def test_words_at_their_ends(form):
+def test_stiff_words_at_their_ends(form):
     corners = np.array(np.meshgrid(*[[0, 1]] * 3, indexing="ij")).reshape(3, -1)
     formats = (GPQ.G_FORMAT, GPQ.P_FORMAT, GPQ.Q_FORMAT)
     coefficients = [

@@ -197,9 +197,23 @@ def test_second_lobe_is_gated():
         assert value[-1] == 1
 
 
-def test_cosines_above_one_count_as_one():
+def test_stiff_exponents():
+    """From 1 to 1000: within 0 and 1, falling with the angle, 1 at the peak."""
+    cosine = np.linspace(1, -1, 4001)
+    for model in REFLECTION_MODELS:
+        for n in (1, 2, 3, 10, 100, 500, 1000):
+            value = reflect(model, cosine, n)
+            assert value[0] == 1
+            assert (np.diff(value) <= 0).all()
+            assert value[-1] >= 0
+
+
+def test_stiff_normals_of_wrong_length():
+    """Cosines above 1 count as 1; a normal of length 0 is at a right angle; one of NaN stays NaN."""
     for model in REFLECTION_MODELS:
         assert reflect(model, 1 + 1 / 256, 1000) == 1
+        assert reflect(model, 0.0, 1000) == pytest.approx(0, abs=1e-300)
+        assert np.isnan(reflect(model, np.nan, 10))
 
 
 def test_phong_and_blinn_are_powers():

@@ -75,7 +75,7 @@ def test_length_of_random_vectors():
 
 @pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45, 89.9, 90])
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
-def test_linear_interpolation_across_a_span(normal_pairs, degrees, length):
+def test_stiff_angles_and_lengths_of_spans(normal_pairs, degrees, length):
     rng = np.random.default_rng(2)
     spans = 3 if length == 4095 else 200
     left, right = (quantise(normals) for normals in normal_pairs(rng, spans, degrees))
@@ -89,7 +89,7 @@ def test_linear_interpolation_across_a_span(normal_pairs, degrees, length):
     assert turned(normals.codes, exact).max() <= np.sqrt(3) * 2.0**-18 * (1.0001 + 1 / 0.7)
 
 
-def test_wide_spans_are_flagged_in_the_middle(normal_pairs):
+def test_stiff_wide_spans_are_flagged_in_the_middle(normal_pairs):
     rng = np.random.default_rng(3)
     t = np.linspace(0, 1, 33)[:, np.newaxis, np.newaxis]
     for degrees in (100, 179.9, 180):
@@ -102,7 +102,7 @@ def test_wide_spans_are_flagged_in_the_middle(normal_pairs):
         assert np.abs(lengths(normals.codes[~outside]) - 1).max() <= Renormaliser.ERROR
 
 
-def test_unit_vectors_stay():
+def test_stiff_unit_vectors_stay():
     rng = np.random.default_rng(4)
     codes = np.vstack(
         [quantise(directions(rng, 10_000)), ONE * np.eye(3, dtype=int), -ONE * np.eye(3, dtype=int)]
@@ -114,7 +114,7 @@ def test_unit_vectors_stay():
     assert np.abs(normals.codes[-6:] - codes[-6:]).max() <= 1
 
 
-def test_lengths_off_by_a_256th_and_words_at_their_ends():
+def test_stiff_lengths_off_by_a_256th_and_words_at_their_ends():
     rng = np.random.default_rng(5)
     for scale in (1 - 1 / 256, 1 + 1 / 256):
         unit = directions(rng, 10_000)

@@ -67,8 +67,8 @@ def test_preparation_as_stated(normal_pairs):
     assert_equal(run, expected)
     first = run.clocks[np.cumsum(lengths) - lengths] - run.input_clocks
     stated = np.array([unit.preparation(k) for k in levels.tolist()])
-    np.testing.assert_array_equal(first, np.where(lengths == 1, 57, stated))
-    assert [unit.preparation(k) for k in range(3)] == [70, 84, 150]
+    np.testing.assert_array_equal(first, np.where(lengths == 1, 56, stated))
+    assert [unit.preparation(k) for k in range(3)] == [69, 83, 148]
     longer = lengths[:-1] > 1
     taken = np.diff(run.input_clocks)[longer]
     np.testing.assert_array_equal(taken, (stated[:-1] - 2)[longer])

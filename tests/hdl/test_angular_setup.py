@@ -1,23 +1,34 @@
+# amaranth: UnusedElaboratable=no
+# Above: a component that is refused is never elaborated.
 """Angular setup: RTL against its twin, clock by clock, and with the highlight-cosine unit behind it."""
 
 import numpy as np
+import pytest
 from amaranth.hdl import Module
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from golden.angular_setup import AngularSetup
+from golden.arccos import Arccos
 from golden.fixed import Fixed
 from golden.highlight_cosine import HighlightCosine
 from golden.unit_vector import COMPONENT, quantise
 from hdl.angular_setup import AngularSetupUnit
+from hdl.cost import cost_of
 from hdl.highlight_cosine import HighlightCosineUnit
 from hdl.stream import connect
 from sim.engine import simulate
 
+VARIANTS = {
+    "half_chord": AngularSetup(),
+    "arccos": AngularSetup("arccos"),
+    "arccos_printed": AngularSetup("arccos", Arccos("printed")),
+}
 
-def beats_of(left, right, vector, length):
+
+def beats_of(left, right, vector, length, parameters=VARIANTS["half_chord"]):
     operands = (Fixed(COMPONENT, codes) for codes in (left, right, vector))
-    angle, phase, step, cos_beta, opposite = AngularSetup().compute(*operands, length)
+    angle, phase, step, cos_beta, opposite = parameters.compute(*operands, length)
     return (
         {"normal_left": left, "normal_right": right, "vector": vector, "length": length},
         {
@@ -31,7 +42,22 @@ def beats_of(left, right, vector, length):
     )
 
 
-def test_equals_twin(verify, normal_pairs):
+@pytest.mark.parametrize(
+    ("variant", "interval"),
+    [("half_chord", None), ("half_chord", 4), ("half_chord", 26), ("arccos", 4), ("arccos_printed", None)],
+)
+def test_equals_twin(verify, normal_pairs, variant, interval):
+    check(verify, normal_pairs, VARIANTS[variant], interval)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("interval", [1, 2, 3, 5])
+def test_equals_twin_with_every_interval(verify, normal_pairs, variant, interval):
+    check(verify, normal_pairs, VARIANTS[variant], interval)
+
+
+def check(verify, normal_pairs, parameters, interval):
     rng = np.random.default_rng(2)
     angles = [np.zeros(20), 10.0 ** rng.uniform(-5, 1, 500), rng.uniform(0, 180, 700), np.full(20, 90)]
     angles = np.concatenate([*angles, 180 - 10.0 ** rng.uniform(-5, 1, 100), np.full(20, 180)])
@@ -47,9 +73,24 @@ def test_equals_twin(verify, normal_pairs):
     )
     length = rng.integers(1, 4096, len(left))
     length[:40] = np.tile([1, 2, 3, 4, 5, 2048, 2049, 2050, 4094, 4095], 4)
-    beats, expected = beats_of(left, right, vector, length)
+    beats, expected = beats_of(left, right, vector, length, parameters)
     assert 0 < expected["opposite"].sum() < 100
-    verify(AngularSetupUnit(), beats, expected)
+    verify(AngularSetupUnit(parameters, interval), beats, expected)
+
+
+def test_times_and_multipliers_as_stated():
+    for variant, latencies, counts, longest in (
+        ("half_chord", [50, 53, 53, 53, 53, 56], [26, 13, 9, 7, 6, 5], 26),
+        ("arccos", [50, 53, 54, 53, 53, 57], [23, 13, 9, 8, 7, 6], 21),
+    ):
+        units = [AngularSetupUnit(VARIANTS[variant], interval) for interval in range(1, 7)]
+        assert [unit.latency for unit in units] == latencies
+        assert [cost_of(unit).multiplier_count for unit in units] == counts
+        for interval in (0, longest + 1):
+            message = rf"^initiation_interval must be 1 to {longest}, not {interval}$"
+            with pytest.raises(ValueError, match=message):
+                AngularSetupUnit(VARIANTS[variant], interval)
+    assert AngularSetupUnit().initiation_interval == 6
 
 
 class Chain(wiring.Component):

@@ -8,6 +8,7 @@ import pytest
 from golden.arccos import ARCCOS_TABLES, Arccos, HalfChord
 from golden.fixed import Fixed
 from hdl.arccos import ArccosUnit, HalfChordUnit
+from hdl.cost import cost_of
 from sim.engine import simulate
 
 FORMAT = Arccos.OPERAND_FORMAT
@@ -45,7 +46,8 @@ def test_arccos_clocks_and_stalls(verify, form):
     verify(ArccosUnit(form=form), x, {"angle": angle.codes, "outside": outside})
 
 
-def test_half_chord_equals_twin(verify):
+@pytest.mark.parametrize("interval", [None, 1, 2, 3, 4, 5])
+def test_half_chord_equals_twin(verify, interval):
     rng = np.random.default_rng(4)
     format = HalfChord.OPERAND_FORMAT
     half = 1 << 35
@@ -55,7 +57,19 @@ def test_half_chord_equals_twin(verify):
     chord = np.r_[edges, size, rng.integers(0, half, 500)]
     supplement = rng.random(len(chord)) < 0.3
     expected = HalfChord().compute(Fixed(format, chord), supplement)
-    verify(HalfChordUnit(), {"chord_squared": chord, "supplement": supplement}, expected.codes)
+    verify(
+        HalfChordUnit(initiation_interval=interval),
+        {"chord_squared": chord, "supplement": supplement},
+        expected.codes,
+    )
+
+
+def test_half_chord_times_as_stated():
+    units = [HalfChordUnit(initiation_interval=interval) for interval in range(1, 7)]
+    assert [unit.latency for unit in units] == [20, 22, 22, 21, 22, 22]
+    assert [cost_of(unit).multiplier_count for unit in units] == [6, 3, 2, 2, 2, 1]
+    with pytest.raises(ValueError, match=r"^initiation_interval must be 1 to 6, not 7$"):
+        HalfChordUnit(initiation_interval=7)
 
 
 def test_unknown_form():

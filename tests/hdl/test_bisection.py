@@ -1,3 +1,4 @@
+# amaranth: UnusedElaboratable=no
 """Bisection unit: RTL against its twin, clock by clock, for every variant."""
 
 import numpy as np
@@ -7,19 +8,51 @@ from golden.bisection import Bisection
 from golden.fixed import Fixed
 from golden.unit_vector import COMPONENT, quantise
 from hdl.bisection import BisectionUnit
+from hdl.cost import cost_of
 
-# With the initiation interval and the latency that the unit's text states.
+# Latency and multipliers for the initiation intervals 1, 2, ..., as the unit's text states them.
+NARROW_1, NARROW_2, WIDE = Bisection(1, 45), Bisection(2, 45), Bisection()
+STATED = {
+    WIDE: [(23, 9), (25, 5), (26, 3), (28, 3), (29, 2), (27, 2), (25, 2), (25, 2), (38, 1)],
+    NARROW_2: [(20, 8), (21, 4), (23, 3), (25, 2), (24, 2), (23, 2), (23, 2), (29, 1)],
+    NARROW_1: [(17, 7), (19, 4), (20, 3), (21, 2), (19, 2), (20, 2), (25, 1)],
+}
 VARIANTS = [
-    (Bisection(), 6, 28),
-    (Bisection(2, as_documented=True), 6, 28),
-    (Bisection(1, as_documented=True), 6, 28),
-    (Bisection(2, 45), 5, 23),
-    (Bisection(1, 45), 4, 20),
+    (WIDE, 6),
+    (Bisection(2, as_documented=True), 6),
+    (Bisection(1, as_documented=True), 6),
+    (NARROW_2, 5),
+    (NARROW_1, 4),
+    *((WIDE, interval) for interval in (1, 2, 3, 4, 5, 7, 9)),
+    (Bisection(2, as_documented=True), 1),
+    *((NARROW_2, interval) for interval in (1, 3, 8)),
+    *((NARROW_1, interval) for interval in (1, 2, 7)),
 ]
 
 
-@pytest.mark.parametrize(("parameters", "interval", "latency"), VARIANTS, ids=str)
-def test_equals_twin(verify, normal_pairs, parameters, interval, latency):
+def test_intervals_and_what_they_cost():
+    for parameters, stated in STATED.items():
+        assert BisectionUnit(parameters).initiation_interval == parameters.steps + 3
+        for interval, (latency, multipliers) in enumerate(stated, 1):
+            unit = BisectionUnit(parameters, interval)
+            assert (unit.initiation_interval, unit.latency) == (interval, latency)
+            cost = cost_of(unit)
+            assert cost.multiplier_count == multipliers
+            assert all(wide <= 18 for wide, _ in cost.multipliers)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "interval"), [(WIDE, 0), (WIDE, 10), (WIDE, 2.5), (NARROW_1, 8)], ids=str
+)
+def test_refuses_an_interval(parameters, interval):
+    with pytest.raises(
+        ValueError, match=rf"^initiation_interval must be 1 to {parameters.steps + 6}, not {interval}$"
+    ):
+        BisectionUnit(parameters, interval)
+
+
+@pytest.mark.parametrize(("parameters", "interval"), VARIANTS, ids=str)
+def test_equals_twin(verify, normal_pairs, parameters, interval):
     rng = np.random.default_rng(2)
     angles = np.r_[np.zeros(20), rng.uniform(0, 90, 1500), np.full(20, 45), np.full(20, 90)]
     angles = np.r_[angles, 10.0 ** rng.uniform(-4, 0, 100), rng.uniform(90, 180, 200), [180]]
@@ -32,10 +65,8 @@ def test_equals_twin(verify, normal_pairs, parameters, interval, latency):
     middle, u, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
     assert wide.any()
     assert not wide.all()
-    unit = BisectionUnit(parameters)
-    assert (unit.initiation_interval, unit.latency) == (interval, latency)
     verify(
-        unit,
+        BisectionUnit(parameters, interval),
         {"normal_a": left, "normal_b": right},
         {"normal_middle": middle.codes, "one_minus_cosine": u.codes, "wide": wide},
     )

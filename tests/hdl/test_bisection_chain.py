@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from amaranth.hdl import ResetInserter, Signal, Value
+from amaranth.sim import Simulator
 
 from golden.bisection import Bisection
 from golden.bisection_chain import BisectionChain
@@ -54,3 +56,52 @@ def test_equals_twin(normal_pairs, bisection):
     zero = {name: value[:1] for name, value in beats.items()} | {"level": [0]}
     run = simulate(unit, zero, count=1, engine="auto")
     assert run.clocks[0] - run.input_clocks[0] == unit.latency(16)
+
+
+@pytest.mark.parametrize("clock", [0, 3, 8, 20, 33, 42, 50, 51, 52])
+def test_reset_in_mid_span_leaves_nothing(normal_pairs, clock):
+    """In every state, the wait for a ready sink included; the next span comes out as if it were the first."""
+    parameters = BisectionChain()
+    unit, reset = BisectionChainUnit(parameters), Signal()
+    left, right = (quantise(normals) for normals in normal_pairs(np.random.default_rng(5), 2, [80.0, 30.0]))
+    level = [2, 3]
+    expected, _ = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right), np.array(level))
+    assert unit.latency(2) == 51
+    simulator = Simulator(ResetInserter(reset)(unit))
+    simulator.add_clock(1e-6)
+    found = []
+
+    def offer(context, index):
+        span = unit.i.payload
+        context.set(span.level, level[index])
+        for c in range(3):
+            context.set(Value.cast(span.normal_left[c]), left[index, c].item())
+            context.set(Value.cast(span.normal_right[c]), right[index, c].item())
+        context.set(unit.i.valid, 1)
+
+    async def drive(context):
+        offer(context, 0)
+        await context.tick().repeat(1 + clock)
+        assert context.get(unit.o.valid) == (clock >= 50)
+        context.set(unit.i.valid, 0)
+        context.set(reset, 1)
+        await context.tick()
+        context.set(reset, 0)
+        context.set(unit.o.ready, 1)
+        # Longer than a span takes: the one that was inside must not come out.
+        for _ in range(60):
+            assert not context.get(unit.o.valid)
+            assert context.get(unit.i.ready)
+            await context.tick()
+        offer(context, 1)
+        await context.tick()
+        context.set(unit.i.valid, 0)
+        clocks = 1
+        while not context.get(unit.o.valid):
+            await context.tick()
+            clocks += 1
+        found.append((clocks, [context.get(Value.cast(unit.o.payload.normal[c])) for c in range(3)]))
+
+    simulator.add_testbench(drive)
+    simulator.run()
+    assert found == [(unit.latency(3), expected.codes[1].tolist())]

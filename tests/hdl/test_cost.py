@@ -9,7 +9,7 @@ from amaranth.lib import memory, stream
 from amaranth.lib.wiring import Component, In, Out
 
 from golden.intensity import Intensity
-from golden.pipeline import ShadingPipeline
+from golden.pipeline import METHODS, ShadingPipeline
 from golden.specular import Specular
 from hdl.cost import Cost, cost_of
 from hdl.difference_accumulator import DifferenceAccumulatorUnit
@@ -68,13 +68,13 @@ README = (Path(__file__).parents[2] / "README.md").read_text()
 
 DEVICES = {
     "dot_product": (DotProductUnit, 3),
-    "middle_normal": (MiddleNormalUnit, 4),
+    "middle_normal": (MiddleNormalUnit, 2),
     "gpq": (GPQUnit, 0),
     "difference_setup": (DifferenceSetupUnit, 1),
     "difference_accumulator": (DifferenceAccumulatorUnit, 0),
     "specular": (SpecularUnit, 2),
     "diffuse": (DiffuseUnit, 0),
-    "light": (LightUnit, 8),
+    "light": (LightUnit, 2),
     "intensity": (IntensityUnit, 6),
     "pipeline": (ShadingPipelineUnit, 19),
 }
@@ -93,6 +93,16 @@ def test_devices_cost_what_the_readme_states(name):
     assert interval == getattr(unit, "initiation_interval", 1)
     if name == "pipeline":
         assert f"at most `max(length, {unit.setup_interval})`" in README
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_methods_cost_what_the_readme_states(method):
+    unit = ShadingPipelineUnit(ShadingPipeline(method))
+    cost = cost_of(unit)
+    assert all(wide <= 18 for wide, _ in cost.multipliers)
+    row = re.search(rf"^\| `{method}` .*", README, re.MULTILINE)[0]
+    stated = [int(cell) for cell in row.split("|")[4:7]]
+    assert stated == [unit.latency, unit.setup_interval, cost.multiplier_count]
 
 
 @pytest.mark.parametrize("lights", [2, 3])

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from amaranth.hdl import ResetInserter, Signal, Value
+from amaranth.sim import Simulator
 
 from golden.difference_accumulator import DifferenceAccumulator
 from golden.fixed import Fixed
@@ -9,7 +11,7 @@ from golden.unit_vector import COMPONENT
 from hdl.difference_accumulator import DifferenceAccumulatorUnit
 from sim.engine import simulate
 
-FORMAT = DifferenceAccumulator.FORMAT
+FORMAT = DifferenceAccumulator().format
 
 
 def spans(lengths, seed):
@@ -64,3 +66,48 @@ def test_engines_agree():
     np.testing.assert_array_equal(fast.beats, expected)
     np.testing.assert_array_equal(slow.clocks, fast.clocks)
     np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+
+
+@pytest.mark.parametrize("clock", [1, 2, 3, 30, 58, 59, 60])
+@pytest.mark.parametrize("ready", [0, 1])
+def test_reset_in_mid_span_leaves_nothing(clock, ready):
+    """From the first clock of a span of 60 to its last, with and without a waiting pixel."""
+    beats, expected = spans([60, 3], 7)
+    unit, reset = DifferenceAccumulatorUnit(), Signal()
+    simulator = Simulator(ResetInserter(reset)(unit))
+    simulator.add_clock(1e-6)
+    found = []
+
+    def offer(context, index):
+        span = unit.i.payload
+        context.set(span.length, beats["length"][index].item())
+        for name in ("start", "first", "second"):
+            for c in range(3):
+                context.set(Value.cast(span[name][c]), beats[name][index, c].item())
+        context.set(unit.i.valid, 1)
+
+    async def drive(context):
+        offer(context, 0)
+        context.set(unit.o.ready, ready)
+        await context.tick()
+        context.set(unit.i.valid, 0)
+        await context.tick().repeat(clock)
+        assert context.get(unit.o.valid)
+        context.set(reset, 1)
+        await context.tick()
+        context.set(reset, 0)
+        context.set(unit.o.ready, 1)
+        for _ in range(70):
+            assert not context.get(unit.o.valid)
+            assert context.get(unit.i.ready)
+            await context.tick()
+        offer(context, 1)
+        for _ in range(8):
+            await context.tick()
+            context.set(unit.i.valid, 0)
+            if context.get(unit.o.valid):
+                found.append([context.get(Value.cast(unit.o.payload[c])) for c in range(3)])
+
+    simulator.add_testbench(drive)
+    simulator.run()
+    assert found == expected[60:].tolist()

@@ -1,17 +1,28 @@
+# amaranth: UnusedElaboratable=no
 """Write port: every address, hold, and no change under a span; reset of the whole pipeline in mid span."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from amaranth.hdl import Module, ResetInserter, Signal, Value
 from amaranth.sim import Simulator
 
-from golden.frame_constants import FIELDS_OF_A_FRAME, FIELDS_OF_A_LIGHT, LIGHT_STRIDE, FrameConstants
+from golden.frame_constants import (
+    FIELDS_OF_A_FRAME,
+    FIELDS_OF_A_LIGHT,
+    LIGHT_STRIDE,
+    MATERIAL_ADDRESS,
+    MAX_MATERIALS,
+    FrameConstants,
+)
 from golden.geometry import normalise
 from golden.intensity import Intensity
 from golden.pipeline import ShadingPipeline, Spans
 from golden.unit_vector import ONE, quantise
 from hdl.frame_constants import FrameConstantsUnit
 from hdl.pipeline import ShadingPipelineUnit
+from sim.engine import simulate
 
 
 def run_bench(m, bench):
@@ -78,6 +89,59 @@ def test_every_address_writes_its_constant_and_no_other(lights):
     run_bench(unit, bench)
 
 
+@pytest.mark.parametrize("lights", [1, 3])
+def test_every_address_writes_its_materials_constant_and_no_other(lights):
+    """All 512 addresses, and now and then another material, in random order.
+
+    A write is seen 2 clocks later where the word is of the material, and 1 where it is not; another
+    material's constants are seen 1 clock after its index is given.
+    """
+    rng = np.random.default_rng(10 + lights)
+    materials = 3
+    unit = FrameConstantsUnit(lights, materials)
+    words = words_of(unit.constants, lights)
+    of_frame = [(light + 1) * LIGHT_STRIDE + k for light in range(lights) for k in range(6)]
+
+    async def bench(ctx):
+        expected = [dict.fromkeys(words, 0) for _ in range(materials)]
+        index, material = 0, 0
+        for address in np.r_[rng.permutation(512), rng.choice(list(words), 200)].tolist():
+            if rng.random() < 0.3:
+                index = int(rng.integers(materials))
+                await write(ctx, unit, MATERIAL_ADDRESS, index)
+            data = int(rng.integers(0, 2**18))
+            if address == MATERIAL_ADDRESS:
+                data = index = int(rng.integers(materials))
+            await write(ctx, unit, address, data)
+            if address in words:
+                shape = words[address].shape()
+                code = data % 2**shape.width
+                code -= 2**shape.width * (shape.signed and code >= 2 ** (shape.width - 1))
+                before = expected[material][address]
+                for k in range(materials):
+                    if address in of_frame or k == index:
+                        expected[k][address] = code
+                now = expected[material][address] if address in of_frame else before
+                assert ctx.get(words[address]) == now
+                await ctx.tick()
+                assert ctx.get(words[address]) == expected[material][address]
+            else:
+                await ctx.tick()
+            assert {a: ctx.get(word) for a, word in words.items()} == expected[material]
+            for material in rng.permutation(materials).tolist():
+                ctx.set(unit.material, material)
+                await ctx.tick()
+                assert {a: ctx.get(word) for a, word in words.items()} == expected[material]
+
+    run_bench(unit, bench)
+
+
+@pytest.mark.parametrize("materials", [0, -1, MAX_MATERIALS + 1])
+def test_numbers_of_materials_out_of_range(materials):
+    with pytest.raises(ValueError, match=f"materials must be 1 to {MAX_MATERIALS}, not {materials}"):
+        FrameConstantsUnit(1, materials)
+
+
 def test_writes_of_a_frame_give_its_constants():
     """The beats of `FrameConstants.writes`, read back by name."""
     given = random_constants(np.random.default_rng(3), 2)
@@ -134,9 +198,30 @@ def random_spans(rng, lengths, normal_pairs):
 
 
 def part(spans, start, stop):
-    return Spans(
-        *(getattr(spans, f)[start:stop] for f in ("x", "y", "length", "normal_left", "normal_right"))
-    )
+    fields = ("x", "y", "length", "normal_left", "normal_right", "material")
+    return Spans(*(getattr(spans, f)[start:stop] for f in fields))
+
+
+def random_materials(rng, lights, materials):
+    """Constants of several materials under the same lights, the exponents and colours far apart."""
+    first = random_constants(rng, lights)
+    return [
+        replace(
+            random_constants(rng, lights),
+            exponent=1 + 40 * index,
+            direction=first.direction,
+            halfway=first.halfway,
+        )
+        for index in range(materials)
+    ]
+
+
+def writes_of(constants):
+    """Beats for one material, or for each of several."""
+    if len(constants) == 1:
+        return constants[0].writes()
+    writes = [of_material.writes(index) for index, of_material in enumerate(constants)]
+    return {name: np.concatenate([beats[name] for beats in writes]) for name in writes[0]}
 
 
 class Driver:
@@ -146,6 +231,7 @@ class Driver:
 
     def __init__(self, unit):
         self.unit = unit
+        self.several = unit.parameters.materials > 1
         self.module = Module()
         self.reset = Signal()
         self.module.submodules.unit = ResetInserter(self.reset)(unit)
@@ -179,6 +265,7 @@ class Driver:
                             name: [c * 2.0**-17 for c in getattr(spans, name)[index].tolist()]
                             for name in ("normal_left", "normal_right")
                         },
+                        **({"material": int(spans.material[index])} if self.several else {}),
                     },
                 )
             ctx.set(unit.i.valid, offered)
@@ -204,29 +291,32 @@ def pixels_of(design, spans, constants):
     return list(zip(*(column.astype(int).tolist() for column in columns), strict=True))
 
 
-@pytest.mark.parametrize("late_clock", [17, 80, 150])
-def test_constants_never_change_under_a_span(late_clock, normal_pairs):
+@pytest.mark.parametrize(("late_clock", "materials"), [(17, 1), (80, 1), (150, 1), (150, 3), (230, 3)])
+def test_constants_never_change_under_a_span(late_clock, materials, normal_pairs):
     """A second frame is written while spans of the first are inside, and while more are offered.
 
     What was taken before keeps the first frame's constants to its last pixel; what is taken after has the
-    second's. The write waits until the last pixel is gone, and the spans wait for the write.
+    second's. The write waits until the last pixel is gone, and the spans wait for the write. Of three
+    materials the second frame writes all, and the spans come in six runs of one.
     """
     rng = np.random.default_rng(late_clock)
-    design = ShadingPipeline()
-    first, second = random_constants(rng, 1), random_constants(rng, 1)
-    spans = random_spans(rng, rng.integers(1, 12, 24), normal_pairs)
+    design = ShadingPipeline(materials=materials)
+    first, second = random_materials(rng, 1, materials), random_materials(rng, 1, materials)
+    spans = random_spans(rng, rng.integers(1, 12, 60), normal_pairs)
+    spans = replace(spans, material=np.arange(60) // 10 % materials)
+    clocks = 960 if materials == 1 else 1700
     driver = Driver(ShadingPipelineUnit(design))
     result = []
 
     async def bench(ctx):
         stalls = (rng.random(31) < 0.3).tolist()
         result.append(
-            await driver.run(ctx, 480, spans, first.writes(), (late_clock, second.writes()), stalls)
+            await driver.run(ctx, clocks, spans, writes_of(first), (late_clock, writes_of(second)), stalls)
         )
 
     run_bench(driver.module, bench)
     pixels, span_clocks, write_clocks = result[0]
-    late_writes = write_clocks[len(first.writes()["address"]) :]
+    late_writes = write_clocks[len(writes_of(first)["address"]) :]
     before = sum(clock < late_writes[0] for clock in span_clocks)
     assert 0 < before < len(spans) == len(span_clocks)
     expected = pixels_of(design, part(spans, 0, before), first)
@@ -239,29 +329,33 @@ def test_constants_never_change_under_a_span(late_clock, normal_pairs):
     assert np.all(np.diff(late_writes) == 1)
 
 
-@pytest.mark.parametrize("reset_at", [25, 90, 131])
-def test_reset_in_mid_span_leaves_nothing_behind(reset_at, normal_pairs):
+@pytest.mark.parametrize(("reset_at", "materials"), [(25, 1), (90, 1), (131, 1), (131, 2), (180, 2)])
+def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, normal_pairs):
     """Spans in the setup, in the FIFOs and half shaded: after a reset the pipeline does as from power-up."""
     rng = np.random.default_rng(reset_at)
-    design = ShadingPipeline()
+    design = ShadingPipeline(materials=materials)
     spans = random_spans(rng, np.r_[40, rng.integers(0, 12, 11)], normal_pairs)
-    constants = random_constants(rng, 1)
+    spans = replace(spans, material=np.arange(12) // 4 % materials)
+    constants = random_materials(rng, 1, materials)
+    writes = writes_of(constants)
+    clocks = 330 if materials == 1 else 600
     stalls = (rng.random(31) < 0.2).tolist()
     fresh, again, status = [], [], []
 
     async def from_power_up(ctx):
-        fresh.append(await fresh_driver.run(ctx, 330, spans, constants.writes(), stalls=stalls))
+        fresh.append(await fresh_driver.run(ctx, clocks, spans, writes, stalls=stalls))
 
     async def after_reset(ctx):
         other = random_spans(rng, rng.integers(0, 30, 40), normal_pairs)
+        other = replace(other, material=rng.permutation(np.arange(40) // 4 % materials))
         unit = driver.unit
-        await driver.run(ctx, reset_at, other, random_constants(rng, 1).writes())
+        await driver.run(ctx, reset_at, other, writes_of(random_materials(rng, 1, materials)))
         ctx.set(driver.reset, 1)
         await ctx.tick()
         ctx.set(driver.reset, 0)
         status.append([ctx.get(unit.status[n]) for n in ("wide_spans", "empty_spans", "overrun")])
         assert ctx.get(unit.o.valid) == 0
-        again.append(await driver.run(ctx, 330, spans, constants.writes(), stalls=stalls))
+        again.append(await driver.run(ctx, clocks, spans, writes, stalls=stalls))
         status.append(ctx.get(unit.status.empty_spans))
 
     fresh_driver, driver = Driver(ShadingPipelineUnit(design)), Driver(ShadingPipelineUnit(design))
@@ -295,3 +389,106 @@ def test_reset_clears_the_constants(normal_pairs):
     assert len(before) == len(after) == 3
     assert {pixel[2:5] for _, pixel in before} == {(255, 255, 255)}
     assert {pixel[2:5] for _, pixel in after} == {(0, 0, 0)}
+
+
+# Several materials in the pipeline.
+
+
+def run_pipeline(unit, spans, constants, count, **options):
+    fields = ("x", "y", "length", "normal_left", "normal_right", "material")
+    beats = {name: getattr(spans, name) for name in fields}
+    return simulate(unit, beats, count=count, write=writes_of(constants), **options)
+
+
+def assert_pixels(run, pixels):
+    for name, expected in zip("xy", (pixels.x, pixels.y), strict=True):
+        np.testing.assert_array_equal(run.beats[name], expected)
+    np.testing.assert_array_equal(np.stack([run.beats[c] for c in "rgb"], axis=-1), pixels.color)
+    np.testing.assert_array_equal(run.beats["last"], pixels.last)
+
+
+@pytest.mark.parametrize("method", ["linear", "quadratic"])
+def test_pipeline_of_three_materials_equals_its_twin(method, normal_pairs):
+    """Spans of three materials in random order, empty ones among them, both engines, random stalls.
+
+    ``linear`` has the shortest way from a span to the constants that it needs.
+    """
+    rng = np.random.default_rng(33)
+    design = ShadingPipeline(method=method, lights=2, materials=3)
+    unit = ShadingPipelineUnit(design)
+    spans = random_spans(rng, rng.integers(0, 20, 150), normal_pairs)
+    runs = np.repeat(np.arange(40), rng.integers(1, 9, 40))[:150]
+    spans = replace(spans, material=rng.integers(0, 3, 40)[runs])
+    constants = random_materials(rng, 2, 3)
+    pixels = design.compute(spans, constants)
+    # The materials make a difference: each shaded alone, with one material's pipeline.
+    for index in range(3):
+        alone = ShadingPipeline(method=method, lights=2).compute(
+            replace(spans, material=None), constants[index]
+        )
+        own = np.repeat(spans.material, spans.length) == index
+        np.testing.assert_array_equal(pixels.color[own], alone.color[own])
+        assert (pixels.color[~own] != alone.color[~own]).any(axis=-1).mean() > 0.9
+    for input_share, output_share in ((0, 0), (0.5, 0.5), (0.9, 0.1)):
+        stalls = {
+            "input_stalls": rng.random(997) < input_share,
+            "output_stalls": rng.random(1009) < output_share,
+        }
+        assert_pixels(run_pipeline(unit, spans, constants, len(pixels.x), engine="auto", **stalls), pixels)
+    few = part(spans, 0, 30)
+    pixels = design.compute(few, constants)
+    slow, fast = (
+        run_pipeline(unit, few, constants, len(pixels.x), engine=engine, **stalls)
+        for engine in ("pysim", "auto")
+    )
+    assert_pixels(slow, pixels)
+    np.testing.assert_array_equal(slow.clocks, fast.clocks)
+    np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+
+
+def test_cost_of_a_material_change(normal_pairs):
+    """A span of another material is taken 5 clocks after the last pixel of the span before it has left.
+
+    Its first pixel comes `latency` clocks later, against 1 clock without the change. An empty span of yet
+    another material takes 5 clocks; one of the same takes 1.
+    """
+    rng = np.random.default_rng(34)
+    design = ShadingPipeline(method="linear", materials=3)
+    unit = ShadingPipelineUnit(design)
+    lengths = np.array([20, 20, 20, 20, 0, 20, 0, 20, 20, 0, 0, 20])
+    material = np.array([0, 0, 1, 2, 2, 1, 2, 1, 0, 1, 2, 0])
+    spans = replace(random_spans(rng, lengths, normal_pairs), material=material)
+    constants = random_materials(rng, 1, 3)
+    pixels = design.compute(spans, constants)
+    run = run_pipeline(unit, spans, constants, len(pixels.x), engine="pysim")
+    assert_pixels(run, pixels)
+    first = np.cumsum(lengths) - lengths
+    # Clocks from the last pixel of the span before: to the next span taken, to its first pixel.
+    waits = {
+        2: 5,
+        3: 5,
+        5: 5,
+        # An empty span of material 2 before it.
+        7: 5 + 5,
+        8: 5,
+        # Two empty spans of other materials before it.
+        11: 5 + 5 + 5,
+    }
+    for span, clocks in waits.items():
+        gone = run.clocks[first[span] - 1]
+        assert run.input_clocks[span] - gone == clocks, span
+        assert run.clocks[first[span]] - gone == clocks + unit.latency, span
+    assert run.clocks[first[1]] - run.clocks[first[1] - 1] == 1
+
+
+def test_indices_of_no_material_change_nothing(normal_pairs):
+    """Writes for a material past the last one are taken and lost: 3 words have indices of 2 bits."""
+    rng = np.random.default_rng(35)
+    design = ShadingPipeline(method="linear", materials=3)
+    unit = ShadingPipelineUnit(design)
+    spans = random_spans(rng, rng.integers(1, 9, 12), normal_pairs)
+    spans = replace(spans, material=np.arange(12) // 4)
+    constants = random_materials(rng, 1, 4)
+    pixels = design.compute(spans, constants[:3])
+    for engine in ("auto", "pysim"):
+        assert_pixels(run_pipeline(unit, spans, constants, len(pixels.x), engine=engine), pixels)

@@ -1,3 +1,5 @@
+# amaranth: UnusedElaboratable=no
+# Above: a component that is refused is never elaborated.
 """Highlight gate unit: RTL against its twin, clock by clock, at full and at reduced width."""
 
 import numpy as np
@@ -7,6 +9,7 @@ from golden.fixed import Fixed
 from golden.highlight_gate import HighlightGate
 from golden.specular import Specular
 from golden.unit_vector import quantise
+from hdl.cost import cost_of
 from hdl.highlight_gate import HighlightGateUnit
 from sim.engine import simulate
 
@@ -30,10 +33,12 @@ def spans(rng, normal_pairs, count, halfway, cosine):
     return left, right
 
 
-@pytest.mark.parametrize("model", ["cosquad", "lyon2"])
-def test_equals_twin(verify, normal_pairs, model):
+@pytest.mark.parametrize(
+    ("model", "interval"), [("cosquad", None), ("lyon2", 4), *(("cosquad", k) for k in (1, 2, 3, 5, 8, 15))]
+)
+def test_equals_twin(verify, normal_pairs, model, interval):
     parameters = HighlightGate(Specular(model))
-    unit = HighlightGateUnit(parameters)
+    unit = HighlightGateUnit(parameters, interval)
     rng = np.random.default_rng(11)
     halfway = np.array([1.0, 2.0, 2.0]) / 3
     code = quantise(halfway)
@@ -83,3 +88,13 @@ def test_equals_twin_at_reduced_width(fraction_bits):
         )
         np.testing.assert_array_equal(run.beats, expected)
     assert 0.01 < min(shares) < 0.8
+
+
+def test_times_and_multipliers_as_stated():
+    units = [HighlightGateUnit(initiation_interval=interval) for interval in range(1, 16)]
+    assert [unit.latency for unit in units] == [16, 18, 19, 19, 19, 20, 22, 27, 28, 24, 22, 23, 23, 24, 33]
+    counts = [cost_of(unit).multiplier_count for unit in units]
+    assert counts == [15, 8, 5, 4, 3, 3, 3, *[2] * 7, 1]
+    assert HighlightGateUnit().initiation_interval == 6
+    with pytest.raises(ValueError, match=r"^initiation_interval must be 1 to 15, not 16$"):
+        HighlightGateUnit(initiation_interval=16)

@@ -1,33 +1,161 @@
-"""Intensity unit: RTL against its twin, clock by clock, for numbers of lights."""
+# amaranth: UnusedElaboratable=no
+"""Intensity unit: RTL against its twin, clock by clock, in both styles, for numbers of lights."""
 
 import numpy as np
 import pytest
+from amaranth.hdl import ResetInserter, Signal, Value
+from amaranth.sim import Simulator
 
 from golden.fixed import Fixed
 from golden.intensity import Intensity
+from hdl.cost import cost_of
 from hdl.intensity import IntensityUnit
+from sim.engine import simulate
+
+COLOR, TERM = Intensity.COLOR_FORMAT, Intensity.TERM_FORMAT
+
+
+def case(rng, lights, brightness, terms):
+    """Input beats, constants, and the twin's channels."""
+    ambient = rng.integers(0, 255 * 64 * brightness, 3)
+    colors = rng.integers(0, 255 * 64 * brightness, (2, lights, 3))
+    expected = Intensity(lights).compute(
+        Fixed(COLOR, ambient),
+        Fixed(COLOR, colors[0]),
+        Fixed(COLOR, colors[1]),
+        Fixed(TERM, terms[0]),
+        Fixed(TERM, terms[1]),
+    )
+    return (
+        {"diffuse": terms[0], "specular": terms[1]},
+        {"ambient": ambient, "diffuse": colors[0], "specular": colors[1]},
+        {name: expected[:, channel] for channel, name in enumerate("rgb")},
+    )
 
 
 @pytest.mark.parametrize("lights", [1, 2, 3, 16])
 def test_equals_twin(verify, lights):
     rng = np.random.default_rng(lights)
-    color, term = Intensity.COLOR_FORMAT, Intensity.TERM_FORMAT
     for brightness in (1, 8):
-        ambient = rng.integers(0, 255 * 64 * brightness, 3)
-        colors = rng.integers(0, 255 * 64 * brightness, (2, lights, 3))
-        terms = rng.integers(0, term.max_code + 1, (2, 800, lights))
-        terms[:, :50] = term.max_code
+        terms = rng.integers(0, TERM.max_code + 1, (2, 800, lights))
+        terms[:, :50] = TERM.max_code
         terms[:, 50:100] = 0
-        expected = Intensity(lights).compute(
-            Fixed(color, ambient),
-            Fixed(color, colors[0]),
-            Fixed(color, colors[1]),
-            Fixed(term, terms[0]),
-            Fixed(term, terms[1]),
-        )
-        verify(
-            IntensityUnit(Intensity(lights)),
-            {"diffuse": terms[0], "specular": terms[1]},
-            {name: expected[:, channel] for channel, name in enumerate("rgb")},
-            constants={"ambient": ambient, "diffuse": colors[0], "specular": colors[1]},
-        )
+        beats, constants, expected = case(rng, lights, brightness, terms)
+        verify(IntensityUnit(Intensity(lights)), beats, expected, constants=constants)
+
+
+def sparse_terms(rng, lights, count):
+    """Terms of which any part is 0; none and all of them; all of the largest."""
+    terms = rng.integers(1, TERM.max_code + 1, (2, count, lights))
+    terms *= rng.random(terms.shape) < rng.random((1, count, 1))
+    terms[:, :20] = TERM.max_code
+    terms[:, 20:40] = 0
+    terms[1, 40:60] = 0
+    return terms
+
+
+@pytest.mark.parametrize("lights", [1, 2, 3, 16])
+def test_compact_equals_twin_in_the_clocks_stated(lights):
+    """Every clock of every pixel: three for each term that is not 0, and three where there is none."""
+    rng = np.random.default_rng(lights)
+    unit = IntensityUnit(Intensity(lights), "compact")
+    assert unit.latency == 6 * lights + 5
+    for brightness in (1, 8):
+        terms = sparse_terms(rng, lights, 300)
+        beats, constants, expected = case(rng, lights, brightness, terms)
+        clocks = 3 * np.maximum((terms != 0).sum(axis=(0, 2)), 1)
+        assert clocks.min() == 3
+        assert clocks.max() == 6 * lights == unit.initiation_interval
+        for engine in ("pysim", "auto"):
+            few = 100 if engine == "pysim" else 300
+            run = simulate(
+                unit,
+                {name: term[:few] for name, term in beats.items()},
+                count=few,
+                constants=constants,
+                engine=engine,
+            )
+            for name in "rgb":
+                np.testing.assert_array_equal(run.beats[name], expected[name][:few])
+            np.testing.assert_array_equal(run.input_clocks, np.r_[0, np.cumsum(clocks[: few - 1])])
+            np.testing.assert_array_equal(run.clocks, run.input_clocks + clocks[:few] + 5)
+
+
+@pytest.mark.parametrize("lights", [1, 3])
+def test_compact_equals_twin_under_stalls(lights):
+    """Pixels are lost, repeated and changed by no pattern of stalls, in both engines on the same clocks."""
+    rng = np.random.default_rng(lights)
+    unit = IntensityUnit(Intensity(lights), "compact")
+    beats, constants, expected = case(rng, lights, 2, sparse_terms(rng, lights, 400))
+    for input_share, output_share in ((0.4, 0.4), (0.9, 0.1), (0.1, 0.9), (0.0, 0.97), (0.97, 0.0)):
+        stalls = {
+            "input_stalls": rng.random(997) < input_share,
+            "output_stalls": rng.random(1009) < output_share,
+        }
+        runs = []
+        for engine, count in (("auto", 400), ("pysim", 70), ("auto", 70)):
+            few = {name: term[:count] for name, term in beats.items()}
+            run = simulate(unit, few, count=count, constants=constants, engine=engine, **stalls)
+            for name in "rgb":
+                np.testing.assert_array_equal(run.beats[name], expected[name][:count])
+            runs.append(run)
+        np.testing.assert_array_equal(runs[1].clocks, runs[2].clocks)
+        np.testing.assert_array_equal(runs[1].input_clocks, runs[2].input_clocks)
+
+
+@pytest.mark.parametrize("clock", range(14))
+def test_compact_reset_in_mid_pixel(clock):
+    """Reset so many clocks after a pixel was taken: the next comes as from power-up, and alone."""
+    terms = np.full((2, 1, 1), TERM.max_code)
+    _, constants, expected = case(np.random.default_rng(1), 1, 1, terms)
+    unit = IntensityUnit(Intensity(), "compact")
+    reset = Signal()
+    simulator = Simulator(ResetInserter(reset)(unit))
+    simulator.add_clock(1e-6)
+    seen = []
+
+    async def bench(context):
+        for color, codes in zip(unit.constants.ambient, constants["ambient"], strict=True):
+            context.set(Value.cast(color), int(codes))
+        for kind in ("diffuse", "specular"):
+            context.set(Value.cast(unit.i.payload[kind]), TERM.max_code)
+            for color, code in zip(unit.constants[kind][0], constants[kind][0], strict=True):
+                context.set(Value.cast(color), int(code))
+        context.set(unit.i.valid, 1)
+        await context.tick()
+        context.set(unit.i.valid, 0)
+        for _ in range(clock):
+            await context.tick()
+        context.set(reset, 1)
+        await context.tick()
+        context.set(reset, 0)
+        context.set(unit.o.ready, 1)
+        context.set(unit.i.valid, 1)
+        assert context.get(unit.i.ready)
+        await context.tick()
+        context.set(unit.i.valid, 0)
+        for wait in range(1, 40):
+            if context.get(unit.o.valid):
+                seen.append((wait, *(context.get(unit.o.payload[name]) for name in "rgb")))
+            await context.tick()
+
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert seen == [(unit.latency, *(expected[name][0] for name in "rgb"))]
+
+
+@pytest.mark.parametrize("lights", [1, 2, 16])
+def test_compact_costs_one_multiplier(lights):
+    cost = cost_of(IntensityUnit(Intensity(lights), "compact"))
+    assert cost.multipliers == {(17, 17): 1}
+    # As the docstring states.
+    stated = {1: 205, 16: 783}
+    assert cost.register_bits == stated.get(lights, cost.register_bits)
+    # Terms and which are left and used; operands, product, rounded sum; sum; channels; four notes; the rest.
+    growth = (2 * lights).bit_length()
+    assert cost.register_bits == 38 * lights + 34 + 34 + (12 + growth) + (34 + growth) + 24 + 20 + 5
+
+
+def test_unknown_style_is_refused():
+    with pytest.raises(ValueError, match=r"^style must be 'throughput' or 'compact', not 'fast'$"):
+        IntensityUnit(style="fast")

@@ -1,22 +1,38 @@
+# amaranth: UnusedElaboratable=no
 """Light unit: both terms of a light against the composition of the twins, clock by clock."""
 
 import numpy as np
 import pytest
 
+from golden.chord import Chord
 from golden.diffuse import Diffuse
 from golden.dot_product import DotProduct
-from golden.fixed import Fixed
+from golden.fixed import SQ, Fixed
+from golden.power import Power
 from golden.specular import Specular
 from golden.unit_vector import COMPONENT, ONE, quantise
 from hdl.light import LightUnit
+from hdl.power import PowerUnit
+from hdl.specular import SpecularUnit
 
 
-def terms(parameters, normals, direction, halfway, exponent):
+def operands_of(parameters, diffuse, normals, direction, halfway):
+    """``N . L`` in the format of ``diffuse``, and ``N . H`` or the chord."""
     normals, direction, halfway = (Fixed(COMPONENT, codes) for codes in (normals, direction, halfway))
-    dot = DotProduct()
-    cosine = dot.compute(normals, direction)
-    specular = parameters.compute(dot.compute(normals, halfway), Diffuse.dark(cosine), exponent)
-    return {"diffuse": Diffuse().compute(cosine).codes, "specular": specular.codes}
+    cosine = DotProduct().compute(normals, direction)
+    cosine = cosine.truncate(diffuse.operand_format.fraction_bits).saturate(diffuse.operand_format)
+    product = DotProduct().compute if parameters.operand == "cosine" else Chord().operand
+    return {"cosine": cosine, "highlight": product(normals, halfway)}
+
+
+def terms(parameters, diffuse, operands, exponent):
+    cosine = operands["cosine"]
+    specular = parameters.compute(operands["highlight"], cosine.codes <= 0, exponent)
+    return {"diffuse": diffuse.compute(cosine).codes, "specular": specular.codes}
+
+
+def codes_of(operands):
+    return {name: operand.codes for name, operand in operands.items()}
 
 
 def normals_about(rng, direction, halfway, exponent):
@@ -30,39 +46,54 @@ def normals_about(rng, direction, halfway, exponent):
     return np.vstack([normals, np.stack(np.meshgrid(ends, ends, ends), axis=-1).reshape(-1, 3)])
 
 
-@pytest.mark.parametrize("exponent", [1, 30, 1000])
-def test_equals_twins(verify, normal_pairs, exponent):
+# The chord method and the angular one have N.L in SQ(2, 25); methods that find normals have it whole.
+DIFFUSE = {"cosine": Diffuse(), "one_minus_cosine": Diffuse(SQ(2, 25))}
+
+
+@pytest.mark.parametrize(
+    ("model", "operand", "exponent"),
+    [
+        *(("cosquad", "cosine", exponent) for exponent in (1, 30, 1000)),
+        *(("cosquad", "one_minus_cosine", exponent) for exponent in (1, 30, 1000)),
+        ("lyon3", "one_minus_cosine", 1000),
+        ("exp", "cosine", 1),
+        ("coscos2", "one_minus_cosine", 30),
+        ("blinn", "cosine", 30),
+        ("blinn", "one_minus_cosine", 1000),
+    ],
+)
+def test_equals_twins(verify, normal_pairs, model, operand, exponent):
     rng = np.random.default_rng(exponent)
-    parameters = Specular()
+    parameters = Power(operand) if model == "blinn" else Specular(model, operand)
     light, viewer = normal_pairs(rng, 1, 70.0)
     halfway = (light + viewer) / np.linalg.norm(light + viewer)
     direction, halfway = quantise(light)[0], quantise(halfway)[0]
     normals = normals_about(rng, direction, halfway, exponent)
-    expected = terms(parameters, normals, direction, halfway, exponent)
+    operands = operands_of(parameters, DIFFUSE[operand], normals, direction, halfway)
+    expected = terms(parameters, DIFFUSE[operand], operands, exponent)
     dark = normals @ direction <= 0
     assert expected["specular"].max() > 2**16
     assert not expected["specular"][dark].any()
     assert not expected["diffuse"][dark].any()
-    verify(
-        LightUnit(parameters),
-        normals,
-        expected,
-        constants={"direction": direction, "halfway": halfway, "exponent": exponent},
-    )
+    unit = LightUnit(parameters, DIFFUSE[operand])
+    assert unit.latency == (PowerUnit if model == "blinn" else SpecularUnit)(parameters).latency
+    verify(unit, codes_of(operands), expected, constants={"exponent": exponent})
 
 
 def test_terminator(verify):
     """N.L of one code above 0, 0, and one below: the highlight, however bright, comes and goes with it."""
     direction, halfway = np.array([1, 0, 0]), np.array([0, 0, ONE])
     normals = np.array([[1, 0, ONE], [0, 0, ONE], [-1, 0, ONE]])
+    operands = codes_of(operands_of(Specular(), Diffuse(), normals, direction, halfway))
+    np.testing.assert_array_equal(operands["cosine"], [1, 0, -1])
     expected = {"diffuse": np.zeros(3, int), "specular": np.array([2**17 - 2, 0, 0])}
-    constants = {"direction": direction, "halfway": halfway, "exponent": 10}
-    verify(LightUnit(), normals, expected, constants=constants)
+    verify(LightUnit(), operands, expected, constants={"exponent": 10})
 
 
 def test_black_light(verify, normal_pairs):
     """A light that is not there, all zero: no diffuse and no specular term."""
     normals = quantise(normal_pairs(np.random.default_rng(1), 200, 0.0)[0])
     zero = np.zeros(3, dtype=int)
+    operands = codes_of(operands_of(Specular(), Diffuse(), normals, zero, zero))
     expected = {"diffuse": np.zeros(200, int), "specular": np.zeros(200, int)}
-    verify(LightUnit(), normals, expected, constants={"direction": zero, "halfway": zero, "exponent": 1})
+    verify(LightUnit(), operands, expected, constants={"exponent": 1})

@@ -1,23 +1,60 @@
+# amaranth: UnusedElaboratable=no
 """Middle normal unit: RTL against its twin, clock by clock."""
 
 import numpy as np
+import pytest
 
 from golden.fixed import Fixed
 from golden.middle_normal import MiddleNormal
 from golden.unit_vector import COMPONENT, quantise
+from hdl.cost import cost_of
 from hdl.middle_normal import MiddleNormalUnit
 
+# Latency and multipliers for the initiation intervals 1 to 9, as the unit's text states them.
+STATED = [(21, 9), (24, 5), (25, 3), (22, 3), (29, 2), (26, 2), (24, 2), (24, 2), (29, 1)]
 
-def test_equals_twin(verify, normal_pairs):
+
+@pytest.mark.parametrize("interval", range(1, 10))
+def test_intervals_and_what_they_cost(interval):
+    unit = MiddleNormalUnit(initiation_interval=interval)
+    assert (unit.latency, unit.initiation_interval) == (STATED[interval - 1][0], interval)
+    cost = cost_of(unit)
+    assert cost.multiplier_count == STATED[interval - 1][1]
+    assert all(wide <= 18 for wide, _ in cost.multipliers)
+
+
+def test_default_interval():
+    unit = MiddleNormalUnit()
+    assert (unit.latency, unit.initiation_interval) == (26, 6)
+
+
+@pytest.mark.parametrize("interval", [0, 10, -1, 1.5])
+def test_refuses_an_interval(interval):
+    with pytest.raises(ValueError, match=rf"^initiation_interval must be 1 to 9, not {interval}$"):
+        MiddleNormalUnit(initiation_interval=interval)
+
+
+@pytest.mark.parametrize(
+    ("interval", "fit"),
+    [
+        *((interval, "exact") for interval in range(1, 10)),
+        (6, "as_documented"),
+        (6, "minimax_2"),
+        (6, "minimax_3"),
+        (1, "minimax_3"),
+    ],
+)
+def test_equals_twin(verify, normal_pairs, interval, fit):
+    parameters = MiddleNormal(fit)
     rng = np.random.default_rng(2)
     angles = np.r_[np.zeros(20), rng.uniform(0, 45, 1500), np.full(20, 45), rng.uniform(45, 180, 300), [180]]
     left, right = (quantise(normals) for normals in normal_pairs(rng, len(angles), angles))
     # Not only unit vectors: every word at its ends must not upset what follows.
     corners = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (400, 6))
     left, right = np.vstack([left, corners[:, :3]]), np.vstack([right, corners[:, 3:]])
-    middle, wide = MiddleNormal().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    middle, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
     verify(
-        MiddleNormalUnit(),
+        MiddleNormalUnit(parameters, interval),
         {"normal_left": left, "normal_right": right},
         {"normal_left": left, "normal_right": right, "normal_middle": middle.codes, "wide": wide},
     )

@@ -1,16 +1,22 @@
+# amaranth: UnusedElaboratable=no
 """The shading pipeline: RTL against its twin, pixel by pixel and clock by clock."""
 
+import gc
 import math
+import warnings
 
 import numpy as np
 import pytest
+from amaranth.hdl import ResetInserter, Signal, UnusedElaboratable, Value
+from amaranth.sim import Simulator
 
 from golden.frame_constants import FrameConstants
 from golden.intensity import Intensity
-from golden.pipeline import ShadingPipeline, Spans
+from golden.pipeline import METHODS, MODELS, ShadingPipeline, Spans
 from golden.specular import SPECULAR_MODELS
 from golden.unit_vector import quantise
-from hdl.pipeline import ShadingPipelineUnit
+from hdl.pipeline import INTERPOLATORS, ShadingPipelineUnit
+from sim.beats import pack, unpack
 from sim.engine import simulate
 
 
@@ -108,8 +114,8 @@ def test_clocks(lights, normal_pairs):
     starts = np.cumsum(lengths) - lengths
     first_pixels = result.clocks[starts]
     assert first_pixels[0] == result.input_clocks[0] + unit.latency
-    assert unit.latency == 66 + math.ceil(math.log2(2 * lights + 1))
-    assert unit.setup_interval <= 8
+    assert unit.latency == 65 + math.ceil(math.log2(2 * lights + 1))
+    assert unit.setup_interval == 4
     taken = np.diff(first_pixels)
     assert np.all(taken >= lengths[:-1])
     assert np.all(taken <= np.maximum(lengths[:-1], unit.setup_interval))
@@ -165,3 +171,367 @@ def test_span_past_the_last_column_is_flagged(normal_pairs):
         result = run(ShadingPipelineUnit(parameters), spans, constants, pixels)
         assert_pixels(result, pixels)
         assert result.status["overrun"] == flagged
+
+
+# Every method.
+
+
+@pytest.fixture
+def never_built():
+    """Pipelines that are refused, or only asked for their figures, are never elaborated."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnusedElaboratable)
+        yield
+        gc.collect()
+
+
+# A model, lights and operand for each method; all models and both operands are there, each for some method.
+DESIGNS = [
+    ("linear", "cosquad", 1, "cosine"),
+    ("linear", "lyon3", 1, "one_minus_cosine"),
+    ("bisection", "exp", 1, "cosine"),
+    ("bisection", "cosquad", 2, "one_minus_cosine"),
+    ("quadratic", "blinn", 1, "cosine"),
+    ("quadratic", "coscos2", 2, "one_minus_cosine"),
+    ("quadratic-eval", "lyon3", 2, "cosine"),
+    ("quadratic-eval", "exp", 1, "one_minus_cosine"),
+    ("quadratic-horner", "coscos2", 1, "cosine"),
+    ("quadratic-horner", "cosquad", 1, "one_minus_cosine"),
+    ("renormalise", "blinn", 1, "cosine"),
+    ("renormalise", "cosquad", 2, "one_minus_cosine"),
+    ("angular", "lyon3", 1, None),
+    ("chord", "cosquad", 1, None),
+    ("chord", "exp", 2, None),
+]
+
+
+def spans_of_every_kind(rng, design, count, normal_pairs):
+    """Lengths 1 to 40, among them 1, 2, 3, 16 and 0; angles 0 to the widest that the method takes."""
+    lengths = np.r_[1, 2, 3, 16, 0, rng.integers(1, 41, count - 5)]
+    spans = make_spans(rng, lengths, normal_pairs, design.interpolator.MAX_ANGLE - 0.01)
+    flat = rng.random(count) < 0.05
+    spans.normal_right[flat] = spans.normal_left[flat]
+    return spans
+
+
+def lit_constants(rng, spans, lights, exponent):
+    """Half-way vectors that are normals of the spans: the peaks are on the picture."""
+    constants = make_constants(rng, lights, exponent)
+    constants.halfway[:] = spans.normal_left[rng.integers(0, len(spans), lights)]
+    constants.direction[:] = spans.normal_right[rng.integers(0, len(spans), lights)]
+    return constants
+
+
+@pytest.mark.parametrize(("method", "model", "lights", "operand"), DESIGNS)
+def test_every_method_equals_its_twin_under_stalls(method, model, lights, operand, normal_pairs):
+    rng = np.random.default_rng(lights + len(method))
+    design = ShadingPipeline(method, model, lights, operand)
+    unit = ShadingPipelineUnit(design)
+    spans = spans_of_every_kind(rng, design, 250, normal_pairs)
+    constants = lit_constants(rng, spans, lights, 20)
+    pixels = design.compute(spans, constants)
+    assert len(np.unique(pixels.color)) > 100
+    clocks = []
+    for input_share, output_share in ((0, 0), (0.5, 0.5), (0.95, 0), (0, 0.7)):
+        result = run(
+            unit,
+            spans,
+            constants,
+            pixels,
+            input_stalls=rng.random(997) < input_share,
+            output_stalls=rng.random(1009) < output_share,
+        )
+        assert_pixels(result, pixels)
+        assert result.status["wide_spans"] == pixels.wide_spans == 0
+        clocks.append(result)
+    # The first span and the clocks of each, without stalls.
+    starts = np.cumsum(spans.length) - spans.length
+    full = np.flatnonzero(spans.length)
+    first = clocks[0].clocks[starts[full]]
+    started = first[0] - clocks[0].input_clocks[full[0]]
+    taken, length = np.diff(first), spans.length[full][:-1]
+    assert np.all(taken >= length * unit.clocks_per_pixel)
+    if method == "bisection":
+        # Spans that are divided take longer.
+        assert started >= unit.latency
+    else:
+        assert started == unit.latency
+        assert np.all(taken <= np.maximum(length * unit.clocks_per_pixel, unit.setup_interval))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_with_every_model(method, model, normal_pairs):
+    rng = np.random.default_rng(MODELS.index(model))
+    design = ShadingPipeline(method, model)
+    spans = spans_of_every_kind(rng, design, 24, normal_pairs)
+    constants = lit_constants(rng, spans, 1, 5)
+    pixels = design.compute(spans, constants)
+    result = run(
+        ShadingPipelineUnit(design),
+        spans,
+        constants,
+        pixels,
+        engine="pysim",
+        output_stalls=rng.random(101) < 0.3,
+    )
+    assert_pixels(result, pixels)
+
+
+def intervals():
+    """Every setup interval of one method of each unit; the ones that say most are not long."""
+    often = {"linear": (1, 7), "quadratic": (1, 3, 7), "angular": (1, 6), "chord": (1, 2, 3, 7, 26)}
+    often |= {"recurrence": (1,)}
+    for method, soon in often.items():
+        interpolator = METHODS[method]
+        for interval in INTERPOLATORS[type(interpolator)].setup_intervals(interpolator):
+            marks = () if interval in soon else (pytest.mark.long,)
+            yield pytest.param(method, interval, marks=marks)
+
+
+@pytest.mark.parametrize(("method", "interval"), list(intervals()))
+def test_setup_interval(method, interval, normal_pairs):
+    """The pixels do not depend on it; a span takes its pixels' clocks or the interval, and no more."""
+    rng = np.random.default_rng(interval)
+    design = ShadingPipeline(method)
+    unit = ShadingPipelineUnit(design, interval)
+    assert unit.setup_interval == interval
+    lengths = np.r_[rng.integers(1, 12, 40), np.full(12, 1), 40, 1, 1]
+    spans = make_spans(rng, lengths, normal_pairs, design.interpolator.MAX_ANGLE - 0.01)
+    constants = make_constants(rng, 1)
+    pixels = design.compute(spans, constants)
+    result = run(unit, spans, constants, pixels, engine="pysim")
+    assert_pixels(result, pixels)
+    first = result.clocks[np.cumsum(lengths) - lengths]
+    assert first[0] == result.input_clocks[0] + unit.latency
+    taken = np.diff(first)
+    assert np.all(taken >= lengths[:-1])
+    assert np.all(taken <= np.maximum(lengths[:-1], interval))
+    # In a run of single pixels each costs the interval.
+    assert np.all(taken[46:51] == interval)
+
+
+def methods_with_intervals():
+    return {method: INTERPOLATORS[type(twin)].setup_intervals(twin) for method, twin in METHODS.items()}
+
+
+def test_intervals_that_there_are(never_built):
+    none = range(0)
+    assert (
+        methods_with_intervals().items()
+        >= {
+            "linear": range(1, 8),
+            "bisection": none,
+            "quadratic": range(1, 8),
+            "quadratic-eval": none,
+            "quadratic-horner": none,
+            "angular": range(1, 7),
+            "renormalise": range(1, 8),
+            "chord": range(1, 27),
+            "recurrence": range(1, 47),
+        }.items()
+    )
+    for method, allowed in methods_with_intervals().items():
+        if 4 in allowed:
+            assert ShadingPipelineUnit(ShadingPipeline(method)).setup_interval == 4
+
+
+def test_every_method_has_a_unit():
+    assert {type(twin) for twin in METHODS.values()} == set(INTERPOLATORS)
+
+
+# Just within, and beyond, what each method takes. Linear normals of 45 degrees differ by less than 1 in every
+# component, of 120 degrees by 1.7 in length: by 1 in some.
+@pytest.mark.parametrize(
+    ("method", "narrow", "wide", "flagged"),
+    [
+        ("linear", 45.0, 140.0, 20),
+        ("renormalise", 45.0, 140.0, 20),
+        ("bisection", 89.99, 90.1, 50),
+        ("quadratic-eval", 44.99, 45.1, 50),
+        ("quadratic-horner", 44.99, 45.1, 50),
+        ("angular", 150.0, 180.0, 50),
+        ("chord", 22.49, 22.52, 50),
+    ],
+)
+def test_wide_spans_of_every_method_are_counted(method, narrow, wide, flagged, normal_pairs):
+    rng = np.random.default_rng(9)
+    design = ShadingPipeline(method)
+    left, right = (
+        np.vstack(v) for v in zip(*(normal_pairs(rng, 50, a) for a in (narrow, wide)), strict=True)
+    )
+    left, right = quantise(left), quantise(right)
+    if wide == 180.0:
+        right[50:] = -left[50:]
+    spans = Spans(np.zeros(100, int), np.zeros(100, int), rng.integers(1, 4, 100), left, right)
+    constants = make_constants(rng, 1)
+    pixels = design.compute(spans, constants)
+    # Of divided spans there are many clocks.
+    engine = "auto" if method == "bisection" else "pysim"
+    result = run(ShadingPipelineUnit(design), spans, constants, pixels, engine=engine)
+    assert_pixels(result, pixels)
+    assert flagged <= pixels.wide_spans <= 50
+    assert result.status["wide_spans"] == pixels.wide_spans
+
+
+def words(layout, beats):
+    return [int.from_bytes(row.astype("<u4").tobytes(), "little") for row in pack(layout, beats)]
+
+
+class Driver:
+    """A pipeline in Amaranth's simulator, with a reset and writes at any time."""
+
+    def __init__(self, unit):
+        self.unit, self.reset = unit, Signal()
+        self.shapes = {name: getattr(unit, name).payload.shape() for name in ("i", "o", "write")}
+
+    def simulate(self, bench):
+        simulator = Simulator(ResetInserter(self.reset)(self.unit))
+        simulator.add_clock(1e-6)
+        simulator.add_testbench(bench)
+        simulator.run()
+
+    async def clock(self, context, beats):
+        """Offer beats of ``i`` and ``write`` (None: nothing) for one clock; which were taken, and a pixel."""
+        unit = self.unit
+        context.set(unit.o.ready, 1)
+        for name, beat in beats.items():
+            port = getattr(unit, name)
+            context.set(port.valid, beat is not None)
+            context.set(Value.cast(port.payload).as_unsigned(), beat or 0)
+        taken = {name: context.get(getattr(unit, name).valid & getattr(unit, name).ready) for name in beats}
+        pixel = context.get(Value.cast(unit.o.payload).as_unsigned()) if context.get(unit.o.valid) else None
+        await context.tick()
+        return taken, pixel
+
+    async def run(self, context, writes, spans, clocks=10**6, pixels=10**6):
+        """Writes, then spans, until so many clocks or pixels; the pixels and the clock of each."""
+        writes, spans, found = list(writes), list(spans), []
+        for clock in range(clocks):
+            beats = {"write": writes[0] if writes else None, "i": spans[0] if spans else None}
+            if writes:
+                beats["i"] = None
+            taken, pixel = await self.clock(context, beats)
+            if taken["write"]:
+                writes.pop(0)
+            if taken["i"]:
+                spans.pop(0)
+            if pixel is not None:
+                found.append((clock, pixel))
+            if len(found) == pixels:
+                break
+        return found
+
+    def beats(self, found):
+        codes = [pixel for _, pixel in found]
+        size = -(-self.unit.o.payload.shape().size // 32)
+        rows = [[code >> 32 * k & 0xFFFFFFFF for k in range(size)] for code in codes]
+        return unpack(self.shapes["o"], np.array(rows, dtype=np.uint32))
+
+
+def assert_colors(beats, pixels):
+    for channel, name in enumerate("rgb"):
+        np.testing.assert_array_equal(beats[name], pixels.color[:, channel])
+    np.testing.assert_array_equal(beats["last"], pixels.last)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_reset_in_mid_span(method, normal_pairs):
+    """After a reset with spans inside: the pixels and clocks are those from power-up."""
+    rng = np.random.default_rng(12)
+    design = ShadingPipeline(method)
+    unit = ShadingPipelineUnit(design)
+    driver = Driver(unit)
+    spans = make_spans(rng, [5, 1, 9, 3], normal_pairs, 20)
+    others = make_spans(rng, rng.integers(1, 30, 40), normal_pairs, 60)
+    constants = make_constants(rng, 1)
+    pixels = design.compute(spans, constants)
+    codes, other_codes = (words(driver.shapes["i"], beats_of(s)) for s in (spans, others))
+    writes = words(driver.shapes["write"], constants.writes())
+    runs = []
+
+    async def bench(context):
+        for before in (0, len(writes) + 3, len(writes) + unit.latency // 2, len(writes) + unit.latency + 40):
+            if before:
+                await driver.run(context, writes, other_codes, clocks=before)
+                context.set(driver.reset, 1)
+                await driver.clock(context, {"write": None, "i": None})
+                context.set(driver.reset, 0)
+                assert not context.get(unit.o.valid)
+            runs.append(await driver.run(context, writes, codes, pixels=len(pixels.x)))
+            # Nothing comes after the last pixel; the pipeline is empty for the next round.
+            assert not await driver.run(context, [], [], clocks=unit.latency + 10)
+            context.set(driver.reset, 1)
+            await driver.clock(context, {"write": None, "i": None})
+            context.set(driver.reset, 0)
+
+    driver.simulate(bench)
+    assert_colors(driver.beats(runs[0]), pixels)
+    assert len(runs) == 4
+    assert all(found == runs[0] for found in runs[1:])
+
+
+@pytest.mark.parametrize("method", ["bisection", "quadratic-horner", "angular", "chord"])
+def test_constants_never_change_under_a_span(method, normal_pairs):
+    """Writes that wait while spans go by: each span has the constants of before, or all of the new ones."""
+    rng = np.random.default_rng(13)
+    design = ShadingPipeline(method)
+    driver = Driver(ShadingPipelineUnit(design))
+    before, after = (make_spans(rng, rng.integers(1, 20, 8), normal_pairs, 20) for _ in range(2))
+    frames = [make_constants(rng, 1, exponent) for exponent in (3, 200)]
+    expected = [
+        design.compute(spans, constants) for spans, constants in zip((before, after), frames, strict=True)
+    ]
+    codes = [words(driver.shapes["i"], beats_of(s)) for s in (before, after)]
+    writes = [words(driver.shapes["write"], constants.writes()) for constants in frames]
+    found = []
+
+    async def bench(context):
+        await driver.run(context, writes[0], [], clocks=len(writes[0]) + 5)
+        waiting, late, spans = list(codes[0]), list(writes[1]), list(codes[1])
+        out = 0
+        while len(found) < sum(len(pixels.x) for pixels in expected):
+            # Writes are offered from the clock on which the last span of before is taken.
+            beats = {
+                "i": waiting[0] if waiting else (spans[0] if spans else None),
+                "write": late[0] if late and not waiting else None,
+            }
+            taken, pixel = await driver.clock(context, beats)
+            if pixel is not None:
+                found.append((0, pixel))
+                out += 1
+            if taken["write"]:
+                assert out == len(expected[0].x)
+                late.pop(0)
+            if taken["i"]:
+                assert not late or waiting
+                (waiting or spans).pop(0)
+
+    driver.simulate(bench)
+    beats, count = driver.beats(found), len(expected[0].x)
+    assert_colors(beats[:count], expected[0])
+    assert_colors(beats[count:], expected[1])
+
+
+@pytest.mark.parametrize(
+    ("method", "interval", "choice"),
+    [
+        ("quadratic", 0, "1 to 7"),
+        ("linear", 8, "1 to 7"),
+        ("angular", 7, "1 to 6"),
+        ("chord", 27, "1 to 26"),
+        ("bisection", 4, "left out"),
+        ("quadratic-eval", 7, "left out"),
+    ],
+)
+def test_refuses_a_setup_interval(method, interval, choice, never_built):
+    text = f"setup_interval of {method} must be {choice}, not {interval}"
+    with pytest.raises(ValueError, match=f"^{text}$"):
+        ShadingPipelineUnit(ShadingPipeline(method), interval)
+
+
+@pytest.mark.parametrize("method", ["bisection", "quadratic-eval", "quadratic-horner"])
+def test_method_without_a_choice_of_interval(method, never_built):
+    assert ShadingPipelineUnit(ShadingPipeline(method)).setup_interval > 4
+    assert len(methods_with_intervals()[method]) == 0

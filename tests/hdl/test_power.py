@@ -4,6 +4,8 @@
 
 import numpy as np
 import pytest
+from amaranth.hdl import ResetInserter, Signal, Value
+from amaranth.sim import Simulator
 
 from golden.fixed import Fixed
 from golden.power import Power
@@ -56,6 +58,63 @@ def test_every_exponent():
         beats = {"operand": codes, "dark": dark.astype(np.uint8)}
         run = simulate(unit, beats, count=len(codes), constants={"exponent": exponent}, engine="auto")
         np.testing.assert_array_equal(run.beats, expected)
+
+
+@pytest.mark.parametrize("form", ["pipelined", "sequential"])
+def test_stiff_largest_and_smallest_codes(form):
+    """The ends of the word and of the sphere in turn, lit and dark: no beat sees anything of the last."""
+    parameters = Power()
+    unit, format, one = PowerUnit(parameters, form), parameters.operand_format, ONE_SQUARED.codes.item()
+    codes = np.tile([format.min_code, format.max_code, -one, one, 0, one // 2], 10)
+    dark = np.arange(60) % 7 == 0
+    beats = {"operand": codes, "dark": dark.astype(np.uint8)}
+    for exponent in (1, 2, 3, 10, 100, 500, 1000):
+        expected = parameters.compute(Fixed(format, codes), dark, exponent).codes
+        constants = {"exponent": exponent}
+        run = simulate(unit, beats, count=len(codes), constants=constants, engine="auto")
+        np.testing.assert_array_equal(run.beats, expected)
+
+
+@pytest.mark.parametrize("clock", [0, 1, 2, 6, 23, 41, 42, 43, 44])
+def test_stiff_reset_in_mid_power(clock):
+    """The sequential form, so many clocks after it took a cosine: the next is raised as from power-up."""
+    parameters = Power("one_minus_cosine")
+    unit, exponent = PowerUnit(parameters, "sequential"), 1000
+    codes = np.array([1 << 14, 1 << 15])
+    expected = parameters.compute(Fixed(parameters.operand_format, codes), np.zeros(2, bool), exponent).codes
+    assert 0 < expected[1] < expected[0]
+    reset = Signal()
+    simulator = Simulator(ResetInserter(reset)(unit))
+    simulator.add_clock(1e-6)
+    seen = []
+
+    async def bench(context):
+        context.set(unit.constants.exponent, exponent)
+        context.set(unit.o.ready, 1)
+        context.set(unit.i.valid, 1)
+        context.set(Value.cast(unit.i.payload.operand), int(codes[0]))
+        await context.tick()
+        context.set(unit.i.valid, 0)
+        for _ in range(clock):
+            await context.tick()
+        context.set(reset, 1)
+        await context.tick()
+        context.set(reset, 0)
+        context.set(unit.i.valid, 1)
+        context.set(Value.cast(unit.i.payload.operand), int(codes[1]))
+        # Taken in at once.
+        assert context.get(unit.i.ready)
+        assert not context.get(unit.o.valid)
+        await context.tick()
+        context.set(unit.i.valid, 0)
+        for wait in range(100):
+            if context.get(unit.o.valid):
+                seen.append((wait, context.get(Value.cast(unit.o.payload))))
+            await context.tick()
+
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert seen == [(unit.latency - 1, expected[1])]
 
 
 def test_unknown_form_is_refused():

@@ -7,8 +7,9 @@ from amaranth.sim import Simulator
 
 from golden.fixed import Fixed
 from golden.gpq import GPQ
+from golden.middle_normal import MiddleNormal
 from golden.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
-from golden.unit_vector import COMPONENT
+from golden.unit_vector import COMPONENT, quantise
 from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
 from sim.engine import simulate
 
@@ -47,7 +48,7 @@ def test_no_gap_between_spans(form):
 
 
 @pytest.mark.parametrize("form", QUADRATIC_FORMS)
-def test_short_spans_come_seven_clocks_apart(form):
+def test_stiff_short_spans_come_seven_clocks_apart(form):
     parameters = QuadraticEvaluator(form)
     unit = QuadraticEvaluatorUnit(parameters)
     lengths = np.r_[1, 0, 2, 0, 0, 3, 1, 1, 2]
@@ -95,6 +96,33 @@ def test_engines_agree(form):
     np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
 
 
+@pytest.mark.parametrize("form", QUADRATIC_FORMS)
+def test_stiff_angles_and_lengths(normal_pairs, form):
+    """Normals of every angle, opposite ones too, over every length of the list; and words at their ends."""
+    angles = np.repeat([0, 1e-4, 1, 45, 89.9, 90, 90.01, 135, 180], 5)
+    lengths = np.tile([1, 2, 3, 16, 4095], 9)
+    left, right = normal_pairs(np.random.default_rng(8), len(angles), angles)
+    left, right = (Fixed(COMPONENT, quantise(normals)) for normals in (left, right))
+    middle, _ = MiddleNormal().compute(left, right)
+    real = [word.codes for word in GPQ().compute(left, middle, right)]
+    corner = np.array(np.meshgrid(*[[0, 1]] * 3)).reshape(3, -1)
+    ends = [
+        np.where(pick, f.max_code, f.min_code)[:, np.newaxis].repeat(3, 1)
+        for f, pick in zip(FORMATS, corner, strict=True)
+    ]
+    words = [np.vstack([both, one]) for both, one in zip(real, ends, strict=True)]
+    lengths = np.r_[lengths, np.full(8, 33)]
+    parameters = QuadraticEvaluator(form)
+    span = np.repeat(np.arange(len(lengths)), lengths)
+    index = np.arange(len(span)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    coefficients = (Fixed(f, word) for f, word in zip(FORMATS, words, strict=True))
+    expected = parameters.compute(*coefficients, lengths, span, index).codes
+    beats = {**dict(zip("gpq", words, strict=True)), "length": lengths}
+    stalls = {"output_stalls": np.random.default_rng(9).random(1009) < 0.2}
+    run = simulate(QuadraticEvaluatorUnit(parameters), beats, count=len(expected), engine="auto", **stalls)
+    np.testing.assert_array_equal(run.beats, expected)
+
+
 def test_lengths_over_the_whole_range():
     parameters = QuadraticEvaluator()
     beats, expected = spans(parameters, np.r_[np.arange(40, 4095, 97), 4094, 4095], 6)
@@ -103,7 +131,7 @@ def test_lengths_over_the_whole_range():
 
 
 @pytest.mark.parametrize("form", QUADRATIC_FORMS)
-def test_reset_in_mid_span_leaves_nothing(form):
+def test_stiff_reset_in_mid_span_leaves_nothing(form):
     unit = QuadraticEvaluatorUnit(QuadraticEvaluator(form))
     reset = Signal()
     simulator = Simulator(ResetInserter(reset)(unit))

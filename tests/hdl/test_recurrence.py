@@ -5,12 +5,23 @@ import pytest
 from amaranth.hdl import ResetInserter, Signal, Value
 from amaranth.sim import Simulator
 
-from golden.fixed import Fixed
+from golden.fixed import SQ, Fixed
 from golden.recurrence import Recurrence
 from hdl.recurrence import RecurrenceUnit
 from sim.engine import simulate
 
-VARIANTS = [Recurrence(), Recurrence(guard_bits=20), Recurrence("reinsch", 24, 20), Recurrence("direct")]
+VARIANTS = [
+    Recurrence(),
+    Recurrence(guard_bits=20),
+    Recurrence("reinsch", 24, 20),
+    Recurrence("direct"),
+    Recurrence(interleave=4),
+    Recurrence("reinsch", 24, 20, interleave=4),
+    Recurrence("direct", interleave=4),
+    Recurrence(interleave=4, result_format=SQ(2, 25)),
+    Recurrence("direct", interleave=4, result_format=SQ(2, 25)),
+]
+FORMS = [Recurrence(), Recurrence("direct"), Recurrence(interleave=4), Recurrence("direct", interleave=4)]
 COPIES = ("diffuse", "highlight")
 
 
@@ -19,7 +30,7 @@ def spans(recurrence, lengths, seed):
     rng = np.random.default_rng(seed)
     lengths = np.asarray(lengths)
     count = len(lengths)
-    step = np.radians(rng.uniform(0, 90, count)) / np.maximum(lengths - 1, 1)
+    step = np.radians(rng.uniform(0, 89, count)) / np.maximum(lengths - 1, 1)
     coefficient, shift = recurrence.coefficient(step)
     format, any_size = recurrence.coefficient_format, np.arange(0, count, 3)
     coefficient.codes[any_size] = rng.integers(format.min_code, format.max_code + 1, len(any_size))
@@ -35,8 +46,8 @@ def spans(recurrence, lengths, seed):
         start = recurrence.start(rng.uniform(-1, 1, count), rng.uniform(-np.pi, np.pi, count), step)
         words = [word.codes.copy() for word in start]
         for word in words:
-            word[any_size] = rng.integers(format.min_code, format.max_code + 1, len(any_size))
-            word[any_size[::5]] = rng.choice([format.min_code, format.max_code], len(any_size[::5]))
+            word[any_size] = rng.integers(format.min_code, format.max_code + 1, word[any_size].shape)
+            word[any_size[::5]] = rng.choice([format.min_code, format.max_code], word[any_size[::5]].shape)
         beats[copy] = dict(zip(("first", "second"), words, strict=True))
         start = (Fixed(format, word) for word in words)
         expected[copy] = recurrence.compute(*start, coefficient, shift, span, index).codes
@@ -77,14 +88,14 @@ def test_equals_twin_under_stalls(recurrence):
         assert_equal(run, expected)
 
 
-@pytest.mark.parametrize("recurrence", [Recurrence(), Recurrence("direct")], ids=str)
+@pytest.mark.parametrize("recurrence", FORMS, ids=str)
 def test_longest_span(recurrence):
     beats, expected = spans(recurrence, [4095] * 6, 4)
     run = simulate(RecurrenceUnit(recurrence), beats, count=6 * 4095, engine="auto")
     assert_equal(run, expected)
 
 
-@pytest.mark.parametrize("recurrence", [Recurrence(), Recurrence("direct")], ids=str)
+@pytest.mark.parametrize("recurrence", FORMS, ids=str)
 def test_engines_agree(recurrence):
     rng = np.random.default_rng(5)
     lengths = rng.integers(0, 8, 30)
@@ -100,40 +111,51 @@ def test_engines_agree(recurrence):
     np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
 
 
-@pytest.mark.parametrize("recurrence", [Recurrence(), Recurrence("direct")], ids=str)
-def test_reset_in_mid_span_leaves_nothing(recurrence):
+@pytest.mark.parametrize("recurrence", FORMS, ids=str)
+@pytest.mark.parametrize("clock", [1, 2, 3, 4, 5, 8])
+def test_reset_in_mid_span_leaves_nothing(recurrence, clock):
     unit = RecurrenceUnit(recurrence)
     reset = Signal()
     simulator = Simulator(ResetInserter(reset)(unit))
     simulator.add_clock(1e-6)
-    span = unit.i.payload
-    found = []
+    phases = recurrence.interleave
+    beats, expected = spans(recurrence, [9, 6], 6)
+    found = {name: [] for name in expected}
+
+    def code(value):
+        width = recurrence.state_format.width
+        return sum((int(word) & ((1 << width) - 1)) << (width * place) for place, word in enumerate(value))
 
     async def drive(context):
-        context.set(unit.o.ready, 1)
-        for first, second, length, clocks in ((0.75, 0.5, 9, 17), (0.25, 0.125, 2, 30)):
-            context.set(span.length, length)
-            for copy in COPIES:
-                context.set(span[copy].first, first)
-                context.set(span[copy].second, second)
+        def offer(span):
+            payload = unit.i.payload
             context.set(unit.i.valid, 1)
+            for copy in COPIES:
+                for word in ("first", "second"):
+                    value = beats[copy][word].reshape(2, phases)[span]
+                    context.set(Value.cast(payload[copy][word]), code(value))
+            for name in beats.keys() - set(COPIES):
+                context.set(Value.cast(payload[name]), int(beats[name][span]))
+
+        context.set(unit.o.ready, 1)
+        offer(0)
+        await context.tick()
+        context.set(unit.i.valid, 0)
+        await context.tick().repeat(clock)
+        context.set(reset, 1)
+        await context.tick()
+        context.set(reset, 0)
+        assert not context.get(unit.o.valid)
+        assert context.get(unit.i.ready)
+        offer(1)
+        for _ in range(40):
+            if context.get(unit.o.valid):
+                for name, values in found.items():
+                    values.append(context.get(Value.cast(unit.o.payload[name])))
             await context.tick()
             context.set(unit.i.valid, 0)
-            for _ in range(clocks):
-                if context.get(unit.o.valid) and length == 2:
-                    payload = unit.o.payload
-                    found.append(
-                        [context.get(Value.cast(field)) for field in (payload.diffuse, payload.last)]
-                    )
-                await context.tick()
-            context.set(reset, 1)
-            await context.tick()
-            context.set(reset, 0)
-            assert not context.get(unit.o.valid)
-            assert context.get(unit.i.ready)
 
     simulator.add_testbench(drive)
     simulator.run()
-    # Coefficient 0: the second value is given, or the given difference away.
-    second = 0.125 if recurrence.form == "direct" else 0.375
-    assert found == [[0.25 * 2**17, 0], [second * 2**17, 1]]
+    for name, values in found.items():
+        np.testing.assert_array_equal(values, expected[name][9:], err_msg=name)

@@ -1,10 +1,12 @@
 """Direct renormaliser: RTL against its twin, clock by clock."""
 
 import numpy as np
+from amaranth.hdl import ResetInserter, Signal, Value
+from amaranth.sim import Simulator
 
 from golden.fixed import Fixed
 from golden.renormaliser import Renormaliser
-from golden.unit_vector import COMPONENT
+from golden.unit_vector import COMPONENT, ONE
 from hdl.renormaliser import RenormaliserUnit
 
 
@@ -33,3 +35,55 @@ def test_every_segment_and_its_ends(verify):
     normals, outside = parameters.compute(Fixed(COMPONENT, codes))
     assert set(outside.tolist()) == {True, False}
     verify(RenormaliserUnit(), codes, {"normal": normals.codes, "outside": outside})
+
+
+def test_stiff_words_and_lengths(verify):
+    """Length 0, 1 +- 1/256, one code off every border, every corner of the word; twice in opposite signs."""
+    low, high = COMPONENT.min_code, COMPONENT.max_code
+    corners = np.array(np.meshgrid(*[[low, -1, 0, 1, high]] * 3)).reshape(3, -1).T
+    axes = ONE * np.vstack([np.eye(3, dtype=int), -np.eye(3, dtype=int)])
+    slanted = np.round(ONE * np.array([[0.6, 0.8, 0], [0.48, 0.6, 0.64]])).astype(int)
+    near = [np.round(slanted * scale).astype(int) for scale in (1 - 1 / 256, 1, 1 + 1 / 256)]
+    codes = np.vstack([corners, axes, *near, *(-v for v in near), axes - np.sign(axes)])
+    normals, outside = Renormaliser().compute(Fixed(COMPONENT, codes))
+    assert outside[(codes == 0).all(axis=1)].all()
+    verify(RenormaliserUnit(), codes, {"normal": normals.codes, "outside": outside})
+
+
+def test_stiff_reset_leaves_nothing():
+    """Reset with 1 to 13 vectors taken in: none of them comes out, and the next one does, at its clock."""
+    unit = RenormaliserUnit()
+    reset = Signal()
+    simulator = Simulator(ResetInserter(reset)(unit))
+    simulator.add_clock(1e-6)
+    expected = Renormaliser().compute(Fixed(COMPONENT, np.array([[80000, -60000, 50000]])))[0].codes[0]
+
+    async def send(context, codes):
+        for c in range(3):
+            context.set(Value.cast(unit.i.payload[c]), codes[c])
+        context.set(unit.i.valid, 1)
+        assert context.get(unit.i.ready)
+        await context.tick()
+        context.set(unit.i.valid, 0)
+
+    async def drive(context):
+        context.set(unit.o.ready, 1)
+        for before in range(1, 14):
+            for k in range(before):
+                await send(context, (90000, 70000, k))
+            context.set(reset, 1)
+            await context.tick()
+            context.set(reset, 0)
+            await send(context, (80000, -60000, 50000))
+            for _ in range(unit.latency - 1):
+                assert not context.get(unit.o.valid)
+                await context.tick()
+            assert context.get(unit.o.valid)
+            found = [context.get(Value.cast(unit.o.payload.normal[c]).as_signed()) for c in range(3)]
+            assert found == expected.tolist()
+            assert not context.get(unit.o.payload.outside)
+            await context.tick()
+            assert not context.get(unit.o.valid)
+
+    simulator.add_testbench(drive)
+    simulator.run()

@@ -15,7 +15,7 @@ from amaranth.lib import data, enum, fifo, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
-from golden.pipeline import ShadingPipeline
+from golden.pipeline import METHODS, ShadingPipeline
 from golden.quadratic_evaluator import QuadraticEvaluator
 from golden.specular import Specular
 from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
@@ -23,6 +23,8 @@ from hdl.angular_setup import AngularSetupUnit
 from hdl.arccos import ArccosUnit, HalfChordUnit
 from hdl.bisection import BisectionUnit
 from hdl.bisection_chain import BisectionChainUnit
+from hdl.chord import ChordUnit
+from hdl.chord_setup import ChordSetupUnit
 from hdl.difference_accumulator import DifferenceAccumulatorUnit
 from hdl.difference_setup import DifferenceSetupUnit
 from hdl.diffuse import DiffuseUnit
@@ -211,6 +213,20 @@ CORES = {
     "adaptive_normaliser": AdaptiveNormaliserUnit,
     "pipeline": ShadingPipelineUnit,
     "pipeline_lin": lambda: ShadingPipelineUnit(ShadingPipeline(model="cosquad_lin", lights=3)),
+    "chord": ChordUnit,
+    "chord_setup": ChordSetupUnit,
+    "chord_setup_of_two_lights": lambda: ChordSetupUnit(lights=2, initiation_interval=1),
+    # One of each method; `quadratic` is above.
+    **{
+        f"pipeline_{method.replace('-', '_')}": lambda method=method: ShadingPipelineUnit(
+            ShadingPipeline(method)
+        )
+        for method in METHODS
+        if method != "quadratic"
+    },
+    "pipeline_by_chord": lambda: ShadingPipelineUnit(
+        ShadingPipeline("linear", "blinn", operand="one_minus_cosine")
+    ),
 }
 
 
@@ -325,9 +341,11 @@ def test_text_is_plain(texts, name):
     assert text.isascii()
     assert text.endswith("\n")
     assert "\\" not in text
-    # A memory's read register that starts at 0 in Amaranth says so in an attribute.
+    # A memory's read register that starts at 0 in Amaranth says so in an attribute, for the bits that do.
     attributes = re.findall(r"\(\*(?!\))(.*?)\*\)", text)
-    assert all(re.fullmatch(r" parallel_case | init = \d+'h0+ ", attribute) for attribute in attributes)
+    assert all(
+        re.fullmatch(r" parallel_case | init = \d+'(h0+|b[0x]+) ", attribute) for attribute in attributes
+    )
     assert not re.search(r"\b(logic|always_comb|always_ff|always_latch|Yosys|/work|src)\b", text)
     assert not re.search(r"'[01xz]\b", text)
     modules = re.findall(r"^module (\w+)", text, re.MULTILINE)

@@ -27,6 +27,7 @@ from golden.scene import Scene
 from sim.cli import main
 from sim.frame import FrameSimulator
 from sim.mesh import load_mesh
+from sim.scene_file import read_scene_file
 
 PROGRAM = [sys.executable, "-c", "import sys; from sim.cli import main; sys.exit(main())"]
 SMALL = ["teapot", "--triangles", "500", "--size", "64x48"]
@@ -172,6 +173,20 @@ KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS)}"
         (["--specular", "0.1,0.2"], "--specular 0.1,0.2", "not a colour; give #rrggbb"),
         (["--background", "#12345"], "--background #12345", "not a colour"),
         (["--vcd", "a.vcd", "--engine", "cxxrtl"], "--vcd", "use --engine pysim"),
+        (["--highlight", "cross"], "--highlight cross", "use one of dot, chord"),
+        (["--setup-interval", "0"], "--setup-interval 0", "from 1 to 26"),
+        (["--frames", "0"], "--frames 0", "from 1 to 9999"),
+        (["--frames", "2", "--jobs", "0"], "--jobs 0", "from 1 to 1024"),
+        (["--jobs", "2"], "--jobs", "give --frames, too"),
+        (["--cluster", ""], "--cluster", "give --frames, too"),
+        (["--frames", "2", "--cluster", ""], "--cluster ", "as tcp://host:8786"),
+        (["--frames", "2", "--cluster", "a:1", "--jobs", "2"], "--jobs", "leave out --jobs or --cluster"),
+        (["--frames", "2", "--compare", "a.png"], "--compare a.png", "is for one frame"),
+        (["--frames", "2", "--vcd", "a.vcd"], "--vcd a.vcd", "is for one frame"),
+        (["--frames", "2", "-o", "a.jpg"], "a.jpg", "use .gif or .png"),
+        (["--frames", "2", "-o", "no/a.gif"], "no/a.gif", "there is no folder no"),
+        (["--frames", "2", "-o", "a.gif", "--json", "a-0002.png"], "a-0002.png", "another output"),
+        (["--frames", "2", "--view", "0,1,0"], "--view 0,1,0", "looks along the axis"),
     ],
 )
 def test_bad_option(refused, options, thing, says):
@@ -179,10 +194,13 @@ def test_bad_option(refused, options, thing, says):
 
 
 @pytest.mark.parametrize("command", [["render", "teapot"], ["verilog", "-o", "core.v"]])
-def test_method_that_cannot_serve_the_model(refused, monkeypatch, command):
-    monkeypatch.setitem(METHODS, "quadratic", ("cosquad", "cosquad7"))
-    says = "method quadratic cannot serve it; use one of cosquad, cosquad7"
-    refused(*command, "--method", "quadratic", "--model", "blinn", thing="--model blinn", says=says)
+def test_design_that_cannot_be(refused, command):
+    says = "the pipeline finds N.H, not R.V; use one of cosquad, "
+    refused(*command, "--model", "phong", thing="--model phong", says=says)
+    says = "method chord finds no normals"
+    refused(*command, "--method", "chord", "--highlight", "dot", thing="--highlight dot", says=says)
+    says = "method linear is not built for it; "
+    refused(*command, "--method", "linear", "--setup-interval", "26", thing="--setup-interval 26", says=says)
 
 
 def test_triangles_of_a_file(refused):
@@ -224,6 +242,282 @@ def test_wrong_command(capsys, arguments, says):
     assert (output, files()) == ("", {})
     assert re.fullmatch(r"blysk: [^\n]+; see blysk --help\n", line)
     assert says in line
+
+
+# Scene files.
+
+SCENE = """
+size = [64, 48]
+background = 0.5
+back_faces = "show"
+[mesh]
+file = "a.obj"
+crease = 180
+[camera]
+projection = "orthographic"
+view = [0, 1, 3]
+[[lights]]
+direction = [1, 1, 1]
+[[lights]]
+direction = [-1, 1, 1]
+color = [0.5, 0.25, 0]
+[material]
+ambient = 0.1
+diffuse = [0.5, 0.25, 0.125]
+specular = 0.75
+exponent = 20
+[pipeline]
+method = "linear"
+model = "cosquad7"
+"""
+SCENE_OPTIONS = [
+    *("--size", "64x48", "--background", "0.5", "--back-faces", "show", "--crease", "180"),
+    *("--projection", "orthographic", "--view", "0,1,3", "--light", "1,1,1"),
+    *("--light=-1,1,1,0.5,0.25,0", "--ambient", "0.1", "--diffuse", "0.5,0.25,0.125"),
+    *("--specular", "0.75", "--exponent", "20", "--method", "linear", "--model", "cosquad7"),
+]
+
+
+@pytest.fixture
+def scenes():
+    """A folder with a scene file and its mesh."""
+    Path("scenes").mkdir()
+    Path("scenes/a.obj").write_text(box("obj"))
+    Path("scenes/a.toml").write_text(SCENE)
+
+
+def figures_of(name):
+    figures = json.loads(Path(name).read_text())
+    del figures["seconds"], figures["simulated_pixels_per_second"]
+    return figures
+
+
+def test_scene_file_says_what_the_options_say(scenes, capsys):
+    assert main(["render", "scenes/a.toml", "--json", "file.json"]) == 0
+    assert main(["render", "scenes/a.obj", *SCENE_OPTIONS, "-o", "b.png", "--json", "options.json"]) == 0
+    assert capsys.readouterr().err == ""
+    assert Path("a-blysk.png").read_bytes() == Path("b.png").read_bytes()
+    assert figures_of("file.json") == figures_of("options.json")
+    figures = figures_of("file.json")
+    assert (figures["method"], figures["model"], figures["exponent"]) == ("linear", "cosquad7", 20)
+    assert (figures["lights"], figures["width"], figures["mesh"]) == (2, 64, "a")
+
+
+def test_options_go_before_the_scene_file(scenes, capsys):
+    given = [
+        "--size",
+        "32x24",
+        "--exponent",
+        "70",
+        "--light",
+        "0,0,1",
+        "--method",
+        "quadratic",
+        "--model",
+        "cosquad",
+        "--view",
+        "1,2,3",
+    ]
+    assert main(["render", "scenes/a.toml", *given, "-o", "a.png", "--json", "a.json"]) == 0
+    options = [*SCENE_OPTIONS]
+    for name in ("--light", "--light=-1,1,1,0.5,0.25,0"):
+        place = options.index(name)
+        del options[place : place + 1 + ("=" not in name)]
+    assert main(["render", "scenes/a.obj", *options, *given, "-o", "b.png", "--json", "b.json"]) == 0
+    assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
+    assert figures_of("a.json") == figures_of("b.json")
+    assert (figures_of("a.json")["lights"], figures_of("a.json")["width"]) == (1, 32)
+    # A default that is written out is given, too.
+    assert main(["render", "scenes/a.toml", "--exponent", "50", "--json", "a.json"]) == 0
+    assert figures_of("a.json")["exponent"] == 50
+
+
+def test_place_of_the_camera(capsys):
+    """A camera by its place, in any unit of the mesh, and the middle of the mesh as its target."""
+
+    def draw(unit, name, place):
+        mesh = trimesh.creation.box((2, 1, 1))
+        vertices = [" ".join(f"{value * unit:.17g}" for value in vertex) for vertex in mesh.vertices]
+        text = "".join(f"v {vertex}\n" for vertex in vertices)
+        text += "".join("f {} {} {}\n".format(*(face + 1)) for face in mesh.faces)
+        Path("a.obj").write_text(text)
+        head = "size = [64, 48]\nmesh.file = 'a.obj'\npipeline.method = 'linear'\n[camera]\n"
+        Path(f"{name}.toml").write_text(head + place.format(x=1 * unit, y=2 * unit, z=3 * unit, up=unit / 2))
+        assert main(["render", f"{name}.toml", "-o", f"{name}.png"]) == 0
+        assert capsys.readouterr().err == ""
+        return picture(f"{name}.png")
+
+    target = "position = [{x}, {y}, {z}]\ntarget = [0, {up}, 0]\n"
+    pictures = [draw(2.0**power, f"target{power}", target) for power in (-600, 0, 600)]
+    assert np.array_equal(pictures[0], pictures[1])
+    assert np.array_equal(pictures[2], pictures[1])
+    middle = draw(1.0, "middle", "position = [{x}, {y}, {z}]\n")
+
+    mesh = load_mesh("a.obj").mesh
+    for expected, place in ((pictures[1], (0, 0.5, 0)), (middle, (0, 0, 0))):
+        scene = Scene(
+            mesh=mesh,
+            camera=Camera((1, 2, 3), place, projection="perspective", near=0.001),
+            width=64,
+            height=48,
+            material=Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0.6, 0.6, 0.6), 50),
+            lights=[Light((-0.5, 0.8, 0.7))],
+            background=(int("1a", 16) / 255, int("1c", 16) / 255, int("20", 16) / 255),
+        )
+        assert np.array_equal(FrameSimulator(ShadingPipeline("linear")).render(scene).image, expected)
+    # --view takes the place of the file's position.
+    options = ["--size", "64x48", "--method", "linear", "--view", "1,2,3"]
+    assert main(["render", "middle.toml", "--view", "1,2,3", "-o", "again.png"]) == 0
+    assert main(["render", "a.obj", *options, "-o", "view.png"]) == 0
+    assert np.array_equal(picture("again.png"), picture("view.png"))
+
+
+def test_no_light(capsys):
+    """Ambient light only."""
+    Path("a.toml").write_text("lights = []\nsize = [16, 12]\nmesh.file = 'teapot'\nmaterial.ambient = 0.2\n")
+    assert main(["render", "a.toml"]) == 0
+    assert capsys.readouterr().err == ""
+    colors = np.unique(picture("a-blysk.png").reshape(-1, 3), axis=0)
+    assert colors.tolist() == [[0x1A, 0x1C, 0x20], [51, 51, 51]]
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "thing", "says"),
+    [
+        ("mesh.file = 'no.obj'", [], "a.toml, mesh.file", "no.obj, there is no such file"),
+        ("mesh.file = 'b.toml'", [], "a.toml, mesh.file", "unknown mesh type '.toml'"),
+        ("mesh.file = '.'", [], "a.toml, mesh.file", "is no file's name"),
+        ("mesh.file = 'empty.obj'", [], "a.toml, mesh.file", "empty.obj, the file is empty"),
+        ("mesh.file = 'empty.obj'", ["--triangles", "100"], "--triangles 100", "leave it out"),
+        ("mesh.file = 'teapot'\nexponent = 3", [], "a.toml, exponent", "unknown key"),
+        ("mesh.file = 'teapot'\nsize = ]", [], "a.toml", "is no TOML"),
+        (
+            "pipeline = {method = 'chord', highlight = 'dot'}",
+            [],
+            "a.toml, pipeline.highlight",
+            "leave it out",
+        ),
+        (
+            "pipeline = {setup_interval = 26}",
+            ["--method", "linear"],
+            "a.toml, pipeline.setup_interval",
+            "linear",
+        ),
+        ("lights = [{direction = [1, 1, 1], color = 30}]", [], "a.toml, lights", "make the light darker"),
+        (
+            "camera.position = [0, 0, 0]\ncamera.target = [0, 0, 0]",
+            [],
+            "a.toml, camera.position",
+            "its target",
+        ),
+        ("camera.position = [1e300, 0, 0]", [], "a.toml, camera.position", "too far away"),
+        ("camera.view = [0, 1, 0]", ["--frames", "2"], "a.toml, camera.view", "looks along the axis"),
+        (
+            "camera.position = [0, 9, 0]\ncamera.target = [0, 0, 0]",
+            ["--frames", "2"],
+            "a.toml, camera.position",
+            "axis",
+        ),
+        ("", ["--json", "a.toml"], "a.toml", "another output"),
+    ],
+)
+def test_bad_scene(refused, text, options, thing, says):
+    Path("empty.obj").touch()
+    Path("b.toml").touch()
+    mesh = "" if "mesh." in text else "mesh.file = 'teapot'\n"
+    Path("a.toml").write_text(mesh + text)
+    refused("render", "a.toml", *options, thing=thing, says=says)
+
+
+def test_no_scene(refused):
+    refused("render", "no.toml", thing="no.toml", says="there is no such file")
+    Path("folder.toml").mkdir()
+    refused("render", "folder.toml", thing="folder.toml", says="is a folder")
+
+
+# Turntables.
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory):
+    """One turntable with its figures: its folder and what it printed."""
+    folder = tmp_path_factory.mktemp("turned")
+    arguments = ["render", *TINY, "--frames", "5", "--jobs", "2", "--method", "linear"]
+    with contextlib.redirect_stdout(io.StringIO()) as output:
+        assert main([*arguments, "-o", str(folder / "a.gif"), "--json", str(folder / "a.json")]) == 0
+    return folder, output.getvalue()
+
+
+def test_files_of_a_turntable(turned):
+    folder, output = turned
+    names = [f"a-000{number}.png" for number in range(1, 6)]
+    assert sorted(path.name for path in folder.iterdir()) == sorted(["a.gif", "a.json", *names])
+    frames = [picture(folder / name) for name in names]
+    assert {frame.shape for frame in frames} == {(12, 16, 3)}
+    assert len({frame.tobytes() for frame in frames}) == 5
+    with Image.open(folder / "a.gif") as animation:
+        assert (animation.n_frames, animation.size) == (5, (16, 12))
+    for name in ("a-0001.png", "a-0005.png", "a.gif", "a.json"):
+        assert str(folder / name) in output
+
+
+def test_figures_of_a_turntable(turned):
+    folder, output = turned
+    figures = json.loads((folder / "a.json").read_text())
+    frames = figures["frames"]
+    assert [Path(frame["picture"]).name for frame in frames] == [
+        f"a-000{number}.png" for number in range(1, 6)
+    ]
+    for name in ("pixels", "visible_pixels", "clocks"):
+        assert figures[name] == sum(frame[name] for frame in frames)
+        assert f"{figures[name]:,}" in output
+    for name in ("arithmetic", "method", "total"):
+        errors = [frame[f"{name}_error"] for frame in frames]
+        worst = figures[f"{name}_error"]
+        for key in ("max_lsb", "p999_lsb", "rmse_lsb"):
+            assert worst[key] == max(error[key] for error in errors) > min(error[key] for error in errors)
+        assert worst["psnr_db"] == min(error["psnr_db"] for error in errors)
+        (row,) = re.findall(rf"^  {name} +([\d. ]+?)   [a-z]", output, re.MULTILINE)
+        values = [worst[key] for key in ERROR_NAMES]
+        assert [float(value) for value in row.split()] == pytest.approx(values, abs=0.005)
+
+
+def test_a_turntable_of_one_frame_is_the_frame(capsys):
+    assert main(["render", *TINY, "--frames", "1", "-o", "a.gif"]) == 0
+    assert main(["render", *TINY, "-o", "b.png"]) == 0
+    assert capsys.readouterr().err == ""
+    assert Path("a-0001.png").read_bytes() == Path("b.png").read_bytes()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_interrupt_of_a_turntable():
+    """Ctrl-C in a terminal reaches all processes: frames done stay, whole, and no process goes on."""
+    arguments = ["render", "teapot", "--triangles", "500", "--size", "64x48", "--engine", "pysim"]
+    process = subprocess.Popen(
+        [*PROGRAM, *arguments, "--frames", "200", "--jobs", "2", "-o", "a.gif"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        patience = time.monotonic() + 120
+        while not Path("a-0001.png").exists():
+            assert process.poll() is None
+            assert time.monotonic() < patience
+            time.sleep(0.02)
+        os.killpg(process.pid, signal.SIGINT)
+        # Returns when nobody holds the pipes any more: neither the program nor one of its workers.
+        output, errors = process.communicate(timeout=60)
+        assert (process.returncode, output, errors) == (130, "", "blysk: interrupted\n")
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    names = sorted(str(path) for path in files())
+    assert all(re.fullmatch(r"a-\d{4}\.png", name) for name in names), names
+    assert 1 <= len(names) < 200
+    for name in names:
+        assert picture(name).shape == (48, 64, 3)
 
 
 # Outputs that cannot be.
@@ -275,6 +569,16 @@ def test_help_has_an_example(capsys, arguments):
     output, errors = capsys.readouterr()
     assert errors == ""
     assert re.search(r"Examples?:\n +blysk (render|verilog) ", output)
+
+
+def test_help_names_every_key_of_a_scene_file(capsys):
+    assert main(["render", "--help"]) == 0
+    (keys,) = re.findall(r"Keys of a scene file.*?\n\n", capsys.readouterr().out, re.DOTALL)
+    example = read_scene_file.__doc__.partition("::")[2].partition("The values'")[0]
+    names = re.findall(r"^ *(\w+) =|^ *(\[+\w+\]+)", example, re.MULTILINE)
+    assert len(names) > 20
+    for name in [*(first or second for first, second in names), "position", "target"]:
+        assert re.search(rf"(?<!\w){re.escape(name)}(?!\w)", keys), name
 
 
 def test_version(capsys):

@@ -14,6 +14,7 @@ from golden.frame_constants import FrameConstants
 from golden.geometry import Mesh
 from golden.interpolation import interpolate
 from golden.lighting import Light, Material
+from golden.middle_normal import MAX_SPAN_ANGLE
 from golden.pipeline import ShadingPipeline
 from golden.raster import rasterise
 from golden.renderer import shade_spans
@@ -59,8 +60,10 @@ def simulator():
 
 
 def twin_pixels(scene):
-    cut, _ = cut_wide_spans(rasterise(scene))
-    return cut, DESIGN.compute(quantise_spans(cut), FrameConstants.of(scene, DESIGN.lights))
+    cut, _ = cut_wide_spans(rasterise(scene), MAX_SPAN_ANGLE)
+    return cut, DESIGN.compute(
+        quantise_spans(cut, scene.mesh.material), FrameConstants.of(scene, DESIGN.lights)
+    )
 
 
 def test_frame_is_the_twin_after_a_depth_test(simulator):
@@ -238,3 +241,53 @@ def test_pixels_that_were_not_asked_for(simulator, monkeypatch):
     changed(monkeypatch, "x")
     with pytest.raises(SimulationError, match="answered with other pixels"):
         simulator.render(scene_of("240", (24, 18)))
+
+
+MATERIALS = (
+    Material((0.1, 0, 0), (0.7, 0.1, 0.1), (0.2, 0.3, 0.4), 5),
+    Material((0, 0.1, 0), (0.1, 0.5, 0.2), (0.5, 0.5, 0.5), 50),
+    Material((0, 0, 0.1), (0.2, 0.1, 0.6), (0.3, 0.2, 0.1), 400),
+)
+
+
+@pytest.mark.parametrize("engine", ["cxxrtl", "pysim"])
+def test_frame_of_three_materials(engine):
+    """Each pixel is that of a frame in its triangle's material alone, by the twin.
+
+    The materials are scattered over the triangles: the spans are in another order than without.
+    """
+    several = ShadingPipeline(lights=1, materials=3)
+    lone = scene_of("240", (40, 30) if engine == "cxxrtl" else (20, 15), lights=LIGHTS[:1])
+    faces = len(lone.mesh.faces)
+    mesh = dataclasses.replace(lone.mesh, material=np.random.default_rng(3).integers(0, 3, faces))
+    scene = dataclasses.replace(lone, mesh=mesh, material=MATERIALS)
+    frame = FrameSimulator(several, engine).render(scene)
+    assert frame.wide_spans == 0
+    raster = frame.raster
+    owner = np.full(scene.width * scene.height, -1)
+    owner[raster.pixel[raster.visible]] = mesh.material[raster.triangle[raster.span[raster.visible]]]
+    owner = owner.reshape(scene.height, scene.width)
+    assert np.bincount(owner[owner >= 0], minlength=3).min() > 20
+    one = ShadingPipeline(lights=1)
+    for index, material in enumerate(MATERIALS):
+        alone = dataclasses.replace(lone, material=material)
+        widest = min(several.interpolator.widest_span(material.exponent) for material in MATERIALS)
+        cut, _ = cut_wide_spans(rasterise(alone), widest)
+        spans = quantise_spans(cut, alone.mesh.material)
+        pixels = one.compute(spans, FrameConstants.of(alone, 1))
+        image = np.zeros((scene.height * scene.width, 3), dtype=np.uint8)
+        image[cut.pixel[cut.visible]] = pixels.color[cut.visible]
+        own = owner == index
+        assert np.array_equal(frame.image[own], image.reshape(frame.image.shape)[own])
+    assert (frame.image[owner < 0] == np.rint(np.multiply(BACKGROUND, 255))).all()
+    # And the figures are those of a frame in its own materials.
+    result = compare(scene, several, frame)
+    assert result.arithmetic_error.max_lsb <= 1
+    in_one = dataclasses.replace(scene, material=(MATERIALS[0],) * 3)
+    assert compare(in_one, several, frame).arithmetic_error.max_lsb > 20
+
+
+def test_other_numbers_of_materials(simulator):
+    scene = dataclasses.replace(scene_of("240", (8, 6)), material=MATERIALS)
+    with pytest.raises(ValueError, match="the pipeline has 1 materials, the scene 3"):
+        simulator.render(scene)

@@ -13,9 +13,14 @@ import pytest
 import trimesh
 
 import sim.mesh
+from golden.camera import Camera
+from golden.frame_constants import MAX_MATERIALS
 from golden.geometry import normalise
+from golden.lighting import Light, Material
+from golden.renderer import render
+from golden.scene import Scene
 from sim.errors import InputError
-from sim.mesh import SUFFIXES, LoadedMesh, load_mesh
+from sim.mesh import SUFFIXES, FileMaterial, LoadedMesh, load_mesh, surfaces
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -824,10 +829,29 @@ def test_damaged_bytes(tmp_path, suffix):
     assert refused > 0
 
 
-def test_reads_a_stream_of_the_whole_file_only(tmp_path, monkeypatch):
-    # Nothing but the file itself, and checked references, may be opened: no material or texture files.
+@pytest.mark.parametrize("kind", ["outside", "inside", "one material", "gltf"])
+def test_reads_the_file_and_checked_references_only(tmp_path, monkeypatch, kind):
+    # No material file outside the folder, no texture, and nothing at all where materials are not asked for.
     path = tmp_path / "a.obj"
-    path.write_text("mtllib ../../secret.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
+    library = "../../secret.mtl" if kind == "outside" else "a.mtl"
+    path.write_text(f"mtllib {library}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n")
+    (tmp_path / "a.mtl").write_text("newmtl a\nKd 1 0 0\nmap_Kd a.png\n")
+    expected = [str(path), str(tmp_path / "a.mtl")] if kind == "inside" else [str(path)]
+    if kind == "gltf":
+        path = tmp_path / "a.gltf"
+        document, buffer = mesh_gltf(
+            TRIANGLE,
+            [0, 1, 2],
+            images=[{"uri": "a.png"}, {"uri": "../secret.png"}],
+            textures=[{"source": 0}, {"source": 1}],
+            materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}],
+        )
+        document["meshes"][0]["primitives"][0]["material"] = 0
+        document["buffers"][0]["uri"] = "a.bin"
+        (tmp_path / "a.bin").write_bytes(buffer)
+        path.write_text(json.dumps(document))
+        expected = [str(path), str(tmp_path / "a.bin")]
+    (tmp_path / "a.png").write_bytes(b"no picture")
     opened = []
     original = io.open
 
@@ -837,5 +861,512 @@ def test_reads_a_stream_of_the_whole_file_only(tmp_path, monkeypatch):
 
     monkeypatch.setattr("builtins.open", watching)
     monkeypatch.setattr("io.open", watching)
-    load_mesh(str(path))
-    assert opened == [str(path)]
+    if kind == "outside":
+        check_refused(path, "outside its folder")
+    else:
+        load_mesh(str(path), materials=kind != "one material")
+    assert opened == expected
+
+
+# Materials
+
+
+RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def strip(count):
+    """Triangles side by side, the middle of number k at x = 2 k + 1/3, as lines of an OBJ file."""
+    lines = [f"v {2 * k + x} {y} 0" for k in range(count) for x, y in ((0, 0), (1, 0), (0, 1))]
+    return "\n".join(lines) + "\n", [f"f {3 * k + 1} {3 * k + 2} {3 * k + 3}\n" for k in range(count)]
+
+
+def by_place(loaded):
+    """Material of each triangle of a `strip`, None where it is missing, in order of its place."""
+    corner = loaded.mesh.vertices[loaded.mesh.faces].min(axis=1)[:, 0]
+    place = np.rint(corner / 2).astype(int)
+    result = [None] * (place.max() + 1)
+    for where, index in zip(place.tolist(), loaded.mesh.material.tolist(), strict=True):
+        assert result[where] is None
+        result[where] = loaded.materials[index]
+    return result
+
+
+def check_materials(loaded):
+    """What the materials of every loaded mesh promise."""
+    assert loaded.mesh.material.dtype == np.int64
+    assert loaded.mesh.material.shape == (len(loaded.mesh.faces),)
+    # Each is used, and no two are equal but for the name.
+    assert np.array_equal(np.unique(loaded.mesh.material), np.arange(len(loaded.materials)))
+    assert len({(m.diffuse, m.specular, m.exponent) for m in loaded.materials}) == len(loaded.materials)
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl", ".glb", ".gltf", "teapot"])
+def test_a_file_without_materials_has_one(tmp_path, suffix):
+    path = "teapot"
+    if suffix == ".gltf":
+        document, buffer = mesh_gltf(TRIANGLE, [0, 1, 2])
+        path = str(tmp_path / "a.gltf")
+        uri = "data:application/octet-stream;base64," + base64.b64encode(buffer).decode()
+        document["buffers"][0]["uri"] = uri
+        Path(path).write_text(json.dumps(document))
+    elif suffix != "teapot":
+        path = save(tmp_path / f"a{suffix}", without_normals(trimesh.creation.box()))
+    loaded = load_mesh(path, triangles=240)
+    check_materials(loaded)
+    assert (loaded.materials, loaded.ignored) == ((FileMaterial(),), ())
+
+
+MTL = """
+Kd 9 9 9
+newmtl red
+Ka 1 1 1
+Kd 1 0 0
+Ks .5 0.25 1e-1
+Ns 96.078431
+newmtl grey # the paint
+    kd 0 0 0
+\tKd\t0.5   # all channels
+illum 2
+newmtl none
+newmtl red
+Kd 0 0 1
+newmtl matt
+Ns 0
+"""
+
+
+def test_obj_materials(tmp_path):
+    vertices, faces = strip(7)
+    lines = ["red", "grey # the paint", "none", "red", "missing", "matt"]
+    text = "mtllib my paint.mtl\n" + vertices + faces[0]
+    text += "".join(f"usemtl {name}\n{face}" for name, face in zip(lines, faces[1:], strict=True))
+    (tmp_path / "a.obj").write_text(text)
+    (tmp_path / "my paint.mtl").write_text(MTL)
+    loaded = load_mesh(str(tmp_path / "a.obj"))
+    check_mesh(loaded.mesh)
+    check_materials(loaded)
+    red = FileMaterial("red", RED, (0.5, 0.25, 0.1), 96)
+    grey = FileMaterial("grey # the paint", (0.5, 0.5, 0.5))
+    # Faces of no material, of one that says nothing, and of one that is not there, are all alike.
+    nothing = FileMaterial("none")
+    matt = FileMaterial("matt", exponent=1)
+    assert by_place(loaded) == [nothing, red, grey, nothing, red, nothing, matt]
+    assert loaded.ignored == ("1 material name without a definition",)
+    one = load_mesh(str(tmp_path / "a.obj"), materials=False)
+    assert (one.materials, one.ignored) == ((FileMaterial("red"),), ())
+    assert np.array_equal(np.sort(one.mesh.vertices, axis=0), np.sort(loaded.mesh.vertices, axis=0))
+
+
+@pytest.mark.parametrize(
+    ("statement", "files"),
+    [
+        ("mtllib a.mtl b.mtl", {"a.mtl": "newmtl a\nKd 1 0 0", "b.mtl": "newmtl b\nKd 0 1 0"}),
+        (
+            "mtllib a.mtl\nmtllib ./b.mtl\r",
+            {"a.mtl": "newmtl a\r\nKd 1 0 0\r\n", "b.mtl": "newmtl b\nKd 0 1 0"},
+        ),
+        ("  mtllib\tsub/c d.mtl", {"sub/c d.mtl": "\ufeffnewmtl a\nKd 1 0 0\n  newmtl\tb \nKd 0 1 0"}),
+    ],
+)
+def test_spellings_of_material_files(tmp_path, statement, files):
+    (tmp_path / "sub").mkdir()
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    vertices, faces = strip(3)
+    # o and g make no difference, nor does where they stand; a comment is no statement.
+    text = f"o whole\n{statement}\n{vertices}g x\nusemtl a\no 7\n{faces[0]}# usemtl a\n\tusemtl \tb\r\n"
+    (tmp_path / "a.obj").write_bytes((text + "g y\no 1\n" + faces[1] + "usemtl\n" + faces[2]).encode())
+    loaded = load_mesh(str(tmp_path / "a.obj"))
+    expected = [FileMaterial("a", RED), FileMaterial("b", GREEN), FileMaterial()]
+    assert (by_place(loaded), loaded.ignored) == (expected, ())
+
+
+def test_material_names_with_a_number_sign(tmp_path):
+    # What looks like a comment is part of the name, if there is such a material, else a comment.
+    vertices, faces = strip(3)
+    (tmp_path / "a.mtl").write_text(
+        "newmtl Material #1\nKd 1 0 0\nnewmtl Material #2\nKd 0 1 0\nnewmtl c\nKd 0 0 1"
+    )
+    names = ("Material #1", "Material #2", "c # the last")
+    text = "".join(f"usemtl {name}\n{face}" for name, face in zip(names, faces, strict=True))
+    (tmp_path / "a.obj").write_text(f"mtllib a.mtl\n{vertices}{text}")
+    assert [m.diffuse for m in by_place(load_mesh(str(tmp_path / "a.obj")))] == [RED, GREEN, BLUE]
+
+
+def test_missing_material_file_is_told(tmp_path):
+    vertices, faces = strip(2)
+    (tmp_path / "a.obj").write_text(f"mtllib no.mtl\n{vertices}usemtl a\n{faces[0]}usemtl b\n{faces[1]}")
+    loaded = load_mesh(str(tmp_path / "a.obj"))
+    assert loaded.materials == (FileMaterial("a"),)
+    told = ("the material file 'no.mtl', which does not exist", "2 material names without a definition")
+    assert loaded.ignored == told
+
+
+def material_glb(path, materials, primitives, nodes=None, normals=None, **extra):
+    """A strip of triangles, one a primitive, of the materials of these indices; None is for none."""
+    document, buffer = mesh_gltf(TRIANGLE, [0, 1, 2], normals, **extra)
+    first = document["meshes"][0]["primitives"][0]
+    document["meshes"] = []
+    for index in primitives:
+        primitive = first if index is None else {**first, "material": index}
+        document["meshes"].append({"primitives": [primitive]})
+    if materials is not None:
+        document["materials"] = materials
+    places = range(len(primitives))
+    document["nodes"] = nodes or [{"mesh": k, "translation": [2 * k, 0, 0]} for k in places]
+    document["scenes"][0]["nodes"] = list(range(len(document["nodes"])))
+    path.write_bytes(glb(document, buffer))
+    return str(path)
+
+
+def base(*color, **other):
+    return {"pbrMetallicRoughness": {"baseColorFactor": list(color)}, **other}
+
+
+@pytest.mark.parametrize("normals", [None, [[0, 0, 1]] * 3])
+def test_gltf_materials(tmp_path, normals):
+    materials = [
+        base(0, 0, 1, 0.5, name="blue"),
+        base(9, 9, 9, 9, name="unused"),
+        {"name": "white"},
+        {"pbrMetallicRoughness": {"metallicFactor": 0.5}},
+        base(0, 0, 1, 1, name="blue too"),
+        base(1, 0.25, 0, 1),
+    ]
+    loaded = load_mesh(material_glb(tmp_path / "a.glb", materials, [5, None, 0, 2, 3, 4, 0], normals=normals))
+    check_mesh(loaded.mesh)
+    check_materials(loaded)
+    blue, white = FileMaterial("blue", BLUE), FileMaterial("white", (1.0, 1.0, 1.0))
+    assert by_place(loaded) == [
+        FileMaterial("", (1.0, 0.25, 0.0)),
+        FileMaterial(),
+        blue,
+        white,
+        white,
+        blue,
+        blue,
+    ]
+    one = load_mesh(str(tmp_path / "a.glb"), materials=False)
+    assert one.materials == (FileMaterial(),)
+    assert np.array_equal(one.mesh.vertices, loaded.mesh.vertices)
+    assert np.array_equal(one.mesh.normals, loaded.mesh.normals)
+
+
+def test_gltf_primitives_of_one_mesh(tmp_path):
+    """Points and lines among them, and the same mesh at a mirrored node: no part takes another's material."""
+    document, buffer = mesh_gltf(TRIANGLE, [0, 1, 2])
+    shifted = np.add(TRIANGLE, [2, 0, 0])
+    start = len(buffer)
+    buffer += shifted.astype("<f4").tobytes()
+    document["buffers"][0]["byteLength"] = len(buffer)
+    document["bufferViews"].append({"buffer": 0, "byteOffset": start, "byteLength": 36})
+    document["accessors"].append({"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC3"})
+    near, far = {"attributes": {"POSITION": 0}}, {"attributes": {"POSITION": 2}}
+    document["meshes"][0]["primitives"] = [
+        {**near, "mode": 0, "material": 0},
+        {**near, "mode": 1, "material": 2},
+        {**near, "mode": 3, "material": 2},
+        {**far, "material": 1},
+        {**near, "material": 0},
+    ]
+    document["materials"] = [base(1, 0, 0, 1), base(0, 1, 0, 1), base(0, 0, 1, 1)]
+    mirrored = {"mesh": 0, "scale": [-1, 1, 1], "translation": [7, 0, 0]}
+    document["nodes"] = [{"mesh": 0}, mirrored]
+    document["scenes"][0]["nodes"] = [0, 1]
+    (tmp_path / "a.glb").write_bytes(glb(document, buffer))
+    loaded = load_mesh(str(tmp_path / "a.glb"))
+    check_materials(loaded)
+    assert (face_normals(loaded.mesh) == [0, 0, 1]).all()
+    assert [m.diffuse for m in by_place(loaded)] == [RED, GREEN, GREEN, RED]
+
+
+@pytest.mark.parametrize("stored", [True, False])
+@pytest.mark.parametrize("mirror", [False, True])
+def test_material_of_a_face_survives_what_is_done_to_the_mesh(tmp_path, sphere, stored, mirror):
+    """Octants in 8 materials: flat triangles dropped, creases cut, vertices welded, a node that mirrors.
+
+    Each triangle's material is known from the place of its middle.
+    """
+    middle = sphere.vertices[sphere.faces].mean(axis=1)
+    octant = (middle > 0) @ [1, 2, 4]
+    rng = np.random.default_rng(4)
+    blobs = [np.asarray(sphere.vertices, "<f4").tobytes()]
+    accessors = [{"bufferView": 0, "componentType": 5126, "count": len(sphere.vertices), "type": "VEC3"}]
+    primitives = []
+    for index in range(8):
+        own = sphere.faces[octant == index]
+        # Every second one is between triangles without area.
+        own = np.stack([own, own[:, [0, 0, 1]]], axis=1).reshape(-1, 3)
+        blobs.append(own.astype("<u4").tobytes())
+        view = {"bufferView": index + 1, "componentType": 5125, "count": own.size, "type": "SCALAR"}
+        accessors.append(view)
+        attributes = {"POSITION": 0, "NORMAL": 0} if stored and index % 2 else {"POSITION": 0}
+        primitives.append({"attributes": attributes, "indices": index + 1, "material": 7 - index})
+    colors = rng.random((8, 4)).tolist()
+    node = {"mesh": 0, "scale": [-1, 2, 1]} if mirror else {"mesh": 0}
+    document, buffer = gltf(primitives, blobs, accessors, [node], materials=[base(*c) for c in colors])
+    (tmp_path / "a.glb").write_bytes(glb(document, buffer))
+    loaded = load_mesh(str(tmp_path / "a.glb"), crease_angle=5)
+    check_mesh(loaded.mesh)
+    check_materials(loaded)
+    assert loaded.dropped_faces == len(loaded.mesh.faces) == len(sphere.faces)
+    middle = loaded.mesh.vertices[loaded.mesh.faces].mean(axis=1) * [-1 if mirror else 1, 1, 1]
+    expected = np.array(colors)[7 - (middle > 0) @ [1, 2, 4], :3]
+    actual = np.array([m.diffuse for m in loaded.materials])[loaded.mesh.material]
+    assert np.array_equal(actual, expected)
+
+
+def test_material_of_dropped_faces_only_is_dropped(tmp_path):
+    text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 1 2\nusemtl b\nf 1 2 3\nusemtl c\n"
+    (tmp_path / "a.obj").write_text(text)
+    (tmp_path / "a.mtl").write_text("newmtl a\nKd 9 9 9\nnewmtl b\nKd 0 1 0\nnewmtl c\nKd x\n")
+    loaded = load_mesh(str(tmp_path / "a.obj"))
+    assert (loaded.materials, loaded.dropped_faces) == ((FileMaterial("b", GREEN),), 1)
+
+
+def test_textures_and_vertex_colours_are_told(tmp_path):
+    vertices, faces = strip(1)
+    (tmp_path / "a.mtl").write_text("newmtl a\nmap_Kd a.png\nmap_bump -bm 1 b.png\nnewmtl b\nmap_Kd c.png\n")
+    (tmp_path / "a.obj").write_text(f"mtllib a.mtl\n{vertices}usemtl a\n{faces[0]}")
+    assert load_mesh(str(tmp_path / "a.obj")).ignored == ("2 textures",)
+    (tmp_path / "a.obj").write_text("v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nf 1 2 3\n")
+    assert load_mesh(str(tmp_path / "a.obj")).ignored == ("vertex colours",)
+    textured = base(1, 0, 0, 1, normalTexture={"index": 0})
+    textured["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
+    path = material_glb(tmp_path / "a.glb", [textured, textured], [0])
+    assert load_mesh(path).ignored == ("2 textures",)
+    document, buffer = mesh_gltf(TRIANGLE, [0, 1, 2], TRIANGLE)
+    attributes = document["meshes"][0]["primitives"][0]["attributes"]
+    attributes["COLOR_0"] = attributes.pop("NORMAL")
+    (tmp_path / "a.glb").write_bytes(glb(document, buffer))
+    assert load_mesh(str(tmp_path / "a.glb")).ignored == ("vertex colours",)
+    box = trimesh.creation.box()
+    box.visual.vertex_colors = np.full((8, 4), 255, np.uint8)
+    assert load_mesh(save(tmp_path / "a.ply", box)).ignored == ("vertex colours",)
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".glb"])
+def test_most_materials(tmp_path, suffix):
+    """`MAX_MATERIALS` load, one more is refused; equal ones count as one, and unused ones not at all."""
+    count = MAX_MATERIALS + 1
+    vertices, faces = strip(count)
+
+    def saved(used, distinct):
+        colors = [(k % distinct / 2000, 0.0, 0.5) for k in range(count)]
+        if suffix == ".glb":
+            materials = [base(*color, 1) for color in colors]
+            return material_glb(tmp_path / "a.glb", materials, range(used))
+        (tmp_path / "a.mtl").write_text(
+            "".join(f"newmtl {k}\nKd {r!r} {g} {b}\n" for k, (r, g, b) in enumerate(colors))
+        )
+        text = "".join(f"usemtl {k}\n{faces[k]}" for k in range(used))
+        (tmp_path / "a.obj").write_text(f"mtllib a.mtl\n{vertices}{text}")
+        return str(tmp_path / "a.obj")
+
+    for used, distinct in ((MAX_MATERIALS, count), (count, MAX_MATERIALS)):
+        loaded = load_mesh(saved(used, distinct))
+        check_materials(loaded)
+        assert len(loaded.materials) == MAX_MATERIALS
+        given = [material.diffuse[0] for material in by_place(loaded)]
+        assert given == [k % distinct / 2000 for k in range(used)]
+    path = saved(count, count)
+    check_refused(path, f"it has {count} materials; the limit is {MAX_MATERIALS}", "with one material")
+    assert load_mesh(path, materials=False).materials == (FileMaterial("0" if suffix == ".obj" else ""),)
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("Kd nan 0 0", "material 'a' has Kd 'nan 0 0', not three numbers from 0 to 1"),
+        ("Kd 0 inf 0", "material 'a' has Kd"),
+        ("Kd 0 0 1.001", "material 'a' has Kd"),
+        ("Kd 0 0 -1e-9", "material 'a' has Kd"),
+        ("Kd", "material 'a' has Kd ''"),
+        ("Kd 0 0", "material 'a' has Kd"),
+        ("Kd 0 0 0 0", "material 'a' has Kd"),
+        ("Kd spectral red.rfl 1", "material 'a' has Kd 'spectral red.rfl 1'"),
+        ("Ks 0 0 \x00\x1b[2J", "material 'a' has Ks '0 0 ??[2J'"),
+        (f"Kd {'9' * 5000}", "..."),
+        ("Ns 1000.1", "material 'a' has Ns '1000.1', not a number from 0 to 1000"),
+        ("Ns -1", "material 'a' has Ns"),
+        ("Ns nan", "material 'a' has Ns"),
+        ("Ns 1 2", "material 'a' has Ns"),
+        ("Ns", "material 'a' has Ns"),
+    ],
+)
+def test_bad_material_file(tmp_path, line, reason):
+    vertices, faces = strip(1)
+    (tmp_path / "a.obj").write_text(f"mtllib a.mtl\n{vertices}usemtl a\n{faces[0]}")
+    (tmp_path / "a.mtl").write_text(f"newmtl a\n{line}\n")
+    text = check_refused(tmp_path / "a.obj", reason, "shade the mesh with one material")
+    assert text.isprintable()
+    assert len(text) < 400
+    assert load_mesh(str(tmp_path / "a.obj"), materials=False).ignored == ()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../secret.mtl",
+        "sub/../../secret.mtl",
+        "sub/../secret.mtl",
+        "/etc/hostname",
+        "C:\\a.mtl",
+        "\\\\host\\a.mtl",
+        "file:a.mtl",
+        "link.mtl",
+        "a.mtl ../secret.mtl",
+    ],
+)
+def test_material_files_outside_the_folder(tmp_path, name):
+    folder = tmp_path / "folder"
+    (folder / "sub").mkdir(parents=True)
+    for place in (tmp_path, folder):
+        (place / "secret.mtl").write_text("newmtl a\nKd 1 0 0\n")
+    (folder / "link.mtl").symlink_to(tmp_path / "secret.mtl")
+    vertices, faces = strip(1)
+    (folder / "a.obj").write_text(f"mtllib {name}\n{vertices}usemtl a\n{faces[0]}")
+    check_refused(folder / "a.obj", "outside its folder", "put that file beside it")
+
+
+def test_odd_material_files(tmp_path, monkeypatch):
+    vertices, faces = strip(1)
+    path = tmp_path / "a.obj"
+
+    def loaded(name):
+        path.write_text(f"mtllib {name}\n{vertices}usemtl a\n{faces[0]}")
+        return load_mesh(str(path))
+
+    # The mesh itself, a folder, no name, a name that no file can have.
+    assert loaded("a.obj").ignored == ("1 material name without a definition",)
+    (tmp_path / "b.mtl").mkdir()
+    assert "the material file 'b.mtl', which does not exist" in loaded("b.mtl").ignored
+    assert loaded("").materials == (FileMaterial("a"),)
+    os.mkfifo(tmp_path / "pipe.mtl")
+    assert "the material file 'pipe.mtl', which does not exist" in loaded("pipe.mtl").ignored
+    (tmp_path / "loop.mtl").symlink_to("loop.mtl")
+    path.write_text(f"mtllib loop.mtl\n{vertices}usemtl a\n{faces[0]}")
+    check_refused(path, "loop")
+    path.write_text(f"mtllib {'x' * 5000}.mtl\n{vertices}usemtl a\n{faces[0]}")
+    check_refused(path)
+    (tmp_path / "c.mtl").write_bytes(b"newmtl a\nKd 1 0 0\n# f\xfcr\n")
+    assert loaded("c.mtl").materials == (FileMaterial("a", RED),)
+    monkeypatch.setattr(sim.mesh, "_MAX_LIBRARY", 10)
+    path.write_text(f"mtllib c.mtl\n{vertices}usemtl a\n{faces[0]}")
+    check_refused(path, "its material file 'c.mtl' is over 10 bytes")
+
+
+@pytest.mark.parametrize(
+    ("materials", "index", "reason"),
+    [
+        ([base(1, 0, 0, 1)], 1, "a mesh refers to material 1 (from 0), there are 1"),
+        (None, 0, "a mesh refers to material 0 (from 0), there are 0"),
+        ([base(1, 0, 0, 1)], -1, "a mesh refers to material -1"),
+        ([base(1, 0, 0, 1)], 10**30, "a mesh refers to material 1000000000"),
+        ([base(1, 0, 0, 1)], "0", "a mesh refers to material 0"),
+        ([base(1, 0, 0, 1)], True, "a mesh refers to material True"),
+        ([base(1, 0, 0, 1)], [0], "a mesh refers to material [0]"),
+        ([base(float("nan"), 0, 0, 1, name="x")], 0, "material 'x' has baseColorFactor '[nan, 0, 0, 1]'"),
+        ([base(0, float("inf"), 0, 1)], 0, "material 'number 0' has baseColorFactor"),
+        ([base(0, 0, 1.5, 1)], 0, "not three numbers from 0 to 1"),
+        ([base(0, 0, -0.5, 1)], 0, "not three numbers from 0 to 1"),
+        ([base(0, 0, 10**400, 1)], 0, "not three numbers from 0 to 1"),
+        ([base(0, 0, 1)], 0, "has baseColorFactor '[0, 0, 1]'"),
+        ([base(0, 0, True, 1)], 0, "not three numbers from 0 to 1"),
+        ([base(0, 0, "1", 1)], 0, "not three numbers from 0 to 1"),
+        ([{"pbrMetallicRoughness": {"baseColorFactor": {"r": 1}}}], 0, "not three numbers from 0 to 1"),
+        ([{"pbrMetallicRoughness": [1]}], 0, "not three numbers from 0 to 1"),
+        ([7], 0, "its materials are no list of objects"),
+        ({"0": base(1, 0, 0, 1)}, 0, "its materials are no list of objects"),
+        ("red", 0, "its materials are no list of objects"),
+    ],
+)
+def test_bad_gltf_materials(tmp_path, materials, index, reason):
+    path = material_glb(tmp_path / "a.glb", materials, [index])
+    text = check_refused(path, reason, "shade the mesh with one material")
+    assert text.isprintable()
+    assert len(text) < 400
+    assert load_mesh(path, materials=False).materials == (FileMaterial(),)
+
+
+def test_gltf_nodes_in_a_circle(tmp_path):
+    nodes = [{"mesh": 0, "children": [1]}, {"mesh": 0, "children": [0]}]
+    path = material_glb(tmp_path / "a.glb", [base(1, 0, 0, 1)], [0], nodes)
+    loaded, refusal = loaded_or_refused(path)
+    assert loaded or "\n" not in refusal
+
+
+@pytest.mark.parametrize("kind", [".mtl", ".glb", ".obj"])
+def test_damaged_materials(tmp_path, kind):
+    """Random bytes of the materials changed: a whole mesh, or a refusal in one line."""
+    rng = np.random.default_rng(20261122)
+    vertices, faces = strip(3)
+    files = {
+        ".obj": (
+            f"mtllib a.mtl\n{vertices}" + "".join(f"usemtl {n}\n{faces[k]}" for k, n in enumerate("abc"))
+        ),
+        ".mtl": "newmtl a\nKd 1 0 0\nnewmtl b\nKs 0 1 0\nNs 20\nnewmtl c\nKd 0 0 1\nmap_Kd a.png\n",
+    }
+    for suffix, text in files.items():
+        (tmp_path / f"a{suffix}").write_text(text)
+    materials = [base(1, 0, 0, 1, name="a"), base(0, 0.5, 0, 1), {"name": "c"}]
+    material_glb(tmp_path / "a.glb", materials, [0, 1, 2, None])
+    path = tmp_path / f"a{kind}"
+    data, main = path.read_bytes(), str(tmp_path / ("a.glb" if kind == ".glb" else "a.obj"))
+    begin, end = 0, len(data)
+    if kind == ".glb":
+        begin, end = data.index(b'"materials"'), len(data.rstrip(b"\0")) - 60
+    outcomes = {True: 0, False: 0}
+    for _ in range(200):
+        damaged = bytearray(data)
+        for at in rng.integers(begin, end, rng.integers(1, 4)):
+            damaged[at] = rng.choice([rng.integers(0, 256), rng.choice(list(b"0123456789.-+e[]{}# "))])
+        path.write_bytes(bytes(damaged))
+        loaded, refusal = loaded_or_refused(main)
+        outcomes[loaded is None] += 1
+        if loaded:
+            check_mesh(loaded.mesh)
+            check_materials(loaded)
+        else:
+            assert "\n" not in refusal
+    assert min(outcomes.values()) > 5
+
+
+def test_surfaces():
+    default = Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0.6, 0.6, 0.6), 50)
+    said = FileMaterial("a", (0.5, 0.0, 1.0), (0.0, 0.0, 0.0), 7)
+    black = FileMaterial("b", (0.0, 0.0, 0.0))
+    nothing = FileMaterial("c", exponent=3)
+    given = surfaces([said, black, nothing], default)
+    assert given == (
+        Material((0.05, 0, 0.1), (0.5, 0, 1), (0, 0, 0), 7),
+        Material((0, 0, 0), (0, 0, 0), (0.6, 0.6, 0.6), 50),
+        Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0.6, 0.6, 0.6), 3),
+    )
+    everything = {"ambient", "diffuse", "specular", "exponent"}
+    assert surfaces([said, black, nothing], default, everything) == (default,) * 3
+    assert surfaces([said], default, {"diffuse", "exponent"}) == (
+        Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0, 0, 0), 50),
+    )
+    assert surfaces([said], default, {"ambient"}) == (
+        Material((0.08, 0.05, 0.03), (0.5, 0, 1), (0, 0, 0), 7),
+    )
+    assert surfaces([FileMaterial()], default) == (default,)
+
+
+def test_a_scene_of_a_file(tmp_path):
+    """From a file to the constants of the pipeline: the surfaces fit the mesh."""
+    path = material_glb(tmp_path / "a.glb", [base(1, 0, 0, 1), base(0, 0, 1, 1)], [1, None, 0])
+    loaded = load_mesh(path)
+    default = Material((0, 0, 0), (0.5, 0.5, 0.5), (0, 0, 0), 1)
+    camera = Camera.framing(loaded.mesh.vertices, (0, 0, 1), "orthographic", 3)
+    light = Light((0, 0, 1))
+    scene = Scene(loaded.mesh, camera, 90, 30, surfaces(loaded.materials, default), (light,))
+    image = render(scene).image
+    colors = np.unique(image[image.any(axis=-1)].round(9), axis=0)
+    assert colors.tolist() == [[0.0, 0.0, 1.0], [0.5, 0.5, 0.5], [1.0, 0.0, 0.0]]
+    # Left to right in the picture as in the strip.
+    shown = [
+        image[:, part].reshape(-1, 3).max(axis=0).round(9).tolist() for part in np.split(np.arange(90), 3)
+    ]
+    assert shown == [[0.0, 0.0, 1.0], [0.5, 0.5, 0.5], [1.0, 0.0, 0.0]]

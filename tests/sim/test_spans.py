@@ -1,5 +1,7 @@
 """Cutting wide spans against the curve's own formula, and the pipeline's flag after quantisation."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from golden.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
 from golden.pipeline import ShadingPipeline
 from golden.raster import Raster
 from golden.unit_vector import COMPONENT, ONE
-from sim.spans import cut_wide_spans, quantise_spans
+from sim.spans import cut_wide_spans, quantise_spans, sort_by_material
 
 WIDTH = 4095
 EPSILON = 2.0**-53
@@ -70,7 +72,7 @@ def wide(normal_pairs):
     rng = np.random.default_rng(11)
     left, right = map(normalise, normal_pairs(rng, 5000, rng.uniform(0, 179.9, 5000)))
     raster = raster_of(rng, left, right, rng.integers(1, 60, 5000, endpoint=True))
-    return raster, *cut_wide_spans(raster)
+    return raster, *cut_wide_spans(raster, MAX_SPAN_ANGLE)
 
 
 def test_fragments_and_pixels_stay(wide):
@@ -115,11 +117,15 @@ def test_counts(wide):
     assert count == np.count_nonzero(np.bincount(origin) > 1)
 
 
+def quantised(raster):
+    return quantise_spans(raster, np.zeros(1 + raster.triangle.max(initial=0), dtype=np.int64))
+
+
 def test_narrow_spans_are_untouched(normal_pairs):
     rng = np.random.default_rng(12)
     left, right = normal_pairs(rng, 2000, rng.uniform(0, 44.999999, 2000))
     raster = raster_of(rng, left, right, rng.integers(1, 30, 2000))
-    cut, count = cut_wide_spans(raster)
+    cut, count = cut_wide_spans(raster, MAX_SPAN_ANGLE)
     assert count == 0
     for name in ("x", "y", "length", "triangle", "normal_left", "normal_right", "span", "offset", "pixel"):
         assert np.array_equal(getattr(cut, name), getattr(raster, name)), name
@@ -127,8 +133,8 @@ def test_narrow_spans_are_untouched(normal_pairs):
 
 def test_no_span_at_all():
     rng = np.random.default_rng(13)
-    cut, count = cut_wide_spans(raster_of(rng, np.empty((0, 3)), np.empty((0, 3)), 0))
-    assert (count, len(cut.length), len(quantise_spans(cut))) == (0, 0, 0)
+    cut, count = cut_wide_spans(raster_of(rng, np.empty((0, 3)), np.empty((0, 3)), 0), MAX_SPAN_ANGLE)
+    assert (count, len(cut.length), len(quantised(cut))) == (0, 0, 0)
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 4, 5, 4094, 4095])
@@ -137,7 +143,7 @@ def test_opposite_normals(length):
     rng = np.random.default_rng(14)
     left = np.eye(3)[:1]
     raster = raster_of(rng, left, -left, length)
-    cut, count = cut_wide_spans(raster)
+    cut, count = cut_wide_spans(raster, MAX_SPAN_ANGLE)
     assert count == (length > 1)
     # Halving closes in on the jump.
     assert len(cut.length) <= 1 + length.bit_length()
@@ -164,27 +170,90 @@ def test_the_pipeline_flags_no_span_after_the_cut(normal_pairs):
     raster = raster_of(rng, left, right, rng.integers(1, 12, len(angle), endpoint=True))
 
     def flagged(raster):
-        spans = quantise_spans(raster)
+        spans = quantised(raster)
         _, wide = MiddleNormal().compute(
             Fixed(COMPONENT, spans.normal_left), Fixed(COMPONENT, spans.normal_right)
         )
         return np.count_nonzero(wide)
 
-    cut, _ = cut_wide_spans(raster)
+    cut, _ = cut_wide_spans(raster, MAX_SPAN_ANGLE)
     assert flagged(cut) == 0
     assert flagged(raster) > 30_000
     vector = np.array([[0, 0, ONE]])
     constants = FrameConstants(10, np.zeros(3, int), vector, vector, np.zeros((1, 3), int), vector * 0)
-    assert ShadingPipeline().compute(quantise_spans(cut), constants).wide_spans == 0
+    assert ShadingPipeline().compute(quantised(cut), constants).wide_spans == 0
 
 
 def test_quantised_ends():
     rng = np.random.default_rng(16)
     left = np.array([[1.0, 0, 0], [0.6, 0, 0.8]])
     raster = raster_of(rng, left, -left[::-1], 7)
-    spans = quantise_spans(raster)
+    spans = quantised(raster)
     assert spans.normal_left[0].tolist() == [ONE, 0, 0]
     for codes, normals in ((spans.normal_left, left), (spans.normal_right, -left[::-1])):
         assert np.abs(codes / ONE - normals).max() < 2.0**-17
     for name in ("x", "y", "length"):
         assert np.array_equal(getattr(spans, name), getattr(raster, name))
+
+
+@pytest.mark.parametrize("materials", [2, 7, 1000])
+@pytest.mark.parametrize("cut", [False, True])
+def test_sorted_spans_are_a_permutation(normal_pairs, materials, cut):
+    """Every span and fragment once, with all that belongs to it, in the given order within a material.
+
+    x and the pixel are not read: they hold the numbers that spans and fragments had before.
+    """
+    rng = np.random.default_rng(17)
+    left, right = map(normalise, normal_pairs(rng, 3000, rng.uniform(0, 90, 3000)))
+    raster = raster_of(rng, left, right, rng.integers(1, 30, 3000))
+    if cut:
+        raster, _ = cut_wide_spans(raster, MAX_SPAN_ANGLE)
+    count = len(raster.length)
+    raster = replace(raster, x=np.arange(count), pixel=np.arange(len(raster.span)))
+    material = rng.integers(0, materials, 1000)
+    ordered = sort_by_material(raster, material)
+
+    spans, fragments = ordered.x, ordered.pixel
+    assert np.array_equal(np.sort(spans), np.arange(count))
+    assert np.array_equal(np.sort(fragments), np.arange(len(raster.span)))
+    assert not np.array_equal(spans, np.arange(count))
+    for name in (field.name for field in fields(raster)):
+        given, moved = getattr(raster, name), getattr(ordered, name)
+        if name in ("span", "offset", "visible"):
+            expected = given[fragments]
+            moved = spans[moved] if name == "span" else moved
+        elif np.ndim(given):
+            # The weights of a raster that was cut are empty.
+            expected = given[spans] if len(given) == count else given
+        else:
+            expected = given
+        if name != "pixel":
+            assert np.array_equal(moved, expected), name
+        assert np.asarray(getattr(ordered, name)).dtype == np.asarray(given).dtype, name
+
+    of_span = material[ordered.triangle]
+    steps = np.diff(of_span)
+    assert (steps >= 0).all()
+    assert (np.diff(spans)[steps == 0] > 0).all()
+    # A span's fragments stay together, from its first to its last.
+    assert np.array_equal(ordered.span, np.repeat(np.arange(count), ordered.length))
+    start = np.cumsum(ordered.length) - ordered.length
+    assert np.array_equal(ordered.offset, np.arange(len(ordered.span)) - start[ordered.span])
+
+
+def test_spans_in_order_are_untouched(normal_pairs):
+    rng = np.random.default_rng(18)
+    raster = raster_of(rng, *map(normalise, normal_pairs(rng, 100, 5.0)), 3)
+    assert sort_by_material(raster, np.zeros(1000, int)) is raster
+    raster = replace(raster, triangle=np.sort(raster.triangle))
+    assert sort_by_material(raster, np.arange(1000) // 100) is raster
+    empty = raster_of(rng, np.empty((0, 3)), np.empty((0, 3)), 0)
+    assert len(sort_by_material(empty, np.arange(1000)).length) == 0
+
+
+def test_spans_have_the_material_of_their_triangle(normal_pairs):
+    rng = np.random.default_rng(19)
+    raster = raster_of(rng, *map(normalise, normal_pairs(rng, 100, 5.0)), 3)
+    material = rng.integers(0, 9, 1000)
+    for given in (raster, sort_by_material(raster, material)):
+        assert np.array_equal(quantise_spans(given, material).material, material[given.triangle])

@@ -1,0 +1,50 @@
+"""The angular method ([T] 3.1, 3.2): cosines of angles that grow evenly along the great circle."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from .angular_setup import AngularSetup
+from .fixed import SQ, UQ, Fixed
+from .highlight_cosine import HighlightCosine
+from .interpolator import Interpolator, Operands, pixels_of
+from .unit_vector import COMPONENT
+
+__all__ = ["AngularInterpolator"]
+
+
+@dataclass(frozen=True)
+class AngularInterpolator(Interpolator):
+    """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, for L and H of each light.
+
+    Formats and error bounds are those of `golden.angular_setup.AngularSetup` and
+    `golden.highlight_cosine.HighlightCosine`. N·L is 1 less the result, ``SQ(2, 25)``. Spans of opposite
+    normals, which have no plane, are flagged.
+
+    Source: [T] 3.1, 3.2.
+    """
+
+    operand: ClassVar = "one_minus_cosine"
+    COSINE_FORMAT = SQ(2, 25)
+    MAX_ANGLE = 150.0
+    CURVE = "slerp"
+
+    def compute(self, normal_left, normal_right, length, direction, halfway):
+        """Bit-true operands."""
+        place = pixels_of(length)
+
+        def along(vector):
+            vector = Fixed(COMPONENT, np.broadcast_to(vector, normal_left.codes.shape))
+            _, phase, step, cos_beta, opposite = AngularSetup().compute(
+                normal_left, normal_right, vector, length
+            )
+            return HighlightCosine().compute(phase, step, cos_beta, *place).codes, opposite
+
+        one = Fixed(UQ(1, 25), 1 << 25)
+        results = [[along(vector) for vector in vectors.codes] for vectors in (direction, halfway)]
+        cosine, highlight = (
+            Fixed(HighlightCosine.RESULT_FORMAT, np.stack([codes for codes, _ in light], axis=-1))
+            for light in results
+        )
+        return Operands(one - cosine, highlight, results[0][0][1])

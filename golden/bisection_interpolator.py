@@ -1,0 +1,57 @@
+"""Bisection of spans until straight lines will do ([T] figure 2.7): method ``bisection``."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .adaptive_normaliser import AdaptiveNormaliser
+from .interpolation import interpolate
+from .interpolator import NormalInterpolator
+
+__all__ = ["BisectionInterpolator"]
+
+
+@dataclass(frozen=True)
+class BisectionInterpolator(NormalInterpolator):
+    """Normals on straight lines over ``2^k`` arcs of the great circle, k just large enough.
+
+    Formats and error bounds are those of `golden.adaptive_normaliser.AdaptiveNormaliser`, for spans to 90
+    degrees.
+
+    Parameters
+    ----------
+    threshold : float
+        Largest length error of a normal.
+
+    Raises
+    ------
+    ValueError
+        If the threshold is out of range or the operand unknown.
+
+    Source: [T] 2.1, figure 2.7.
+    """
+
+    threshold: float = 2.0**-14
+
+    MAX_ANGLE = 90.0
+
+    def __post_init__(self):
+        super().__post_init__()
+        AdaptiveNormaliser(self.threshold)
+
+    def normals(self, normal_left, normal_right, length):
+        """Bit-true normals."""
+        normals, wide, _ = AdaptiveNormaliser(self.threshold).compute(normal_left, normal_right, length)
+        return normals, wide
+
+    def exact_normals(self, normal_left, normal_right, t):
+        """Straight lines between exact points of the great circle."""
+        t = np.asarray(t, dtype=np.float64)
+        chord = np.linalg.norm(np.subtract(normal_right, normal_left), axis=-1)
+        angle = 2 * np.arcsin(np.minimum(chord / 2, 1))
+        depth = AdaptiveNormaliser(self.threshold).depth
+        sagitta = 1 - np.cos(angle[..., np.newaxis] / 2.0 ** np.arange(1, depth + 1))
+        segments = 2.0 ** np.count_nonzero(sagitta > self.threshold, axis=-1)
+        left = np.minimum(np.floor(t * segments), segments - 1)
+        ends = (interpolate("slerp", normal_left, normal_right, (left + k) / segments) for k in (0, 1))
+        return interpolate("linear", *ends, t * segments - left)

@@ -1,0 +1,148 @@
+"""Interpolators: what shading needs of a span at every pixel, whatever the method that finds it."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from .chord import Chord
+from .dot_product import DotProduct
+from .fixed import Fixed, Format
+from .interpolation import interpolate
+from .middle_normal import MAX_SPAN_ANGLE
+from .unit_vector import COMPONENT
+
+__all__ = ["Interpolator", "NormalInterpolator", "Operand", "Operands", "pixels_of"]
+
+Operand = Literal["cosine", "one_minus_cosine"]
+"""What the specular unit may be given."""
+
+
+class Operands(NamedTuple):
+    """What the shading of a light starts from.
+
+    Parameters
+    ----------
+    cosine : Fixed, shape (pixels, lights)
+        N·L.
+    highlight : Fixed, shape (pixels, lights)
+        N·H, or 1 - N·H.
+    wide : bool array, shape (spans,)
+        Whether the span is wider than the method can shade: its operands mean nothing.
+    """
+
+    cosine: Fixed
+    highlight: Fixed
+    wide: np.ndarray
+
+
+def pixels_of(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Span of each pixel, and its place in the span, for spans of so many pixels each."""
+    span = np.repeat(np.arange(len(length)), length)
+    return span, np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)
+
+
+@dataclass(frozen=True)
+class Interpolator:
+    """A method that takes spans to the operands of their pixels, one subclass a method.
+
+    A subclass states its formats, and has the bit-true `compute` and, in float64, what it stands for.
+
+    Attributes
+    ----------
+    operand : str
+        ``"cosine"`` or ``"one_minus_cosine"``: what the specular unit is given.
+    COSINE_FORMAT : Format
+        Of N·L.
+    MAX_ANGLE : float
+        Widest span in degrees; others are flagged.
+    CURVE : str
+        The curve of `golden.interpolation.CURVES` on which the method's normals lie in exact arithmetic.
+    """
+
+    COSINE_FORMAT: ClassVar[Format] = DotProduct().result_format
+    MAX_ANGLE: ClassVar[float] = MAX_SPAN_ANGLE
+    CURVE: ClassVar[str] = "normalised"
+
+    @property
+    def uses_chord(self) -> bool:
+        """Whether, in exact arithmetic, the specular operand is ``|N - H|^2 / 2`` of its normals."""
+        return False
+
+    def widest_span(self, exponent: int) -> float:
+        """Widest span, in degrees, that should be given to the method at a specular exponent."""
+        return self.MAX_ANGLE
+
+    def compute(
+        self,
+        normal_left: Fixed,
+        normal_right: Fixed,
+        length: np.ndarray,
+        direction: Fixed,
+        halfway: Fixed,
+    ) -> Operands:
+        """Bit-true operands of every pixel, in the order of the spans.
+
+        Parameters
+        ----------
+        normal_left, normal_right : Fixed, shape (spans, 3), SQ(1, 17)
+            Unit normals of the first and last pixel centre.
+        length : int array, shape (spans,)
+            Pixels, 1 to 4095.
+        direction, halfway : Fixed, shape (lights, 3), SQ(1, 17)
+            Unit vectors L and H of each light.
+        """
+        raise NotImplementedError
+
+    def exact_normals(self, normal_left: np.ndarray, normal_right: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Normals that the method stands for, in float64, as `golden.interpolation.interpolate` gives them.
+
+        Parameters
+        ----------
+        normal_left, normal_right : arrays, shape (..., 3)
+            Unit normals of the span of each pixel.
+        t : array, shape (...)
+            Place of the pixel in its span, 0 to 1.
+        """
+        return interpolate(self.CURVE, normal_left, normal_right, t)
+
+
+@dataclass(frozen=True)
+class NormalInterpolator(Interpolator):
+    """A method that finds normals; products with L and H follow.
+
+    Parameters
+    ----------
+    operand : str
+        ``"cosine"``: the specular unit is given N·H. ``"one_minus_cosine"``: it is given the chord
+        ``|N - H|^2 / 2`` of `golden.chord.Chord`, which feels the length of N only at second order.
+
+    Raises
+    ------
+    ValueError
+        If the operand is none of those.
+    """
+
+    operand: Operand = "cosine"
+
+    def __post_init__(self):
+        if self.operand not in ("cosine", "one_minus_cosine"):
+            raise ValueError(f"operand must be 'cosine' or 'one_minus_cosine', not {self.operand!r}")
+
+    @property
+    def uses_chord(self):
+        """With ``operand="one_minus_cosine"``."""
+        return self.operand == "one_minus_cosine"
+
+    def normals(
+        self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
+    ) -> tuple[Fixed, np.ndarray]:
+        """Bit-true normals of every pixel, shape (pixels, 3), SQ(1, 17), and which spans are too wide."""
+        raise NotImplementedError
+
+    def compute(self, normal_left, normal_right, length, direction, halfway) -> Operands:
+        """Bit-true operands: exact products of the normals."""
+        normals, wide = self.normals(normal_left, normal_right, length)
+        normals = Fixed(COMPONENT, normals.codes[:, np.newaxis])
+        product = DotProduct().compute if self.operand == "cosine" else Chord().operand
+        return Operands(DotProduct().compute(normals, direction), product(normals, halfway), wide)

@@ -1,0 +1,50 @@
+"""Bisection of spans until straight lines will do ([T] figure 2.7): method ``bisection``."""
+
+from amaranth.lib import stream, wiring
+
+from golden.adaptive_normaliser import AdaptiveNormaliser
+from golden.bisection_interpolator import BisectionInterpolator
+
+from .adaptive_normaliser import AdaptiveNormaliserUnit
+from .interpolator import NormalInterpolatorUnit
+from .middle_normal import normal_shape
+from .stream import connect
+
+__all__ = ["BisectionInterpolatorUnit"]
+
+
+class BisectionInterpolatorUnit(NormalInterpolatorUnit):
+    """The adaptive normaliser; `golden.bisection_interpolator.BisectionInterpolator` is the twin.
+
+    `latency` and `setup_interval` are those of a span that is not divided; a divided one takes longer (see
+    `AdaptiveNormaliserUnit`).
+
+    Parameters
+    ----------
+    parameters : BisectionInterpolator
+        Threshold and specular operand.
+    lights : int
+        Number of lights, at least 1.
+
+    Source: [T] 2.1, figure 2.7.
+    """
+
+    def __init__(self, parameters: BisectionInterpolator, lights: int):
+        super().__init__(parameters, lights)
+        self._normaliser = AdaptiveNormaliserUnit(AdaptiveNormaliser(parameters.threshold))
+        preparation = self._normaliser.preparation(0)
+        self.latency = preparation + self.product_latency
+        self.setup_interval = preparation - 2
+
+    def source(self, m):
+        """The normaliser, and one flag a span."""
+        m.submodules.adaptive_normaliser = normaliser = self._normaliser
+        connect(m, wiring.flipped(self.i), normaliser.i)
+        normals = stream.Signature(normal_shape()).create(path=("normals",))
+        pixel = normaliser.o.payload
+        m.d.comb += [
+            normals.payload.eq(pixel.normal),
+            normals.valid.eq(normaliser.o.valid),
+            normaliser.o.ready.eq(normals.ready),
+        ]
+        return normals, normals.valid & normals.ready & pixel.last & pixel.wide

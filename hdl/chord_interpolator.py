@@ -1,0 +1,81 @@
+"""The chord method: scalar forward differences of N·L and of the squared chord from N to H (chord.md)."""
+
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+
+from golden.chord_interpolator import ChordInterpolator
+
+from .chord_setup import ChordSetupUnit, chord_differences_shape
+from .difference_accumulator import AccumulatorUnit
+from .interpolator import InterpolatorUnit, operands_shape
+from .stream import BUFFER_LATENCY, connect, connect_buffered
+
+__all__ = ["ChordAccumulatorUnit", "ChordInterpolatorUnit"]
+
+
+class ChordAccumulatorUnit(AccumulatorUnit):
+    """``N . L`` and u of each light, two quadratics a light; see `AccumulatorUnit`.
+
+    Parameters
+    ----------
+    lights : int
+        Number of lights, at least 1.
+    """
+
+    def __init__(self, lights: int):
+        super().__init__(chord_differences_shape(lights), operands_shape(ChordInterpolator(), lights))
+
+    def quadratics(self):
+        """Those of each light."""
+        for index, light in enumerate(self.i.payload.lights):
+            result = self.o.payload[index]
+            for name, parameters, value in (
+                ("diffuse", ChordInterpolator.DIFFUSE, result.cosine),
+                ("highlight", ChordInterpolator.HIGHLIGHT, result.highlight),
+            ):
+                span = light[name]
+                yield f"{name}_{index}", parameters, (span.start, span.first, span.second), value
+
+
+class ChordInterpolatorUnit(InterpolatorUnit):
+    """Chord setup, then accumulators; `golden.chord_interpolator.ChordInterpolator` is the twin.
+
+    No multiplier a pixel; those of the setup are ``ceil((7 + 19 lights) / setup_interval)``.
+
+    Parameters
+    ----------
+    parameters : ChordInterpolator
+        Twin.
+    lights : int
+        Number of lights, at least 1.
+    setup_interval : int
+        Clocks from a span to the next at the closest, at least 1.
+
+    Source: chord.md.
+    """
+
+    @classmethod
+    def setup_intervals(cls, parameters):
+        """What the setup can be built for."""
+        return range(1, 27)
+
+    def __init__(self, parameters: ChordInterpolator, lights: int, setup_interval: int = 4):
+        super().__init__(parameters, lights)
+        self.setup_interval = setup_interval
+        self._setup = ChordSetupUnit(lights, setup_interval)
+        self._accumulator = ChordAccumulatorUnit(lights)
+        self.latency = self._setup.latency + BUFFER_LATENCY + self._accumulator.latency
+
+    def elaborate(self, platform):
+        """A FIFO between the two holds spans ready, so that a long one pays for short ones after it."""
+        m = Module()
+        m.submodules.chord_setup = setup = self._setup
+        m.submodules.chord_accumulator = accumulator = self._accumulator
+        connect(m, wiring.flipped(self.i), setup.i)
+        connect_buffered(m, "prepared", setup.o, accumulator.i, depth=3)
+        connect(m, accumulator.o, wiring.flipped(self.o))
+        m.d.comb += [
+            setup.constants.eq(self.constants),
+            self.wide.eq(setup.o.valid & setup.o.ready & setup.o.payload.wide),
+        ]
+        return m

@@ -1,0 +1,82 @@
+"""The recurrence method ([T] 3.3): cosines of equal steps along the great circle, one product each."""
+
+from amaranth.hdl import Module, Value
+from amaranth.lib import wiring
+
+from golden.fixed import UQ
+from golden.recurrence_interpolator import RecurrenceInterpolator
+
+from .fixed import FixedValue
+from .interpolator import InterpolatorUnit
+from .recurrence import RecurrenceUnit
+from .recurrence_setup import RecurrenceSetupUnit
+from .stream import BUFFER_LATENCY, connect, connect_buffered
+
+__all__ = ["RecurrenceInterpolatorUnit"]
+
+
+class RecurrenceInterpolatorUnit(InterpolatorUnit):
+    """Recurrence setup, then a recurrence unit for each light, which has a copy for L and one for H.
+
+    `golden.recurrence_interpolator.RecurrenceInterpolator` is the twin. All recurrence units are equal, are
+    offered the same spans and taken from on the same clocks. Two multipliers a light, and those of the
+    setup, ``ceil((14 + 32 lights) / setup_interval)``.
+
+    Parameters
+    ----------
+    parameters : RecurrenceInterpolator
+        Twin.
+    lights : int
+        Number of lights, at least 1.
+    setup_interval : int
+        Clocks from a span to the next at the closest, at least 1.
+
+    Source: [T] 3.1, 3.3, figure 3.5.
+    """
+
+    @classmethod
+    def setup_intervals(cls, parameters):
+        """What the setup can be built for."""
+        return range(1, 47)
+
+    def __init__(self, parameters: RecurrenceInterpolator, lights: int, setup_interval: int = 4):
+        super().__init__(parameters, lights)
+        self.setup_interval = setup_interval
+        self._setup = RecurrenceSetupUnit(parameters.setup, lights, setup_interval)
+        self._recurrences = [RecurrenceUnit(parameters.setup.recurrence) for _ in range(lights)]
+        unit = self._recurrences[0]
+        self.latency = self._setup.latency + BUFFER_LATENCY + unit.latency
+
+    def elaborate(self, platform):
+        """A FIFO between the two holds spans ready, so that a long one pays for short ones after it."""
+        m = Module()
+        m.submodules.recurrence_setup = setup = self._setup
+        connect(m, wiring.flipped(self.i), setup.i)
+        prepared = setup.o.signature.create(path=("prepared",))
+        connect_buffered(m, "spans", setup.o, prepared, depth=3)
+        one = FixedValue.constant(UQ(1, 25), 1)
+        for light, unit in enumerate(self._recurrences):
+            m.submodules[f"recurrence_{light}"] = unit
+            starts, result = prepared.payload.lights[light], self.o.payload[light]
+            m.d.comb += [
+                *(
+                    Value.cast(unit.i.payload[name]).eq(Value.cast(starts[name]))
+                    for name in ("diffuse", "highlight")
+                ),
+                *(
+                    unit.i.payload[name].eq(prepared.payload[name])
+                    for name in ("coefficient", "shift", "length")
+                    if name in unit.i.payload.shape().members
+                ),
+                unit.i.valid.eq(prepared.valid),
+                unit.o.ready.eq(self.o.ready),
+                result.cosine.eq(unit.o.payload.diffuse),
+                result.highlight.eq((one - unit.o.payload.highlight).saturate(result.highlight.format)),
+            ]
+        m.d.comb += [
+            prepared.ready.eq(self._recurrences[0].i.ready),
+            self.o.valid.eq(self._recurrences[0].o.valid),
+            setup.constants.eq(self.constants),
+            self.wide.eq(setup.o.valid & setup.o.ready & setup.o.payload.wide),
+        ]
+        return m

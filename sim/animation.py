@@ -1,0 +1,459 @@
+"""Turntables: a camera that goes once round, and its frames, spread over processes or machines."""
+
+import contextlib
+import functools
+import importlib.util
+import logging
+import multiprocessing
+import os
+import re
+import signal
+import threading
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from golden.camera import Camera
+from golden.geometry import normalise
+from golden.pipeline import ShadingPipeline
+from golden.scene import Scene
+from sim.cxxrtl import cache_folder
+from sim.errors import InputError
+from sim.frame import FrameSimulator, compare
+from sim.output import atomic_writer
+from sim.report import frame_figures
+
+__all__ = [
+    "Crew",
+    "Film",
+    "Shot",
+    "check_address",
+    "cluster",
+    "equal_distance",
+    "process_pool",
+    "processors",
+    "shoot",
+    "shot",
+    "turned",
+    "turntable",
+    "write_gif",
+]
+
+_CONNECT_SECONDS = 10
+_START = "start one with `dask scheduler`, and give its address, as tcp://host:8786"
+
+
+# Where the camera goes.
+
+
+def turned(vector: Sequence[float], axis: Sequence[float], count: int) -> np.ndarray:
+    """A vector turned once round an axis, in equal steps, counter-clockwise seen against the axis.
+
+    Step k is ``v cos a + (u x v) sin a + u (u·v) (1 - cos a)`` with the axis' unit vector u and
+    ``a = 2 pi k / count`` (Rodrigues). The first is the vector itself, to the bit.
+
+    Parameters
+    ----------
+    vector, axis : three floats
+        The axis not 0.
+    count : int
+        Steps, at least 1.
+
+    Returns
+    -------
+    float64 array, shape (count, 3)
+
+    Raises
+    ------
+    ValueError
+        If there are several and the vector lies along the axis: they would be the same but for rounding.
+    """
+    vector, unit = np.asarray(vector, dtype=np.float64), normalise(axis)
+    if count > 1 and np.linalg.norm(np.cross(normalise(vector), unit)) < 1e-6:
+        raise ValueError("the camera looks along the axis that it would turn about")
+    angle = 2 * np.pi / count * np.arange(count)[:, np.newaxis]
+    along = unit * (unit @ vector)
+    return vector * np.cos(angle) + np.cross(unit, vector) * np.sin(angle) + along * (1 - np.cos(angle))
+
+
+def turntable(camera: Camera, count: int) -> list[Camera]:
+    """Cameras that go once round their target, about the axis ``up``, from a camera on.
+
+    The lights stay where they are. The first camera is the given one.
+
+    Raises
+    ------
+    ValueError
+        If there are several and the camera looks along the axis.
+    """
+    offset = np.subtract(camera.position, camera.target)
+    places = np.add(camera.target, turned(offset, camera.up, count)[1:])
+    return [camera, *(replace(camera, position=tuple(place)) for place in places.tolist())]
+
+
+def equal_distance(cameras: Sequence[Camera]) -> list[Camera]:
+    """Cameras with one target, as `Camera.framing` gives them, all as far away as the furthest.
+
+    A turntable of framing cameras would come nearer wherever the mesh is narrow. The height of the picture
+    becomes the largest, the near plane the nearest.
+    """
+    if len(cameras) == 1:
+        return list(cameras)
+    target = np.asarray(cameras[0].target)
+    distance = max(float(np.linalg.norm(np.subtract(camera.position, target))) for camera in cameras)
+    height = max(camera.height for camera in cameras)
+    near = min(camera.near for camera in cameras)
+    return [
+        replace(camera, position=tuple(target + distance * camera.viewer), height=height, near=near)
+        for camera in cameras
+    ]
+
+
+# What a worker does.
+
+
+@dataclass(frozen=True)
+class Film:
+    """What all frames of an animation have in common.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is drawn; its camera counts for nothing.
+    design : ShadingPipeline
+        The pipeline.
+    engine : str
+        ``"cxxrtl"`` or ``"pysim"``.
+    setup_interval : int, optional
+        See `hdl.pipeline.ShadingPipelineUnit`.
+    """
+
+    scene: Scene
+    design: ShadingPipeline
+    engine: str = "cxxrtl"
+    setup_interval: int | None = None
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A frame of an animation.
+
+    Parameters
+    ----------
+    image : uint8 array, shape (height, width, 3)
+        The frame buffer.
+    figures : dict
+        Of `sim.report.frame_figures`.
+    """
+
+    image: np.ndarray
+    figures: dict[str, Any]
+
+
+_ONE_AT_A_TIME = threading.Lock()
+_film: Film | None = None
+
+
+@functools.lru_cache(maxsize=1)
+def _simulator(design: ShadingPipeline, engine: str, setup_interval: int | None) -> FrameSimulator:
+    return FrameSimulator(design, engine, setup_interval)
+
+
+def shot(film: Film, camera: Camera) -> Shot:
+    """Render one frame and hold it against the golden renderer.
+
+    A process builds or loads its model at the first frame. A model has one state: threads take turns.
+    """
+    with _ONE_AT_A_TIME:
+        scene = replace(film.scene, camera=camera)
+        frame = _simulator(film.design, film.engine, film.setup_interval).render(scene)
+        comparison = compare(scene, film.design, frame)
+        return Shot(frame.image, frame_figures(scene, film.design, frame, comparison))
+
+
+def _begin(film: Film, cache: str | None) -> None:
+    """First thing in a process of the pool: the film crosses once, not with every frame."""
+    global _film
+    _film = film
+    # The parent stops its workers; where it could not block the signal for them, they ignore it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if cache:
+        os.environ["BLYSK_CACHE"] = cache
+
+
+def _shot(camera: Camera) -> Shot:
+    return shot(_film, camera)
+
+
+# Who does it.
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Workers that wait for cameras.
+
+    Parameters
+    ----------
+    submit : callable
+        Takes a camera, returns the `concurrent.futures.Future` of its `Shot`.
+    workers : int
+        Frames at a time.
+    name : str
+        For the report.
+    """
+
+    submit: Callable[[Camera], Future]
+    workers: int
+    name: str
+
+
+def processors() -> int:
+    """Processors that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1
+
+
+@contextmanager
+def process_pool(film: Film, jobs: int) -> Iterator[Crew]:
+    """A crew of processes on this machine.
+
+    The model must be in the cache, or each process builds it for itself. An exception in the block, an
+    interrupt too, ends the processes at once.
+
+    Parameters
+    ----------
+    film : Film
+        What they draw.
+    jobs : int
+        How many processes.
+    """
+    cache = None
+    if film.engine == "cxxrtl":
+        with warnings.catch_warnings():  # It was said when the model was built.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            cache = str(cache_folder())
+    # Other threads run in this process, so none is forked.
+    context = multiprocessing.get_context("spawn")
+    before = set(multiprocessing.active_children())
+    executor = ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(film, cache))
+
+    def submit(camera: Camera) -> Future:
+        with _interrupts_blocked():  # The first calls start the processes, which inherit it.
+            return executor.submit(_shot, camera)
+
+    try:
+        yield Crew(submit, jobs, f"{jobs} process{'es' * (jobs > 1)}")
+        executor.shutdown()
+    except BrokenProcessPool:
+        raise InputError(
+            f"--jobs {jobs}", "a process died, perhaps for want of memory", "use fewer, or a smaller --size"
+        ) from None
+    finally:
+        executor.shutdown(wait=False, cancel_futures=True)
+        for child in set(multiprocessing.active_children()) - before:
+            child.terminate()
+            child.join()
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+def check_address(address: str) -> None:
+    """Check, before long work, that this may be the address of a scheduler, and that Dask is there.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    option = f"--cluster {address}"
+    # Dask's client, given what is no address, stays behind half built.
+    if not re.fullmatch(r"((tcp|tls|wss?)://)?([^\s/:@\[\]]+|\[[0-9a-fA-F:.%]+\]):[0-9]{1,5}", address):
+        raise InputError(option, "not the address of a Dask scheduler", _START)
+    if importlib.util.find_spec("distributed") is None:
+        raise InputError(option, "Dask is not installed", "pip install 'blysk[cluster]'")
+
+
+@contextmanager
+def cluster(film: Film, address: str) -> Iterator[Crew]:
+    """A crew of the workers of a Dask scheduler, through Dask's own executor.
+
+    The workers need this version of blysk. Each builds its model at its first frame, in its own cache. An
+    exception in the block takes the waiting frames back; Dask cannot stop those that are being drawn.
+    Dask's messages are pickled Python: whoever answers at the address is trusted.
+
+    Parameters
+    ----------
+    film : Film
+        What they draw; it crosses to each worker once.
+    address : str
+        Of the scheduler, ``tcp://host:8786``.
+
+    Raises
+    ------
+    InputError
+        If Dask is not installed, no scheduler answers, or it has no worker with this version.
+    """
+    option = f"--cluster {address}"
+    check_address(address)
+    from distributed import Client, KilledWorker
+    from distributed.comm import CommClosedError
+
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(_quiet_dask())
+        try:
+            client = stack.enter_context(Client(address, timeout=_CONNECT_SECONDS, set_as_default=False))
+        except (OSError, ValueError, TypeError) as error:
+            text = str(error).strip().split("\n")[0]
+            raise InputError(
+                option,
+                f"no Dask scheduler answers ({text or type(error).__name__})",
+                _START,
+            ) from None
+        threads = client.nthreads()
+        if not threads:
+            raise InputError(option, "the scheduler has no workers", f"start some: dask worker {address}")
+        _check_workers(client, option)
+        shared = client.scatter(film, broadcast=True, hash=False)
+        executor = client.get_executor(pure=False)
+        workers = len(threads)
+        try:
+            yield Crew(
+                functools.partial(executor.submit, shot, shared),
+                workers,
+                f"{workers} worker{'s' * (workers > 1)} at {address}",
+            )
+        except (CommClosedError, KilledWorker, CancelledError) as error:
+            raise InputError(
+                option,
+                f"lost its workers ({type(error).__name__})",
+                "see their log; less --size takes less memory",
+            ) from None
+        finally:
+            executor.shutdown(wait=False)
+
+
+@contextmanager
+def _quiet_dask() -> Iterator[None]:
+    """Keep Dask's log of a lost connection off the terminal: one line of our own tells of it."""
+    # The second has a level of its own.
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
+
+
+def _check_workers(client, option: str) -> None:
+    here = version("blysk")
+    remedy = f"install blysk {here} where they run"
+    try:
+        versions = set(client.run(version, "blysk").values())
+    # Whatever a worker without the package raises.
+    except Exception as error:
+        text = str(error).strip().split("\n")[0]
+        raise InputError(option, f"its workers have no blysk ({text})", remedy) from None
+    if versions != {here}:
+        raise InputError(option, f"its workers have blysk {', '.join(sorted(versions - {here}))}", remedy)
+
+
+def shoot(crew: Crew, cameras: Sequence[Camera]) -> Iterator[tuple[int, Shot]]:
+    """Frames as they are done, in any order, with the index of each.
+
+    At most two frames a worker are under way, so that finished ones do not fill the memory.
+
+    Parameters
+    ----------
+    crew : Crew
+        Who draws them.
+    cameras : sequence of Camera
+        One a frame.
+    """
+    waiting = iter(enumerate(cameras))
+    pending: dict[Future, int] = {}
+    try:
+        while True:
+            while len(pending) < 2 * crew.workers and (entry := next(waiting, None)) is not None:
+                index, camera = entry
+                pending[crew.submit(camera)] = index
+            if not pending:
+                return
+            done, _ = wait(pending, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield pending.pop(future), future.result()
+                del future
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+# What comes of it.
+
+
+def write_gif(path: str | os.PathLike, frames: Iterable[str | os.PathLike], milliseconds: int = 50) -> None:
+    """Write pictures of one size as an animated GIF without end; whole or not at all.
+
+    GIF has 256 colours. The same serve all frames, so that none flickers: those of Pillow's maximum coverage
+    over the frames' colours, each counted once, or else a wide background would take most. They are found in
+    a regular sample of about a million pixels.
+
+    Parameters
+    ----------
+    path : path
+        The output file.
+    frames : paths
+        The pictures.
+    milliseconds : int
+        Time of each, in steps of 10.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    frames = [Path(frame) for frame in frames]
+    sample = []
+    for frame in frames:
+        with Image.open(frame) as image:
+            pixels = np.asarray(image.convert("RGB")).reshape(-1, 3)
+        sample.append(pixels[:: 1 + len(pixels) * len(frames) // 1_000_000])
+    colors = np.unique(np.concatenate(sample), axis=0)
+    palette = Image.fromarray(colors[np.newaxis]).quantize(256, Image.Quantize.MAXCOVERAGE)
+
+    def indexed(frame: Path) -> Image.Image:
+        with Image.open(frame) as image:
+            return image.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE)
+
+    with atomic_writer(path) as temporary:
+        indexed(frames[0]).save(
+            temporary,
+            format="GIF",
+            save_all=True,
+            append_images=(indexed(frame) for frame in frames[1:]),
+            duration=milliseconds,
+            loop=0,
+        )

@@ -1,0 +1,210 @@
+# amaranth: UnusedElaboratable=no
+"""Structures: read right from a component made for it, and complete for the devices."""
+
+import pytest
+from amaranth.hdl import Module, Mux, Signal, signed, unsigned
+from amaranth.lib import data, memory, stream
+from amaranth.lib.wiring import Component, In, Out
+
+from bench.drawing import _Layout, draw_structure
+from bench.structure import Graph, Node, describe_shape, graph_of, layers
+from golden.quadratic_evaluator import QuadraticEvaluator
+from hdl.bisection import BisectionUnit
+from hdl.cost import cost_of
+from hdl.difference_accumulator import DifferenceAccumulatorUnit
+from hdl.difference_setup import DifferenceSetupUnit
+from hdl.dot_product import DotProductUnit
+from hdl.fixed import SQ
+from hdl.gpq import GPQUnit
+from hdl.light import LightUnit
+from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
+from hdl.specular import SpecularUnit
+
+VECTOR = data.ArrayLayout(signed(8), 3)
+
+
+class Sample(Component):
+    """Three products of one shape, a ROM, an accumulator, a choice, a delay, and control."""
+
+    i: In(stream.Signature(data.StructLayout({"a": VECTOR, "b": VECTOR, "which": 1})))
+    o: Out(stream.Signature(data.StructLayout({"products": data.ArrayLayout(16, 3), "total": 16, "late": 8})))
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.table = table = memory.Memory(shape=unsigned(16), depth=8, init=range(8))
+        port = table.read_port()
+        busy = Signal(4)
+        m.d.sync += busy.eq(busy + 1)
+        enable = busy == 0
+        operands = self.i.payload
+        for k in range(3):
+            product = Signal(16, name=f"product_{k}")
+            with m.If(enable):
+                m.d.sync += product.eq(operands.a[k] * operands.b[k])
+            m.d.comb += self.o.payload.products[k].eq(product)
+        total, chosen = Signal(16, name="total"), Signal(8, name="chosen")
+        early, late = Signal(8, name="early"), Signal(8, name="late")
+        m.d.sync += [
+            chosen.eq(Mux(operands.which, operands.a[0], operands.b[0])),
+            early.eq(chosen),
+            late.eq(early),
+            total.eq(total + port.data),
+        ]
+        m.d.comb += [
+            port.addr.eq(chosen),
+            self.o.payload.total.eq(total),
+            self.o.payload.late.eq(late),
+            self.o.valid.eq(enable),
+            self.i.ready.eq(enable),
+        ]
+        return m
+
+
+def by_name(graph):
+    return {node.name: (number, node) for number, node in graph.nodes.items()}
+
+
+def test_sample():
+    graph = graph_of(Sample())
+    nodes = by_name(graph)
+    # Nothing of the control, no box twice.
+    assert set(nodes) == {"a", "b", "which", "product", "chosen", "total", "late", "products", "table"}
+    kinds = {name: node.kind for name, (_, node) in nodes.items()}
+    assert kinds["a"] == kinds["b"] == kinds["which"] == "input"
+    assert kinds["products"] == kinds["late"] == "output"
+    assert kinds["table"] == "memory"
+    assert nodes["table"][1].detail == "ROM 8 × 16"
+    assert nodes["a"][1].detail == "3 × 8 bits, signed"
+    product = nodes["product"][1]
+    assert (product.copies, product.operations["×"], product.detail) == (3, 1, "16")
+    assert nodes["chosen"][1].operations["mux"] == 1
+    registers = [node for node in graph.nodes.values() if node.kind == "register"]
+    # The two registers after `chosen` only hold its word.
+    assert sorted((node.name, node.stages) for node in registers) == [
+        ("chosen", 3),
+        ("product", 1),
+        ("total", 1),
+    ]
+    total = next(n for n, node in graph.nodes.items() if node.kind == "register" and node.name == "total")
+    assert graph.nodes[total].operations["+"] == 1
+    edges = graph.edges
+    number = {name: n for name, (n, node) in nodes.items() if node.kind != "output"} | {"total": total}
+    assert edges[number["a"], number["product"]]
+    assert edges[number["table"], total]
+    assert edges[total, total]
+    # What only chooses is told from what is chosen.
+    assert edges[number["which"], number["chosen"]] is False
+    assert edges[number["a"], number["chosen"]]
+    assert (number["product"], number["product"]) not in edges
+
+
+FLAT = [DotProductUnit, GPQUnit, DifferenceSetupUnit, DifferenceAccumulatorUnit, SpecularUnit]
+
+
+@pytest.mark.parametrize("unit", FLAT)
+def test_parts_are_those_of_the_netlist(unit):
+    graph, cost = graph_of(unit()), cost_of(unit())
+    multipliers = sum(node.copies * node.operations["×"] for node in graph.nodes.values())
+    assert multipliers == cost.multiplier_count + cost.constant_multipliers
+    bits = 0
+    for node in graph.nodes.values():
+        if node.kind == "memory":
+            kind, depth, _, width = node.detail.split()
+            assert kind == "ROM"
+            bits += int(depth) * int(width)
+    assert bits == cost.rom_bits
+    # No register is made up; those of the control are left out.
+    shown = sum(int(n.detail) * n.copies * n.stages for n in graph.nodes.values() if n.kind == "register")
+    assert 0.5 * cost.register_bits < shown <= cost.register_bits
+
+
+UNITS = [*FLAT, BisectionUnit, LightUnit, lambda: QuadraticEvaluatorUnit(QuadraticEvaluator("horner"))]
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_every_port_takes_part(unit):
+    graph = graph_of(unit())
+    sources, targets = graph.neighbours()
+    for number, node in graph.nodes.items():
+        if node.kind == "input":
+            assert targets[number], node.name
+        else:
+            assert sources[number], node.name
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_columns_and_boxes(unit):
+    graph = graph_of(unit())
+    columns, back = layers(graph)
+    for edge in graph.edges:
+        assert (columns[edge[0]] < columns[edge[1]]) == (edge not in back)
+    boxes = [place for place in _Layout(graph).places if place.node]
+    assert len(boxes) == len(graph.nodes)
+    for k, a in enumerate(boxes):
+        for b in boxes[:k]:
+            apart_x = abs(a.x - b.x) >= (a.width + b.width) / 2
+            apart_y = abs(a.y - b.y) >= (a.height + b.height) / 2 - 1e-6
+            assert apart_x or apart_y
+
+
+class Chain(Component):
+    """A dot product behind another."""
+
+    i: In(stream.Signature(DotProductUnit().i.payload.shape()))
+    o: Out(stream.Signature(DotProductUnit().o.payload.shape()))
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.first = first = DotProductUnit()
+        m.submodules.second = second = DotProductUnit()
+        m.d.comb += [
+            first.i.payload.eq(self.i.payload),
+            second.i.payload.a.eq(self.i.payload.b),
+            second.i.payload.b[0].as_value().eq(first.o.payload.as_value()[-18:]),
+            self.o.payload.eq(second.o.payload),
+            first.i.valid.eq(self.i.valid),
+            second.i.valid.eq(first.o.valid),
+            self.o.valid.eq(second.o.valid),
+            self.i.ready.eq(first.i.ready),
+            first.o.ready.eq(second.i.ready),
+            second.o.ready.eq(self.o.ready),
+        ]
+        return m
+
+
+def test_submodules_are_boxes():
+    graph = graph_of(Chain())
+    nodes = by_name(graph)
+    assert [(node.name, node.detail) for node in graph.nodes.values() if node.kind == "unit"] == [
+        ("first", "dot product"),
+        ("second", "dot product"),
+    ]
+    a, b, first, second, o = (nodes[name][0] for name in ("a", "b", "first", "second", "o"))
+    arrows = {(a, first), (b, first), (b, second), (first, second), (second, o)}
+    assert graph.edges == dict.fromkeys(arrows, True)
+
+
+def test_large_structures_are_cut_down():
+    few = graph_of(BisectionUnit(), most=1)
+    assert len(few.nodes) < len(graph_of(BisectionUnit()).nodes)
+    assert {node.name for node in few.nodes.values()} >= {"normal_a", "normal_b", "wide"}
+    assert all(node.kind != "register" or node.operations["×"] for node in few.nodes.values())
+
+
+def test_loop_leads_back():
+    graph = Graph()
+    a, b, c = (graph.add(Node("register", name)) for name in "abc")
+    for source, target in ((a, b), (b, c), (c, b)):
+        graph.connect(source, target, True)
+    columns, back = layers(graph)
+    assert columns == {a: 0, b: 1, c: 2}
+    assert back == {(c, b)}
+    figure = draw_structure(graph)
+    assert figure.get_size_inches()[0] > 0
+
+
+def test_shapes():
+    assert describe_shape(SQ(1, 17)) == "SQ(1, 17)"
+    assert describe_shape(data.ArrayLayout(SQ(1, 17), 3)) == "3 × SQ(1, 17)"
+    assert describe_shape(unsigned(1)) == "1 bit"
+    assert describe_shape(signed(4)) == "4 bits, signed"

@@ -1,0 +1,170 @@
+# amaranth: UnusedElaboratable=no
+"""Chord setup: RTL against its twin, clock by clock, at many intervals."""
+
+import numpy as np
+import pytest
+from amaranth.hdl import ResetInserter, Signal, Value
+from amaranth.sim import Simulator
+
+from golden.chord_setup import ChordSetup
+from golden.fixed import Fixed
+from golden.unit_vector import COMPONENT, quantise
+from hdl.chord_setup import ChordSetupUnit
+from hdl.cost import cost_of
+from sim.beats import dtype_of, pack
+from sim.engine import simulate
+
+VARIANTS = [*((1, interval) for interval in (1, 2, 3, 4, 5, 7, 13, 26)), (2, 4)]
+
+
+def spans(rng, normal_pairs, count=500):
+    """Spans of every angle, some far over the widest, some of the largest and smallest codes."""
+    angles = np.r_[np.zeros(20), 10.0 ** rng.uniform(-4, 0, 80), rng.uniform(0, 22.4, count - 160)]
+    angles = np.r_[angles, rng.uniform(22.6, 180, 59), 180]
+    left, right = (quantise(v) for v in normal_pairs(rng, count, angles))
+    ends = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (40, 6))
+    left, right = np.vstack([left, ends[:, :3]]), np.vstack([right, ends[:, 3:]])
+    length = rng.integers(1, 4096, len(left))
+    length[:12] = [1, 2, 3, 4, 5, 16, 17, 2048, 2049, 2050, 4094, 4095]
+    order = rng.permutation(len(left))
+    return {"normal_left": left[order], "normal_right": right[order], "length": length[order]}
+
+
+def constants_of(unit, vectors):
+    constants = np.zeros(unit.lights, dtype_of(unit.constants.shape().elem_shape))
+    constants["direction"], constants["halfway"] = vectors
+    return constants
+
+
+def expected_of(unit, beats, vectors):
+    """Beats of the output."""
+    left, right, *vectors = (
+        Fixed(COMPONENT, codes) for codes in (beats["normal_left"], beats["normal_right"], *vectors)
+    )
+    diffuse, highlight, wide = ChordSetup().compute(left, right, *vectors, beats["length"])
+    expected = np.zeros(len(wide), dtype_of(unit.o.payload.shape()))
+    for name, differences in (("diffuse", diffuse), ("highlight", highlight)):
+        for field in ("start", "first", "second"):
+            expected["lights"][name][field] = getattr(differences, field).codes
+    expected["length"], expected["wide"] = beats["length"], wide
+    return expected
+
+
+@pytest.mark.parametrize(("lights", "interval"), VARIANTS)
+def test_equals_twin(verify, normal_pairs, lights, interval):
+    rng = np.random.default_rng(interval)
+    unit = ChordSetupUnit(lights, interval)
+    beats = spans(rng, normal_pairs)
+    vectors = [quantise(normal_pairs(rng, lights, 0.0)[0]) for _ in range(2)]
+    # Near the peak u and its differences are small.
+    beats["normal_left"][:50] = vectors[1][0]
+    expected = expected_of(unit, beats, vectors)
+    assert 50 < np.count_nonzero(expected["wide"]) < 200
+    verify(unit, beats, expected, constants=constants_of(unit, vectors))
+
+
+@pytest.mark.parametrize(("lights", "interval"), VARIANTS)
+def test_multipliers(lights, interval):
+    """7 products a span and 19 a light, as even as the interval allows; all of 18 bits."""
+    unit = ChordSetupUnit(lights, interval)
+    cost = cost_of(unit)
+    assert cost.multipliers == {(18, 18): -(-(7 + 19 * lights) // interval)}
+    assert unit.multipliers == cost.multiplier_count
+    assert cost.constant_multipliers == 0
+    # Nothing stands longer than the graph: the latency grows with the interval by what multipliers wait.
+    assert unit.latency >= ChordSetupUnit(lights, 1).latency
+
+
+def test_default_interval():
+    unit = ChordSetupUnit()
+    assert (unit.lights, unit.initiation_interval, unit.multipliers) == (1, 4, 7)
+
+
+@pytest.mark.parametrize("interval", [0, -1])
+def test_refuses_an_interval(interval):
+    with pytest.raises(ValueError, match=rf"^interval must be at least 1, not {interval}$"):
+        ChordSetupUnit(1, interval)
+
+
+def test_beats_after_a_pause(normal_pairs):
+    """The results of a beat do not depend on what came before, or on how long ago it was."""
+    rng = np.random.default_rng(3)
+    unit = ChordSetupUnit(1, 4)
+    beats = spans(rng, normal_pairs)
+    beats = {name: codes[:40] for name, codes in beats.items()}
+    vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+    expected = expected_of(unit, beats, vectors)
+    constants = constants_of(unit, vectors)
+    stalls = np.arange(60 * 40) % 60 != 0
+    run = simulate(unit, beats, count=40, constants=constants, engine="auto", input_stalls=stalls)
+    np.testing.assert_array_equal(run.beats, expected)
+    np.testing.assert_array_equal(run.clocks, run.input_clocks + unit.latency)
+
+
+@pytest.mark.parametrize("interval", [1, 4, 26])
+def test_reset_leaves_nothing_behind(normal_pairs, interval):
+    """After a reset with beats inside the unit answers as from power-up, on the same clocks."""
+    rng = np.random.default_rng(8)
+    unit = ChordSetupUnit(1, interval)
+    beats = {name: codes[:12] for name, codes in spans(rng, normal_pairs).items()}
+    vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+    words = [
+        int.from_bytes(row.astype("<u4").tobytes(), "little") for row in pack(unit.i.payload.shape(), beats)
+    ]
+    constants = int.from_bytes(
+        pack(unit.constants.shape().elem_shape, constants_of(unit, vectors))[0].astype("<u4").tobytes(),
+        "little",
+    )
+    reset = Signal()
+    found = []
+
+    async def send(context, words, clocks):
+        sent, taken = 0, []
+        for clock in range(clocks):
+            context.set(unit.i.valid, sent < len(words))
+            context.set(Value.cast(unit.i.payload).as_unsigned(), words[min(sent, len(words) - 1)])
+            accepted = context.get(unit.i.valid & unit.i.ready)
+            if context.get(unit.o.valid):
+                taken.append((clock, context.get(Value.cast(unit.o.payload).as_unsigned())))
+            await context.tick()
+            sent += accepted
+        return taken
+
+    async def bench(context):
+        context.set(Value.cast(unit.constants).as_unsigned(), constants)
+        context.set(unit.o.ready, 1)
+        clocks = unit.latency + 6 * interval
+        for before in (0, 1, 2 * interval + 1, unit.latency + 2):
+            await send(context, words[6:], before)
+            context.set(reset, before > 0)
+            await context.tick()
+            context.set(reset, 0)
+            assert not context.get(unit.o.valid)
+            found.append(await send(context, words[:6], clocks))
+
+    simulator = Simulator(ResetInserter(reset)(unit))
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert [clock for clock, _ in found[0]] == [unit.latency + interval * k for k in range(6)]
+    assert len({payload for _, payload in found[0]}) == 6
+    assert all(run == found[0] for run in found[1:])
+
+
+def test_shorter_spans_need_a_smaller_table(verify, normal_pairs):
+    """The same results for every length that fits."""
+    rng = np.random.default_rng(9)
+    unit = ChordSetupUnit(1, 4, length_bits=9)
+    assert cost_of(unit).rom_bits == 17 << 8
+    beats = spans(rng, normal_pairs, 600)
+    beats["length"] = rng.permutation(
+        np.r_[np.arange(1, 512), rng.integers(1, 512, len(beats["length"]) - 511)]
+    )
+    vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+    verify(unit, beats, expected_of(unit, beats, vectors), constants=constants_of(unit, vectors))
+
+
+@pytest.mark.parametrize("bits", [1, 13])
+def test_refuses_length_bits(bits):
+    with pytest.raises(ValueError, match=rf"^length_bits must be 2 to 12, not {bits}$"):
+        ChordSetupUnit(length_bits=bits)

@@ -1,0 +1,117 @@
+# amaranth: UnusedElaboratable=no
+"""Recurrence setup: RTL against its twin, clock by clock, at several intervals."""
+
+import numpy as np
+import pytest
+
+from golden.fixed import SQ, Fixed
+from golden.recurrence import Recurrence
+from golden.recurrence_setup import RecurrenceSetup
+from golden.unit_vector import COMPONENT, quantise
+from hdl.cost import cost_of
+from hdl.recurrence_setup import RecurrenceSetupUnit
+from sim.beats import dtype_of
+from sim.engine import simulate
+
+DIRECT = RecurrenceSetup(Recurrence("direct", interleave=4, result_format=SQ(2, 25)))
+VARIANTS = [
+    pytest.param(RecurrenceSetup(), 1, 1, marks=pytest.mark.long),
+    (RecurrenceSetup(), 1, 4),
+    (RecurrenceSetup(), 1, 46),
+    pytest.param(RecurrenceSetup(), 2, 4, marks=pytest.mark.long),
+    pytest.param(DIRECT, 1, 3, marks=pytest.mark.long),
+]
+COPIES = ("diffuse", "highlight")
+
+
+def spans(rng, normal_pairs, count=400):
+    """Spans of every angle, some far over the widest, some of the largest and smallest codes."""
+    angles = np.r_[np.zeros(20), 10.0 ** rng.uniform(-4, 0, 80), rng.uniform(0, 90, count - 160)]
+    angles = np.r_[angles, rng.uniform(90.1, 180, 59), 180]
+    left, right = (quantise(v) for v in normal_pairs(rng, count, angles))
+    ends = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (40, 6))
+    left, right = np.vstack([left, ends[:, :3]]), np.vstack([right, ends[:, 3:]])
+    length = rng.integers(1, 4096, len(left))
+    length[::2] = rng.integers(1, 20, len(length[::2]))
+    length[:12] = [1, 2, 3, 4, 5, 16, 17, 2048, 2049, 2050, 4094, 4095]
+    order = rng.permutation(len(left))
+    return {"normal_left": left[order], "normal_right": right[order], "length": length[order]}
+
+
+def constants_of(unit, vectors):
+    constants = np.zeros(unit.lights, dtype_of(unit.constants.shape().elem_shape))
+    constants["direction"], constants["halfway"] = vectors
+    return constants
+
+
+def expected_of(unit, beats, vectors):
+    """Beats of the output."""
+    left, right = (Fixed(COMPONENT, beats[name]) for name in ("normal_left", "normal_right"))
+    expected = np.zeros(len(left.codes), dtype_of(unit.o.payload.shape()))
+    for copy, of_lights in zip(COPIES, vectors, strict=True):
+        for light, vector in enumerate(of_lights):
+            first, second, coefficient, shift, wide = unit.parameters.compute(
+                left, right, Fixed(COMPONENT, vector), beats["length"]
+            )
+            expected["lights"][copy]["first"][:, light] = first.codes
+            expected["lights"][copy]["second"][:, light] = second.codes
+    expected["coefficient"], expected["length"], expected["wide"] = coefficient.codes, beats["length"], wide
+    if unit.parameters.recurrence.form == "reinsch":
+        expected["shift"] = shift
+    return expected
+
+
+@pytest.mark.parametrize(("parameters", "lights", "interval"), VARIANTS)
+def test_equals_twin(verify, normal_pairs, parameters, lights, interval):
+    rng = np.random.default_rng(interval)
+    unit = RecurrenceSetupUnit(parameters, lights, interval)
+    beats = spans(rng, normal_pairs)
+    vectors = [quantise(normal_pairs(rng, lights, 0.0)[0]) for _ in range(2)]
+    # At the peak, and with no slope at all.
+    beats["normal_left"][:50] = vectors[1][0]
+    beats["normal_right"][:10] = vectors[1][0]
+    expected = expected_of(unit, beats, vectors)
+    assert 50 < np.count_nonzero(expected["wide"]) < 200
+    verify(unit, beats, expected, constants=constants_of(unit, vectors))
+
+
+@pytest.mark.parametrize(
+    ("lights", "interval", "multipliers", "shifters", "latency"),
+    [
+        (1, 1, 46, 18, 99),
+        (1, 2, 23, 9, 108),
+        (1, 4, 12, 5, 114),
+        (1, 8, 6, 3, 121),
+        (1, 46, 1, 1, 230),
+        (2, 4, 20, 9, 114),
+    ],
+)
+def test_multipliers(lights, interval, multipliers, shifters, latency):
+    """14 products a span and 32 a light, as even as the interval allows; all of 18 bits."""
+    unit = RecurrenceSetupUnit(lights=lights, initiation_interval=interval)
+    cost = cost_of(unit)
+    assert cost.multipliers == {(18, 18): multipliers}
+    assert (unit.multipliers, unit.shifters) == (multipliers, shifters)
+    assert cost.constant_multipliers == 0
+    assert unit.latency == latency
+    assert multipliers == -(-(14 + 32 * lights) // interval)
+
+
+@pytest.mark.parametrize("interval", [0, -1])
+def test_refuses_an_interval(interval):
+    with pytest.raises(ValueError, match=rf"^interval must be at least 1, not {interval}$"):
+        RecurrenceSetupUnit(initiation_interval=interval)
+
+
+def test_beats_after_a_pause(normal_pairs):
+    """The results of a beat do not depend on what came before, or on how long ago it was."""
+    rng = np.random.default_rng(3)
+    unit = RecurrenceSetupUnit()
+    beats = {name: codes[:40] for name, codes in spans(rng, normal_pairs).items()}
+    vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+    expected = expected_of(unit, beats, vectors)
+    stalls = np.arange(150 * 40) % 150 != 0
+    constants = constants_of(unit, vectors)
+    run = simulate(unit, beats, count=40, constants=constants, engine="auto", input_stalls=stalls)
+    np.testing.assert_array_equal(run.beats, expected)
+    np.testing.assert_array_equal(run.clocks, run.input_clocks + unit.latency)

@@ -1,0 +1,109 @@
+"""Toggle counts against those of small components, known by hand, and of units with nothing to do."""
+
+import numpy as np
+import pytest
+from amaranth.hdl import EnableInserter, Module, Signal
+from amaranth.lib import memory, stream
+from amaranth.lib.wiring import Component, In, Out
+
+from golden.unit_vector import ONE_SQUARED
+from hdl.specular import SpecularUnit
+from sim.toggles import count_toggles
+
+
+class Sample(Component):
+    """The last beat, plain or inverted; in submodules a count, a table, and the lowest bit."""
+
+    i: In(stream.Signature(8))
+    o: Out(stream.Signature(8))
+    constants: In(8)
+    status: Out(8)
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.count = count = Module()
+        m.submodules.table = table = memory.Memory(shape=4, depth=4, init=[0, 15, 1, 7])
+        inner = Module()
+        odd = Signal(init=1)
+        inner.d.sync += odd.eq(self.i.payload[0])
+        m.submodules.gated = EnableInserter(self.i.valid & self.i.ready)(inner)
+        port = table.read_port()
+        wire = Signal(8)
+        taken = self.i.valid & self.i.ready
+        beats = Signal(8, init=3)
+        m.d.comb += [
+            self.i.ready.eq(~self.o.valid | self.o.ready),
+            wire.eq(self.i.payload ^ self.constants),
+            port.addr.eq(beats[:2]),
+            self.status.eq(port.data),
+        ]
+        with m.If(self.i.ready):
+            m.d.sync += self.o.valid.eq(self.i.valid)
+        with m.If(taken):
+            m.d.sync += self.o.payload.eq(wire)
+        with count.If(taken):
+            count.d.sync += beats.eq(beats + 1)
+        return m
+
+
+@pytest.mark.parametrize("engine", ["pysim", "auto"])
+def test_counts_known_by_hand(engine):
+    beats = np.array([0x00, 0xFF, 0xFE, 0x01, 0x03])
+    run, toggles = count_toggles(Sample(), beats, count=5, constants=0, engine=engine)
+    np.testing.assert_array_equal(run.beats, beats)
+    assert toggles == {
+        # 0 to 0, 8, 1, 8, 1 bits of the payload; valid rises and falls.
+        "top": 18 + 2,
+        # 3, 4, 5, 6, 7, 8.
+        "count": 3 + 1 + 2 + 1 + 4,
+        # 0, then words 3, 0, 1, 2, 3, 0: 0, 7, 0, 15, 1, 7, 0.
+        "table": 3 + 3 + 4 + 3 + 2 + 3,
+        # 1, then 0, 1, 0, 1, 1.
+        "gated": 4,
+    }
+
+
+@pytest.mark.parametrize("engine", ["pysim", "auto"])
+def test_stalls_and_equal_beats_toggle_nothing(engine):
+    """The same beat over and over, the sink seldom ready: its first pass and valid are all."""
+    stalls = np.arange(10) != 7
+    beats = np.full(20, 0xA5)
+    run, toggles = count_toggles(
+        Sample(), beats, count=20, constants=0x5A, output_stalls=stalls, input_stalls=~stalls, engine=engine
+    )
+    assert (run.beats == 0xFF).all()
+    valid = toggles["top"] - 8
+    assert valid % 2 == 0
+    assert 2 <= valid <= 40
+    # From 3 to 23.
+    assert toggles["count"] == sum((k ^ (k + 1)).bit_count() for k in range(3, 23))
+    assert toggles["gated"] == 0
+
+
+@pytest.mark.parametrize("interval", [1, 2, 4])
+def test_dark_beats_toggle_only_their_input(interval):
+    """Operand isolation: 200 dark beats add nothing to the data path but to the register of the input."""
+    rng = np.random.default_rng(2)
+    lit = ONE_SQUARED.codes - rng.integers(0, 1 << 32, 40)
+    dark = ONE_SQUARED.codes - rng.integers(0, 1 << 34, 200)
+    counts = {}
+    for kind, codes, marks in (
+        ("short", np.r_[lit, dark[:1]], np.r_[np.zeros(40), 1]),
+        ("long", np.r_[lit, dark], np.r_[np.zeros(40), np.ones(200)]),
+        ("lit", np.r_[lit, dark], np.zeros(240)),
+    ):
+        beats = {"operand": codes, "dark": marks.astype(np.uint8)}
+        unit = SpecularUnit(initiation_interval=interval)
+        run, toggles = count_toggles(
+            unit, beats, count=len(codes), constants={"exponent": 10}, engine="pysim"
+        )
+        if kind == "long":
+            assert not run.beats[40:].any()
+        counts[kind] = toggles["datapath"]
+    more = counts["long"] - counts["short"]
+    if interval == 1:
+        assert more == 0
+    else:
+        inputs = np.bitwise_count((dark[1:] ^ dark[:-1]).astype(np.uint64) & np.uint64((1 << 38) - 1)).sum()
+        assert more == inputs
+    assert counts["lit"] > counts["long"] + 200 * 20
