@@ -540,10 +540,11 @@ def _adaptive_normaliser(rng, count, p):
 
 def _recurrence(rng, count, unit):
     length = _lengths(rng, max(count // 500, 8), 2)
-    psi = np.radians(_angles(rng, len(length), 90.0))
+    psi = np.radians(rng.permutation(_angles(rng, len(length), 90.0)))
+    psi[2:4] = np.pi / 2  # The longest spans are the widest, too.
     step = psi / (length - 1)
-    phase = psi * rng.uniform(0, 1, len(length))
-    amplitude = rng.uniform(0.5, 1 - 2.0**-16, len(length))
+    phase = rng.uniform(-np.pi, np.pi, len(length))
+    amplitude = rng.uniform(0, 1 - 2.0**-16, len(length))
     states = unit.states(*unit.start(amplitude, phase, step), *unit.coefficient(step), int(length.max()))
     k = np.arange(len(states.codes))[:, np.newaxis]
     inside = k < length

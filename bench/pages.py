@@ -480,10 +480,9 @@ def index_page() -> str:
     rows = []
     for device, blocks in DEVICES.items():
         sources = dict.fromkeys(block.source for block in blocks)
-        variants = [block.variant for block in blocks if block.variant]
         kind, _ = _documented(_unit(device))
         link = f"[{_title(device)}]({device}.md)"
-        rows.append((link, ", ".join(sources), _summary(kind), str(max(len(variants), 1))))
+        rows.append((link, ", ".join(sources), _summary(kind), str(len(blocks))))
     head = ("device", "source", "what it computes", "variants")
     body = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
     return "\n".join(

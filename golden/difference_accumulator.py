@@ -29,8 +29,7 @@ class DifferenceAccumulator:
     used leaves ``SQ(2, 42)``; a wider, flagged span may wrap there.
 
     Error of a normal against ``Q + k W_0 + k (k - 1)/2 (2 G dt^2)``: the last rounding, 2^-18, alone, unless
-    it saturates. Drift
-    from the rounding of the differences is bounded in `DifferenceSetup`.
+    it saturates. Drift from the rounding of the differences is bounded in `DifferenceSetup`.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ class HighlightGate:
        + 2^-34) |G|`` for the reciprocal of the length, with |P| <= 0.83 and |G| <= 0.305; ``sqrt(3) 2^-42
        (k + k^2/2)`` for the rounding of the differences at pixel k, to 4094; ``sqrt(3) 2^-18`` for its own:
        together 4.4 steps of 2^-17 for its default fit. Saturation only brings a component nearer to one of a
-       unit vector. tau is `margin`, the sum in whole steps rounded up (5, `MARGIN`; 135 to 875 for the other
+       unit vector. tau is `margin`, the sum in whole steps rounded up (5; 135 to 875 for the other
        fits, whose normals may be too long), below the largest N·H that the specular unit shades 0, which
        follows from its PROM in integers. The dot product is exact, and the unit's argument falls with it: the
        term is 0. ∎
@@ -103,7 +103,6 @@ class HighlightGate:
     fraction_bits: int = 17
     middle_normal: MiddleNormal = field(default_factory=MiddleNormal)
 
-    MARGIN = 5 * 2.0**-17
     """`margin` with the default middle normal."""
 
     def __post_init__(self):

@@ -55,7 +55,9 @@ class Interpolator:
     COSINE_FORMAT : Format
         Of N·L.
     MAX_ANGLE : float
-        Widest span in degrees; others are flagged.
+        Widest span in degrees for which the method is meant. It flags wider ones as far as it can tell them:
+        most from there on; straight lines where a component of ``N_r - N_l`` is 1 or more, which takes 60
+        degrees and happens to half of the spans at 75; the angular method opposite normals alone.
     CURVE : str
         The curve of `golden.interpolation.CURVES` on which the method's normals lie in exact arithmetic.
     """

@@ -1,5 +1,7 @@
 """The shading pipeline: raster spans in, pixels out, one a clock."""
 
+from typing import Literal
+
 from amaranth.hdl import Module, Shape, Signal, unsigned
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
@@ -31,7 +33,17 @@ from .recurrence_interpolator import RecurrenceInterpolatorUnit
 from .specular import SlopeUnit
 from .stream import BUFFER_LATENCY, connect, connect_buffered
 
-__all__ = ["INTERPOLATORS", "PORT_DESCRIPTIONS", "ShadingPipelineUnit", "span_shape", "status_shape"]
+__all__ = [
+    "INTERPOLATORS",
+    "PORT_DESCRIPTIONS",
+    "STYLES",
+    "ShadingPipelineUnit",
+    "span_shape",
+    "status_shape",
+]
+
+STYLES = ("throughput", "compact")
+"""One pixel a clock, or few multipliers."""
 
 INTERPOLATORS: dict[type[Interpolator], type[InterpolatorUnit]] = {
     AngularInterpolator: AngularInterpolatorUnit,
@@ -106,6 +118,11 @@ class ShadingPipelineUnit(wiring.Component):
     ready, so that a long one pays for short ones after it. (``bisection`` takes longer where it divides
     spans.) A span of length 0 is taken like any other and gives nothing.
 
+    In the *compact* style one multiplier does the colours, one or a few the specular terms and one or two the
+    setup (as many as its longest interval needs): a pixel takes 3 clocks for each of its diffuse and specular
+    terms that is not 0, at least 3, so that what has no highlight costs less; a power takes 42. The pixels
+    are the same to the bit. ``clocks_per_pixel`` and ``latency`` are then those of a pixel with every term.
+
     A write is taken when no span is inside, and no span is taken while a write waits, so a frame's constants
     never change under a running span: ``i.ready`` falls on the clock on which ``write.valid`` rises. For the
     same reason a span of another material than the one before it waits until no span is inside: it is taken 5
@@ -118,12 +135,14 @@ class ShadingPipelineUnit(wiring.Component):
         Method, reflection model, numbers of lights and materials.
     setup_interval : int or None
         Clocks from a span to the next at the closest, where the method has that choice: a smaller one needs
-        more multipliers, and changes no pixel. ``None``: 4.
+        more multipliers, and changes no pixel. ``None``: 4, or in the compact style the largest.
+    style : str
+        ``"throughput"`` or ``"compact"``.
 
     Raises
     ------
     ValueError
-        If the method is not built for the setup interval.
+        If the method is not built for the setup interval, or the style is unknown.
 
     Members
     -------
@@ -141,7 +160,15 @@ class ShadingPipelineUnit(wiring.Component):
 
     PLACES = 64
 
-    def __init__(self, parameters: ShadingPipeline | None = None, setup_interval: int | None = None):
+    def __init__(
+        self,
+        parameters: ShadingPipeline | None = None,
+        setup_interval: int | None = None,
+        style: Literal["throughput", "compact"] = "throughput",
+    ):
+        if style not in STYLES:
+            raise ValueError(f"style must be one of {', '.join(STYLES)}, not {style!r}")
+        self.style = style
         self.parameters = p = parameters or ShadingPipeline()
         super().__init__(
             {
@@ -156,16 +183,25 @@ class ShadingPipelineUnit(wiring.Component):
         if setup_interval not in (None, *served):
             choice = f"1 to {served[-1]}" if served else "left out"
             raise ValueError(f"setup_interval of {p.method} must be {choice}, not {setup_interval}")
+        if style == "compact" and setup_interval is None and served:
+            setup_interval = served[-1]
         options = {} if setup_interval is None else {"setup_interval": setup_interval}
         self._interpolator = method(p.interpolator, p.lights, **options)
         diffuse = Diffuse(p.interpolator.COSINE_FORMAT)
         self._slope = None if isinstance(p.highlight, Power) else SlopeUnit(p.highlight)
         shares_slope = self._slope is not None
-        self._lights = [LightUnit(p.highlight, diffuse, shares_slope=shares_slope) for _ in range(p.lights)]
-        self._intensity = IntensityUnit(Intensity(p.lights))
+        interval = 1
+        if style == "compact":
+            interval = 3 if shares_slope else 42
+        self._lights = [
+            LightUnit(p.highlight, diffuse, interval, shares_slope=shares_slope) for _ in range(p.lights)
+        ]
+        self._intensity = IntensityUnit(Intensity(p.lights), style)
         self._assembler = PixelAssemblerUnit()
         self.setup_interval = self._interpolator.setup_interval
-        self.clocks_per_pixel = self._interpolator.clocks_per_pixel
+        self.clocks_per_pixel = max(
+            self._interpolator.clocks_per_pixel, interval, self._intensity.initiation_interval
+        )
         chain = (self._interpolator, self._lights[0], self._intensity, self._assembler)
         self.latency = sum(unit.latency for unit in chain) + BUFFER_LATENCY
 

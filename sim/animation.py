@@ -134,6 +134,7 @@ class Film:
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
     setup_interval : int, optional
+    style : str
         See `hdl.pipeline.ShadingPipelineUnit`.
     """
 
@@ -141,6 +142,7 @@ class Film:
     design: ShadingPipeline
     engine: str = "cxxrtl"
     setup_interval: int | None = None
+    style: str = "throughput"
 
 
 @dataclass(frozen=True)
@@ -164,8 +166,10 @@ _film: Film | None = None
 
 
 @functools.lru_cache(maxsize=1)
-def _simulator(design: ShadingPipeline, engine: str, setup_interval: int | None) -> FrameSimulator:
-    return FrameSimulator(design, engine, setup_interval)
+def _simulator(
+    design: ShadingPipeline, engine: str, setup_interval: int | None, style: str
+) -> FrameSimulator:
+    return FrameSimulator(design, engine, setup_interval, style)
 
 
 def shot(film: Film, camera: Camera) -> Shot:
@@ -175,7 +179,7 @@ def shot(film: Film, camera: Camera) -> Shot:
     """
     with _ONE_AT_A_TIME:
         scene = replace(film.scene, camera=camera)
-        frame = _simulator(film.design, film.engine, film.setup_interval).render(scene)
+        frame = _simulator(film.design, film.engine, film.setup_interval, film.style).render(scene)
         comparison = compare(scene, film.design, frame)
         return Shot(frame.image, frame_figures(scene, film.design, frame, comparison))
 

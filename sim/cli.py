@@ -27,7 +27,7 @@ from golden.pipeline import METHODS, MODELS, ShadingPipeline
 from golden.reflection import REFLECTION_MODELS
 from golden.scene import BACK_FACES, LARGEST_SIDE, Scene
 from golden.specular import MAX_EXPONENT
-from hdl.pipeline import INTERPOLATORS, PORT_DESCRIPTIONS, ShadingPipelineUnit
+from hdl.pipeline import INTERPOLATORS, PORT_DESCRIPTIONS, STYLES, ShadingPipelineUnit
 from hdl.verilog import emit
 from sim.animation import (
     Film,
@@ -167,9 +167,17 @@ def _design_options(command):
     """Options of the pipeline's design, shared by the commands."""
     for option in (
         click.option(
+            "--style",
+            type=_Choice("style", STYLES),
+            default="throughput",
+            show_default=True,
+            help="One pixel a clock, or few multipliers.",
+        ),
+        click.option(
             "--setup-interval",
-            type=_Whole(1, 26),
-            help="Clocks from a span to the next at the closest; less takes more multipliers.  [default: 4]",
+            type=_Whole(1, 46),
+            help="Clocks from a span to the next at the closest; less takes more multipliers.  "
+            "[default: 4; compact: the most]",
         ),
         click.option(
             "--highlight",
@@ -408,7 +416,7 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
         [camera]    projection, view or position and target, up, field_of_view
         [[lights]]  direction, color
         [material]  ambient, diffuse, specular, exponent
-        [pipeline]  method, model, highlight, setup_interval
+        [pipeline]  method, model, highlight, setup_interval, style
     """
     start = perf_counter()
     settings = _read_settings(context, mesh, options)
@@ -444,7 +452,7 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
         stage.set_description_str("rasterising and simulating")
         scenes = _scenes(loaded, settings, frames or 1)
         if frames:
-            film = Film(scenes[0], design, settings["engine"], settings["setup_interval"])
+            film = Film(scenes[0], design, settings["engine"], settings["setup_interval"], settings["style"])
             cameras = [scene.camera for scene in scenes]
             report = _shoot_film(loaded, film, cameras, pictures, seconds, jobs, address)
             stage.set_description_str("writing the animation")
@@ -488,7 +496,7 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
 )
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
 @click.option("-o", "--output", type=click.Path(), help="Verilog file.  [default: standard output]")
-def verilog(method, model, highlight, setup_interval, lights, materials, name, output):
+def verilog(method, model, highlight, setup_interval, style, lights, materials, name, output):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
     \b
@@ -506,10 +514,10 @@ def verilog(method, model, highlight, setup_interval, lights, materials, name, o
     design = dataclasses.replace(design, materials=materials)
     if output:
         check_writable(output)
-    unit = ShadingPipelineUnit(design, setup_interval)
+    unit = ShadingPipelineUnit(design, setup_interval, style)
     header = [
         f"blysk {version('blysk')} shading pipeline",
-        f"method {method}, model {model}, lights {lights}, materials {materials}",
+        f"method {method}, model {model}, lights {lights}, materials {materials}, {style} style",
         f"latency {unit.latency} clocks, {unit.clocks_per_pixel} a pixel",
         f"a span takes at most max({unit.clocks_per_pixel} length, {unit.setup_interval}) clocks",
         "",
@@ -587,11 +595,11 @@ def _simulator(
 
     Where the slow engine stands in, the settings become its own.
     """
-    interval = settings["setup_interval"]
+    options = settings["setup_interval"], settings["style"]
     if settings["engine"] == "pysim":
-        return FrameSimulator(design, "pysim", interval)
+        return FrameSimulator(design, "pysim", *options)
     try:
-        simulator = FrameSimulator(design, "cxxrtl", interval)
+        simulator = FrameSimulator(design, "cxxrtl", *options)
     except CompilerMissing as error:
         if address:
             simulator = None
@@ -599,7 +607,7 @@ def _simulator(
             settings["size"] = width, height = _at_most(settings["size"], SLOW_SIZE)
             settings["engine"] = "pysim"
             tqdm.write(f"blysk: pysim at {width}x{height} instead of cxxrtl, {error}", file=sys.stderr)
-            return FrameSimulator(design, "pysim", interval)
+            return FrameSimulator(design, "pysim", *options)
         else:
             raise
     settings["engine"] = "cxxrtl"

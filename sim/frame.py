@@ -77,6 +77,7 @@ class FrameSimulator:
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
     setup_interval : int, optional
+    style : str
         See `hdl.pipeline.ShadingPipelineUnit`.
 
     Attributes
@@ -92,11 +93,17 @@ class FrameSimulator:
         If the engine is ``"cxxrtl"`` and no C++ compiler works.
     """
 
-    def __init__(self, design: ShadingPipeline, engine: str = "cxxrtl", setup_interval: int | None = None):
+    def __init__(
+        self,
+        design: ShadingPipeline,
+        engine: str = "cxxrtl",
+        setup_interval: int | None = None,
+        style: str = "throughput",
+    ):
         start = perf_counter()
         self.design = design
         self.engine = engine
-        self._unit = ShadingPipelineUnit(design, setup_interval)
+        self._unit = ShadingPipelineUnit(design, setup_interval, style)
         spans, constants = _sample(design)
         expected = design.compute(spans, constants)
         run = self._run(spans, constants, len(expected.x))

@@ -14,6 +14,7 @@ from golden.intensity import MAX_LIGHTS
 from golden.pipeline import METHODS, MODELS
 from golden.scene import BACK_FACES, LARGEST_SIDE
 from golden.specular import MAX_EXPONENT
+from hdl.pipeline import STYLES
 from sim.errors import InputError
 
 __all__ = ["HIGHLIGHTS", "MAX_BYTES", "SceneFile", "read_scene_file"]
@@ -96,6 +97,7 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         model = "cosquad"
         highlight = "dot"                   # "chord"
         setup_interval = 4
+        style = "throughput"                # "compact"
 
     The values' ranges are those of the command line. The mesh and what follows from several values at once
     are not looked at.
@@ -353,6 +355,7 @@ _TOP = {
         "method": ("method", _choice(METHODS)),
         "model": ("model", _choice(MODELS)),
         "highlight": ("highlight", _choice(HIGHLIGHTS)),
-        "setup_interval": ("setup_interval", _whole(1, 26)),
+        "setup_interval": ("setup_interval", _whole(1, 46)),
+        "style": ("style", _choice(STYLES)),
     },
 }

@@ -16,6 +16,8 @@ from golden.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 
 EXPONENTS = (2, 3, 5, 10, 30, 100, 300, 500, 1000)
 
+MARGIN = HighlightGate().margin
+
 
 def arc_maximum(a, b, angle, shares=513):
     """Largest N·H over points of the arc, from the sine formula: no use of the gate's."""
@@ -154,7 +156,7 @@ def test_no_pixel_is_suppressed_with_other_middle_normals():
         steps[fit] = gate.margin * 2**17
         # With a wide margin, spans about the threshold are seldom visible.
         check_spans(gate, np.random.default_rng(10), 20_000, shaded_share=1 / 100)
-    assert steps["exact"] * 2.0**-17 == HighlightGate.MARGIN
+    assert steps["exact"] * 2.0**-17 == MARGIN
     others = sorted(steps.values())[1:]
     assert (others[0], others[-1]) == (135, 875)
 
@@ -263,7 +265,7 @@ def test_the_term_is_0_everywhere_below(model):
         tau = np.sqrt(gate.thresholds.values[exponent])
         if tau == 0:
             continue
-        highest = int((tau + gate.MARGIN) * 2.0**34)
+        highest = int((tau + gate.margin) * 2.0**34)
         codes = np.r_[rng.integers(-(2**34), highest, 50_000), highest - np.arange(2000), -(2**34)]
         operand = Fixed(gate.specular.operand_format, codes)
         assert not gate.specular.compute(operand, np.zeros(len(codes), bool), exponent).codes.any()
@@ -278,7 +280,7 @@ def test_margin_covers_the_pipeline():
         np.sqrt(3) * 2.0**-42 * (k + k * k / 2),
         np.sqrt(3) * 2.0**-18,
     ]
-    assert 4.2 * 2.0**-17 < sum(terms) < 4.45 * 2.0**-17 < HighlightGate.MARGIN
+    assert 4.2 * 2.0**-17 < sum(terms) < 4.45 * 2.0**-17 < MARGIN
     rng, gate = np.random.default_rng(5), HighlightGate()
     worst = 0
     for exponent in (10, 1000):
@@ -292,7 +294,7 @@ def test_margin_covers_the_pipeline():
         # What is let through is near the threshold, so the margins cost little.
         lit = gate.compute(*(Fixed(COMPONENT, codes) for codes in (left, right, halfway)), exponent)
         assert (maximum[lit] ** 2 > gate.thresholds.values[exponent] - 9 * 2.0**-17).all()
-    assert HighlightGate.MARGIN / 8 < worst < HighlightGate.MARGIN
+    assert MARGIN / 8 < worst < MARGIN
 
 
 def test_thresholds_lie_under_what_the_unit_shades():
@@ -310,7 +312,7 @@ def test_thresholds_lie_under_what_the_unit_shades():
             while high - low > 1:
                 middle = (low + high) // 2
                 low, high = (middle, high) if shade(middle) == 0 else (low, middle)
-            tau = low * 2.0**-34 - HighlightGate.MARGIN if shade(low) == 0 else -1.0
+            tau = low * 2.0**-34 - MARGIN if shade(low) == 0 else -1.0
             if tau <= 0:
                 assert lowest[exponent] == 0
             else:

@@ -10,11 +10,14 @@ import pytest
 from amaranth.hdl import ResetInserter, Signal, UnusedElaboratable, Value
 from amaranth.sim import Simulator
 
+from golden.diffuse import Diffuse
+from golden.fixed import Fixed
 from golden.frame_constants import FrameConstants
 from golden.intensity import Intensity
 from golden.pipeline import METHODS, MODELS, ShadingPipeline, Spans
 from golden.specular import SPECULAR_MODELS
-from golden.unit_vector import quantise
+from golden.unit_vector import COMPONENT, quantise
+from hdl.cost import cost_of
 from hdl.pipeline import INTERPOLATORS, ShadingPipelineUnit
 from sim.beats import pack, unpack
 from sim.engine import simulate
@@ -535,3 +538,45 @@ def test_refuses_a_setup_interval(method, interval, choice, never_built):
 def test_method_without_a_choice_of_interval(method, never_built):
     assert ShadingPipelineUnit(ShadingPipeline(method)).setup_interval > 4
     assert len(methods_with_intervals()[method]) == 0
+
+
+@pytest.mark.parametrize(
+    ("method", "model", "lights"),
+    [("chord", "cosquad", 1), ("chord", "lyon3", 2), ("quadratic", "exp", 1), ("linear", "blinn", 1)],
+)
+def test_compact_style_equals_twin_under_stalls(method, model, lights, normal_pairs):
+    rng = np.random.default_rng(lights)
+    design = ShadingPipeline(method, model, lights)
+    spans = make_spans(rng, rng.integers(0, 24, 40), normal_pairs, 20.0)
+    constants = make_constants(rng, lights)
+    pixels = design.compute(spans, constants)
+    unit = ShadingPipelineUnit(design, style="compact")
+    for share in (0, 0.4):
+        stalls = {"input_stalls": rng.random(97) < share, "output_stalls": rng.random(89) < share}
+        assert_pixels(run(unit, spans, constants, pixels, **stalls), pixels)
+
+
+def test_compact_style_takes_three_clocks_a_term(normal_pairs):
+    """Highlights cost clocks, and what has none does not."""
+    rng = np.random.default_rng(1)
+    design = ShadingPipeline("chord")
+    spans = make_spans(rng, np.full(30, 60), normal_pairs, 20.0)
+    constants = make_constants(rng, 1, exponent=3)
+    vectors = (spans.normal_left, spans.normal_right, constants.direction, constants.halfway)
+    left, right, direction, halfway = (Fixed(COMPONENT, codes) for codes in vectors)
+    operands = design.interpolator.compute(left, right, spans.length, direction, halfway)
+    diffuse = Diffuse(operands.cosine.format)
+    dark = diffuse.dark(operands.cosine)
+    specular = design.highlight.compute(operands.highlight, dark, constants.exponent)
+    clocks = Intensity.clocks(diffuse.compute(operands.cosine), specular)
+    assert set(clocks.tolist()) == {3, 6}
+    unit = ShadingPipelineUnit(design, style="compact")
+    found = run(unit, spans, constants, design.compute(spans, constants))
+    np.testing.assert_array_equal(np.diff(found.clocks), clocks[1:])
+    assert unit.clocks_per_pixel == 6
+    assert cost_of(unit).multiplier_count == 3
+
+
+def test_unknown_style(never_built):
+    with pytest.raises(ValueError, match=r"^style must be one of throughput, compact, not 'small'$"):
+        ShadingPipelineUnit(style="small")

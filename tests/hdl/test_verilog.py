@@ -224,6 +224,7 @@ CORES = {
         for method in METHODS
         if method != "quadratic"
     },
+    "pipeline_compact": lambda: ShadingPipelineUnit(ShadingPipeline("chord"), style="compact"),
     "pipeline_by_chord": lambda: ShadingPipelineUnit(
         ShadingPipeline("linear", "blinn", operand="one_minus_cosine")
     ),

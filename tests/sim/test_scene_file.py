@@ -57,6 +57,7 @@ def test_documented_example(write):
         "model": "cosquad",
         "highlight": "dot",
         "setup_interval": 4,
+        "style": "throughput",
     }
     assert file.keys["mesh"] == "mesh.file"
     assert file.keys["exponent"] == "material.exponent"
