@@ -1,5 +1,6 @@
 """Interpolators: what shading needs of a span at every pixel, whatever the method that finds it."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple
 
@@ -74,6 +75,13 @@ class Interpolator:
     def widest_span(self, exponent: int) -> float:
         """Widest span, in degrees, that should be given to the method at a specular exponent."""
         return self.MAX_ANGLE
+
+    def largest_bend(self, exponent: int) -> float:
+        """How far, in radians, the middle of a part of a span may lie from the middle normal of its ends.
+
+        Wider parts should be cut again before they are given to the method. By default anything will do.
+        """
+        return math.inf
 
     def compute(
         self,

@@ -158,9 +158,10 @@ class FrameSimulator:
             )
         constants = [FrameConstants.of(scene, self.design.lights, index=index) for index in materials]
         raster = rasterise(scene)
-        exponents = (material.exponent for material in scene.materials)
-        widest = min(map(self.design.interpolator.widest_span, exponents))
-        cut_raster, spans_cut = cut_wide_spans(raster, widest)
+        interpolator = self.design.interpolator
+        exponents = [material.exponent for material in scene.materials]
+        widest = min(map(interpolator.widest_span, exponents))
+        cut_raster, spans_cut = cut_wide_spans(raster, widest, min(map(interpolator.largest_bend, exponents)))
         cut_raster = sort_by_material(cut_raster, scene.mesh.material)
         spans = quantise_spans(cut_raster, scene.mesh.material)
         rastered = perf_counter()

@@ -1,9 +1,11 @@
 """From the rasteriser's spans to the pipeline's: cut where too wide, and quantised."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
+from golden.geometry import normalise
 from golden.interpolation import interpolate
 from golden.pipeline import Spans
 from golden.raster import Raster
@@ -12,8 +14,14 @@ from golden.unit_vector import quantise
 __all__ = ["cut_wide_spans", "quantise_spans", "sort_by_material"]
 
 
-def cut_wide_spans(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
+def cut_wide_spans(
+    raster: Raster, largest_angle: float, largest_bend: float = math.inf
+) -> tuple[Raster, int]:
     """Halve spans until the normals at the ends of each are at most an angle apart.
+
+    A part of a span has a curve of its own: along ``normalise((1-t) N_l + t N_r)`` the angle does not grow
+    evenly, so that in the middle of the part the span's normal is not quite the middle normal of the part's
+    ends. Parts in which the two are further apart than ``largest_bend`` are halved, too.
 
     The normals at a cut are those of the span's own curve, ``normalise((1-t) N_l + t N_r)``, at the pixel
     centres on both sides of it. A pixel more or less than half goes to the right. The fragments stay as they
@@ -25,6 +33,8 @@ def cut_wide_spans(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
         Spans; replaced are ``x, y, length, triangle, normal_left, normal_right, back, span, offset``.
     largest_angle : float
         Degrees, over 0.
+    largest_bend : float
+        Radians, over 0.
 
     Returns
     -------
@@ -47,6 +57,12 @@ def cut_wide_spans(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
     cosine = np.cos(np.radians(largest_angle))
     while True:
         wide = (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
+        # A whole span bends evenly; a part of two pixels has nothing between them.
+        part = np.flatnonzero((last - first > 1) & (last - first < raster.length[origin] - 1) & ~wide)
+        if len(part) and largest_bend < math.inf:
+            own = normals(origin[part], (first[part] + last[part]) / 2)
+            bend = np.linalg.norm(own - normalise(left[part] + right[part]), axis=-1)
+            wide[part[bend > largest_bend]] = True
         if not wide.any():
             break
         middle = (first[wide] + last[wide] + 1) // 2

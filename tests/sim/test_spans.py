@@ -8,6 +8,7 @@ import pytest
 from golden.fixed import Fixed
 from golden.frame_constants import FrameConstants
 from golden.geometry import normalise
+from golden.interpolation import interpolate
 from golden.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
 from golden.pipeline import ShadingPipeline
 from golden.raster import Raster
@@ -257,3 +258,31 @@ def test_spans_have_the_material_of_their_triangle(normal_pairs):
     material = rng.integers(0, 9, 1000)
     for given in (raster, sort_by_material(raster, material)):
         assert np.array_equal(quantise_spans(given, material).material, material[given.triangle])
+
+
+@pytest.mark.parametrize("largest_bend", [1e-3, 1e-5])
+def test_parts_bend_evenly(largest_bend, normal_pairs):
+    """The curve of the whole span, in the middle of each part, is the middle normal of the part's ends."""
+    rng = np.random.default_rng(20)
+    count = 400
+    left, right = normal_pairs(rng, count, rng.uniform(5, 120, count))
+    raster = raster_of(rng, left, right, rng.integers(2, 200, count))
+    coarse, _ = cut_wide_spans(raster, 10.0)
+    fine, cut = cut_wide_spans(raster, 10.0, largest_bend)
+
+    def bends(parts):
+        """Of parts of more than two pixels, in radians."""
+        first = np.flatnonzero(parts.offset == 0)
+        place = first - np.concatenate([[0], np.cumsum(raster.length)])[raster.span[first]]
+        t = (place + (parts.length - 1) / 2) / (raster.length[raster.span[first]] - 1)
+        whole = raster.span[first]
+        own = interpolate("normalised", left[whole], right[whole], t)
+        middle = normalise(parts.normal_left + parts.normal_right)
+        return np.linalg.norm(own - middle, axis=1)[
+            (parts.length > 2) & (parts.length < raster.length[whole])
+        ]
+
+    assert bends(coarse).max() > largest_bend >= bends(fine).max()
+    assert len(fine.length) > len(coarse.length)
+    assert cut <= count
+    assert np.array_equal(fine.pixel, raster.pixel)
