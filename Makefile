@@ -15,10 +15,10 @@ demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
 
 test: $(VENV)/.installed-test lint
-	$(BIN)/python -m pytest -n $(TEST_WORKERS)
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile
 
 test-all: $(VENV)/.installed-test lint
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) -m ""
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile -m ""
 
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m bench.engines

@@ -174,7 +174,7 @@ KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS)}"
         (["--background", "#12345"], "--background #12345", "not a colour"),
         (["--vcd", "a.vcd", "--engine", "cxxrtl"], "--vcd", "use --engine pysim"),
         (["--highlight", "cross"], "--highlight cross", "use one of dot, chord"),
-        (["--setup-interval", "0"], "--setup-interval 0", "from 1 to 26"),
+        (["--setup-interval", "0"], "--setup-interval 0", "from 1 to 46"),
         (["--frames", "0"], "--frames 0", "from 1 to 9999"),
         (["--frames", "2", "--jobs", "0"], "--jobs 0", "from 1 to 1024"),
         (["--jobs", "2"], "--jobs", "give --frames, too"),

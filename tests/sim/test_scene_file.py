@@ -173,7 +173,7 @@ BAD = {
     "pipeline.method = 'slurp'": ("a.toml, pipeline.method", "use one of linear, bisection, "),
     "pipeline.model = 'phong'": ("a.toml, pipeline.model", "'phong' is unknown"),
     "pipeline.highlight = 'cross'": ("a.toml, pipeline.highlight", "dot, chord"),
-    "pipeline.setup_interval = 0": ("a.toml, pipeline.setup_interval", "from 1 to 26"),
+    "pipeline.setup_interval = 0": ("a.toml, pipeline.setup_interval", "from 1 to 46"),
     "[camera]\nview = [1, 0, 0]\nposition = [1, 0, 0]\n" + MESH: ("a.toml, camera", "leave one"),
     "[camera]\ntarget = [1, 0, 0]\n" + MESH: ("a.toml, camera.target", "give camera.position too"),
     b"a = '\xff'": ("a.toml", "is not UTF-8 (line 1)"),
