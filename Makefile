@@ -25,6 +25,8 @@ bench: $(VENV)/.installed-bench
 	$(BIN)/python -m bench.throughput
 	$(BIN)/python -m bench.renderer
 	$(BIN)/python -m bench.accuracy
+	$(BIN)/python -m bench.gate
+	$(BIN)/python -m bench.sweep
 
 pages: $(VENV)/.installed
 	$(BIN)/blysk pages docs/blocks

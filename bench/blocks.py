@@ -4,8 +4,11 @@
 float64 mathematics, times from the units or a simulation of them, parts from their netlists.
 """
 
+import multiprocessing
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -17,7 +20,7 @@ from tqdm import tqdm
 
 from golden.adaptive_normaliser import AdaptiveNormaliser
 from golden.angular_setup import AngularSetup
-from golden.arccos import ARCCOS_TABLES, Arccos, HalfChord
+from golden.arccos import ARCCOS_TABLES, SEGMENT_BOUNDS, Arccos, HalfChord
 from golden.bisection import Bisection
 from golden.bisection_chain import BisectionChain
 from golden.chord import Chord
@@ -31,14 +34,19 @@ from golden.frame_constants import FrameConstants
 from golden.geometry import normalise
 from golden.gpq import GPQ
 from golden.highlight_cosine import HighlightCosine
+from golden.highlight_gate import HighlightGate
 from golden.intensity import Intensity
 from golden.interpolation import interpolate
 from golden.interpolator import pixels_of
+from golden.local_chord_interpolator import LocalChordInterpolator, SpanValues
+from golden.local_chord_setup import LocalChordSetup
 from golden.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
 from golden.pipeline import METHODS, ShadingPipeline, Spans
 from golden.power import Power
 from golden.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
+from golden.quadratic_interpolator import QuadraticInterpolator
 from golden.recurrence import RECURRENCE_FORMS, Recurrence
+from golden.recurrence_setup import RecurrenceSetup
 from golden.reflection import COSCOS_MODELS, reflect
 from golden.renormaliser import Renormaliser
 from golden.specular import FURTHER_MODELS, MAX_EXPONENT, SPECULAR_MODELS, Specular
@@ -60,6 +68,8 @@ from hdl.highlight_cosine import HighlightCosineUnit
 from hdl.highlight_gate import HighlightGateUnit
 from hdl.intensity import IntensityUnit
 from hdl.light import LightUnit
+from hdl.local_chord_interpolator import LocalChordInterpolatorUnit
+from hdl.local_chord_setup import LocalChordSetupUnit
 from hdl.middle_normal import MiddleNormalUnit
 from hdl.pipeline import INTERPOLATORS, ShadingPipelineUnit
 from hdl.power import PowerUnit
@@ -73,10 +83,29 @@ from sim.engine import simulate
 from sim.errors import InputError
 from sim.output import check_writable, write_json
 
-__all__ = ["BLOCKS", "Block", "Row", "Sample", "cells_of", "command", "row_of", "rows", "sample_of", "table"]
+__all__ = [
+    "BLOCKS",
+    "Block",
+    "Decisions",
+    "Row",
+    "Sample",
+    "cells_of",
+    "command",
+    "row_of",
+    "rows",
+    "sample_of",
+    "table",
+]
 
-SAMPLES = 100_000
+SAMPLES = 1_000_000
 SEED = 1
+
+_CHUNK = 1 << 17
+"""Samples that are measured at once; bounds the memory."""
+
+_MOST_JOBS = 64
+_GROUPS = 8
+"""Of spans, each with lights of its own, in a chunk of whole spans."""
 
 _STEP = COMPONENT.step
 _SCALE = ONE * _STEP
@@ -108,14 +137,47 @@ class Sample:
     @property
     def errors(self) -> tuple[float | None, float | None, float]:
         """Largest model, arithmetic and total error."""
-
-        def largest(a, b):
-            return float(np.abs(np.asarray(a) - b).max())
-
-        total = largest(self.found, self.exact)
+        total = self._size(self.found, self.exact)
         if self.formula is None:
             return None, None, total
-        return largest(self.formula, self.exact), largest(self.found, self.formula), total
+        return self._size(self.formula, self.exact), self._size(self.found, self.formula), total
+
+    @staticmethod
+    def _size(a, b) -> float:
+        return float(np.abs(np.subtract(a, b)).max())
+
+    @property
+    def extremes(self) -> "Sample":
+        """The three results or fewer that `errors` come from."""
+        pairs = [(self.found, self.exact)]
+        if self.formula is not None:
+            pairs += [(self.formula, self.exact), (self.found, self.formula)]
+        worst = [int(np.abs(np.subtract(a, b)).argmax()) for a, b in pairs]
+        parts = (self.found, self.exact, self.formula)
+        return Sample(*(None if part is None else np.ravel(part)[worst] for part in parts))
+
+
+class Decisions(Sample):
+    """Yes, 1, or no, 0, and what it should have been. Errors are their share of all.
+
+    The formula is yes where either is: a model error is a yes for nothing, a waste; an arithmetic one a no
+    by mistake.
+    """
+
+    @classmethod
+    def of(cls, found: np.ndarray, exact: np.ndarray, at: np.ndarray | None = None) -> "Decisions":
+        """Decisions and what they should have been, as booleans."""
+        found, exact = (np.asarray(decision, dtype=np.int8) for decision in (found, exact))
+        return cls(found, exact, np.maximum(found, exact), at)
+
+    @staticmethod
+    def _size(a, b):
+        return float(np.abs(np.subtract(a, b)).mean())
+
+    @property
+    def extremes(self) -> "Decisions":
+        """All of them."""
+        return replace(self, at=None)
 
 
 @dataclass(frozen=True)
@@ -130,14 +192,14 @@ class Block:
         Document and figure.
     unit : callable
         Makes the unit.
-    measure : callable or None
-        Takes a random generator and a number of samples, gives a `Sample`; `None` for a device without a
-        number as its result, of which `note` says what holds.
+    measure : callable
+        Takes a random generator and a number of samples, gives a `Sample`. For methods of whole spans a
+        sample is a pixel.
     domain : str
         Operands over which errors are measured.
     scale : str
-        Unit of the errors: nothing (1 is a full term or the length of a vector), ``rad``, ``turn`` or
-        ``LSB``.
+        Unit of the errors: nothing (1 is a full term or the length of a vector), ``rad``, ``turn``, ``LSB``
+        or ``rate``, a share of the decisions.
     exhaustive : bool
         Every operand of the domain is measured, whatever the number of samples.
     beat : dict
@@ -155,7 +217,7 @@ class Block:
     variant: str
     source: str
     unit: Callable[[], Component]
-    measure: Callable[[np.random.Generator, int], Sample] | None
+    measure: Callable[[np.random.Generator, int], Sample]
     domain: str
     scale: str = ""
     exhaustive: bool = False
@@ -265,6 +327,18 @@ def _lengths(rng: np.random.Generator, count: int, least: int = 1) -> np.ndarray
     return lengths
 
 
+def _span_lengths(rng: np.random.Generator, pixels: int, least: int = 1) -> np.ndarray:
+    """Lengths of spans that have about so many pixels or a few more, in any order."""
+    return rng.permutation(_lengths(rng, max(pixels // 450, 2 * _GROUPS), least))
+
+
+def _vectors_near(rng: np.random.Generator, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Codes of a unit vector for each span: anywhere, and for every second near the span's normals."""
+    vector = _sphere(rng, len(left))
+    vector[::2] = normalise((0.7 * left + 0.3 * right)[::2] / ONE + vector[::2] * 1e-3)
+    return quantise(vector)
+
+
 def _pixels(rng: np.random.Generator, length: np.ndarray) -> np.ndarray:
     """A pixel of each span; of every fourth the last."""
     pixel = np.floor(rng.random(len(length)) * length).astype(np.int64)
@@ -297,7 +371,7 @@ def _joined(samples: Iterable[Sample]) -> Sample:
         else np.concatenate([np.ravel(getattr(s, name)) for s in samples])
         for name in ("found", "exact", "formula", "at")
     ]
-    return Sample(*parts)
+    return type(samples[0])(*parts)
 
 
 # What is measured: `rng, count -> Sample`, a function a device.
@@ -519,7 +593,7 @@ def _bisection_chain(rng, count, chain):
 
 
 def _adaptive_normaliser(rng, count, p):
-    length = _lengths(rng, max(count // 400, 8))
+    length = _span_lengths(rng, count)
     left, right = _ends(rng, len(length), p.bisection.max_angle)
     found, wide, levels = p.compute(*_vectors(left, right), length)
     span, pixel = pixels_of(length)
@@ -537,19 +611,28 @@ def _adaptive_normaliser(rng, count, p):
     return Sample(found.values[kept], exact[kept] * _SCALE, lines[kept] * _SCALE, angle)
 
 
-def _recurrence(rng, count, unit):
-    length = _lengths(rng, max(count // 500, 8), 2)
+def _recurrence(rng, count, unit, shortcut=False):
+    length = _lengths(rng, max(count // 450, 8), 2)
     psi = np.radians(rng.permutation(_angles(rng, len(length), 90.0)))
     psi[2:4] = np.pi / 2  # The longest spans are the widest, too.
     step = psi / (length - 1)
     phase = rng.uniform(-np.pi, np.pi, len(length))
     amplitude = rng.uniform(0, 1 - 2.0**-16, len(length))
-    states = unit.states(*unit.start(amplitude, phase, step), *unit.coefficient(step), int(length.max()))
+    # The shortcut for cos d, by its half angle: near d = 0 a cosine has lost its digits.
+    taken = 2 * np.arcsin(np.sin(psi / 2) / (length - 1)) if shortcut else step
+    states = unit.states(*unit.start(amplitude, phase, step), *unit.coefficient(taken), int(length.max()))
     k = np.arange(len(states.codes))[:, np.newaxis]
     inside = k < length
-    exact = (amplitude * np.cos(phase - k * step))[inside]
+    exact = formula = (amplitude * np.cos(phase - k * step))[inside]
+    if shortcut:
+        first, second = (amplitude * np.cos(phase - n * step) for n in (0, 1))
+        rise = second - first + 2 * first * np.square(np.sin(taken / 2))
+        turns = k * np.sinc(k * taken / np.pi) / np.sinc(taken / np.pi)
+        # Up to 1.1 where the span is wide: out of the result's word.
+        limit = unit.result_format.max_code * unit.result_format.step
+        formula = np.clip((first * np.cos(k * taken) + rise * turns)[inside], -1, limit)
     pixel = np.broadcast_to(k, inside.shape)[inside]
-    return Sample(unit.result(states).values[inside], exact, exact, pixel)
+    return Sample(unit.result(states).values[inside], exact, formula, pixel)
 
 
 def _renormaliser(rng, count):
@@ -583,10 +666,19 @@ def _half_chord(rng, count):
     obtuse = _dot(left, right) < 0
     across = np.where(obtuse[:, np.newaxis], left + right, left - right)
     chord = np.minimum(_dot(across, across), 2 << 34)
-    found = HalfChord().compute(Fixed(HalfChord.OPERAND_FORMAT, chord), obtuse)
-    turns = np.arcsin(np.sqrt(chord) / (2 * ONE)) / np.pi
-    exact = np.where(obtuse, 0.5 - turns, turns)
-    return Sample(found.values, exact, at=360 * exact)
+    unit = HalfChord()
+    found = unit.compute(Fixed(unit.OPERAND_FORMAT, chord), obtuse)
+    # The table's lines and the polynomial, in words of the hardware, without further rounding.
+    z = chord * 2.0**-36
+    halvings = np.clip(np.floor(-np.frexp(z)[1] / 2), 0, 17)
+    place = z * 4.0**halvings * 2**unit.ADDRESS_BITS
+    address = np.minimum(np.floor(place), 2**unit.ADDRESS_BITS - 1).astype(np.int64)
+    value, slope = (word.values[address] for word in unit.roots)
+    root = value + slope * (place - address) / 2**unit.ADDRESS_BITS
+    factor = np.polynomial.polynomial.polyval(z, np.r_[unit.constant.values, unit.coefficients.values])
+    turns = np.stack([np.arcsin(np.sqrt(chord) / (2 * ONE)) / np.pi, root * factor / 2 * 2.0**-halvings])
+    exact, formula = np.where(obtuse, 0.5 - turns, turns)
+    return Sample(found.values, exact, formula, 360 * exact)
 
 
 def _highlight_cosine(rng, count, unit):
@@ -604,16 +696,25 @@ def _highlight_cosine(rng, count, unit):
     )
     found = unit.compute(*words, np.arange(count), pixel)
     turns = (phase - pixel * step) / 2.0**40
-    exact = 1 - beta * 2.0**-25 * np.cos(2 * np.pi * turns)
-    exact = np.minimum(exact, unit.RESULT_FORMAT.max_code * unit.RESULT_FORMAT.step)
-    return Sample(found.values, exact, at=360 * (turns % 1))
+    # The table's lines, in its words.
+    quarters = np.abs(turns - np.rint(turns)) * 4
+    back = quarters > 1
+    place = np.where(back, 2 - quarters, quarters) * 2**unit.address_bits
+    address = np.minimum(np.floor(place), 2**unit.address_bits - 1).astype(np.int64)
+    value, rise = (word.values[address] for word in unit.table)
+    line = value + rise * (place - address)
+    beta = beta * 2.0**-25
+    largest = unit.RESULT_FORMAT.max_code * unit.RESULT_FORMAT.step
+    exact, formula = (
+        np.minimum(1 - beta * cosine, largest)
+        for cosine in (np.cos(2 * np.pi * turns), np.where(back, line - 1, 1 - line))
+    )
+    return Sample(found.values, exact, formula, 360 * (turns % 1))
 
 
 def _angular_setup(rng, count, unit):
     left, right = _ends(rng, count, 150.0)
-    vector = _sphere(rng, count)
-    vector[::2] = normalise((0.7 * left + 0.3 * right)[::2] / ONE + vector[::2] * 1e-3)
-    vector = quantise(vector)
+    vector = _vectors_near(rng, left, right)
     length = _lengths(rng, count, 2)
     pixel = _pixels(rng, length)
     _, phase, step, cos_beta, _ = unit.compute(*_vectors(left, right, vector), length)
@@ -624,10 +725,21 @@ def _angular_setup(rng, count, unit):
     acute = across >= chord
     sine = np.where(acute, np.sqrt(chord) / 2, np.sqrt(np.maximum(1 - across / 4, 0)))
     cosine = np.where(acute, np.sqrt(np.maximum(1 - chord / 4, 0)), np.sqrt(across) / 2)
+    x = (a + b) / 2 / cosine
     y = np.divide(_dot(right - left, vector) / ONE**2 / 2, sine, out=np.zeros(count), where=sine > 0)
-    turned = (pixel / (length - 1) - 0.5) * 2 * np.arctan2(sine, cosine)
-    exact = (a + b) / 2 / cosine * np.cos(turned) + y * np.sin(turned)
-    return Sample(found, exact, at=_degrees(left, right)[:, 0])
+    angle = 2 * np.arctan2(sine, cosine)
+    early = late = angle
+    if unit.angle == "arccos":
+        cross = _dot(left, right) / ONE**2
+        at_bound = np.abs(np.abs(cross)[:, np.newaxis] - SEGMENT_BOUNDS[1:-1]).min(axis=1) < 2.0**-16
+        early, late = (
+            unit.arccos.polynomial(np.clip(cross + at_bound * way, -1, 1)) for way in (-(2.0**-16), 2.0**-16)
+        )
+    turned = (pixel / (length - 1) - 0.5) * np.stack([angle, early, late])
+    exact, early, late = x * np.cos(turned) + y * np.sin(turned)
+    # At the bound of two segments rounding decides, and the one that the unit took counts.
+    formula = np.where(np.abs(found - early) < np.abs(found - late), early, late)
+    return Sample(found, exact, formula, _degrees(left, right)[:, 0])
 
 
 def _chord(rng, count):
@@ -635,51 +747,175 @@ def _chord(rng, count):
     exact = _dot(right - left, right - left) / 2 * _STEP**2
     found = Chord().operand(*_vectors(left, right)).values
     limit = Chord.ARGUMENT_FORMAT.max_code * Chord.ARGUMENT_FORMAT.step
-    return Sample(found, np.minimum(exact, limit), at=_degrees(left, right)[:, 0])
+    exact = np.minimum(exact, limit)
+    return Sample(found, exact, exact, _degrees(left, right)[:, 0])
 
 
 def _interpolator(rng, count, method):
-    """``1 - N.H`` along spans."""
+    """N.L and ``1 - N.H`` along spans; 1 is the product of two unit vectors."""
     p = METHODS[method]
-    length = rng.integers(1, 64, max(count // 32, 8))
-    length[:4] = 1, 2, 4094, 4095
-    left, right = _ends(rng, len(length), min(p.MAX_ANGLE, 45.0))
-    vector = quantise(_sphere(rng, 1))
-    normals = _vectors(left, right)
-    operands = p.compute(*normals, length, *_vectors(vector, vector))
-    highlight = operands.highlight.values[:, 0]
-    found = highlight if p.operand == "one_minus_cosine" else ONE_SQUARED.values - highlight
-    span, pixel = pixels_of(length)
-    t = pixel / np.maximum(length - 1, 1)[span]
-    ends = [normalise(end / ONE)[span] for end in (left, right)]
-    vector = normalise(vector[0] / ONE)
-    exact, formula = (
-        1 - normals @ vector for normals in (interpolate("normalised", *ends, t), p.exact_normals(*ends, t))
-    )
-    kept = ~operands.wide[span]
-    return Sample(found[kept], exact[kept], formula[kept], _degrees(left, right)[span[kept], 0])
+    one = 1.0 if method in _IN_TURNS else ONE_SQUARED.values
+
+    def samples():
+        for length in np.array_split(_span_lengths(rng, count), _GROUPS):
+            spans = len(length)
+            light, halfway = _sphere(rng, 1), _sphere(rng, 1)
+            around = np.repeat(halfway, spans, axis=0)
+            left = _turned(rng, around, rng.permutation(_angles(rng, spans, 180.0)))
+            angles = rng.permutation(_angles(rng, spans, min(p.MAX_ANGLE, 45.0)))
+            left, right = quantise(left), quantise(_turned(rng, left, angles))
+            light, halfway = quantise(light), quantise(halfway)
+            operands = p.compute(*_vectors(left, right), length, *_vectors(light, halfway))
+            highlight = operands.highlight.values[:, 0] / one
+            if p.operand == "cosine":
+                highlight = 1 - highlight
+            found = np.stack([operands.cosine.values[:, 0] / one, highlight])
+            span, pixel = pixels_of(length)
+            t = pixel / np.maximum(length - 1, 1)[span]
+            left, right, light, halfway = (normalise(v / ONE) for v in (left, right, light, halfway))
+            exact, formula = (
+                np.stack([normals @ light[0], 1 - normals @ halfway[0]])
+                for normals in (
+                    interpolate("normalised", left[span], right[span], t),
+                    p.exact_normals(left[span], right[span], t),
+                )
+            )
+            kept = ~operands.wide[span]
+            angle = _degrees(left * ONE, right * ONE)[span[kept], 0]
+            yield Sample(found[:, kept], exact[:, kept], formula[:, kept], angle)
+
+    return _joined(samples())
 
 
 def _chord_setup(rng, count):
-    """U and N.L at any pixel that the differences lead to."""
+    """N.L and u at any pixel that the differences lead to; 1 is the product of two unit vectors."""
     length = _lengths(rng, count, 2)
     left, right = _ends(rng, count, ChordSetup.MAX_ANGLE)
-    light, halfway = quantise(_sphere(rng, 2))
+    light, halfway = quantise(_sphere(rng, count)), _vectors_near(rng, left, right)
     pixel = _pixels(rng, length)
-    diffuse, highlight, _ = ChordSetup().compute(
-        *_vectors(left, right, light[np.newaxis], halfway[np.newaxis]), length
-    )
+    # Each span has lights of its own.
+    lights = (vector[:, np.newaxis] for vector in (light, halfway))
+    diffuse, highlight, _ = ChordSetup().compute(*_vectors(left, right, *lights), length)
     t = pixel / (length - 1)
-    ends = [normalise(end / ONE) for end in (left, right)]
-    normals = interpolate("quadratic", *ends, t)
-    exact = [normals @ normalise(light / ONE), 1 - normals @ normalise(halfway / ONE)]
+    normals = interpolate("quadratic", *(normalise(end / ONE) for end in (left, right)), t)
+    exact = np.stack([_dot(normals, normalise(light / ONE)), 1 - _dot(normals, normalise(halfway / ONE))])
     k = pixel.astype(np.float64)
     found = [
-        (w.start.values + k[:, np.newaxis] * w.first.values)[:, 0] + (k * (k - 1) / 2) * w.second.values[:, 0]
+        w.start.values[:, 0] + k * w.first.values[:, 0] + k * (k - 1) / 2 * w.second.values[:, 0]
         for w in (diffuse, highlight)
     ]
-    exact = np.stack(exact)
-    return Sample(np.stack(found), exact, exact, _degrees(left, right)[:, 0])
+    return Sample(np.stack(found) / ONE_SQUARED.values, exact, exact, _degrees(left, right)[:, 0])
+
+
+def _local_curves(rng: np.random.Generator, spans: int) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """N.L and ``1 - N.H`` at places of so many spans, whose lights and viewer are near."""
+    start = rng.normal(size=(spans, 3))
+    step = rng.uniform(0, 0.3, (spans, 1)) * _sphere(rng, spans)
+    to_viewer = _sphere(rng, spans)
+    to_light = _turned(rng, to_viewer, rng.uniform(0, 120, spans))
+    viewer, light = (start + rng.uniform(2, 4, (spans, 1)) * way for way in (to_viewer, to_light))
+    left = _turned(rng, normalise(to_viewer + to_light), rng.permutation(_angles(rng, spans, 90.0)))
+    right = _turned(rng, left, rng.permutation(_angles(rng, spans, 15.0)))
+
+    def at(span, t):
+        place = start[span] + t[:, np.newaxis] * step[span]
+        ways = [normalise(point[span] - place) for point in (light, viewer)]
+        normal = interpolate("normalised", left[span], right[span], t)
+        return np.stack([_dot(normal, ways[0]), 1 - _dot(normal, normalise(ways[0] + ways[1]))])
+
+    return at
+
+
+def _three_values(at, spans: int) -> tuple[np.ndarray, SpanValues]:
+    """Exact values at the ends and the middle, shape (2, spans, 3), and their codes for one light."""
+    exact = np.stack([at(np.arange(spans), np.full(spans, t)) for t in (0.0, 0.5, 1.0)], axis=-1)
+    return exact, SpanValues.quantise(*exact[:, :, np.newaxis])
+
+
+def _parabola(values: np.ndarray, t: np.ndarray) -> np.ndarray:
+    left, middle, right = np.moveaxis(values, -1, 0)
+    return left + t * (4 * middle - right - 3 * left + t * 2 * (left + right - 2 * middle))
+
+
+def _local_chord_setup(rng, count):
+    """N.L and u at any pixel that the differences lead to; 1 is the product of two unit vectors."""
+    length = _lengths(rng, count, 2)
+    pixel = _pixels(rng, length)
+    values, codes = _three_values(_local_curves(rng, count), count)
+    unit = LocalChordSetup()
+    *words, wide = unit.compute(
+        Fixed(unit.DIFFUSE_FORMAT, codes.diffuse), Fixed(unit.HIGHLIGHT_FORMAT, codes.highlight), length
+    )
+    k = pixel.astype(np.float64)
+    found = [
+        w.start.values[:, 0] + k * w.first.values[:, 0] + k * (k - 1) / 2 * w.second.values[:, 0]
+        for w in words
+    ]
+    kept = ~wide
+    exact = _parabola(values, pixel / (length - 1))[:, kept]
+    return Sample(np.stack(found)[:, kept] / ONE_SQUARED.values, exact, exact, pixel[kept])
+
+
+def _local_chord_interpolator(rng, count):
+    """N.L and ``1 - N.H`` along spans; 1 is the product of two unit vectors."""
+    length = _span_lengths(rng, count)
+    curves = _local_curves(rng, len(length))
+    values, codes = _three_values(curves, len(length))
+    operands = LocalChordInterpolator().compute_values(codes, length)
+    span, pixel = pixels_of(length)
+    t = pixel / np.maximum(length - 1, 1)[span]
+    found = np.stack([operands.cosine.values[:, 0], operands.highlight.values[:, 0]]) / ONE_SQUARED.values
+    kept = ~operands.wide[span]
+    exact, formula = curves(span, t), _parabola(values[:, span], t)
+    # Between its three values a parabola may dip under 0, which is the least that the word holds.
+    formula[1] = np.maximum(formula[1], 0)
+    return Sample(found[:, kept], exact[:, kept], formula[:, kept], pixel[kept])
+
+
+def _recurrence_setup(rng, count):
+    """Cosine at any pixel that the start values and the coefficient lead to."""
+    length = _lengths(rng, count)
+    left, right = _ends(rng, count, 90.0)
+    vector = _vectors_near(rng, left, right)
+    pixel = _pixels(rng, length)
+    first, second, coefficient, shift, _ = RecurrenceSetup().compute(*_vectors(left, right, vector), length)
+    steps, phase = np.divmod(pixel, 4)
+    start, rise = (word.values[np.arange(count), phase] for word in (first, second))
+    bend = coefficient.values * 4 * 2.0**-shift
+    turn = 2 * np.arcsin(np.sqrt(bend) / 2)
+    turns = steps * np.sinc(steps * turn / np.pi) / np.sinc(turn / np.pi)
+    found = start * np.cos(steps * turn) + (rise + start * bend / 2) * turns
+    a, b = (_dot(normal, vector) / ONE**2 for normal in (left, right))
+    psi = 2 * np.arcsin(np.sqrt(_dot(right - left, right - left)) / (2 * ONE))
+    t = pixel / np.maximum(length - 1, 1)
+    weights = (part * np.sinc(part * psi / np.pi) / np.sinc(psi / np.pi) for part in (1 - t, t))
+    exact = sum(end * weight for end, weight in zip((a, b), weights, strict=True))
+    return Sample(found, exact, exact, np.degrees(psi))
+
+
+def _highlight_gate(rng, count):
+    """Whether a span is let through, and whether any of its pixels has a term."""
+    gate, interpolator = HighlightGate(), QuadraticInterpolator()
+
+    def samples():
+        for exponent, share in _exponents(rng, count):
+            edge = np.degrees(np.arccos(np.sqrt(gate.thresholds.values[exponent])))
+            halfway = _sphere(rng, share)
+            left = _turned(rng, halfway, rng.uniform(0, 2, share) * edge)
+            right = _turned(rng, left, rng.permutation(_angles(rng, share, MAX_SPAN_ANGLE)))
+            left, right, halfway = (quantise(v) for v in (left, right, halfway))
+            length = np.floor(17 ** rng.random(share)).astype(np.int64)
+            right[length == 1] = left[length == 1]
+            lit = gate.compute(*_vectors(left, right, halfway), exponent)
+            normals, wide = interpolator.normals(*_vectors(left, right), length)
+            span, pixel = pixels_of(length)
+            cosine = DotProduct().compute(normals, *_vectors(halfway[span]))
+            term = gate.specular.compute(cosine, np.zeros(len(span), bool), exponent)
+            shows = np.maximum.reduceat(term.codes, np.flatnonzero(pixel == 0)) > 0
+            kept = ~wide
+            yield Decisions.of(lit[kept], shows[kept], _degrees(left, right)[kept, 0])
+
+    return _joined(samples())
 
 
 def _pipeline(rng, count, method, model):
@@ -687,37 +923,41 @@ def _pipeline(rng, count, method, model):
     interpolator = design.interpolator
     reflection = {"ambient": 0.1, "diffuse": 0.5, "specular": 0.4}
     ambient, k_d, k_s = reflection.values()
+    grey = {name: np.tile(Intensity.color(k), 3) for name, k in reflection.items()}
+    exponents = [1, 10, 100, MAX_EXPONENT]
+    exponents += np.floor((MAX_EXPONENT + 1) ** rng.random(_GROUPS - len(exponents))).astype(int).tolist()
 
     def samples():
-        for exponent in (1, 10, 100, MAX_EXPONENT):
-            length = rng.integers(2, 200, max(count // 400, 4))
-            light, viewer = normalise(np.array([[-0.5, 0.8, 0.7], [0, 0, 1.0]]))
-            light, halfway = quantise(light), quantise(normalise(light + viewer))
+        lengths = np.array_split(_span_lengths(rng, count), _GROUPS)
+        for exponent, length in zip(exponents, lengths, strict=True):
+            viewer = _sphere(rng, 1)
+            light = _turned(rng, viewer, rng.uniform(0, 120, 1))
+            halfway = normalise(light + viewer)
             widest = min(interpolator.widest_span(exponent), MAX_SPAN_ANGLE)
-            angles = rng.permutation(_angles(rng, len(length), widest))
-            left = _turned(rng, np.tile(normalise(halfway / ONE), (len(length), 1)), rng.permutation(angles))
-            left, right = quantise(left), quantise(_turned(rng, left, angles))
-            grey = {name: np.tile(Intensity.color(k), 3) for name, k in reflection.items()}
+            around = np.repeat(halfway, len(length), axis=0)
+            left = _turned(rng, around, rng.permutation(_angles(rng, len(length), 60.0)))
+            right = _turned(rng, left, rng.permutation(_angles(rng, len(length), widest)))
+            left, right, light, halfway = (quantise(v) for v in (left, right, light, halfway))
             constants = FrameConstants(
                 exponent,
                 grey["ambient"],
-                light[np.newaxis],
-                halfway[np.newaxis],
+                light,
+                halfway,
                 grey["diffuse"][np.newaxis],
                 grey["specular"][np.newaxis],
             )
             place = np.zeros_like(length)
             found = design.compute(Spans(place, place, length, left, right), constants).color[:, 0]
             span, pixel = pixels_of(length)
-            t = pixel / (length - 1)[span]
+            t = pixel / np.maximum(length - 1, 1)[span]
             ends = [normalise(end / ONE)[span] for end in (left, right)]
             shades = []
             for normal, name in (
                 (interpolate("normalised", *ends, t), "blinn"),
                 (interpolator.exact_normals(*ends, t), model),
             ):
-                cosine = normal @ light / ONE
-                highlight = reflect(name, normal @ halfway / ONE, exponent) * (cosine > 0)
+                cosine = normal @ light[0] / ONE
+                highlight = reflect(name, normal @ halfway[0] / ONE, exponent) * (cosine > 0)
                 shades.append(255 * np.minimum(ambient + k_d * np.maximum(cosine, 0) + k_s * highlight, 1))
             # Behind the light the highlight is cut off at once, wherever rounding puts that.
             kept = cosine > 1 / 16
@@ -739,9 +979,11 @@ _METHOD_SOURCES = dict.fromkeys(METHODS, "[T] 2.2") | {
     "bisection": "[T] 2.7",
     "angular": "[T] 3.1",
     "recurrence": "[T] 3.3",
-    "renormalise": "numbers.md",
+    "renormalise": "numbers",
     "chord": "chord.md",
 }
+_IN_TURNS = ("angular", "recurrence")
+"""Methods of which 1 is 1; of the others 1 is the product of two unit vectors' codes."""
 
 _AXES = {
     "dot_product": ("a · b", False),
@@ -749,6 +991,8 @@ _AXES = {
     "difference_accumulator": ("pixel of the span", True),
     "quadratic_evaluator": ("pixel of the span", True),
     "recurrence": ("pixel of the span", True),
+    "local_chord_setup": ("pixel of the span", True),
+    "local_chord_interpolator": ("pixel of the span", True),
     "renormaliser": ("length of the vector", False),
     "arccos": ("x", False),
     "half_chord": ("angle, degrees", False),
@@ -772,7 +1016,7 @@ def _blocks() -> Iterator[Block]:
             "middle_normal",
             fit,
             "[T] 2.2",
-            lambda unit=unit: MiddleNormalUnit(unit),
+            partial(MiddleNormalUnit, unit),
             partial(_middle_normal, unit=unit),
             _SPANS_45,
         )
@@ -780,7 +1024,7 @@ def _blocks() -> Iterator[Block]:
         "middle_normal",
         "exact, interval 1",
         "[T] 2.2",
-        lambda: MiddleNormalUnit(initiation_interval=1),
+        partial(MiddleNormalUnit, initiation_interval=1),
         partial(_middle_normal, unit=MiddleNormal()),
         _SPANS_45,
     )
@@ -795,7 +1039,7 @@ def _blocks() -> Iterator[Block]:
             "difference_setup",
             variant,
             "[T] 2.11",
-            lambda unit=unit, interval=interval: DifferenceSetupUnit(unit, interval),
+            partial(DifferenceSetupUnit, unit, interval),
             partial(_difference_setup, unit=unit),
             f"{_SPANS_45}, {_LONG}",
             note="of the curve at any pixel that the differences lead to",
@@ -814,7 +1058,7 @@ def _blocks() -> Iterator[Block]:
             "quadratic_evaluator",
             form,
             f"[T] 2.9 {figure}",
-            lambda form=form: QuadraticEvaluatorUnit(QuadraticEvaluator(form)),
+            partial(QuadraticEvaluatorUnit, QuadraticEvaluator(form)),
             partial(_quadratic_evaluator, form=form),
             f"{_SPANS_45}, {_LONG}",
             beat={"length": 64},
@@ -826,7 +1070,7 @@ def _blocks() -> Iterator[Block]:
                 "bisection",
                 f"{degree}, {max_angle}" + ", documented" * documented,
                 "[T] 2.6",
-                lambda p=p: BisectionUnit(p),
+                partial(BisectionUnit, p),
                 partial(_bisection, p=p),
                 f"spans to {max_angle} degrees",
                 note=f"degree {degree}",
@@ -837,48 +1081,58 @@ def _blocks() -> Iterator[Block]:
             "bisection_chain",
             "documented" if documented else "",
             "[T] 2.1",
-            lambda chain=chain: BisectionChainUnit(chain),
+            partial(BisectionChainUnit, chain),
             partial(_bisection_chain, chain=chain),
             "spans to 90 degrees, levels 1 to 15",
             beat={"normal_left": _Z_AXIS, "normal_right": _Z_AXIS, "level": 1},
             note="times of level 1",
         )
-    for exponent in (6, 10, 14):
-        p = AdaptiveNormaliser(2.0**-exponent)
+    for exponent, documented in ((6, False), (10, False), (14, False), (10, True)):
+        p = AdaptiveNormaliser(2.0**-exponent, Bisection(as_documented=documented))
         yield Block(
             "adaptive_normaliser",
-            f"threshold 2^-{exponent}",
+            f"threshold 2^-{exponent}" + ", printed" * documented,
             "[T] 2.7",
-            lambda p=p: AdaptiveNormaliserUnit(p),
+            partial(AdaptiveNormaliserUnit, p),
             partial(_adaptive_normaliser, p=p),
             "spans to 90 degrees, 1 to 4095 pixels",
             beat=_SPAN,
             note="model: straight lines; the bisection's fit counts as arithmetic; latency of equal normals",
         )
-    yield Block("renormaliser", "", "numbers.md", RenormaliserUnit, _renormaliser, "lengths 0.685 to 1.0155")
+    yield Block("renormaliser", "", "numbers", RenormaliserUnit, _renormaliser, "lengths 0.685 to 1.0155")
     for table in ARCCOS_TABLES:
         for form in ("pipelined", "sequential"):
             yield Block(
                 "arccos",
                 f"{table}, {form}",
-                "[T] t. 3.1",
-                lambda table=table, form=form: ArccosUnit(Arccos(table), form),
+                "[T] 3.3",
+                partial(ArccosUnit, Arccos(table), form),
                 partial(_arccos, table=table),
                 "x -1 to 1",
                 "rad",
                 exhaustive=True,
             )
-    yield Block("half_chord", "", "[T] 3.3", HalfChordUnit, _half_chord, "angles 0 to 180 degrees", "turn")
+    yield Block(
+        "half_chord",
+        "",
+        "[T] 3.3",
+        HalfChordUnit,
+        _half_chord,
+        "angles 0 to 180 degrees",
+        "turn",
+        note="model: the root by lines, the factor by its polynomial",
+    )
     for interpolated in (True, False):
         unit = HighlightCosine(interpolated=interpolated)
         yield Block(
             "highlight_cosine",
             "interpolated" if interpolated else "table alone",
             "[T] 3.2",
-            lambda unit=unit: HighlightCosineUnit(unit),
+            partial(HighlightCosineUnit, unit),
             partial(_highlight_cosine, unit=unit),
             "all angles, cos beta 0 to 1",
             beat={"length": 64},
+            note="model: the cosine by the table's lines" if interpolated else "model: the table",
         )
     setups = {"half chord": AngularSetup()}
     setups |= {f"arccos {table}": AngularSetup("arccos", Arccos(table)) for table in ARCCOS_TABLES}
@@ -887,33 +1141,35 @@ def _blocks() -> Iterator[Block]:
             "angular_setup",
             variant,
             "[T] 3.1",
-            lambda unit=unit: AngularSetupUnit(unit),
+            partial(AngularSetupUnit, unit),
             partial(_angular_setup, unit=unit),
             f"spans to 150 degrees, {_LONG}",
-            note="of cos gamma at any pixel",
+            note="of cos gamma at any pixel; the tables count as arithmetic, but not that of arccos",
         )
-    for form in RECURRENCE_FORMS:
-        for interleave in (1, 4):
-            unit = Recurrence(form, interleave=interleave)
-            yield Block(
-                "recurrence",
-                form + ", interleaved" * (interleave > 1),
-                "[T] 3.5",
-                lambda unit=unit: RecurrenceUnit(unit),
-                partial(_recurrence, unit=unit),
-                f"spans to 90 degrees, {_LONG}",
-                beat={"length": 64},
-            )
+    recurrences = [(form, interleave, False) for form in RECURRENCE_FORMS for interleave in (1, 4)]
+    for form, interleave, shortcut in [*recurrences, ("reinsch", 1, True)]:
+        unit = Recurrence(form, interleave=interleave)
+        yield Block(
+            "recurrence",
+            form + ", interleaved" * (interleave > 1) + ", shortcut" * shortcut,
+            "[T] 3.3" if shortcut else "[T] 3.5",
+            partial(RecurrenceUnit, unit),
+            partial(_recurrence, unit=unit, shortcut=shortcut),
+            f"spans to 90 degrees, {_LONG}",
+            beat={"length": 64},
+            note="the same unit, given cos d = 1 - (1 - cos psi)/(m - 1)^2" if shortcut else "",
+        )
     yield Block("diffuse", "", "[B] 4", DiffuseUnit, _diffuse, "N.L -1 to 1")
     sources = dict.fromkeys(SPECULAR_MODELS + FURTHER_MODELS, "Lyon 1993")
     sources |= {"cosquad": "[T] 3.6", "cosquad7": "[T] 3.7", "cosquad_lin": "[C]", "cosquad_q": "[C]"}
+    sources["cosquad_lin_refitted"] = "numbers"
     sources |= {"exp": "models.md", **dict.fromkeys(COSCOS_MODELS, "[T] 3.1")}
     for model, source in sources.items():
         yield Block(
             "specular",
             model,
             source,
-            lambda model=model: SpecularUnit(Specular(model)),
+            partial(SpecularUnit, Specular(model)),
             partial(_highlight, unit=Specular(model), model=model),
             _HIGHLIGHTS,
         )
@@ -921,7 +1177,7 @@ def _blocks() -> Iterator[Block]:
         "specular",
         "cosquad, interval 2",
         sources["cosquad"],
-        lambda: SpecularUnit(initiation_interval=2),
+        partial(SpecularUnit, initiation_interval=2),
         partial(_highlight, unit=Specular(), model="cosquad"),
         _HIGHLIGHTS,
     )
@@ -931,7 +1187,7 @@ def _blocks() -> Iterator[Block]:
             "specular",
             f"{model}, documented",
             sources[model],
-            lambda unit=unit: SpecularUnit(unit),
+            partial(SpecularUnit, unit),
             partial(_highlight, unit=unit, model=model),
             _HIGHLIGHTS,
             note="comparator on the square, so that the parabola's second lobe shows",
@@ -941,7 +1197,7 @@ def _blocks() -> Iterator[Block]:
             "power",
             form,
             "[B] 3",
-            lambda form=form: PowerUnit(form=form),
+            partial(PowerUnit, form=form),
             partial(_highlight, unit=Power(), model="blinn"),
             _HIGHLIGHTS,
         )
@@ -953,16 +1209,17 @@ def _blocks() -> Iterator[Block]:
         "conservative",
         "[T] 4.10",
         HighlightGateUnit,
-        None,
-        "all spans",
-        note="suppresses no lit pixel",
+        _highlight_gate,
+        "spans to 45 degrees, 1 to 16 pixels, N_l within twice the highlight's radius of H, n 1 to 1000",
+        "rate",
+        note="of all spans; model: let through for nothing; arithmetic: stopped though a pixel has a term",
     )
     for style in ("throughput", "compact"):
         yield Block(
             "intensity",
             f"1 light, {style}",
             "[T] 4.10",
-            lambda style=style: IntensityUnit(style=style),
+            partial(IntensityUnit, style=style),
             _intensity,
             "all terms",
             "LSB",
@@ -973,52 +1230,74 @@ def _blocks() -> Iterator[Block]:
             "chord_setup",
             f"interval {interval}",
             "chord.md",
-            lambda interval=interval: ChordSetupUnit(1, interval),
+            partial(ChordSetupUnit, 1, interval),
             _chord_setup,
             f"spans to 22.5 degrees, {_LONG}",
-            note="of N.L and u at any pixel that the differences lead to",
+            note="of N.L and u at any pixel that the differences lead to; exact: the quadratic",
         )
     yield Block(
         "recurrence_setup",
         "interval 4",
         "[T] 3.3",
         RecurrenceSetupUnit,
-        None,
+        _recurrence_setup,
         "spans to 90 degrees, 1 to 4095 pixels",
-        note="its errors are those of recurrence_interpolator",
+        note="of cos gamma at any pixel that its words lead to; the tables count as arithmetic",
     )
-    for method, p in METHODS.items():
+    local = "lights and viewer 2 to 4 away, spans to 0.3 and 15 degrees"
+    yield Block(
+        "local_chord_setup",
+        "interval 4",
+        "chord.md",
+        partial(LocalChordSetupUnit, 1, 4),
+        _local_chord_setup,
+        f"{local}, {_LONG}",
+        note="of N.L and u at any pixel that the differences lead to; exact: the quadratic",
+    )
+    yield Block(
+        "local_chord_interpolator",
+        "chord-local",
+        "chord.md",
+        partial(LocalChordInterpolatorUnit, LocalChordInterpolator(), 1),
+        _local_chord_interpolator,
+        f"{local}, 1 to 4095 pixels",
+        beat={"length": 64},
+        note="of N.L and 1 - N.H; exact: normalised interpolation, L and H of the pixel",
+    )
+    methods = {name: p for name, p in METHODS.items() if not isinstance(p, LocalChordInterpolator)}
+    for method, p in methods.items():
         unit = INTERPOLATORS[type(p)]
         yield Block(
             unit.__module__.removeprefix("hdl."),
             method,
             _METHOD_SOURCES[method],
-            lambda unit=unit, p=p: unit(p, 1),
+            partial(unit, p, 1),
             partial(_interpolator, method=method),
             f"spans to {min(p.MAX_ANGLE, 45):g} degrees, 1 to 4095 pixels",
             beat=_SPAN,
-            note="of 1 - N.H, one light; exact: normalised interpolation",
+            note="of N.L and 1 - N.H; exact: normalised interpolation"
+            + "; the bisection's fit counts as arithmetic" * (method == "bisection"),
         )
     designs = [("quadratic", model) for model in SPECULAR_MODELS]
-    designs += [(method, "cosquad") for method in METHODS if method != "quadratic"]
+    designs += [(method, "cosquad") for method in methods if method != "quadratic"]
     designs += [("chord", "exp"), ("chord", "blinn")]
     for method, model in designs:
         yield Block(
             "pipeline",
             f"{method}, {model}",
             "[T] 4.10",
-            lambda method=method, model=model: ShadingPipelineUnit(ShadingPipeline(method, model)),
+            partial(ShadingPipelineUnit, ShadingPipeline(method, model)),
             partial(_pipeline, method=method, model=model),
-            "spans to what the method asks for, 45 degrees at most, n 1 to 1000, N.L > 1/16",
+            "spans to what the method asks for, 45 degrees at most, 1 to 4095 pixels, n 1 to 1000, "
+            "N.L > 1/16",
             "LSB",
             beat=_SPAN,
-            note="one light, against normalised Phong interpolation with Blinn's power",
+            note="one light, against normalised Phong interpolation with Blinn's power"
+            + "; the bisection's fit counts as arithmetic" * (method == "bisection"),
         )
 
 
 def _with_axis(block: Block) -> Block:
-    if block.measure is None:
-        return block
     axis, logarithmic = _AXES.get(block.device, ("angle of the span, degrees", False))
     return replace(block, axis=axis, logarithmic=logarithmic)
 
@@ -1040,7 +1319,9 @@ def _times(block: Block, unit: Component) -> tuple[int, int]:
     return int(run.clocks[0] - run.input_clocks[0]), int(np.median(np.diff(run.clocks)))
 
 
-def rows(blocks: Sequence[Block] = BLOCKS, samples: int = SAMPLES, seed: int = SEED) -> Iterator[Row]:
+def rows(
+    blocks: Sequence[Block] = BLOCKS, samples: int = SAMPLES, seed: int = SEED, jobs: int = 1
+) -> Iterator[Row]:
     """Lines of the table, one after the other.
 
     Parameters
@@ -1051,18 +1332,48 @@ def rows(blocks: Sequence[Block] = BLOCKS, samples: int = SAMPLES, seed: int = S
         About how many random operands; 40 or more.
     seed : int
         Of the operands. Every entry starts from it, so that a line does not depend on the others.
+    jobs : int
+        Processes that the entries are spread over. The lines are the same, and in the same order.
     """
-    for block in blocks:
-        yield row_of(block, sample_of(block, samples, seed))
+    if jobs == 1 or len(blocks) < 2:
+        for block in blocks:
+            yield _row(block, samples, seed)
+        return
+    # Workers that start afresh: a fork would copy the threads of a progress bar.
+    with ProcessPoolExecutor(min(jobs, len(blocks)), multiprocessing.get_context("spawn")) as pool:
+        waiting = [pool.submit(_row, block, samples, seed) for block in blocks]
+        try:
+            for block, row in zip(blocks, waiting, strict=True):
+                yield replace(row.result(), block=block)
+        finally:
+            for row in waiting:
+                row.cancel()
 
 
-def sample_of(block: Block, samples: int = SAMPLES, seed: int = SEED) -> Sample | None:
-    """Measure an entry; `None` where it has no number as its result."""
-    return block.measure(np.random.default_rng(seed), samples) if block.measure else None
+def _row(block: Block, samples: int, seed: int) -> Row:
+    """Line of an entry, of whose results only the worst are kept."""
+    count, worst = 0, []
+    for sample in _chunks(block, samples, seed):
+        count += np.size(sample.found)
+        worst.append(sample.extremes)
+    return replace(row_of(block, _joined(worst)), samples=count)
+
+
+def _chunks(block: Block, samples: int, seed: int) -> Iterator[Sample]:
+    rng = np.random.default_rng(seed)
+    parts = 1 if block.exhaustive else -(-samples // _CHUNK)
+    for part in range(parts):
+        yield block.measure(rng, samples * (part + 1) // parts - samples * part // parts)
+
+
+def sample_of(block: Block, samples: int = SAMPLES, seed: int = SEED) -> Sample:
+    """Measure an entry."""
+    chunks = list(_chunks(block, samples, seed))
+    return chunks[0] if len(chunks) == 1 else _joined(chunks)
 
 
 def row_of(block: Block, sample: Sample | None) -> Row:
-    """Line of an entry whose errors have been measured."""
+    """Line of an entry whose errors have been measured; `None`: they have not."""
     count, errors = (0, (None, None, None)) if sample is None else (np.size(sample.found), sample.errors)
     unit = block.unit()
     return Row(block, count, errors, *_times(block, unit), cost_of(unit))
@@ -1087,7 +1398,9 @@ _HEAD = (
 def _figure(error: float | None) -> str:
     if error is None:
         return "-"
-    if error == 0 or 0.1 <= error < 100:
+    if 10 <= error < 1000:
+        return f"{error:.0f}"
+    if error == 0 or 0.1 <= error < 10:
         return f"{error:.2g}"
     return f"{error:.1e}".replace("e-0", "e-")
 
@@ -1147,25 +1460,33 @@ class _Count(click.ParamType):
     "--samples", type=_Count(1000, 10_000_000), default=SAMPLES, show_default=True, help="Of each device."
 )
 @click.option("--seed", type=_Count(0, 2**32 - 1), default=SEED, show_default=True, help="Of the operands.")
+@click.option(
+    "--jobs",
+    type=_Count(1, _MOST_JOBS),
+    default=lambda: min(os.cpu_count() or 1, 4),
+    show_default="number of cores, 4 at most",
+    help="Processes, of a quarter of a GB each.",
+)
 @click.option("--json", "figures", type=click.Path(), help="Every figure, with domains and notes.")
-def command(samples, seed, figures):
+def command(samples, seed, jobs, figures):
     """Measure every device and variant, and print a table.
 
     Errors are the largest found: of the model, the device's formula in float64 against the exact function;
-    of the arithmetic, the device against that formula; and in total. Where tables make the first two one,
-    there is the total alone. They are in units of a full term or a vector's length, or as the fourth column
-    says. lat: clocks from an input to its first result; int: clocks from a result to the next; ROM and regs
-    in bits; multipliers: 3*18 are three of 18x18 bits, 1*c is one by a constant. Of a bisection the variant
-    is the degree and the widest span in degrees.
+    of the arithmetic, the device against that formula; and in total. They are in units of a full term or a
+    vector's length, or as the fourth column says; rate: of a gate's decisions, those that let a dark span
+    through, those that stop a lit one, and both. For methods of whole spans a sample is a pixel. lat: clocks
+    from an input to its first result; int: clocks from a result to the next; ROM and regs in bits;
+    multipliers: 3*18 are three of 18x18 bits, 1*c is one by a constant. Of a bisection the variant is the
+    degree and the widest span in degrees.
 
     \b
     Example:
-        blysk blocks --samples 1000000 --json blocks.json
+        blysk blocks --jobs 4 --json blocks.json
     """
     if figures:
         check_writable(figures)
     lines = list(
-        tqdm(rows(BLOCKS, samples, seed), total=len(BLOCKS), unit=" rows", leave=False, disable=None)
+        tqdm(rows(BLOCKS, samples, seed, jobs), total=len(BLOCKS), unit=" rows", leave=False, disable=None)
     )
     if figures:
         write_json(figures, {"samples": samples, "seed": seed, "blocks": [row.as_dict() for row in lines]})

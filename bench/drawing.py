@@ -1,8 +1,12 @@
-"""Drawing of a structure: boxes in columns from left to right, arrows between them."""
+"""Drawing of a structure: boxes in columns from left to right, arrows between them.
 
-from collections import defaultdict
-from dataclasses import dataclass
-from itertools import pairwise
+A wide one is folded: its columns stand in bands below each other, and an arrow from a band to another ends
+at a tag and goes on from one of the same number.
+"""
+
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field
+from itertools import count, pairwise
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -17,6 +21,14 @@ __all__ = ["draw_structure"]
 _FONT = 8.0
 _LINE = 10.5
 _GAP = 9.0
+_WIDEST = 860.0
+"""Width above which a drawing is folded."""
+_BETWEEN = 30.0
+"""Width between columns, about."""
+_TAGS = 70.0
+"""Width that tags take on a side of a band, about."""
+_BAND = 6
+"""Cut arrows that a band more is worth."""
 _FACES = {
     "input": "#ffffff",
     "output": "#ffffff",
@@ -24,6 +36,7 @@ _FACES = {
     "operation": "#ffffff",
     "memory": "#dcefdc",
     "unit": "#d9e6f7",
+    "tag": "#ffffff",
 }
 _MULTIPLIER, _ADDER = "#f9d9b8", "#fbf3cf"
 _INKS = ("#35506b", "#7a4a12", "#2f6b3a", "#6a3470", "#8a2f3c", "#22696c", "#5a5a1e", "#444444")
@@ -42,11 +55,45 @@ class _Place:
     y: float = 0.0
 
 
+@dataclass
+class _Band:
+    """Boxes of some columns, and the tags of arrows from and to the others.
+
+    Parameters
+    ----------
+    graph : Graph
+        Boxes and tags.
+    columns : dict of int to int
+        Their columns, from 0 on, each with a box or a tag.
+    back : set of (int, int)
+        Arrows that lead back.
+    sources : dict of int to int
+        Of a tag the box that its arrow comes from, in the whole graph.
+    """
+
+    graph: Graph
+    columns: dict[int, int]
+    back: set[tuple[int, int]]
+    sources: dict[int, int] = field(default_factory=dict)
+
+
+def _shown(operations: Counter[str]) -> Counter[str]:
+    """Operations as they are written: a constant is named only as a multiplier's, which makes it none."""
+    shown: Counter[str] = Counter()
+    for symbol, number in operations.items():
+        shown["× const" if symbol == "×c" else symbol.removesuffix("c")] += number
+    return shown
+
+
 def _lines(node: Node) -> list[tuple[str, str]]:
     """Style and text of the lines in a box."""
     lines = []
     if node.operations:
-        parts = [f"{count} {s}" if count > 1 else s for s, count in sorted(node.operations.items()) if count]
+        parts = [
+            f"{count} {symbol}" if count > 1 else symbol
+            for symbol, count in sorted(_shown(node.operations).items())
+            if count
+        ]
         lines.append(("operation", "  ".join(parts)))
     if node.name:
         lines.append(("name", node.name))
@@ -60,6 +107,13 @@ def _lines(node: Node) -> list[tuple[str, str]]:
     if detail:
         lines.append(("detail", detail))
     return lines
+
+
+def _size(node: Node) -> tuple[float, float]:
+    """Width and height of a box."""
+    texts = _lines(node)
+    width = max(len(text) * (0.64 if style == "name" else 0.58) for style, text in texts) * _FONT + 11
+    return width, len(texts) * _LINE + 6
 
 
 def _spread(wanted: np.ndarray, heights: np.ndarray) -> np.ndarray:
@@ -78,16 +132,15 @@ def _spread(wanted: np.ndarray, heights: np.ndarray) -> np.ndarray:
 class _Layout:
     """Places of boxes, and of the points that arrows pass."""
 
-    def __init__(self, graph: Graph):
-        columns, back = layers(graph)
+    def __init__(self, band: _Band):
+        graph, columns, back = band.graph, band.columns, band.back
         self.places: list[_Place] = []
         self.paths: list[tuple[list[int], bool, bool]] = []
         self.links: dict[int, list[int]] = defaultdict(list)
         index = {}
         for number, node in graph.nodes.items():
-            texts = _lines(node)
-            width = max(len(text) * (0.64 if style == "name" else 0.58) for style, text in texts) * _FONT + 11
-            index[number] = self._add(columns[number], width, len(texts) * _LINE + 6, node)
+            index[number] = self._add(columns[number], *_size(node), node)
+        self.inks = {k: _INKS[band.sources.get(n, n) % len(_INKS)] for n, k in index.items()}
         trunks: dict[tuple[int, int], int] = {}
         for (a, b), is_data in sorted(graph.edges.items()):
             if (a, b) in back:
@@ -113,6 +166,7 @@ class _Layout:
             self.columns[place.column].append(k)
         self._order()
         self._set_heights()
+        self._close_gaps()
         self._set_columns()
 
     def _add(self, column, width, height, node=None) -> int:
@@ -170,6 +224,21 @@ class _Layout:
                 for k, y in zip(order, _spread(np.array(wanted), heights[column]), strict=True):
                     self.places[k].y = float(y)
 
+    def _close_gaps(self) -> None:
+        """Take out empty stripes, as between parts that no arrow joins."""
+        shift, bottom = 0.0, -np.inf
+        for place in sorted(self.places, key=lambda p: p.y - p.height / 2):
+            top = place.y - place.height / 2
+            if np.isfinite(bottom):
+                shift += max(0.0, top - bottom - _GAP)
+            bottom = max(bottom, place.y + place.height / 2)
+            place.y -= shift
+
+    @property
+    def width(self) -> float:
+        """Distance of the outermost sides."""
+        return max(p.x + p.width / 2 for p in self.places) - min(p.x - p.width / 2 for p in self.places)
+
     def _set_columns(self) -> None:
         x = 0.0
         for column, order in enumerate(self.columns):
@@ -178,6 +247,75 @@ class _Layout:
                 self.places[k].x = x + width / 2
             lines = sum(len(self._beside(k, column + 1)) for k in order)
             x += width + 16 + min(lines, 22)
+
+
+def _cuts(graph: Graph, columns: dict[int, int]) -> list[int]:
+    """First columns of the bands, so that each is narrow enough and few arrows are cut."""
+    last = max(columns.values()) + 1
+    widths = np.zeros(last)
+    for number, column in columns.items():
+        widths[column] = max(widths[column], _size(graph.nodes[number])[0])
+    widths += _BETWEEN
+    cut = [
+        len({a for a, b in graph.edges if min(columns[a], columns[b]) < k <= max(columns[a], columns[b])})
+        for k in range(last)
+    ]
+    best: list[tuple[float, list[int]]] = [(0.0, [])]
+    for end in range(1, last + 1):
+        found = []
+        for start in range(end):
+            width = widths[start:end].sum() + _TAGS * ((start > 0) + (end < last))
+            # A column that is too wide stands alone.
+            if width <= _WIDEST or start == end - 1:
+                cost, starts = best[start]
+                found.append((cost + (cut[start] + _BAND) * (start > 0), [*starts, start]))
+        best.append(min(found))
+    return best[last][1]
+
+
+def _bands(graph: Graph) -> list[_Band]:
+    """A graph's boxes in one band, or in several where they would be too wide."""
+    columns, back = layers(graph)
+    whole = _Band(graph, columns, back)
+    starts = _cuts(graph, columns)
+    if len(starts) == 1 or _Layout(whole).width <= _WIDEST:
+        return [whole]
+    band_of = {
+        number: int(np.searchsorted(starts, column, "right")) - 1 for number, column in columns.items()
+    }
+    bands = [_Band(Graph(), {}, set()) for _ in starts]
+    for number, node in graph.nodes.items():
+        bands[band_of[number]].graph.nodes[number] = node
+        bands[band_of[number]].columns[number] = columns[number]
+    fresh = count(max(graph.nodes) + 1)
+    tags: dict[int, str] = {}
+    known: dict[tuple[int, int, bool], int] = {}
+
+    def tag(source: int, band: int, leaves: bool, column: int) -> int:
+        key = source, band, leaves
+        if key not in known:
+            known[key] = number = next(fresh)
+            node = graph.nodes[source]
+            text = tags.setdefault(source, f"{len(tags) + 1} {node.name}".strip())
+            bands[band].graph.nodes[number] = Node("tag", text)
+            bands[band].columns[number] = column
+            bands[band].sources[number] = source
+        number = known[key]
+        bands[band].columns[number] = min(bands[band].columns[number], column)
+        return number
+
+    for (a, b), is_data in sorted(graph.edges.items()):
+        near, far = band_of[a], band_of[b]
+        if near == far:
+            bands[near].graph.edges[a, b] = is_data
+            bands[near].back |= {(a, b)} & back
+        else:
+            bands[near].graph.connect(a, tag(a, near, True, columns[a] + 1), is_data)
+            bands[far].graph.connect(tag(a, far, False, columns[b] - 1), b, is_data)
+    for band in bands:
+        ranks = {column: k for k, column in enumerate(sorted(set(band.columns.values())))}
+        band.columns = {number: ranks[column] for number, column in band.columns.items()}
+    return bands
 
 
 def draw_structure(graph: Graph) -> Figure:
@@ -193,18 +331,35 @@ def draw_structure(graph: Graph) -> Figure:
     Figure
         A matplotlib figure of the drawing's size, 72 units to the inch.
     """
-    layout = _Layout(graph)
-    boxes = [(k, place) for k, place in enumerate(layout.places) if place.node]
-    left = min(p.x - p.width / 2 for p in layout.places) - 14
-    right = max(p.x + p.width / 2 for p in layout.places) + 14
-    top = min(p.y - p.height / 2 for p in layout.places) - 18
-    bottom = max(p.y + p.height / 2 for p in layout.places) + 10
-    figure = Figure(figsize=((right - left) / 72, (bottom - top) / 72), facecolor="white")
+    layouts = [_Layout(band) for band in _bands(graph)]
+    right, bottom = 0.0, 0.0
+    limits = []
+    for layout in layouts:
+        left = min(p.x - p.width / 2 for p in layout.places) - 14
+        top = min(p.y - p.height / 2 for p in layout.places) - 18
+        for place in layout.places:
+            place.x -= left
+            place.y += bottom - top
+        right = max(right, *(p.x + p.width / 2 + 14 for p in layout.places))
+        bottom = max(p.y + p.height / 2 for p in layout.places) + 10
+        limits.append(bottom)
+    figure = Figure(figsize=(right / 72, bottom / 72), facecolor="white")
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set_axis_off()
-    axes.set_xlim(left, right)
-    axes.set_ylim(bottom, top)
+    axes.set_xlim(0, right)
+    axes.set_ylim(bottom, 0)
+    for y in limits[:-1]:
+        axes.plot([0, right], [y, y], color="#bbbbbb", linewidth=0.7, linestyle=(0, (1, 3)), zorder=0)
+    for layout in layouts:
+        _draw_arrows(axes, layout)
+        for place in layout.places:
+            if place.node:
+                _draw_box(axes, place)
+    return figure
+
+
+def _draw_arrows(axes, layout: _Layout) -> None:
     column_left = {p.column: p.x - p.width / 2 for p in layout.places}
     column_right = {p.column: p.x + p.width / 2 for p in layout.places}
     for p in layout.places:
@@ -223,7 +378,7 @@ def draw_structure(graph: Graph) -> Figure:
 
     for number, (path, is_data, is_back) in enumerate(layout.paths):
         a, b = layout.places[path[0]], layout.places[path[-1]]
-        ink = _BACK if is_back else _INKS[path[0] % len(_INKS)]
+        ink = _BACK if is_back else layout.inks[path[0]]
         x0, y0, x1, y1 = a.x + a.width / 2, a.y, b.x - b.width / 2 - 4, entry[number]
         vertices, codes = [(x0, y0)], [Path.MOVETO]
 
@@ -236,7 +391,10 @@ def draw_structure(graph: Graph) -> Figure:
             curve((x0 + 12, y0), (x0 + 12, high), (a.x, high))
             curve((x1 - 10, high), (x1 - 10, y1), (x1, y1))
         else:
-            x, y = x0, y0
+            # Within a column arrows keep their height, so that they do not pass other boxes of it.
+            x, y = column_right[a.column], y0
+            vertices.append((x, y))
+            codes.append(Path.LINETO)
             for k in path[1:-1]:
                 p = layout.places[k]
                 edges = (column_left[p.column], column_right[p.column])
@@ -256,7 +414,10 @@ def draw_structure(graph: Graph) -> Figure:
                 vertices.append((x1, y1))
                 codes.append(Path.LINETO)
             else:
-                curve((x + (x1 - x) / 2, y), (x1 - (x1 - x) / 2, y1), (x1, y1))
+                near = column_left[b.column] - 4
+                curve((x + (near - x) / 2, y), (near - (near - x) / 2, y1), (near, y1))
+                vertices.append((x1, y1))
+                codes.append(Path.LINETO)
         axes.add_patch(
             PathPatch(
                 Path(vertices, codes),
@@ -268,9 +429,6 @@ def draw_structure(graph: Graph) -> Figure:
             )
         )
         axes.fill([x1, x1, x1 + 4], [y1 - 2, y1 + 2, y1], color=ink, linewidth=0, zorder=1)
-    for _, place in boxes:
-        _draw_box(axes, place)
-    return figure
 
 
 def _draw_box(axes, place: _Place) -> None:
@@ -278,13 +436,19 @@ def _draw_box(axes, place: _Place) -> None:
     face = _FACES[node.kind]
     if node.operations["×"]:
         face = _MULTIPLIER
-    elif node.operations["+"] or node.operations["−"]:
+    elif any(node.operations[symbol] for symbol in ("×c", "+", "+c", "−", "−c")):
         face = _ADDER
-    rounded = node.kind in ("input", "output", "operation")
+    rounded = node.kind in ("input", "output", "operation", "tag")
     x, y = place.x - place.width / 2, place.y - place.height / 2
     style = f"round,pad=0,rounding_size={min(place.height / 2.2, 9) if rounded else 0.1}"
     box = FancyBboxPatch(
-        (x, y), place.width, place.height, boxstyle=style, facecolor=face, edgecolor="#333333", linewidth=0.9
+        (x, y),
+        place.width,
+        place.height,
+        boxstyle=style,
+        facecolor=face,
+        edgecolor="#999999" if node.kind == "tag" else "#333333",
+        linewidth=0.9,
     )
     axes.add_patch(box)
     if node.kind == "register":
@@ -299,7 +463,7 @@ def _draw_box(axes, place: _Place) -> None:
             ha="center",
             va="center",
             fontsize=_FONT + (style == "operation"),
-            fontweight="bold" if style == "name" else "normal",
+            fontweight="bold" if style == "name" and node.kind != "tag" else "normal",
             color="#555555" if style == "detail" else "black",
             zorder=3,
         )

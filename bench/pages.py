@@ -4,10 +4,12 @@
 table, drawings from the netlist, from a simulation and from the measured errors.
 """
 
+import hashlib
 import inspect
 import pydoc
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from io import StringIO
@@ -28,26 +30,32 @@ from tqdm import tqdm
 from sim.errors import InputError
 from sim.output import check_writable, write_text
 
-from .blocks import BLOCKS, SAMPLES, SEED, Block, Row, Sample, cells_of, row_of, sample_of
+from .blocks import BLOCKS, SEED, Block, Row, Sample, cells_of, row_of, sample_of
 from .drawing import draw_structure
-from .structure import describe_shape, graph_of
+from .structure import Graph, describe_shape, graph_of
 from .timing import draw_timing, waves_of
 
 __all__ = [
     "DEVICES",
+    "SAMPLES",
     "closing",
     "command",
     "draw_errors",
     "index_page",
+    "likeness",
     "markdown",
     "opening",
     "page",
     "pictures",
     "svg",
+    "variants_table",
     "write_pages",
 ]
 
 PROJECT = Path(__file__).parents[1]
+
+SAMPLES = 100_000
+"""Random operands of each entry: enough for the drawings, and few enough to check all pages often."""
 
 DEVICES: dict[str, tuple[Block, ...]] = {
     device: tuple(blocks) for device, blocks in groupby(BLOCKS, lambda block: block.device)
@@ -59,6 +67,11 @@ _STYLE = {"svg.fonttype": "none", "svg.hashsalt": "blysk", "font.family": ["Deja
 
 _DEPTH = 1e-7
 """Errors under this share of the largest are not drawn."""
+
+_DOCUMENTED = "total, as documented"
+
+_LIKENESS_DEPTH = 8
+"""Arrows from a box to those that tell it from another."""
 
 
 # Docstrings as Markdown.
@@ -190,7 +203,8 @@ def _documented(unit: wiring.Component) -> tuple[type, type | None]:
 def _summary(kind: type) -> str:
     """First sentence or line of a docstring."""
     first = inspect.getdoc(kind).split("\n\n")[0].replace("\n", " ")
-    return _inline(first)
+    # The page says where the twin is.
+    return _inline(re.sub(r"; `golden\.[^;]*twin\.$", ".", first))
 
 
 def _files(kind: type, twin: type | None) -> str:
@@ -241,7 +255,8 @@ _VARIANT_HEAD = (
 )
 
 
-def _variants(rows: Sequence[Row]) -> list[str]:
+def variants_table(rows: Sequence[Row]) -> list[str]:
+    """Lines of the table of a device's entries."""
     table = []
     for row in rows:
         cells = cells_of(row)
@@ -265,21 +280,86 @@ def _variants(rows: Sequence[Row]) -> list[str]:
     return _markdown_table([_VARIANT_HEAD[k] for k in kept], [[line[k] for k in kept] for line in table])
 
 
-def _alike(rows: Sequence[Row], with_parts: bool) -> list[tuple[str, list[Row]]]:
-    """Rows that share a drawing, by times and multipliers, and the suffix of its name; the first kinds."""
-    groups: dict[tuple, list[Row]] = {}
+@cache
+def _graph(device: str, place: int) -> Graph:
+    """Structure of a device's entry."""
+    return graph_of(DEVICES[device][place].unit())
+
+
+def likeness(graph: Graph) -> str:
+    """A text that graphs share if they are alike but for widths, registers' names and constants."""
+    labels = {
+        number: repr(
+            (
+                node.kind,
+                node.name if node.kind in ("input", "output") else "",
+                node.detail if node.kind == "unit" else "",
+                sorted((s, n) for s, n in node.operations.items() if n and not s.endswith("c")),
+                node.copies,
+                node.stages,
+            )
+        )
+        for number, node in graph.nodes.items()
+    }
+    sources, targets = graph.neighbours()
+    # A box is told by its neighbours, theirs, and so on.
+    for _ in range(_LIKENESS_DEPTH):
+        labels = {
+            number: _digest(
+                label,
+                sorted((labels[other], graph.edges[other, number]) for other in sources[number]),
+                sorted((labels[other], graph.edges[number, other]) for other in targets[number]),
+            )
+            for number, label in labels.items()
+        }
+    return _digest(sorted(labels.values()))
+
+
+def _digest(*parts) -> str:
+    return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+@cache
+def _structures(device: str) -> list[tuple[str, list[int]]]:
+    """Entries of one structure, and the suffix of its drawing's name."""
+    blocks = DEVICES[device]
+    if len(blocks) == 1:
+        return [("", [0])]
+    groups: dict[str, list[int]] = {}
+    for place in range(len(blocks)):
+        groups.setdefault(likeness(_graph(device, place)), []).append(place)
+    return _suffixed(groups.values())
+
+
+def _timings(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
+    """Rows of one interval, and the suffix of their drawing's name."""
+    groups: dict[int, list[Row]] = {}
     for row in rows:
-        key = (row.latency, row.interval, row.cost.multiplier_count if with_parts else None)
-        groups.setdefault(key, []).append(row)
-    kinds = list(groups.values())[:_MOST_DRAWINGS]
-    return [(f"-{k + 1}" if k else "", group) for k, group in enumerate(kinds)]
+        groups.setdefault(row.interval, []).append(row)
+    return _suffixed(groups.values())
 
 
-def _named(rows: Sequence[Row]) -> str:
-    return "; ".join(row.block.variant for row in rows if row.block.variant)
+def _suffixed(groups: Iterable[list]) -> list[tuple[str, list]]:
+    return [(f"-{k + 1}" if k else "", group) for k, group in enumerate(groups)]
 
 
 # Pictures.
+
+
+def _with_classes(text: str) -> str:
+    """Styles that are used more than once as classes."""
+    found = Counter(re.findall(r' style="([^"]*)"', text))
+    names = {style: f"s{k}" for k, (style, uses) in enumerate(found.items()) if uses > 1}
+    rules = "".join(f".{name}{{{style}}}\n" for style, name in names.items())
+    text = re.sub(r' style="([^"]*)"', lambda m: f' class="{names[m[1]]}"' if m[1] in names else m[0], text)
+    return text.replace("</style>", f"\n{rules}</style>", 1)
+
+
+_NUMBER = re.compile(r"(?<![\w#.])-?\d+\.\d{2,}(?![\w.])")
+
+
+def _rounded(number: re.Match) -> str:
+    return f"{float(number[0]):.1f}".rstrip("0").rstrip(".")
 
 
 def svg(figure: Figure) -> str:
@@ -292,10 +372,10 @@ def svg(figure: Figure) -> str:
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     text = re.sub(r' clip-path="url\([^"]*"', "", text)
     text = re.sub(r"<clipPath.*?</clipPath>", "", text, flags=re.DOTALL)
-    text = re.sub(
-        r"(?<![\w#.])(-?\d+\.\d{2,})(?![\w.])", lambda m: f"{float(m[1]):.1f}".rstrip("0").rstrip("."), text
-    )
+    # Numbers of strokes and places, not those that are written.
+    text = re.sub(r"<[^>]*>", lambda tag: _NUMBER.sub(_rounded, tag[0]), text)
     text = re.sub(r'"([\d.]+)pt"', lambda m: f'"{float(m[1]) * 4 / 3:.0f}"', text)
+    text = _with_classes(text)
     used = set(re.findall(r"#([\w-]+)", text))
     text = re.sub(r' id="([\w-]+)"', lambda m: m[0] if m[1] in used else "", text)
     text = re.sub(r"font-family: 'DejaVu Sans'", "font-family: 'DejaVu Sans', Verdana, sans-serif", text)
@@ -308,6 +388,12 @@ def _envelope(at: np.ndarray, errors: np.ndarray, edges: np.ndarray) -> np.ndarr
     largest = np.full(len(edges) - 1, -1.0)
     np.maximum.at(largest, place, errors)
     return np.where(largest < 0, np.nan, largest)
+
+
+def _shares(at: np.ndarray, errors: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Share of errors in each interval; NaN where there is nothing."""
+    counts, wrong = np.histogram(at.ravel(), edges)[0], np.histogram(at.ravel()[errors], edges)[0]
+    return np.divide(wrong, counts, out=np.full(len(counts), np.nan), where=counts > 0)
 
 
 @dataclass(frozen=True)
@@ -333,81 +419,133 @@ def _distinct(blocks: Sequence[Block], samples: Sequence[Sample | None]) -> list
     return found
 
 
+def _with_documented(measured: Sequence[_Measured]) -> list[tuple[_Measured, _Measured | None]]:
+    """Panels: each default variant with its documented one, if there are both."""
+
+    def parts(label):
+        return set(label.split(", ")) - {"documented", ""}
+
+    found: list[tuple[_Measured, _Measured | None]] = []
+    for m in measured:
+        places = [
+            k
+            for k, (other, documented) in enumerate(found)
+            if documented is None and parts(other.label) == parts(m.label)
+        ]
+        if "documented" in m.label.split(", ") and places:
+            found[places[0]] = (found[places[0]][0], m)
+        else:
+            found.append((m, None))
+    return found
+
+
 def draw_errors(blocks: Sequence[Block], samples: Sequence[Sample | None]) -> Figure:
-    """Largest errors against the entries' own axis, a panel a variant."""
-    measured = _distinct(blocks, samples)
-    columns = min(len(measured), 3)
-    lines = -(-len(measured) // columns)
-    single = len(measured) == 1
+    """Largest errors against the entries' own axis, a panel a variant, with the one as documented in it."""
+    panels = _with_documented(_distinct(blocks, samples))
+    columns = 2 if len(panels) == 4 else min(len(panels), 3)
+    lines = -(-len(panels) // columns)
+    single = len(panels) == 1
     figure = Figure(figsize=(5.6 if single else 2.9 * columns + 0.4, 2.9 if single else 1.9 * lines + 0.7))
     FigureCanvasAgg(figure)
     axes = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
+    measured = [m for panel in panels for m in panel if m]
     block = measured[0].block
-    bins = 90 if len(measured) <= 4 else 50
-    at = [np.broadcast_to(m.sample.at, np.shape(m.sample.found)).ravel() for m in measured]
-    low, high = min(a.min() for a in at), max(a.max() for a in at)
+    at = {id(m): np.broadcast_to(m.sample.at, np.shape(m.sample.found)).ravel() for m in measured}
+    # Pixels of a span share its angle: an interval of one span would show that span's chance.
+    bins = min(90 if len(panels) <= 4 else 50, *(max(len(np.unique(a)) // 8, 2) for a in at.values()))
+    low, high = min(a.min() for a in at.values()), max(a.max() for a in at.values())
     if block.logarithmic:
-        low = 1.0 if low == 0 and np.all(at[0] == np.rint(at[0])) else max(low, 1e-3)
+        first = at[id(measured[0])]
+        low = 1.0 if low == 0 and np.all(first == np.rint(first)) else max(low, 1e-3)
         edges = np.geomspace(low, high, bins + 1)
         middles = np.sqrt(edges[1:] * edges[:-1])
     else:
         edges = np.linspace(low, high, bins + 1)
         middles = (edges[1:] + edges[:-1]) / 2
-    largest = max(m.sample.errors[2] for m in measured)
-    floor = largest * _DEPTH
-    for panel, m, where in zip(axes.flat, measured, at, strict=False):
-        sample = m.sample
-        curves = [("total", "#1f4e79", 1.3, sample.found, sample.exact)]
-        if sample.errors[0]:
-            curves = [
-                ("model", "#e3a376", 2.6, sample.formula, sample.exact),
-                ("arithmetic", "#5b8c3a", 0.9, sample.found, sample.formula),
-                *curves,
-            ]
-        for name, color, width, a, b in curves:
-            values = _envelope(where, np.abs(np.asarray(a) - b).ravel(), edges)
+    decides = np.asarray(measured[0].sample.found).dtype == bool
+    floor = 0.0 if decides else max(m.sample.errors[2] for m in measured) * _DEPTH
+    handles = {}
+    for panel, (m, documented) in zip(axes.flat, panels, strict=False):
+        curves = [(name, errors, m) for name, errors in _curves_of(m.sample)]
+        if documented:
+            curves.append((_DOCUMENTED, _curves_of(documented.sample)[-1][1], documented))
+        for name, errors, of in curves:
+            values = (_shares if decides else _envelope)(at[id(of)], errors, edges)
+            # Intervals between whole numbers are empty.
+            has_any = ~np.isnan(values)
+            values = values[has_any]
             # Errors of nearly nothing would take up the whole of a logarithmic axis.
             values[values < floor] = np.nan
-            panel.plot(middles, values, color=color, linewidth=width, label=name)
+            (handles[name],) = panel.plot(middles[has_any], values, label=name, **_CURVES[name])
         if m.label:
             panel.set_title(m.label, fontsize=8)
         # A picture of many panels is kept small.
-        if len(measured) <= 8:
-            panel.grid(True, color="#dddddd", linewidth=0.5)
-    for panel in axes.flat[len(measured) :]:
+        panel.grid(True, axis="both" if len(panels) <= 8 else "y", color="#dddddd", linewidth=0.5)
+    for panel in axes.flat[len(panels) :]:
         panel.set_visible(False)
-    for panel in axes[0]:
-        if block.logarithmic:
-            panel.set_xscale("log")
-    axes[0, 0].set_yscale("log")
+    for panel in axes.flat[max(len(panels) - columns, 0) : len(panels)]:
+        panel.tick_params(labelbottom=True)
+    if block.logarithmic:
+        axes[0, 0].set_xscale("log")
+    if not decides:
+        axes[0, 0].set_yscale("log")
     for panel in axes.flat:
         panel.minorticks_off()
         if block.logarithmic:
             panel.xaxis.set_major_locator(LogLocator(numticks=5))
             panel.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        panel.yaxis.set_major_locator(LogLocator(numticks=5))
-        panel.yaxis.set_major_formatter(lambda value, _: re.sub("e([+-])0", r"e\1", f"{value:.0e}"))
+        if not decides:
+            panel.yaxis.set_major_locator(LogLocator(numticks=5))
+            panel.yaxis.set_major_formatter(lambda value, _: re.sub("e([+-])0", r"e\1", f"{value:.0e}"))
     figure.supxlabel(block.axis, fontsize=8)
-    figure.supylabel(f"largest error{', ' + block.scale if block.scale else ''}", fontsize=8)
-    if len(axes[0, 0].lines) > 1:
-        axes[0, 0].legend(fontsize=7, loc="best")
-    figure.tight_layout()
+    label = f"largest error{', ' + block.scale if block.scale else ''}"
+    figure.supylabel("share of all results" if decides else label, fontsize=8)
+    if len(handles) > 1:
+        shown = [name for name in _CURVES if name in handles]
+        figure.legend(
+            [handles[name] for name in shown], shown, fontsize=7, loc="upper right", ncols=4, frameon=False
+        )
+    figure.tight_layout(
+        rect=(0, 0, 1, 1 - 0.22 / figure.get_figheight()) if len(handles) > 1 else (0, 0, 1, 1)
+    )
     return figure
 
 
-_MOST_DRAWINGS = 3
-"""Of a kind and device."""
+_CURVES = {
+    "model": {"color": "#e3a376", "linewidth": 2.6},
+    "arithmetic": {"color": "#5b8c3a", "linewidth": 0.9},
+    "total": {"color": "#1f4e79", "linewidth": 1.3},
+    _DOCUMENTED: {"color": "#b03a2e", "linewidth": 1.1, "linestyle": (0, (4, 2))},
+    "yes by mistake": {"color": "#1f4e79", "linewidth": 1.3},
+    "no by mistake": {"color": "#b03a2e", "linewidth": 1.3},
+}
+
+
+def _curves_of(sample: Sample) -> list[tuple[str, np.ndarray]]:
+    """Names of the curves of an entry, and the errors of every result; the last is the total error."""
+    found, exact = np.asarray(sample.found), sample.exact
+    if found.dtype == bool:
+        return [("yes by mistake", found & ~exact), ("no by mistake", exact & ~found)]
+    curves = [("total", found - exact)]
+    if sample.errors[0]:
+        curves = [("model", sample.formula - exact), ("arithmetic", found - sample.formula), *curves]
+    return [(name, np.abs(errors).ravel()) for name, errors in curves]
+
 
 _STRUCTURE_NOTE = (
     "Generated from the netlist. A box with the clock's mark is a register, with the operations in front of "
-    "it; orange: a multiplier, yellow: an adder, green: a memory, blue: a unit of its own, white: a port. A "
-    "dashed arrow chooses, a red one leads back. Left out: the control by valid and ready, enables, "
-    "saturation, constants; in a large unit choices and comparisons too, then plain registers, then adders. "
-    f"Of variants of more than {_MOST_DRAWINGS} kinds the first {_MOST_DRAWINGS} are drawn."
+    "it; orange: a multiplier, yellow: an adder or a product by a constant, green: a memory, blue: a unit of "
+    "its own, white: a port. A dashed arrow chooses, a red one leads back. A wide drawing is in bands: an "
+    "arrow that ends at a numbered tag goes on at the tags of that number. Left out: the control by valid "
+    "and ready, enables, saturation, constants; in a large unit choices and comparisons too, then plain "
+    "registers, then adders. Variants that differ in words and constants alone share a drawing, of the "
+    "first."
 )
 _TIMING_NOTE = (
-    "From a simulation, clock by clock as read just before the rising edge. A, B, C are the input beats; the "
-    "source pauses before the last, the sink stalls at a first result."
+    "From a simulation, clock by clock as read just before the rising edge. A, B, C are the input beats, A0, "
+    "A1 the results of A where it has several; the source pauses before the last beat, the sink stalls at a "
+    "first result. Dots stand for clocks without a change. A drawing for each interval; the latencies of all "
+    "variants are in the table above."
 )
 
 
@@ -440,64 +578,143 @@ def page(device: str, rows: Sequence[Row]) -> str:
         Lines of the table of all its entries.
     """
     block = rows[0].block
-    lines = ["## Variants", "", *_variants(rows), ""]
-    lines += ["Made by `blysk pages`; the columns are those of `blysk blocks`.", ""]
-    for heading, note, kind_of_picture, with_parts in (
-        ("Structure", _STRUCTURE_NOTE, "structure", True),
-        ("Timing", _TIMING_NOTE, "timing", False),
-    ):
-        lines += [f"## {heading}", "", note, ""]
-        groups = _alike(rows, with_parts)
-        for suffix, group in groups:
-            named = _named(group) if len(groups) > 1 else ""
-            if named:
-                lines += [f"{_inline(named)}:", ""]
-            text = f"{heading} of the {_title(device).lower()}{', ' * bool(named)}{named}"
-            lines += [f"![{text}]({device}-{kind_of_picture}{suffix}.svg)", ""]
+    lines = ["## Variants", "", *variants_table(rows), ""]
+    lines += [
+        f"Made by `blysk pages` of {SAMPLES:,} random operands; the columns are those of `blysk blocks`.",
+        "",
+    ]
+    title = _title(device).lower()
+    lines += ["## Structure", "", _STRUCTURE_NOTE, ""]
+    structures = _structures(device)
+    for suffix, places in structures:
+        named = "; ".join(rows[k].block.variant for k in places if rows[k].block.variant) or "default"
+        named = named if len(structures) > 1 else ""
+        lines += [f"{_inline(named)}:", ""] if named else []
+        lines += [
+            f"![Structure of the {title}{', ' * bool(named)}{named}]({device}-structure{suffix}.svg)",
+            "",
+        ]
+    lines += ["## Timing", "", _TIMING_NOTE, ""]
+    for suffix, (row, *others) in _timings(rows):
+        named = f"{row.block.variant or 'default'}: " if len(rows) > 1 else ""
+        times = f"latency {row.latency}, interval {row.interval}"
+        more = f"; {len(others)} more of this interval" if others else ""
+        lines += [f"{_inline(named)}{times}{more}.", ""]
+        lines += [f"![Timing of the {title}, {named}{times}]({device}-timing{suffix}.svg)", ""]
     if block.measure and not any(row.errors[2] for row in rows):
         lines += ["## Errors", "", "None were found: the device is exact.", ""]
     elif block.measure:
-        lines += ["## Errors", "", f"Largest errors found, against: {_inline(block.axis)}.", ""]
-        lines += [f"![Errors of the {_title(device).lower()}]({device}-errors.svg)", ""]
+        unit = f"In {block.scale}." if block.scale else "1 is a full term, or the length of a unit vector."
+        text = f"Largest errors found, against: {_inline(block.axis)}. {unit}"
+        if block.scale == "share":
+            text = (
+                "Shares of the decisions that are yes by mistake (the first error column) and no by mistake "
+                f"(the second), against: {_inline(block.axis)}."
+            )
+        lines += ["## Errors", "", text, ""]
+        lines += [f"![Errors of the {title}]({device}-errors.svg)", ""]
     return (opening(device) + "\n".join([*lines, ""]) + closing(device)).rstrip() + "\n"
 
 
 def pictures(device: str, rows: Sequence[Row], samples: Sequence[Sample | None]) -> Iterator[tuple[str, str]]:
     """Names and texts of the pictures of a device's page."""
     with rc_context(_STYLE):
-        for suffix, group in _alike(rows, with_parts=True):
-            yield f"{device}-structure{suffix}.svg", svg(draw_structure(graph_of(group[0].block.unit())))
-        for suffix, group in _alike(rows, with_parts=False):
-            block = group[0].block
+        for suffix, places in _structures(device):
+            yield f"{device}-structure{suffix}.svg", svg(draw_structure(_graph(device, places[0])))
+        for suffix, (row, *_) in _timings(rows):
+            block = row.block
             yield f"{device}-timing{suffix}.svg", svg(draw_timing(waves_of(block.unit(), block.beat)))
     if any(sample is not None and sample.errors[2] for sample in samples):
         with rc_context(_STYLE):
             yield f"{device}-errors.svg", svg(draw_errors([row.block for row in rows], samples))
 
 
+_STAGES: dict[str, dict[str, str]] = {
+    "Normals of a span from its ends": {
+        "dot_product": "cosine of the angle between two vectors",
+        "middle_normal": "normal in the middle of a span, by a square root's polynomial",
+        "gpq": "coefficients of the quadratic curve through both ends and the middle",
+        "difference_setup": "forward differences of that curve, for a span's number of pixels",
+        "difference_accumulator": "normals on that curve, by two additions a pixel",
+        "quadratic_evaluator": "normals on that curve, by products instead",
+        "renormaliser": "makes any normal a unit vector: the rival of all that avoids it",
+    },
+    "Normals by bisection": {
+        "bisection": "normal half-way between two others, of unit length",
+        "bisection_chain": "normals at a half, a quarter, an eighth of a span",
+        "adaptive_normaliser": "a span's normals by bisection as deep as its angle asks for, lines between",
+    },
+    "Cosines without normals": {
+        "arccos": "angle of a cosine",
+        "half_chord": "angle between two vectors from their distance, well-conditioned near 0",
+        "angular_setup": "angles of a span and a vector, and the step from a pixel to the next",
+        "highlight_cosine": "cosine of a span's angles, from a table",
+        "recurrence_setup": "start values and coefficient of the recurrence",
+        "recurrence": "cosines along a span by a product and two additions a pixel",
+        "chord": "half the square of the distance of two unit vectors, which is 1 less their cosine",
+        "chord_setup": "differences of the cosines along a span",
+        "local_chord_setup": "the same from three values a span, for lights or a viewer that are near",
+    },
+    "A whole method": {
+        "linear_interpolator": "normals on a straight line, not of unit length: Phong's own",
+        "quadratic_interpolator": "normals on a quadratic curve",
+        "bisection_interpolator": "normals by bisection",
+        "angular_interpolator": "cosines by their angles",
+        "recurrence_interpolator": "cosines by recurrence",
+        "chord_interpolator": "cosines by forward differences",
+        "local_chord_interpolator": "cosines by forward differences, for lights or a viewer that are near",
+    },
+    "Light": {
+        "highlight_gate": "tells from its ends that a span has no highlight",
+        "diffuse": "diffuse term of a cosine",
+        "specular": "highlight term, by a model in the place of a power",
+        "power": "highlight term, by the power itself",
+        "light": "both terms of a light for a normal",
+        "intensity": "colour of a pixel from the terms of its lights",
+    },
+    "All of it": {"pipeline": "from spans to coloured pixels"},
+}
+"""Devices in the order in which a pixel passes them, and what each is for."""
+
+
+def _in_order() -> list[tuple[str, list[tuple[str, str]]]]:
+    """Parts of the index: devices and what they are for; new ones are in a last part."""
+    parts = [
+        (title, [(device, purpose) for device, purpose in devices.items() if device in DEVICES])
+        for title, devices in _STAGES.items()
+    ]
+    known = {device for _, devices in parts for device, _ in devices}
+    others = [(device, "") for device in DEVICES if device not in known]
+    return parts + [("Others", others)] * bool(others)
+
+
 def index_page() -> str:
-    """Text of the folder's first page: the table of the devices."""
-    rows = []
-    for device, blocks in DEVICES.items():
-        sources = dict.fromkeys(block.source for block in blocks)
-        kind, _ = _documented(_unit(device))
-        link = f"[{_title(device)}]({device}.md)"
-        rows.append((link, ", ".join(sources), _summary(kind), str(len(blocks))))
-    head = ("device", "source", "what it computes", "variants")
-    body = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
-    return "\n".join(
-        [
-            "# The devices",
-            "",
-            "One page a device, made by `blysk pages docs/blocks` from the code itself: text from the "
-            "docstrings, figures as `blysk blocks` measures them, drawings from netlists and simulations.",
-            "",
-            "| " + " | ".join(head) + " |",
-            "|" + " --- |" * len(head),
-            *body,
-            "",
-        ]
-    )
+    """Text of the folder's first page: the devices in the order of the pipeline."""
+    lines = [
+        "# The devices",
+        "",
+        "One page a device, made by `blysk pages docs/blocks` from the code itself: text from the "
+        "docstrings, figures as `blysk blocks` measures them, drawings from netlists and simulations. "
+        "The devices are in the order in which a span passes them; of those that do the same a pipeline has "
+        "one.",
+        "",
+        "[![The pipeline with the quadratic method](pipeline-structure.svg)](pipeline.md)",
+    ]
+    for title, devices in _in_order():
+        lines += ["", f"## {title}", ""]
+        rows = []
+        for device, purpose in devices:
+            blocks = DEVICES[device]
+            kind, _ = _documented(_unit(device))
+            sources = dict.fromkeys(block.source for block in blocks)
+            summary = _summary(kind).replace("|", "\\|")
+            link = f"[{_title(device)}]({device}.md)"
+            picture = f'<img src="{device}-structure.svg" alt="" height="90">'
+            text = f"{purpose[:1].upper()}{purpose[1:]}.<br>{summary}" if purpose else summary
+            count = f"{len(blocks)} variant{'s' * (len(blocks) > 1)}"
+            rows.append(f"| {link} | {text} | {', '.join(sources)}<br>{count} | {picture} |")
+        lines += ["| device | what it does | source | structure |", "| --- | --- | --- | --- |", *rows]
+    return "\n".join([*lines, ""])
 
 
 def write_pages(
@@ -508,7 +725,7 @@ def write_pages(
 ) -> None:
     """Write the pages of devices, their pictures and the index.
 
-    A page's files are written when all of them are made.
+    A page's files are written when all of them are made; pictures that it no longer has are removed.
 
     Parameters
     ----------
@@ -536,6 +753,10 @@ def write_pages(
         files = {f"{device}.md": page(device, rows), **dict(pictures(device, rows, measured))}
         for name, text in files.items():
             write_text(folder / name, text)
+        for path in folder.glob(f"{device}-*.svg"):
+            of_this_page = re.fullmatch(rf"{device}-(structure|timing|errors)(-\d+)?\.svg", path.name)
+            if of_this_page and path.name not in files:
+                path.unlink()
     write_text(folder / "README.md", index_page())
 
 
@@ -556,7 +777,8 @@ class _Device(click.ParamType):
 def command(folder, devices):
     """Write a page a device, with drawings of structure, timing and errors, into FOLDER.
 
-    FOLDER is docs/blocks if left out. It has to be there; other files in it are left alone.
+    FOLDER is docs/blocks if left out. It has to be there. Pictures that a page no longer has are removed,
+    other files are left alone.
 
     \b
     Example:

@@ -66,7 +66,7 @@ class Node:
     detail : str
         Width, format or size.
     operations : Counter
-        Symbols of the operations in the box, and how many of each.
+        Symbols of the operations in the box, and how many of each; ``×c`` is by a constant.
     copies : int
         Equal boxes that this one stands for.
     stages : int
@@ -270,6 +270,8 @@ class _Netlist:
                 symbol = _SYMBOLS[kind]
                 if symbol == "+" and self._rounds(cell):
                     symbol = "round"
+                elif symbol in ("×", "+", "−") and self._has_constant(cell):
+                    symbol += "c"
                 number = graph.add(Node("operation", operations=Counter([symbol])))
             else:
                 continue
@@ -325,6 +327,11 @@ class _Netlist:
         if symbol in ("+", "−"):
             return len(operands["Y"]) > 1 and any(isinstance(bit, int) for bit in operands["A"])
         return True
+
+    def _has_constant(self, cell) -> bool:
+        """Whether an operand is a constant."""
+        operands = (cell["connections"].get(port, [0]) for port in "AB")
+        return any(not any(isinstance(bit, int) for bit in operand) for operand in operands)
 
     def _rounds(self, cell) -> bool:
         """Whether an adder adds one bit of a word to its upper bits."""
@@ -634,12 +641,13 @@ def graph_of(component: wiring.Component, most: int = MOST_BOXES) -> Graph:
     whole = _Netlist(component).graph
     light = _COMPARISONS | {"round"}
     choices = light | {"mux", "shift"}
+    products, sums = {"×", "×c"}, {"+", "+c", "−", "−c"}
     for dropped, kept in (
         (set(), None),
         (light, None),
         (choices, None),
-        (choices, {"×", "+", "−"}),
-        (choices | {"+", "−"}, {"×"}),
+        (choices, products | sums),
+        (choices | sums, products),
     ):
         graph = simplified(dropped, kept)
         if len(graph.nodes) <= most:

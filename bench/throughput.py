@@ -18,11 +18,10 @@ import numpy as np
 
 from golden.frame_constants import FrameConstants
 from golden.pipeline import ShadingPipeline, Spans
-from golden.raster import rasterise
 from golden.scene import Scene
 from hdl.pipeline import ShadingPipelineUnit
 from sim.engine import simulate
-from sim.spans import cut_wide_spans, quantise_spans
+from sim.frame import prepare
 from sim.teapot import teapot
 
 from .accuracy import scene_for
@@ -127,8 +126,7 @@ class Throughput:
 
 def spans_of(scene: Scene, method: str) -> Spans:
     """Spans of a scene as a method gets them."""
-    widest = ShadingPipeline(method).interpolator.widest_span(scene.materials[0].exponent)
-    return quantise_spans(cut_wide_spans(rasterise(scene), widest)[0], scene.mesh.material)
+    return prepare(scene, ShadingPipeline(method)).spans
 
 
 def measure(

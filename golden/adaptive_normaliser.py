@@ -7,6 +7,7 @@ import numpy as np
 from .bisection import Bisection
 from .difference_setup import DifferenceSetup, reciprocal_place
 from .fixed import SQ, Fixed
+from .interpolator import pixels_of
 from .unit_vector import COMPONENT
 
 __all__ = ["AdaptiveNormaliser"]
@@ -40,7 +41,9 @@ class AdaptiveNormaliser:
 
     A span wider than the bisection's `max_angle` is flagged and not divided: its normals lie on the straight
     line between its ends (for ends further apart than 1 in a component, near the left one), and mean nothing
-    but at its first and last pixel.
+    but at its first and last pixel. Ends must be of unit length, to 1/256 or so: a middle normal is made
+    as long as one, so that the normals between ends that are not are off by as much. An end of length 0
+    counts as 90 degrees away, and is not flagged.
 
     ================ ========== ==================================================================
     word             format     why
@@ -187,8 +190,7 @@ class AdaptiveNormaliser:
             middle, _, _ = self.bisection.compute(Fixed(COMPONENT, before), Fixed(COMPONENT, after))
             ends[active, half :: 2 * half] = middle.codes
 
-        span = np.repeat(np.arange(len(length)), length)
-        pixel = np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)
+        span, pixel = pixels_of(length)
         steps = np.maximum(length - 1, 1)
         reciprocal, shift = self.reciprocal(steps)
         steps, reciprocal, shift, level = (x[span] for x in (steps, reciprocal, shift, levels))
@@ -204,9 +206,8 @@ class AdaptiveNormaliser:
         slope = (difference * Fixed(COMPONENT, reciprocal[:, np.newaxis])).codes
         slope = Fixed(SQ(2, 34), slope >> np.maximum(shift - 1 - level, 0)[:, np.newaxis]).truncate(32)
         walked = start.codes + (pixel - first_pixel)[:, np.newaxis] * slope.wrap(self.STEP_FORMAT).codes
-        width = self.ACCUMULATOR_FORMAT.width
-        walked = ((walked & ((1 << width) - 1)) ^ (1 << (width - 1))) - (1 << (width - 1))
-        normal = Fixed(self.ACCUMULATOR_FORMAT, walked).truncate(COMPONENT.fraction_bits)
+        walked = Fixed(self.ACCUMULATOR_FORMAT, self.ACCUMULATOR_FORMAT.wrap(walked))
+        normal = walked.truncate(COMPONENT.fraction_bits)
         return normal.saturate(COMPONENT), wide, levels
 
     @property

@@ -19,16 +19,23 @@ class AngularInterpolator(Interpolator):
     """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, for L and H of each light.
 
     Formats and error bounds are those of `golden.angular_setup.AngularSetup` and
-    `golden.highlight_cosine.HighlightCosine`. N·L is 1 less the result, ``SQ(2, 25)``. Spans of opposite
-    normals, which have no plane, are flagged.
+    `golden.highlight_cosine.HighlightCosine`. N·L is 1 less the result, ``SQ(2, 25)``. Spans over 150
+    degrees are flagged.
 
     Source: [T] 3.1, 3.2.
     """
 
     operand: ClassVar = "one_minus_cosine"
     COSINE_FORMAT = SQ(2, 25)
-    MAX_ANGLE = 150.0
+    MAX_ANGLE = AngularSetup.MAX_ANGLE
     CURVE = "slerp"
+
+    @property
+    def highlight_excess(self):
+        """Errors of the setup, of the cosine and of its cut: ``cos gamma(t)`` is the great circle's."""
+        angles = np.linspace(1e-4, self.gate_angle, 1000)
+        setup = AngularSetup.error(angles).max()
+        return float(setup) + HighlightCosine.ERROR + HighlightCosine.RESULT_FORMAT.step
 
     def compute(self, normal_left, normal_right, length, direction, halfway):
         """Bit-true operands."""
@@ -36,10 +43,8 @@ class AngularInterpolator(Interpolator):
 
         def along(vector):
             vector = Fixed(COMPONENT, np.broadcast_to(vector, normal_left.codes.shape))
-            _, phase, step, cos_beta, opposite = AngularSetup().compute(
-                normal_left, normal_right, vector, length
-            )
-            return HighlightCosine().compute(phase, step, cos_beta, *place).codes, opposite
+            _, phase, step, cos_beta, wide = AngularSetup().compute(normal_left, normal_right, vector, length)
+            return HighlightCosine().compute(phase, step, cos_beta, *place).codes, wide
 
         one = Fixed(UQ(1, 25), 1 << 25)
         results = [[along(vector) for vector in vectors.codes] for vectors in (direction, halfway)]

@@ -39,7 +39,9 @@ class AngularSetup:
     = 2^j T(v)`` from a table on ``v = z 4^j`` in [1/4, 1), with ``b - a`` shifted by j. psi is that of
     `HalfChord`; nothing needs an arccos. Beyond 90 degrees ``|N_r + N_l|^2`` takes the place of w and x and
     y change places, so every angle from 0 to 180 degrees is served. Only for opposite normals is there no
-    plane: the setup then says so, and goes round by the pole ``x = 0``.
+    plane: the setup then goes round by the pole ``x = 0``. The nearer they come to it, the more their
+    rounding turns the plane, by ``1/sin psi`` of it: spans over 150 degrees are flagged. One comparison does,
+    ``|N_r + N_l|^2 < 4 cos^2(75 degrees)``, less what rounding may take off: flagged for certain from 150.01.
 
     Polar coordinates are found by 22 steps of CORDIC; its gain is taken back by shifts and additions. A
     span of one pixel gets ``psi/(m-1) = psi``, which nothing reads.
@@ -98,7 +100,13 @@ class AngularSetup:
     angle: Literal["half_chord", "arccos"] = "half_chord"
     arccos: Arccos = field(default_factory=Arccos)
 
+    MAX_ANGLE = 150.0
     CHORD_FORMAT = HalfChord.OPERAND_FORMAT
+    # The rounding of two normals moves a squared sum of length 0.52 by under 3.6 steps.
+    SHORTEST_SUM = Fixed(
+        UQ(2, 17),
+        int((ONE_SQUARED.values * 4 * np.cos(np.radians(MAX_ANGLE / 2)) ** 2 - 4 * COMPONENT.step) * 2.0**17),
+    )
     CORRECTION_FORMAT = UQ(-1, 18)
     CORRECTION_VALUE_FORMAT = UQ(-1, 22)
     CORRECTION_RISE_FORMAT = UQ(-9, 22)
@@ -250,8 +258,8 @@ class AngularSetup:
         step : Fixed, shape (spans,), UQ(0, 40)
             ``psi/(m-1)`` in turns.
         cos_beta : Fixed, shape (spans,), UQ(1, 25)
-        opposite : bool array, shape (spans,)
-            Whether the normals are opposite, and their plane arbitrary.
+        wide : bool array, shape (spans,)
+            Whether the normals are over `MAX_ANGLE` apart, and their plane is not to be trusted.
 
         Raises
         ------
@@ -273,7 +281,7 @@ class AngularSetup:
         total, difference = (left + right).extend(SQ(6, 34)), (right - left).extend(SQ(6, 34))
         major = Fixed(SQ(6, 34), np.where(obtuse, difference.codes, total.codes))
         minor = Fixed(SQ(6, 34), np.where(obtuse, total.codes, difference.codes))
-        shift = self._shift(chord)
+        shift = HalfChord.shift(chord)
         x, y = self._major(chord, major), self._minor(chord, minor, shift)
         x, y = np.where(obtuse, y, x), np.where(obtuse, x, y)
         radius, direction = self._polar(x, y)
@@ -287,7 +295,8 @@ class AngularSetup:
         half = angle.scale(-1).extend(UQ(0, 40))
         phase = (direction.extend(self.PHASE_FORMAT) + half).wrap(self.PHASE_FORMAT)
         step = self._step(angle, angle_shift, length)
-        return angle, phase, step, cos_beta, obtuse & (chord.codes == 0)
+        wide = obtuse & (chord.truncate(self.SHORTEST_SUM.format.fraction_bits) < self.SHORTEST_SUM)
+        return angle, phase, step, cos_beta, wide
 
     def _by_arccos(self, cross: Fixed) -> Fixed:
         """Psi in turns, from the exact dot product of the normals."""
@@ -295,14 +304,6 @@ class AngularSetup:
         radians, _ = self.arccos.compute(cosine.saturate(Arccos.OPERAND_FORMAT))
         radians = radians.round_half_up(15).saturate(self.RADIANS_FORMAT)
         return (radians * self.TURNS_PER_RADIAN).extend(self.ANGLE_FORMAT)
-
-    @staticmethod
-    def _shift(chord: Fixed) -> np.ndarray:
-        """j, with ``z 4^j`` in [1/4, 1)."""
-        shift = np.full_like(chord.codes, 17)
-        for j in range(17, -1, -1):
-            shift[chord.codes >> (34 - 2 * j) > 0] = j
-        return shift
 
     def _looked_up(self, table, bits: np.ndarray, width: int) -> tuple[Fixed, Fixed]:
         """Word at the top bits, and its change times the bits below them."""

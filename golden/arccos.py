@@ -292,6 +292,24 @@ class HalfChord:
             Fixed.round(self.TABLE_SLOPE_FORMAT, np.where(used, slope, 0)),
         )
 
+    @staticmethod
+    def shift(chord_squared: Fixed) -> np.ndarray:
+        """j, with ``z 4^j`` in [1/4, 1); 17 of a chord of 0.
+
+        Parameters
+        ----------
+        chord_squared : Fixed, any shape, UQ(2, 34)
+            w.
+
+        Returns
+        -------
+        int64 array, same shape
+        """
+        shift = np.full_like(chord_squared.codes, 17)
+        for j in range(17, -1, -1):
+            shift[chord_squared.codes >> (34 - 2 * j) > 0] = j
+        return shift
+
     def compute(self, chord_squared: Fixed, supplement: np.ndarray) -> Fixed:
         """Bit-true angles.
 
@@ -315,11 +333,8 @@ class HalfChord:
         if chord_squared.format != self.OPERAND_FORMAT:
             raise ValueError(f"operand must be {self.OPERAND_FORMAT}, not {chord_squared.format}")
         z = chord_squared.scale(-2)
-        codes = z.codes
-        shift = np.full_like(codes, 17)
-        for j in range(17, -1, -1):
-            shift[codes >> (34 - 2 * j) > 0] = j
-        v = codes << 2 * shift
+        shift = self.shift(chord_squared)
+        v = z.codes << 2 * shift
         values, slopes = self.roots
         address = v >> (36 - self.ADDRESS_BITS)
         fraction = Fixed(

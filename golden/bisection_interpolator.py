@@ -1,12 +1,14 @@
 """Bisection of spans until straight lines will do ([T] figure 2.7): method ``bisection``."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from .adaptive_normaliser import AdaptiveNormaliser
 from .interpolation import interpolate
 from .interpolator import NormalInterpolator
+from .unit_vector import CODE_LENGTH_ERROR
 
 __all__ = ["BisectionInterpolator"]
 
@@ -39,9 +41,20 @@ class BisectionInterpolator(NormalInterpolator):
         super().__post_init__()
         AdaptiveNormaliser(self.threshold)
 
+    @property
+    def normal_error(self):
+        """That of three components, at the largest depth, and the codes' lengths."""
+        normaliser = AdaptiveNormaliser(self.threshold)
+        return float(np.sqrt(3) * normaliser.error(normaliser.depth, False)) + CODE_LENGTH_ERROR
+
+    @property
+    def shortest_length(self):
+        """One less the threshold and the rounding of the error block."""
+        return 1 - self.threshold - 2.0**-18
+
     def normals(self, normal_left, normal_right, length):
         """Bit-true normals."""
-        normals, wide, _ = AdaptiveNormaliser(self.threshold).compute(normal_left, normal_right, length)
+        normals, wide, _ = _normaliser(self.threshold).compute(normal_left, normal_right, length)
         return normals, wide
 
     def exact_normals(self, normal_left, normal_right, t):
@@ -55,3 +68,9 @@ class BisectionInterpolator(NormalInterpolator):
         left = np.minimum(np.floor(t * segments), segments - 1)
         ends = (interpolate("slerp", normal_left, normal_right, (left + k) / segments) for k in (0, 1))
         return interpolate("linear", *ends, t * segments - left)
+
+
+@cache
+def _normaliser(threshold: float) -> AdaptiveNormaliser:
+    """The unit, whose polynomials take half a second to fit."""
+    return AdaptiveNormaliser(threshold)

@@ -1,13 +1,17 @@
 """The chord method: scalar forward differences of N·L and of the squared chord from N to H (chord.md)."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
+
+import numpy as np
 
 from .chord_setup import ChordSetup, largest_span_angle
 from .difference_accumulator import DifferenceAccumulator
 from .fixed import SQ
 from .interpolator import Interpolator, Operands, pixels_of
 from .specular import Specular
+from .unit_vector import CODE_LENGTH_ERROR
 
 __all__ = ["ChordInterpolator"]
 
@@ -30,18 +34,49 @@ class ChordInterpolator(Interpolator):
     u          UQ(1, 25)  cut, saturates
     ========== ========== ========================================
 
+    Parameters
+    ----------
+    terms, fraction_bits : int
+        Of the setup.
+
+    Raises
+    ------
+    ValueError
+        If one is out of range.
+
     Source: chord.md.
     """
 
+    terms: int = 3
+    fraction_bits: int = 46
+
     operand: ClassVar = "one_minus_cosine"
     COSINE_FORMAT = SQ(2, 25)
-    MAX_ANGLE = ChordSetup.MAX_ANGLE
     CURVE = "quadratic"
 
-    DIFFUSE = DifferenceAccumulator(ChordSetup.COSINE_FORMAT, SQ(3, 46), ChordSetup.FORMAT, SQ(2, 25))
-    HIGHLIGHT = DifferenceAccumulator(
-        ChordSetup.CHORD_FORMAT, SQ(3, 46), ChordSetup.FORMAT, Specular.ARGUMENT_FORMAT
-    )
+    def __post_init__(self):
+        _ = self.setup
+
+    @cached_property
+    def setup(self) -> ChordSetup:
+        """Twin of the setup."""
+        return ChordSetup(self.terms, self.fraction_bits)
+
+    @property
+    def MAX_ANGLE(self) -> float:
+        """Widest span in degrees that is not flagged."""
+        return self.setup.max_angle
+
+    @property
+    def accumulators(self) -> dict[str, DifferenceAccumulator]:
+        """Twins of the accumulators, ``diffuse`` of N·L and ``highlight`` of u."""
+        format, difference = SQ(3, self.fraction_bits), self.setup.format
+        starts = {"diffuse": ChordSetup.COSINE_FORMAT, "highlight": ChordSetup.CHORD_FORMAT}
+        results = {"diffuse": self.COSINE_FORMAT, "highlight": Specular.ARGUMENT_FORMAT}
+        return {
+            name: DifferenceAccumulator(start, format, difference, results[name])
+            for name, start in starts.items()
+        }
 
     def widest_span(self, exponent):
         """Widest span, in degrees, that the fit shades well."""
@@ -51,10 +86,21 @@ class ChordInterpolator(Interpolator):
         """What costs 0.15 LSB: the cosine-quadratic model changes by ``0.77 sqrt(n)`` a radian at most."""
         return 0.15 / (255 * 0.77 * exponent**0.5)
 
+    @property
+    def highlight_excess(self):
+        """Error of u at the widest span and any ends, its cut, and the lengths of N and H as codes.
+
+        The quadratic through the exact values is ``1 - N·H`` of the quadratic curve of normals.
+        """
+        error = self.setup.highlight_error(self.gate_angle, np.array(2.0))
+        return float(error) + 2 * CODE_LENGTH_ERROR + Specular.ARGUMENT_FORMAT.step
+
     def compute(self, normal_left, normal_right, length, direction, halfway):
         """Bit-true operands."""
-        diffuse, highlight, wide = ChordSetup().compute(normal_left, normal_right, direction, halfway, length)
+        diffuse, highlight, wide = self.setup.compute(normal_left, normal_right, direction, halfway, length)
         place = pixels_of(length)
         return Operands(
-            self.DIFFUSE.compute(*diffuse, *place), self.HIGHLIGHT.compute(*highlight, *place), wide
+            self.accumulators["diffuse"].compute(*diffuse, *place),
+            self.accumulators["highlight"].compute(*highlight, *place),
+            wide,
         )

@@ -86,7 +86,5 @@ class DifferenceAccumulator:
             + step * first.codes[span]
             + step * (step - 1) // 2 * second.codes[span]
         )
-        width = self.format.width
-        total = ((total & ((1 << width) - 1)) ^ (1 << (width - 1))) - (1 << (width - 1))
         result = self.result_format
-        return Fixed(self.format, total).truncate(result.fraction_bits).saturate(result)
+        return Fixed(self.format, self.format.wrap(total)).truncate(result.fraction_bits).saturate(result)

@@ -76,6 +76,11 @@ class Format:
         """Value of one unit of the code, ``2**-fraction_bits``."""
         return 2.0**-self.fraction_bits
 
+    def wrap(self, codes: np.ndarray) -> np.ndarray:
+        """Codes of the same low bits, of integers of any size; those of int64 may have overflowed."""
+        low = codes & ((1 << self.width) - 1)
+        return low - ((low >> (self.width - 1)) << self.width) if self.signed else low
+
     def holds(self, other: "Format") -> bool:
         """Whether every number of ``other`` is a number of this format."""
         return (
@@ -322,10 +327,7 @@ class Fixed:
             If the fraction bits differ: round, truncate or extend first.
         """
         require_same_point(self.format, format, "wrap")
-        low = self.codes & ((1 << format.width) - 1)
-        if format.signed:
-            low = low - ((low >> (format.width - 1)) << format.width)
-        return Fixed._exact(format, low)
+        return Fixed._exact(format, format.wrap(self.codes))
 
     def extend(self, format: Format) -> "Fixed":
         """Same values in a format that holds them all.

@@ -66,7 +66,8 @@ class FrameConstants:
         """Constants of a scene and one of its materials, for a pipeline with ``lights`` lights.
 
         Lights that the scene does not have are black. A light straight behind the surface that faces the
-        viewer (``L = -V``) has no half-way vector, and no specular light.
+        viewer (``L = -V``) has no half-way vector, and no specular light. With point lights or a near viewer
+        there are no vectors of a frame: they are 0.
 
         With ``energy`` the highlight is that of the energy-normalised form: the factor of
         `golden.reflection.energy_factor` multiplies k_s here, once a frame, and the specular unit stays as it
@@ -104,11 +105,13 @@ class FrameConstants:
         direction = np.zeros((count, 3), dtype=np.int64)
         halfway, diffuse, specular = np.zeros((3, count, 3), dtype=np.int64)
         for index, light in enumerate(scene.lights):
-            direction[index] = quantise(np.asarray(light.direction))
             diffuse[index] = Intensity.color(np.multiply(material.diffuse, light.color))
-            between = halfway_vector(light.direction, scene.camera.viewer)
-            if np.any(between):
-                halfway[index] = quantise(between)
+            between = np.zeros(3)
+            if not scene.local:
+                direction[index] = quantise(np.asarray(light.direction))
+                between = halfway_vector(light.direction, scene.camera.viewer)
+            if scene.local or np.any(between):
+                halfway[index] = quantise(between) if between.any() else 0
                 highlight = factor * np.multiply(material.specular, light.color)
                 if energy is not None and highlight.max() > MAX_INTENSITY:
                     raise ValueError(

@@ -7,8 +7,10 @@ import numpy as np
 
 from .dot_product import DotProduct
 from .fixed import SQ, UQ, Fixed, Format
-from .middle_normal import MAX_SPAN_ANGLE, MiddleNormal
-from .specular import MAX_EXPONENT, Specular
+from .interpolator import Interpolator
+from .quadratic_interpolator import QuadraticInterpolator
+from .specular import MAX_EXPONENT, HighlightOperand, Specular
+from .unit_vector import ONE_SQUARED
 
 __all__ = ["HighlightGate"]
 
@@ -22,7 +24,7 @@ class HighlightGate:
     With ``cos psi = 1 - u`` and d = a - b that is ``M^2 = (d^2 + 2 a b u) / (u (2 - u))``, in which nothing
     cancels for psi tending to 0, and inside is ``max(a, b) u > |d|``. A span is lit where
 
-    - it is over 45 degrees, or
+    - it is over 45 degrees, or wider than the method is meant for, or
     - ``max(a, b)^2 >= T``, or
     - ``max(a, b) u > |d|`` and ``d^2 >= u w``, with ``w = 2 T - 2 a b - T u``: that is ``M^2 >= T``.
 
@@ -47,7 +49,8 @@ class HighlightGate:
        codes. The exact curve is ``N(t) = alpha N_l + beta N_r`` with ``alpha = (1-t)(1 + k t)``,
        ``beta = t (1 + k (1-t))``, ``k = 4h - 2``, ``h = 1/sqrt(2 (1 + cos psi)) >= 1/2``; both are at least 0
        for t in [0, 1]. Hence ``N(t).H <= alpha a' + beta b'`` for all ``a' >= a``, ``b' >= b``. (Where
-       rounding makes ``cos psi > 1``, the unit takes k = 0, and the sum is at most max(a', b').)
+       rounding makes ``cos psi > 1``, the unit takes k = 0, and the sum is at most max(a', b').) A straight
+       line has k = 0; points of the great circle, and straight lines between them, have factors like these.
     2. *It stays inside the unit circle.* For unit vectors e_l, e_r psi apart, ``alpha e_l + beta e_r`` is the
        same curve; along and across the bisector it is ``1 - s^2 (1 - c)`` and ``s sin(psi/2)``, s = 2t - 1,
        ``c = cos(psi/2)``. Its squared length is ``1 - (1-c)^2 s^2 (1 - s^2) <= 1`` and its direction turns
@@ -64,32 +67,32 @@ class HighlightGate:
        ``max(a', b') u > |d|``.
     4. *The comparison.* T and w are cut, everything else is exact, so not lit gives ``m^2 < T``, also where m
        is at an end. T is at most ``tau^2``, so ``m < tau`` and ``N(t).H < tau`` on the exact curve.
-    5. *The pipeline.* A pixel's N differs from the exact curve, along a vector H of length 1 at most, by
-       under ``sqrt(3) e`` for the middle normal, e = `MiddleNormal.error`; ``2^-17 |P| + (2^-16 + 2^-17
-       + 2^-34) |G|`` for the reciprocal of the length, with |P| <= 0.83 and |G| <= 0.305; ``sqrt(3) 2^-42
-       (k + k^2/2)`` for the rounding of the differences at pixel k, to 4094; ``sqrt(3) 2^-18`` for its own:
-       together 4.4 steps of 2^-17 for its default fit. Saturation only brings a component nearer to one of a
-       unit vector. tau is `margin`, the sum in whole steps rounded up (5; 135 to 875 for the other
-       fits, whose normals may be too long), below the largest N·H that the specular unit shades 0, which
-       follows from its PROM in integers. The dot product is exact, and the unit's argument falls with it: the
-       term is 0. ∎
+    5. *The pipeline.* Each method states how far its pixels may be brighter than m
+       (`golden.interpolator.Interpolator.highlight_excess`, from the errors of its devices; 4.4 steps of
+       2^-17 for quadratic normals): it has no N·H over ``m + excess``, no 1 - N·H under
+       ``shortest (1 - m) - excess``. x, the largest argument to which the specular unit may give a term, in
+       steps of 2^-25, follows from its PROM in integers (`HighlightOperand.last_lit_arguments`). So tau is
+       such that ``shortest (1 - tau) - excess`` is x and a step more, the excess rounded up to whole steps
+       (`margin`). The argument falls with N·H, and beyond x the term is 0. ∎
 
-    The margins cost little: a span is let through only if ``M^2 >= tau^2 - 10 * 2^-17``.
+    The margins cost little: for quadratic normals, a span is let through only if
+    ``M^2 >= tau^2 - 10 * 2^-17``.
 
-    The proof is one for quadratic normals by `DifferenceSetup` and `DifferenceAccumulator`. Normals by
-    another method are off the exact curve by more or less than step 5 has it, and need a sum of their own.
+    Ends must be unit vectors as `quantise` makes them. With N·H of straight or quadratic normals a search
+    over all models lost no highlight for ends up to 1/128 longer, or shorter; other methods lose some where
+    ends are 8 to 128 steps of 2^-17 too short or too long.
 
     An exponent under which the unit shades nothing 0 up to N·H = tau <= 0 (1; 2 and 3 for wide models) has
     T = 0.
 
     Parameters
     ----------
-    specular : Specular
-        The unit that is gated: its model and PROM.
+    specular : Specular or Power
+        The unit that is gated.
     fraction_bits : int
         F, 5 to 17.
-    middle_normal : MiddleNormal
-        The unit that the pipeline has; its error is part of the margin.
+    interpolator : Interpolator
+        The method that finds the pixels' operands.
 
     Raises
     ------
@@ -99,11 +102,9 @@ class HighlightGate:
     Source: [T] 4.2, figure 4.10.
     """
 
-    specular: Specular = field(default_factory=Specular)
+    specular: HighlightOperand = field(default_factory=Specular)
     fraction_bits: int = 17
-    middle_normal: MiddleNormal = field(default_factory=MiddleNormal)
-
-    """`margin` with the default middle normal."""
+    interpolator: Interpolator = field(default_factory=QuadraticInterpolator)
 
     def __post_init__(self):
         if not 5 <= self.fraction_bits <= 17:
@@ -111,13 +112,8 @@ class HighlightGate:
 
     @property
     def margin(self) -> float:
-        """Step 5's sum in whole steps of 2^-17: how far a pixel's N·H may be over the exact curve's."""
-        k, middle = 4094, np.sqrt(3) * self.middle_normal.error
-        # G and P have four times the middle normal.
-        p, g = 0.83 + 4 * middle, 0.305 + 4 * middle
-        reciprocal = 2.0**-17 * p + (2.0**-16 + 2.0**-17 + 2.0**-34) * g
-        total = middle + reciprocal + np.sqrt(3) * (2.0**-42 * (k + k * k / 2) + 2.0**-18)
-        return float(np.ceil(total * 2.0**17) * 2.0**-17)
+        """The method's excess in whole steps of 2^-17."""
+        return float(np.ceil(self.interpolator.highlight_excess * 2.0**17) * 2.0**-17)
 
     @property
     def component_format(self) -> Format:
@@ -147,22 +143,17 @@ class HighlightGate:
 
     @property
     def widest(self) -> Fixed:
-        """Largest cut ``u`` of which the exact one is under that of 45 degrees for certain."""
-        limit = self.one_squared.values * (1 - np.cos(np.radians(MAX_SPAN_ANGLE)))
+        """Largest cut ``u`` of which the exact one is under that of the method's `gate_angle` for certain."""
+        limit = self.one_squared.values * (1 - np.cos(np.radians(self.interpolator.gate_angle)))
         return Fixed(self.angle_format, int(limit / self.angle_format.step) - 1)
 
     @cached_property
     def thresholds(self) -> Fixed:
         """The PROM: T for exponents 0 to 1023."""
-        unit = self.specular
-        _, shift = unit.scale(np.arange(1 << unit.EXPONENT_BITS))
-        boundary = unit.boundaries.codes
-        # Largest 1 - N.H, in steps of 2^-25, that is not cut off; see `Specular.compute`.
-        argument = (((boundary + 1) << 10) - 1) >> (shift + 1)
-        argument[boundary == unit.SHIFTED_FORMAT.max_code] = 1 << 27
-        one = Specular("cosquad").operand_format
-        level = HighlightGate(unit).one_squared.codes - ((argument + 1) << (one.fraction_bits - 25))
-        level -= round(self.margin * 2**one.fraction_bits)
+        nearest = (self.specular.last_lit_arguments + 1) * 2.0**-25
+        level = float(ONE_SQUARED.values) - (nearest + self.margin) / self.interpolator.shortest_normal
+        # In steps of 2^-34; one less, as the quotient is not exact.
+        level = np.floor(level * 2.0**34).astype(np.int64) - 1
         # Squares of 34 bits outgrow an int64.
         codes = [max(code, 0) ** 2 >> (68 - self.fraction_bits) for code in level.tolist()]
         return Fixed(self.level_format, codes)

@@ -26,25 +26,33 @@ class Intensity:
     Parameters
     ----------
     lights : int
-        Number of lights, 1 to 16; a scene without lights uses one that is black.
+        Number of lights, 0 to 16.
+    has_specular : bool
+        Whether there are specular terms; else they must be 0.
+    channels : int
+        3, or 1: red's colour operands count for every channel.
 
     Raises
     ------
     ValueError
-        If the number of lights is out of range.
+        If the number of lights or channels is out of range.
 
     Source: [B] 4 and 5, [T] figure 4.10.
     """
 
     lights: int = 1
+    has_specular: bool = True
+    channels: int = 3
 
     COLOR_FORMAT = UQ(11, 6)
     TERM_FORMAT = UQ(0, 17)
     RESULT_FORMAT = UQ(8, 0)
 
     def __post_init__(self):
-        if not 1 <= self.lights <= MAX_LIGHTS:
-            raise ValueError(f"lights must be 1 to {MAX_LIGHTS}, not {self.lights}")
+        if not 0 <= self.lights <= MAX_LIGHTS:
+            raise ValueError(f"lights must be 0 to {MAX_LIGHTS}, not {self.lights}")
+        if self.channels not in (1, 3):
+            raise ValueError(f"channels must be 1 or 3, not {self.channels}")
 
     @classmethod
     def color(cls, intensity: np.ndarray) -> np.ndarray:
@@ -94,11 +102,11 @@ class Intensity:
         total = diffuse.codes @ diffuse_color.codes + specular.codes @ specular_color.codes
         total = total + (ambient.codes << self.TERM_FORMAT.fraction_bits)
         total = Fixed(UQ(17, fraction_bits), total).round_half_up(0).saturate(self.RESULT_FORMAT)
-        return total.codes.astype(np.uint8)
+        color = total.codes.astype(np.uint8)
+        return color if self.channels == 3 else np.repeat(color[:, :1], 3, axis=-1)
 
-    @staticmethod
-    def clocks(diffuse: Fixed, specular: Fixed) -> np.ndarray:
-        """Clocks that each pixel takes in the unit's compact style: ``3 max(1, terms that are not 0)``.
+    def clocks(self, diffuse: Fixed, specular: Fixed) -> np.ndarray:
+        """Clocks that each pixel takes in the unit's compact style: ``channels max(1, terms not 0)``.
 
         Parameters
         ----------
@@ -110,4 +118,4 @@ class Intensity:
         int64 array, shape (pixels,)
         """
         terms = np.concatenate([diffuse.codes, specular.codes], axis=-1)
-        return 3 * np.maximum(np.count_nonzero(terms, axis=-1), 1)
+        return self.channels * np.maximum(np.count_nonzero(terms, axis=-1), 1)

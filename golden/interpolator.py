@@ -11,7 +11,8 @@ from .dot_product import DotProduct
 from .fixed import Fixed, Format
 from .interpolation import interpolate
 from .middle_normal import MAX_SPAN_ANGLE
-from .unit_vector import COMPONENT
+from .specular import Specular
+from .unit_vector import CODE_LENGTH_ERROR, COMPONENT
 
 __all__ = ["Interpolator", "NormalInterpolator", "Operand", "Operands", "pixels_of"]
 
@@ -58,7 +59,8 @@ class Interpolator:
     MAX_ANGLE : float
         Widest span in degrees for which the method is meant. It flags wider ones as far as it can tell them:
         most from there on; straight lines where a component of ``N_r - N_l`` is 1 or more, which takes 60
-        degrees and happens to half of the spans at 75; the angular method opposite normals alone.
+        degrees and happens to half of the spans at 75; ``renormalise`` besides every span with a normal that
+        its unit does not serve (unit normals: over 94 degrees).
     CURVE : str
         The curve of `golden.interpolation.CURVES` on which the method's normals lie in exact arithmetic.
     """
@@ -66,6 +68,26 @@ class Interpolator:
     COSINE_FORMAT: ClassVar[Format] = DotProduct().result_format
     MAX_ANGLE: ClassVar[float] = MAX_SPAN_ANGLE
     CURVE: ClassVar[str] = "normalised"
+
+    @property
+    def gate_angle(self) -> float:
+        """Widest span, in degrees, for which `highlight_excess` is stated: 45, or `MAX_ANGLE` if less."""
+        return min(self.MAX_ANGLE, MAX_SPAN_ANGLE)
+
+    @property
+    def highlight_excess(self) -> float:
+        """How far a highlight may be brighter than the great circle says, for spans to `gate_angle`.
+
+        With c the largest cosine to H on the arc of the great circle from N_l to N_r, in units of
+        `ONE_SQUARED`, no pixel has an N·H over ``c + highlight_excess``, or a 1 - N·H under
+        ``shortest_normal (1 - c) - highlight_excess``. A highlight gate counts on it.
+        """
+        raise NotImplementedError
+
+    @property
+    def shortest_normal(self) -> float:
+        """Least length of a normal on the way, for spans to `gate_angle`, where the chord is taken to it."""
+        return 1.0
 
     @property
     def uses_chord(self) -> bool:
@@ -143,6 +165,32 @@ class NormalInterpolator(Interpolator):
     def uses_chord(self):
         """With ``operand="one_minus_cosine"``."""
         return self.operand == "one_minus_cosine"
+
+    @property
+    def normal_error(self) -> float:
+        """Largest distance of a normal from the method's curve, which keeps inside the unit circle."""
+        raise NotImplementedError
+
+    @property
+    def shortest_length(self) -> float:
+        """Least length of a normal on the method's curve, for spans to `gate_angle`."""
+        return 1.0
+
+    @property
+    def highlight_excess(self):
+        """`normal_error` along H; of the chord, ``|N - H| <= 2``, twice that and its cut.
+
+        On a curve of length r, c away from H, half the squared chord is ``(1 - r)^2/2 + r (1 - c)``, which is
+        at least ``r (1 - c)``. The directions of N_l and H differ from their codes in length.
+        """
+        if not self.uses_chord:
+            return self.normal_error
+        return 2 * (self.normal_error + 2 * CODE_LENGTH_ERROR) + Specular.ARGUMENT_FORMAT.step
+
+    @property
+    def shortest_normal(self):
+        """`shortest_length`, of the chord."""
+        return self.shortest_length if self.uses_chord else 1.0
 
     def normals(
         self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from .difference_accumulator import DifferenceAccumulator
-from .difference_setup import DifferenceSetup
+from .difference_setup import LENGTH_BITS, DifferenceSetup
 from .fixed import Fixed
 from .gpq import GPQ
 from .interpolator import NormalInterpolator, pixels_of
 from .renormaliser import Renormaliser
+from .unit_vector import CODE_LENGTH_ERROR
 
 __all__ = ["LinearInterpolator"]
 
@@ -20,7 +21,9 @@ class LinearInterpolator(NormalInterpolator):
 
     The first is what is left when a normal is not brought to unit length: too short by ``1 - cos(psi/2)`` in
     the middle. The second is the rival without the documents, with the direct renormaliser at every pixel.
-    ``N_r - N_l`` saturates at 1 in a component, over 60 degrees; such a span is flagged.
+    ``N_r - N_l`` saturates at 1 in a component, over 60 degrees; such a span is flagged. With
+    ``renormalised``, so is one with a pixel of which the renormaliser says that it is too short or too long,
+    which passes as it is: of unit normals, those over 94 degrees with a pixel near the middle.
 
     Parameters
     ----------
@@ -42,6 +45,22 @@ class LinearInterpolator(NormalInterpolator):
         """The curve in exact arithmetic."""
         return "normalised" if self.renormalised else "linear"
 
+    @property
+    def normal_error(self):
+        """That of the differences, with |P| <= 0.766; renormalised, of a length of 0.92, and of the rest."""
+        k = (1 << LENGTH_BITS) - 2
+        chord = 2 * np.sin(np.radians(self.gate_angle / 2)) + 4 * CODE_LENGTH_ERROR
+        error = 2.0**-17 * chord + np.sqrt(3) * (2.0**-42 * (k + k * k / 2) + 2.0**-18)
+        if self.renormalised:
+            return float(error / 0.92 + Renormaliser.ERROR + 2 * CODE_LENGTH_ERROR)
+        return float(error)
+
+    @property
+    def shortest_length(self):
+        """In the middle of the widest span."""
+        middle = float(np.cos(np.radians(self.gate_angle / 2))) - CODE_LENGTH_ERROR
+        return 1.0 if self.renormalised else middle
+
     def normals(self, normal_left, normal_right, length):
         """Bit-true normals."""
         difference = normal_right - normal_left
@@ -49,7 +68,9 @@ class LinearInterpolator(NormalInterpolator):
         wide = np.any(p.codes != difference.codes, axis=-1)
         zero = Fixed(GPQ.G_FORMAT, np.zeros_like(p.codes))
         first, second = DifferenceSetup().compute(zero, p, length)
-        normals = DifferenceAccumulator().compute(normal_left, first, second, *pixels_of(length))
+        span, step = pixels_of(length)
+        normals = DifferenceAccumulator().compute(normal_left, first, second, span, step)
         if self.renormalised:
-            normals, _ = Renormaliser().compute(normals)
+            normals, outside = Renormaliser().compute(normals)
+            wide[span[outside]] = True
         return normals, wide

@@ -1,6 +1,6 @@
 """The shading pipeline: spans in, pixels out; which methods and models there are, and the bit-true twin."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,16 +9,19 @@ import numpy as np
 from .angular_interpolator import AngularInterpolator
 from .bisection_interpolator import BisectionInterpolator
 from .chord_interpolator import ChordInterpolator
+from .difference_setup import LENGTH_BITS
 from .diffuse import Diffuse
 from .fixed import Fixed
 from .frame_constants import MAX_MATERIALS, FrameConstants
+from .highlight_gate import HighlightGate
 from .intensity import Intensity
-from .interpolator import Interpolator, NormalInterpolator, Operand, pixels_of
+from .interpolator import Interpolator, NormalInterpolator, Operand, Operands, pixels_of
 from .linear_interpolator import LinearInterpolator
+from .local_chord_interpolator import LocalChordInterpolator, SpanValues
 from .power import Power
 from .quadratic_interpolator import QuadraticInterpolator
 from .recurrence_interpolator import RecurrenceInterpolator
-from .specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from .specular import FURTHER_MODELS, MAX_EXPONENT, SPECULAR_MODELS, Specular
 from .unit_vector import COMPONENT
 
 __all__ = ["METHODS", "MODELS", "Pixels", "ShadingPipeline", "Spans"]
@@ -33,13 +36,12 @@ METHODS: dict[str, Interpolator] = {
     "recurrence": RecurrenceInterpolator(),
     "renormalise": LinearInterpolator(renormalised=True),
     "chord": ChordInterpolator(),
+    "chord-local": LocalChordInterpolator(),
 }
 """Interpolation methods of the pipeline."""
 
 MODELS = (*SPECULAR_MODELS, *FURTHER_MODELS, "blinn")
 """Reflection models of the pipeline; every method serves each."""
-
-_LARGEST_PLACE = 4095
 
 _CHUNK = 1 << 18
 """Pixels shaded at once."""
@@ -52,13 +54,16 @@ class Spans:
     Parameters
     ----------
     x, y : int arrays, shape (spans,)
-        First pixel of each span, 0 to 4095.
+        First pixel of each span, 0 to 4095, or what the pipeline's coordinates hold.
     length : int array, shape (spans,)
-        Pixels, 0 to 4095. A span of length 0 gives no pixel; one that goes past x = 4095 starts again at 0.
+        Pixels, 0 to 4095. A span of length 0 gives no pixel; one that goes past the largest x starts again
+        at 0.
     normal_left, normal_right : int arrays, shape (spans, 3)
         Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``.
     material : int array, shape (spans,), optional
         Index of the material; ``None``: 0 for all.
+    values : SpanValues, optional
+        For ``chord-local``, which reads no normals: values of each light.
     """
 
     x: np.ndarray
@@ -67,6 +72,7 @@ class Spans:
     normal_left: np.ndarray
     normal_right: np.ndarray
     material: np.ndarray | None = None
+    values: SpanValues | None = None
 
     def __post_init__(self):
         if self.material is None:
@@ -110,55 +116,118 @@ class ShadingPipeline:
     ----------
     method : str
         One of `METHODS`.
-    model : str
-        One of `MODELS`.
+    model : str or None
+        One of `MODELS`; ``None``: no specular light.
     lights : int
-        Number of lights, 1 to 16.
+        Number of lights, 0 to 16. Without any there is ambient light alone, and no method.
     operand : str or None
         What the specular unit is given, ``"cosine"`` or ``"one_minus_cosine"``, for methods that find normals
         (see `golden.interpolator.NormalInterpolator`). ``None``: what the method gives by itself.
     materials : int
         Number of materials, 1 to `golden.frame_constants.MAX_MATERIALS`.
+    gate : bool
+        Whether a `golden.highlight_gate.HighlightGate` tells the lights which spans have no highlight. For
+        unit normals that changes no pixel.
+    exponent : int or None
+        A specular exponent for good; ``None``: that of the frame constants.
+    grey : bool
+        One channel in place of three: red's colour operands count, and the pixel has it three times.
+    x_bits, y_bits, length_bits : int
+        Bits of the coordinates, 1 to 12, and of a span's length, 2 to 12.
+    terms, fraction_bits : int or None
+        Of the chord method alone: terms of its polynomial, and bits of its differences, where they are to be
+        fewer than those of `golden.chord_setup.ChordSetup`.
 
     Raises
     ------
     ValueError
-        If the method, the model, the number of lights or materials or the operand is unknown, or the method
-        has no choice of operand.
+        If the method, the model, the number of lights or materials or the operand is unknown, the method has
+        no choice of operand, a number of bits or the exponent is out of range, or a gate is asked for without
+        specular light.
     """
 
     method: str = "quadratic"
-    model: str = "cosquad"
+    model: str | None = "cosquad"
     lights: int = 1
     operand: Operand | None = None
     materials: int = 1
+    gate: bool = False
+    exponent: int | None = None
+    grey: bool = False
+    x_bits: int = 12
+    y_bits: int = 12
+    length_bits: int = 12
+    terms: int | None = None
+    fraction_bits: int | None = None
 
     def __post_init__(self):
         if self.method not in METHODS:
             raise ValueError(f"method must be one of {', '.join(METHODS)}, not {self.method!r}")
-        if self.model not in MODELS:
+        if self.model is not None and self.model not in MODELS:
             raise ValueError(f"model must be one of {', '.join(MODELS)}, not {self.model!r}")
         if self.operand not in (None, METHODS[self.method].operand):
             if not isinstance(METHODS[self.method], NormalInterpolator):
                 raise ValueError(f"method {self.method} finds no normals, and gives 1 - cos gamma")
             _ = self.interpolator
+        if self.method != "chord" and (self.terms, self.fraction_bits) != (None, None):
+            raise ValueError(f"terms and fraction_bits are for the method chord, not {self.method}")
+        _ = self.interpolator
         Intensity(self.lights)
         if not 1 <= self.materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {self.materials}")
+        if self.gate and not (self.model and self.lights):
+            raise ValueError("without specular light there is nothing to gate")
+        if self.gate and self.takes_values:
+            raise ValueError(f"method {self.method} has no normals for a gate")
+        if self.exponent is not None and not 1 <= self.exponent <= MAX_EXPONENT:
+            raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {self.exponent}")
+        for name, least in (("x_bits", 1), ("y_bits", 1), ("length_bits", 2)):
+            if not least <= getattr(self, name) <= LENGTH_BITS:
+                raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
 
     @cached_property
     def interpolator(self) -> Interpolator:
         """Twin of the method."""
         interpolator = METHODS[self.method]
-        if self.operand in (None, interpolator.operand):
-            return interpolator
-        return replace(interpolator, operand=self.operand)
+        changes = {"terms": self.terms, "fraction_bits": self.fraction_bits}
+        if self.operand != interpolator.operand:
+            changes["operand"] = self.operand
+        return replace(interpolator, **{name: x for name, x in changes.items() if x is not None})
 
     @property
-    def highlight(self) -> Specular | Power:
+    def takes_values(self) -> bool:
+        """Whether spans carry values of each light, in place of normals, so that L and H may be local."""
+        return isinstance(self.interpolator, LocalChordInterpolator)
+
+    @property
+    def highlight(self) -> Specular | Power | None:
         """Twin of the specular unit."""
         operand = self.interpolator.operand
+        if self.model is None:
+            return None
         return Power(operand) if self.model == "blinn" else Specular(self.model, operand)
+
+    @cached_property
+    def highlight_gate(self) -> HighlightGate:
+        """Twin of the highlight gate."""
+        return HighlightGate(self.highlight, interpolator=self.interpolator)
+
+    def lit_spans(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> np.ndarray:
+        """Which spans the highlight gate lets through, for each light: bool array, shape (spans, lights).
+
+        Parameters
+        ----------
+        spans, constants
+            As for `compute`.
+        """
+        constants = [constants] if isinstance(constants, FrameConstants) else constants
+        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
+        exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
+        lit = [
+            self.highlight_gate.compute(left, right, Fixed(COMPONENT, halfway), exponent)
+            for halfway in constants[0].halfway
+        ]
+        return np.stack(lit, axis=-1)
 
     def compute(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> Pixels:
         """Bit-true pixels, in the order of the spans.
@@ -173,7 +242,8 @@ class ShadingPipeline:
         Raises
         ------
         ValueError
-            If a code is out of range, or the constants are for another number of lights or materials.
+            If a code is out of range, the constants are for another number of lights or materials, or spans
+            lack the values that the method takes.
         """
         constants = [constants] if isinstance(constants, FrameConstants) else list(constants)
         if len(constants) != self.materials:
@@ -182,47 +252,83 @@ class ShadingPipeline:
             if len(of_material.direction) != self.lights:
                 given = len(of_material.direction)
                 raise ValueError(f"the constants are for {given} lights, not {self.lights}")
+            if self.exponent not in (None, of_material.exponent):
+                raise ValueError(f"the exponent is {self.exponent} for good, not {of_material.exponent}")
         if len(spans) and not 0 <= spans.material.min() <= spans.material.max() < self.materials:
             raise ValueError(f"material must be 0 to {self.materials - 1}")
-        for name in ("x", "y", "length"):
+        for name, bits in (("x", self.x_bits), ("y", self.y_bits), ("length", self.length_bits)):
             codes = np.asarray(getattr(spans, name))
-            if codes.size and not 0 <= codes.min() <= codes.max() <= _LARGEST_PLACE:
-                raise ValueError(f"{name} must be 0 to {_LARGEST_PLACE}")
+            if codes.size and not 0 <= codes.min() <= codes.max() < 1 << bits:
+                raise ValueError(f"{name} must be 0 to {(1 << bits) - 1}")
         kept = np.flatnonzero(np.asarray(spans.length) > 0)
         length = np.asarray(spans.length, dtype=np.int64)[kept]
-        left, right = (Fixed(COMPONENT, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
-        direction, halfway = (Fixed(COMPONENT, v) for v in (constants[0].direction, constants[0].halfway))
+        interpolate = self._interpolated(spans, kept, length, constants[0])
 
         span, step = pixels_of(length)
         color = np.empty((len(span), 3), dtype=np.uint8)
         wide, done = 0, 0
+        lit = self.lit_spans(spans, constants)[kept] if self.gate else None
         for part in _chunks(length):
-            operands = self.interpolator.compute(left[part], right[part], length[part], direction, halfway)
+            if not self.lights:
+                color[:] = self._ambient(constants, spans.material[kept][span])
+                break
+            operands = interpolate(part)
             count = len(operands.cosine.codes)
-            material = spans.material[kept][span[done : done + count]]
+            of_pixel = span[done : done + count]
+            material = spans.material[kept][of_pixel]
+            dark = np.zeros((count, self.lights), dtype=bool) if lit is None else ~lit[of_pixel]
             for index in np.unique(material):
                 which = np.flatnonzero(material == index)
                 color[done + which] = self._shade(
-                    operands.cosine[which], operands.highlight[which], constants[index]
+                    operands.cosine[which], operands.highlight[which], dark[which], constants[index]
                 )
             wide, done = wide + int(np.count_nonzero(operands.wide)), done + count
         return Pixels(
-            x=(np.asarray(spans.x)[kept][span] + step) & _LARGEST_PLACE,
+            x=(np.asarray(spans.x)[kept][span] + step) & ((1 << self.x_bits) - 1),
             y=np.asarray(spans.y)[kept][span],
             color=color,
             last=step == length[span] - 1,
             wide_spans=wide,
         )
 
-    def _shade(self, cosine: Fixed, highlight: Fixed, constants: FrameConstants) -> np.ndarray:
+    def _interpolated(self, spans, kept, length, constants) -> Callable[[slice], Operands]:
+        """What takes a part of the spans that are kept to operands."""
+        if self.takes_values and self.lights:
+            if spans.values is None or spans.values.diffuse.shape != (len(spans), self.lights, 3):
+                raise ValueError(f"method {self.method} takes spans with values for {self.lights} lights")
+            values = [codes[kept] for codes in spans.values]
+            return lambda part: self.interpolator.compute_values(
+                SpanValues(*(codes[part] for codes in values)), length[part]
+            )
+        left, right = (Fixed(COMPONENT, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
+        vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]
+        return lambda part: self.interpolator.compute(left[part], right[part], length[part], *vectors)
+
+    def _shade(
+        self, cosine: Fixed, highlight: Fixed, dark: np.ndarray, constants: FrameConstants
+    ) -> np.ndarray:
         diffuse_unit = Diffuse(cosine.format)
-        dark = diffuse_unit.dark(cosine)
+        dark = dark | diffuse_unit.dark(cosine)
         diffuse = diffuse_unit.compute(cosine)
-        specular = self.highlight.compute(highlight, dark, constants.exponent)
+        specular = Fixed(Intensity.TERM_FORMAT, np.zeros(dark.shape, dtype=np.int64))
+        if self.model is not None:
+            specular = self.highlight.compute(highlight, dark, constants.exponent)
+        return self.intensity.compute(*self._colors(constants), diffuse, specular)
+
+    def _ambient(self, constants: Sequence[FrameConstants], material: np.ndarray) -> np.ndarray:
+        """Colours of pixels of such materials without any light."""
+        nothing = Fixed(Intensity.TERM_FORMAT, np.zeros((1, 0), dtype=np.int64))
+        each = [self.intensity.compute(*self._colors(of), nothing, nothing) for of in constants]
+        return np.concatenate(each)[material]
+
+    @property
+    def intensity(self) -> Intensity:
+        """Twin of the intensity unit."""
+        return Intensity(self.lights, has_specular=self.model is not None, channels=1 if self.grey else 3)
+
+    def _colors(self, constants: FrameConstants) -> tuple[Fixed, ...]:
         colors = (constants.ambient, constants.diffuse, constants.specular)
-        return Intensity(self.lights).compute(
-            *(Fixed(Intensity.COLOR_FORMAT, codes) for codes in colors), diffuse, specular
-        )
+        return tuple(Fixed(Intensity.COLOR_FORMAT, codes) for codes in colors)
 
 
 def _chunks(length: np.ndarray) -> Iterator[slice]:

@@ -52,6 +52,13 @@ class Power(HighlightOperand):
     FACTOR_FORMAT = UQ(0, 17)
     ERROR = 6 * 2.0**-17
 
+    @property
+    def last_lit_arguments(self):
+        """That of ``c^n = 2^-17``, as the result is never too large; one step more for float64."""
+        exponent = np.arange(1 << self.EXPONENT_BITS)
+        argument = -np.expm1(-17 * np.log(2) / np.maximum(exponent, 1)) / self.ARGUMENT_FORMAT.step
+        return np.where(exponent > 0, np.ceil(argument).astype(np.int64) + 1, 1 << 27)
+
     def compute(self, operand: Fixed, dark: np.ndarray, exponent: int) -> Fixed:
         """Bit-true specular terms.
 

@@ -285,7 +285,10 @@ class Recurrence:
         start, following = codes[:, :4], codes[:, 4:]
         if self.form == "reinsch":
             # The register's half step.
-            start, following = self._wrap(start - self._half_operand), self._wrap(following - start)
+            start, following = (
+                self.state_format.wrap(start - self._half_operand),
+                self.state_format.wrap(following - start),
+            )
         return Fixed(self.state_format, start), Fixed(self.state_format, following)
 
     @property
@@ -333,7 +336,7 @@ class Recurrence:
         found = np.empty((-(-steps // self.interleave), *x.shape), dtype=np.int64)
         step = self._reinsch if self.form == "reinsch" else self._direct
         if self.form == "reinsch":
-            x = self._wrap(x + self._half_operand)
+            x = self.state_format.wrap(x + self._half_operand)
         # Every step rounds, so that there is no closed form: the loop is over time, not over spans.
         for k in range(len(found)):
             found[k] = x
@@ -347,8 +350,8 @@ class Recurrence:
             bend = self.bend_format.fraction_bits
             product = (x >> self.guard_bits) * factor << (bend - 2 * self.fraction_bits + 1)
             cut = bend - self.state_format.fraction_bits
-            difference = self._wrap(difference - (product >> shift >> cut))
-        return self._wrap(x + difference), difference
+            difference = self.state_format.wrap(difference - (product >> shift >> cut))
+        return self.state_format.wrap(x + difference), difference
 
     def _direct(self, x, other, factor, shift, is_first):
         if is_first:
@@ -356,10 +359,6 @@ class Recurrence:
         bits = self.fraction_bits
         total = ((1 << (bits - 1)) - (other << bits) - x * factor) >> bits
         return np.clip(total, self.state_format.min_code, self.state_format.max_code), x
-
-    def _wrap(self, codes):
-        half = 1 << (self.state_format.width - 1)
-        return ((codes + half) & (2 * half - 1)) - half
 
     def compute(
         self,

@@ -6,11 +6,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from .difference_setup import LENGTH_BITS
 from .fixed import SQ, UQ, Fixed
 from .interpolator import Interpolator, Operands, pixels_of
 from .recurrence import Recurrence
 from .recurrence_setup import RecurrenceSetup
 from .specular import Specular
+from .unit_vector import CODE_LENGTH_ERROR
 
 __all__ = ["RecurrenceInterpolator"]
 
@@ -48,6 +50,15 @@ class RecurrenceInterpolator(Interpolator):
     def setup(self) -> RecurrenceSetup:
         """Setup, and the recurrence."""
         return RecurrenceSetup(Recurrence(self.form, interleave=4, result_format=self.COSINE_FORMAT))
+
+    @property
+    def highlight_excess(self):
+        """Error of the setup and the recurrence, largest for spans of two pixels, and the codes' lengths."""
+        if self.form == "direct":
+            return 2.0
+        length = np.arange(2, 1 << LENGTH_BITS)
+        error = self.setup.error(length, np.full(length.shape, np.radians(self.gate_angle)))
+        return float(error.max()) + 2 * CODE_LENGTH_ERROR + Specular.ARGUMENT_FORMAT.step
 
     def compute(self, normal_left, normal_right, length, direction, halfway):
         """Bit-true operands."""

@@ -27,6 +27,7 @@ _LINES: dict[str, tuple[Callable[[float], float], int]] = {
     "cosquad7": (lambda n: 7 * n / 16, 2),
     "cosquad_q": (lambda n: (math.sqrt(_Q) - 1) / math.expm1(math.log(_Q) / n), 2),
     "cosquad_lin": (lambda n: 0.448 * n + 0.099, 2),
+    "cosquad_lin_refitted": (lambda n: 0.44813 * n + 0.10235, 2),
     "lyon2": (lambda n: n / 4, 4),
     "lyon3": (lambda n: n / 8, 8),
     "lyon1_refitted": (lambda n: 0.3557 * n + 0.2457, 2),
@@ -59,20 +60,22 @@ def _check_exponent(exponent: float) -> float:
 def slope(model: str, exponent: float) -> float:
     """Slope k of a line model ``max(k (c - 1) + 1, 0)^p``.
 
-    ======================= ================================= === ====================
-    model                   k                                 p   source
-    ======================= ================================= === ====================
-    ``cosquad`` (f2)        ``n / 2``                         2   [T] 3.4, fig. 3.6
-    ``cosquad7`` (W3)       ``7 n / 16``                      2   [T] fig. 3.7
-    ``cosquad_q`` (fQ)      ``(sqrt(Q)-1) / (Q^(1/n)-1)``,    2   [C]
-                            ``Q = 0.64``
-    ``cosquad_lin`` (fQ2)   ``0.448 n + 0.099``               2   [C]
-    ``lyon2``, ``lyon3``    ``n / 4``, ``n / 8``              4,8 Lyon 1993
-    ``lyon1_refitted``      ``0.3557 n + 0.2457``             2   minimax over the
-                                                                  whole range
-    ``lyon2_refitted``      ``0.2113 n + 0.1468``             4   the same
-    ``lyon3_refitted``      ``0.1150 n + 0.0799``             8   the same
-    ======================= ================================= === ====================
+    ======================== ================================= === ====================
+    model                    k                                 p   source
+    ======================== ================================= === ====================
+    ``cosquad`` (f2)         ``n / 2``                         2   [T] 3.4, fig. 3.6
+    ``cosquad7`` (W3)        ``7 n / 16``                      2   [T] fig. 3.7
+    ``cosquad_q`` (fQ)       ``(sqrt(Q)-1) / (Q^(1/n)-1)``,    2   [C]
+                             ``Q = 0.64``
+    ``cosquad_lin`` (fQ2)    ``0.448 n + 0.099``               2   [C]
+    ``cosquad_lin_refitted`` ``0.44813 n + 0.10235``           2   line through the slope
+                                                                   of ``cosquad_q``
+    ``lyon2``, ``lyon3``     ``n / 4``, ``n / 8``              4,8 Lyon 1993
+    ``lyon1_refitted``       ``0.3557 n + 0.2457``             2   minimax over the
+                                                                   whole range
+    ``lyon2_refitted``       ``0.2113 n + 0.1468``             4   the same
+    ``lyon3_refitted``       ``0.1150 n + 0.0799``             8   the same
+    ======================== ================================= === ====================
 
     Lyon's model is ``max(1 - x/2^j, 0)^(2^j)`` with ``x = n (1 - c)``, which tends to ``exp(-x)``; its
     first, j = 1, is ``cosquad``.

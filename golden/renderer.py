@@ -8,7 +8,7 @@ import numpy as np
 
 from golden.geometry import normalise
 from golden.interpolation import interpolate
-from golden.lighting import halfway_vector, intensity, saturate
+from golden.lighting import halfway_vector, intensity, intensity_of_cosines, saturate
 from golden.raster import Raster, face_normals, fragment_barycentrics, fragment_normals, rasterise
 from golden.scene import Scene
 
@@ -20,8 +20,10 @@ __all__ = [
     "Curve",
     "Frame",
     "Thresholds",
+    "fragment_positions",
     "gouraud_triangles",
     "render",
+    "shade_operands",
     "shade_spans",
 ]
 
@@ -120,10 +122,14 @@ def gouraud_triangles(scene: Scene, thresholds: Thresholds | None = None) -> np.
     faces = scene.mesh.faces
     result = np.ones(len(faces), dtype=bool)
     cosines = []
+    viewer = scene.view_vectors(scene.mesh.vertices)
     for light in scene.lights:
-        direction = np.array(light.direction)
-        halfway = halfway_vector(direction, scene.camera.viewer)
-        cosines += [(normals @ halfway, thresholds.highlight), (normals @ direction, thresholds.diffuse)]
+        direction = light.towards(scene.mesh.vertices)
+        halfway = halfway_vector(direction, viewer)
+        cosines += [
+            ((normals * halfway).sum(axis=1), thresholds.highlight),
+            ((normals * direction).sum(axis=1), thresholds.diffuse),
+        ]
     for first, second in ((0, 1), (1, 2), (2, 0)):
         first, second = faces[:, first], faces[:, second]
         result &= np.linalg.norm(normals[first] - normals[second], axis=1) < thresholds.normal
@@ -141,7 +147,7 @@ def render(
 ) -> Frame:
     """Picture of a scene in float64.
 
-    - ``flat``: the intensity of each triangle's own normal;
+    - ``flat``: the intensity of each triangle's own normal, in its middle;
     - ``gouraud``: the intensity at the three vertices, saturated there, interpolated perspective-correctly;
     - ``quadratic_gouraud``: the second-degree polynomial through the intensities, saturated, at the three
       vertices and at the middles of the three edges ([T] appendix Д), where the normal is that of
@@ -154,6 +160,9 @@ def render(
     - ``phong``: the vertex normals interpolated perspective-correctly and normalised at every pixel, as a
       GPU does: the reference image;
     - ``slerp``: normals on the great circle between the ends of each span, linear in screen space ([T] 2.1).
+
+    Point lights and a near viewer have an L and V of their own at every point that is lit: a fragment's place
+    on the surface, a vertex, the middle of an edge.
 
     Parameters
     ----------
@@ -195,7 +204,14 @@ def render(
                 normals = fragment_normals(scene, raster, by_normals)
                 span = raster.span[by_normals]
                 colors[raster.pixel[by_normals]] = saturate(
-                    _shade(scene, normals, model, raster.triangle, span)
+                    _shade(
+                        scene,
+                        normals,
+                        model,
+                        raster.triangle,
+                        span,
+                        points=_points(scene, raster, by_normals),
+                    )
                 )
     mask = np.zeros((scene.height, scene.width), dtype=bool)
     mask.reshape(-1)[raster.pixel[raster.visible]] = True
@@ -209,8 +225,10 @@ class _NodeColors:
         self.raster, self.shading = raster, shading
         shown, self.place = np.unique(raster.triangle, return_inverse=True)
         face = face_normals(scene.mesh)[shown][:, np.newaxis]
+        points = scene.mesh.vertices[scene.mesh.faces[shown]]
         if shading == "flat":
             normals = face
+            points = points.mean(axis=1, keepdims=True)
         else:
             normals = scene.mesh.normals[scene.mesh.faces[shown]]
             if shading == "quadratic_gouraud":
@@ -220,11 +238,12 @@ class _NodeColors:
                 lost = np.linalg.norm(total, axis=-1, keepdims=True) <= 1e-12
                 middles = np.where(lost, face, normalise(total))
                 normals = np.concatenate((normals, middles), axis=1)
+                points = np.concatenate((points, (points[:, [1, 2, 0]] + points[:, [2, 0, 1]]) / 2), axis=1)
         if scene.back_faces == "flip":
             back = np.zeros(len(shown), dtype=bool)
             back[self.place] = raster.back
             normals = np.where(back[:, np.newaxis, np.newaxis], -normals, normals)
-        self.colors = saturate(_shade(scene, normals, model, shown, slice(None)))
+        self.colors = saturate(_shade(scene, normals, model, shown, slice(None), points=points))
 
     def interpolate(self, which: np.ndarray) -> np.ndarray:
         """Colors of fragments, shape (count, 3)."""
@@ -253,8 +272,9 @@ def shade_spans(
         Size, background, materials, lights and viewer; of the mesh the materials of its faces.
     raster : Raster
         The spans. Only normal_left, normal_right, length, span, offset, pixel and visible are used (and
-        triangle, where there are several materials), so that they may be replaced, with
-        `dataclasses.replace`, by quantised ones.
+        triangle, where there are several materials; and triangle, weights_left and weights_right, where there
+        are point lights or a near viewer), so that they may be replaced, with `dataclasses.replace`, by
+        quantised ones.
     curve : str or callable
         One of `golden.interpolation.CURVES`, or a function of the normals at both ends and t.
     model : str
@@ -270,7 +290,7 @@ def shade_spans(
     Raises
     ------
     ValueError
-        If the curve or the model is unknown.
+        If the curve or the model is unknown, or spans without weights have point lights or a near viewer.
     """
     image = _background(scene)
     colors = image.reshape(-1, 3)
@@ -279,8 +299,85 @@ def shade_spans(
         t = raster.offset[which] / np.maximum(raster.length[span] - 1, 1)
         ends = raster.normal_left[span], raster.normal_right[span]
         normals = interpolate(curve, *ends, t) if isinstance(curve, str) else curve(*ends, t)
-        colors[raster.pixel[which]] = saturate(_shade(scene, normals, model, raster.triangle, span, chord))
+        points = _points(scene, raster, which)
+        shaded = _shade(scene, normals, model, raster.triangle, span, chord, points)
+        colors[raster.pixel[which]] = saturate(shaded)
     return image
+
+
+def shade_operands(
+    scene: Scene, raster: Raster, cosine: np.ndarray, highlight_cosine: np.ndarray, model: str
+) -> np.ndarray:
+    """Picture from what a method without normals gives for every fragment.
+
+    Parameters
+    ----------
+    scene : Scene
+        Size, background, materials and the lights' colours; of the mesh the materials of its faces.
+    raster : Raster
+        The fragments; span, pixel, visible and triangle are used.
+    cosine, highlight_cosine : arrays, shape (fragments, lights)
+        N·L and N·H.
+    model : str
+        One of `golden.reflection.REFLECTION_MODELS`.
+
+    Returns
+    -------
+    float64 array, shape (height, width, 3)
+        Intensities in [0, 1], not rounded.
+
+    Raises
+    ------
+    ValueError
+        If the model is unknown.
+    """
+    image = _background(scene)
+    colors = image.reshape(-1, 3)
+    for which in _visible(raster):
+        material = scene.mesh.material[raster.triangle[raster.span[which]]]
+        for index, coefficients in enumerate(scene.materials):
+            chosen = which[material == index]
+            shaded = intensity_of_cosines(
+                coefficients,
+                scene.lights,
+                scene.ambient_light,
+                cosine[chosen],
+                highlight_cosine[chosen],
+                model,
+            )
+            colors[raster.pixel[chosen]] = saturate(shaded)
+    return image
+
+
+def fragment_positions(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray:
+    """Where fragments lie on the surface, in the mesh's units: perspective-correct.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene that was rasterised.
+    raster : Raster
+        From `golden.raster.rasterise`.
+    which : int or bool array
+        The fragments, as an index into the fragment arrays.
+
+    Returns
+    -------
+    float64 array, shape (count, 3)
+
+    Raises
+    ------
+    ValueError
+        If the raster's weights were left out.
+    """
+    if len(raster.weights_left) != len(raster.length):
+        raise ValueError("point lights and a near viewer need the weights of the spans")
+    corners = scene.mesh.vertices[scene.mesh.faces[raster.triangle[raster.span[which]]]]
+    return np.einsum("fn,fnk->fk", fragment_barycentrics(raster, which), corners)
+
+
+def _points(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray | None:
+    return fragment_positions(scene, raster, which) if scene.local else None
 
 
 def _background(scene: Scene) -> np.ndarray:
@@ -303,14 +400,20 @@ def _shade(
     triangles: np.ndarray,
     which: np.ndarray | slice,
     chord: bool = False,
+    points: np.ndarray | None = None,
 ) -> np.ndarray:
     """Intensities of normals, whose first axis is that of ``triangles[which]``, the triangles they lie on."""
-    lighting = scene.lights, scene.ambient_light, scene.camera.viewer, model, chord
+
+    def shade(normals, material, points):
+        viewer = scene.view_vectors(points)
+        return intensity(normals, material, scene.lights, scene.ambient_light, viewer, model, chord, points)
+
     if len(scene.materials) == 1:
-        return intensity(normals, scene.materials[0], *lighting)
+        return shade(normals, scene.materials[0], points)
     result = np.empty(normals.shape)
     material = scene.mesh.material[triangles[which]]
     for index in np.unique(material):
-        of_index = material == index
-        result[of_index] = intensity(normals[of_index], scene.materials[index], *lighting)
+        chosen = material == index
+        own = None if points is None else points[chosen]
+        result[chosen] = shade(normals[chosen], scene.materials[index], own)
     return result

@@ -3,14 +3,19 @@
 import operator
 from dataclasses import dataclass
 
+import numpy as np
+
 from golden.camera import Camera
-from golden.geometry import Mesh
+from golden.geometry import Mesh, normalise
 from golden.lighting import Light, Material, Triple, triple
 
-__all__ = ["BACK_FACES", "LARGEST_SIDE", "Scene"]
+__all__ = ["BACK_FACES", "LARGEST_SIDE", "VIEWERS", "Scene"]
 
 BACK_FACES = ("flip", "show", "cull")
 """What happens to a triangle seen from behind."""
+
+VIEWERS = ("distant", "near")
+"""Where light is reflected to: one direction for the whole frame, or the camera."""
 
 LARGEST_SIDE = 4095
 """Largest width and height: x, y and a span's length are 12 bits each."""
@@ -31,7 +36,7 @@ class Scene:
     material : Material or sequence of Material
         The surface's coefficients; several by the mesh's index of each face, stored as a tuple.
     lights : sequence of Light
-        Any number of directional lights; stored as a tuple.
+        Any number, directional or point lights; stored as a tuple.
     ambient_light : three floats
         I_a a channel, at least 0.
     background : three floats
@@ -39,11 +44,15 @@ class Scene:
     back_faces : {"flip", "show", "cull"}
         A triangle seen from behind (its corners clockwise) is drawn with its normals negated, so that those
         of an outer surface turn to the viewer's side, or with its normals as they are, or is left out.
+    viewer : {"distant", "near"}
+        The V of the lighting: `Camera.viewer` everywhere, or from each point of the surface to a perspective
+        camera.
 
     Raises
     ------
     ValueError
-        If a value is out of range, or the mesh has faces of a material that there is not.
+        If a value is out of range, the mesh has faces of a material that there is not, or a near viewer has
+        an orthographic camera.
     TypeError
         If a size is not an integer, a light is not a `Light` or a material is not a `Material`.
     """
@@ -57,6 +66,7 @@ class Scene:
     ambient_light: Triple = (1.0, 1.0, 1.0)
     background: Triple = (0.0, 0.0, 0.0)
     back_faces: str = "flip"
+    viewer: str = "distant"
 
     def __post_init__(self):
         for name in ("width", "height"):
@@ -80,6 +90,39 @@ class Scene:
         object.__setattr__(self, "background", triple("a scene's background", self.background, 0, 1))
         if self.back_faces not in BACK_FACES:
             raise ValueError(f"back_faces must be one of {', '.join(BACK_FACES)}, not {self.back_faces!r}")
+        if self.viewer not in VIEWERS:
+            raise ValueError(f"viewer must be one of {', '.join(VIEWERS)}, not {self.viewer!r}")
+        if self.viewer == "near" and self.camera.projection != "perspective":
+            raise ValueError("a near viewer needs a perspective camera; an orthographic one is distant")
+
+    @property
+    def local(self) -> bool:
+        """Whether L or H differ from point to point: there is a point light, or a near viewer."""
+        return self.viewer == "near" or any(light.position is not None for light in self.lights)
+
+    def view_vectors(self, points: np.ndarray | None = None) -> np.ndarray:
+        """Unit vectors V from points of the surface to the viewer.
+
+        Parameters
+        ----------
+        points : array, shape (..., 3), optional
+            Points; a distant viewer does not read them.
+
+        Returns
+        -------
+        float64 array
+            Shape (3,) of a distant viewer, else that of the points; 0 at the camera itself.
+
+        Raises
+        ------
+        ValueError
+            If a near viewer is given no points.
+        """
+        if self.viewer == "distant":
+            return self.camera.viewer
+        if points is None:
+            raise ValueError("a near viewer needs the points that it sees")
+        return normalise(np.asarray(self.camera.position) - points)
 
     @property
     def materials(self) -> tuple[Material, ...]:

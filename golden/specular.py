@@ -26,6 +26,7 @@ _MODELS = {
     "cosquad7": ((7 / 16, 0.0), 1),
     "cosquad_lin": ((0.448, 0.099), 1),
     "cosquad_q": (None, 1),
+    "cosquad_lin_refitted": ((0.44813, 0.10235), 1),
     "lyon1_refitted": ((0.3557, 0.2457), 1),
     "lyon2": ((1 / 4, 0.0), 2),
     "lyon2_refitted": ((0.2113, 0.1468), 2),
@@ -78,6 +79,14 @@ class HighlightOperand:
         if not 1 <= exponent <= MAX_EXPONENT:
             raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {exponent}")
         return ONE_SQUARED - operand if self.operand == "cosine" else operand
+
+    @property
+    def last_lit_arguments(self) -> np.ndarray:
+        """Largest ``1 - cos gamma``, in steps of 2^-25, that may give a term over 0, for each exponent.
+
+        int64 array, shape (1024,); 2^27 where every argument may.
+        """
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -323,6 +332,15 @@ class Specular(HighlightOperand):
             base = self._cosine(Fixed(self.ARGUMENT_FORMAT, last), Fixed(format, shifted) * scale)
             boundary = np.where(base >= self.cutoff.codes, shifted, boundary)
         return Fixed(format, boundary)
+
+    @property
+    def last_lit_arguments(self):
+        """From the PROM, in integers."""
+        _, shift = self.scale(np.arange(1 << self.EXPONENT_BITS))
+        boundary = self.boundaries.codes
+        arguments = (((boundary + 1) << 10) - 1) >> (shift + 1)
+        arguments[boundary == self.SHIFTED_FORMAT.max_code] = 1 << 27
+        return arguments
 
     def compute(self, operand: Fixed, dark: np.ndarray, exponent: int) -> Fixed:
         """Bit-true specular terms.

@@ -11,7 +11,7 @@ import numpy as np
 
 from .fixed import SQ, Fixed
 
-__all__ = ["COMPONENT", "ONE", "ONE_SQUARED", "quantise", "values"]
+__all__ = ["CODE_LENGTH_ERROR", "COMPONENT", "ONE", "ONE_SQUARED", "quantise", "values"]
 
 COMPONENT = SQ(1, 17)
 """Number format of one component."""
@@ -21,6 +21,10 @@ ONE = COMPONENT.max_code
 
 ONE_SQUARED = Fixed((COMPONENT * COMPONENT), ONE * ONE)
 """Dot product of a unit vector with itself."""
+
+
+CODE_LENGTH_ERROR = 3**0.5 * COMPONENT.step / 2 * (1 + 2.0**-10)
+"""Largest error of the length of what `quantise` gives: that of a vector of rounded components."""
 
 
 def quantise(vectors: np.ndarray) -> np.ndarray:

@@ -30,6 +30,8 @@ class AngularInterpolatorUnit(InterpolatorUnit):
         Number of lights, at least 1.
     setup_interval : int
         Clocks from a span to the next at the closest, 1 to 6.
+    options
+        As for `InterpolatorUnit`.
 
     Source: [T] 3.1, 3.2.
     """
@@ -39,23 +41,22 @@ class AngularInterpolatorUnit(InterpolatorUnit):
         """What the setup can be built for."""
         return range(1, 7)
 
-    def __init__(self, parameters: AngularInterpolator, lights: int, setup_interval: int = 4):
-        super().__init__(parameters, lights)
+    def __init__(self, parameters: AngularInterpolator, lights: int, setup_interval: int = 4, **options):
+        super().__init__(parameters, lights, **options)
         self.setup_interval = setup_interval
-        self._chains = [
-            (AngularSetupUnit(initiation_interval=setup_interval), HighlightCosineUnit())
-            for _ in range(2 * lights)
-        ]
-        setup, cosine = self._chains[0]
+        self._chains = {
+            (light, name): (AngularSetupUnit(initiation_interval=setup_interval), HighlightCosineUnit())
+            for light in range(lights)
+            for name in (("direction", "halfway") if self.highlights else ("direction",))
+        }
+        setup, cosine = self._chains[0, "direction"]
         self.latency = setup.latency + BUFFER_LATENCY + cosine.latency
 
     def elaborate(self, platform):
         """Chains in lockstep, each with a FIFO of prepared spans."""
         m = Module()
         one = FixedValue.constant(UQ(1, 25), 1)
-        for index, (setup, cosine) in enumerate(self._chains):
-            light, which = divmod(index, 2)
-            name = ("direction", "halfway")[which]
+        for (light, name), (setup, cosine) in self._chains.items():
             m.submodules[f"setup_{name}_{light}"] = setup
             m.submodules[f"cosine_{name}_{light}"] = cosine
             prepared = stream.Signature(highlight_shape()).create(path=(f"prepared_{name}_{light}",))
@@ -75,14 +76,14 @@ class AngularInterpolatorUnit(InterpolatorUnit):
             ]
             connect_buffered(m, f"prepared_{name}_{light}", prepared, cosine.i, depth=3)
             result = self.o.payload[light]
-            if which:
+            if name == "halfway":
                 m.d.comb += result.highlight.eq(cosine.o.payload)
             else:
                 m.d.comb += result.cosine.eq(one - cosine.o.payload)
-        setup, cosine = self._chains[0]
+        setup, cosine = self._chains[0, "direction"]
         m.d.comb += [
             self.i.ready.eq(setup.i.ready),
             self.o.valid.eq(cosine.o.valid),
-            self.wide.eq(setup.o.valid & setup.o.ready & setup.o.payload.opposite),
+            self.wide.eq(setup.o.valid & setup.o.ready & setup.o.payload.wide),
         ]
         return m

@@ -63,7 +63,7 @@ class AngularSetupUnit(PipelinedUnit):
         Unit vectors, three components ``SQ(1, 17)`` each; length 1 to 4095.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
         ``angle`` UQ(0, 36), ``phase`` SQ(0, 40), ``step`` UQ(0, 40), all in turns; ``cos_beta`` UQ(1, 25);
-        ``length``; ``opposite``: the normals are opposite, and their plane arbitrary.
+        ``length``; ``wide``: the span is over 150 degrees, and its plane not to be trusted.
 
     Source: [T] 3.1.
     """
@@ -90,7 +90,7 @@ class AngularSetupUnit(PipelinedUnit):
                     "step": FixedShape(AngularSetup.STEP_FORMAT),
                     "cos_beta": FixedShape(AngularSetup.COS_BETA_FORMAT),
                     "length": unsigned(DifferenceSetup.LENGTH_BITS),
-                    "opposite": unsigned(1),
+                    "wide": unsigned(1),
                 }
             ),
             latency=max(word.age for word in self._words.values()),
@@ -132,8 +132,13 @@ class AngularSetupUnit(PipelinedUnit):
             g.register(name, lambda *words: _choice(*words), obtuse, *words)
             for name, words in (("major", (difference, total)), ("minor", (total, difference)))
         )
-        opposite = g.register(
-            "opposite", lambda obtuse, chord: obtuse & ~Value.cast(chord).any(), obtuse, chord
+        shortest = p.SHORTEST_SUM
+        limit = FixedValue.constant(shortest.format, shortest.values.item())
+        wide = g.register(
+            "wide",
+            lambda obtuse, chord: obtuse & (chord.truncate(shortest.format.fraction_bits) < limit),
+            obtuse,
+            chord,
         )
         shift, v = normalised_words(g, chord)
 
@@ -159,7 +164,7 @@ class AngularSetupUnit(PipelinedUnit):
             "step": self._step(angle, obtuse, shift, length),
             "cos_beta": cos_beta,
             "length": length,
-            "opposite": opposite,
+            "wide": wide,
         }
 
     def _by_arccos(self, cross: Word) -> Word:

@@ -1,14 +1,13 @@
 """Bisection of spans until straight lines will do ([T] figure 2.7): method ``bisection``."""
 
-from amaranth.lib import stream, wiring
+from amaranth.lib import stream
 
 from golden.adaptive_normaliser import AdaptiveNormaliser
 from golden.bisection_interpolator import BisectionInterpolator
 
 from .adaptive_normaliser import AdaptiveNormaliserUnit
-from .interpolator import NormalInterpolatorUnit
+from .interpolator import NormalInterpolatorUnit, span_words
 from .middle_normal import normal_shape
-from .stream import connect
 
 __all__ = ["BisectionInterpolatorUnit"]
 
@@ -25,12 +24,14 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit):
         Threshold and specular operand.
     lights : int
         Number of lights, at least 1.
+    options
+        As for `InterpolatorUnit`.
 
     Source: [T] 2.1, figure 2.7.
     """
 
-    def __init__(self, parameters: BisectionInterpolator, lights: int):
-        super().__init__(parameters, lights)
+    def __init__(self, parameters: BisectionInterpolator, lights: int, **options):
+        super().__init__(parameters, lights, **options)
         self._normaliser = AdaptiveNormaliserUnit(AdaptiveNormaliser(parameters.threshold))
         preparation = self._normaliser.preparation(0)
         self.latency = preparation + self.product_latency
@@ -39,7 +40,11 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit):
     def source(self, m):
         """The normaliser, and one flag a span."""
         m.submodules.adaptive_normaliser = normaliser = self._normaliser
-        connect(m, wiring.flipped(self.i), normaliser.i)
+        m.d.comb += [
+            *(normaliser.i.payload[name].eq(word) for name, word in span_words(self.i.payload)),
+            normaliser.i.valid.eq(self.i.valid),
+            self.i.ready.eq(normaliser.i.ready),
+        ]
         normals = stream.Signature(normal_shape()).create(path=("normals",))
         pixel = normaliser.o.payload
         m.d.comb += [

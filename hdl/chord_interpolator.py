@@ -20,27 +20,35 @@ class ChordAccumulatorUnit(AccumulatorUnit):
     ----------
     lights : int
         Number of lights, at least 1.
+    highlights : bool
+        Whether there is u.
+    parameters : ChordInterpolator
+        Formats.
     """
 
-    def __init__(self, lights: int):
-        super().__init__(chord_differences_shape(lights), operands_shape(ChordInterpolator(), lights))
+    def __init__(self, lights: int, highlights: bool = True, parameters: ChordInterpolator | None = None):
+        self.parameters = p = parameters or ChordInterpolator()
+        self.functions = ("diffuse", "highlight") if highlights else ("diffuse",)
+        super().__init__(
+            chord_differences_shape(lights, highlights, p.setup), operands_shape(p, lights, highlights)
+        )
 
     def quadratics(self):
         """Those of each light."""
         for index, light in enumerate(self.i.payload.lights):
             result = self.o.payload[index]
-            for name, parameters, value in (
-                ("diffuse", ChordInterpolator.DIFFUSE, result.cosine),
-                ("highlight", ChordInterpolator.HIGHLIGHT, result.highlight),
-            ):
+            for name in self.functions:
                 span = light[name]
+                parameters = self.parameters.accumulators[name]
+                value = result["cosine" if name == "diffuse" else name]
                 yield f"{name}_{index}", parameters, (span.start, span.first, span.second), value
 
 
 class ChordInterpolatorUnit(InterpolatorUnit):
     """Chord setup, then accumulators; `golden.chord_interpolator.ChordInterpolator` is the twin.
 
-    No multiplier a pixel; those of the setup are ``ceil((7 + 19 lights) / setup_interval)``.
+    No multiplier a pixel; those of the setup are ``ceil((7 + 19 lights) / setup_interval)``, without
+    highlights ``ceil((7 + 9 lights) / setup_interval)``.
 
     Parameters
     ----------
@@ -50,6 +58,8 @@ class ChordInterpolatorUnit(InterpolatorUnit):
         Number of lights, at least 1.
     setup_interval : int
         Clocks from a span to the next at the closest, at least 1.
+    options
+        As for `InterpolatorUnit`.
 
     Source: chord.md.
     """
@@ -59,11 +69,13 @@ class ChordInterpolatorUnit(InterpolatorUnit):
         """What the setup can be built for."""
         return range(1, 27)
 
-    def __init__(self, parameters: ChordInterpolator, lights: int, setup_interval: int = 4):
-        super().__init__(parameters, lights)
+    def __init__(self, parameters: ChordInterpolator, lights: int, setup_interval: int = 4, **options):
+        super().__init__(parameters, lights, **options)
         self.setup_interval = setup_interval
-        self._setup = ChordSetupUnit(lights, setup_interval)
-        self._accumulator = ChordAccumulatorUnit(lights)
+        self._setup = ChordSetupUnit(
+            lights, setup_interval, self.length_bits, self.highlights, parameters.setup
+        )
+        self._accumulator = ChordAccumulatorUnit(lights, self.highlights, parameters)
         self.latency = self._setup.latency + BUFFER_LATENCY + self._accumulator.latency
 
     def elaborate(self, platform):

@@ -17,6 +17,8 @@ class Cost:
 
     Parameters
     ----------
+    cells : int
+        Operators, multiplexers, registers and memories of any width.
     multipliers : dict of (int, int) to int
         Number of multipliers by the widths of their operands, the wider first. A multiplier by a constant is
         not counted.
@@ -28,6 +30,7 @@ class Cost:
         Bits of memories that nothing writes, and of those that something does.
     """
 
+    cells: int
     multipliers: dict[tuple[int, int], int]
     constant_multipliers: int
     register_bits: int
@@ -67,7 +70,7 @@ def cost_of(component: wiring.Component) -> Cost:
                 ram += bits
             else:
                 rom += bits
-    return Cost(dict(multipliers), constant, registers, rom, ram)
+    return Cost(len(cells), dict(multipliers), constant, registers, rom, ram)
 
 
 def _significant(operand: list) -> int:

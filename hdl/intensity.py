@@ -33,7 +33,8 @@ class IntensityUnit(PipelinedUnit):
     grows by a bit at each level of the adder tree.
 
     In the throughput style the latency is ``3 + ceil(log2(2 lights + 1))`` clocks (products, adder tree,
-    rounding, saturation) and the initiation interval is 1. Six multipliers a light.
+    rounding, saturation) and the initiation interval is 1. Six multipliers a light. Without specular terms
+    there are ``lights`` in place of ``2 lights``, with one channel a third of the multipliers.
 
     In the compact style there is one multiplier of 17 by 17 bits, and no product of a term that is 0. A pixel
     takes ``c = 3 max(1, T)`` clocks, T the number of its diffuse and specular terms that are not 0
@@ -46,14 +47,14 @@ class IntensityUnit(PipelinedUnit):
     Parameters
     ----------
     parameters : Intensity
-        Number of lights.
+        Number of lights, at least 1; whether there are specular terms; channels.
     style : str
         ``"throughput"`` or ``"compact"``.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"diffuse": ..., "specular": ...})))`
-        One term a light, ``UQ(0, 17)``.
+        One term a light, ``UQ(0, 17)``; the latter only where there are specular terms.
     o : :py:`Out(stream.Signature(pixel_color_shape()))`
         Channels.
     constants : :py:`In(StructLayout({"ambient", "diffuse", "specular"}))`
@@ -77,13 +78,15 @@ class IntensityUnit(PipelinedUnit):
         self.style = style
         self.parameters = parameters or Intensity()
         lights = self.parameters.lights
-        clocks = 6 * lights if style == "compact" else 1
+        self.kinds = ("diffuse", "specular") if self.parameters.has_specular else ("diffuse",)
+        self._terms = len(self.kinds) * lights
+        clocks = self.parameters.channels * self._terms if style == "compact" else 1
         terms = data.ArrayLayout(FixedShape(Intensity.TERM_FORMAT), lights)
         colors = data.ArrayLayout(color_shape(), lights)
         super().__init__(
-            data.StructLayout({"diffuse": terms, "specular": terms}),
+            data.StructLayout(dict.fromkeys(self.kinds, terms)),
             pixel_color_shape(),
-            latency=clocks + 5 if style == "compact" else 3 + (2 * lights).bit_length(),
+            latency=clocks + 5 if style == "compact" else 3 + self._terms.bit_length(),
             initiation_interval=clocks,
             constants=data.StructLayout({"ambient": color_shape(), "diffuse": colors, "specular": colors}),
         )
@@ -96,15 +99,17 @@ class IntensityUnit(PipelinedUnit):
         """Products, a binary tree of sums, rounding, saturation."""
         register = self.register
         result = Signal(self.o.payload.shape())
-        for channel, name in enumerate("rgb"):
+        channels = "rgb"[: self.parameters.channels]
+        for channel, name in enumerate(channels):
             terms = [register(m, self.constants.ambient[channel], f"ambient_{name}")]
             for light in range(self.parameters.lights):
                 terms += [
-                    register(m, term[light] * color[light][channel], f"{kind}_{light}_{name}")
-                    for kind, term, color in (
-                        ("diffuse", operands.diffuse, self.constants.diffuse),
-                        ("specular", operands.specular, self.constants.specular),
+                    register(
+                        m,
+                        operands[kind][light] * self.constants[kind][light][channel],
+                        f"{kind}_{light}_{name}",
                     )
+                    for kind in self.kinds
                 ]
             level = 0
             while len(terms) > 1:
@@ -115,16 +120,17 @@ class IntensityUnit(PipelinedUnit):
                 ]
                 level += 1
             rounded = register(m, terms[0].round_half_up(0), f"rounded_{name}")
-            m.d.comb += result[name].eq(
-                register(m, rounded.saturate(Intensity.RESULT_FORMAT), name).as_value()
-            )
+            level = register(m, rounded.saturate(Intensity.RESULT_FORMAT), name).as_value()
+            of_channel = name if len(channels) > 1 else "rgb"
+            m.d.comb += [result[each].eq(level) for each in of_channel]
         return result
 
     def _compact(self) -> Module:
         """Channel by channel, a clock for each term that is not 0; then product, sum, rounding."""
         m = Module()
-        terms = [*self.i.payload.diffuse, *self.i.payload.specular]
-        colors = [*self.constants.diffuse, *self.constants.specular]
+        terms = [term for kind in self.kinds for term in self.i.payload[kind]]
+        colors = [color for kind in self.kinds for color in self.constants[kind]]
+        last_channel = self.parameters.channels - 1
         held = [Signal.like(Value.cast(term), name=f"term_{k}") for k, term in enumerate(terms)]
         used, left = Signal(len(terms)), Signal(len(terms))
         busy, valid = Signal(), Signal()
@@ -140,7 +146,7 @@ class IntensityUnit(PipelinedUnit):
             turn.eq(left & -left),
             rest.eq(left & ~turn),
             ends_channel.eq(~rest.any()),
-            ends_pixel.eq(ends_channel & (channel == 2)),
+            ends_pixel.eq(ends_channel & (channel == last_channel)),
             self.i.ready.eq(advance & (~busy | ends_pixel)),
             accept.eq(self.i.valid & self.i.ready),
         ]
@@ -169,18 +175,18 @@ class IntensityUnit(PipelinedUnit):
         issued, multiplied, added, rounding = notes
         first = Signal(init=1)
         format, one = Intensity.COLOR_FORMAT, Intensity.TERM_FORMAT
-        total = Signal(FixedShape(UQ(11 + (2 * self.parameters.lights).bit_length(), 23)))
+        total = Signal(FixedShape(UQ(11 + self._terms.bit_length(), 23)))
         factors = [Signal(FixedShape(of), name=name) for of, name in ((one, "term"), (format, "color"))]
         product = Signal(FixedShape(one * format))
         start = FixedValue(format, of_channel(self.constants.ambient, multiplied.channel))
         before = Mux(multiplied.first, Value.cast(start.extend(total.format)), Value.cast(total))
         rounded = Signal.like(Value.cast(total.round_half_up(0)))
-        channels = [Signal(8, name=name) for name in "rgb"]
-        m.d.comb += Value.cast(self.o.payload).eq(Cat(channels))
+        channels = [Signal(8, name=name) for name in "rgb"[: last_channel + 1]]
+        m.d.comb += Value.cast(self.o.payload).eq(Cat(*channels, *channels[:1] * (2 - last_channel)))
         with m.If(advance):
             m.d.sync += [
                 Cat(notes).eq(Cat(busy, first, ends_channel, channel, notes[:-1])),
-                valid.eq(rounding.live & rounding.last & (rounding.channel == 2)),
+                valid.eq(rounding.live & rounding.last & (rounding.channel == last_channel)),
             ]
             with m.If(busy):
                 m.d.sync += [

@@ -21,6 +21,7 @@ __all__ = [
     "light_vectors_shape",
     "operands_shape",
     "span_normals_shape",
+    "span_words",
 ]
 
 
@@ -30,19 +31,23 @@ def light_vectors_shape(lights: int) -> data.ArrayLayout:
     return data.ArrayLayout(vectors, lights)
 
 
-def span_normals_shape() -> data.StructLayout:
+def span_normals_shape(length_bits: int = LENGTH_BITS) -> data.StructLayout:
     """Shape of what an interpolator needs of a span: the normals at its ends, and its length in pixels."""
     return data.StructLayout(
-        {"normal_left": normal_shape(), "normal_right": normal_shape(), "length": unsigned(LENGTH_BITS)}
+        {"normal_left": normal_shape(), "normal_right": normal_shape(), "length": unsigned(length_bits)}
     )
 
 
-def operands_shape(parameters: Interpolator, lights: int) -> data.ArrayLayout:
+def span_words(span: data.View) -> list[tuple[str, Value]]:
+    """Names and values of a span's members; a shorter length is taken for one of 12 bits."""
+    return [(name, span[name]) for name in ("normal_left", "normal_right", "length")]
+
+
+def operands_shape(parameters: Interpolator, lights: int, highlights: bool = True) -> data.ArrayLayout:
     """Shape of what an interpolator gives for a pixel: for each light N·L, and N·H or 1 - N·H."""
-    operands = {
-        "cosine": FixedShape(parameters.COSINE_FORMAT),
-        "highlight": FixedShape(Specular(operand=parameters.operand).operand_format),
-    }
+    operands = {"cosine": FixedShape(parameters.COSINE_FORMAT)}
+    if highlights:
+        operands["highlight"] = FixedShape(Specular(operand=parameters.operand).operand_format)
     return data.ArrayLayout(data.StructLayout(operands), lights)
 
 
@@ -59,12 +64,16 @@ class InterpolatorUnit(wiring.Component):
         Twin.
     lights : int
         Number of lights, at least 1.
+    highlights : bool
+        Whether there is specular light; else there are no operands of it.
+    length_bits : int
+        Bits of the length.
 
     Members
     -------
-    i : :py:`In(stream.Signature(span_normals_shape()))`
-        Spans of length 1 to 4095.
-    o : :py:`Out(stream.Signature(operands_shape(parameters, lights)))`
+    i : :py:`In(stream.Signature(span_normals_shape(length_bits)))`
+        Spans of length 1 or more.
+    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights)))`
         Operands of the pixels.
     constants : :py:`In(light_vectors_shape(lights))`
         L and H of each light; stay while spans are inside.
@@ -79,13 +88,22 @@ class InterpolatorUnit(wiring.Component):
         """Values of a constructor argument ``setup_interval`` that there may be; none by default."""
         return range(0)
 
-    def __init__(self, parameters: Interpolator, lights: int):
+    def __init__(
+        self,
+        parameters: Interpolator,
+        lights: int,
+        *,
+        highlights: bool = True,
+        length_bits: int = LENGTH_BITS,
+    ):
         self.parameters = parameters
         self.lights = lights
+        self.highlights = highlights
+        self.length_bits = length_bits
         super().__init__(
             {
-                "i": In(stream.Signature(span_normals_shape())),
-                "o": Out(stream.Signature(operands_shape(parameters, lights))),
+                "i": In(stream.Signature(span_normals_shape(length_bits))),
+                "o": Out(stream.Signature(operands_shape(parameters, lights, highlights))),
                 "constants": In(light_vectors_shape(lights)),
                 "wide": Out(1),
             }
@@ -95,8 +113,9 @@ class InterpolatorUnit(wiring.Component):
 class LightProductsUnit(PipelinedUnit):
     """Products of a normal with L and H of every light: ``N . L``, and ``N . H`` or the chord.
 
-    The latency is 4 clocks (operands, products, two sums), with the chord 8; the initiation interval is 1.
-    Six multipliers a light.
+    With an initiation interval of 1 the latency is 4 clocks (operands, products, two sums), with the chord 8.
+    Six products a light, three without highlights; with a longer interval they take turns at fewer
+    multipliers.
 
     Parameters
     ----------
@@ -104,32 +123,43 @@ class LightProductsUnit(PipelinedUnit):
         Which specular operand.
     lights : int
         Number of lights, at least 1.
+    highlights : bool
+        Whether there is specular light.
+    initiation_interval : int
+        Distance in clocks of two inputs, at least 1.
 
     Members
     -------
     i : :py:`In(stream.Signature(ArrayLayout(SQ(1, 17), 3)))`
         Normals.
-    o : :py:`Out(stream.Signature(operands_shape(parameters, lights)))`
+    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights)))`
         Operands.
     constants : :py:`In(light_vectors_shape(lights))`
         L and H; stay while beats are inside.
     """
 
-    def __init__(self, parameters: NormalInterpolator, lights: int):
-        self._graph = graph = Dataflow(1, 6 * lights)
+    def __init__(
+        self,
+        parameters: NormalInterpolator,
+        lights: int,
+        highlights: bool = True,
+        initiation_interval: int = 1,
+    ):
+        self._graph = graph = Dataflow(initiation_interval, (6 if highlights else 3) * lights)
         normal = graph.input("normal", lambda operands: operands)
         self._words = []
         for i in range(lights):
-            cosine = dot(graph, f"cosine_{i}", normal, lambda _, i=i: self.constants[i].direction)
-            if parameters.operand == "cosine":
-                highlight = dot(graph, f"highlight_{i}", normal, lambda _, i=i: self.constants[i].halfway)
-            else:
-                highlight = chord(graph, f"highlight_{i}", normal, lambda i=i: self.constants[i].halfway)
-            self._words.append({"cosine": cosine, "highlight": highlight})
+            words = {"cosine": dot(graph, f"cosine_{i}", normal, lambda _, i=i: self.constants[i].direction)}
+            if highlights:
+                product = dot if parameters.operand == "cosine" else chord
+                vector = lambda *_, i=i: self.constants[i].halfway  # noqa: E731
+                words["highlight"] = product(graph, f"highlight_{i}", normal, vector)
+            self._words.append(words)
         super().__init__(
             normal_shape(),
-            operands_shape(parameters, lights),
-            latency=highlight.age,
+            operands_shape(parameters, lights, highlights),
+            latency=max(word.age for word in words.values()),
+            initiation_interval=initiation_interval,
             constants=light_vectors_shape(lights),
         )
 
@@ -138,11 +168,10 @@ class LightProductsUnit(PipelinedUnit):
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         for light, words in zip(result, self._words, strict=True):
-            highlight, format = value(words["highlight"], self.latency), light.highlight.format
-            m.d.comb += [
-                light.cosine.eq(value(words["cosine"], self.latency)),
-                light.highlight.eq(highlight.truncate(format.fraction_bits).saturate(format)),
-            ]
+            m.d.comb += light.cosine.eq(value(words["cosine"], self.latency))
+            if "highlight" in words:
+                highlight, format = value(words["highlight"], self.latency), light.highlight.format
+                m.d.comb += light.highlight.eq(highlight.truncate(format.fraction_bits).saturate(format))
         return result
 
 
@@ -150,19 +179,21 @@ class NormalInterpolatorUnit(InterpolatorUnit):
     """A method that finds normals, before the products with L and H of every light.
 
     A subclass makes, in `source`, what takes spans to normals, and sets `latency` with `product_latency`
-    added. Six multipliers a light for the products.
+    added. ``ceil(6 lights / product_interval)`` multipliers for the products, half as many without
+    highlights.
 
     Parameters
     ----------
-    parameters : NormalInterpolator
-        Twin.
-    lights : int
-        Number of lights, at least 1.
+    parameters, lights, options
+        As for `InterpolatorUnit`.
+    product_interval : int
+        Clocks from a pixel to the next at the closest, at least 1.
     """
 
-    def __init__(self, parameters: NormalInterpolator, lights: int):
-        super().__init__(parameters, lights)
-        self._products = LightProductsUnit(parameters, lights)
+    def __init__(self, parameters: NormalInterpolator, lights: int, *, product_interval: int = 1, **options):
+        super().__init__(parameters, lights, **options)
+        self.product_interval = product_interval
+        self._products = LightProductsUnit(parameters, lights, self.highlights, product_interval)
         self.product_latency = self._products.latency
 
     def source(self, m: Module) -> tuple[stream.Interface, Value]:

@@ -1,7 +1,7 @@
 """Linear interpolation of normals, as it comes (``linear``) or brought to unit length (``renormalise``)."""
 
 from amaranth.hdl import Cat, Signal, Value
-from amaranth.lib import stream
+from amaranth.lib import fifo, stream
 
 from golden.gpq import GPQ
 from golden.linear_interpolator import LinearInterpolator
@@ -20,7 +20,8 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
     """Normals on a straight line; `golden.linear_interpolator.LinearInterpolator` is the twin.
 
     The difference setup of a straight line, ``P = N_r - N_l``, the accumulator, and with ``renormalised`` the
-    direct renormaliser, of eight multipliers.
+    direct renormaliser, of eight multipliers. A span that is too wide is flagged when it comes in; with
+    ``renormalised`` at the first pixel that shows it, as only the renormaliser knows which it does not serve.
 
     Parameters
     ----------
@@ -30,19 +31,26 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
         Number of lights, at least 1.
     setup_interval : int
         Clocks from a span to the next at the closest, 1 to 7.
+    options
+        As for `InterpolatorUnit`.
 
     Source: [T] 2.1; numbers.md, "Rivals to measure against".
     """
+
+    # Spans that wait ready for the accumulator.
+    PREPARED = 3
 
     @classmethod
     def setup_intervals(cls, parameters):
         """What the setup can be built for."""
         return range(1, 8)
 
-    def __init__(self, parameters: LinearInterpolator, lights: int, setup_interval: int = 4):
-        super().__init__(parameters, lights)
+    def __init__(self, parameters: LinearInterpolator, lights: int, setup_interval: int = 4, **options):
+        super().__init__(parameters, lights, **options)
         self.setup_interval = setup_interval
-        self._setup = DifferenceSetupUnit(initiation_interval=setup_interval, order=1)
+        self._setup = DifferenceSetupUnit(
+            initiation_interval=setup_interval, length_bits=self.length_bits, order=1
+        )
         self._accumulator = DifferenceAccumulatorUnit()
         units = [self._setup, self._accumulator]
         if parameters.renormalised:
@@ -55,7 +63,6 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
         m.submodules.difference_setup = setup = self._setup
         m.submodules.difference_accumulator = accumulator = self._accumulator
         span, operands = self.i.payload, setup.i.payload
-        wide = Signal()
         differences = [span.normal_right[c] - span.normal_left[c] for c in range(3)]
         m.d.comb += [
             *(operands.p[c].eq(differences[c].saturate(GPQ.P_FORMAT)) for c in range(3)),
@@ -65,9 +72,11 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
             self.i.ready.eq(setup.i.ready),
         ]
         tops = (Value.cast(difference)[-2:] for difference in differences)
-        m.d.sync += wide.eq(self.i.valid & self.i.ready & Cat(top[0] ^ top[1] for top in tops).any())
-        connect_buffered(m, "prepared", setup.o, accumulator.i, depth=3)
+        far = Cat(top[0] ^ top[1] for top in tops).any()
+        connect_buffered(m, "prepared", setup.o, accumulator.i, depth=self.PREPARED)
+        wide = Signal()
         if not self.parameters.renormalised:
+            m.d.sync += wide.eq(self.i.valid & self.i.ready & far)
             return accumulator.o, wide
         m.submodules.renormaliser = renormaliser = self._renormaliser
         connect(m, accumulator.o, renormaliser.i)
@@ -77,4 +86,33 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
             normals.valid.eq(renormaliser.o.valid),
             renormaliser.o.ready.eq(normals.ready),
         ]
+        first, far = self._marks(m, far)
+        # Of this span: a pixel before this one has shown it.
+        shown, shows = Signal(), Signal()
+        before = shown & ~first
+        m.d.comb += shows.eq((first & far) | renormaliser.o.payload.outside)
+        m.d.sync += wide.eq(0)
+        with m.If(normals.valid & normals.ready):
+            m.d.sync += [wide.eq(shows & ~before), shown.eq(shows | before)]
         return normals, wide
+
+    def _marks(self, m, far):
+        """Of a normal that the renormaliser offers: whether it is a span's first, and then ``far`` of it."""
+        setup, accumulator, renormaliser = self._setup, self._accumulator, self._renormaliser
+        # Holds every span between the input and the accumulator, and so is never full.
+        depth = -(-setup.latency // self.setup_interval) + 1 + self.PREPARED
+        m.submodules.far = spans = fifo.SyncFIFOBuffered(width=1, depth=depth)
+        load = accumulator.i.valid & accumulator.i.ready
+        m.d.comb += [
+            spans.w_data.eq(far),
+            spans.w_en.eq(self.i.valid & self.i.ready),
+            spans.r_en.eq(load),
+        ]
+        # As old as the values: two registers of the accumulator, then those of the renormaliser.
+        young = Signal(2 * accumulator.latency)
+        with m.If(~accumulator.o.valid | accumulator.o.ready):
+            m.d.sync += young.eq(Cat(load, spans.r_data, young))
+        old = Signal(2 * renormaliser.latency)
+        with m.If(renormaliser.i.ready):
+            m.d.sync += old.eq(Cat(young[-2:], old))
+        return old[-2], old[-1]

@@ -1,8 +1,10 @@
 """The shading pipeline: raster spans in, pixels out, one a clock."""
 
+from functools import reduce
+from operator import and_
 from typing import Literal
 
-from amaranth.hdl import Module, Shape, Signal, unsigned
+from amaranth.hdl import Module, Mux, Shape, Signal, Value, unsigned
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -11,8 +13,9 @@ from golden.bisection_interpolator import BisectionInterpolator
 from golden.chord_interpolator import ChordInterpolator
 from golden.diffuse import Diffuse
 from golden.intensity import Intensity
-from golden.interpolator import Interpolator
+from golden.interpolator import Interpolator, NormalInterpolator
 from golden.linear_interpolator import LinearInterpolator
+from golden.local_chord_interpolator import LocalChordInterpolator
 from golden.pipeline import ShadingPipeline
 from golden.power import Power
 from golden.quadratic_interpolator import QuadraticInterpolator
@@ -21,16 +24,20 @@ from golden.recurrence_interpolator import RecurrenceInterpolator
 from .angular_interpolator import AngularInterpolatorUnit
 from .bisection_interpolator import BisectionInterpolatorUnit
 from .chord_interpolator import ChordInterpolatorUnit
+from .diffuse import DiffuseUnit
 from .frame_constants import FrameConstantsUnit, write_shape
+from .highlight_gate import HighlightGateUnit
 from .intensity import IntensityUnit
 from .interpolator import InterpolatorUnit
 from .light import LightUnit
 from .linear_interpolator import LinearInterpolatorUnit
+from .local_chord_interpolator import LocalChordInterpolatorUnit
+from .local_chord_setup import span_values_shape
 from .middle_normal import normal_shape
 from .pixel_assembler import PixelAssemblerUnit, pixel_shape, place_shape
 from .quadratic_interpolator import QuadraticInterpolatorUnit
 from .recurrence_interpolator import RecurrenceInterpolatorUnit
-from .specular import SlopeUnit
+from .specular import SlopeUnit, SpecularUnit
 from .stream import BUFFER_LATENCY, connect, connect_buffered
 
 __all__ = [
@@ -50,6 +57,7 @@ INTERPOLATORS: dict[type[Interpolator], type[InterpolatorUnit]] = {
     BisectionInterpolator: BisectionInterpolatorUnit,
     ChordInterpolator: ChordInterpolatorUnit,
     LinearInterpolator: LinearInterpolatorUnit,
+    LocalChordInterpolator: LocalChordInterpolatorUnit,
     QuadraticInterpolator: QuadraticInterpolatorUnit,
     RecurrenceInterpolator: RecurrenceInterpolatorUnit,
 }
@@ -61,6 +69,7 @@ PORT_DESCRIPTIONS = {
     "i_length": "pixels of the span; 0 gives none",
     "i_normal_left": "unit normal at the first pixel centre, times 2^17 - 1",
     "i_normal_right": "unit normal at the last pixel centre",
+    "i_values": "codes of N.L and 1 - N.H of each light at the first pixel, the middle and the last pixel",
     "i_material": "index of the span's material",
     "o_x": "column of the pixel",
     "o_y": "row",
@@ -72,25 +81,29 @@ PORT_DESCRIPTIONS = {
     "write_data": "its code; taken when no span is inside",
     "status_wide_spans": "spans too wide for the method since reset, at most 65535",
     "status_empty_spans": "spans of length 0 since reset, at most 65535",
-    "status_overrun": "a span went past column 4095",
+    "status_overrun": "a span went past the largest column",
 }
 """What each port of the pipeline is, for the table in its Verilog."""
 
 
-def span_shape(materials: int = 1) -> data.StructLayout:
+def span_shape(parameters: ShadingPipeline) -> data.StructLayout:
     """Shape of a raster span: first pixel, pixels, unit normals at the first and last pixel centre.
 
-    With several materials there is the index of its own, ``material``, too.
+    Without lights there are no normals, and a method that takes values has them in their place; with several
+    materials there is the index of its own, ``material``.
     """
     members = {
-        "x": unsigned(12),
-        "y": unsigned(12),
-        "length": unsigned(12),
-        "normal_left": normal_shape(),
-        "normal_right": normal_shape(),
+        "x": unsigned(parameters.x_bits),
+        "y": unsigned(parameters.y_bits),
+        "length": unsigned(parameters.length_bits),
     }
-    if materials > 1:
-        members["material"] = Shape.cast(range(materials))
+    if parameters.lights and parameters.takes_values:
+        values = span_values_shape(parameters.lights, parameters.model is not None)
+        members["values"] = values.members["values"]
+    elif parameters.lights:
+        members |= {"normal_left": normal_shape(), "normal_right": normal_shape()}
+    if parameters.materials > 1:
+        members["material"] = Shape.cast(range(parameters.materials))
     return data.StructLayout(members)
 
 
@@ -99,7 +112,7 @@ def status_shape() -> data.StructLayout:
 
     ``wide_spans``: spans too wide for the method, whose pixels are not to be trusted; counted when that is
     known, some clocks after they are taken. ``empty_spans``: spans of length 0.
-    ``overrun``: whether a span has gone past x = 4095, where x starts again at 0.
+    ``overrun``: whether a span has gone past the largest x, where x starts again at 0.
     """
     return data.StructLayout(
         {"wide_spans": unsigned(16), "empty_spans": unsigned(16), "overrun": unsigned(1)}
@@ -111,17 +124,28 @@ class ShadingPipelineUnit(wiring.Component):
 
     An interpolator takes spans to the operands of their pixels; a light unit for each light takes these to
     terms, and the intensity unit to colours. The setup of the next spans overlaps the pixels of this one; a
-    FIFO carries the spans' places round it. `golden.pipeline.ShadingPipeline` is the bit-true twin.
+    FIFO carries the spans' places round it. `golden.pipeline.ShadingPipeline` is the bit-true twin, and says
+    what a pipeline may do without.
 
     The first pixel of a span leaves `latency` clocks after an idle pipeline has taken it. Without stalls each
     span then takes at most ``max(clocks_per_pixel length, setup_interval)`` clocks; three spans are held
     ready, so that a long one pays for short ones after it. (``bisection`` takes longer where it divides
     spans.) A span of length 0 is taken like any other and gives nothing.
 
-    In the *compact* style one multiplier does the colours, one or a few the specular terms and one or two the
-    setup (as many as its longest interval needs): a pixel takes 3 clocks for each of its diffuse and specular
-    terms that is not 0, at least 3, so that what has no highlight costs less; a power takes 42. The pixels
-    are the same to the bit. ``clocks_per_pixel`` and ``latency`` are then those of a pixel with every term.
+    With a gate a highlight gate looks at each span beside the interpolator, and tells the light units which
+    spans hold no highlight: their specular units stand still, or are passed by in the compact style. It takes
+    spans as often as the setup does, and its answer is there before the span's first pixel, or that waits:
+    a method whose setup is shorter than the gate, such as ``linear``, may take a clock more for short spans.
+
+    Without lights there is neither interpolator nor multiplier; a span's pixels have the ambient colour.
+
+    In the *compact* style one multiplier does the colours, one the specular terms of a light, two its
+    products with a normal where there is one, and one or two the setup (as many as its longest interval
+    needs). A pixel takes a clock a channel for each of its diffuse
+    and specular terms that is not 0, at least one; and, where its light is in front and its span not dark,
+    as many clocks as its specular model has products, a power 42. So what has no highlight costs less. The
+    pixels are the same to the bit. ``clocks_per_pixel`` and ``latency`` are then those of a pixel with every
+    term.
 
     A write is taken when no span is inside, and no span is taken while a write waits, so a frame's constants
     never change under a running span: ``i.ready`` falls on the clock on which ``write.valid`` rises. For the
@@ -132,7 +156,7 @@ class ShadingPipelineUnit(wiring.Component):
     Parameters
     ----------
     parameters : ShadingPipeline
-        Method, reflection model, numbers of lights and materials.
+        Method, reflection model, numbers of lights and materials, and what is left out.
     setup_interval : int or None
         Clocks from a span to the next at the closest, where the method has that choice: a smaller one needs
         more multipliers, and changes no pixel. ``None``: 4, or in the compact style the largest.
@@ -146,9 +170,9 @@ class ShadingPipelineUnit(wiring.Component):
 
     Members
     -------
-    i : :py:`In(stream.Signature(span_shape(materials)))`
+    i : :py:`In(stream.Signature(span_shape(parameters)))`
         Spans.
-    o : :py:`Out(stream.Signature(pixel_shape()))`
+    o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits)))`
         Pixels.
     write : :py:`In(stream.Signature(write_shape()))`
         Frame constants; see `FrameConstantsUnit` for the addresses.
@@ -159,6 +183,9 @@ class ShadingPipelineUnit(wiring.Component):
     """
 
     PLACES = 64
+
+    # Spans between their admission and their first pixel: at most a setup's latency over its interval.
+    DECISIONS = 32
 
     def __init__(
         self,
@@ -172,12 +199,20 @@ class ShadingPipelineUnit(wiring.Component):
         self.parameters = p = parameters or ShadingPipeline()
         super().__init__(
             {
-                "i": In(stream.Signature(span_shape(p.materials))),
-                "o": Out(stream.Signature(pixel_shape())),
+                "i": In(stream.Signature(span_shape(p))),
+                "o": Out(stream.Signature(pixel_shape(p.x_bits, p.y_bits))),
                 "write": In(stream.Signature(write_shape())),
                 "status": Out(status_shape()),
             }
         )
+        self._assembler = PixelAssemblerUnit(p.x_bits, p.y_bits, p.length_bits)
+        self._interpolator, self._gate, self._slope, self._lights = None, None, None, []
+        self.setup_interval = self.clocks_per_pixel = 1
+        self.latency = BUFFER_LATENCY + self._assembler.latency
+        if not p.lights:
+            if setup_interval is not None:
+                raise ValueError("without lights there is no setup, and no setup_interval")
+            return
         method = INTERPOLATORS[type(p.interpolator)]
         served = method.setup_intervals(p.interpolator)
         if setup_interval not in (None, *served):
@@ -186,85 +221,98 @@ class ShadingPipelineUnit(wiring.Component):
         if style == "compact" and setup_interval is None and served:
             setup_interval = served[-1]
         options = {} if setup_interval is None else {"setup_interval": setup_interval}
-        self._interpolator = method(p.interpolator, p.lights, **options)
-        diffuse = Diffuse(p.interpolator.COSINE_FORMAT)
-        self._slope = None if isinstance(p.highlight, Power) else SlopeUnit(p.highlight)
-        shares_slope = self._slope is not None
-        interval = 1
-        if style == "compact":
-            interval = 3 if shares_slope else 42
-        self._lights = [
-            LightUnit(p.highlight, diffuse, interval, shares_slope=shares_slope) for _ in range(p.lights)
-        ]
-        self._intensity = IntensityUnit(Intensity(p.lights), style)
-        self._assembler = PixelAssemblerUnit()
+        if style == "compact" and isinstance(p.interpolator, NormalInterpolator):
+            # A pixel takes its channels' clocks at least.
+            options["product_interval"] = p.intensity.channels
+        self._interpolator = method(
+            p.interpolator,
+            p.lights,
+            highlights=p.model is not None,
+            length_bits=p.length_bits,
+            **options,
+        )
         self.setup_interval = self._interpolator.setup_interval
+        self._lights = self._light_units()
+        self._intensity = IntensityUnit(p.intensity, style)
+        if p.gate:
+            interval = min(self.setup_interval, 3 + 12 * p.lights)
+            self._gate = HighlightGateUnit(p.highlight_gate, interval, p.lights, p.exponent)
         self.clocks_per_pixel = max(
-            self._interpolator.clocks_per_pixel, interval, self._intensity.initiation_interval
+            self._interpolator.clocks_per_pixel,
+            options.get("product_interval", 1),
+            self._lights[0].initiation_interval,
+            self._intensity.initiation_interval,
         )
         chain = (self._interpolator, self._lights[0], self._intensity, self._assembler)
         self.latency = sum(unit.latency for unit in chain) + BUFFER_LATENCY
+        if p.gate:
+            # A FIFO before the gate, and one after it.
+            decided = self._gate.latency + 2 * BUFFER_LATENCY
+            self.latency += max(decided - self._interpolator.latency, 0)
+
+    def _light_units(self) -> list:
+        """Diffuse units, or light units, which share what follows from the exponent."""
+        p, compact = self.parameters, self.style == "compact"
+        diffuse = Diffuse(p.interpolator.COSINE_FORMAT)
+        if p.model is None:
+            return [DiffuseUnit(parameters=diffuse) for _ in range(p.lights)]
+        interval, shares_slope = 1, False
+        if isinstance(p.highlight, Power):
+            interval = 42 if compact else 1
+        else:
+            if compact:
+                # A colour takes its channels' clocks anyway.
+                interval = max(SpecularUnit.multiplications(p.highlight, p.exponent), p.intensity.channels)
+            if p.exponent is None:
+                self._slope, shares_slope = SlopeUnit(p.highlight), True
+        return [
+            LightUnit(
+                p.highlight,
+                diffuse,
+                interval,
+                exponent=p.exponent,
+                shares_slope=shares_slope,
+                gated=p.gate,
+            )
+            for _ in range(p.lights)
+        ]
 
     def elaborate(self, platform):
-        """Interpolator, then the lights side by side, then the assembler."""
+        """Admission, then shading, then the assembler."""
         m = Module()
         p = self.parameters
-        m.submodules.interpolator = interpolator = self._interpolator
-        m.submodules.intensity = intensity = self._intensity
         m.submodules.pixel_assembler = assembler = self._assembler
         m.submodules.frame_constants = frame = FrameConstantsUnit(p.lights, p.materials)
-        m.submodules.places = places = fifo.SyncFIFOBuffered(width=place_shape().size, depth=self.PLACES)
+        place_layout = place_shape(p.x_bits, p.y_bits, p.length_bits)
+        m.submodules.places = places = fifo.SyncFIFOBuffered(width=place_layout.size, depth=self.PLACES)
 
-        # Admission: a span goes to the interpolator, its place round it, both or neither.
-        place = Signal(place_shape())
+        # Admission: a span goes to what sets it up, its place round it, to all or to none.
+        place = Signal(place_layout)
         empty, offered, free, admit, settled = (Signal() for _ in range(5))
         span = self.i.payload
+        takers = [(places.w_en, places.w_rdy)]
+        if p.lights:
+            takers += self._shade(m, frame)
+        else:
+            ambient = frame.constants.ambient
+            for channel, name in enumerate("rgb"):
+                level = ambient[0 if p.grey else channel].round_half_up(0).saturate(Intensity.RESULT_FORMAT)
+                m.d.comb += assembler.colors.payload[name].eq(level.as_value())
+            m.d.comb += assembler.colors.valid.eq(1)
         m.d.comb += [
             empty.eq(span.length == 0),
             offered.eq(self.i.valid & ~empty),
-            free.eq(~self.write.valid & places.w_rdy & settled),
-            admit.eq(offered & free & interpolator.i.ready),
-            self.i.ready.eq(free & interpolator.i.ready),
-            interpolator.i.valid.eq(offered & free),
-            interpolator.i.payload.normal_left.eq(span.normal_left),
-            interpolator.i.payload.normal_right.eq(span.normal_right),
-            interpolator.i.payload.length.eq(span.length),
+            free.eq(~self.write.valid & settled),
+            self.i.ready.eq(free & reduce(and_, (ready for _, ready in takers))),
+            admit.eq(offered & self.i.ready),
             place.x.eq(span.x),
             place.y.eq(span.y),
             place.length.eq(span.length),
             places.w_data.eq(place),
-            places.w_en.eq(admit),
         ]
-
-        # Lights in lockstep: equal units that are offered the same beats and taken from on the same clocks.
-        constants_of_exponent = frame.constants.exponent
-        if self._slope is not None:
-            m.submodules.slope = self._slope
-            m.d.comb += self._slope.exponent.eq(frame.constants.exponent)
-            constants_of_exponent = self._slope.slope
-        for index, light in enumerate(self._lights):
-            m.submodules[f"light_{index}"] = light
-            constants = frame.constants.lights[index]
-            vectors = interpolator.constants[index]
-            m.d.comb += [
-                vectors.direction.eq(constants.direction),
-                vectors.halfway.eq(constants.halfway),
-                light.i.payload.cosine.eq(interpolator.o.payload[index].cosine),
-                light.i.payload.highlight.eq(interpolator.o.payload[index].highlight),
-                light.i.valid.eq(interpolator.o.valid),
-                light.o.ready.eq(intensity.i.ready),
-                light.constants.eq(constants_of_exponent),
-                intensity.i.payload.diffuse[index].eq(light.o.payload.diffuse),
-                intensity.i.payload.specular[index].eq(light.o.payload.specular),
-                intensity.constants.diffuse[index].eq(constants.diffuse),
-                intensity.constants.specular[index].eq(constants.specular),
-            ]
-        m.d.comb += [
-            interpolator.o.ready.eq(self._lights[0].i.ready),
-            intensity.i.valid.eq(self._lights[0].o.valid),
-            intensity.constants.ambient.eq(frame.constants.ambient),
-        ]
-        connect_buffered(m, "shaded", intensity.o, assembler.colors, depth=4)
+        for index, (valid, _) in enumerate(takers):
+            others = (ready for k, (_, ready) in enumerate(takers) if k != index)
+            m.d.comb += valid.eq(reduce(and_, others, offered & free))
         m.d.comb += [
             assembler.places.payload.eq(places.r_data),
             assembler.places.valid.eq(places.r_rdy),
@@ -293,11 +341,110 @@ class ShadingPipelineUnit(wiring.Component):
 
         status = self.status
         for counter, event in (
-            (status.wide_spans, interpolator.wide),
+            (status.wide_spans, self._interpolator.wide if p.lights else 0),
             (status.empty_spans, self.i.valid & self.i.ready & empty),
         ):
             with m.If(event & ~counter.all()):
                 m.d.sync += counter.eq(counter + 1)
-        with m.If(admit & (span.x + span.length > 4096)):
+        with m.If(admit & (span.x + span.length > 1 << p.x_bits)):
             m.d.sync += status.overrun.eq(1)
         return m
+
+    def _shade(self, m: Module, frame: FrameConstantsUnit) -> list[tuple[Value, Value]]:
+        """From spans to colours; valid and ready of what takes the spans."""
+        p, span = self.parameters, self.i.payload
+        m.submodules.interpolator = interpolator = self._interpolator
+        m.submodules.intensity = intensity = self._intensity
+        takers = [(interpolator.i.valid, interpolator.i.ready)]
+        words = interpolator.i.payload
+        m.d.comb += [Value.cast(words[name]).eq(Value.cast(span[name])) for name in words.shape().members]
+        operands, gated = interpolator.o, None
+        if self._gate is not None:
+            operands, gated = self._decide(m, frame, takers)
+        if self._slope is not None:
+            m.submodules.slope = self._slope
+            m.d.comb += self._slope.exponent.eq(frame.constants.exponent)
+
+        # In lockstep, one handshake is that of all: equal units, offered the same beats and taken from on the
+        # same clocks. Where lights skip beats, all take one together, or none.
+        lockstep = p.model is None or not self._lights[0].skips_dark
+        leaders = self._lights[:1] if lockstep else self._lights
+        for index, light in enumerate(self._lights):
+            m.submodules[f"light_{index}"] = light
+            constants = frame.constants.lights[index]
+            if not p.takes_values:
+                vectors = interpolator.constants[index]
+                m.d.comb += [
+                    vectors.direction.eq(constants.direction),
+                    vectors.halfway.eq(constants.halfway),
+                ]
+            m.d.comb += [
+                intensity.constants.diffuse[index].eq(constants.diffuse),
+                intensity.constants.specular[index].eq(constants.specular),
+            ]
+            words, terms = operands.payload[index], light.o.payload
+            if p.model is None:
+                m.d.comb += [light.i.payload.eq(words.cosine), intensity.i.payload.diffuse[index].eq(terms)]
+            else:
+                m.d.comb += [
+                    light.i.payload.cosine.eq(words.cosine),
+                    light.i.payload.highlight.eq(words.highlight),
+                    intensity.i.payload.diffuse[index].eq(terms.diffuse),
+                    intensity.i.payload.specular[index].eq(terms.specular),
+                ]
+                if gated is not None:
+                    m.d.comb += light.i.payload.gated.eq(gated[index])
+                if self._slope is not None:
+                    m.d.comb += light.constants.eq(self._slope.slope)
+                elif "constants" in light.signature.members:
+                    m.d.comb += light.constants.eq(frame.constants.exponent)
+            others = [other for other in leaders if other is not light and not lockstep]
+            m.d.comb += [
+                light.i.valid.eq(reduce(and_, (other.i.ready for other in others), operands.valid)),
+                light.o.ready.eq(reduce(and_, (other.o.valid for other in others), intensity.i.ready)),
+            ]
+        m.d.comb += [
+            operands.ready.eq(reduce(and_, (light.i.ready for light in leaders))),
+            intensity.i.valid.eq(reduce(and_, (light.o.valid for light in leaders))),
+            intensity.constants.ambient.eq(frame.constants.ambient),
+        ]
+        connect_buffered(m, "shaded", intensity.o, self._assembler.colors, depth=4)
+        return takers
+
+    def _decide(self, m: Module, frame: FrameConstantsUnit, takers: list) -> tuple[stream.Interface, Value]:
+        """The highlight gate's decisions beside the operands of each pixel; it too takes the spans."""
+        p, span = self.parameters, self.i.payload
+        m.submodules.highlight_gate = gate = self._gate
+        width = p.length_bits
+        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=width, depth=self.DECISIONS)
+        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=p.lights, depth=self.DECISIONS)
+        # The gate takes a span at a turn of its own, which is not always that of the setup.
+        waiting = gate.i.signature.flip().create(path=("waiting",))
+        connect_buffered(m, "undecided", waiting, gate.i, depth=3)
+        takers += [(waiting.valid, waiting.ready), (lengths.w_en, lengths.w_rdy)]
+        source = self._interpolator.o
+        operands = source.signature.create(path=("decided",))
+        place, last = Signal(p.length_bits), Signal()
+        moves = operands.valid & operands.ready
+        m.d.comb += [
+            waiting.payload.normal_left.eq(span.normal_left),
+            waiting.payload.normal_right.eq(span.normal_right),
+            lengths.w_data.eq(span.length),
+            decisions.w_data.eq(gate.o.payload),
+            decisions.w_en.eq(gate.o.valid),
+            gate.o.ready.eq(decisions.w_rdy),
+            # A decision, and with it the length, is there before the pixel, or that waits.
+            Value.cast(operands.payload).eq(Value.cast(source.payload)),
+            operands.valid.eq(source.valid & decisions.r_rdy),
+            source.ready.eq(operands.ready & decisions.r_rdy),
+            last.eq(place == lengths.r_data - 1),
+            lengths.r_en.eq(moves & last),
+            decisions.r_en.eq(moves & last),
+        ]
+        for index in range(p.lights):
+            m.d.comb += gate.constants.halfway[index].eq(frame.constants.lights[index].halfway)
+        if p.exponent is None:
+            m.d.comb += gate.constants.exponent.eq(frame.constants.exponent)
+        with m.If(moves):
+            m.d.sync += place.eq(Mux(last, 0, place + 1))
+        return operands, ~decisions.r_data

@@ -9,17 +9,17 @@ from .intensity import pixel_color_shape
 __all__ = ["PixelAssemblerUnit", "pixel_shape", "place_shape"]
 
 
-def place_shape() -> data.StructLayout:
+def place_shape(x_bits: int = 12, y_bits: int = 12, length_bits: int = 12) -> data.StructLayout:
     """Shape of a span's place: first pixel and number of pixels."""
-    return data.StructLayout({"x": unsigned(12), "y": unsigned(12), "length": unsigned(12)})
+    return data.StructLayout({"x": unsigned(x_bits), "y": unsigned(y_bits), "length": unsigned(length_bits)})
 
 
-def pixel_shape() -> data.StructLayout:
+def pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
     """Shape of a pixel: place, colour, and whether it is the last of its span."""
     return data.StructLayout(
         {
-            "x": unsigned(12),
-            "y": unsigned(12),
+            "x": unsigned(x_bits),
+            "y": unsigned(y_bits),
             "r": unsigned(8),
             "g": unsigned(8),
             "b": unsigned(8),
@@ -33,13 +33,18 @@ class PixelAssemblerUnit(wiring.Component):
 
     The latency is 1 clock and the initiation interval 1. No multipliers.
 
+    Parameters
+    ----------
+    x_bits, y_bits, length_bits : int
+        Bits of the coordinates and of a span's length.
+
     Members
     -------
-    places : :py:`In(stream.Signature(place_shape()))`
-        Place of each span; waits until the span's last pixel has gone. ``x + length`` is at most 4096.
+    places : :py:`In(stream.Signature(place_shape(x_bits, y_bits, length_bits)))`
+        Place of each span; waits until the span's last pixel has gone. Past the largest x it starts at 0.
     colors : :py:`In(stream.Signature(pixel_color_shape()))`
         Colours, in the order of the spans' pixels.
-    o : :py:`Out(stream.Signature(pixel_shape()))`
+    o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits)))`
         Pixels.
 
     Source: pipeline.md, "Span stream".
@@ -47,19 +52,19 @@ class PixelAssemblerUnit(wiring.Component):
 
     latency = 1
 
-    def __init__(self):
+    def __init__(self, x_bits: int = 12, y_bits: int = 12, length_bits: int = 12):
         super().__init__(
             {
-                "places": In(stream.Signature(place_shape())),
+                "places": In(stream.Signature(place_shape(x_bits, y_bits, length_bits))),
                 "colors": In(stream.Signature(pixel_color_shape())),
-                "o": Out(stream.Signature(pixel_shape())),
+                "o": Out(stream.Signature(pixel_shape(x_bits, y_bits))),
             }
         )
 
     def elaborate(self, platform):
         """An offset counter and an output register."""
         m = Module()
-        offset = Signal(12)
+        offset = Signal.like(self.places.payload.length)
         advance, take, last = Signal(), Signal(), Signal()
         place, color, pixel = self.places.payload, self.colors.payload, self.o.payload
         m.d.comb += [

@@ -39,6 +39,8 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
     setup_interval : int
         Clocks from a span to the next at the closest, 1 to 7: what the middle normal and the difference
         setup are built for.
+    options
+        As for `InterpolatorUnit`.
 
     Source: [T] 2.2, 2.3, figures 2.8 to 2.11.
     """
@@ -51,12 +53,14 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
         """What the setup can be built for."""
         return range(1, 8) if parameters.form == "differences" else range(0)
 
-    def __init__(self, parameters: QuadraticInterpolator, lights: int, setup_interval: int = 4):
-        super().__init__(parameters, lights)
-        self._middle, self._gpq = MiddleNormalUnit(initiation_interval=setup_interval), GPQUnit()
+    def __init__(self, parameters: QuadraticInterpolator, lights: int, setup_interval: int = 4, **options):
+        super().__init__(parameters, lights, **options)
+        self._middle, self._gpq = MiddleNormalUnit(parameters.middle_normal, setup_interval), GPQUnit()
         before = self._middle.latency + self._gpq.latency
         if parameters.form == "differences":
-            self._setup = DifferenceSetupUnit(initiation_interval=setup_interval)
+            self._setup = DifferenceSetupUnit(
+                initiation_interval=setup_interval, length_bits=self.length_bits
+            )
             self._accumulator = DifferenceAccumulatorUnit()
             self.setup_interval = setup_interval
             after = self._setup.latency + BUFFER_LATENCY + self._accumulator.latency
@@ -72,7 +76,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
         """Coefficients, and the form that takes them to normals."""
         m.submodules.middle_normal = middle = self._middle
         m.submodules.gpq = gpq = self._gpq
-        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=12, depth=self.LENGTHS)
+        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=self.length_bits, depth=self.LENGTHS)
         differences = self.parameters.form == "differences"
         curve = self._setup if differences else self._evaluator
         span = self.i.payload

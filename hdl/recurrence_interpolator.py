@@ -1,16 +1,15 @@
 """The recurrence method ([T] 3.3): cosines of equal steps along the great circle, one product each."""
 
 from amaranth.hdl import Module, Value
-from amaranth.lib import wiring
 
 from golden.fixed import UQ
 from golden.recurrence_interpolator import RecurrenceInterpolator
 
 from .fixed import FixedValue
-from .interpolator import InterpolatorUnit
+from .interpolator import InterpolatorUnit, span_words
 from .recurrence import RecurrenceUnit
 from .recurrence_setup import RecurrenceSetupUnit
-from .stream import BUFFER_LATENCY, connect, connect_buffered
+from .stream import BUFFER_LATENCY, connect_buffered
 
 __all__ = ["RecurrenceInterpolatorUnit"]
 
@@ -20,7 +19,8 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
 
     `golden.recurrence_interpolator.RecurrenceInterpolator` is the twin. All recurrence units are equal, are
     offered the same spans and taken from on the same clocks. Two multipliers a light, and those of the
-    setup, ``ceil((14 + 32 lights) / setup_interval)``.
+    setup, ``ceil((14 + 32 lights) / setup_interval)``. Without highlights the setup and the units are the
+    same, and what follows from H goes nowhere.
 
     Parameters
     ----------
@@ -30,6 +30,8 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
         Number of lights, at least 1.
     setup_interval : int
         Clocks from a span to the next at the closest, at least 1.
+    options
+        As for `InterpolatorUnit`.
 
     Source: [T] 3.1, 3.3, figure 3.5.
     """
@@ -39,8 +41,8 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
         """What the setup can be built for."""
         return range(1, 47)
 
-    def __init__(self, parameters: RecurrenceInterpolator, lights: int, setup_interval: int = 4):
-        super().__init__(parameters, lights)
+    def __init__(self, parameters: RecurrenceInterpolator, lights: int, setup_interval: int = 4, **options):
+        super().__init__(parameters, lights, **options)
         self.setup_interval = setup_interval
         self._setup = RecurrenceSetupUnit(parameters.setup, lights, setup_interval)
         self._recurrences = [RecurrenceUnit(parameters.setup.recurrence) for _ in range(lights)]
@@ -51,7 +53,11 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
         """A FIFO between the two holds spans ready, so that a long one pays for short ones after it."""
         m = Module()
         m.submodules.recurrence_setup = setup = self._setup
-        connect(m, wiring.flipped(self.i), setup.i)
+        m.d.comb += [
+            *(setup.i.payload[name].eq(word) for name, word in span_words(self.i.payload)),
+            setup.i.valid.eq(self.i.valid),
+            self.i.ready.eq(setup.i.ready),
+        ]
         prepared = setup.o.signature.create(path=("prepared",))
         connect_buffered(m, "spans", setup.o, prepared, depth=3)
         one = FixedValue.constant(UQ(1, 25), 1)
@@ -71,8 +77,10 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
                 unit.i.valid.eq(prepared.valid),
                 unit.o.ready.eq(self.o.ready),
                 result.cosine.eq(unit.o.payload.diffuse),
-                result.highlight.eq((one - unit.o.payload.highlight).saturate(result.highlight.format)),
             ]
+            if self.highlights:
+                highlight = one - unit.o.payload.highlight
+                m.d.comb += result.highlight.eq(highlight.saturate(result.highlight.format))
         m.d.comb += [
             prepared.ready.eq(self._recurrences[0].i.ready),
             self.o.valid.eq(self._recurrences[0].o.valid),

@@ -180,8 +180,7 @@ class SpecularUnit(PipelinedUnit):
             raise ValueError("a unit with an exponent of its own shares no slope")
         self.exponent, self.shares_slope = exponent, shares_slope
         self._has_slope_turn = exponent is None and not p.as_documented
-        chords = 3 if p.is_coscos else int(p.model == "exp")
-        count = self._has_slope_turn + p.squarings + chords
+        count = self.multiplications(p, exponent)
         self._graph = Dataflow(initiation_interval, count if initiation_interval > 1 else 0)
         self._result = self._describe()
         constants = None
@@ -196,6 +195,13 @@ class SpecularUnit(PipelinedUnit):
             initiation_interval=initiation_interval,
             constants=constants,
         )
+
+    @staticmethod
+    def multiplications(parameters: Specular, exponent: int | None = None) -> int:
+        """M, of the table above: an initiation interval of as many clocks needs one multiplier."""
+        chords = 3 if parameters.is_coscos else int(parameters.model == "exp")
+        by_slope = exponent is None and not parameters.as_documented
+        return by_slope + parameters.squarings + chords
 
     def datapath(self, m, operands):
         """The graph, read at the age of its last word."""

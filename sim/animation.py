@@ -136,6 +136,9 @@ class Film:
     setup_interval : int, optional
     style : str
         See `hdl.pipeline.ShadingPipelineUnit`.
+    full : ShadingPipeline, optional
+        What the pipeline was fitted from, whose method and model the frames are held against. ``None``: the
+        pipeline itself.
     """
 
     scene: Scene
@@ -143,6 +146,7 @@ class Film:
     engine: str = "cxxrtl"
     setup_interval: int | None = None
     style: str = "throughput"
+    full: ShadingPipeline | None = None
 
 
 @dataclass(frozen=True)
@@ -180,8 +184,8 @@ def shot(film: Film, camera: Camera) -> Shot:
     with _ONE_AT_A_TIME:
         scene = replace(film.scene, camera=camera)
         frame = _simulator(film.design, film.engine, film.setup_interval, film.style).render(scene)
-        comparison = compare(scene, film.design, frame)
-        return Shot(frame.image, frame_figures(scene, film.design, frame, comparison))
+        full = film.full or film.design
+        return Shot(frame.image, frame_figures(scene, full, frame, compare(scene, full, frame)))
 
 
 def _begin(film: Film, cache: str | None) -> None:

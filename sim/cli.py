@@ -23,9 +23,10 @@ from golden.frame_constants import MAX_MATERIALS, FrameConstants, address_table
 from golden.geometry import normalise
 from golden.intensity import MAX_LIGHTS
 from golden.lighting import Light, Material
+from golden.local_chord_interpolator import LocalChordInterpolator
 from golden.pipeline import METHODS, MODELS, ShadingPipeline
 from golden.reflection import REFLECTION_MODELS
-from golden.scene import BACK_FACES, LARGEST_SIDE, Scene
+from golden.scene import BACK_FACES, LARGEST_SIDE, VIEWERS, Scene
 from golden.specular import MAX_EXPONENT
 from hdl.pipeline import INTERPOLATORS, PORT_DESCRIPTIONS, STYLES, ShadingPipelineUnit
 from hdl.verilog import emit
@@ -43,11 +44,20 @@ from sim.animation import (
 )
 from sim.engine import CompilerMissing, SimulationError
 from sim.errors import InputError
+from sim.fit import Fit, for_scene
 from sim.frame import FrameSimulator, SimulatedFrame, compare
 from sim.mesh import LoadedMesh, load_mesh, surfaces
 from sim.output import atomic_writer, check_writable, write_json, write_text
 from sim.picture import check_image_path, write_comparison, write_image
-from sim.report import frame_figures, print_counts, print_errors, print_figures, worst_errors
+from sim.report import (
+    fit_figures,
+    frame_figures,
+    print_counts,
+    print_errors,
+    print_figures,
+    print_fit,
+    worst_errors,
+)
 from sim.scene_file import HIGHLIGHTS, read_scene_file
 
 __all__ = ["main"]
@@ -180,6 +190,12 @@ def _design_options(command):
             "[default: 4; compact: the most]",
         ),
         click.option(
+            "--gate/--no-gate",
+            default=False,
+            show_default=True,
+            help="A highlight gate: spans without a highlight pass the specular units by.",
+        ),
+        click.option(
             "--highlight",
             type=_Choice("form", HIGHLIGHTS),
             help="Form of the specular argument, for methods that find normals.  [default: dot]",
@@ -239,14 +255,19 @@ def _read_settings(context: click.Context, mesh: str, options: dict) -> _Setting
         raise InputError(f"MESH {mesh!r}", "is no file's name", "give a mesh or scene file, or teapot")
     if not any(options["view"]):
         raise InputError("--view 0,0,0", "no direction", "give a vector other than 0")
-    if len(options["lights"]) > MAX_LIGHTS:
-        raise InputError("--light", f"{len(options['lights'])} lights", f"give at most {MAX_LIGHTS}")
-    options = {
-        **options,
-        "crease": _angle(options["crease"][0]),
-        "lights": tuple(_light(numbers) for numbers in options["lights"]) or DEFAULT_LIGHTS,
-    }
+    count = len(options["lights"]) + len(options["point_lights"])
+    if count > MAX_LIGHTS:
+        raise InputError("--light", f"{count} lights", f"give at most {MAX_LIGHTS}")
+    lights = tuple(_light(numbers) for numbers in options["lights"])
+    lights += tuple(_light(numbers, "position") for numbers in options["point_lights"])
+    options = {**options, "crease": _angle(options["crease"][0]), "lights": lights or DEFAULT_LIGHTS}
     settings = _over_file(context, mesh, options)
+    if settings["viewer"] == "near" and settings["projection"] != "perspective":
+        raise settings.refuse("viewer", "an orthographic camera is distant", "use a perspective one")
+    local = settings["viewer"] == "near" or any(light.position for light in settings["lights"])
+    if local and settings["method"] != "chord-local":
+        what = "point lights and a near viewer need the values of a span"
+        raise settings.refuse("method", what, "use chord-local")
     if settings["triangles"] is not None and settings["mesh"] != "teapot":
         raise settings.refuse("triangles", "only the teapot is tessellated", "leave it out for a file")
     return settings
@@ -259,9 +280,13 @@ def _over_file(context: click.Context, mesh: str, options: dict) -> _Settings:
     file = read_scene_file(mesh)
     if "view" in given:
         given |= {"position", "target"}
+    if given & {"lights", "point_lights"}:
+        given |= {"lights", "point_lights"}
     values = {name: value for name, value in file.values.items() if name not in given}
     if "lights" in values:
+        at = values.pop("point_lights", ())
         values["lights"] = tuple(Light(numbers[:3], numbers[3:]) for numbers in values["lights"])
+        values["lights"] += tuple(Light(color=numbers[3:], position=numbers[:3]) for numbers in at)
     if "position" in values:
         options = {**options, "view": None}
     shown = "".join(c if c.isprintable() else "?" for c in mesh)
@@ -272,9 +297,15 @@ def _over_file(context: click.Context, mesh: str, options: dict) -> _Settings:
 def _design(settings: _Settings, lights: int) -> ShadingPipeline:
     if settings["model"] not in MODELS:
         raise settings.refuse("model", "the pipeline finds N.H, not R.V", f"use one of {', '.join(MODELS)}")
+    if settings["gate"] and isinstance(METHODS[settings["method"]], LocalChordInterpolator):
+        raise settings.refuse("gate", f"{settings['method']} has no normals for one", "leave it out", "")
     try:
         design = ShadingPipeline(
-            settings["method"], settings["model"], lights, _OPERANDS.get(settings["highlight"])
+            settings["method"],
+            settings["model"],
+            lights,
+            _OPERANDS.get(settings["highlight"]),
+            gate=settings["gate"],
         )
     except ValueError as error:
         raise settings.refuse("highlight", str(error), "leave it out") from None
@@ -358,6 +389,20 @@ def cli():
     "[default: -0.5,0.8,0.7]",
 )
 @click.option(
+    "--point-light",
+    "point_lights",
+    multiple=True,
+    type=_Numbers("X,Y,Z or X,Y,Z,R,G,B", (3, 6), "a light"),
+    help="Place of a light in the mesh's units, and its colour; repeat for more. Needs --method chord-local.",
+)
+@click.option(
+    "--viewer",
+    type=_Choice("viewer", VIEWERS),
+    default="distant",
+    show_default=True,
+    help="Highlights as seen from one direction, or from the camera: near needs --method chord-local.",
+)
+@click.option(
     "--materials",
     type=_Choice("source of materials", ("file", "one")),
     default="file",
@@ -385,6 +430,18 @@ def cli():
 )
 @click.option("--compare", "comparison", type=click.Path(), help="Picture: simulated, golden, error map.")
 @click.option("--json", "figures", type=click.Path(), help="Every printed figure.")
+@click.option(
+    "--fit/--full",
+    default=False,
+    show_default=True,
+    help="Build only what the scene needs, say what is left out, and compare with the full pipeline.",
+)
+@click.option(
+    "--words/--no-words",
+    default=False,
+    show_default=True,
+    help="With --fit: also shorter words, where the error bound stays; pixels may change by a step.",
+)
 @click.option("--vcd", type=click.Path(), help="Waveforms; implies --engine pysim.")
 @click.option(
     "--frames",
@@ -407,16 +464,18 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
         blysk render teapot -o teapot.png
         blysk render model.obj --model cosquad_lin --exponent 200 --size 1280x720 --compare both.png
         blysk render scene.toml --exponent 100
+        blysk render scene.toml --gate --fit
+        blysk render teapot --method chord-local --point-light 3,4,5 --viewer near
         blysk render scene.toml --frames 36 -o turntable.gif
 
     \b
     Keys of a scene file, all but mesh.file optional:
         size, background, ambient_light, back_faces
         [mesh]      file, triangles, crease, materials
-        [camera]    projection, view or position and target, up, field_of_view
-        [[lights]]  direction, color
+        [camera]    projection, view or position and target, up, field_of_view, viewer
+        [[lights]]  direction or position, color
         [material]  ambient, diffuse, specular, exponent
-        [pipeline]  method, model, highlight, setup_interval, style
+        [pipeline]  method, model, highlight, setup_interval, style, gate, fit, words
     """
     start = perf_counter()
     settings = _read_settings(context, mesh, options)
@@ -439,30 +498,49 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
         raise InputError("--jobs" if jobs else "--cluster", "is for many frames", "give --frames, too")
     else:
         _check_outputs(inputs, pictures=[output, comparison], others=[figures, vcd])
+    if settings["words"] and not settings["fit"]:
+        raise settings.refuse("words", "nothing is fitted", "give --fit, too", "")
     settings["size"] = settings["size"] or (SLOW_SIZE if vcd else DEFAULT_SIZE)
     with tqdm(bar_format="{desc}", leave=False, disable=None) as stage:
         stage.set_description_str("loading the mesh")
         loaded = _load(settings)
         design = dataclasses.replace(design, materials=len(loaded.materials))
         seconds = {"load": perf_counter() - start}
-        _scenes(loaded, settings, frames or 1)  # Bad input is found before the model is built.
+        scenes = _scenes(loaded, settings, frames or 1)
+        if settings["fit"]:
+            stage.set_description_str("finding out what the scene needs")
+            fit = for_scene(scenes, design, exact=not settings["words"])
+        else:
+            fit = Fit(design, (), tuple(scenes))
         stage.set_description_str("building the model")
-        simulator = _simulator(design, settings, address)
+        size = settings["size"]
+        simulator = _simulator(fit.design, settings, address)
+        if settings["size"] != size:
+            # The slow engine's own size.
+            scenes = _scenes(loaded, settings, frames or 1)
+            fit = Fit(design, (), tuple(scenes))
+            if settings["fit"]:
+                fit = for_scene(scenes, design, exact=not settings["words"])
+            simulator = _simulator(fit.design, settings, address)
         seconds["build"] = perf_counter() - start - seconds["load"]
         stage.set_description_str("rasterising and simulating")
-        scenes = _scenes(loaded, settings, frames or 1)
         if frames:
-            film = Film(scenes[0], design, settings["engine"], settings["setup_interval"], settings["style"])
+            options = settings["engine"], settings["setup_interval"], settings["style"]
+            film = Film(fit.scenes[0], fit.design, *options, design)
             cameras = [scene.camera for scene in scenes]
             report = _shoot_film(loaded, film, cameras, pictures, seconds, jobs, address)
             stage.set_description_str("writing the animation")
             write_gif(animation, pictures)
             seconds["animation"] = perf_counter() - start - sum(seconds.values())
         else:
-            frame = _simulate(simulator, scenes[0], vcd)
+            frame = _simulate(simulator, fit.scenes[0], vcd)
             stage.set_description_str("comparing with the golden renderer")
             result = compare(scenes[0], design, frame)
             report = _with_mesh(loaded, frame_figures(scenes[0], design, frame, result), seconds)
+            if settings["fit"]:
+                stage.set_description_str("comparing with the full pipeline")
+                whole = None if vcd else _simulate(_simulator(design, settings), scenes[0], None)
+                report["fit"] = fit_figures(fit, settings, frame, whole)
             stage.set_description_str("writing")
             if output:
                 write_image(output, frame.image)
@@ -476,6 +554,7 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
         written = {"frames": f"{pictures[0]} to {pictures[-1]}", "animation": animation}
     else:
         print_figures(report)
+        print_fit(report.get("fit"))
         for text in loaded.ignored:
             print(f"{'ignored':<12}{text}")
         written = {"frame": output, "comparison": comparison}
@@ -496,7 +575,7 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
 )
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
 @click.option("-o", "--output", type=click.Path(), help="Verilog file.  [default: standard output]")
-def verilog(method, model, highlight, setup_interval, style, lights, materials, name, output):
+def verilog(lights, materials, name, output, **settings):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
     \b
@@ -505,27 +584,25 @@ def verilog(method, model, highlight, setup_interval, style, lights, materials, 
     """
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise InputError(f"--name {name}", "no Verilog name", "use letters, digits and underscores")
-    design = _design(
-        _Settings(
-            {"method": method, "model": model, "highlight": highlight, "setup_interval": setup_interval}
-        ),
-        lights,
-    )
+    design = _design(_Settings(settings), lights)
+    setup_interval, style = settings["setup_interval"], settings["style"]
     design = dataclasses.replace(design, materials=materials)
     if output:
         check_writable(output)
     unit = ShadingPipelineUnit(design, setup_interval, style)
     header = [
         f"blysk {version('blysk')} shading pipeline",
-        f"method {method}, model {model}, lights {lights}, materials {materials}, {style} style",
+        f"method {design.method}, model {design.model}, lights {lights}, materials {materials}, {style} style"
+        + (", highlight gate" if design.gate else ""),
         f"latency {unit.latency} clocks, {unit.clocks_per_pixel} a pixel",
         f"a span takes at most max({unit.clocks_per_pixel} length, {unit.setup_interval}) clocks",
         "",
         "Frame constants, through the write port:",
         *address_table(lights, materials),
     ]
+    fields = {f"i_{name}" for name in unit.i.payload.shape().members}
     descriptions = {
-        port: text for port, text in PORT_DESCRIPTIONS.items() if port != "i_material" or design.materials > 1
+        port: text for port, text in PORT_DESCRIPTIONS.items() if not port.startswith("i_") or port in fields
     }
     try:
         text = emit(unit, name, header=header, descriptions=descriptions)
@@ -537,13 +614,14 @@ def verilog(method, model, highlight, setup_interval, style, lights, materials, 
         click.echo(text, nl=False)
 
 
-def _light(numbers: tuple[float, ...]) -> Light:
+def _light(numbers: tuple[float, ...], kind: str = "direction") -> Light:
     try:
-        return Light(numbers[:3], numbers[3:] or (1.0, 1.0, 1.0))
+        return Light(color=numbers[3:] or (1.0, 1.0, 1.0), **{kind: numbers[:3]})
     except ValueError as error:
         text = ",".join(f"{number:g}" for number in numbers)
+        option = "--light" if kind == "direction" else "--point-light"
         raise InputError(
-            f"--light {text}", str(error), "give a direction other than 0 and colours of 0 or more"
+            f"{option} {text}", str(error), "give a direction other than 0 and colours of 0 or more"
         ) from None
 
 
@@ -640,7 +718,8 @@ def _scenes(loaded: LoadedMesh, settings: _Settings, count: int = 1) -> list[Sce
         width=width,
         height=height,
         material=_materials(loaded, settings),
-        lights=settings["lights"],
+        lights=[_scaled(light, shift) for light in settings["lights"]],
+        viewer=settings["viewer"],
         background=settings["background"],
         back_faces=settings["back_faces"],
         ambient_light=settings.get("ambient_light", (1.0, 1.0, 1.0)),
@@ -651,6 +730,13 @@ def _scenes(loaded: LoadedMesh, settings: _Settings, count: int = 1) -> list[Sce
     except ValueError as error:
         raise settings.refuse("lights", str(error), "make the light darker", "") from None
     return [dataclasses.replace(scene, camera=camera) for camera in cameras]
+
+
+def _scaled(light: Light, shift: int) -> Light:
+    """A light in a mesh whose unit has been multiplied by ``2**shift``."""
+    if light.position is None:
+        return light
+    return dataclasses.replace(light, position=tuple(np.ldexp(light.position, shift).tolist()))
 
 
 def _cameras(vertices: np.ndarray, shift: int, settings: _Settings, count: int) -> list[Camera]:
@@ -776,8 +862,7 @@ def _show(bar: tqdm, done: int, count: int) -> None:
 def _captions(report: dict) -> dict[str, str]:
     """Title and subtitle of the comparison."""
     return {
-        "title": f"{report['mesh']}: {report['method']} normals, {report['model']}, "
-        f"exponent {report['exponent']}",
+        "title": f"{report['mesh']}: {report['method']}, {report['model']}, exponent {report['exponent']}",
         "subtitle": (
             f"simulated RTL beside normalised Phong interpolation in float64: largest error "
             f"{report['method_error']['max_lsb']:.2f} LSB, {report['clocks']:,} clocks for "

@@ -5,21 +5,24 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
 from golden.frame_constants import FrameConstants
+from golden.local_chord_interpolator import SpanValues
 from golden.metrics import ErrorFigures, error_figures, mnse_printed, nmse
 from golden.pipeline import ShadingPipeline, Spans
 from golden.raster import Raster, rasterise
-from golden.renderer import render, shade_spans
+from golden.renderer import render, shade_operands, shade_spans
 from golden.scene import Scene
 from golden.unit_vector import COMPONENT, quantise
 from hdl.pipeline import ShadingPipelineUnit
+from sim.beats import dtype_of
 from sim.engine import SimulationError, simulate
-from sim.spans import cut_wide_spans, quantise_spans, sort_by_material
+from sim.spans import cut_local_spans, cut_wide_spans, local_values, quantise_spans, sort_by_material
 
-__all__ = ["Comparison", "FrameSimulator", "SimulatedFrame", "compare"]
+__all__ = ["Comparison", "FrameSimulator", "PreparedFrame", "SimulatedFrame", "compare", "prepare"]
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,52 @@ class SimulatedFrame:
         return len(self.cut_raster.span)
 
 
+class PreparedFrame(NamedTuple):
+    """What a pipeline is given for a frame.
+
+    Parameters
+    ----------
+    raster : Raster
+        The rasteriser's spans.
+    cut_raster : Raster
+        The same fragments in spans that are narrow enough for the method.
+    spans_cut : int
+        Spans of the former that were cut.
+    spans : Spans
+        The latter, quantised.
+    """
+
+    raster: Raster
+    cut_raster: Raster
+    spans_cut: int
+    spans: Spans
+
+
+def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
+    """Rasterise a scene, and cut and quantise its spans for a pipeline.
+
+    Raises
+    ------
+    ValueError
+        If the scene has point lights or a near viewer, and the method does not take values.
+    """
+    raster = rasterise(scene)
+    if design.takes_values:
+        cut, count = cut_local_spans(scene, raster, design.interpolator)
+        cut = sort_by_material(cut, scene.mesh.material)
+        spans = quantise_spans(cut, scene.mesh.material)
+        values = local_values(scene, cut, design.lights)
+        return PreparedFrame(raster, cut, count, dataclasses.replace(spans, values=values))
+    if scene.local:
+        raise ValueError("point lights and a near viewer need the method chord-local")
+    interpolator = design.interpolator
+    exponents = [material.exponent for material in scene.materials]
+    widest = min(map(interpolator.widest_span, exponents))
+    cut, count = cut_wide_spans(raster, widest, min(map(interpolator.largest_bend, exponents)))
+    cut = sort_by_material(cut, scene.mesh.material)
+    return PreparedFrame(raster, cut, count, quantise_spans(cut, scene.mesh.material))
+
+
 class FrameSimulator:
     """A pipeline, built once, that renders any number of frames.
 
@@ -78,7 +127,7 @@ class FrameSimulator:
         ``"cxxrtl"`` or ``"pysim"``.
     setup_interval : int, optional
     style : str
-        See `hdl.pipeline.ShadingPipelineUnit`.
+        See `hdl.pipeline.ShadingPipelineUnit`. Without lights there is no interval.
 
     Attributes
     ----------
@@ -103,7 +152,7 @@ class FrameSimulator:
         start = perf_counter()
         self.design = design
         self.engine = engine
-        self._unit = ShadingPipelineUnit(design, setup_interval, style)
+        self._unit = ShadingPipelineUnit(design, setup_interval if design.lights else None, style)
         spans, constants = _sample(design)
         expected = design.compute(spans, constants)
         run = self._run(spans, constants, len(expected.x))
@@ -112,14 +161,20 @@ class FrameSimulator:
         self.build_seconds = perf_counter() - start
 
     def _run(self, spans: Spans, constants: Sequence[FrameConstants], count: int, **options):
-        fields = ("x", "y", "length", "normal_left", "normal_right")
+        fields = {
+            name: getattr(spans, name) for name in self._unit.i.payload.shape().members if name != "values"
+        }
+        if self.design.takes_values and self.design.lights:
+            layout = self._unit.i.payload.shape().members["values"]
+            fields["values"] = values = np.zeros(len(spans), dtype_of(layout))
+            for name in layout.elem_shape.members:
+                values[name] = getattr(spans.values, name)
         writes = [of_material.writes() for of_material in constants]
         if len(constants) > 1:
-            fields += ("material",)
             writes = [of_material.writes(index) for index, of_material in enumerate(constants)]
         return simulate(
             self._unit,
-            {name: getattr(spans, name) for name in fields},
+            fields,
             count=count,
             write={name: np.concatenate([beats[name] for beats in writes]) for name in ("address", "data")},
             engine=self.engine,
@@ -157,13 +212,7 @@ class FrameSimulator:
                 f"the pipeline has {self.design.materials} materials, the scene {len(materials)}"
             )
         constants = [FrameConstants.of(scene, self.design.lights, index=index) for index in materials]
-        raster = rasterise(scene)
-        interpolator = self.design.interpolator
-        exponents = [material.exponent for material in scene.materials]
-        widest = min(map(interpolator.widest_span, exponents))
-        cut_raster, spans_cut = cut_wide_spans(raster, widest, min(map(interpolator.largest_bend, exponents)))
-        cut_raster = sort_by_material(cut_raster, scene.mesh.material)
-        spans = quantise_spans(cut_raster, scene.mesh.material)
+        raster, cut_raster, spans_cut, spans = prepare(scene, self.design)
         rastered = perf_counter()
         count = len(cut_raster.span)
         report = None if progress is None else lambda done: progress(done, count)
@@ -225,9 +274,14 @@ def compare(scene: Scene, design: ShadingPipeline, frame: SimulatedFrame) -> Com
     """
     start = perf_counter()
     interpolator = design.interpolator
-    same_method = shade_spans(
-        scene, frame.cut_raster, interpolator.exact_normals, design.model, interpolator.uses_chord
-    )
+    if design.takes_values:
+        values = local_values(scene, frame.cut_raster)
+        cosine, one_minus_cosine = interpolator.exact_operands(values, frame.cut_raster.length)
+        same_method = shade_operands(scene, frame.cut_raster, cosine, 1 - one_minus_cosine, design.model)
+    else:
+        same_method = shade_spans(
+            scene, frame.cut_raster, interpolator.exact_normals, design.model, interpolator.uses_chord
+        )
     golden = shade_spans(scene, frame.raster, "normalised", design.model)
     exact = render(scene, "phong", "blinn", raster=frame.raster)
     seconds = perf_counter() - start
@@ -251,25 +305,28 @@ def _colors(beats: np.ndarray) -> np.ndarray:
 def _sample(design: ShadingPipeline) -> tuple[Spans, list[FrameConstants]]:
     """A few spans of every kind, lights from all sides and materials, to check a model with."""
     rng = np.random.default_rng(2025)
-    length = np.r_[1, 2, 3, rng.integers(0, 24, 37)]
+    length = np.r_[1, 2, 3, rng.integers(0, min(24, 1 << design.length_bits), 37)]
     normals = rng.normal(size=(len(length), 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     turned = normals + rng.uniform(-0.3, 0.3, normals.shape)
     turned /= np.linalg.norm(turned, axis=1, keepdims=True)
     spans = Spans(
-        x=rng.integers(0, 4000, len(length)),
-        y=rng.integers(0, 4096, len(length)),
+        x=rng.integers(0, 4000, len(length)) >> (12 - design.x_bits),
+        y=rng.integers(0, 4096, len(length)) >> (12 - design.y_bits),
         length=length,
         normal_left=quantise(normals),
         normal_right=quantise(turned),
         material=np.arange(len(length)) // 5 % design.materials,
     )
+    if design.takes_values:
+        start, step = rng.uniform(0, 0.3, (2, 2, len(length), design.lights, 1))
+        spans = dataclasses.replace(spans, values=SpanValues.quantise(*(start + step * (0, 0.4, 1))))
     half = COMPONENT.max_code // 2
     vectors = rng.integers(-half, half, (2, design.lights, 3))
     constants = []
     for index in range(design.materials):
-        colors = rng.integers(0, 255 * 64, (3, design.lights, 3))
-        constants.append(
-            FrameConstants(7 + index, colors[2, 0] // 8, vectors[0], vectors[1], colors[0], colors[1])
-        )
+        colors = rng.integers(0, 255 * 64, (2, design.lights, 3))
+        exponent = design.exponent or 7 + index
+        ambient = rng.integers(0, 255 * 8, 3)
+        constants.append(FrameConstants(exponent, ambient, vectors[0], vectors[1], colors[0], colors[1]))
     return spans, constants

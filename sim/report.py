@@ -9,9 +9,20 @@ import numpy as np
 
 from golden.pipeline import ShadingPipeline
 from golden.scene import Scene
+from hdl.cost import Cost
+from sim.fit import Fit
 from sim.frame import Comparison, SimulatedFrame
 
-__all__ = ["ERRORS", "frame_figures", "print_counts", "print_errors", "print_figures", "worst_errors"]
+__all__ = [
+    "ERRORS",
+    "fit_figures",
+    "frame_figures",
+    "print_counts",
+    "print_errors",
+    "print_figures",
+    "print_fit",
+    "worst_errors",
+]
 
 ERRORS = {
     "arithmetic": "the same method and model in float64",
@@ -131,6 +142,79 @@ def print_figures(figures: Mapping[str, Any]) -> None:
     print_counts(figures["counts"])
     times = ", ".join(f"{name} {value:.2f}" for name, value in figures["seconds"].items())
     print(f"{'seconds':<12}{times}")
+
+
+def fit_figures(
+    fit: Fit, settings: Mapping[str, Any], frame: SimulatedFrame, full_frame: SimulatedFrame | None
+) -> dict[str, Any]:
+    """What a fitted pipeline leaves out, and what that saves, each omission on top of those before it.
+
+    Parameters
+    ----------
+    fit : Fit
+        The pipeline and what it leaves out.
+    settings : mapping
+        ``setup_interval`` and ``style``.
+    frame : SimulatedFrame
+        Its frame.
+    full_frame : SimulatedFrame or None
+        That of the full pipeline, if it has been simulated.
+    """
+    full, steps = fit.costs(settings["setup_interval"], settings["style"])
+    before = [full, *steps]
+    figures = {
+        "full": _cost_figures(full),
+        "fitted": _cost_figures(before[-1]),
+        "omissions": [
+            {
+                "reason": omission.reason,
+                "saves": {
+                    name: count - _cost_figures(after)[name] for name, count in _cost_figures(cost).items()
+                },
+            }
+            for omission, cost, after in zip(fit.omissions, before, steps, strict=False)
+        ],
+        "clocks": frame.clocks,
+    }
+    if full_frame is not None:
+        figures["full_clocks"] = full_frame.clocks
+        difference = np.abs(full_frame.image.astype(np.int16) - frame.image)
+        figures["largest_difference"] = int(difference.max(initial=0))
+        figures["different_pixels"] = int(np.count_nonzero(difference.any(axis=-1)))
+    return figures
+
+
+def _cost_figures(cost: Cost) -> dict[str, int]:
+    return {
+        "cells": cost.cells,
+        "multipliers": cost.multiplier_count,
+        "register_bits": cost.register_bits,
+        "memory_bits": cost.rom_bits + cost.ram_bits,
+    }
+
+
+def print_fit(figures: Mapping[str, Any] | None) -> None:
+    """Print what `fit_figures` has found; nothing for ``None``."""
+    if figures is None:
+        return
+    for omission in figures["omissions"]:
+        saves = ", ".join(
+            f"{count:,} {name.replace('_', ' ')}" for name, count in omission["saves"].items() if count
+        )
+        print(f"{'left out':<12}{omission['reason']}; saves {saves or 'nothing'}")
+    full, fitted = figures["full"], figures["fitted"]
+    parts = [f"{count:,} of {full[name]:,} {name.replace('_', ' ')}" for name, count in fitted.items()]
+    if "full_clocks" in figures:
+        parts.append(f"{figures['clocks']:,} of {figures['full_clocks']:,} clocks")
+    print(f"{'fitted':<12}{', '.join(parts)}")
+    if "full_clocks" in figures:
+        text = "the frame is that of the full pipeline, to the bit"
+        if figures["different_pixels"]:
+            text = (
+                f"{figures['different_pixels']:,} pixels differ from the full pipeline's, by at most "
+                f"{figures['largest_difference']} of 255"
+            )
+        print(f"{'':<12}{text}")
 
 
 def print_counts(counts: Mapping[str, int]) -> None:

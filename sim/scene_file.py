@@ -12,7 +12,7 @@ from typing import Any
 from golden.camera import PROJECTIONS
 from golden.intensity import MAX_LIGHTS
 from golden.pipeline import METHODS, MODELS
-from golden.scene import BACK_FACES, LARGEST_SIDE
+from golden.scene import BACK_FACES, LARGEST_SIDE, VIEWERS
 from golden.specular import MAX_EXPONENT
 from hdl.pipeline import STYLES
 from sim.errors import InputError
@@ -38,9 +38,10 @@ class SceneFile:
         The file.
     values : dict
         What the file sets and nothing else, by the names of the options of ``blysk render``, in the types
-        that these have. Beside them ``position``, ``target``, ``up``, ``field_of_view`` and
-        ``ambient_light``, which have no option. ``mesh`` is ``teapot`` or a path: one that is not absolute
-        starts at the scene file's folder.
+        that these have. Beside them ``position``, ``target``, ``up``, ``field_of_view``, ``ambient_light``,
+        ``viewer`` and ``point_lights``, which have no option; the latter, positions and colours, stands where
+        there are such among the lights, and ``lights`` holds the others. ``mesh`` is ``teapot`` or a path:
+        one that is not absolute starts at the scene file's folder.
     keys : dict
         The key of each value, for messages: ``material.exponent``.
     """
@@ -81,9 +82,11 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         up = [0, 1, 0]
         field_of_view = 30                  # degrees, vertical, 1 to 179
         # position, target                  # in place of view, in the mesh's own units
+        viewer = "distant"                  # "near": highlights as seen from a perspective camera
 
         [[lights]]                          # one table a light, none: lights = []
         direction = [-0.5, 0.8, 0.7]        # to the light
+        # position                          # of a point light, in place of direction, in the mesh's own units
         color = [1, 1, 1]                   # or "#rrggbb"; may exceed 1
 
         [material]
@@ -98,6 +101,9 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         highlight = "dot"                   # "chord"
         setup_interval = 4
         style = "throughput"                # "compact"
+        gate = false                        # the highlight gate
+        fit = false                         # only what the scene needs
+        words = false                       # with fit: in words as short as the error bound allows
 
     The values' ranges are those of the command line. The mesh and what follows from several values at once
     are not looked at.
@@ -131,6 +137,7 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
             raise _KeyRefused("mesh.triangles", "only the teapot is tessellated", "leave it out for a file")
     except _KeyRefused as refusal:
         raise InputError(f"{shown}, {refusal.key}", refusal.reason, refusal.remedy) from None
+    _part_lights(values, keys)
     if values["mesh"] != "teapot":
         values["mesh"] = os.path.join(os.path.dirname(os.fspath(path)), values["mesh"])
     return SceneFile(os.fspath(path), values, keys)
@@ -285,6 +292,12 @@ def _choice(names: Sequence[str]) -> _Reader:
     return read
 
 
+def _truth(value):
+    if not isinstance(value, bool):
+        raise _Refused(f"{_shown(value)} is neither true nor false", "give true or false")
+    return value
+
+
 def _size(value):
     side = _whole(1, LARGEST_SIDE)
     if not isinstance(value, list) or len(value) != 2:
@@ -314,16 +327,35 @@ def _lights(value):
             raise _KeyRefused(key, f"{_shown(entry)} is no table", remedy)
         light = {}
         _read_table(entry, _LIGHT, f"{key}.", light, {})
-        if "direction" not in light:
-            raise _KeyRefused(f"{key}.direction", "is missing", "give [x, y, z], from the mesh to the light")
-        lights.append((*light["direction"], *light.get("color", _WHITE)))
+        if "direction" not in light and "position" not in light:
+            remedy = "give [x, y, z], from the mesh to the light, or a position"
+            raise _KeyRefused(f"{key}.direction", "is missing", remedy)
+        if "direction" in light and "position" in light:
+            raise _KeyRefused(key, "holds both direction and position", "leave one of them out")
+        lights.append(light)
     return tuple(lights)
+
+
+def _part_lights(values: dict, keys: dict) -> None:
+    """Lights with a direction and lights with a position, each as numbers: the vector, then the colour."""
+    if "lights" in values:
+        lights = values["lights"]
+        values["lights"], at = (
+            tuple((*light[name], *light.get("color", _WHITE)) for light in lights if name in light)
+            for name in ("direction", "position")
+        )
+        if at:
+            values["point_lights"], keys["point_lights"] = at, keys["lights"]
 
 
 _DIRECTION = "give [x, y, z], a vector other than 0"
 _PLACE = "give [x, y, z]"
 
-_LIGHT = {"direction": ("direction", _vector(_DIRECTION)), "color": ("color", _color(math.inf))}
+_LIGHT = {
+    "direction": ("direction", _vector(_DIRECTION)),
+    "position": ("position", _vector(_PLACE, zero=True)),
+    "color": ("color", _color(math.inf)),
+}
 
 _TOP = {
     "size": ("size", _size),
@@ -343,6 +375,7 @@ _TOP = {
         "target": ("target", _vector(_PLACE, zero=True)),
         "up": ("up", _vector(_DIRECTION)),
         "field_of_view": ("field_of_view", _number(1, 179, "give 1 to 179 degrees")),
+        "viewer": ("viewer", _choice(VIEWERS)),
     },
     "lights": ("lights", _lights),
     "material": {
@@ -356,6 +389,9 @@ _TOP = {
         "model": ("model", _choice(MODELS)),
         "highlight": ("highlight", _choice(HIGHLIGHTS)),
         "setup_interval": ("setup_interval", _whole(1, 46)),
+        "gate": ("gate", _truth),
+        "fit": ("fit", _truth),
+        "words": ("words", _truth),
         "style": ("style", _choice(STYLES)),
     },
 }

@@ -1,10 +1,10 @@
 """Switching activity: how many register bits change, by submodule, while a component runs."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from amaranth.hdl import Cat, Const, Fragment, Module, Signal, Value
+from amaranth.hdl import Cat, Const, Elaboratable, Fragment, Module, Signal, Value
 from amaranth.lib import data
 from amaranth.lib.wiring import Component, Out
 
@@ -13,6 +13,7 @@ from .engine import Run, simulate
 __all__ = ["ToggleCounter", "count_toggles"]
 
 _BITS = 48
+_WORD = 32
 
 
 class ToggleCounter(Component):
@@ -61,12 +62,16 @@ class ToggleCounter(Component):
                 ]
             else:
                 m.d.comb += Value.cast(inner).eq(Value.cast(outer))
-        for path, registers in _registers(fragment).items():
-            now = Cat(registers)
-            init = Cat(_init(register) for register in registers)
-            before = Signal(len(now), init=Const.cast(init).value, name="before")
+        # Registers that stay: with a constant, a conjunction is put together from single bits, and takes
+        # minutes to compile.
+        masks = [Signal(_WORD, init=mask, name=f"mask_{step}") for step, mask in enumerate(_Ones.MASKS)]
+        m.d.sync += [mask.eq(mask) for mask in masks]
+        for number, (path, registers) in enumerate(_registers(fragment).items()):
+            counts = [_Ones(*word, masks) for word in _words(registers)]
+            for index, count in enumerate(counts):
+                m.submodules[f"ones_{number}_{index}"] = count
             total = Signal(_BITS, name="total")
-            m.d.sync += [before.eq(now), total.eq(total + _ones(m, now ^ before))]
+            m.d.sync += total.eq(total + _total(counts))
             m.d.comb += self.status[path].eq(total)
         return m
 
@@ -83,8 +88,8 @@ def count_toggles(
     beats, **options
         Those of `simulate`.
     engine : str
-        As for `simulate`. The sums take the compiled engine over a minute to build; for a small frame the
-        interpreted one is done before.
+        As for `simulate`. With the sums a component takes the compiled engine three times as long to build,
+        a pipeline half a minute; the interpreted one is done before with some hundred clocks.
 
     Returns
     -------
@@ -114,18 +119,60 @@ def _registers(fragment: Fragment, path: str = "top") -> dict[str, list[Value]]:
     return found
 
 
-def _init(register: Value) -> Const:
-    return Const(getattr(register, "init", 0), len(register))
+def _init(register: Value) -> int:
+    return Const(getattr(register, "init", 0), len(register)).value
 
 
-def _ones(m: Module, bits: Value) -> Value:
-    """Number of ones: sums of neighbours in fields of 2, 4, 8, ... bits, all of a size at once."""
-    width, field = 1 << (len(bits) - 1).bit_length(), 1
-    while field < width:
-        fields = Signal(width)
-        m.d.comb += fields.eq(bits)
-        # Every other field of all.
-        mask = ((1 << width) - 1) // ((1 << 2 * field) - 1) * ((1 << field) - 1)
-        bits = ((fields & mask) + (fields[field:] & mask))[:width]
-        field *= 2
-    return bits
+def _words(registers: Sequence[Value]) -> Iterator[tuple[Value, int]]:
+    """Bits of the registers, 32 together, and what they are after reset.
+
+    An engine computes with such words at once; a word of all bits would take minutes to compile.
+    """
+    parts, initial, width = [], 0, 0
+    for register in registers:
+        start, init = 0, _init(register)
+        while start < len(register):
+            part = register[start : start + _WORD - width]
+            parts.append(part)
+            initial |= (init >> start & (1 << len(part)) - 1) << width
+            start, width = start + len(part), width + len(part)
+            if width == _WORD:
+                yield Cat(parts), initial
+                parts, initial, width = [], 0, 0
+    if parts:
+        yield Cat(parts), initial
+
+
+class _Ones(Elaboratable):
+    """Bits of a word that are not what they were a clock before: how many of each byte, in that byte.
+
+    A module of its own, of which an engine that looks for changes has little to do again.
+    """
+
+    # Neighbours are added up in fields of 1, 2 and 4 bits.
+    MASKS = tuple(((1 << _WORD) - 1) // ((1 << 2 * field) - 1) * ((1 << field) - 1) for field in (1, 2, 4))
+
+    def __init__(self, now: Value, init: int, masks: Sequence[Value]):
+        self._now, self._init, self._masks = now, init, masks
+        self.bytes = Signal(_WORD)
+
+    def elaborate(self, platform):
+        m = Module()
+        before = Signal(len(self._now), init=self._init)
+        m.d.sync += before.eq(self._now)
+        ones = self._now ^ before
+        for step, mask in enumerate(self._masks):
+            fields = Signal(_WORD, name=f"fields_{step}")
+            m.d.comb += fields.eq((ones & mask) + ((ones >> (1 << step)) & mask))
+            ones = fields
+        m.d.comb += self.bytes.eq(ones)
+        return m
+
+
+def _total(counts: Sequence[_Ones]) -> Value:
+    """Sum of the bytes. One holds 8 at most: those of 31 words add up to less than 256."""
+    total = Const(0)
+    for start in range(0, len(counts), 31):
+        bytes_ = sum((count.bytes for count in counts[start : start + 31]), Const(0, _WORD))[:_WORD]
+        total = total + sum((bytes_.word_select(k, 8) for k in range(_WORD // 8)), Const(0))
+    return total

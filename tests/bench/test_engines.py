@@ -9,7 +9,7 @@ from amaranth.lib import data, stream
 from amaranth.lib.wiring import Component, In, Out
 
 import bench.engines
-from bench.engines import Speed, main, measure
+from bench.engines import Speed, main, measure, picture_seconds
 from sim.beats import pack
 from sim.engine import Ports, simulate
 
@@ -71,26 +71,33 @@ def test_measure():
 
 
 @pytest.mark.parametrize(
-    ("cxxrtl", "pysim", "verilator", "missed"),
+    ("cxxrtl", "pysim", "verilator", "seconds", "missed"),
     [
-        (7.5e6, 2500.0, 5e6, None),
-        (4.9e6, 2500.0, 4e6, "5,000,000 pixels a second"),
-        (7.5e6, 40e3, 5e6, "200 times pysim"),
-        (7.5e6, 2500.0, 7.6e6, "1 times Verilator"),
-        (4.9e6, 40e3, 6e6, "5,000,000 pixels a second, 200 times pysim, 1 times Verilator"),
+        (7.5e6, 2500.0, 5e6, (1.9, 2.5), None),
+        (7.5e6, 2500.0, 5e6, (6.0, 1.9), None),
+        (4.9e6, 2500.0, 4e6, (1.9, 1.9), "5,000,000 pixels a second"),
+        (7.5e6, 40e3, 5e6, (1.9, 1.9), "200 times pysim"),
+        (7.5e6, 2500.0, 7.6e6, (1.9, 1.9), "1 times Verilator"),
+        (7.5e6, 2500.0, 5e6, (2.0, 2.1), "a picture in 2 s"),
+        (4.9e6, 40e3, 6e6, (1.9, 1.9), "5,000,000 pixels a second, 200 times pysim, 1 times Verilator"),
     ],
 )
-def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, missed):
+def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, seconds, missed):
     """The spans, the pixels expected of them, the table and the exit status, without the runs."""
     asked = {}
 
-    def measured(component, beats, **others):
+    def measured(gate, beats, **others):
+        assert others["rival"] is not gate
+        if gate:
+            assert others["expected"] is asked["expected"]
+            return Speed(6e6, 2000.0, 6e6, 2000.0, build=4.5, clocks=9000)
         asked.update(others, beats=beats)
         return Speed(cxxrtl, pysim, cxxrtl, pysim, build=4.25, clocks=9000, verilator_beats=verilator)
 
     monkeypatch.setattr(bench.engines, "measure", measured)
     # Amaranth complains of components that are made and not used.
-    monkeypatch.setattr(bench.engines, "ShadingPipelineUnit", lambda design: None)
+    monkeypatch.setattr(bench.engines, "ShadingPipelineUnit", lambda design: design.gate)
+    monkeypatch.setattr(bench.engines, "picture_seconds", lambda: seconds)
     assert main(1000, 750) == (0 if missed is None else 1)
     lines = capsys.readouterr().out.splitlines()
     pixels = asked["beats"]["length"].sum()
@@ -102,7 +109,26 @@ def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, missed):
     assert lines[2].split() == ["cxxrtl", f"{cxxrtl:,.0f}", "1.00x"]
     assert lines[3].split() == ["verilator", f"{verilator:,.0f}", f"{cxxrtl / verilator:,.2f}x"]
     assert lines[4].split() == ["pysim", f"{pysim:,.0f}", f"{cxxrtl / pysim:,.2f}x"]
+    assert lines[5].split() == ["cxxrtl,", "gate", "6,000,000", f"{cxxrtl / 6e6:,.2f}x"]
+    assert f" {seconds[0]:.2f} s by the clock, {seconds[1]:.2f} s of the processor" in lines[7]
     assert lines[-1] == ("every target met" if missed is None else f"missed: {missed}")
+
+
+def test_picture_seconds(monkeypatch):
+    """The command is run as a user would, and the first picture, which builds the model, does not count."""
+    calls = []
+    run = bench.engines.subprocess.run
+
+    def counted(command, **options):
+        # Without a cache each would build; the interpreted engine builds nothing.
+        calls.append([*command, "--engine", "pysim"])
+        return run(calls[-1], **options)
+
+    monkeypatch.setattr(bench.engines.subprocess, "run", counted)
+    wall, processor = picture_seconds(100, "16x12", repeats=1)
+    assert len(calls) == 2
+    assert processor > 0.01
+    assert wall > 0.01
 
 
 class Rival:

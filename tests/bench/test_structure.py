@@ -1,12 +1,15 @@
 # amaranth: UnusedElaboratable=no
 """Structures: read right from a component made for it, and complete for the devices."""
 
+from functools import cache
+from itertools import pairwise
+
 import pytest
 from amaranth.hdl import Module, Mux, Signal, signed, unsigned
 from amaranth.lib import data, memory, stream
 from amaranth.lib.wiring import Component, In, Out
 
-from bench.drawing import _Layout, draw_structure
+from bench.drawing import _WIDEST, _bands, _Layout, draw_structure
 from bench.structure import Graph, Node, describe_shape, graph_of, layers
 from golden.quadratic_evaluator import QuadraticEvaluator
 from hdl.bisection import BisectionUnit
@@ -19,6 +22,13 @@ from hdl.gpq import GPQUnit
 from hdl.light import LightUnit
 from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
 from hdl.specular import SpecularUnit
+
+
+@cache
+def structure_of(unit):
+    """A unit's structure, to be looked at only."""
+    return graph_of(unit())
+
 
 VECTOR = data.ArrayLayout(signed(8), 3)
 
@@ -103,9 +113,9 @@ FLAT = [DotProductUnit, GPQUnit, DifferenceSetupUnit, DifferenceAccumulatorUnit,
 
 @pytest.mark.parametrize("unit", FLAT)
 def test_parts_are_those_of_the_netlist(unit):
-    graph, cost = graph_of(unit()), cost_of(unit())
-    multipliers = sum(node.copies * node.operations["×"] for node in graph.nodes.values())
-    assert multipliers == cost.multiplier_count + cost.constant_multipliers
+    graph, cost = structure_of(unit), cost_of(unit())
+    for symbol, count in (("×", cost.multiplier_count), ("×c", cost.constant_multipliers)):
+        assert sum(node.copies * node.operations[symbol] for node in graph.nodes.values()) == count
     bits = 0
     for node in graph.nodes.values():
         if node.kind == "memory":
@@ -123,7 +133,7 @@ UNITS = [*FLAT, BisectionUnit, LightUnit, lambda: QuadraticEvaluatorUnit(Quadrat
 
 @pytest.mark.parametrize("unit", UNITS)
 def test_every_port_takes_part(unit):
-    graph = graph_of(unit())
+    graph = structure_of(unit)
     sources, targets = graph.neighbours()
     for number, node in graph.nodes.items():
         if node.kind == "input":
@@ -134,17 +144,21 @@ def test_every_port_takes_part(unit):
 
 @pytest.mark.parametrize("unit", UNITS)
 def test_columns_and_boxes(unit):
-    graph = graph_of(unit())
+    graph = structure_of(unit)
     columns, back = layers(graph)
     for edge in graph.edges:
         assert (columns[edge[0]] < columns[edge[1]]) == (edge not in back)
-    boxes = [place for place in _Layout(graph).places if place.node]
-    assert len(boxes) == len(graph.nodes)
-    for k, a in enumerate(boxes):
-        for b in boxes[:k]:
-            apart_x = abs(a.x - b.x) >= (a.width + b.width) / 2
-            apart_y = abs(a.y - b.y) >= (a.height + b.height) / 2 - 1e-6
-            assert apart_x or apart_y
+    shown = 0
+    for band in _bands(graph):
+        boxes = [place for place in _Layout(band).places if place.node]
+        assert len(boxes) == len(band.graph.nodes)
+        shown += sum(place.node.kind != "tag" for place in boxes)
+        for k, a in enumerate(boxes):
+            for b in boxes[:k]:
+                apart_x = abs(a.x - b.x) >= (a.width + b.width) / 2
+                apart_y = abs(a.y - b.y) >= (a.height + b.height) / 2 - 1e-6
+                assert apart_x or apart_y
+    assert shown == len(graph.nodes)
 
 
 class Chain(Component):
@@ -186,7 +200,7 @@ def test_submodules_are_boxes():
 
 def test_large_structures_are_cut_down():
     few = graph_of(BisectionUnit(), most=1)
-    assert len(few.nodes) < len(graph_of(BisectionUnit()).nodes)
+    assert len(few.nodes) < len(structure_of(BisectionUnit).nodes)
     assert {node.name for node in few.nodes.values()} >= {"normal_a", "normal_b", "wide"}
     assert all(node.kind != "register" or node.operations["×"] for node in few.nodes.values())
 
@@ -201,6 +215,56 @@ def test_loop_leads_back():
     assert back == {(c, b)}
     figure = draw_structure(graph)
     assert figure.get_size_inches()[0] > 0
+
+
+def row_of_boxes(count):
+    """A chain of boxes, with arrows from the first to the last and back from the last to the second."""
+    graph = Graph()
+    numbers = [graph.add(Node("register", f"register_{k}", "18")) for k in range(count)]
+    for a, b in pairwise(numbers):
+        graph.connect(a, b, True)
+    graph.connect(numbers[0], numbers[-1], False)
+    graph.connect(numbers[-1], numbers[1], True)
+    return graph
+
+
+def test_a_wide_drawing_is_folded():
+    graph = row_of_boxes(40)
+    bands = _bands(graph)
+    assert len(bands) > 3
+    assert sorted(number for band in bands for number in band.graph.nodes if number in graph.nodes) == list(
+        range(40)
+    )
+    # An arrow is in a band, or it ends at a tag and starts at one of the same text.
+    ways = {}
+    leaves, arrives = {}, []
+    for band in bands:
+        for (a, b), is_data in band.graph.edges.items():
+            if a in graph.nodes and b in graph.nodes:
+                ways[a, b] = is_data
+            elif a in graph.nodes:
+                leaves[band.graph.nodes[b].name] = a
+            else:
+                arrives.append((band.graph.nodes[a].name, b, is_data))
+    ways |= {(leaves[text], b): is_data for text, b, is_data in arrives}
+    assert ways == graph.edges
+    # No tag's number is another's.
+    assert len({text.split()[0] for text in leaves}) == len(leaves) == len(bands) + 1
+    assert draw_structure(graph).get_size_inches()[0] * 72 < 1.15 * _WIDEST
+
+
+def test_a_narrow_drawing_is_not_folded():
+    graph = row_of_boxes(4)
+    (band,) = _bands(graph)
+    assert band.graph is graph
+    assert (3, 1) in band.back
+
+
+def test_drawings_have_the_width_of_a_page():
+    for unit in (BisectionUnit, DifferenceSetupUnit):
+        graph = structure_of(unit)
+        assert len(_bands(graph)) > 1
+        assert draw_structure(graph).get_size_inches()[0] * 72 < 1.15 * _WIDEST
 
 
 def test_shapes():

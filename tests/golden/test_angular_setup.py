@@ -192,7 +192,7 @@ def test_each_figure(degrees, normal_pairs):
     left, right = normal_pairs(rng, count, degrees)
     vector, _ = normal_pairs(rng, count, 0)
     length = rng.integers(2, 4096, count)
-    angle, phase, step, cos_beta, opposite = setup(*(quantise(v) for v in (left, right, vector)), length)
+    angle, phase, step, cos_beta, wide = setup(*(quantise(v) for v in (left, right, vector)), length)
     to_left, to_right = dot(left, vector), dot(right, vector)
     side = (to_right - np.cos(psi) * to_left) / np.sin(psi)
     # Codes are off by under a step in each component; sin psi turns that into an angle of the plane.
@@ -205,16 +205,16 @@ def test_each_figure(degrees, normal_pairs):
         assert np.abs(turn * radius).max() <= 2 * plane
     off = np.abs(step.values * (length - 1) - angle.values)
     assert np.all(off <= (2.0**-19 / 0.159 + 2.0**-17) * angle.values + 4095 * 2.0**-40)
-    assert not opposite.any()
+    assert not wide.any()
 
 
 def test_stiff_equal_normals(normal_pairs):
     left, _, vector, length = operands(normal_pairs, 7, 0)
     result = setup(left, left, vector, length)
-    angle, _, step, _, opposite = result
+    angle, _, step, _, wide = result
     assert not angle.codes.any()
     assert not step.codes.any()
-    assert not opposite.any()
+    assert not wide.any()
     assert np.abs(cosines(result, 0) - dot(left, vector) / ONE**2).max() <= UNIT.error(0)
 
 
@@ -231,14 +231,15 @@ def test_stiff_normals_one_step_apart(normal_pairs):
         assert np.abs(cosines(result, pixel) - dot(normal, vector) / ONE**2).max() <= UNIT.error(0.001)
 
 
-def test_stiff_opposite_normals_are_flagged(normal_pairs):
+def test_stiff_wide_spans_are_flagged(normal_pairs):
     left, right, vector, length = operands(normal_pairs, 9, 180)
     right = -left
     result = setup(left, right, vector, length)
     assert result[4].all()
     assert np.all(result[0].values == 0.5)
-    left, right, vector, length = operands(normal_pairs, 9, 179.9)
-    assert not setup(left, right, vector, length)[4].any()
+    for degrees, flagged in ((150.0, False), (150.01, True), (179.9, True)):
+        result = setup(*operands(normal_pairs, 9, degrees))
+        assert (result[4] == flagged).all()
 
 
 @pytest.mark.parametrize("degrees", [0.5, 10, 60])

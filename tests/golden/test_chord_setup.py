@@ -24,10 +24,10 @@ def setup(left, right, direction, halfway, length):
 def at(differences, step, light=0):
     """Values of the quadratic at a pixel of each span, by exact integers."""
     start, first, second = (d.codes[:, light].astype(object) for d in differences)
-    shift = ChordSetup.FORMAT.fraction_bits - differences.start.format.fraction_bits
+    shift = ChordSetup().format.fraction_bits - differences.start.format.fraction_bits
     step = step.astype(object)
     total = (start << shift) + step * first + step * (step - 1) // 2 * second
-    return total.astype(float) * ChordSetup.FORMAT.step
+    return total.astype(float) * ChordSetup().format.step
 
 
 def unit(codes):
@@ -112,6 +112,22 @@ def test_error(angle, normal_pairs):
     assert diffuse > p.diffuse_error(widest) / 8
 
 
+@pytest.mark.parametrize("terms", [1, 2, 3])
+@pytest.mark.parametrize("fraction_bits", [36, 40, 46])
+def test_fewer_terms_and_bits_keep_the_bounds(terms, fraction_bits, normal_pairs, monkeypatch):
+    """Those of a span as wide and as long as they allow; the bounds are hardly larger than in full."""
+    rng = np.random.default_rng(terms)
+    p = ChordSetup(terms, fraction_bits)
+    assert p.longest == {36: 127, 40: 511, 46: 4095}[fraction_bits]
+    angle = p.max_angle - 0.01
+    monkeypatch.setitem(globals(), "ChordSetup", lambda: p)
+    for length in (2, 3, p.longest):
+        check(rng, angle, length, normal_pairs)
+    for function in ("highlight_error", "diffuse_error"):
+        full = getattr(type(p)(), function)(angle)
+        assert full / 2 < getattr(p, function)(angle) < 1.1 * full
+
+
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
 @pytest.mark.parametrize("angle", ANGLES)
 def test_stiff_angles_and_lengths(angle, length, normal_pairs):
@@ -177,8 +193,8 @@ def test_stiff_drift_over_4095_pixels(bend):
     slopes = rng.integers(-(2**33), 2**33, (count, 1))
     bends = rng.integers(-(2**17), 2**17, (count, 1)) * bend
     start = Fixed(p.CHORD_FORMAT, np.zeros((count, 1), dtype=np.int64))
-    differences = p._differences(
-        start, Fixed(p.SLOPE_FORMAT, slopes), Fixed(p.BEND_FORMAT, bends), *p._steps(length)
+    differences = p.differences(
+        start, Fixed(p.SLOPE_FORMAT, slopes), Fixed(p.BEND_FORMAT, bends), *p.steps(length)
     )
     reciprocal, shift, square, square_shift = DifferenceSetup().steps(np.array([4095]))
     k = 4094

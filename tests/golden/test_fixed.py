@@ -148,3 +148,17 @@ def test_widest_numbers_stay_exact():
     for fraction_bits in (41, 20, 0):
         unit = Fraction(2) ** -fraction_bits
         assert exact(wide.truncate(fraction_bits)) == [floor(x / unit) * unit for x in exact(wide)]
+
+
+@pytest.mark.parametrize(
+    "format", [SQ(1, 17), UQ(0, 17), SQ(2, 42), UQ(2, 1), SQ(1, 0), SQ(1, 62), UQ(1, 62)]
+)
+def test_wrap_of_codes_of_any_size(format):
+    """Against Python's integers: sums that overflow an int64, and integers that do not fit one."""
+    rng = np.random.default_rng(format.width)
+    a, b = rng.integers(-(2**63), 2**63, (2, 5000))
+    low, modulus = format.min_code, 1 << format.width
+    exact = [(int(x) + int(y) - low) % modulus + low for x, y in zip(a, b, strict=True)]
+    assert format.wrap(a + b).tolist() == exact
+    assert format.wrap(a.astype(object) + b.astype(object)).tolist() == exact
+    assert format.wrap(np.array([low, format.max_code])).tolist() == [low, format.max_code]

@@ -102,9 +102,11 @@ def test_other_intensities_are_refused(intensity):
 
 
 def test_bad_arguments_are_refused():
-    for lights in (0, MAX_LIGHTS + 1):
-        with pytest.raises(ValueError, match=rf"^lights must be 1 to 16, not {lights}$"):
+    for lights in (-1, MAX_LIGHTS + 1):
+        with pytest.raises(ValueError, match=rf"^lights must be 0 to 16, not {lights}$"):
             Intensity(lights)
+    with pytest.raises(ValueError, match=r"^channels must be 1 or 3, not 2$"):
+        Intensity(channels=2)
     ambient, color, term = Fixed(COLOR, [0, 0, 0]), Fixed(COLOR, [[0, 0, 0]]), Fixed(TERM, [[0]])
     other = Fixed(UQ(12, 5), [[0, 0, 0]])
     for colors in ((other, color, color), (ambient, other, color), (ambient, color, other)):
@@ -119,4 +121,5 @@ def test_clocks_of_the_compact_style():
     """Three for each term that is not 0, three for a pixel without any; by hand."""
     diffuse = Fixed(TERM, [[0, 0], [0, 0], [1, 0], [1, 0], [7, TERM.max_code], [0, 0]])
     specular = Fixed(TERM, [[0, 0], [0, 5], [0, 0], [1, 0], [3, TERM.max_code], [2, 2]])
-    assert Intensity.clocks(diffuse, specular).tolist() == [3, 3, 3, 6, 12, 6]
+    assert Intensity().clocks(diffuse, specular).tolist() == [3, 3, 3, 6, 12, 6]
+    assert Intensity(channels=1).clocks(diffuse, specular).tolist() == [1, 1, 1, 2, 4, 2]

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from golden.geometry import normalise
-from golden.lighting import Light, Material, gram_determinant, halfway_vector, intensity, saturate
+from golden.lighting import (
+    Light,
+    Material,
+    gram_determinant,
+    halfway_vector,
+    intensity,
+    intensity_of_cosines,
+    saturate,
+)
 from golden.reflection import REFLECTION_MODELS, reflect
 
 V = np.array([0.0, 0.0, 1.0])
@@ -170,6 +178,94 @@ def test_halfway_vector():
     assert halfway_vector(V, V) == pytest.approx(V)
 
 
+def test_halfway_vectors_of_arrays():
+    """Each as alone; opposite vectors have none."""
+    lights, viewers = random_units(50, 8), random_units(50, 9)
+    viewers[::5] = -lights[::5]
+    half = halfway_vector(lights, viewers)
+    for light, viewer, found in zip(lights, viewers, half, strict=True):
+        np.testing.assert_array_equal(found, halfway_vector(light, viewer))
+    assert not half[::5].any()
+    np.testing.assert_array_equal(halfway_vector(lights, V), [halfway_vector(light, V) for light in lights])
+
+
+# Point lights and a near viewer
+
+
+def test_point_light_towards():
+    light = Light(position=(1, 2, 3))
+    assert light.direction is None
+    assert light.towards(np.array([1.0, 2.0, 1.0])) == pytest.approx((0, 0, 1))
+    points = np.array([[1.0, 2, 3], [4, 2, 3], [1, 2 + 3e-200, 3 - 4e-200], [1, 5, -1]])
+    expected = [(0, 0, 0), (-1, 0, 0), (0, 0, 0), (0, -0.6, 0.8)]
+    assert light.towards(points) == pytest.approx(np.array(expected))
+    assert Light(direction=(0, 0, 2)).towards(points) == pytest.approx((0, 0, 1))
+    with pytest.raises(ValueError, match=r"^a point light needs the points that it lights$"):
+        light.towards()
+
+
+@pytest.mark.parametrize("chord", [False, True])
+@pytest.mark.parametrize("model", REFLECTION_MODELS[:6])
+def test_local_formula_point_by_point(model, chord):
+    """Each point as if it were alone, with a directional light and a distant viewer of its own."""
+    rng = np.random.default_rng(10)
+    normals, points = random_units(60, 11), rng.normal(size=(60, 3))
+    eye = np.array([0.3, 0.4, 5.0])
+    viewers = normalise(eye - points)
+    lights = [Light(position=(2, 1, 3), color=(0.5, 0.6, 0.7)), Light((-1, 4, 1)), Light(position=(0, -4, 1))]
+    material = Material((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), 9)
+    found = intensity(normals, material, lights, grey(0.5), viewers, model, chord, points)
+    for normal, point, viewer, value in zip(normals, points, viewers, found, strict=True):
+        alone = [
+            Light(np.subtract(light.position, point), light.color) if light.position else light
+            for light in lights
+        ]
+        expected = intensity(normal, material, alone, grey(0.5), viewer, model, chord)
+        assert value == pytest.approx(expected, abs=1e-12)
+    assert np.ptp(found, axis=0).min() > 0.1
+
+
+def test_far_point_light_is_a_directional_one():
+    normals, points = random_units(200, 12), random_units(200, 13)
+    material = Material(grey(0.1), grey(0.5), grey(0.5), 10)
+    near, far = Light(position=(3e7, 2e7, 6e7)), Light((3, 2, 6))
+    ambient = grey(1), V, "blinn"
+    found = intensity(normals, material, [near], *ambient, points=points)
+    assert found == pytest.approx(intensity(normals, material, [far], *ambient), abs=1e-6)
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+def test_stiff_point_light_on_the_surface_and_behind_it(model):
+    """At its own place it gives nothing; with L = -V there is no highlight; nothing is NaN."""
+    material = Material(grey(0.1), grey(0.5), grey(0.5), 1)
+    light = Light(position=(0, 0, -1))
+    points = np.array([[0.0, 0, -1], [0, 0, 0], [0, 0, -2]])
+    normals = np.array([[0.0, 0, 1], [0, 0, -1], [0, 0, 1]])
+    value = intensity(normals, material, [light], grey(1), V, model, points=points)
+    # At the light, between light and viewer (L = -V) seen from behind, and beyond it, lit from the front.
+    assert value[0] == pytest.approx(grey(0.1))
+    assert value[1] == pytest.approx(grey(0.6))
+    assert value[2] == pytest.approx(grey(1.1), abs=1e-9)
+    # A point at the viewer's own place has no V.
+    nowhere = intensity(normals, material, [light], grey(1), np.zeros((3, 3)), model, points=points)
+    assert np.isfinite(nowhere).all()
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS[1:])
+def test_intensity_of_cosines(model):
+    """The same sum from N·L and N·H."""
+    normals = random_units(300, 14)
+    lights = [Light((1, 2, 3), (0.5, 0.6, 0.7)), Light((-3, 2, 1))]
+    material = Material((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), 9)
+    cosine = np.stack([normals @ light.direction for light in lights], axis=-1)
+    highlight = np.stack([normals @ halfway_vector(light.direction, V) for light in lights], axis=-1)
+    found = intensity_of_cosines(material, lights, grey(0.5), cosine, highlight, model)
+    expected = intensity(normals, material, lights, grey(0.5), V, model)
+    assert found == pytest.approx(expected, abs=1e-14)
+    with pytest.raises(ValueError, match=r"model must be one of phong, .* not 'gauss'"):
+        intensity_of_cosines(material, lights, grey(0.5), cosine, highlight, "gauss")
+
+
 def test_gram_identity():
     normals, lights, viewers = random_units(300, 5), random_units(300, 6), random_units(300, 7)
     product = (np.cross(lights, normals) * viewers).sum(axis=1)
@@ -197,6 +293,14 @@ def test_refusals():
         Light((0, 0, 0))
     with pytest.raises(ValueError, match="a light's direction must be three finite numbers"):
         Light((0, 0, math.nan))
+    for both in ({}, {"direction": (0, 0, 1), "position": (0, 0, 1)}):
+        with pytest.raises(ValueError, match=r"^a light must have either a direction or a position$"):
+            Light(**both)
+    with pytest.raises(ValueError, match="a light's position must be three finite numbers"):
+        Light(position=(0, math.inf, 0))
+    material, lamp = Material(grey(0), grey(1), grey(0), 1), Light(position=(0, 0, 1))
+    with pytest.raises(ValueError, match="a point light needs the points"):
+        intensity(V, material, [lamp], grey(0), V, "blinn")
     with pytest.raises(ValueError, match="a light's color must be at least 0"):
         Light((0, 0, 1), (1, -1, 1))
     with pytest.raises(ValueError, match=r"a material's diffuse must be three finite numbers, not 0.5"):

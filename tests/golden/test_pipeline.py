@@ -5,6 +5,7 @@ import pytest
 
 from golden.chord_setup import ChordSetup, largest_span_angle
 from golden.difference_setup import DifferenceSetup
+from golden.fixed import Fixed
 from golden.frame_constants import FrameConstants
 from golden.geometry import normalise
 from golden.intensity import Intensity
@@ -12,10 +13,10 @@ from golden.interpolation import interpolate
 from golden.interpolator import pixels_of
 from golden.lighting import Light, Material, halfway_vector, intensity, saturate
 from golden.middle_normal import MiddleNormal
-from golden.pipeline import ShadingPipeline, Spans
+from golden.pipeline import METHODS, ShadingPipeline, Spans
 from golden.reflection import reflect, slope
 from golden.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
-from golden.unit_vector import ONE, quantise
+from golden.unit_vector import COMPONENT, ONE, quantise
 
 AMBIENT, DIFFUSE, SPECULAR = 0.1, 0.6, 0.5
 LARGEST_ANGLE = 20.0
@@ -443,8 +444,8 @@ def test_bad_arguments_are_refused():
     for method in ("angular", "chord"):
         with pytest.raises(ValueError, match=rf"^method {method} finds no normals, and gives 1 - cos gamma$"):
             ShadingPipeline(method, operand="cosine")
-    with pytest.raises(ValueError, match=r"^lights must be 1 to 16, not 0$"):
-        ShadingPipeline(lights=0)
+    with pytest.raises(ValueError, match=r"^lights must be 0 to 16, not -1$"):
+        ShadingPipeline(lights=-1)
     spans = Spans(*np.zeros((3, 1), dtype=int), np.array([[0, 0, ONE]]), np.array([[0, 0, 2**17]]))
     spans.length[:] = 2
     constants = constants_of([(UP, 0.5, 0.5)])
@@ -452,3 +453,54 @@ def test_bad_arguments_are_refused():
         ShadingPipeline().compute(spans, constants)
     with pytest.raises(ValueError, match=r"^the constants are for 1 lights, not 2$"):
         ShadingPipeline(lights=2).compute(spans, constants)
+
+
+def spans_near_a_highlight(rng, halfway, level, angle):
+    """Ends of arcs whose great circle comes as near to H as a cosine says, there or a bit before or after."""
+    count = len(level)
+    side = normalise(np.cross(halfway, rng.normal(size=(count, 3))))
+    top = halfway * level[:, np.newaxis] + side * np.sqrt(1 - level**2)[:, np.newaxis]
+    along = np.cross(halfway, side)
+    first = -rng.choice([0.0, 0.5, 1.0, rng.uniform(-0.2, 1.2)], count) * angle
+    ends = (first, first + angle)
+    return [quantise(top * np.cos(end)[:, np.newaxis] + along * np.sin(end)[:, np.newaxis]) for end in ends]
+
+
+GATED = [(method, None) for method in METHODS if method != "chord-local"] + [
+    (method, "one_minus_cosine") for method in ("linear", "bisection", "quadratic", "renormalise")
+]
+
+
+@pytest.mark.parametrize("model", ["cosquad", "coscos4", "exp", "blinn"])
+@pytest.mark.parametrize(("method", "operand"), GATED)
+def test_gated_spans_have_no_highlight(method, operand, model):
+    """About the threshold of each exponent, where the gate has to let spans through that seem dark."""
+    rng = np.random.default_rng(3)
+    design = ShadingPipeline(method, model, operand=operand)
+    gate = design.highlight_gate
+    suppressed = shaded = 0
+    for exponent in (3, 20, 150, 1000):
+        last = design.highlight.last_lit_arguments[exponent] * 2.0**-25
+        for _ in range(2):
+            halfway = quantise(normalise(rng.normal(size=3)))
+            count = 400
+            level = 1 - last + last * 10.0 ** rng.uniform(-5, -0.3, count) * rng.choice([-1, 1], count)
+            angle = np.radians(rng.uniform(0, gate.interpolator.gate_angle, count))
+            angle[::7] = 0
+            level = np.clip(level, -1, 1)
+            codes = spans_near_a_highlight(rng, halfway / np.linalg.norm(halfway), level, angle)
+            length = rng.choice([1, 2, 3, 5, 16, 200], count, p=[0.1, 0.3, 0.2, 0.2, 0.15, 0.05])
+            left, right = (Fixed(COMPONENT, end) for end in codes)
+            vector = Fixed(COMPONENT, halfway)
+            lit = gate.compute(left, right, vector, exponent)
+            vectors = Fixed(COMPONENT, halfway[np.newaxis])
+            operands = design.interpolator.compute(left, right, length, vectors, vectors)
+            assert not (operands.wide & ~lit).any()
+            dark = np.zeros((len(operands.highlight.codes), 1), dtype=bool)
+            term = design.highlight.compute(operands.highlight, dark, exponent)
+            of_span = np.bincount(pixels_of(length)[0], weights=term.codes[:, 0])
+            assert not of_span[~lit].any()
+            suppressed += np.count_nonzero(~lit)
+            shaded += np.count_nonzero(of_span)
+    assert suppressed > 150
+    assert shaded > 100

@@ -128,12 +128,34 @@ def test_wide_spans_are_flagged(normal_pairs):
         assert np.all(wide == flagged)
 
 
-def test_stiff_words_at_their_ends():
-    """Codes of any size give words that the recurrence takes."""
+@pytest.mark.parametrize("length", [2, 3, 5, 16, 2049, 4095])
+def test_stiff_words_at_their_ends(length):
+    """Codes of any size, lengths 0 to sqrt 3: the flag and x(0) are exact, the angle follows the chord.
+
+    x(0) is N_l.H, saturated at -2 and 2. Whatever the lengths, K is that of an isosceles triangle with the
+    chord of the span, within the relative error that `RecurrenceSetup.error` counts.
+    """
     rng = np.random.default_rng(7)
-    ends = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (3, 3000, 3))
-    for length in (1, 2, 3, 2049, 4095):
-        states_of(RecurrenceSetup(), *ends, length)
+    left, right, vector = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (3, 3000, 3))
+    setup, step = RecurrenceSetup(), 2.0**-34
+    first, _, coefficient, shift, wide = setup.compute(
+        *(Fixed(COMPONENT, codes) for codes in (left, right, vector)), np.full(3000, length)
+    )
+    unit = 1 + 2.0**-16
+    chord = np.square(right - left).sum(axis=1) / 2 * step * unit
+    np.testing.assert_array_equal(wide, chord >= 1 + 2.0**-13)
+    assert 900 < np.count_nonzero(wide) < 2100
+    cosine = (left * vector).sum(axis=1) * step * unit
+    assert np.count_nonzero(np.abs(cosine) >= 2) > 20
+    assert np.abs(first.values[:, 0] - np.clip(cosine, -2, 2 - step)).max() < step
+    angle = 4 * 2 * np.arcsin(np.sqrt(np.minimum(chord, 1) / 2)) / (length - 1)
+    used = ~wide & (angle <= np.pi / 2)
+    exact = 4 * np.square(np.sin(angle[used] / 2))
+    found = coefficient.values[used] * 2.0 ** (2 - shift[used])
+    word, table = 2.0**-18, setup.TABLE_ERROR
+    relative = 9 * word + table + (word + table) / 0.81 + word / 0.40
+    assert np.count_nonzero(used) > 200
+    assert np.all(np.abs(found - exact) <= relative * exact)
 
 
 def test_tables():

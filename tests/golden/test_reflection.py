@@ -44,6 +44,7 @@ def errors(model):
         ("cosquad7", 0.1208, 0.0759),
         ("cosquad_q", None, 0.0125),
         ("cosquad_lin", 0.1278, 0.01257),
+        ("cosquad_lin_refitted", None, 0.0125),
         ("coscos2", 0.1135, 0.051),
         ("coscos4", 0.0638, 0.024),
     ],
@@ -173,8 +174,8 @@ def test_linear_fit_of_the_slope(line, error):
     exact = np.array([slope("cosquad_q", value) for value in n])
     found = np.abs((line[0] * n + line[1]) / exact - 1).max()
     assert found == pytest.approx(error, abs=0.5e-4)
-    if line == (0.448, 0.099):
-        assert [slope("cosquad_lin", value) for value in n] == pytest.approx(line[0] * n + line[1], rel=1e-15)
+    model = "cosquad_lin" if line == (0.448, 0.099) else "cosquad_lin_refitted"
+    assert [slope(model, value) for value in n] == pytest.approx(line[0] * n + line[1], rel=1e-15)
 
 
 def test_slopes():

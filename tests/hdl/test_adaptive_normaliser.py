@@ -30,7 +30,12 @@ def assert_equal(run, expected):
 
 @pytest.mark.parametrize(
     "parameters",
-    [AdaptiveNormaliser(), AdaptiveNormaliser(2.0**-14, Bisection(1, 45)), AdaptiveNormaliser(1 / 8)],
+    [
+        AdaptiveNormaliser(),
+        AdaptiveNormaliser(2.0**-14, Bisection(1, 45)),
+        AdaptiveNormaliser(1 / 8),
+        AdaptiveNormaliser(bisection=Bisection(as_documented=True)),
+    ],
     ids=str,
 )
 def test_equals_twin_without_gaps(normal_pairs, parameters):

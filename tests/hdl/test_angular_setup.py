@@ -28,7 +28,7 @@ VARIANTS = {
 
 def beats_of(left, right, vector, length, parameters=VARIANTS["half_chord"]):
     operands = (Fixed(COMPONENT, codes) for codes in (left, right, vector))
-    angle, phase, step, cos_beta, opposite = parameters.compute(*operands, length)
+    angle, phase, step, cos_beta, wide = parameters.compute(*operands, length)
     return (
         {"normal_left": left, "normal_right": right, "vector": vector, "length": length},
         {
@@ -37,7 +37,7 @@ def beats_of(left, right, vector, length, parameters=VARIANTS["half_chord"]):
             "step": step.codes,
             "cos_beta": cos_beta.codes,
             "length": length,
-            "opposite": opposite,
+            "wide": wide,
         },
     )
 
@@ -74,7 +74,7 @@ def check(verify, normal_pairs, parameters, interval):
     length = rng.integers(1, 4096, len(left))
     length[:40] = np.tile([1, 2, 3, 4, 5, 2048, 2049, 2050, 4094, 4095], 4)
     beats, expected = beats_of(left, right, vector, length, parameters)
-    assert 0 < expected["opposite"].sum() < 100
+    assert 100 < expected["wide"].sum() < 500
     verify(AngularSetupUnit(parameters, interval), beats, expected)
 
 

@@ -3,16 +3,13 @@
 
 import numpy as np
 import pytest
-from amaranth.hdl import ResetInserter, Signal, Value
-from amaranth.sim import Simulator
 
 from golden.chord_setup import ChordSetup
 from golden.fixed import Fixed
 from golden.unit_vector import COMPONENT, quantise
 from hdl.chord_setup import ChordSetupUnit
 from hdl.cost import cost_of
-from sim.beats import dtype_of, pack
-from sim.engine import simulate
+from sim.beats import dtype_of
 
 VARIANTS = [*((1, interval) for interval in (1, 2, 3, 4, 5, 7, 13, 26)), (2, 4)]
 
@@ -41,7 +38,7 @@ def expected_of(unit, beats, vectors):
     left, right, *vectors = (
         Fixed(COMPONENT, codes) for codes in (beats["normal_left"], beats["normal_right"], *vectors)
     )
-    diffuse, highlight, wide = ChordSetup().compute(left, right, *vectors, beats["length"])
+    diffuse, highlight, wide = unit.parameters.compute(left, right, *vectors, beats["length"])
     expected = np.zeros(len(wide), dtype_of(unit.o.payload.shape()))
     for name, differences in (("diffuse", diffuse), ("highlight", highlight)):
         for field in ("start", "first", "second"):
@@ -86,69 +83,25 @@ def test_refuses_an_interval(interval):
         ChordSetupUnit(1, interval)
 
 
-def test_beats_after_a_pause(normal_pairs):
+def test_beats_after_a_pause(normal_pairs, verify_pauses):
     """The results of a beat do not depend on what came before, or on how long ago it was."""
     rng = np.random.default_rng(3)
     unit = ChordSetupUnit(1, 4)
-    beats = spans(rng, normal_pairs)
-    beats = {name: codes[:40] for name, codes in beats.items()}
+    beats = {name: codes[:40] for name, codes in spans(rng, normal_pairs).items()}
     vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
-    expected = expected_of(unit, beats, vectors)
-    constants = constants_of(unit, vectors)
-    stalls = np.arange(60 * 40) % 60 != 0
-    run = simulate(unit, beats, count=40, constants=constants, engine="auto", input_stalls=stalls)
-    np.testing.assert_array_equal(run.beats, expected)
-    np.testing.assert_array_equal(run.clocks, run.input_clocks + unit.latency)
+    verify_pauses(unit, beats, expected_of(unit, beats, vectors), 60, constants_of(unit, vectors))
 
 
 @pytest.mark.parametrize("interval", [1, 4, 26])
-def test_reset_leaves_nothing_behind(normal_pairs, interval):
-    """After a reset with beats inside the unit answers as from power-up, on the same clocks."""
+def test_reset_leaves_nothing_behind(normal_pairs, verify_reset, interval):
     rng = np.random.default_rng(8)
     unit = ChordSetupUnit(1, interval)
     beats = {name: codes[:12] for name, codes in spans(rng, normal_pairs).items()}
     vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
-    words = [
-        int.from_bytes(row.astype("<u4").tobytes(), "little") for row in pack(unit.i.payload.shape(), beats)
-    ]
-    constants = int.from_bytes(
-        pack(unit.constants.shape().elem_shape, constants_of(unit, vectors))[0].astype("<u4").tobytes(),
-        "little",
-    )
-    reset = Signal()
-    found = []
-
-    async def send(context, words, clocks):
-        sent, taken = 0, []
-        for clock in range(clocks):
-            context.set(unit.i.valid, sent < len(words))
-            context.set(Value.cast(unit.i.payload).as_unsigned(), words[min(sent, len(words) - 1)])
-            accepted = context.get(unit.i.valid & unit.i.ready)
-            if context.get(unit.o.valid):
-                taken.append((clock, context.get(Value.cast(unit.o.payload).as_unsigned())))
-            await context.tick()
-            sent += accepted
-        return taken
-
-    async def bench(context):
-        context.set(Value.cast(unit.constants).as_unsigned(), constants)
-        context.set(unit.o.ready, 1)
-        clocks = unit.latency + 6 * interval
-        for before in (0, 1, 2 * interval + 1, unit.latency + 2):
-            await send(context, words[6:], before)
-            context.set(reset, before > 0)
-            await context.tick()
-            context.set(reset, 0)
-            assert not context.get(unit.o.valid)
-            found.append(await send(context, words[:6], clocks))
-
-    simulator = Simulator(ResetInserter(reset)(unit))
-    simulator.add_clock(1e-6)
-    simulator.add_testbench(bench)
-    simulator.run()
-    assert [clock for clock, _ in found[0]] == [unit.latency + interval * k for k in range(6)]
-    assert len({payload for _, payload in found[0]}) == 6
-    assert all(run == found[0] for run in found[1:])
+    befores = 1, 2 * interval + 1, unit.latency + 2
+    found = verify_reset(unit, beats, befores, unit.latency + 6 * interval, constants_of(unit, vectors))
+    assert [clock for clock, _ in found] == [unit.latency + interval * k for k in range(6)]
+    assert len({payload for _, payload in found}) == 6
 
 
 def test_shorter_spans_need_a_smaller_table(verify, normal_pairs):
@@ -162,6 +115,26 @@ def test_shorter_spans_need_a_smaller_table(verify, normal_pairs):
     )
     vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
     verify(unit, beats, expected_of(unit, beats, vectors), constants=constants_of(unit, vectors))
+
+
+@pytest.mark.parametrize(("terms", "fraction_bits", "interval"), [(1, 36, 4), (2, 46, 5), (3, 40, 1)])
+def test_fewer_terms_and_bits(verify, normal_pairs, terms, fraction_bits, interval):
+    """The twin's; each term is a product of a span."""
+    rng = np.random.default_rng(terms)
+    parameters = ChordSetup(terms, fraction_bits)
+    unit = ChordSetupUnit(1, interval, parameters=parameters)
+    beats = spans(rng, normal_pairs)
+    vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+    verify(unit, beats, expected_of(unit, beats, vectors), constants=constants_of(unit, vectors))
+    assert cost_of(unit).multiplier_count == -(-(4 + terms + 19) // interval)
+
+
+def test_refuses_terms_and_bits():
+    with pytest.raises(ValueError, match=r"^terms must be 1 to 3, not 4$"):
+        ChordSetup(terms=4)
+    for bits in (34, 37, 48):
+        with pytest.raises(ValueError, match=rf"^fraction_bits must be even and 36 to 46, not {bits}$"):
+            ChordSetup(fraction_bits=bits)
 
 
 @pytest.mark.parametrize("bits", [1, 13])

@@ -8,7 +8,7 @@ import pytest
 from golden.fixed import Fixed
 from golden.highlight_gate import HighlightGate
 from golden.specular import Specular
-from golden.unit_vector import quantise
+from golden.unit_vector import COMPONENT, quantise
 from hdl.cost import cost_of
 from hdl.highlight_gate import HighlightGateUnit
 from sim.engine import simulate
@@ -52,7 +52,7 @@ def test_equals_twin(verify, normal_pairs, model, interval):
         expected = parameters.compute(*(Fixed(format, n) for n in (left, right, code)), exponent)
         shares.append(expected[:600].mean())
         beats = {"normal_left": left, "normal_right": right}
-        constants = {"halfway": code, "exponent": exponent}
+        constants = {"halfway": code[np.newaxis], "exponent": exponent}
         verify(unit, beats, expected.astype(np.uint8), constants=constants)
     assert shares[0] == 1
     assert min(shares) > 0.3
@@ -83,7 +83,7 @@ def test_equals_twin_at_reduced_width(fraction_bits):
             unit,
             {"normal_left": left, "normal_right": right},
             count=len(left),
-            constants={"halfway": halfway, "exponent": exponent},
+            constants={"halfway": halfway[np.newaxis], "exponent": exponent},
             engine="auto",
         )
         np.testing.assert_array_equal(run.beats, expected)
@@ -98,3 +98,35 @@ def test_times_and_multipliers_as_stated():
     assert HighlightGateUnit().initiation_interval == 6
     with pytest.raises(ValueError, match=r"^initiation_interval must be 1 to 15, not 16$"):
         HighlightGateUnit(initiation_interval=16)
+
+
+@pytest.mark.parametrize(("lights", "exponent", "interval"), [(3, None, 4), (2, 60, 27), (1, 60, 6)])
+def test_several_lights_or_an_exponent_for_good(verify, normal_pairs, lights, exponent, interval):
+    parameters = HighlightGate()
+    unit = HighlightGateUnit(parameters, interval, lights, exponent)
+    rng = np.random.default_rng(lights)
+    halfway = rng.normal(size=(lights, 3)) * 0.3 + [0, 0, 1]
+    halfway /= np.linalg.norm(halfway, axis=1, keepdims=True)
+    cosine = np.sqrt(parameters.thresholds.values[60])
+    parts = [spans(rng, normal_pairs, 150, h, cosine) for h in halfway]
+    left, right = (quantise(np.concatenate(ends)) for ends in zip(*parts, strict=True))
+    codes = quantise(halfway)
+    operands = [Fixed(COMPONENT, n) for n in (left, right)]
+    lit = np.stack([parameters.compute(*operands, Fixed(COMPONENT, code), 60) for code in codes], axis=-1)
+    assert np.all((lit.mean(axis=0) > 0.1) & (lit.mean(axis=0) < 0.9))
+    constants = {"halfway": codes} | ({"exponent": 60} if exponent is None else {})
+    verify(
+        unit,
+        {"normal_left": left, "normal_right": right},
+        lit @ (1 << np.arange(lights)),
+        constants=constants,
+    )
+    cost = cost_of(unit)
+    assert cost.multiplier_count == -(-(3 + 12 * lights) // interval)
+    assert cost.rom_bits == (1024 * 17 if exponent is None else 0)
+
+
+def test_exponents_out_of_range_are_refused():
+    for exponent in (0, 1001):
+        with pytest.raises(ValueError, match=rf"^exponent must be 1 to 1000, not {exponent}$"):
+            HighlightGateUnit(exponent=exponent)

@@ -14,6 +14,7 @@ from golden.unit_vector import COMPONENT, ONE, quantise
 from hdl.light import LightUnit
 from hdl.power import PowerUnit
 from hdl.specular import SpecularUnit
+from sim.engine import simulate
 
 
 def operands_of(parameters, diffuse, normals, direction, halfway):
@@ -97,3 +98,70 @@ def test_black_light(verify, normal_pairs):
     operands = codes_of(operands_of(Specular(), Diffuse(), normals, zero, zero))
     expected = {"diffuse": np.zeros(200, int), "specular": np.zeros(200, int)}
     verify(LightUnit(), operands, expected, constants={"exponent": 1})
+
+
+@pytest.mark.parametrize(
+    ("model", "operand", "interval"),
+    [("cosquad", "cosine", 3), ("coscos4", "one_minus_cosine", 6), ("blinn", "one_minus_cosine", 42)],
+)
+@pytest.mark.parametrize("gated", [False, True])
+def test_dark_beats_pass_the_specular_unit_by(model, operand, interval, gated, normal_pairs):
+    """In order, with a specular term of 0; a run of them takes a clock each."""
+    rng = np.random.default_rng(interval)
+    parameters = Power(operand) if model == "blinn" else Specular(model, operand)
+    diffuse = DIFFUSE[operand]
+    light, viewer = normal_pairs(rng, 1, 70.0)
+    direction = quantise(light)[0]
+    halfway = quantise((light + viewer) / np.linalg.norm(light + viewer))[0]
+    normals = normals_about(rng, direction, halfway, 30)
+    operands = operands_of(parameters, diffuse, normals, direction, halfway)
+    count = len(normals)
+    dark = operands["cosine"].codes <= 0
+    beats = codes_of(operands)
+    if gated:
+        beats["gated"] = rng.random(count) < 0.3
+        beats["gated"][200:250] = True
+        dark = dark | beats["gated"]
+    expected = {
+        "diffuse": diffuse.compute(operands["cosine"]).codes,
+        "specular": parameters.compute(operands["highlight"], dark, 30).codes,
+    }
+    assert 0.2 < dark.mean() < 0.9
+    unit = LightUnit(parameters, diffuse, interval, gated=gated)
+    assert unit.initiation_interval == interval
+    runs = []
+    for share in (0, 0.3, 0.8):
+        runs.append(
+            simulate(
+                unit,
+                beats,
+                count=count,
+                constants={"exponent": 30},
+                engine="auto",
+                input_stalls=rng.random(997) < share / 2,
+                output_stalls=rng.random(1009) < share,
+            )
+        )
+        for name, codes in expected.items():
+            np.testing.assert_array_equal(runs[-1].beats[name], codes)
+    lit = np.count_nonzero(~dark)
+    clocks = runs[0].clocks
+    # After a run of dark beats, which take a clock each, a lit one waits for the unit's turn.
+    runs_of_dark = np.count_nonzero(np.diff(dark.astype(int)) == 1)
+    assert interval * (lit - 1) <= clocks[-1] - clocks[0] <= interval * (lit + runs_of_dark) + (count - lit)
+    if gated:
+        # The last of a long run of dark beats.
+        assert clocks[249] - clocks[230] == 19
+
+
+@pytest.mark.parametrize("model", ["cosquad", "blinn"])
+def test_exponent_for_good(verify, model, normal_pairs):
+    rng = np.random.default_rng(1)
+    parameters = Power() if model == "blinn" else Specular(model)
+    direction, halfway = (quantise(vector)[0] for vector in normal_pairs(rng, 1, 20.0))
+    operands = operands_of(
+        parameters, Diffuse(), normals_about(rng, direction, halfway, 77), direction, halfway
+    )
+    expected = terms(parameters, Diffuse(), operands, 77)
+    assert np.count_nonzero(expected["specular"]) > 100
+    verify(LightUnit(parameters, exponent=77), codes_of(operands), expected)

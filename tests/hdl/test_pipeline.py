@@ -4,6 +4,7 @@
 import gc
 import math
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,13 +15,16 @@ from golden.diffuse import Diffuse
 from golden.fixed import Fixed
 from golden.frame_constants import FrameConstants
 from golden.intensity import Intensity
+from golden.local_chord_interpolator import SpanValues
 from golden.pipeline import METHODS, MODELS, ShadingPipeline, Spans
 from golden.specular import SPECULAR_MODELS
 from golden.unit_vector import COMPONENT, quantise
 from hdl.cost import cost_of
-from hdl.pipeline import INTERPOLATORS, ShadingPipelineUnit
-from sim.beats import pack, unpack
+from hdl.pipeline import INTERPOLATORS, STYLES, ShadingPipelineUnit
+from sim.beats import dtype_of, pack, unpack
 from sim.engine import simulate
+
+FROM_NORMALS = [method for method in METHODS if method != "chord-local"]
 
 
 def make_spans(rng, lengths, normal_pairs, largest_angle=44.0):
@@ -48,8 +52,8 @@ def make_constants(rng, lights, exponent=20, brightness=1.0):
     )
 
 
-def beats_of(spans):
-    return {name: getattr(spans, name) for name in ("x", "y", "length", "normal_left", "normal_right")}
+def beats_of(spans, unit):
+    return {name: getattr(spans, name) for name in unit.i.payload.shape().members}
 
 
 def assert_pixels(run, pixels):
@@ -62,7 +66,7 @@ def assert_pixels(run, pixels):
 
 def run(unit, spans, constants, pixels, **options):
     options.setdefault("engine", "auto")
-    return simulate(unit, beats_of(spans), count=len(pixels.x), write=constants.writes(), **options)
+    return simulate(unit, beats_of(spans, unit), count=len(pixels.x), write=constants.writes(), **options)
 
 
 @pytest.mark.parametrize("model", SPECULAR_MODELS)
@@ -264,7 +268,7 @@ def test_every_method_equals_its_twin_under_stalls(method, model, lights, operan
 
 @pytest.mark.long
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", FROM_NORMALS)
 def test_every_method_with_every_model(method, model, normal_pairs):
     rng = np.random.default_rng(MODELS.index(model))
     design = ShadingPipeline(method, model)
@@ -439,7 +443,7 @@ def assert_colors(beats, pixels):
     np.testing.assert_array_equal(beats["last"], pixels.last)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", FROM_NORMALS)
 def test_reset_in_mid_span(method, normal_pairs):
     """After a reset with spans inside: the pixels and clocks are those from power-up."""
     rng = np.random.default_rng(12)
@@ -450,7 +454,7 @@ def test_reset_in_mid_span(method, normal_pairs):
     others = make_spans(rng, rng.integers(1, 30, 40), normal_pairs, 60)
     constants = make_constants(rng, 1)
     pixels = design.compute(spans, constants)
-    codes, other_codes = (words(driver.shapes["i"], beats_of(s)) for s in (spans, others))
+    codes, other_codes = (words(driver.shapes["i"], beats_of(s, unit)) for s in (spans, others))
     writes = words(driver.shapes["write"], constants.writes())
     runs = []
 
@@ -480,13 +484,14 @@ def test_constants_never_change_under_a_span(method, normal_pairs):
     """Writes that wait while spans go by: each span has the constants of before, or all of the new ones."""
     rng = np.random.default_rng(13)
     design = ShadingPipeline(method)
-    driver = Driver(ShadingPipelineUnit(design))
+    unit = ShadingPipelineUnit(design)
+    driver = Driver(unit)
     before, after = (make_spans(rng, rng.integers(1, 20, 8), normal_pairs, 20) for _ in range(2))
     frames = [make_constants(rng, 1, exponent) for exponent in (3, 200)]
     expected = [
         design.compute(spans, constants) for spans, constants in zip((before, after), frames, strict=True)
     ]
-    codes = [words(driver.shapes["i"], beats_of(s)) for s in (before, after)]
+    codes = [words(driver.shapes["i"], beats_of(s, unit)) for s in (before, after)]
     writes = [words(driver.shapes["write"], constants.writes()) for constants in frames]
     found = []
 
@@ -568,13 +573,213 @@ def test_compact_style_takes_three_clocks_a_term(normal_pairs):
     diffuse = Diffuse(operands.cosine.format)
     dark = diffuse.dark(operands.cosine)
     specular = design.highlight.compute(operands.highlight, dark, constants.exponent)
-    clocks = Intensity.clocks(diffuse.compute(operands.cosine), specular)
+    clocks = Intensity().clocks(diffuse.compute(operands.cosine), specular)
     assert set(clocks.tolist()) == {3, 6}
     unit = ShadingPipelineUnit(design, style="compact")
     found = run(unit, spans, constants, design.compute(spans, constants))
     np.testing.assert_array_equal(np.diff(found.clocks), clocks[1:])
     assert unit.clocks_per_pixel == 6
     assert cost_of(unit).multiplier_count == 3
+
+
+@pytest.mark.parametrize(("lights", "style", "materials"), [(2, "throughput", 1), (1, "compact", 3)])
+def test_spans_with_values(lights, style, materials):
+    """The local chord method: its spans carry values of each light, and no normals."""
+    rng = np.random.default_rng(lights)
+    design = ShadingPipeline("chord-local", lights=lights, materials=materials)
+    unit = ShadingPipelineUnit(design, style=style)
+    lengths = np.r_[0, 1, 2, 3, 16, rng.integers(1, 40, 150)]
+    count = len(lengths)
+    start, step = rng.uniform(0.41, 0.6, (2, count, lights, 1)), rng.uniform(-0.2, 0.2, (2, count, lights, 1))
+    ends = start + step * (0, 1, 2) + rng.uniform(-0.01, 0.01, (2, count, lights, 1)) * (0, 1, 0)
+    ends[0] -= rng.choice([0, 0.5], (count, lights, 1))
+    values = SpanValues.quantise(ends[0], ends[1] / 4)
+    zero = np.zeros((count, 3), dtype=int)
+    x, y = rng.integers(0, 4000, (2, count))
+    material = np.sort(rng.integers(0, materials, count))
+    spans = Spans(x, y, lengths, zero, zero, material, values)
+    constants = [make_constants(rng, lights, exponent) for exponent in (20, 3, 100)[:materials]]
+    pixels = design.compute(spans, constants)
+    assert len(np.unique(pixels.color)) > 100
+    assert pixels.wide_spans == 0
+    beats = {name: getattr(spans, name) for name in unit.i.payload.shape().members}
+    beats["values"] = np.zeros((count, lights), dtype_of(unit.i.payload.shape()["values"].shape).base)
+    for name in ("diffuse", "highlight"):
+        beats["values"][name] = getattr(values, name)
+    writes = [of.writes(k if materials > 1 else None) for k, of in enumerate(constants)]
+    write = {name: np.concatenate([beat[name] for beat in writes]) for name in ("address", "data")}
+    for share in (0, 0.4):
+        stalls = {"input_stalls": rng.random(97) < share, "output_stalls": rng.random(89) < share}
+        result = simulate(unit, beats, count=len(pixels.x), write=write, engine="auto", **stalls)
+        assert_pixels(result, pixels)
+        if not share and style == "throughput":
+            assert result.clocks[0] == result.input_clocks[1] + unit.latency
+    with pytest.raises(ValueError, match=r"^method chord-local has no normals for a gate$"):
+        ShadingPipeline("chord-local", gate=True)
+    with pytest.raises(
+        ValueError, match=rf"^method chord-local takes spans with values for {lights} lights$"
+    ):
+        design.compute(replace(spans, values=None), constants)
+
+
+GATED = [
+    ("chord", "coscos2", 1, None, "throughput"),
+    ("quadratic", "cosquad", 2, "cosine", "throughput"),
+    ("chord", "cosquad", 2, None, "compact"),
+    pytest.param("linear", "lyon3", 1, "one_minus_cosine", "throughput", marks=pytest.mark.long),
+    pytest.param("bisection", "exp", 1, "cosine", "throughput", marks=pytest.mark.long),
+    pytest.param("angular", "cosquad", 1, None, "throughput", marks=pytest.mark.long),
+    pytest.param("recurrence", "cosquad", 2, None, "throughput", marks=pytest.mark.long),
+    pytest.param("renormalise", "blinn", 1, "cosine", "throughput", marks=pytest.mark.long),
+    pytest.param("quadratic-horner", "blinn", 1, "cosine", "compact", marks=pytest.mark.long),
+]
+
+
+@pytest.mark.parametrize(("method", "model", "lights", "operand", "style"), GATED)
+def test_gate_changes_no_pixel(method, model, lights, operand, style, normal_pairs):
+    """The twin without a gate says what the pixels are."""
+    rng = np.random.default_rng(lights + len(method))
+    design = ShadingPipeline(method, model, lights, operand)
+    gated = replace(design, gate=True)
+    unit = ShadingPipelineUnit(gated, style=style)
+    spans = spans_of_every_kind(rng, design, 250, normal_pairs)
+    for exponent in (2, 50, 1000):
+        constants = lit_constants(rng, spans, lights, exponent)
+        pixels = design.compute(spans, constants)
+        lit = gated.lit_spans(spans, constants)
+        assert 0 < lit.mean() < 1 or exponent == 2
+        for share in (0, 0.5):
+            stalls = {"input_stalls": rng.random(997) < share, "output_stalls": rng.random(1009) < share}
+            result = run(unit, spans, constants, pixels, **stalls)
+            assert_pixels(result, pixels)
+            if style == "throughput" and method != "bisection" and not share:
+                assert result.clocks[0] == result.input_clocks[0] + unit.latency
+
+
+@pytest.mark.parametrize(("method", "interval"), [("chord", 4), ("quadratic", 7)])
+def test_gate_costs_no_clock(method, interval, normal_pairs):
+    """Decisions come in time for spans of every length."""
+    rng = np.random.default_rng(interval)
+    design = ShadingPipeline(method, gate=True)
+    unit = ShadingPipelineUnit(design, interval)
+    lengths = np.r_[rng.integers(1, 40, 200), np.full(60, 1), np.full(60, 5)]
+    spans = make_spans(rng, lengths, normal_pairs, 20.0)
+    constants = lit_constants(rng, spans, 1, 20)
+    pixels = design.compute(spans, constants)
+    result = run(unit, spans, constants, pixels)
+    assert_pixels(result, pixels)
+    first = result.clocks[np.cumsum(lengths) - lengths]
+    assert np.all(np.diff(first) <= np.maximum(lengths[:-1], interval))
+
+
+def test_gate_spares_the_compact_style_clocks(normal_pairs):
+    """A power takes 42 clocks a pixel, but for pixels behind the light and in spans without a highlight."""
+    rng = np.random.default_rng(3)
+    design = ShadingPipeline("chord", "blinn")
+    spans = make_spans(rng, np.full(30, 40), normal_pairs, 20.0)
+    constants = make_constants(rng, 1, exponent=300)
+    constants.halfway[:] = spans.normal_left[:1]
+    constants.direction[:] = constants.halfway
+    vectors = (spans.normal_left, spans.normal_right, constants.direction, constants.halfway)
+    left, right, direction, halfway = (Fixed(COMPONENT, codes) for codes in vectors)
+    operands = design.interpolator.compute(left, right, spans.length, direction, halfway)
+    behind = Diffuse(operands.cosine.format).dark(operands.cosine)[:, 0]
+    pixels = design.compute(spans, constants)
+    clocks = []
+    for gate in (False, True):
+        gated = replace(design, gate=gate)
+        found = run(ShadingPipelineUnit(gated, style="compact"), spans, constants, pixels)
+        assert_pixels(found, pixels)
+        dark = behind | ~np.repeat(gated.lit_spans(spans, constants)[:, 0], 40) if gate else behind
+        # Few pixels wait beside the power unit, so that dark ones take their three clocks between powers.
+        expected = np.where(dark, 3, 42).sum()
+        assert expected * 0.95 <= found.total_clocks <= expected * 1.05
+        clocks.append(found.total_clocks)
+    assert clocks[1] < clocks[0] / 3
+
+
+LEFT_OUT = {
+    "specular": {"model": None},
+    "exponent": {"exponent": 20},
+    "channels": {"grey": True},
+    "widths": {"x_bits": 9, "y_bits": 8, "length_bits": 5},
+    "all": {"model": None, "grey": True, "x_bits": 9, "y_bits": 8, "length_bits": 5},
+}
+
+
+@pytest.mark.parametrize(
+    ("what", "style"),
+    [
+        ("specular", "throughput"),
+        ("exponent", "throughput"),
+        ("channels", "throughput"),
+        ("all", "throughput"),
+        pytest.param("widths", "throughput", marks=pytest.mark.long),
+        *(pytest.param(what, "compact", marks=pytest.mark.long) for what in LEFT_OUT),
+    ],
+)
+def test_less_hardware_shades_the_same(what, style, normal_pairs):
+    """A scene that does not need a part has the pixels of the full pipeline without it, and it costs less."""
+    rng = np.random.default_rng(5)
+    full = ShadingPipeline("chord", lights=2, gate=True)
+    design = replace(full, gate=full.gate and "model" not in LEFT_OUT[what], **LEFT_OUT[what])
+    spans = make_spans(rng, rng.integers(0, 32, 60), normal_pairs, 20.0)
+    spans.x[:] = rng.integers(0, 480, 60)
+    spans.y[:] = rng.integers(0, 256, 60)
+    constants = lit_constants(rng, spans, 2, 20)
+    if design.model is None:
+        constants.specular[:] = 0
+    if design.grey:
+        for colors in (constants.ambient, constants.diffuse, constants.specular):
+            colors[...] = colors[..., :1]
+    pixels = full.compute(spans, constants)
+    assert len(np.unique(pixels.color)) > 50
+    unit = ShadingPipelineUnit(design, style=style)
+    stalls = {"input_stalls": rng.random(97) < 0.3, "output_stalls": rng.random(89) < 0.3}
+    assert_pixels(run(unit, spans, constants, pixels, **stalls), pixels)
+    assert_pixels(run(unit, spans, constants, pixels), pixels)
+    less, more = (cost_of(ShadingPipelineUnit(each, style=style)) for each in (design, full))
+    assert less.register_bits < more.register_bits
+    assert less.multiplier_count <= more.multiplier_count
+    if what in ("specular", "exponent", "channels") and style == "throughput":
+        assert less.multiplier_count < more.multiplier_count
+
+
+@pytest.mark.parametrize("materials", [1, 3])
+def test_without_lights_there_is_ambient_light(materials, normal_pairs, never_built):
+    rng = np.random.default_rng(1)
+    design = ShadingPipeline(lights=0, materials=materials)
+    unit = ShadingPipelineUnit(design)
+    spans = make_spans(rng, rng.integers(0, 20, 50), normal_pairs)
+    spans.material[:] = np.sort(rng.integers(0, materials, 50))
+    constants = [make_constants(rng, 0) for _ in range(materials)]
+    result = simulate(
+        unit,
+        beats_of(spans, unit),
+        count=int(spans.length.sum()),
+        write={
+            name: np.concatenate(
+                [of.writes(index if materials > 1 else None)[name] for index, of in enumerate(constants)]
+            )
+            for name in ("address", "data")
+        },
+        output_stalls=rng.random(89) < 0.3,
+    )
+    expected = np.array([np.floor(of.ambient / 64 + 0.5) for of in constants])
+    colors = np.stack([result.beats[name] for name in "rgb"], axis=-1)
+    np.testing.assert_array_equal(colors, expected[np.repeat(spans.material, spans.length)])
+    np.testing.assert_array_equal(colors, design.compute(spans, constants).color)
+    cost = cost_of(unit)
+    assert cost.multiplier_count == 0
+    with pytest.raises(ValueError, match=r"^without lights there is no setup, and no setup_interval$"):
+        ShadingPipelineUnit(design, 4)
+
+
+@pytest.mark.parametrize(("method", "lights"), [("quadratic", 1), ("renormalise", 2)])
+def test_products_with_normals_share_multipliers_in_the_compact_style(method, lights, never_built):
+    full, compact = (ShadingPipelineUnit(ShadingPipeline(method, lights=lights), style=s) for s in STYLES)
+    counts = [cost_of(unit._interpolator._products).multiplier_count for unit in (full, compact)]
+    assert counts == [6 * lights, 2 * lights]
 
 
 def test_unknown_style(never_built):

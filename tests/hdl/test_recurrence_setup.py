@@ -11,7 +11,6 @@ from golden.unit_vector import COMPONENT, quantise
 from hdl.cost import cost_of
 from hdl.recurrence_setup import RecurrenceSetupUnit
 from sim.beats import dtype_of
-from sim.engine import simulate
 
 DIRECT = RecurrenceSetup(Recurrence("direct", interleave=4, result_format=SQ(2, 25)))
 VARIANTS = [
@@ -24,24 +23,8 @@ VARIANTS = [
 COPIES = ("diffuse", "highlight")
 
 
-def spans(rng, normal_pairs, count=400):
-    """Spans of every angle, some far over the widest, some of the largest and smallest codes."""
-    angles = np.r_[np.zeros(20), 10.0 ** rng.uniform(-4, 0, 80), rng.uniform(0, 90, count - 160)]
-    angles = np.r_[angles, rng.uniform(90.1, 180, 59), 180]
-    left, right = (quantise(v) for v in normal_pairs(rng, count, angles))
-    ends = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (40, 6))
-    left, right = np.vstack([left, ends[:, :3]]), np.vstack([right, ends[:, 3:]])
-    length = rng.integers(1, 4096, len(left))
-    length[::2] = rng.integers(1, 20, len(length[::2]))
-    length[:12] = [1, 2, 3, 4, 5, 16, 17, 2048, 2049, 2050, 4094, 4095]
-    order = rng.permutation(len(left))
-    return {"normal_left": left[order], "normal_right": right[order], "length": length[order]}
-
-
-def constants_of(unit, vectors):
-    constants = np.zeros(unit.lights, dtype_of(unit.constants.shape().elem_shape))
-    constants["direction"], constants["halfway"] = vectors
-    return constants
+def spans(rng, setup_spans, count=400):
+    return setup_spans(rng, count, 90, 90.1)
 
 
 def expected_of(unit, beats, vectors):
@@ -62,17 +45,17 @@ def expected_of(unit, beats, vectors):
 
 
 @pytest.mark.parametrize(("parameters", "lights", "interval"), VARIANTS)
-def test_equals_twin(verify, normal_pairs, parameters, lights, interval):
+def test_equals_twin(verify, normal_pairs, setup_spans, light_constants, parameters, lights, interval):
     rng = np.random.default_rng(interval)
     unit = RecurrenceSetupUnit(parameters, lights, interval)
-    beats = spans(rng, normal_pairs)
+    beats = spans(rng, setup_spans)
     vectors = [quantise(normal_pairs(rng, lights, 0.0)[0]) for _ in range(2)]
     # At the peak, and with no slope at all.
     beats["normal_left"][:50] = vectors[1][0]
     beats["normal_right"][:10] = vectors[1][0]
     expected = expected_of(unit, beats, vectors)
     assert 50 < np.count_nonzero(expected["wide"]) < 200
-    verify(unit, beats, expected, constants=constants_of(unit, vectors))
+    verify(unit, beats, expected, constants=light_constants(unit, *vectors))
 
 
 @pytest.mark.parametrize(
@@ -103,15 +86,11 @@ def test_refuses_an_interval(interval):
         RecurrenceSetupUnit(initiation_interval=interval)
 
 
-def test_beats_after_a_pause(normal_pairs):
+def test_beats_after_a_pause(normal_pairs, setup_spans, light_constants, verify_pauses):
     """The results of a beat do not depend on what came before, or on how long ago it was."""
     rng = np.random.default_rng(3)
     unit = RecurrenceSetupUnit()
-    beats = {name: codes[:40] for name, codes in spans(rng, normal_pairs).items()}
+    beats = {name: codes[:40] for name, codes in spans(rng, setup_spans).items()}
     vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
     expected = expected_of(unit, beats, vectors)
-    stalls = np.arange(150 * 40) % 150 != 0
-    constants = constants_of(unit, vectors)
-    run = simulate(unit, beats, count=40, constants=constants, engine="auto", input_stalls=stalls)
-    np.testing.assert_array_equal(run.beats, expected)
-    np.testing.assert_array_equal(run.clocks, run.input_clocks + unit.latency)
+    verify_pauses(unit, beats, expected, 150, light_constants(unit, *vectors))

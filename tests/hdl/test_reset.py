@@ -95,7 +95,7 @@ def test_reset_in_mid_span_leaves_nothing_behind(name):
     async def bench(context):
         if hasattr(unit, "constants"):
             # A half-way vector and an exponent that light about half of the spans.
-            halfway = pack(unit.constants.shape()["halfway"].shape, quantise(np.array([[0.6, 0, 0.8]])))
+            halfway = pack(unit.constants.shape()["halfway"].shape, quantise(np.array([[[0.6, 0, 0.8]]])))
             context.set(
                 Value.cast(unit.constants.halfway),
                 int.from_bytes(halfway[0].astype("<u4").tobytes(), "little"),

@@ -15,6 +15,7 @@ from amaranth.lib import data, enum, fifo, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
+from golden.local_chord_interpolator import LocalChordInterpolator
 from golden.pipeline import METHODS, ShadingPipeline
 from golden.quadratic_evaluator import QuadraticEvaluator
 from golden.specular import Specular
@@ -35,6 +36,8 @@ from hdl.highlight_cosine import HighlightCosineUnit
 from hdl.highlight_gate import HighlightGateUnit
 from hdl.intensity import IntensityUnit
 from hdl.light import LightUnit
+from hdl.local_chord_interpolator import LocalChordInterpolatorUnit
+from hdl.local_chord_setup import LocalChordSetupUnit
 from hdl.middle_normal import MiddleNormalUnit
 from hdl.pipeline import ShadingPipelineUnit
 from hdl.power import PowerUnit
@@ -216,6 +219,8 @@ CORES = {
     "chord": ChordUnit,
     "chord_setup": ChordSetupUnit,
     "chord_setup_of_two_lights": lambda: ChordSetupUnit(lights=2, initiation_interval=1),
+    "local_chord_setup": LocalChordSetupUnit,
+    "local_chord_of_two_lights": lambda: LocalChordInterpolatorUnit(LocalChordInterpolator(), 2, 3),
     # One of each method; `quadratic` is above.
     **{
         f"pipeline_{method.replace('-', '_')}": lambda method=method: ShadingPipelineUnit(
@@ -224,6 +229,11 @@ CORES = {
         for method in METHODS
         if method != "quadratic"
     },
+    "pipeline_gated": lambda: ShadingPipelineUnit(ShadingPipeline("chord", "coscos2", gate=True)),
+    "pipeline_of_little": lambda: ShadingPipelineUnit(
+        ShadingPipeline("chord", None, lights=2, grey=True, x_bits=9, y_bits=8, length_bits=5)
+    ),
+    "pipeline_without_lights": lambda: ShadingPipelineUnit(ShadingPipeline(lights=0, materials=2)),
     "pipeline_compact": lambda: ShadingPipelineUnit(ShadingPipeline("chord"), style="compact"),
     "pipeline_by_chord": lambda: ShadingPipelineUnit(
         ShadingPipeline("linear", "blinn", operand="one_minus_cosine")

@@ -563,6 +563,58 @@ def test_output_over_the_mesh(refused):
 # Help and version.
 
 
+def test_fit_says_what_it_leaves_out(folder, capsys):
+    options = ["--method", "chord", "--gate", "--fit", "--size", "64x48", "--specular", "0"]
+    assert main(["render", "teapot", *options, "-o", "a.png", "--json", "a.json"]) == 0
+    output = capsys.readouterr().out
+    assert re.search(
+        r"^left out +no specular path: every k_s is 0; saves [\d,]+ cells, \d+ mult", output, re.M
+    )
+    assert re.search(r"^left out +x in 6 bits: 64 columns; saves ", output, re.M)
+    assert re.search(r"^fitted +[\d,]+ of [\d,]+ cells, \d+ of \d+ multipliers, .* clocks$", output, re.M)
+    assert re.search(r"^ +the frame is that of the full pipeline, to the bit$", output, re.M)
+    fit = json.loads(Path("a.json").read_text())["fit"]
+    assert (fit["largest_difference"], fit["different_pixels"]) == (0, 0)
+    for name, count in fit["fitted"].items():
+        saved = sum(omission["saves"][name] for omission in fit["omissions"])
+        assert count == fit["full"][name] - saved < fit["full"][name]
+
+
+@pytest.mark.long
+def test_fitted_turntable(folder, capsys):
+    options = ["--method", "chord", "--fit", "--size", "32x24", "--frames", "2", "--jobs", "1"]
+    assert main(["render", "teapot", *options, "-o", "a.gif"]) == 0
+    assert main(["render", "teapot", *[o for o in options if o != "--fit"], "-o", "b.gif"]) == 0
+    for number in (1, 2):
+        np.testing.assert_array_equal(picture(f"a-000{number}.png"), picture(f"b-000{number}.png"))
+
+
+def test_point_lights(folder, refused, capsys):
+    local = ["--method", "chord-local", "--point-light", "3,4,5,1,0.5,0.5", "--viewer", "near"]
+    assert main(["render", "teapot", *local, "--size", "48x36", "-o", "a.png", "--json", "a.json"]) == 0
+    assert json.loads(Path("a.json").read_text())["method_error"]["max_lsb"] < 1
+    Path("a.toml").write_text(
+        '[mesh]\nfile = "teapot"\n[[lights]]\nposition = [3, 4, 5]\ncolor = [1, 0.5, 0.5]\n'
+        '[camera]\nviewer = "near"\n[pipeline]\nmethod = "chord-local"\n'
+    )
+    assert main(["render", "a.toml", "--size", "48x36", "-o", "b.png"]) == 0
+    np.testing.assert_array_equal(picture("a.png"), picture("b.png"))
+    capsys.readouterr()
+    what = "need the values of a span; use chord-local"
+    refused("render", "teapot", "--point-light", "3,4,5", thing="--method quadratic", says=what)
+    refused("render", "a.toml", "--method", "chord", thing="--method chord", says=what)
+    refused("render", "teapot", *local, "--projection", "orthographic", thing="--viewer near", says="distant")
+    refused("render", "teapot", *local, "--gate", thing="--gate", says="has no normals for one")
+    refused("render", "teapot", "--words", thing="--words", says="nothing is fitted; give --fit, too")
+
+
+def test_verilog_with_a_gate(capsys):
+    assert main(["verilog", "--method", "chord", "--gate"]) == 0
+    output = capsys.readouterr().out
+    assert "throughput style, highlight gate" in output
+    assert "highlight_gate" in output.partition("module")[2]
+
+
 @pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["render", "--help"], ["verilog", "-h"]])
 def test_help_has_an_example(capsys, arguments):
     assert main(arguments) == 0

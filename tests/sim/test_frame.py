@@ -23,6 +23,7 @@ from sim.engine import SimulationError
 from sim.frame import FrameSimulator, compare
 from sim.mesh import load_mesh
 from sim.spans import cut_wide_spans, quantise_spans
+from sim.teapot import teapot
 
 DESIGN = ShadingPipeline(lights=3)
 LIGHTS = (
@@ -291,3 +292,29 @@ def test_other_numbers_of_materials(simulator):
     scene = dataclasses.replace(scene_of("240", (8, 6)), material=MATERIALS)
     with pytest.raises(ValueError, match="the pipeline has 1 materials, the scene 3"):
         simulator.render(scene)
+
+
+@pytest.mark.parametrize("exponent", [10, 1000])
+def test_point_light_and_near_viewer(exponent):
+    """Within an LSB of L, H and N at every pixel; the light is as near as the pot is large."""
+    mesh = teapot(1000)
+    scene = Scene(
+        mesh,
+        Camera.framing(mesh.vertices, (0.4, 0.5, 1), "perspective", 4 / 3),
+        160,
+        120,
+        Material((0.05,) * 3, (0.4,) * 3, (0.55,) * 3, exponent),
+        [Light(position=(-2, 4, 3)), Light((0.5, 0.2, 1), (0.2, 0.3, 0.4))],
+        viewer="near",
+    )
+    design = ShadingPipeline("chord-local", lights=2)
+    frame = FrameSimulator(design).render(scene)
+    assert frame.wide_spans == 0
+    errors = compare(scene, design, frame)
+    assert errors.method_error.max_lsb < 1
+    # Two terms of full brightness, and the last rounding.
+    assert errors.arithmetic_error.max_lsb < 0.6
+    far = dataclasses.replace(scene, viewer="distant", lights=[Light((-2, 4, 3)), scene.lights[1]])
+    assert np.abs(FrameSimulator(design).render(far).image.astype(int) - frame.image).max() > 20
+    with pytest.raises(ValueError, match=r"^point lights and a near viewer need the method chord-local$"):
+        FrameSimulator(ShadingPipeline("chord", lights=2)).render(scene)

@@ -48,6 +48,7 @@ def test_documented_example(write):
         "view": (0.4, 0.5, 1.0),
         "up": (0.0, 1.0, 0.0),
         "field_of_view": 30.0,
+        "viewer": "distant",
         "lights": ((-0.5, 0.8, 0.7, 1.0, 1.0, 1.0),),
         "ambient": (0.08, 0.05, 0.03),
         "diffuse": (0.75, 0.42, 0.2),
@@ -58,6 +59,9 @@ def test_documented_example(write):
         "highlight": "dot",
         "setup_interval": 4,
         "style": "throughput",
+        "gate": False,
+        "fit": False,
+        "words": False,
     }
     assert file.keys["mesh"] == "mesh.file"
     assert file.keys["exponent"] == "material.exponent"
@@ -106,6 +110,32 @@ def test_values_are_those_of_their_text(write):
         (1.0, 2.0, 3.0, 1.0, 1.0, 1.0),
         (0.0, 0.0, 1.0, 1.0, 0.0, 128 / 255),
     )
+
+
+def test_point_lights(write):
+    """Beside the others, in their order; the origin is a place, too."""
+    text = """
+    [camera]
+    viewer = "near"
+    [[lights]]
+    position = [0, 0, 0]
+    [[lights]]
+    direction = [1, 2, 3]
+    color = 2
+    [[lights]]
+    position = [1, -2, 3.5]
+    color = [0.5, 0, 4]
+    """
+    file = read_scene_file(write(MESH + text))
+    assert file.values["viewer"] == "near"
+    assert file.values["lights"] == ((1.0, 2.0, 3.0, 2.0, 2.0, 2.0),)
+    assert file.values["point_lights"] == ((0, 0, 0, 1.0, 1.0, 1.0), (1.0, -2.0, 3.5, 0.5, 0.0, 4.0))
+    assert file.keys["point_lights"] == "lights"
+    assert file.keys["viewer"] == "camera.viewer"
+    only = read_scene_file(write(MESH + "[[lights]]\nposition = [1, 1, 1]\n")).values
+    assert only["lights"] == ()
+    assert len(only["point_lights"]) == 1
+    assert read_scene_file(write("lights = []\n" + MESH)).values == {"mesh": "teapot", "lights": ()}
 
 
 def test_every_method_and_model_can_be_named(write):
@@ -165,7 +195,17 @@ BAD = {
     "lights = [{color = 1}]": ("a.toml, lights[1].direction", "is missing"),
     "lights = [{direction = [1, 0, 0]}, {direction = [0, 0, 0]}]": ("a.toml, lights[2].direction", "no dir"),
     "lights = [{direction = [1, 0, 0], color = -1}]": ("a.toml, lights[1].color", "of 0 or more"),
-    "lights = [{direction = [1, 0, 0], bulb = 1}]": ("a.toml, lights[1].bulb", "use one of direction, color"),
+    "lights = [{direction = [1, 0, 0], bulb = 1}]": (
+        "a.toml, lights[1].bulb",
+        "use one of direction, position, color",
+    ),
+    "lights = [{direction = [1, 0, 0], position = [1, 0, 0]}]": (
+        "a.toml, lights[1]",
+        "holds both direction and position; leave one of them out",
+    ),
+    "lights = [{position = [1, 0]}]": ("a.toml, lights[1].position", "an array is not three numbers"),
+    "lights = [{position = [1, 0, nan]}]": ("a.toml, lights[1].position", "nan is out of range"),
+    "camera.viewer = 'far'": ("a.toml, camera.viewer", "'far' is unknown; use one of distant, near"),
     "lights = [" + "{direction = [1, 0, 0]}," * (MAX_LIGHTS + 1) + "]": ("a.toml, lights", "at most 16"),
     "material.exponent = 0": ("a.toml, material.exponent", "from 1 to 1000"),
     "material.exponent = 50.0": ("a.toml, material.exponent", "not a whole number"),

@@ -1,5 +1,7 @@
 """Toggle counts against those of small components, known by hand, and of units with nothing to do."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from amaranth.hdl import EnableInserter, Module, Signal
@@ -78,6 +80,39 @@ def test_stalls_and_equal_beats_toggle_nothing(engine):
     # From 3 to 23.
     assert toggles["count"] == sum((k ^ (k + 1)).bit_count() for k in range(3, 23))
     assert toggles["gated"] == 0
+
+
+class Chain(Component):
+    """26 registers of 40 bits, each a clock behind the one before: words of a sum split and overflow."""
+
+    i: In(stream.Signature(40))
+    o: Out(stream.Signature(40))
+
+    INITS = np.random.default_rng(3).integers(0, 1 << 40, 26)
+
+    def elaborate(self, platform):
+        m = Module()
+        value = self.i.payload
+        stages = [Signal(40, init=int(init), name=f"stage_{k}") for k, init in enumerate(self.INITS)]
+        with m.If(self.i.valid):
+            m.d.sync += stages[0].eq(value)
+        m.d.sync += [stage.eq(before) for before, stage in pairwise(stages)]
+        m.d.comb += [self.i.ready.eq(self.o.ready), self.o.valid.eq(self.i.valid), self.o.payload.eq(value)]
+        return m
+
+
+@pytest.mark.parametrize("engine", ["pysim", "auto"])
+def test_many_wide_registers(engine):
+    """Stage k shows what it and those before held after reset, last first, then the beats."""
+    beats = np.random.default_rng(4).integers(0, 1 << 40, 300)
+    beats[100:200:2] = 0
+    beats[101:200:2] = (1 << 40) - 1
+    _, toggles = count_toggles(Chain(), beats, count=len(beats), engine=engine)
+    expected = 0
+    for stage in range(26):
+        shown = np.r_[Chain.INITS[stage::-1], beats].astype(np.uint64)
+        expected += int(np.bitwise_count(shown[1:] ^ shown[:-1]).sum())
+    assert toggles == {"top": expected}
 
 
 @pytest.mark.parametrize("interval", [1, 2, 4])
