@@ -60,7 +60,8 @@ class Sample(Component):
 
 def test_counts():
     cost = cost_of(Sample())
-    assert cost == Cost({(16, 7): 2}, 1, 16, rom_bits=32, ram_bits=8)
+    # Three multipliers, two memories, the register, the sum of bits, and the enable of the write port.
+    assert cost == Cost(8, {(16, 7): 2}, 1, 16, rom_bits=32, ram_bits=8)
     assert cost.multiplier_count == 2
 
 
