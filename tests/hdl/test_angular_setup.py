@@ -44,7 +44,14 @@ def beats_of(left, right, vector, length, parameters=VARIANTS["half_chord"]):
 
 @pytest.mark.parametrize(
     ("variant", "interval"),
-    [("half_chord", None), ("half_chord", 4), ("half_chord", 26), ("arccos", 4), ("arccos_printed", None)],
+    [
+        ("half_chord", 4),
+        ("arccos", 4),
+        *(
+            pytest.param(*variant, marks=pytest.mark.long)
+            for variant in (("half_chord", None), ("half_chord", 26), ("arccos_printed", None))
+        ),
+    ],
 )
 def test_equals_twin(verify, normal_pairs, variant, interval):
     check(verify, normal_pairs, VARIANTS[variant], interval)
@@ -78,6 +85,7 @@ def check(verify, normal_pairs, parameters, interval):
     verify(AngularSetupUnit(parameters, interval), beats, expected)
 
 
+@pytest.mark.long
 def test_times_and_multipliers_as_stated():
     for variant, latencies, counts, longest in (
         ("half_chord", [50, 53, 53, 53, 53, 56], [26, 13, 9, 7, 6, 5], 26),

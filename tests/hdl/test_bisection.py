@@ -30,6 +30,7 @@ VARIANTS = [
 ]
 
 
+@pytest.mark.long
 def test_intervals_and_what_they_cost():
     for parameters, stated in STATED.items():
         assert BisectionUnit(parameters).initiation_interval == parameters.steps + 3

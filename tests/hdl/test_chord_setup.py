@@ -47,7 +47,13 @@ def expected_of(unit, beats, vectors):
     return expected
 
 
-@pytest.mark.parametrize(("lights", "interval"), VARIANTS)
+@pytest.mark.parametrize(
+    ("lights", "interval"),
+    [
+        pytest.param(*variant, marks=() if variant in ((1, 4), (1, 26), (2, 4)) else pytest.mark.long)
+        for variant in VARIANTS
+    ],
+)
 def test_equals_twin(verify, normal_pairs, lights, interval):
     rng = np.random.default_rng(interval)
     unit = ChordSetupUnit(lights, interval)
@@ -117,7 +123,10 @@ def test_shorter_spans_need_a_smaller_table(verify, normal_pairs):
     verify(unit, beats, expected_of(unit, beats, vectors), constants=constants_of(unit, vectors))
 
 
-@pytest.mark.parametrize(("terms", "fraction_bits", "interval"), [(1, 36, 4), (2, 46, 5), (3, 40, 1)])
+@pytest.mark.parametrize(
+    ("terms", "fraction_bits", "interval"),
+    [(1, 36, 4), *(pytest.param(*p, marks=pytest.mark.long) for p in ((2, 46, 5), (3, 40, 1)))],
+)
 def test_fewer_terms_and_bits(verify, normal_pairs, terms, fraction_bits, interval):
     """The twin's; each term is a product of a span."""
     rng = np.random.default_rng(terms)

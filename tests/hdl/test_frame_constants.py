@@ -407,7 +407,7 @@ def assert_pixels(run, pixels):
     np.testing.assert_array_equal(run.beats["last"], pixels.last)
 
 
-@pytest.mark.parametrize("method", ["linear", "quadratic"])
+@pytest.mark.parametrize("method", [pytest.param("linear", marks=pytest.mark.long), "quadratic"])
 def test_pipeline_of_three_materials_equals_its_twin(method, normal_pairs):
     """Spans of three materials in random order, empty ones among them, both engines, random stalls.
 

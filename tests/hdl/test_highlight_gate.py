@@ -90,6 +90,7 @@ def test_equals_twin_at_reduced_width(fraction_bits):
     assert 0.01 < min(shares) < 0.8
 
 
+@pytest.mark.long
 def test_times_and_multipliers_as_stated():
     units = [HighlightGateUnit(initiation_interval=interval) for interval in range(1, 16)]
     assert [unit.latency for unit in units] == [16, 18, 19, 19, 19, 20, 22, 27, 28, 24, 22, 23, 23, 24, 33]
@@ -100,7 +101,10 @@ def test_times_and_multipliers_as_stated():
         HighlightGateUnit(initiation_interval=16)
 
 
-@pytest.mark.parametrize(("lights", "exponent", "interval"), [(3, None, 4), (2, 60, 27), (1, 60, 6)])
+@pytest.mark.parametrize(
+    ("lights", "exponent", "interval"),
+    [(2, 60, 27), *(pytest.param(*p, marks=pytest.mark.long) for p in ((3, None, 4), (1, 60, 6)))],
+)
 def test_several_lights_or_an_exponent_for_good(verify, normal_pairs, lights, exponent, interval):
     parameters = HighlightGate()
     unit = HighlightGateUnit(parameters, interval, lights, exponent)

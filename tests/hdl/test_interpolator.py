@@ -47,7 +47,10 @@ def expected_of(unit, operand, normals, vectors):
 
 
 @pytest.mark.parametrize("operand", ["cosine", "one_minus_cosine"])
-@pytest.mark.parametrize(("lights", "interval"), [(1, 1), (2, 1), (5, 1), (1, 3), (2, 3), (2, 12)])
+@pytest.mark.parametrize(
+    ("lights", "interval"),
+    [(1, 1), (2, 3), *(pytest.param(*p, marks=pytest.mark.long) for p in ((2, 1), (5, 1), (1, 3), (2, 12)))],
+)
 def test_equals_exact_integers(verify, normal_pairs, lights, interval, operand):
     rng = np.random.default_rng(lights)
     normals, vectors = normals_and_vectors(rng, normal_pairs, lights)

@@ -51,7 +51,7 @@ def run(unit, spans, constants, pixels, **stalls):
         ("recurrence", "cosquad", 1, 4),
         pytest.param("recurrence", "blinn", 2, 4, marks=pytest.mark.long),
         pytest.param("recurrence", "blinn", 1, 2, marks=pytest.mark.long),
-        ("recurrence-direct", "cosquad", 1, 4),
+        pytest.param("recurrence-direct", "cosquad", 1, 4, marks=pytest.mark.long),
     ],
 )
 def test_equals_twin(normal_pairs, monkeypatch, method, model, lights, interval):

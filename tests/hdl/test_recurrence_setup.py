@@ -16,7 +16,7 @@ DIRECT = RecurrenceSetup(Recurrence("direct", interleave=4, result_format=SQ(2, 
 VARIANTS = [
     pytest.param(RecurrenceSetup(), 1, 1, marks=pytest.mark.long),
     (RecurrenceSetup(), 1, 4),
-    (RecurrenceSetup(), 1, 46),
+    pytest.param(RecurrenceSetup(), 1, 46, marks=pytest.mark.long),
     pytest.param(RecurrenceSetup(), 2, 4, marks=pytest.mark.long),
     pytest.param(DIRECT, 1, 3, marks=pytest.mark.long),
 ]

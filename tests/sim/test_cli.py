@@ -565,6 +565,7 @@ def test_output_over_the_mesh(refused):
 
 def test_fit_says_what_it_leaves_out(folder, capsys):
     options = ["--method", "chord", "--gate", "--fit", "--size", "64x48", "--specular", "0"]
+    options += ["--engine", "pysim", "--triangles", "64"]
     assert main(["render", "teapot", *options, "-o", "a.png", "--json", "a.json"]) == 0
     output = capsys.readouterr().out
     assert re.search(

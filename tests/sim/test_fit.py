@@ -70,7 +70,7 @@ def test_everything_is_needed():
     assert_same_frame(scene, fit)
 
 
-@pytest.mark.parametrize("style", ["throughput", "compact"])
+@pytest.mark.parametrize("style", ["throughput", pytest.param("compact", marks=pytest.mark.long)])
 def test_no_specular_path(style):
     scene = scene_of(replace(CLAY, specular=(0, 0, 0)))
     fit = for_scene(scene, full_of(scene))
@@ -215,6 +215,7 @@ def test_default_is_the_chord_method_with_a_gate():
     assert for_scene(scene).full == ShadingPipeline("chord", gate=True)
 
 
+@pytest.mark.long
 def test_simulated_frame():
     """The RTL of the fitted pipeline draws the frame of the full one."""
     scene = scene_of(Material((0.1,) * 3, (0.5,) * 3, (0.4,) * 3, 30), (KEY, BLACK), size=(120, 90))
