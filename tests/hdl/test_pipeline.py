@@ -116,7 +116,7 @@ def test_sixteen_lights(normal_pairs):
     assert_pixels(run(ShadingPipelineUnit(parameters), spans, constants, pixels), pixels)
 
 
-@pytest.mark.parametrize("lights", [1, 3])
+@pytest.mark.parametrize("lights", [1, pytest.param(3, marks=pytest.mark.long)])
 def test_clocks(lights, normal_pairs):
     """One pixel a clock; a span costs its length or the setup interval, whichever is more, and no more.
 
@@ -218,7 +218,7 @@ DESIGNS = [
     pytest.param("quadratic-horner", "cosquad", 1, "one_minus_cosine", marks=pytest.mark.long),
     ("renormalise", "blinn", 1, "cosine"),
     pytest.param("renormalise", "cosquad", 2, "one_minus_cosine", marks=pytest.mark.long),
-    ("angular", "lyon3", 1, None),
+    pytest.param("angular", "lyon3", 1, None, marks=pytest.mark.long),
     ("chord", "cosquad", 1, None),
     pytest.param("chord", "exp", 2, None, marks=pytest.mark.long),
 ]
@@ -641,7 +641,7 @@ def test_spans_with_values(lights, style, materials):
 
 GATED = [
     ("chord", "coscos2", 1, None, "throughput"),
-    ("chord", "cosquad", 2, None, "compact"),
+    pytest.param("chord", "cosquad", 2, None, "compact", marks=pytest.mark.long),
     pytest.param("quadratic", "cosquad", 2, "cosine", "throughput", marks=pytest.mark.long),
     pytest.param("linear", "lyon3", 1, "one_minus_cosine", "throughput", marks=pytest.mark.long),
     pytest.param("bisection", "exp", 1, "cosine", "throughput", marks=pytest.mark.long),
@@ -730,11 +730,10 @@ LEFT_OUT = {
 @pytest.mark.parametrize(
     ("what", "style"),
     [
-        ("exponent", "throughput"),
         ("all", "throughput"),
         *(
             pytest.param(what, "throughput", marks=pytest.mark.long)
-            for what in ("specular", "channels", "widths")
+            for what in ("specular", "exponent", "channels", "widths")
         ),
         *(pytest.param(what, "compact", marks=pytest.mark.long) for what in LEFT_OUT),
     ],

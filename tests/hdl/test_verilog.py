@@ -242,9 +242,7 @@ CORES = {
 
 
 # What these consist of is above them, and in the pipelines that are left.
-SELDOM = {
-    name for name in CORES if re.match("pipeline_(?!chord$|gated|of_little|compact)|.*_of_two_lights", name)
-}
+SELDOM = re.compile("pipeline_(?!chord$|gated|of_little|compact)|.*_of_two_lights")
 NAMES = [pytest.param(name, marks=pytest.mark.long) if SELDOM.match(name) else name for name in CORES]
 
 
