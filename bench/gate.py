@@ -10,7 +10,6 @@ Toggles are those of registers: what happens inside a multiplier between two of 
 works once a span and saves once a pixel, so it is the frame's spans that decide which is more.
 """
 
-import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -27,13 +26,14 @@ from golden.frame_constants import FrameConstants
 from golden.interpolator import pixels_of
 from golden.pipeline import MODELS as ALL_MODELS
 from golden.pipeline import Pixels, ShadingPipeline, Spans
-from golden.scene import LARGEST_SIDE, Scene
+from golden.scene import Scene
 from golden.specular import MAX_EXPONENT
 from golden.unit_vector import COMPONENT
 from hdl.pipeline import ShadingPipelineUnit
+from sim.cli import Size
 from sim.engine import CompilerMissing, Run, SimulationError, simulate
 from sim.errors import InputError
-from sim.frame import prepare
+from sim.frame import beats_of, prepare
 from sim.mesh import load_mesh
 from sim.output import check_writable, write_json
 from sim.toggles import ToggleCounter
@@ -55,7 +55,6 @@ __all__ = [
 MODELS = ("cosquad", "coscos4", "blinn")
 EXPONENTS = (2, 10, 50, 200, 1000)
 
-_FIELDS = ("x", "y", "length", "normal_left", "normal_right")
 _SPECULAR = ("light_0.specular",)
 _GATE = ("highlight_gate", "undecided", "lengths", "decisions")
 
@@ -184,9 +183,8 @@ def frames(
     engine : str
         As `sim.engine.simulate` takes it.
     """
-    beats = {field: getattr(spans, field) for field in _FIELDS}
     count, write = int(np.sum(spans.length)), constants.writes()
-    return [simulate(unit, beats, count=count, write=write, engine=engine) for unit in units]
+    return [simulate(unit, beats_of(unit, spans), count=count, write=write, engine=engine) for unit in units]
 
 
 def same_pixels(run: Run, expected: Pixels) -> bool:
@@ -345,21 +343,9 @@ def _print(rows: Sequence[GateRow]) -> None:
     click.echo(f"{same} of {len(rows)} frames are the same to the bit with the gate off and on.")
 
 
-class _Size(click.ParamType):
-    name = "WIDTHxHEIGHT"
-
-    def convert(self, value, param, ctx):
-        match = re.fullmatch("([0-9]{1,9})x([0-9]{1,9})", str(value))
-        if not match or not all(1 <= int(side) <= LARGEST_SIDE for side in match.groups()):
-            raise InputError(
-                f"--size {value}", "not a size", f"give {self.name}, 1 to {LARGEST_SIDE} each, as in 320x240"
-            )
-        return int(match[1]), int(match[2])
-
-
 @click.command()
 @click.argument("meshes", nargs=-1)
-@click.option("--size", type=_Size(), default="320x240", show_default=True, help="Of the frames.")
+@click.option("--size", type=Size(), default="320x240", show_default=True, help="Of the frames.")
 @click.option(
     "--model", "models", type=click.Choice(ALL_MODELS), multiple=True, default=MODELS, help="Repeat for more."
 )

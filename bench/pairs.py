@@ -16,12 +16,11 @@ import numpy as np
 
 from golden.frame_constants import FrameConstants
 from golden.geometry import Mesh
-from golden.pipeline import METHODS, MODELS, ShadingPipeline, Spans
+from golden.pipeline import METHODS, MODELS, ShadingPipeline
 from hdl.pipeline import ShadingPipelineUnit
-from sim.beats import dtype_of
 from sim.engine import SimulationError, simulate
 from sim.errors import InputError
-from sim.frame import prepare
+from sim.frame import beats_of, prepare
 from sim.mesh import load_mesh
 
 from .accuracy import scene_for
@@ -57,17 +56,6 @@ class Pair:
     failure: str = ""
 
 
-def _beats(unit: ShadingPipelineUnit, spans: Spans) -> dict[str, np.ndarray]:
-    """Input beats, as `sim.frame.FrameSimulator` sends them."""
-    members = unit.i.payload.shape().members
-    beats = {name: getattr(spans, name) for name in members if name != "values"}
-    if "values" in members:
-        beats["values"] = np.zeros(len(spans), dtype_of(members["values"]))
-        for name in members["values"].elem_shape.members:
-            beats["values"][name] = getattr(spans.values, name)
-    return beats
-
-
 def mismatches(
     unit: ShadingPipelineUnit, mesh: Mesh, exponent: int, width: int, height: int
 ) -> tuple[int, int]:
@@ -95,7 +83,7 @@ def mismatches(
     expected = unit.parameters.compute(spans, constants)
     run = simulate(
         unit,
-        _beats(unit, spans),
+        beats_of(unit, spans),
         count=len(expected.x),
         write=constants.writes(),
     )

@@ -21,7 +21,7 @@ from golden.pipeline import ShadingPipeline, Spans
 from golden.scene import Scene
 from hdl.pipeline import ShadingPipelineUnit
 from sim.engine import simulate
-from sim.frame import prepare
+from sim.frame import beats_of, prepare
 from sim.teapot import teapot
 
 from .accuracy import scene_for
@@ -43,7 +43,6 @@ LARGEST = 1.05
 """Target: clocks a pixel of those."""
 
 _EXPONENT = 50
-_FIELDS = ("x", "y", "length", "normal_left", "normal_right")
 
 
 @dataclass(frozen=True)
@@ -149,7 +148,7 @@ def measure(
         return 0, 0
     run = simulate(
         unit,
-        {name: getattr(spans, name) for name in _FIELDS},
+        beats_of(unit, spans),
         count=int(np.sum(spans.length)),
         write=constants.writes(),
         engine=engine,
@@ -172,7 +171,7 @@ def _frames(
         for method in methods:
             spans = spans_of(scene, method)
             chosen = np.asarray(spans.length) >= LONG
-            long = Spans(**{name: getattr(spans, name)[chosen] for name in _FIELDS})
+            long = spans[chosen]
             yield (
                 Lengths.of(len(mesh.faces), method, spans.length),
                 [

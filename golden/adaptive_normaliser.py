@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .bisection import Bisection
-from .difference_setup import DifferenceSetup, reciprocal_place
+from .difference_setup import DifferenceSetup, checked_lengths, reciprocal_place
 from .fixed import SQ, Fixed
 from .interpolator import pixels_of
 from .unit_vector import COMPONENT
@@ -175,9 +175,7 @@ class AdaptiveNormaliser:
         ValueError
             If an operand has another format or a length is out of range.
         """
-        length = np.asarray(length, dtype=np.int64)
-        if length.size and not 0 <= length.min() <= length.max() < 1 << self.LENGTH_BITS:
-            raise ValueError(f"lengths must be 0 to {(1 << self.LENGTH_BITS) - 1}")
+        length = checked_lengths(length, 0)
         whole = 1 << self.depth
         ends = np.zeros((len(length), whole + 1, 3), dtype=np.int64)
         ends[:, 0], ends[:, -1] = normal_left.codes, normal_right.codes

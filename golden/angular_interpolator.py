@@ -1,6 +1,6 @@
 """The angular method ([T] 3.1, 3.2): cosines of angles that grow evenly along the great circle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -22,8 +22,15 @@ class AngularInterpolator(Interpolator):
     `golden.highlight_cosine.HighlightCosine`. N·L is 1 less the result, ``SQ(2, 25)``. Spans over 150
     degrees are flagged.
 
+    Parameters
+    ----------
+    setup : AngularSetup
+        The unit that finds the angles.
+
     Source: [T] 3.1, 3.2.
     """
+
+    setup: AngularSetup = field(default_factory=AngularSetup)
 
     operand: ClassVar = "one_minus_cosine"
     COSINE_FORMAT = SQ(2, 25)
@@ -43,7 +50,7 @@ class AngularInterpolator(Interpolator):
 
         def along(vector):
             vector = Fixed(COMPONENT, np.broadcast_to(vector, normal_left.codes.shape))
-            _, phase, step, cos_beta, wide = AngularSetup().compute(normal_left, normal_right, vector, length)
+            _, phase, step, cos_beta, wide = self.setup.compute(normal_left, normal_right, vector, length)
             return HighlightCosine().compute(phase, step, cos_beta, *place).codes, wide
 
         one = Fixed(UQ(1, 25), 1 << 25)

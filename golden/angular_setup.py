@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from .arccos import SEGMENT_BOUNDS, Arccos, HalfChord
-from .difference_setup import DifferenceSetup, reciprocal_place
+from .difference_setup import DifferenceSetup, checked_lengths, reciprocal_place
 from .dot_product import DotProduct
 from .fixed import SQ, UQ, Fixed, Format
 from .highlight_cosine import HighlightCosine
@@ -266,11 +266,9 @@ class AngularSetup:
         ValueError
             If an operand has another format or a length is out of range.
         """
-        length = np.asarray(length, dtype=np.int64)
+        length = checked_lengths(length)
         if {normal_left.format, normal_right.format, vector.format} != {COMPONENT}:
             raise ValueError(f"operands must be {COMPONENT}")
-        if length.size and not 1 <= length.min() <= length.max() < 1 << DifferenceSetup.LENGTH_BITS:
-            raise ValueError(f"lengths must be 1 to {(1 << DifferenceSetup.LENGTH_BITS) - 1}")
         dot = DotProduct().compute
         own = dot(normal_left, normal_left) + dot(normal_right, normal_right)
         cross = dot(normal_left, normal_right)

@@ -1,11 +1,12 @@
 """Bisection of spans until straight lines will do ([T] figure 2.7): method ``bisection``."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
 
 from .adaptive_normaliser import AdaptiveNormaliser
+from .bisection import Bisection
 from .interpolation import interpolate
 from .interpolator import NormalInterpolator
 from .unit_vector import CODE_LENGTH_ERROR
@@ -24,6 +25,8 @@ class BisectionInterpolator(NormalInterpolator):
     ----------
     threshold : float
         Largest length error of a normal.
+    bisection : Bisection
+        Factor of the bisection unit.
 
     Raises
     ------
@@ -34,6 +37,7 @@ class BisectionInterpolator(NormalInterpolator):
     """
 
     threshold: float = 2.0**-14
+    bisection: Bisection = field(default_factory=Bisection)
 
     MAX_ANGLE = 90.0
 
@@ -42,9 +46,14 @@ class BisectionInterpolator(NormalInterpolator):
         AdaptiveNormaliser(self.threshold)
 
     @property
+    def normaliser(self) -> AdaptiveNormaliser:
+        """The unit."""
+        return _normaliser(self.threshold, self.bisection)
+
+    @property
     def normal_error(self):
         """That of three components, at the largest depth, and the codes' lengths."""
-        normaliser = AdaptiveNormaliser(self.threshold)
+        normaliser = self.normaliser
         return float(np.sqrt(3) * normaliser.error(normaliser.depth, False)) + CODE_LENGTH_ERROR
 
     @property
@@ -54,7 +63,7 @@ class BisectionInterpolator(NormalInterpolator):
 
     def normals(self, normal_left, normal_right, length):
         """Bit-true normals."""
-        normals, wide, _ = _normaliser(self.threshold).compute(normal_left, normal_right, length)
+        normals, wide, _ = self.normaliser.compute(normal_left, normal_right, length)
         return normals, wide
 
     def exact_normals(self, normal_left, normal_right, t):
@@ -62,7 +71,7 @@ class BisectionInterpolator(NormalInterpolator):
         t = np.asarray(t, dtype=np.float64)
         chord = np.linalg.norm(np.subtract(normal_right, normal_left), axis=-1)
         angle = 2 * np.arcsin(np.minimum(chord / 2, 1))
-        depth = AdaptiveNormaliser(self.threshold).depth
+        depth = self.normaliser.depth
         sagitta = 1 - np.cos(angle[..., np.newaxis] / 2.0 ** np.arange(1, depth + 1))
         segments = 2.0 ** np.count_nonzero(sagitta > self.threshold, axis=-1)
         left = np.minimum(np.floor(t * segments), segments - 1)
@@ -71,6 +80,6 @@ class BisectionInterpolator(NormalInterpolator):
 
 
 @cache
-def _normaliser(threshold: float) -> AdaptiveNormaliser:
+def _normaliser(threshold: float, bisection: Bisection) -> AdaptiveNormaliser:
     """The unit, whose polynomials take half a second to fit."""
-    return AdaptiveNormaliser(threshold)
+    return AdaptiveNormaliser(threshold, bisection)

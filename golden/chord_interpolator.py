@@ -82,10 +82,6 @@ class ChordInterpolator(Interpolator):
         """Widest span, in degrees, that the fit shades well."""
         return largest_span_angle(exponent)
 
-    def largest_bend(self, exponent):
-        """What costs 0.15 LSB: the cosine-quadratic model changes by ``0.77 sqrt(n)`` a radian at most."""
-        return 0.15 / (255 * 0.77 * exponent**0.5)
-
     @property
     def highlight_excess(self):
         """Error of u at the widest span and any ends, its cut, and the lengths of N and H as codes.

@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from .chord import Chord
-from .difference_setup import DifferenceSetup
+from .difference_setup import DifferenceSetup, checked_lengths
 from .dot_product import DotProduct
 from .fixed import SQ, UQ, Fixed, Format
 from .polynomials import half_angle_factor, largest_error, minimax_quantised
@@ -176,11 +176,9 @@ class ChordSetup:
         ValueError
             If an operand has another format or a length is out of range.
         """
-        length = np.asarray(length, dtype=np.int64)
+        length = checked_lengths(length)
         if {v.format for v in (normal_left, normal_right, direction, halfway)} != {COMPONENT}:
             raise ValueError(f"operands must be {COMPONENT}")
-        if length.size and not 1 <= length.min() <= length.max() < 1 << DifferenceSetup.LENGTH_BITS:
-            raise ValueError(f"lengths must be 1 to {(1 << DifferenceSetup.LENGTH_BITS) - 1}")
         w = Chord().compute(normal_right, normal_left).round_half_up(20).saturate(self.ANGLE_FORMAT)
         wide = w > self.widest
         coefficients = [self.coefficients[i] for i in range(self.terms)]

@@ -15,6 +15,27 @@ LENGTH_BITS = 12
 """Bits of a span's length."""
 
 
+def checked_lengths(length: np.ndarray, least: int = 1) -> np.ndarray:
+    """Lengths of spans as int64.
+
+    Parameters
+    ----------
+    length : int array
+        Pixels of each span.
+    least : int
+        Least length that a device takes.
+
+    Raises
+    ------
+    ValueError
+        If one is out of range.
+    """
+    length = np.asarray(length, dtype=np.int64)
+    if length.size and not least <= length.min() <= length.max() < 1 << LENGTH_BITS:
+        raise ValueError(f"lengths must be {least} to {(1 << LENGTH_BITS) - 1}")
+    return length
+
+
 def reciprocal_table(format: Format) -> Fixed:
     """``1/(1 + k/2048)`` at address k, rounded half up, and 1/2 at address 0, as no format here holds 1."""
     size = 1 << (LENGTH_BITS - 1)
@@ -115,13 +136,11 @@ class DifferenceSetup:
         ValueError
             If an operand has another format or a length is out of range.
         """
-        length = np.asarray(length, dtype=np.int64)
+        length = checked_lengths(length)
         if (g.format, p.format) != (GPQ.G_FORMAT, GPQ.P_FORMAT):
             raise ValueError(
                 f"operands must be {GPQ.G_FORMAT} and {GPQ.P_FORMAT}, not {g.format}, {p.format}"
             )
-        if length.size and not 1 <= length.min() <= length.max() < 1 << self.LENGTH_BITS:
-            raise ValueError(f"lengths must be 1 to {(1 << self.LENGTH_BITS) - 1}")
         reciprocal, shift, square, square_shift = self.steps(length)
         if self.as_documented:
             bend = g.extend(COMPONENT) * Fixed(reciprocal.format, reciprocal.codes[:, np.newaxis])

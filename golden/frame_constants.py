@@ -1,5 +1,6 @@
 """Frame constants: what the pipeline is told before a frame, and the addresses of its write port."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ __all__ = [
     "MAX_MATERIALS",
     "FrameConstants",
     "address_table",
+    "writes_of",
 ]
 
 FIELDS_OF_A_FRAME = {"exponent": (0, 1), "ambient": (1, 3)}
@@ -110,8 +112,10 @@ class FrameConstants:
             if not scene.local:
                 direction[index] = quantise(np.asarray(light.direction))
                 between = halfway_vector(light.direction, scene.camera.viewer)
-            if scene.local or np.any(between):
-                halfway[index] = quantise(between) if between.any() else 0
+            has_halfway = np.any(between)
+            if has_halfway:
+                halfway[index] = quantise(between)
+            if scene.local or has_halfway:
                 highlight = factor * np.multiply(material.specular, light.color)
                 if energy is not None and highlight.max() > MAX_INTENSITY:
                     raise ValueError(
@@ -141,6 +145,14 @@ class FrameConstants:
                 address += range(base + first, base + first + count)
                 data += getattr(self, name)[light].tolist()
         return {"address": np.array(address), "data": np.array(data) & 0x3FFFF}
+
+
+def writes_of(constants: Sequence[FrameConstants]) -> dict[str, np.ndarray]:
+    """Beats for the write port of a pipeline with so many materials, see `FrameConstants.writes`."""
+    if len(constants) == 1:
+        return constants[0].writes()
+    writes = [of_material.writes(index) for index, of_material in enumerate(constants)]
+    return {name: np.concatenate([beats[name] for beats in writes]) for name in ("address", "data")}
 
 
 _MEANINGS = {

@@ -1,6 +1,6 @@
 """Interpolators: what shading needs of a span at every pixel, whatever the method that finds it."""
 
-import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple
 
@@ -14,7 +14,7 @@ from .middle_normal import MAX_SPAN_ANGLE
 from .specular import Specular
 from .unit_vector import CODE_LENGTH_ERROR, COMPONENT
 
-__all__ = ["Interpolator", "NormalInterpolator", "Operand", "Operands", "pixels_of"]
+__all__ = ["Interpolator", "NormalInterpolator", "Operand", "Operands", "pixels_of", "runs_of"]
 
 Operand = Literal["cosine", "one_minus_cosine"]
 """What the specular unit may be given."""
@@ -42,6 +42,25 @@ def pixels_of(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Span of each pixel, and its place in the span, for spans of so many pixels each."""
     span = np.repeat(np.arange(len(length)), length)
     return span, np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)
+
+
+def runs_of(length: np.ndarray, most: int = 1 << 18) -> Iterator[slice]:
+    """Runs of spans with so many pixels or fewer, or of one span: bounds the memory of what is done at once.
+
+    Parameters
+    ----------
+    length : int array, shape (spans,)
+        Pixels of each.
+    most : int
+        Pixels of a run.
+    """
+    ends = np.cumsum(length)
+    start = 0
+    while start < len(length):
+        before = ends[start - 1] if start else 0
+        stop = max(int(np.searchsorted(ends, before + most, side="right")), start + 1)
+        yield slice(start, stop)
+        start = stop
 
 
 @dataclass(frozen=True)
@@ -101,9 +120,11 @@ class Interpolator:
     def largest_bend(self, exponent: int) -> float:
         """How far, in radians, the middle of a part of a span may lie from the middle normal of its ends.
 
-        Wider parts should be cut again before they are given to the method. By default anything will do.
+        Wider parts should be cut again before they are given to the method, which takes every span to bend
+        evenly. It is what costs 0.15 LSB: the cosine-quadratic model changes by ``0.77 sqrt(n)`` a radian at
+        most.
         """
-        return math.inf
+        return 0.15 / (255 * 0.77 * exponent**0.5)
 
     def compute(
         self,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .chord_setup import ChordSetup, Differences
-from .difference_setup import DifferenceSetup
+from .difference_setup import checked_lengths
 from .fixed import SQ, UQ, Fixed
 
 __all__ = ["LocalChordSetup"]
@@ -76,14 +76,12 @@ class LocalChordSetup:
         ValueError
             If an operand has another format or a length is out of range.
         """
-        length = np.asarray(length, dtype=np.int64)
+        length = checked_lengths(length)
         if (diffuse.format, highlight.format) != (self.DIFFUSE_FORMAT, self.HIGHLIGHT_FORMAT):
             raise ValueError(
                 f"operands must be {self.DIFFUSE_FORMAT} and {self.HIGHLIGHT_FORMAT}, "
                 f"not {diffuse.format}, {highlight.format}"
             )
-        if length.size and not 1 <= length.min() <= length.max() < 1 << DifferenceSetup.LENGTH_BITS:
-            raise ValueError(f"lengths must be 1 to {(1 << DifferenceSetup.LENGTH_BITS) - 1}")
         steps = ChordSetup.steps(length)
         wide = np.zeros(len(length), dtype=bool)
         results = []

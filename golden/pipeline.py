@@ -1,12 +1,15 @@
 """The shading pipeline: spans in, pixels out; which methods and models there are, and the bit-true twin."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from .angular_interpolator import AngularInterpolator
+from .angular_setup import AngularSetup
+from .arccos import Arccos
+from .bisection import Bisection
 from .bisection_interpolator import BisectionInterpolator
 from .chord_interpolator import ChordInterpolator
 from .difference_setup import LENGTH_BITS
@@ -15,16 +18,17 @@ from .fixed import Fixed
 from .frame_constants import MAX_MATERIALS, FrameConstants
 from .highlight_gate import HighlightGate
 from .intensity import Intensity
-from .interpolator import Interpolator, NormalInterpolator, Operand, Operands, pixels_of
+from .interpolator import Interpolator, NormalInterpolator, Operand, Operands, pixels_of, runs_of
 from .linear_interpolator import LinearInterpolator
 from .local_chord_interpolator import LocalChordInterpolator, SpanValues
+from .middle_normal import MiddleNormal
 from .power import Power
 from .quadratic_interpolator import QuadraticInterpolator
 from .recurrence_interpolator import RecurrenceInterpolator
 from .specular import FURTHER_MODELS, MAX_EXPONENT, SPECULAR_MODELS, Specular
 from .unit_vector import COMPONENT
 
-__all__ = ["METHODS", "MODELS", "Pixels", "ShadingPipeline", "Spans"]
+__all__ = ["METHODS", "MODELS", "PRINTED", "Pixels", "ShadingPipeline", "Spans"]
 
 METHODS: dict[str, Interpolator] = {
     "linear": LinearInterpolator(),
@@ -40,11 +44,21 @@ METHODS: dict[str, Interpolator] = {
 }
 """Interpolation methods of the pipeline."""
 
+PRINTED: dict[str, Interpolator] = {
+    "bisection-printed": BisectionInterpolator(bisection=Bisection(as_documented=True)),
+    "quadratic-printed": QuadraticInterpolator(middle_normal=MiddleNormal("as_documented")),
+    "angular-printed": AngularInterpolator(AngularSetup("arccos", Arccos("printed"))),
+    "angular-corrected": AngularInterpolator(AngularSetup("arccos", Arccos("corrected"))),
+    "recurrence-direct": RecurrenceInterpolator("direct"),
+}
+"""Methods with the coefficients or in the form that the documents print, to be compared with the others: the
+polynomials of [T] 2.1 and 2.2, table 3.1 with its misprint and without, and formula 3.3 as it stands. A
+gate does not go with them."""
+
 MODELS = (*SPECULAR_MODELS, *FURTHER_MODELS, "blinn")
 """Reflection models of the pipeline; every method serves each."""
 
-_CHUNK = 1 << 18
-"""Pixels shaded at once."""
+_ALL = METHODS | PRINTED
 
 
 @dataclass(frozen=True)
@@ -81,6 +95,12 @@ class Spans:
     def __len__(self):
         return len(self.length)
 
+    def __getitem__(self, which: slice | np.ndarray) -> "Spans":
+        """Some of the spans, by a slice, indices or a mask."""
+        values = self.values if self.values is None else SpanValues(*(codes[which] for codes in self.values))
+        fields = ("x", "y", "length", "normal_left", "normal_right", "material")
+        return Spans(*(getattr(self, name)[which] for name in fields), values)
+
 
 @dataclass(frozen=True)
 class Pixels:
@@ -115,7 +135,7 @@ class ShadingPipeline:
     Parameters
     ----------
     method : str
-        One of `METHODS`.
+        One of `METHODS` or `PRINTED`.
     model : str or None
         One of `MODELS`; ``None``: no specular light.
     lights : int
@@ -143,7 +163,7 @@ class ShadingPipeline:
     ValueError
         If the method, the model, the number of lights or materials or the operand is unknown, the method has
         no choice of operand, a number of bits or the exponent is out of range, or a gate is asked for without
-        specular light.
+        specular light or with a method of `PRINTED`.
     """
 
     method: str = "quadratic"
@@ -161,12 +181,12 @@ class ShadingPipeline:
     fraction_bits: int | None = None
 
     def __post_init__(self):
-        if self.method not in METHODS:
+        if self.method not in _ALL:
             raise ValueError(f"method must be one of {', '.join(METHODS)}, not {self.method!r}")
         if self.model is not None and self.model not in MODELS:
             raise ValueError(f"model must be one of {', '.join(MODELS)}, not {self.model!r}")
-        if self.operand not in (None, METHODS[self.method].operand):
-            if not isinstance(METHODS[self.method], NormalInterpolator):
+        if self.operand not in (None, _ALL[self.method].operand):
+            if not isinstance(_ALL[self.method], NormalInterpolator):
                 raise ValueError(f"method {self.method} finds no normals, and gives 1 - cos gamma")
             _ = self.interpolator
         if self.method != "chord" and (self.terms, self.fraction_bits) != (None, None):
@@ -177,8 +197,9 @@ class ShadingPipeline:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {self.materials}")
         if self.gate and not (self.model and self.lights):
             raise ValueError("without specular light there is nothing to gate")
-        if self.gate and self.takes_values:
-            raise ValueError(f"method {self.method} has no normals for a gate")
+        if self.gate and not self.serves_gate:
+            lacks = "normals" if self.takes_values else "error bound"
+            raise ValueError(f"method {self.method} has no {lacks} for a gate")
         if self.exponent is not None and not 1 <= self.exponent <= MAX_EXPONENT:
             raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {self.exponent}")
         for name, least in (("x_bits", 1), ("y_bits", 1), ("length_bits", 2)):
@@ -188,7 +209,7 @@ class ShadingPipeline:
     @cached_property
     def interpolator(self) -> Interpolator:
         """Twin of the method."""
-        interpolator = METHODS[self.method]
+        interpolator = _ALL[self.method]
         changes = {"terms": self.terms, "fraction_bits": self.fraction_bits}
         if self.operand != interpolator.operand:
             changes["operand"] = self.operand
@@ -198,6 +219,11 @@ class ShadingPipeline:
     def takes_values(self) -> bool:
         """Whether spans carry values of each light, in place of normals, so that L and H may be local."""
         return isinstance(self.interpolator, LocalChordInterpolator)
+
+    @property
+    def serves_gate(self) -> bool:
+        """Whether a highlight gate can tell what the method's pixels will be."""
+        return not self.takes_values and self.method not in PRINTED
 
     @property
     def highlight(self) -> Specular | Power | None:
@@ -268,7 +294,7 @@ class ShadingPipeline:
         color = np.empty((len(span), 3), dtype=np.uint8)
         wide, done = 0, 0
         lit = self.lit_spans(spans, constants)[kept] if self.gate else None
-        for part in _chunks(length):
+        for part in runs_of(length):
             if not self.lights:
                 color[:] = self._ambient(constants, spans.material[kept][span])
                 break
@@ -329,14 +355,3 @@ class ShadingPipeline:
     def _colors(self, constants: FrameConstants) -> tuple[Fixed, ...]:
         colors = (constants.ambient, constants.diffuse, constants.specular)
         return tuple(Fixed(Intensity.COLOR_FORMAT, codes) for codes in colors)
-
-
-def _chunks(length: np.ndarray) -> Iterator[slice]:
-    """Runs of spans with about `_CHUNK` pixels each; bounds the memory, changes no result."""
-    ends = np.cumsum(length)
-    start = 0
-    while start < len(length):
-        before = ends[start - 1] if start else 0
-        stop = max(int(np.searchsorted(ends, before + _CHUNK, side="right")), start + 1)
-        yield slice(start, stop)
-        start = stop

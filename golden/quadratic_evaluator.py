@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from .difference_setup import LENGTH_BITS, reciprocal_place, reciprocal_table
+from .difference_setup import LENGTH_BITS, checked_lengths, reciprocal_place, reciprocal_table
 from .fixed import SQ, UQ, Fixed
 from .gpq import GPQ
 from .unit_vector import COMPONENT
@@ -102,9 +102,7 @@ class QuadraticEvaluator:
         ValueError
             If a length is out of range.
         """
-        length = np.asarray(length, dtype=np.int64)
-        if length.size and not 1 <= length.min() <= length.max() < 1 << self.LENGTH_BITS:
-            raise ValueError(f"lengths must be 1 to {(1 << self.LENGTH_BITS) - 1}")
+        length = checked_lengths(length)
         address, shift = reciprocal_place(length - 1)
         scaled = self.reciprocals[address].scale(1).extend(self.STEP_FORMAT)
         return Fixed(self.STEP_FORMAT, scaled.codes >> shift)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from .chord import Chord
-from .difference_setup import LENGTH_BITS, reciprocal_place, reciprocal_table
+from .difference_setup import LENGTH_BITS, checked_lengths, reciprocal_place, reciprocal_table
 from .dot_product import DotProduct
 from .fixed import SQ, UQ, Fixed
 from .recurrence import Recurrence
@@ -231,11 +231,9 @@ class RecurrenceSetup:
         ValueError
             If an operand has another format or a length is out of range.
         """
-        length = np.asarray(length, dtype=np.int64)
+        length = checked_lengths(length)
         if {normal_left.format, normal_right.format, vector.format} != {COMPONENT}:
             raise ValueError(f"operands must be {COMPONENT}")
-        if length.size and not 1 <= length.min() <= length.max() < 1 << LENGTH_BITS:
-            raise ValueError(f"lengths must be 1 to {(1 << LENGTH_BITS) - 1}")
         chord = Chord().compute(normal_right, normal_left)
         chord = chord + chord.scale(-16).truncate(35)
         wide = chord >= self.WIDEST

@@ -14,6 +14,7 @@ from golden.unit_vector import COMPONENT
 from .bisection import BisectionUnit
 from .fixed import FixedShape, FixedValue
 from .middle_normal import normal_shape
+from .stream import count_down, offer
 
 __all__ = ["AdaptiveNormaliserUnit"]
 
@@ -337,29 +338,21 @@ class AdaptiveNormaliserUnit(wiring.Component):
         """Interpolate: an accumulating adder a component."""
         p = self.parameters
         segment = data.View(segment_shape, fifo.r_data)
-        remaining = Signal(p.LENGTH_BITS, name="pixels_left")
-        inside, wide = Signal(), Signal(name="span_wide")
+        inside, wide, valid = Signal(), Signal(name="span_wide"), Signal(name="pixel_valid")
         advance, load = Signal(name="back_advance"), Signal()
+        given = fifo.r_rdy & (inside | (ready_spans != 0))
+        active, ends = count_down(m, given, segment.count, advance)
+        pixel = Signal(self.o.payload.shape())
         m.d.comb += [
-            advance.eq(~self.o.valid | self.o.ready),
-            load.eq(advance & (remaining <= 1) & fifo.r_rdy & (inside | (ready_spans != 0))),
+            advance.eq(offer(m, self.o, valid, pixel)),
+            load.eq(advance & ends & given),
             begun.eq(load & ~inside),
             fifo.r_en.eq(load),
         ]
         with m.If(advance):
-            m.d.sync += [
-                self.o.valid.eq(remaining != 0),
-                self.o.payload.wide.eq(wide),
-                self.o.payload.last.eq((remaining == 1) & ~inside),
-            ]
-            with m.If(load):
-                m.d.sync += [
-                    remaining.eq(segment.count),
-                    inside.eq(~segment.last),
-                    wide.eq(segment.wide),
-                ]
-            with m.Elif(remaining != 0):
-                m.d.sync += remaining.eq(remaining - 1)
+            m.d.sync += [valid.eq(active), pixel.wide.eq(wide), pixel.last.eq(active & ends & ~inside)]
+        with m.If(load):
+            m.d.sync += [inside.eq(~segment.last), wide.eq(segment.wide)]
         for c in range(3):
             normal = Signal(FixedShape(p.ACCUMULATOR_FORMAT), name=f"normal_{c}")
             slope = Signal(FixedShape(p.STEP_FORMAT), name=f"step_{c}")
@@ -369,4 +362,4 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 m.d.sync += normal.eq((normal + slope).wrap(p.ACCUMULATOR_FORMAT))
             with m.If(advance):
                 result = normal.truncate(COMPONENT.fraction_bits).saturate(COMPONENT)
-                m.d.sync += self.o.payload.normal[c].eq(result)
+                m.d.sync += pixel.normal[c].eq(result)

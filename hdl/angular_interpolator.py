@@ -10,7 +10,7 @@ from .angular_setup import AngularSetupUnit
 from .fixed import FixedValue
 from .highlight_cosine import HighlightCosineUnit, highlight_shape
 from .interpolator import InterpolatorUnit
-from .stream import BUFFER_LATENCY, connect_buffered
+from .stream import connect_registered
 
 __all__ = ["AngularInterpolatorUnit"]
 
@@ -45,12 +45,12 @@ class AngularInterpolatorUnit(InterpolatorUnit):
         super().__init__(parameters, lights, **options)
         self.setup_interval = setup_interval
         self._chains = {
-            (light, name): (AngularSetupUnit(initiation_interval=setup_interval), HighlightCosineUnit())
+            (light, name): (AngularSetupUnit(parameters.setup, setup_interval), HighlightCosineUnit())
             for light in range(lights)
             for name in (("direction", "halfway") if self.highlights else ("direction",))
         }
         setup, cosine = self._chains[0, "direction"]
-        self.latency = setup.latency + BUFFER_LATENCY + cosine.latency
+        self.latency = setup.latency + 1 + cosine.latency
 
     def elaborate(self, platform):
         """Chains in lockstep, each with a FIFO of prepared spans."""
@@ -74,7 +74,7 @@ class AngularInterpolatorUnit(InterpolatorUnit):
                 setup.o.ready.eq(prepared.ready),
                 cosine.o.ready.eq(self.o.ready),
             ]
-            connect_buffered(m, f"prepared_{name}_{light}", prepared, cosine.i, depth=3)
+            connect_registered(m, prepared, cosine.i)
             result = self.o.payload[light]
             if name == "halfway":
                 m.d.comb += result.highlight.eq(cosine.o.payload)

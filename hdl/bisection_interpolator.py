@@ -2,7 +2,6 @@
 
 from amaranth.lib import stream
 
-from golden.adaptive_normaliser import AdaptiveNormaliser
 from golden.bisection_interpolator import BisectionInterpolator
 
 from .adaptive_normaliser import AdaptiveNormaliserUnit
@@ -21,7 +20,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit):
     Parameters
     ----------
     parameters : BisectionInterpolator
-        Threshold and specular operand.
+        Threshold, factor of the bisection unit, specular operand.
     lights : int
         Number of lights, at least 1.
     options
@@ -32,7 +31,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit):
 
     def __init__(self, parameters: BisectionInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
-        self._normaliser = AdaptiveNormaliserUnit(AdaptiveNormaliser(parameters.threshold))
+        self._normaliser = AdaptiveNormaliserUnit(parameters.normaliser)
         preparation = self._normaliser.preparation(0)
         self.latency = preparation + self.product_latency
         self.setup_interval = preparation - 2

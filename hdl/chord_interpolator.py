@@ -8,7 +8,7 @@ from golden.chord_interpolator import ChordInterpolator
 from .chord_setup import ChordSetupUnit, chord_differences_shape
 from .difference_accumulator import AccumulatorUnit
 from .interpolator import InterpolatorUnit, operands_shape
-from .stream import BUFFER_LATENCY, connect, connect_buffered
+from .stream import connect, connect_registered
 
 __all__ = ["ChordAccumulatorUnit", "ChordInterpolatorUnit"]
 
@@ -33,10 +33,10 @@ class ChordAccumulatorUnit(AccumulatorUnit):
             chord_differences_shape(lights, highlights, p.setup), operands_shape(p, lights, highlights)
         )
 
-    def quadratics(self):
+    def quadratics(self, values):
         """Those of each light."""
         for index, light in enumerate(self.i.payload.lights):
-            result = self.o.payload[index]
+            result = values[index]
             for name in self.functions:
                 span = light[name]
                 parameters = self.parameters.accumulators[name]
@@ -76,15 +76,15 @@ class ChordInterpolatorUnit(InterpolatorUnit):
             lights, setup_interval, self.length_bits, self.highlights, parameters.setup
         )
         self._accumulator = ChordAccumulatorUnit(lights, self.highlights, parameters)
-        self.latency = self._setup.latency + BUFFER_LATENCY + self._accumulator.latency
+        self.latency = self._setup.latency + 1 + self._accumulator.latency
 
     def elaborate(self, platform):
-        """A FIFO between the two holds spans ready, so that a long one pays for short ones after it."""
+        """Registers between the two hold spans ready, so that a long one pays for short ones after it."""
         m = Module()
         m.submodules.chord_setup = setup = self._setup
         m.submodules.chord_accumulator = accumulator = self._accumulator
         connect(m, wiring.flipped(self.i), setup.i)
-        connect_buffered(m, "prepared", setup.o, accumulator.i, depth=3)
+        connect_registered(m, setup.o, accumulator.i)
         connect(m, accumulator.o, wiring.flipped(self.o))
         m.d.comb += [
             setup.constants.eq(self.constants),

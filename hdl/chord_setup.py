@@ -77,9 +77,8 @@ class ChordSetupUnit(ChordDifferencesUnit):
 
     The 7 products of a span and the 19 of each light take turns at ``ceil((7 + 19 lights) / I)`` multipliers
     of 18x18 bits, I the initiation interval: 7 for one light and an interval of 4. Without highlights there
-    are 9 products a light. A table of
-    ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals. The latency, `latency`, follows from the
-    turns.
+    are 9 products a light. A table of ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals. The
+    latency, `latency`, follows from the turns.
 
     Parameters
     ----------

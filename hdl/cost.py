@@ -42,6 +42,16 @@ class Cost:
         """Number of multipliers of any width."""
         return sum(self.multipliers.values())
 
+    @property
+    def totals(self) -> dict[str, int]:
+        """``cells``, ``multipliers``, ``register_bits`` and ``memory_bits``, each one number."""
+        return {
+            "cells": self.cells,
+            "multipliers": self.multiplier_count,
+            "register_bits": self.register_bits,
+            "memory_bits": self.rom_bits + self.ram_bits,
+        }
+
 
 def cost_of(component: wiring.Component) -> Cost:
     """Count the parts of a component.

@@ -364,9 +364,13 @@ class _Build:
         return copies[max(start for start in copies if start <= age)]
 
     def issue(self, operator: Operator, piece: int, age: int, operands: Sequence[Any]) -> Any:
-        """Give a piece of an operator its operands at an age; its result, for all uses."""
-        key = operator, piece
+        """Give a piece of an operator its operands at an age; its result, for all uses.
+
+        Those of the first use are given whenever it is no other's turn, so that no register needs an enable.
+        """
+        key, when = (operator, piece), self.when(age)
         if key not in self._pieces:
+            when = None
             given = [
                 Signal(shape, name=f"{operator.name}_{piece}_{k}") for k, shape in enumerate(operator.shapes)
             ]
@@ -379,7 +383,7 @@ class _Build:
         assignments = [
             Value.cast(to).eq(Value.cast(value)) for to, value in zip(given, operands, strict=True)
         ]
-        if (when := self.when(age)) is None:
+        if when is None:
             self.m.d.sync += assignments
         else:
             with self.m.If(when):

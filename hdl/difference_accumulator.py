@@ -2,16 +2,16 @@
 
 from collections.abc import Iterator
 
-from amaranth.hdl import Module, ShapeLike, Signal
+from amaranth.hdl import Module, ShapeLike, Signal, ValueCastable
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from golden.difference_accumulator import DifferenceAccumulator
-from golden.difference_setup import LENGTH_BITS
 
 from .difference_setup import difference_shape
 from .fixed import FixedShape, FixedValue
 from .middle_normal import normal_shape
+from .stream import count_down, offer
 
 __all__ = ["AccumulatorUnit", "DifferenceAccumulatorUnit"]
 
@@ -48,28 +48,26 @@ class AccumulatorUnit(wiring.Component):
     def __init__(self, input_shape: data.StructLayout, output_shape: ShapeLike):
         super().__init__({"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))})
 
-    def quadratics(self) -> Iterator[tuple[str, DifferenceAccumulator, tuple, FixedValue]]:
-        """Name, formats, (start, first, second) and output of each quadratic."""
+    def quadratics(
+        self, values: ValueCastable
+    ) -> Iterator[tuple[str, DifferenceAccumulator, tuple, FixedValue]]:
+        """Name, formats, (start, first, second) and place among the ``values`` of each quadratic."""
         raise NotImplementedError
 
     def elaborate(self, platform):
-        """Accumulators, a pixel counter, and an output register for the saturated values."""
+        """Accumulators, a pixel counter, and a register for the saturated values."""
         m = Module()
-        remaining = Signal(LENGTH_BITS)
-        advance = Signal()
-        load = Signal()
+        advance, load, valid = Signal(), Signal(), Signal()
+        active, ends = count_down(m, self.i.valid, self.i.payload.length, advance)
+        values = Signal(self.o.payload.shape())
         m.d.comb += [
-            advance.eq(~self.o.valid | self.o.ready),
-            self.i.ready.eq(advance & (remaining <= 1)),
+            advance.eq(offer(m, self.o, valid, values)),
+            self.i.ready.eq(advance & ends),
             load.eq(self.i.valid & self.i.ready),
         ]
         with m.If(advance):
-            m.d.sync += self.o.valid.eq(remaining != 0)
-            with m.If(load):
-                m.d.sync += remaining.eq(self.i.payload.length)
-            with m.Elif(remaining != 0):
-                m.d.sync += remaining.eq(remaining - 1)
-        for name, p, (start, first, second), result in self.quadratics():
+            m.d.sync += valid.eq(active)
+        for name, p, (start, first, second), result in self.quadratics(values):
             value = Signal(FixedShape(p.format), name=name)
             difference = Signal(FixedShape(p.difference_format), name=f"{name}_difference")
             bend = Signal(FixedShape(p.difference_format), name=f"{name}_second_difference")
@@ -106,9 +104,9 @@ class DifferenceAccumulatorUnit(AccumulatorUnit):
     def __init__(self):
         super().__init__(difference_shape(), normal_shape())
 
-    def quadratics(self):
+    def quadratics(self, values):
         """The components of the normal."""
         span = self.i.payload
         for c in range(3):
             operands = span.start[c], span.first[c], span.second[c]
-            yield f"normal_{c}", DifferenceAccumulator(), operands, self.o.payload[c]
+            yield f"normal_{c}", DifferenceAccumulator(), operands, values[c]

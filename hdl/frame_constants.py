@@ -62,10 +62,10 @@ class FrameConstantsUnit(wiring.Component):
     16 (light + 1) + 9 to 11 specular red, green, blue, ``UQ(11, 6)`` LSB
     ======================== ==========================================================
 
-    With several materials the exponent and the colours stand in memories of a word each, written for the
-    material whose index was last written to address 4 and read for that of ``material``: they follow it 1
-    clock behind, and a write 2. Writes for an index past the last material are lost. Memories are not cleared
-    by reset.
+    A constant is there 2 clocks after its write was taken. With several materials the exponent and the
+    colours stand in memories of a word each, written for the material whose index was last written to
+    address 4 and read for that of ``material``: they follow it 1 clock behind, and a write 3. Writes for an
+    index past the last material are lost. Memories are not cleared by reset.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class FrameConstantsUnit(wiring.Component):
     write : :py:`In(stream.Signature(write_shape()))`
         Writes.
     hold : :py:`In(1)`
-        Whether the constants must not change.
+        Whether no write is to be taken.
     material : :py:`In(range(materials))`
         Only where there are several: the material whose constants are given.
     constants : :py:`Out(frame_constants_shape(lights))`
@@ -108,7 +108,7 @@ class FrameConstantsUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """One decoded register, or memory, a word."""
+        """One register, or memory, a word; its decoded address stands in one, too, beside the data."""
         m = Module()
         m.d.comb += self.write.ready.eq(~self.hold)
         words, of_material = {}, set()
@@ -124,14 +124,16 @@ class FrameConstantsUnit(wiring.Component):
                 if name in ("diffuse", "specular"):
                     of_material |= set(addresses)
         taken = self.write.valid & self.write.ready
-        word_data = self.write.payload.data
+        word_data = Signal.like(self.write.payload.data)
+        m.d.sync += word_data.eq(self.write.payload.data)
         if self.materials > 1:
             index = Signal(range(self.materials))
             with m.If(taken & (self.write.payload.address == MATERIAL_ADDRESS)):
-                m.d.sync += index.eq(word_data)
+                m.d.sync += index.eq(self.write.payload.data)
         for address, word in words.items():
             code = Value.cast(word)
-            written = taken & (self.write.payload.address == address)
+            written = Signal(name=f"written_{address}")
+            m.d.sync += written.eq(taken & (self.write.payload.address == address))
             if self.materials > 1 and address in of_material:
                 memory = Memory(shape=len(code), depth=self.materials, init=[])
                 m.submodules[f"word_{address}"] = memory

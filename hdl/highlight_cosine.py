@@ -9,7 +9,7 @@ from golden.fixed import SQ, UQ
 from golden.highlight_cosine import HighlightCosine
 
 from .fixed import FixedShape, FixedValue
-from .stream import PipelinedUnit
+from .stream import PipelinedUnit, count_down, offer
 
 __all__ = ["HighlightCosineUnit", "highlight_shape"]
 
@@ -67,33 +67,23 @@ class HighlightCosineUnit(wiring.Component):
         """Accumulator and counter, and the stages after them under one enable."""
         m = Module()
         phase_format = HighlightCosine.PHASE_FORMAT
-        remaining = Signal(HighlightCosine.LENGTH_BITS)
         theta, step = Signal(FixedShape(phase_format)), Signal(FixedShape(HighlightCosine.STEP_FORMAT))
         cos_beta = Signal(FixedShape(HighlightCosine.COS_BETA_FORMAT))
         valid = Signal(self.latency - 1)
         advance, load = Signal(), Signal()
         span = self.i.payload
-        m.d.comb += [
-            self.o.valid.eq(valid[-1]),
-            advance.eq(~self.o.valid | self.o.ready),
-            self.i.ready.eq(advance & (remaining <= 1)),
-            load.eq(self.i.valid & self.i.ready),
-        ]
+        active, ends = count_down(m, self.i.valid, span.length, advance)
+        m.d.comb += [self.i.ready.eq(advance & ends), load.eq(self.i.valid & self.i.ready)]
         with m.If(advance):
-            m.d.sync += valid.eq(Cat(remaining != 0, valid[:-1]))
+            m.d.sync += valid.eq(Cat(active, valid[:-1]))
             with m.If(load):
-                m.d.sync += [
-                    remaining.eq(span.length),
-                    theta.eq(span.phase),
-                    step.eq(span.step),
-                    cos_beta.eq(span.cos_beta),
-                ]
-            with m.Elif(remaining != 0):
-                m.d.sync += [remaining.eq(remaining - 1), theta.eq((theta - step).wrap(phase_format))]
+                m.d.sync += [theta.eq(span.phase), step.eq(span.step), cos_beta.eq(span.cos_beta)]
+            with m.Elif(active):
+                m.d.sync += theta.eq((theta - step).wrap(phase_format))
         inner = Module()
         result = self._wave(inner, Value.cast(theta).as_unsigned(), cos_beta)
         m.submodules.wave = EnableInserter(advance)(inner)
-        m.d.comb += self.o.payload.eq(result)
+        m.d.comb += advance.eq(offer(m, self.o, valid[-1], result))
         return m
 
     def _wave(self, m, theta, cos_beta):

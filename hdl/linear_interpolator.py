@@ -11,7 +11,7 @@ from .difference_setup import DifferenceSetupUnit
 from .interpolator import NormalInterpolatorUnit
 from .middle_normal import normal_shape
 from .renormaliser import RenormaliserUnit
-from .stream import BUFFER_LATENCY, connect, connect_buffered
+from .stream import connect, connect_registered, offer
 
 __all__ = ["LinearInterpolatorUnit"]
 
@@ -37,7 +37,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
     Source: [T] 2.1; numbers.md, "Rivals to measure against".
     """
 
-    # Spans that wait ready for the accumulator.
+    # Spans that wait ready for the accumulator: one at the output of the setup, two in the registers between.
     PREPARED = 3
 
     @classmethod
@@ -56,7 +56,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
         if parameters.renormalised:
             self._renormaliser = RenormaliserUnit()
             units.append(self._renormaliser)
-        self.latency = sum(unit.latency for unit in units) + BUFFER_LATENCY + self.product_latency
+        self.latency = sum(unit.latency for unit in units) + 1 + self.product_latency
 
     def source(self, m):
         """Difference, its share a pixel, the sums."""
@@ -73,7 +73,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
         ]
         tops = (Value.cast(difference)[-2:] for difference in differences)
         far = Cat(top[0] ^ top[1] for top in tops).any()
-        connect_buffered(m, "prepared", setup.o, accumulator.i, depth=self.PREPARED)
+        connect_registered(m, setup.o, accumulator.i)
         wide = Signal()
         if not self.parameters.renormalised:
             m.d.sync += wide.eq(self.i.valid & self.i.ready & far)
@@ -108,11 +108,14 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
             spans.w_en.eq(self.i.valid & self.i.ready),
             spans.r_en.eq(load),
         ]
-        # As old as the values: two registers of the accumulator, then those of the renormaliser.
-        young = Signal(2 * accumulator.latency)
-        with m.If(~accumulator.o.valid | accumulator.o.ready):
-            m.d.sync += young.eq(Cat(load, spans.r_data, young))
-        old = Signal(2 * renormaliser.latency)
-        with m.If(renormaliser.i.ready):
-            m.d.sync += old.eq(Cat(young[-2:], old))
-        return old[-2], old[-1]
+        mark = Cat(load, spans.r_data)
+        for name, unit in (("young", accumulator), ("old", renormaliser)):
+            # As many registers as the values go through in the unit, and one to wait in beside theirs.
+            marks = Signal(2 * unit.latency, name=name)
+            beside = stream.Signature(2).create(path=(name,))
+            advance = offer(m, beside, unit.o.valid, marks[-2:])
+            m.d.comb += beside.ready.eq(unit.o.ready)
+            with m.If(advance):
+                m.d.sync += marks.eq(Cat(mark, marks))
+            mark = beside.payload
+        return mark[0], mark[1]

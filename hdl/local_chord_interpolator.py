@@ -10,7 +10,7 @@ from golden.local_chord_interpolator import LocalChordInterpolator
 from .chord_interpolator import ChordAccumulatorUnit
 from .interpolator import operands_shape
 from .local_chord_setup import LocalChordSetupUnit, span_values_shape
-from .stream import BUFFER_LATENCY, connect, connect_buffered
+from .stream import connect, connect_registered
 
 __all__ = ["LocalChordInterpolatorUnit"]
 
@@ -73,7 +73,7 @@ class LocalChordInterpolatorUnit(wiring.Component):
         self.length_bits = length_bits
         self._setup = LocalChordSetupUnit(lights, setup_interval, length_bits, highlights)
         self._accumulator = ChordAccumulatorUnit(lights, highlights)
-        self.latency = self._setup.latency + BUFFER_LATENCY + self._accumulator.latency
+        self.latency = self._setup.latency + 1 + self._accumulator.latency
         super().__init__(
             {
                 "i": In(stream.Signature(span_values_shape(lights, highlights, length_bits))),
@@ -83,12 +83,12 @@ class LocalChordInterpolatorUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """A FIFO between the two holds spans ready, so that a long one pays for short ones after it."""
+        """Registers between the two hold spans ready, so that a long one pays for short ones after it."""
         m = Module()
         m.submodules.local_chord_setup = setup = self._setup
         m.submodules.chord_accumulator = accumulator = self._accumulator
         connect(m, wiring.flipped(self.i), setup.i)
-        connect_buffered(m, "prepared", setup.o, accumulator.i, depth=3)
+        connect_registered(m, setup.o, accumulator.i)
         connect(m, accumulator.o, wiring.flipped(self.o))
         m.d.comb += self.wide.eq(setup.o.valid & setup.o.ready & setup.o.payload.wide)
         return m

@@ -141,17 +141,17 @@ class ShadingPipelineUnit(wiring.Component):
 
     In the *compact* style one multiplier does the colours, one the specular terms of a light, two its
     products with a normal where there is one, and one or two the setup (as many as its longest interval
-    needs). A pixel takes a clock a channel for each of its diffuse
-    and specular terms that is not 0, at least one; and, where its light is in front and its span not dark,
-    as many clocks as its specular model has products, a power 42. So what has no highlight costs less. The
-    pixels are the same to the bit. ``clocks_per_pixel`` and ``latency`` are then those of a pixel with every
-    term.
+    needs). A pixel takes a clock a channel for each of its diffuse and specular terms that is not 0, at least
+    one; and, where its light is in front and its span not dark, as many clocks as its specular model has
+    products, a power 42. So what has no highlight costs less. The pixels are the same to the bit.
+    ``clocks_per_pixel`` and ``latency`` are then those of a pixel with every term.
 
     A write is taken when no span is inside, and no span is taken while a write waits, so a frame's constants
-    never change under a running span: ``i.ready`` falls on the clock on which ``write.valid`` rises. For the
-    same reason a span of another material than the one before it waits until no span is inside: it is taken 5
-    clocks after the last pixel has left, and its first pixel comes ``latency + 5`` clocks after that one,
-    where without the change it comes 1 clock after. Sort spans by material.
+    never change under a running span: ``i.ready`` falls on the clock on which ``write.valid`` rises, and
+    rises 2 clocks after the last write was taken. For the same reason a span of another material than the one
+    before it waits until no span is inside: it is taken 5 clocks after the last pixel has left, and its first
+    pixel comes ``latency + 5`` clocks after that one, where without the change it comes 1 clock after. Sort
+    spans by material.
 
     Parameters
     ----------
@@ -182,11 +182,6 @@ class ShadingPipelineUnit(wiring.Component):
     Source: pipeline.md; [T] figure 4.10.
     """
 
-    PLACES = 64
-
-    # Spans between their admission and their first pixel: at most a setup's latency over its interval.
-    DECISIONS = 32
-
     def __init__(
         self,
         parameters: ShadingPipeline | None = None,
@@ -208,7 +203,7 @@ class ShadingPipelineUnit(wiring.Component):
         self._assembler = PixelAssemblerUnit(p.x_bits, p.y_bits, p.length_bits)
         self._interpolator, self._gate, self._slope, self._lights = None, None, None, []
         self.setup_interval = self.clocks_per_pixel = 1
-        self.latency = BUFFER_LATENCY + self._assembler.latency
+        self.latency = BUFFER_LATENCY + self._assembler.place_latency
         if not p.lights:
             if setup_interval is not None:
                 raise ValueError("without lights there is no setup, and no setup_interval")
@@ -244,11 +239,19 @@ class ShadingPipelineUnit(wiring.Component):
             self._intensity.initiation_interval,
         )
         chain = (self._interpolator, self._lights[0], self._intensity, self._assembler)
-        self.latency = sum(unit.latency for unit in chain) + BUFFER_LATENCY
+        self.latency = sum(unit.latency for unit in chain)
         if p.gate:
             # A FIFO before the gate, and one after it.
             decided = self._gate.latency + 2 * BUFFER_LATENCY
             self.latency += max(decided - self._interpolator.latency, 0)
+
+    @property
+    def _places(self) -> int:
+        """Spans that wait beside the interpolator for their colours: as many as may be on the way at a time.
+
+        17 are a memory of 16 words, and a register behind it.
+        """
+        return max(-(-self.latency // self.setup_interval), 17)
 
     def _light_units(self) -> list:
         """Diffuse units, or light units, which share what follows from the exponent."""
@@ -284,11 +287,11 @@ class ShadingPipelineUnit(wiring.Component):
         m.submodules.pixel_assembler = assembler = self._assembler
         m.submodules.frame_constants = frame = FrameConstantsUnit(p.lights, p.materials)
         place_layout = place_shape(p.x_bits, p.y_bits, p.length_bits)
-        m.submodules.places = places = fifo.SyncFIFOBuffered(width=place_layout.size, depth=self.PLACES)
+        m.submodules.places = places = fifo.SyncFIFOBuffered(width=place_layout.size, depth=self._places)
 
         # Admission: a span goes to what sets it up, its place round it, to all or to none.
         place = Signal(place_layout)
-        empty, offered, free, admit, settled = (Signal() for _ in range(5))
+        empty, offered, free, admit, settled, written = (Signal() for _ in range(6))
         span = self.i.payload
         takers = [(places.w_en, places.w_rdy)]
         if p.lights:
@@ -302,7 +305,7 @@ class ShadingPipelineUnit(wiring.Component):
         m.d.comb += [
             empty.eq(span.length == 0),
             offered.eq(self.i.valid & ~empty),
-            free.eq(~self.write.valid & settled),
+            free.eq(~self.write.valid & ~written & settled),
             self.i.ready.eq(free & reduce(and_, (ready for _, ready in takers))),
             admit.eq(offered & self.i.ready),
             place.x.eq(span.x),
@@ -322,16 +325,22 @@ class ShadingPipelineUnit(wiring.Component):
 
         # Writes, only while no span is inside.
         connect(m, wiring.flipped(self.write), frame.write)
-        inside = Signal(range(self.PLACES + 2))
+        # A constant is there two clocks after its write.
+        m.d.sync += written.eq(self.write.valid & self.write.ready)
+        inside = Signal(range(self._places + self._assembler.PLACES + 1))
         finished = self.o.valid & self.o.ready & self.o.payload.last
-        m.d.comb += frame.hold.eq(inside != 0)
-        m.d.sync += inside.eq(inside + admit - finished)
+        idle = Signal(init=1)
+        m.d.comb += frame.hold.eq(~idle)
+        m.d.sync += [
+            inside.eq(inside + admit - finished),
+            idle.eq(~admit & (idle | (finished & (inside == 1)))),
+        ]
         if p.materials > 1:
             # Constants follow the index a clock behind, the highlight's slope some more.
             waited = Signal(2)
             with m.If(self.i.valid & (span.material != frame.material)):
                 m.d.sync += waited.eq(0)
-                with m.If(inside == 0):
+                with m.If(idle):
                     m.d.sync += frame.material.eq(span.material)
             with m.Elif(~waited.all()):
                 m.d.sync += waited.eq(waited + 1)
@@ -343,11 +352,12 @@ class ShadingPipelineUnit(wiring.Component):
         for counter, event in (
             (status.wide_spans, self._interpolator.wide if p.lights else 0),
             (status.empty_spans, self.i.valid & self.i.ready & empty),
+            (status.overrun, admit & (span.x + span.length > 1 << p.x_bits)),
         ):
-            with m.If(event & ~counter.all()):
+            seen = Signal(name="seen")
+            m.d.sync += seen.eq(event)
+            with m.If(seen & ~counter.all()):
                 m.d.sync += counter.eq(counter + 1)
-        with m.If(admit & (span.x + span.length > 1 << p.x_bits)):
-            m.d.sync += status.overrun.eq(1)
         return m
 
     def _shade(self, m: Module, frame: FrameConstantsUnit) -> list[tuple[Value, Value]]:
@@ -408,7 +418,7 @@ class ShadingPipelineUnit(wiring.Component):
             intensity.i.valid.eq(reduce(and_, (light.o.valid for light in leaders))),
             intensity.constants.ambient.eq(frame.constants.ambient),
         ]
-        connect_buffered(m, "shaded", intensity.o, self._assembler.colors, depth=4)
+        connect(m, intensity.o, self._assembler.colors)
         return takers
 
     def _decide(self, m: Module, frame: FrameConstantsUnit, takers: list) -> tuple[stream.Interface, Value]:
@@ -416,8 +426,8 @@ class ShadingPipelineUnit(wiring.Component):
         p, span = self.parameters, self.i.payload
         m.submodules.highlight_gate = gate = self._gate
         width = p.length_bits
-        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=width, depth=self.DECISIONS)
-        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=p.lights, depth=self.DECISIONS)
+        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=width, depth=self._places)
+        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=p.lights, depth=self._places)
         # The gate takes a span at a turn of its own, which is not always that of the setup.
         waiting = gate.i.signature.flip().create(path=("waiting",))
         connect_buffered(m, "undecided", waiting, gate.i, depth=3)

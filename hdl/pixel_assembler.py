@@ -1,10 +1,11 @@
 """Pixel assembler: gives each shaded colour its place on the screen."""
 
-from amaranth.hdl import Module, Signal, unsigned
+from amaranth.hdl import Cat, Module, Signal, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from .intensity import pixel_color_shape
+from .stream import connect_registered, count_down, offer
 
 __all__ = ["PixelAssemblerUnit", "pixel_shape", "place_shape"]
 
@@ -31,7 +32,8 @@ def pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
 class PixelAssemblerUnit(wiring.Component):
     """Joins the stream of colours with that of span places; counts x along the span and marks its end.
 
-    The latency is 1 clock and the initiation interval 1. No multipliers.
+    A colour leaves as a pixel 1 clock after it was taken in, and one is taken in on every clock, if its place
+    has been there for 2. Places are taken in ahead of their colours. No multipliers.
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ class PixelAssemblerUnit(wiring.Component):
     Members
     -------
     places : :py:`In(stream.Signature(place_shape(x_bits, y_bits, length_bits)))`
-        Place of each span; waits until the span's last pixel has gone. Past the largest x it starts at 0.
+        Place of each span, of 1 pixel or more. Past the largest x it starts at 0.
     colors : :py:`In(stream.Signature(pixel_color_shape()))`
         Colours, in the order of the spans' pixels.
     o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits)))`
@@ -51,6 +53,12 @@ class PixelAssemblerUnit(wiring.Component):
     """
 
     latency = 1
+
+    place_latency = 3
+    """Clocks from a place to its first pixel, if the colour waits."""
+
+    PLACES = 6
+    """Spans inside at most: four places, and two pixels that wait."""
 
     def __init__(self, x_bits: int = 12, y_bits: int = 12, length_bits: int = 12):
         super().__init__(
@@ -62,30 +70,36 @@ class PixelAssemblerUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """An offset counter and an output register."""
+        """Places of spans; from them places of pixels, which meet the colours; a register for the pixel."""
         m = Module()
-        offset = Signal.like(self.places.payload.length)
-        advance, take, last = Signal(), Signal(), Signal()
-        place, color, pixel = self.places.payload, self.colors.payload, self.o.payload
+        place, color = self.places.payload, self.colors.payload
+        following = self.places.signature.create(path=("following",))
+        connect_registered(m, wiring.flipped(self.places), following)
+
+        x, y = Signal.like(place.x), Signal.like(place.y)
+        load, moves = Signal(), Signal()
+        active, ends = count_down(m, following.valid, following.payload.length, moves)
+        spot = stream.Signature(data.StructLayout({"x": x.shape(), "y": y.shape(), "last": 1})).create()
         m.d.comb += [
-            advance.eq(~self.o.valid | self.o.ready),
-            self.colors.ready.eq(advance & self.places.valid),
-            take.eq(self.colors.ready & self.colors.valid),
-            last.eq(offset == place.length - 1),
-            self.places.ready.eq(take & last),
+            moves.eq(offer(m, spot, active, Cat(x, y, ends))),
+            following.ready.eq(moves & ends),
+            load.eq(following.ready & following.valid),
+        ]
+        with m.If(load):
+            m.d.sync += [x.eq(following.payload.x), y.eq(following.payload.y)]
+        with m.Elif(moves):
+            m.d.sync += x.eq(x + 1)
+
+        pixel, valid, advance = Signal(self.o.payload.shape()), Signal(), Signal()
+        m.d.comb += [
+            advance.eq(offer(m, self.o, valid, pixel)),
+            self.colors.ready.eq(advance & spot.valid),
+            spot.ready.eq(advance & self.colors.valid),
         ]
         with m.If(advance):
-            m.d.sync += self.o.valid.eq(take)
-        with m.If(take):
             m.d.sync += [
-                offset.eq(offset + 1),
-                pixel.x.eq(place.x + offset),
-                pixel.y.eq(place.y),
-                pixel.r.eq(color.r),
-                pixel.g.eq(color.g),
-                pixel.b.eq(color.b),
-                pixel.last.eq(last),
+                valid.eq(spot.valid & self.colors.valid),
+                *(pixel[name].eq(spot.payload[name]) for name in ("x", "y", "last")),
+                *(pixel[name].eq(color[name]) for name in "rgb"),
             ]
-            with m.If(last):
-                m.d.sync += offset.eq(0)
         return m

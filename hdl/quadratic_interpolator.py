@@ -1,6 +1,6 @@
 """Quadratic interpolation of normals ([T] 2.2): methods ``quadratic``, ``-eval`` and ``-horner``."""
 
-from amaranth.lib import fifo
+from amaranth.lib import fifo, stream
 
 from golden.quadratic_evaluator import QuadraticEvaluator
 from golden.quadratic_interpolator import QuadraticInterpolator
@@ -11,7 +11,7 @@ from .gpq import GPQUnit
 from .interpolator import NormalInterpolatorUnit
 from .middle_normal import MiddleNormalUnit
 from .quadratic_evaluator import QuadraticEvaluatorUnit
-from .stream import BUFFER_LATENCY, connect_buffered
+from .stream import connect_registered
 
 __all__ = ["QuadraticInterpolatorUnit"]
 
@@ -45,9 +45,6 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
     Source: [T] 2.2, 2.3, figures 2.8 to 2.11.
     """
 
-    # Spans in the middle-normal unit, at most its latency over its interval, and in G/P/Q.
-    LENGTHS = 32
-
     @classmethod
     def setup_intervals(cls, parameters):
         """What the setup can be built for."""
@@ -63,7 +60,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
             )
             self._accumulator = DifferenceAccumulatorUnit()
             self.setup_interval = setup_interval
-            after = self._setup.latency + BUFFER_LATENCY + self._accumulator.latency
+            after = self._setup.latency + 1 + self._accumulator.latency
         else:
             self._evaluator = QuadraticEvaluatorUnit(QuadraticEvaluator(parameters.form))
             # A pixel comes every two clocks, on which an interval of 7 does not end.
@@ -76,14 +73,17 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
         """Coefficients, and the form that takes them to normals."""
         m.submodules.middle_normal = middle = self._middle
         m.submodules.gpq = gpq = self._gpq
-        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=self.length_bits, depth=self.LENGTHS)
+        # As many as both units hold, each with one that waits: never full.
+        depth = -(-middle.latency // middle.initiation_interval) + gpq.latency + 2
+        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=self.length_bits, depth=depth)
+        length = stream.Signature(self.length_bits).create(path=("length",))
+        connect_registered(m, lengths.r_stream, length)
         differences = self.parameters.form == "differences"
         curve = self._setup if differences else self._evaluator
         span = self.i.payload
         m.d.comb += [
-            # A span and its length go in together, or neither.
-            self.i.ready.eq(middle.i.ready & lengths.w_rdy),
-            middle.i.valid.eq(self.i.valid & lengths.w_rdy),
+            self.i.ready.eq(middle.i.ready),
+            middle.i.valid.eq(self.i.valid),
             middle.i.payload.normal_left.eq(span.normal_left),
             middle.i.payload.normal_right.eq(span.normal_right),
             lengths.w_en.eq(self.i.valid & middle.i.ready),
@@ -96,15 +96,15 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
             middle.o.ready.eq(gpq.i.ready),
             # A length is always there before its coefficients: the two have left together.
             *(curve.i.payload[name].eq(gpq.o.payload[name]) for name in "gpq"),
-            curve.i.payload.length.eq(lengths.r_data),
+            curve.i.payload.length.eq(length.payload),
             curve.i.valid.eq(gpq.o.valid),
             gpq.o.ready.eq(curve.i.ready),
-            lengths.r_en.eq(gpq.o.valid & curve.i.ready),
+            length.ready.eq(gpq.o.valid & curve.i.ready),
         ]
         if differences:
             m.submodules.difference_setup = curve
             m.submodules.difference_accumulator = accumulator = self._accumulator
-            connect_buffered(m, "prepared", curve.o, accumulator.i, depth=3)
+            connect_registered(m, curve.o, accumulator.i)
             normals = accumulator.o
         else:
             m.submodules.evaluator = curve

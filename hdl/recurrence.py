@@ -8,7 +8,7 @@ from golden.fixed import SQ, UQ
 from golden.recurrence import Recurrence
 
 from .fixed import FixedShape, FixedValue
-from .stream import PipelinedUnit
+from .stream import PipelinedUnit, offer
 
 __all__ = ["RecurrenceUnit"]
 
@@ -77,9 +77,11 @@ class RecurrenceUnit(wiring.Component):
         p, span = self.parameters, self.i.payload
         active, after, phase = Signal(), Signal(p.LENGTH_BITS), Signal(range(self.clocks_per_pixel))
         is_first = Signal()
+        rounded_valid, rounded_last, valid = Signal(), Signal(), Signal()
+        result = Signal(self.o.payload.shape())
         advance, load = Signal(), Signal()
         m.d.comb += [
-            advance.eq(~self.o.valid | self.o.ready),
+            advance.eq(offer(m, self.o, valid, result)),
             self.i.ready.eq(advance & (after == 0)),
             load.eq(self.i.valid & self.i.ready),
         ]
@@ -87,15 +89,14 @@ class RecurrenceUnit(wiring.Component):
         # Interleaved: which of the next pixels are the first of their phases.
         first_to_come = Signal(p.interleave - 1)
         starts = load | first_to_come[0] if p.interleave > 1 else load
-        rounded_valid, rounded_last = Signal(), Signal()
         coefficient = Signal(FixedShape(p.coefficient_format))
         shift = Signal(p.SHIFT_BITS)
         with m.If(advance):
             m.d.sync += [
                 rounded_valid.eq(active & (phase == 0)),
                 rounded_last.eq(after == 0),
-                self.o.valid.eq(rounded_valid),
-                self.o.payload.last.eq(rounded_last),
+                valid.eq(rounded_valid),
+                result.last.eq(rounded_last),
             ]
             with m.If(load):
                 m.d.sync += [
@@ -125,7 +126,7 @@ class RecurrenceUnit(wiring.Component):
                 register = Signal(rounded.shape(), name=f"{name}_rounded")
                 m.d.sync += [
                     register.eq(rounded),
-                    self.o.payload[name].eq(register.saturate(p.result_format)),
+                    result[name].eq(register.saturate(p.result_format)),
                 ]
         return m
 

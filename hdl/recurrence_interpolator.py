@@ -9,7 +9,7 @@ from .fixed import FixedValue
 from .interpolator import InterpolatorUnit, span_words
 from .recurrence import RecurrenceUnit
 from .recurrence_setup import RecurrenceSetupUnit
-from .stream import BUFFER_LATENCY, connect_buffered
+from .stream import connect_registered
 
 __all__ = ["RecurrenceInterpolatorUnit"]
 
@@ -47,10 +47,10 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
         self._setup = RecurrenceSetupUnit(parameters.setup, lights, setup_interval)
         self._recurrences = [RecurrenceUnit(parameters.setup.recurrence) for _ in range(lights)]
         unit = self._recurrences[0]
-        self.latency = self._setup.latency + BUFFER_LATENCY + unit.latency
+        self.latency = self._setup.latency + 1 + unit.latency
 
     def elaborate(self, platform):
-        """A FIFO between the two holds spans ready, so that a long one pays for short ones after it."""
+        """Registers between the two hold spans ready, so that a long one pays for short ones after it."""
         m = Module()
         m.submodules.recurrence_setup = setup = self._setup
         m.d.comb += [
@@ -59,7 +59,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
             self.i.ready.eq(setup.i.ready),
         ]
         prepared = setup.o.signature.create(path=("prepared",))
-        connect_buffered(m, "spans", setup.o, prepared, depth=3)
+        connect_registered(m, setup.o, prepared)
         one = FixedValue.constant(UQ(1, 25), 1)
         for light, unit in enumerate(self._recurrences):
             m.submodules[f"recurrence_{light}"] = unit

@@ -112,7 +112,8 @@ class SpecularUnit(PipelinedUnit):
 
     Models, formats, the PROM and the error bound are those of `golden.specular.Specular`, the bit-true twin.
     A beat is dark where the light is behind the surface, or a highlight gate says that its span is. It works
-    as if its argument were 0, so nothing toggles from one dark beat to the next but its input.
+    as if its argument were 0, so nothing toggles from one dark beat to the next but its input and the first
+    register.
 
     With an initiation interval I of 1 the latency is 7 clocks (one minus, saturation, shift, saturation,
     product, base, square), and each of M products has a multiplier: 17 by 17 bits, 17 by 11 and 14 by 11 in
@@ -232,9 +233,9 @@ class SpecularUnit(PipelinedUnit):
         operand = g.input("operand", lambda operands: operands.operand)
         self._dark = dark = g.input("dark", lambda operands: operands.dark)
 
-        def difference(operand, dark):
-            value = one_minus(p, operand).truncate(25)
-            return FixedValue(value.format, Mux(dark, 0, Value.cast(value))[: value.format.width])
+        def saturated(argument, dark):
+            argument = Value.cast(argument.saturate(p.ARGUMENT_FORMAT))
+            return FixedValue(p.ARGUMENT_FORMAT, Mux(dark, 0, argument)[: p.ARGUMENT_FORMAT.width])
 
         def shifted(argument):
             return FixedValue(UQ(10, 26), (Value.cast(argument) << self._slope[1])[:36]).truncate(16)
@@ -244,8 +245,8 @@ class SpecularUnit(PipelinedUnit):
             boundary = self._slope[2]
             return ((wide <= boundary) | Value.cast(boundary).all()) & ~dark
 
-        argument = g.register("one_minus_cosine", difference, operand, dark)
-        argument = g.register("argument", lambda x: x.saturate(p.ARGUMENT_FORMAT), argument)
+        argument = g.register("one_minus_cosine", lambda x: one_minus(p, x).truncate(25), operand)
+        argument = g.register("argument", saturated, argument, dark)
         wide = g.register("shifted_wide", shifted, argument)
         format = p.WIDE_FORMAT if p.as_documented else p.SHIFTED_FORMAT
         operand = g.register("shifted", lambda wide: wide.saturate(format), wide)

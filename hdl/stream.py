@@ -1,12 +1,21 @@
-"""What every streaming unit shares: checked connections and the pipeline with one common enable."""
+"""What every streaming unit shares: connections, outputs that wait, and the pipeline with one enable."""
 
-from amaranth.hdl import Cat, EnableInserter, Module, Mux, Shape, ShapeLike, Signal, Value
+from amaranth.hdl import Cat, EnableInserter, Module, Mux, Shape, ShapeLike, Signal, Value, ValueLike
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from .fixed import FixedShape
 
-__all__ = ["BUFFER_LATENCY", "PipelinedUnit", "connect", "connect_buffered", "require_same_shape"]
+__all__ = [
+    "BUFFER_LATENCY",
+    "PipelinedUnit",
+    "connect",
+    "connect_buffered",
+    "connect_registered",
+    "count_down",
+    "offer",
+    "require_same_shape",
+]
 
 BUFFER_LATENCY = 2
 """Clocks that a payload takes through an empty buffer."""
@@ -68,7 +77,7 @@ def connect(m: Module, source: stream.Interface, sink: stream.Interface) -> None
 def connect_buffered(
     m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int
 ) -> None:
-    """Connect two streams through a FIFO, which ends the combinational path of readies backwards.
+    """Connect two streams through a FIFO, which takes payloads in while the sink waits.
 
     A payload takes `BUFFER_LATENCY` clocks through the empty FIFO.
 
@@ -99,14 +108,110 @@ def connect_buffered(
     ]
 
 
+def offer(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
+    """Offer on a stream what stands in registers; one more register holds what is not taken.
+
+    The result, *advance*, tells whether the registers behind ``valid`` and ``payload`` take their next values
+    on this clock. It is itself a register, so that no path leads from the ready of one unit to that of the
+    one before it, however many there are in a row: a beat that is not taken on the clock on which it is first
+    offered moves into the register, and what stands behind it follows into its place and waits there.
+
+    This costs a register and a multiplexer for each bit of the payload. It takes no clock, neither of the
+    latency nor of the throughput: a beat is offered on the clock on which ``valid`` rises, and while the
+    output is ready beats follow each other as they come. One that waits stays as it is. Reset empties the
+    register.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the register.
+    output : stream.Interface
+        Stream on which to offer.
+    valid : ValueLike
+        Whether there is a payload; a register that changes only while ``advance``.
+    payload : ValueLike
+        The payload, likewise.
+
+    Returns
+    -------
+    Value
+        ``advance``, one bit.
+    """
+    held = Signal(name="held")
+    spare = Signal(len(Value.cast(payload)), name="spare", reset_less=True)
+    m.d.comb += [
+        output.valid.eq(held | valid),
+        Value.cast(output.payload).eq(Mux(held, spare, Value.cast(payload))),
+    ]
+    m.d.sync += held.eq(output.valid & ~output.ready)
+    with m.If(~held):
+        m.d.sync += spare.eq(Value.cast(payload))
+    return ~held
+
+
+def connect_registered(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
+    """Connect two streams through a register, for a clock of latency; the source's ready is one, too.
+
+    Parameters
+    ----------
+    m, source, sink
+        As for `connect`.
+
+    Raises
+    ------
+    TypeError
+        If the payloads differ in a field or in a fixed-point format.
+    """
+    require_same_shape(source.payload.shape(), sink.payload.shape())
+    valid = Signal(name="valid")
+    payload = Signal(Shape.cast(source.payload.shape()).width, name="payload", reset_less=True)
+    advance = offer(m, sink, valid, payload)
+    m.d.comb += source.ready.eq(advance)
+    with m.If(advance):
+        m.d.sync += [valid.eq(source.valid), payload.eq(source.payload)]
+
+
+def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[Signal, Signal]:
+    """Count the pixels of spans, one on each clock on which ``advance`` is high.
+
+    A span is taken in while ``valid & advance & ends``.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the counter.
+    valid : Value
+        Whether there is a next span.
+    length : Value
+        Its pixels, 0 or more.
+    advance : Value
+        Whether the counter moves.
+
+    Returns
+    -------
+    active, ends : Signal
+        Whether there is a pixel; whether the next span may begin: there is none, or it is the last. Both are
+        registers.
+    """
+    active, ends = Signal(name="active"), Signal(name="ends", init=1)
+    remaining = Signal(len(length), name="remaining")
+    with m.If(advance):
+        with m.If(ends):
+            m.d.sync += [active.eq(valid & (length != 0)), ends.eq(~valid | (length <= 1))]
+            m.d.sync += remaining.eq(length)
+        with m.Else():
+            m.d.sync += [ends.eq(remaining == 2), remaining.eq(remaining - 1)]
+    return active, ends
+
+
 class PipelinedUnit(wiring.Component):
     """A unit with a fixed latency and initiation interval, moved on by one common enable.
 
     A beat taken in on one clock is offered on the output ``latency`` clocks later, unless the output waits:
-    then the whole unit stands still and holds its payload. As long as a beat is inside, the next is taken
-    in a whole multiple of ``initiation_interval`` clocks after it, not counting those of standing still.
-    ``o.valid`` is a register; ``i.ready`` follows from ``o.ready`` and the unit's own state. Reset empties
-    the unit.
+    then the whole unit stands still, from the clock after the first on which a beat was not taken, and holds
+    its payloads (`offer`). As long as a beat is inside, the next is taken in a whole multiple of
+    ``initiation_interval`` clocks after it, not counting those of standing still. ``i.ready`` and ``o.valid``
+    follow from the unit's registers alone. Reset empties the unit.
 
     A subclass describes its registers in `datapath`, as if they moved on every clock. Control comes from the
     *age* of a beat: `at` tells whether a beat was taken in so many enabled clocks ago.
@@ -174,23 +279,11 @@ class PipelinedUnit(wiring.Component):
         """Build the control and put the data path under the common enable."""
         m = Module()
         self._ages = Signal(self.latency, name="ages")
-        advance = Signal()
-        accept = Signal()
-        m.d.comb += [
-            self.o.valid.eq(self._ages[-1]),
-            advance.eq(~self.o.valid | self.o.ready),
-        ]
+        advance, accept = Signal(), Signal()
         if self.initiation_interval == 1:
             m.d.comb += self.i.ready.eq(advance)
         else:
-            # A shared part serves beats of several ages, at turns fixed by their distance.
-            turn = Signal(range(self.initiation_interval))
-            empty = ~self._ages.any()
-            m.d.comb += self.i.ready.eq(advance & (empty | (turn == 0)))
-            with m.If(empty & accept):
-                m.d.sync += turn.eq(1)
-            with m.Elif(advance):
-                m.d.sync += turn.eq(Mux(turn == self.initiation_interval - 1, 0, turn + 1))
+            m.d.comb += self.i.ready.eq(self._turn(m, advance, accept))
         m.d.comb += accept.eq(self.i.valid & self.i.ready)
         with m.If(advance):
             m.d.sync += self._ages.eq(Cat(accept, self._ages[:-1]))
@@ -198,8 +291,27 @@ class PipelinedUnit(wiring.Component):
         inner = Module()
         operands = self.i.payload
         if self.initiation_interval > 1:
-            operands = self.register(inner, operands, "operands", when=accept)
+            # What comes without being valid has no age.
+            operands = self.register(inner, operands, "operands", when=self.i.ready)
         result = self.datapath(inner, operands)
         m.submodules.datapath = EnableInserter(advance)(inner)
-        m.d.comb += self.o.payload.eq(result)
+        m.d.comb += advance.eq(offer(m, self.o, self._ages[-1], result))
         return m
+
+    def _turn(self, m: Module, advance: Value, accept: Value) -> Value:
+        """Whether a beat may come: a shared part serves those of several ages, at turns fixed by distance.
+
+        A register, worked out a clock ahead.
+        """
+        ready, turn = Signal(name="ready", init=1), Signal(range(self.initiation_interval))
+        # Whether a beat will be inside on the next clock even if none comes on this one.
+        stays, opens = Signal(name="stays"), Signal(name="opens")
+        m.d.comb += opens.eq((turn == self.initiation_interval - 1) | ~(accept | stays))
+        with m.If(advance):
+            m.d.sync += [
+                stays.eq(Cat(accept, self._ages)[:-2].any()),
+                turn.eq(Mux(opens, 0, turn + 1)),
+            ]
+        waits = self.o.valid & ~self.o.ready
+        m.d.sync += ready.eq(~waits & Mux(advance, opens, turn == 0))
+        return ready

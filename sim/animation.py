@@ -1,21 +1,12 @@
 """Turntables: a camera that goes once round, and its frames, spread over processes or machines."""
 
-import contextlib
 import functools
-import importlib.util
-import logging
-import multiprocessing
 import os
-import re
-import signal
 import threading
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -26,31 +17,24 @@ from golden.camera import Camera
 from golden.geometry import normalise
 from golden.pipeline import ShadingPipeline
 from golden.scene import Scene
-from sim.cxxrtl import cache_folder
-from sim.errors import InputError
 from sim.frame import FrameSimulator, compare
 from sim.output import atomic_writer
 from sim.report import frame_figures
+from sim.workers import cluster_client, local_executor
 
 __all__ = [
     "Crew",
     "Film",
     "Shot",
-    "check_address",
     "cluster",
     "equal_distance",
     "process_pool",
-    "processors",
     "shoot",
     "shot",
     "turned",
     "turntable",
     "write_gif",
 ]
-
-_CONNECT_SECONDS = 10
-_START = "start one with `dask scheduler`, and give its address, as tcp://host:8786"
-
 
 # Where the camera goes.
 
@@ -188,14 +172,10 @@ def shot(film: Film, camera: Camera) -> Shot:
         return Shot(frame.image, frame_figures(scene, full, frame, compare(scene, full, frame)))
 
 
-def _begin(film: Film, cache: str | None) -> None:
+def _begin(film: Film) -> None:
     """First thing in a process of the pool: the film crosses once, not with every frame."""
     global _film
     _film = film
-    # The parent stops its workers; where it could not block the signal for them, they ignore it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if cache:
-        os.environ["BLYSK_CACHE"] = cache
 
 
 def _shot(camera: Camera) -> Shot:
@@ -224,20 +204,11 @@ class Crew:
     name: str
 
 
-def processors() -> int:
-    """Processors that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:
-        return os.cpu_count() or 1
-
-
 @contextmanager
 def process_pool(film: Film, jobs: int) -> Iterator[Crew]:
-    """A crew of processes on this machine.
+    """A crew of processes on this machine, see `sim.workers.local_executor`.
 
-    The model must be in the cache, or each process builds it for itself. An exception in the block, an
-    interrupt too, ends the processes at once.
+    The model must be in the cache, or each process builds it for itself.
 
     Parameters
     ----------
@@ -246,69 +217,13 @@ def process_pool(film: Film, jobs: int) -> Iterator[Crew]:
     jobs : int
         How many processes.
     """
-    cache = None
-    if film.engine == "cxxrtl":
-        with warnings.catch_warnings():  # It was said when the model was built.
-            warnings.simplefilter("ignore", RuntimeWarning)
-            cache = str(cache_folder())
-    # Other threads run in this process, so none is forked.
-    context = multiprocessing.get_context("spawn")
-    before = set(multiprocessing.active_children())
-    executor = ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(film, cache))
-
-    def submit(camera: Camera) -> Future:
-        with _interrupts_blocked():  # The first calls start the processes, which inherit it.
-            return executor.submit(_shot, camera)
-
-    try:
-        yield Crew(submit, jobs, f"{jobs} process{'es' * (jobs > 1)}")
-        executor.shutdown()
-    except BrokenProcessPool:
-        raise InputError(
-            f"--jobs {jobs}", "a process died, perhaps for want of memory", "use fewer, or a smaller --size"
-        ) from None
-    finally:
-        executor.shutdown(wait=False, cancel_futures=True)
-        for child in set(multiprocessing.active_children()) - before:
-            child.terminate()
-            child.join()
-
-
-@contextmanager
-def _interrupts_blocked() -> Iterator[None]:
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-
-
-def check_address(address: str) -> None:
-    """Check, before long work, that this may be the address of a scheduler, and that Dask is there.
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
-    option = f"--cluster {address}"
-    # Dask's client, given what is no address, stays behind half built.
-    if not re.fullmatch(r"((tcp|tls|wss?)://)?([^\s/:@\[\]]+|\[[0-9a-fA-F:.%]+\]):[0-9]{1,5}", address):
-        raise InputError(option, "not the address of a Dask scheduler", _START)
-    if importlib.util.find_spec("distributed") is None:
-        raise InputError(option, "Dask is not installed", "pip install 'blysk[cluster]'")
+    with local_executor(jobs, _begin, (film,)) as executor:
+        yield Crew(functools.partial(executor.submit, _shot), jobs, f"{jobs} process{'es' * (jobs > 1)}")
 
 
 @contextmanager
 def cluster(film: Film, address: str) -> Iterator[Crew]:
-    """A crew of the workers of a Dask scheduler, through Dask's own executor.
-
-    The workers need this version of blysk. Each builds its model at its first frame, in its own cache. An
-    exception in the block takes the waiting frames back; Dask cannot stop those that are being drawn.
-    Dask's messages are pickled Python: whoever answers at the address is trusted.
+    """A crew of the workers of a Dask scheduler, see `sim.workers.cluster_client`.
 
     Parameters
     ----------
@@ -316,77 +231,19 @@ def cluster(film: Film, address: str) -> Iterator[Crew]:
         What they draw; it crosses to each worker once.
     address : str
         Of the scheduler, ``tcp://host:8786``.
-
-    Raises
-    ------
-    InputError
-        If Dask is not installed, no scheduler answers, or it has no worker with this version.
     """
-    option = f"--cluster {address}"
-    check_address(address)
-    from distributed import Client, KilledWorker
-    from distributed.comm import CommClosedError
-
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(_quiet_dask())
-        try:
-            client = stack.enter_context(Client(address, timeout=_CONNECT_SECONDS, set_as_default=False))
-        except (OSError, ValueError, TypeError) as error:
-            text = str(error).strip().split("\n")[0]
-            raise InputError(
-                option,
-                f"no Dask scheduler answers ({text or type(error).__name__})",
-                _START,
-            ) from None
-        threads = client.nthreads()
-        if not threads:
-            raise InputError(option, "the scheduler has no workers", f"start some: dask worker {address}")
-        _check_workers(client, option)
+    with cluster_client(address) as client:
+        workers = len(client.nthreads())
         shared = client.scatter(film, broadcast=True, hash=False)
         executor = client.get_executor(pure=False)
-        workers = len(threads)
         try:
             yield Crew(
                 functools.partial(executor.submit, shot, shared),
                 workers,
                 f"{workers} worker{'s' * (workers > 1)} at {address}",
             )
-        except (CommClosedError, KilledWorker, CancelledError) as error:
-            raise InputError(
-                option,
-                f"lost its workers ({type(error).__name__})",
-                "see their log; less --size takes less memory",
-            ) from None
         finally:
             executor.shutdown(wait=False)
-
-
-@contextmanager
-def _quiet_dask() -> Iterator[None]:
-    """Keep Dask's log of a lost connection off the terminal: one line of our own tells of it."""
-    # The second has a level of its own.
-    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
-    levels = [logger.level for logger in loggers]
-    for logger in loggers:
-        logger.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.setLevel(level)
-
-
-def _check_workers(client, option: str) -> None:
-    here = version("blysk")
-    remedy = f"install blysk {here} where they run"
-    try:
-        versions = set(client.run(version, "blysk").values())
-    # Whatever a worker without the package raises.
-    except Exception as error:
-        text = str(error).strip().split("\n")[0]
-        raise InputError(option, f"its workers have no blysk ({text})", remedy) from None
-    if versions != {here}:
-        raise InputError(option, f"its workers have blysk {', '.join(sorted(versions - {here}))}", remedy)
 
 
 def shoot(crew: Crew, cameras: Sequence[Camera]) -> Iterator[tuple[int, Shot]]:

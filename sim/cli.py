@@ -23,8 +23,7 @@ from golden.frame_constants import MAX_MATERIALS, FrameConstants, address_table
 from golden.geometry import normalise
 from golden.intensity import MAX_LIGHTS
 from golden.lighting import Light, Material
-from golden.local_chord_interpolator import LocalChordInterpolator
-from golden.pipeline import METHODS, MODELS, ShadingPipeline
+from golden.pipeline import METHODS, MODELS, PRINTED, ShadingPipeline
 from golden.reflection import REFLECTION_MODELS
 from golden.scene import BACK_FACES, LARGEST_SIDE, VIEWERS, Scene
 from golden.specular import MAX_EXPONENT
@@ -32,11 +31,9 @@ from hdl.pipeline import INTERPOLATORS, PORT_DESCRIPTIONS, STYLES, ShadingPipeli
 from hdl.verilog import emit
 from sim.animation import (
     Film,
-    check_address,
     cluster,
     equal_distance,
     process_pool,
-    processors,
     shoot,
     turned,
     turntable,
@@ -59,8 +56,9 @@ from sim.report import (
     worst_errors,
 )
 from sim.scene_file import HIGHLIGHTS, read_scene_file
+from sim.workers import check_address, processors
 
-__all__ = ["Settings", "Whole", "chosen_design", "design_options", "main"]
+__all__ = ["Choice", "Settings", "Size", "Whole", "chosen_design", "design_options", "main"]
 
 ENGINES = ("auto", "cxxrtl", "pysim")
 
@@ -75,17 +73,27 @@ MAX_FRAMES = 9999
 """Most frames of a turntable: four digits in their names."""
 
 
-class _Choice(click.ParamType):
-    """One of a few names."""
+class Choice(click.ParamType):
+    """One of a few names.
+
+    Parameters
+    ----------
+    kind : str
+        What they are names of, for the message.
+    names : sequence of str
+        The names.
+    """
 
     def __init__(self, kind: str, names: Sequence[str]):
         self.name = kind
         self.names = tuple(names)
 
     def get_metavar(self, param, ctx):
+        """What help shows for a value."""
         return f"[{'|'.join(self.names)}]"
 
     def convert(self, value, param, ctx):
+        """The value of a text."""
         if value not in self.names:
             raise InputError(
                 f"{param.opts[0]} {value}", f"unknown {self.name}", f"use one of {', '.join(self.names)}"
@@ -111,15 +119,17 @@ class Whole(click.ParamType):
         return int(value)
 
 
-class _Size(click.ParamType):
+class Size(click.ParamType):
     """Width and height of a picture."""
 
     name = "WIDTHxHEIGHT"
 
     def get_metavar(self, param, ctx):
+        """What help shows for a value."""
         return self.name
 
     def convert(self, value, param, ctx):
+        """The value of a text."""
         if isinstance(value, tuple):
             return value
         match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", value)
@@ -179,7 +189,7 @@ def design_options(command):
     for option in (
         click.option(
             "--style",
-            type=_Choice("style", STYLES),
+            type=Choice("style", STYLES),
             default="throughput",
             show_default=True,
             help="One pixel a clock, or few multipliers.",
@@ -198,19 +208,19 @@ def design_options(command):
         ),
         click.option(
             "--highlight",
-            type=_Choice("form", HIGHLIGHTS),
+            type=Choice("form", HIGHLIGHTS),
             help="Form of the specular argument, for methods that find normals.  [default: dot]",
         ),
         click.option(
             "--model",
-            type=_Choice("reflection model", REFLECTION_MODELS),
+            type=Choice("reflection model", REFLECTION_MODELS),
             default="cosquad",
             show_default=True,
             help="Reflection model; every method serves all but phong.",
         ),
         click.option(
             "--method",
-            type=_Choice("method", METHODS),
+            type=Choice("method", METHODS | PRINTED),
             default="quadratic",
             show_default=True,
             help="Interpolation along a span.",
@@ -312,8 +322,9 @@ def chosen_design(settings: Settings, lights: int) -> ShadingPipeline:
     """
     if settings["model"] not in MODELS:
         raise settings.refuse("model", "the pipeline finds N.H, not R.V", f"use one of {', '.join(MODELS)}")
-    if settings["gate"] and isinstance(METHODS[settings["method"]], LocalChordInterpolator):
-        raise settings.refuse("gate", f"{settings['method']} has no normals for one", "leave it out", "")
+    if settings["gate"] and not ShadingPipeline(settings["method"]).serves_gate:
+        lacks = "error bound" if settings["method"] in PRINTED else "normals"
+        raise settings.refuse("gate", f"{settings['method']} has no {lacks} for one", "leave it out", "")
     try:
         design = ShadingPipeline(
             settings["method"],
@@ -365,17 +376,17 @@ def cli():
 @click.option(
     "--exponent", type=Whole(1, MAX_EXPONENT), default=50, show_default=True, help="Of the highlight."
 )
-@click.option("--size", type=_Size(), help="Of the picture.  [default: 640x480; 160x120 with --vcd]")
+@click.option("--size", type=Size(), help="Of the picture.  [default: 640x480; 160x120 with --vcd]")
 @click.option(
     "--engine",
-    type=_Choice("engine", ENGINES),
+    type=Choice("engine", ENGINES),
     default="auto",
     show_default=True,
     help="auto: compiled or, without a C++ compiler, pysim at a smaller size.",
 )
 @click.option(
     "--projection",
-    type=_Choice("projection", PROJECTIONS),
+    type=Choice("projection", PROJECTIONS),
     default="perspective",
     show_default=True,
     help="Of the camera.",
@@ -412,14 +423,14 @@ def cli():
 )
 @click.option(
     "--viewer",
-    type=_Choice("viewer", VIEWERS),
+    type=Choice("viewer", VIEWERS),
     default="distant",
     show_default=True,
     help="Highlights as seen from one direction, or from the camera: near needs --method chord-local.",
 )
 @click.option(
     "--materials",
-    type=_Choice("source of materials", ("file", "one")),
+    type=Choice("source of materials", ("file", "one")),
     default="file",
     show_default=True,
     help="Colours of the mesh file, where it has some and no option gives them, or of the options alone.",
@@ -432,7 +443,7 @@ def cli():
 )
 @click.option(
     "--back-faces",
-    type=_Choice("treatment of back faces", BACK_FACES),
+    type=Choice("treatment of back faces", BACK_FACES),
     default="flip",
     show_default=True,
     help="Shade them with their normals turned, as they are, or not at all.",
@@ -522,20 +533,15 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
         design = dataclasses.replace(design, materials=len(loaded.materials))
         seconds = {"load": perf_counter() - start}
         scenes = _scenes(loaded, settings, frames or 1)
-        if settings["fit"]:
-            stage.set_description_str("finding out what the scene needs")
-            fit = for_scene(scenes, design, exact=not settings["words"])
-        else:
-            fit = Fit(design, (), tuple(scenes))
+        stage.set_description_str("finding out what the scene needs" if settings["fit"] else "")
+        fit = _fitted(scenes, design, settings)
         stage.set_description_str("building the model")
         size = settings["size"]
         simulator = _simulator(fit.design, settings, address)
         if settings["size"] != size:
             # The slow engine's own size.
             scenes = _scenes(loaded, settings, frames or 1)
-            fit = Fit(design, (), tuple(scenes))
-            if settings["fit"]:
-                fit = for_scene(scenes, design, exact=not settings["words"])
+            fit = _fitted(scenes, design, settings)
             simulator = _simulator(fit.design, settings, address)
         seconds["build"] = perf_counter() - start - seconds["load"]
         stage.set_description_str("rasterising and simulating")
@@ -576,6 +582,12 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
     for name, path in {**written, "figures": figures, "waves": vcd}.items():
         if path:
             print(f"{name:<12}{path}")
+
+
+def _fitted(scenes: Sequence[Scene], design: ShadingPipeline, settings: Settings) -> Fit:
+    if settings["fit"]:
+        return for_scene(scenes, design, exact=not settings["words"])
+    return Fit(design, (), tuple(scenes))
 
 
 @cli.command(short_help="Emit the pipeline as Verilog.")

@@ -23,3 +23,7 @@ class InputError(Exception):
         self.thing = thing
         self.reason = reason
         self.remedy = remedy
+
+    def __reduce__(self):
+        """How it crosses from one process to another."""
+        return type(self), (self.thing, self.reason, self.remedy)

@@ -114,7 +114,8 @@ def for_scene(
 
     constants = [FrameConstants.of(first, full.lights, index=k) for k in range(len(first.materials))]
     bright = np.any([of.diffuse | of.specular for of in constants], axis=(0, 2))
-    if not bright.all():
+    # With values, spans are cut by every light's, dark or not.
+    if not bright.all() and not (full.takes_values and bright.any()):
         count = int(np.count_nonzero(bright))
         kept = tuple(light for light, lit in zip(first.lights, bright, strict=False) if lit)
         scenes = tuple(replace(scene, lights=kept) for scene in scenes)
@@ -199,6 +200,8 @@ def _without_highlights(design: ShadingPipeline, prepared: Sequence, constants: 
     nothing = {"model": None, "gate": False}
     if not any(of.specular.any() for of in constants):
         return [Omission("no specular path: every k_s is 0", nothing)]
+    if not design.serves_gate:
+        return []
     lit = np.concatenate([design.lit_spans(frame.spans, constants) for frame in prepared])
     shown = np.array([of.specular.any(axis=-1) for of in constants])
     material = np.concatenate([frame.spans.material for frame in prepared])

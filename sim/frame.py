@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from golden.frame_constants import FrameConstants
+from golden.frame_constants import FrameConstants, writes_of
 from golden.local_chord_interpolator import SpanValues
 from golden.metrics import ErrorFigures, error_figures, mnse_printed, nmse
 from golden.pipeline import ShadingPipeline, Spans
@@ -22,7 +22,18 @@ from sim.beats import dtype_of
 from sim.engine import SimulationError, simulate
 from sim.spans import cut_local_spans, cut_wide_spans, local_values, quantise_spans, sort_by_material
 
-__all__ = ["Comparison", "FrameSimulator", "PreparedFrame", "SimulatedFrame", "compare", "prepare"]
+__all__ = [
+    "Comparison",
+    "FrameSimulator",
+    "PreparedFrame",
+    "SimulatedFrame",
+    "beats_of",
+    "compare",
+    "cut_spans",
+    "method_in_float64",
+    "prepare",
+    "twin_frame",
+]
 
 
 @dataclass(frozen=True)
@@ -45,7 +56,7 @@ class SimulatedFrame:
     wide_spans : int
         Spans that the pipeline flagged as wider than it can shade.
     engine : str
-        ``"cxxrtl"`` or ``"pysim"``.
+        ``"cxxrtl"`` or ``"pysim"``; ``"twin"`` for a frame that was not simulated.
     seconds : dict
         Of ``raster`` (rasterise, cut, quantise) and ``simulate`` (the stream in and out).
     """
@@ -91,6 +102,25 @@ class PreparedFrame(NamedTuple):
     spans: Spans
 
 
+def beats_of(unit: ShadingPipelineUnit, spans: Spans) -> dict[str, np.ndarray]:
+    """Input beats of a pipeline, as `sim.engine.simulate` takes them.
+
+    Parameters
+    ----------
+    unit : ShadingPipelineUnit
+        The pipeline, or what has its ports.
+    spans : Spans
+        What it is to shade.
+    """
+    members = unit.i.payload.shape().members
+    beats = {name: getattr(spans, name) for name in members if name != "values"}
+    if "values" in members:
+        beats["values"] = values = np.zeros(len(spans), dtype_of(members["values"]))
+        for name in members["values"].elem_shape.members:
+            values[name] = getattr(spans.values, name)
+    return beats
+
+
 def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
     """Rasterise a scene, and cut and quantise its spans for a pipeline.
 
@@ -99,21 +129,68 @@ def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
     ValueError
         If the scene has point lights or a near viewer, and the method does not take values.
     """
-    raster = rasterise(scene)
-    if design.takes_values:
-        cut, count = cut_local_spans(scene, raster, design.interpolator)
-        cut = sort_by_material(cut, scene.mesh.material)
-        spans = quantise_spans(cut, scene.mesh.material)
-        values = local_values(scene, cut, design.lights)
-        return PreparedFrame(raster, cut, count, dataclasses.replace(spans, values=values))
-    if scene.local:
+    if scene.local and not design.takes_values:
         raise ValueError("point lights and a near viewer need the method chord-local")
+    raster = rasterise(scene)
+    cut, count = cut_spans(scene, raster, design)
+    cut = sort_by_material(cut, scene.mesh.material)
+    spans = quantise_spans(cut, scene.mesh.material)
+    if design.takes_values:
+        spans = dataclasses.replace(spans, values=local_values(scene, cut, design.lights))
+    return PreparedFrame(raster, cut, count, spans)
+
+
+def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Raster, int]:
+    """Cut spans as the method of a pipeline needs it: the cut ones, and how many were cut."""
     interpolator = design.interpolator
+    if design.takes_values:
+        return cut_local_spans(scene, raster, interpolator)
     exponents = [material.exponent for material in scene.materials]
     widest = min(map(interpolator.widest_span, exponents))
-    cut, count = cut_wide_spans(raster, widest, min(map(interpolator.largest_bend, exponents)))
-    cut = sort_by_material(cut, scene.mesh.material)
-    return PreparedFrame(raster, cut, count, quantise_spans(cut, scene.mesh.material))
+    return cut_wide_spans(raster, widest, min(map(interpolator.largest_bend, exponents)))
+
+
+def twin_frame(scene: Scene, design: ShadingPipeline) -> SimulatedFrame:
+    """A frame by the bit-true twin: the simulated one to the bit, without clocks, which are 0.
+
+    Parameters
+    ----------
+    scene, design
+        As `FrameSimulator` takes them.
+
+    Raises
+    ------
+    ValueError
+        As `FrameSimulator.render` does.
+    """
+    start = perf_counter()
+    raster, cut_raster, spans_cut, spans = prepare(scene, design)
+    prepared = perf_counter()
+    pixels = design.compute(spans, _constants_of(scene, design))
+    return SimulatedFrame(
+        image=_picture(scene, cut_raster, pixels.color),
+        raster=raster,
+        cut_raster=cut_raster,
+        spans_cut=spans_cut,
+        clocks=0,
+        wide_spans=pixels.wide_spans,
+        engine="twin",
+        seconds={"raster": prepared - start, "simulate": perf_counter() - prepared},
+    )
+
+
+def _constants_of(scene: Scene, design: ShadingPipeline) -> list[FrameConstants]:
+    if len(scene.materials) != design.materials:
+        raise ValueError(f"the pipeline has {design.materials} materials, the scene {len(scene.materials)}")
+    return [FrameConstants.of(scene, design.lights, index=index) for index in range(design.materials)]
+
+
+def _picture(scene: Scene, raster: Raster, colors: np.ndarray) -> np.ndarray:
+    """Frame buffer with the colours of the fragments that are seen."""
+    image = np.empty((scene.height, scene.width, 3), dtype=np.uint8)
+    image[...] = np.floor(np.multiply(scene.background, 255) + 0.5)
+    image.reshape(-1, 3)[raster.pixel[raster.visible]] = colors[raster.visible]
+    return image
 
 
 class FrameSimulator:
@@ -161,22 +238,11 @@ class FrameSimulator:
         self.build_seconds = perf_counter() - start
 
     def _run(self, spans: Spans, constants: Sequence[FrameConstants], count: int, **options):
-        fields = {
-            name: getattr(spans, name) for name in self._unit.i.payload.shape().members if name != "values"
-        }
-        if self.design.takes_values and self.design.lights:
-            layout = self._unit.i.payload.shape().members["values"]
-            fields["values"] = values = np.zeros(len(spans), dtype_of(layout))
-            for name in layout.elem_shape.members:
-                values[name] = getattr(spans.values, name)
-        writes = [of_material.writes() for of_material in constants]
-        if len(constants) > 1:
-            writes = [of_material.writes(index) for index, of_material in enumerate(constants)]
         return simulate(
             self._unit,
-            fields,
+            beats_of(self._unit, spans),
             count=count,
-            write={name: np.concatenate([beats[name] for beats in writes]) for name in ("address", "data")},
+            write=writes_of(constants),
             engine=self.engine,
             **options,
         )
@@ -206,12 +272,7 @@ class FrameSimulator:
             If the scene has more lights or other materials than the design, or a term is brighter than 8.
         """
         start = perf_counter()
-        materials = range(len(scene.materials))
-        if len(materials) != self.design.materials:
-            raise ValueError(
-                f"the pipeline has {self.design.materials} materials, the scene {len(materials)}"
-            )
-        constants = [FrameConstants.of(scene, self.design.lights, index=index) for index in materials]
+        constants = _constants_of(scene, self.design)
         raster, cut_raster, spans_cut, spans = prepare(scene, self.design)
         rastered = perf_counter()
         count = len(cut_raster.span)
@@ -220,11 +281,8 @@ class FrameSimulator:
         pixel = run.beats["y"].astype(np.int64) * scene.width + run.beats["x"]
         if not np.array_equal(pixel, cut_raster.pixel):
             raise SimulationError("the simulated pipeline answered with other pixels than it was asked for")
-        image = np.empty((scene.height, scene.width, 3), dtype=np.uint8)
-        image[...] = np.floor(np.multiply(scene.background, 255) + 0.5)
-        image.reshape(-1, 3)[pixel[cut_raster.visible]] = _colors(run.beats[cut_raster.visible])
         return SimulatedFrame(
-            image=image,
+            image=_picture(scene, cut_raster, _colors(run.beats)),
             raster=raster,
             cut_raster=cut_raster,
             spans_cut=spans_cut,
@@ -267,21 +325,36 @@ class Comparison:
     seconds: float
 
 
+def method_in_float64(scene: Scene, design: ShadingPipeline, raster: Raster) -> np.ndarray:
+    """A frame by the method and the model of a pipeline, in exact arithmetic.
+
+    Parameters
+    ----------
+    scene, design
+        What is drawn, and by what.
+    raster : Raster
+        The spans, wide ones cut.
+
+    Returns
+    -------
+    float64 array, shape (height, width, 3)
+        In [0, 1].
+    """
+    interpolator = design.interpolator
+    if design.takes_values:
+        values = local_values(scene, raster)
+        cosine, one_minus_cosine = interpolator.exact_operands(values, raster.length)
+        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, design.model)
+    return shade_spans(scene, raster, interpolator.exact_normals, design.model, interpolator.uses_chord)
+
+
 def compare(scene: Scene, design: ShadingPipeline, frame: SimulatedFrame) -> Comparison:
     """Hold a simulated frame against the golden renderer.
 
     Of a frame that shows no surface every figure is NaN.
     """
     start = perf_counter()
-    interpolator = design.interpolator
-    if design.takes_values:
-        values = local_values(scene, frame.cut_raster)
-        cosine, one_minus_cosine = interpolator.exact_operands(values, frame.cut_raster.length)
-        same_method = shade_operands(scene, frame.cut_raster, cosine, 1 - one_minus_cosine, design.model)
-    else:
-        same_method = shade_spans(
-            scene, frame.cut_raster, interpolator.exact_normals, design.model, interpolator.uses_chord
-        )
+    same_method = method_in_float64(scene, design, frame.cut_raster)
     golden = shade_spans(scene, frame.raster, "normalised", design.model)
     exact = render(scene, "phong", "blinn", raster=frame.raster)
     seconds = perf_counter() - start

@@ -9,7 +9,6 @@ import numpy as np
 
 from golden.pipeline import ShadingPipeline
 from golden.scene import Scene
-from hdl.cost import Cost
 from sim.fit import Fit
 from sim.frame import Comparison, SimulatedFrame
 
@@ -163,14 +162,12 @@ def fit_figures(
     full, steps = fit.costs(settings["setup_interval"], settings["style"])
     before = [full, *steps]
     figures = {
-        "full": _cost_figures(full),
-        "fitted": _cost_figures(before[-1]),
+        "full": full.totals,
+        "fitted": before[-1].totals,
         "omissions": [
             {
                 "reason": omission.reason,
-                "saves": {
-                    name: count - _cost_figures(after)[name] for name, count in _cost_figures(cost).items()
-                },
+                "saves": {name: count - after.totals[name] for name, count in cost.totals.items()},
             }
             for omission, cost, after in zip(fit.omissions, before, steps, strict=False)
         ],
@@ -182,15 +179,6 @@ def fit_figures(
         figures["largest_difference"] = int(difference.max(initial=0))
         figures["different_pixels"] = int(np.count_nonzero(difference.any(axis=-1)))
     return figures
-
-
-def _cost_figures(cost: Cost) -> dict[str, int]:
-    return {
-        "cells": cost.cells,
-        "multipliers": cost.multiplier_count,
-        "register_bits": cost.register_bits,
-        "memory_bits": cost.rom_bits + cost.ram_bits,
-    }
 
 
 def print_fit(figures: Mapping[str, Any] | None) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from golden.camera import PROJECTIONS
 from golden.intensity import MAX_LIGHTS
-from golden.pipeline import METHODS, MODELS
+from golden.pipeline import METHODS, MODELS, PRINTED
 from golden.scene import BACK_FACES, LARGEST_SIDE, VIEWERS
 from golden.specular import MAX_EXPONENT
 from hdl.pipeline import STYLES
@@ -385,7 +385,7 @@ _TOP = {
         "exponent": ("exponent", _whole(1, MAX_EXPONENT)),
     },
     "pipeline": {
-        "method": ("method", _choice(METHODS)),
+        "method": ("method", _choice(METHODS | PRINTED)),
         "model": ("model", _choice(MODELS)),
         "highlight": ("highlight", _choice(HIGHLIGHTS)),
         "setup_interval": ("setup_interval", _whole(1, 46)),

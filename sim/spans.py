@@ -8,7 +8,7 @@ import numpy as np
 
 from golden.geometry import normalise
 from golden.interpolation import interpolate
-from golden.interpolator import pixels_of
+from golden.interpolator import pixels_of, runs_of
 from golden.lighting import halfway_vector
 from golden.local_chord_interpolator import LocalChordInterpolator, SpanValues
 from golden.local_chord_setup import LocalChordSetup
@@ -170,17 +170,6 @@ def _chunks(count: int) -> Iterator[slice]:
         yield slice(start, start + _CHUNK)
 
 
-def _runs(pixels: np.ndarray) -> Iterator[slice]:
-    """Runs of spans with about as many pixels."""
-    ends = np.cumsum(pixels)
-    start = 0
-    while start < len(pixels):
-        before = ends[start - 1] if start else 0
-        stop = max(int(np.searchsorted(ends, before + _CHUNK, side="right")), start + 1)
-        yield slice(start, stop)
-        start = stop
-
-
 def cut_local_spans(
     scene: Scene, raster: Raster, interpolator: LocalChordInterpolator | None = None
 ) -> tuple[Raster, int]:
@@ -313,7 +302,7 @@ def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, bend
     """Whether N·L of a pixel of a span might have the wrong sign, for the lights that are told."""
     result = np.zeros(len(origin), dtype=bool)
     bound = LocalChordSetup.diffuse_error(np.abs(slope), np.abs(bend))
-    for run in _runs(last - first + 1):
+    for run in runs_of(last - first + 1, _CHUNK):
         span, step = pixels_of((last - first + 1)[run])
         of_pixel = run.start + span
         place = (first[of_pixel] + step) / (raster.length[origin[of_pixel]] - 1)

@@ -223,6 +223,26 @@ def test_what_is_cached_runs_no_tool(calls, cache):
     assert len(list(cache.iterdir())) == 4
 
 
+@pytest.mark.parametrize(("luts", "placer"), [(fpga._MANY - 1, ()), (fpga._MANY, fpga._PLACER)])
+def test_placer_by_size(luts, placer, cache, monkeypatch):
+    """Hardly any logic would never end in the static placer."""
+    given = []
+
+    def run(self, name, code, arguments, folder, text=""):
+        if name == "Yosys":
+            (folder / "top.json").write_text(json.dumps(netlist(*[("LUT4", {}, 3, 4)] * luts)))
+        else:
+            given.extend(arguments)
+            (folder / "1.json").write_text(json.dumps(REPORT))
+
+    monkeypatch.setattr(fpga._Runner, "run", run)
+    monkeypatch.setattr(fpga, "_versions", lambda: {})
+    lay_out("counter", Counter(), 1)
+    place = given.index("--placer") if placer else 0
+    assert ("--placer" in given) == bool(placer)
+    assert tuple(given[place : place + len(placer)]) == placer
+
+
 def test_another_design_or_tool_is_another_entry(calls, cache, monkeypatch):
     lay_out("counter", Counter(), 1)
     lay_out("counter", Counter(23), 1)

@@ -198,7 +198,7 @@ def test_a_frame_that_differs_fails(counted, capsys):
     [
         (["missing.obj"], "missing.obj: "),
         (["--size", "640"], "--size 640: not a size; give WIDTHxHEIGHT"),
-        (["--size", "0x9"], "--size 0x9: not a size"),
+        (["--size", "0x9"], "--size 0x9: out of range"),
         (["--exponent", "1001"], "Invalid value for '--exponent'"),
         (["--model", "phong"], "Invalid value for '--model'"),
         (["--json", "no/such/folder.json"], "no/such/folder.json: "),

@@ -10,7 +10,7 @@ import pytest
 from bench import pairs
 from bench.accuracy import scene_for
 from bench.pairs import Pair, main, measure
-from golden.pipeline import METHODS, MODELS
+from golden.pipeline import METHODS, MODELS, PRINTED
 from golden.raster import rasterise
 from sim.engine import SimulationError, simulate
 from sim.mesh import load_mesh
@@ -95,6 +95,15 @@ def test_judged(outcome, capsys, frame, text):
 def test_bad_mesh_is_one_line(capsys):
     assert main(["missing.obj"]) == 2
     assert capsys.readouterr().err.startswith("bench.pairs: missing.obj: ")
+
+
+@pytest.mark.parametrize(
+    "method", [pytest.param(name, marks=() if "quad" in name else pytest.mark.long) for name in PRINTED]
+)
+def test_what_the_documents_print_runs_as_hardware_too(method):
+    (pair,) = measure([load_mesh(STRESS).mesh], [method], ["cosquad"], (30,), 48, 36)
+    assert (pair.mismatches, pair.failure) == (0, "")
+    assert pair.pixels > 100
 
 
 @pytest.mark.long

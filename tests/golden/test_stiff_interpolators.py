@@ -1,24 +1,19 @@
 """Stiff and extreme cases of the interpolators: peaks, terminators, wrong normals, the ends of the words.
 
 The reference is the method's own curve in float64, through the vectors of the codes, whatever their length;
-the bounds are those that the docstrings of the devices state for spans to 45 degrees.
+the bounds are those that the docstrings of the devices state for spans to 45 degrees. What the colours of all
+methods do in all groups of cases is in `bench.stability`.
 """
-
-from functools import cache
 
 import numpy as np
 import pytest
 
-from golden.adaptive_normaliser import AdaptiveNormaliser
-from golden.angular_setup import AngularSetup
+from bench.stability import operand_error as bound
 from golden.diffuse import Diffuse
 from golden.fixed import Fixed
-from golden.highlight_cosine import HighlightCosine
 from golden.interpolation import interpolate
 from golden.interpolator import pixels_of
-from golden.middle_normal import MiddleNormal
 from golden.pipeline import METHODS
-from golden.quadratic_evaluator import QuadraticEvaluator
 from golden.renormaliser import Renormaliser
 from golden.specular import Specular
 from golden.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
@@ -51,33 +46,6 @@ def reference(method, left, right, length, vector):
         return t * np.sinc(t * psi / np.pi) / np.sinc(psi / np.pi)
 
     return a * weight(1 - t) + b * weight(t)
-
-
-@cache
-def bound(method, length, degrees):
-    """Largest error of a cosine in a span of so many pixels, to 45 degrees by the quadratic methods."""
-    psi = np.radians(degrees)
-    # Three roundings to the result, 1/(m-1) by 2^-17, and the rounding of the differences at the last pixel.
-    rounding = np.sqrt(3) * (2.0**-18 + 2.0**-42 * (length + length**2 / 2))
-    middle = np.sqrt(3) * MiddleNormal.ERROR
-    straight = rounding + STEP * (2 * np.sin(psi / 2) + STEP)
-    if method == "linear":
-        return straight
-    if method == "renormalise":
-        return straight / np.cos(psi / 2) + Renormaliser.ERROR
-    if method == "quadratic":
-        return rounding + middle + STEP * 0.83 + (3 * STEP + 2.0**-34) * 0.305
-    if method in ("quadratic-eval", "quadratic-horner"):
-        form = METHODS[method].form
-        return middle + np.sqrt(3) * QuadraticEvaluator(form).error
-    if method == "bisection":
-        unit = AdaptiveNormaliser(METHODS[method].threshold)
-        error = max(unit.error(k, degrees > 45) for k in range(unit.depth + 1))
-        return np.sqrt(3) * error + unit.threshold + 2.0**-19 + 0.017 * (8.1 * unit.threshold) ** 1.5
-    if method == "angular":
-        # The code of length 1, where the setup has 1; half a step of the result.
-        return AngularSetup.error(degrees) + HighlightCosine.ERROR + 2.0**-16 + 2.0**-26
-    return METHODS[method].setup.error(length, psi)
 
 
 def operands(method, left, right, length, vector):

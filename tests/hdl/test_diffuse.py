@@ -23,14 +23,16 @@ def test_equals_twin(verify, latency, interval):
 
 
 def test_waits_in_a_register_an_interval():
-    """Ages, operand at more than an interval of 1, rounded, result; then a copy for each interval begun."""
+    """Ages; operand, turn and ready at more than an interval of 1; rounded, result, one that waits; then a
+    copy for each interval begun.
+    """
     assert DiffuseUnit().latency == 2
     assert DiffuseUnit(initiation_interval=4).latency == 3
     width, rounded = Diffuse().operand_format.width, 22
     for latency, interval, copies in ((7, 1, 5), (11, 2, 4), (11, 3, 2), (11, 6, 1)):
         cost = cost_of(DiffuseUnit(latency, initiation_interval=interval))
-        control = latency + (0 if interval == 1 else width + (interval - 1).bit_length())
-        assert cost.register_bits == control + rounded + 17 * (1 + copies)
+        control = latency + 1 + (0 if interval == 1 else width + 2 + (interval - 1).bit_length())
+        assert cost.register_bits == control + rounded + 17 * (2 + copies)
         assert cost.multiplier_count == 0
 
 

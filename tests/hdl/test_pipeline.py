@@ -69,6 +69,22 @@ def run(unit, spans, constants, pixels, **options):
     return simulate(unit, beats_of(spans, unit), count=len(pixels.x), write=constants.writes(), **options)
 
 
+def run_under_stalls(rng, unit, spans, constants, pixels):
+    """Without stalls, then with stalls of either side and of both; the pixels are those of the twin."""
+    results = []
+    for input_share, output_share in ((0, 0), (0.5, 0.5), (0.95, 0), (0, 0.7)):
+        stalls = {
+            "input_stalls": rng.random(997) < input_share,
+            "output_stalls": rng.random(1009) < output_share,
+        }
+        results.append(run(unit, spans, constants, pixels, **stalls))
+        assert_pixels(results[-1], pixels)
+        assert results[-1].status["wide_spans"] == pixels.wide_spans == 0
+        assert results[-1].status["empty_spans"] == np.count_nonzero(spans.length == 0)
+        assert not results[-1].status["overrun"]
+    return results
+
+
 @pytest.mark.parametrize(
     ("model", "lights"),
     [
@@ -91,19 +107,7 @@ def test_equals_twin_under_stalls(model, lights, normal_pairs):
         constants = make_constants(rng, lights, exponent, brightness=rng.choice([1.0, 8.0]))
         pixels = parameters.compute(spans, constants)
         assert len(np.unique(pixels.color)) > 100
-        for input_share, output_share in ((0, 0), (0.5, 0.5), (0.95, 0), (0, 0.7)):
-            result = run(
-                unit,
-                spans,
-                constants,
-                pixels,
-                input_stalls=rng.random(997) < input_share,
-                output_stalls=rng.random(1009) < output_share,
-            )
-            assert_pixels(result, pixels)
-            assert result.status["wide_spans"] == pixels.wide_spans == 0
-            assert result.status["empty_spans"] == np.count_nonzero(spans.length == 0)
-            assert not result.status["overrun"]
+        run_under_stalls(rng, unit, spans, constants, pixels)
 
 
 @pytest.mark.long
@@ -250,19 +254,7 @@ def test_every_method_equals_its_twin_under_stalls(method, model, lights, operan
     constants = lit_constants(rng, spans, lights, 20)
     pixels = design.compute(spans, constants)
     assert len(np.unique(pixels.color)) > 100
-    clocks = []
-    for input_share, output_share in ((0, 0), (0.5, 0.5), (0.95, 0), (0, 0.7)):
-        result = run(
-            unit,
-            spans,
-            constants,
-            pixels,
-            input_stalls=rng.random(997) < input_share,
-            output_stalls=rng.random(1009) < output_share,
-        )
-        assert_pixels(result, pixels)
-        assert result.status["wide_spans"] == pixels.wide_spans == 0
-        clocks.append(result)
+    clocks = run_under_stalls(rng, unit, spans, constants, pixels)
     # The first span and the clocks of each, without stalls.
     starts = np.cumsum(spans.length) - spans.length
     full = np.flatnonzero(spans.length)
@@ -674,14 +666,15 @@ def test_gate_changes_no_pixel(method, model, lights, operand, style, normal_pai
 
 
 @pytest.mark.parametrize(
-    ("method", "interval"), [("chord", 4), pytest.param("quadratic", 7, marks=pytest.mark.long)]
+    ("method", "interval"),
+    [("chord", 4), ("chord", 1), pytest.param("quadratic", 7, marks=pytest.mark.long)],
 )
 def test_gate_costs_no_clock(method, interval, normal_pairs):
-    """Decisions come in time for spans of every length."""
+    """Decisions come in time for spans of every length, however many single pixels are on the way."""
     rng = np.random.default_rng(interval)
     design = ShadingPipeline(method, gate=True)
     unit = ShadingPipelineUnit(design, interval)
-    lengths = np.r_[rng.integers(1, 40, 200), np.full(60, 1), np.full(60, 5)]
+    lengths = np.r_[rng.integers(1, 40, 200), np.full(150, 1), np.full(60, 5)]
     spans = make_spans(rng, lengths, normal_pairs, 20.0)
     constants = lit_constants(rng, spans, 1, 20)
     pixels = design.compute(spans, constants)

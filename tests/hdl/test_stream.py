@@ -1,14 +1,18 @@
 # amaranth: UnusedElaboratable=no
 """Connections that look at every field, and the control of a pipelined unit: stalls, distance, reset."""
 
+import itertools
+from functools import partial
+
 import numpy as np
 import pytest
 from amaranth.hdl import Cat, Module, ResetInserter, Signal, Value, signed, unsigned
-from amaranth.lib import data, enum, stream
+from amaranth.lib import data, enum, stream, wiring
+from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
 from hdl.fixed import SQ, UQ, FixedShape
-from hdl.stream import PipelinedUnit, connect, require_same_shape
+from hdl.stream import PipelinedUnit, connect, connect_registered, count_down, require_same_shape
 from sim.engine import simulate
 
 
@@ -136,6 +140,64 @@ def test_connect_carries_payload_valid_and_ready(shape):
     simulator.run()
 
 
+class Registers(wiring.Component):
+    """So many registers in a row; each adds nothing but its clock."""
+
+    i: In(stream.Signature(unsigned(16)))
+    o: Out(stream.Signature(unsigned(16)))
+    initiation_interval = 1
+
+    def __init__(self, latency):
+        self.latency = latency
+        self.added = 0
+        super().__init__()
+
+    def elaborate(self, platform):
+        m = Module()
+        streams = [stream.Signature(unsigned(16)).create(path=(str(k),)) for k in range(self.latency - 1)]
+        streams = [wiring.flipped(self.i), *streams, wiring.flipped(self.o)]
+        for source, sink in itertools.pairwise(streams):
+            connect_registered(m, source, sink)
+        return m
+
+
+def test_registers_refuse_a_moved_binary_point():
+    with pytest.raises(TypeError, match=r"^payload is SQ\(1, 17\) on one side, SQ\(2, 16\) on the other$"):
+        connect_registered(Module(), *streams(SQ(1, 17), SQ(2, 16)))
+
+
+@pytest.mark.parametrize("clocks", [1, 3])
+def test_counter_follows_the_span(clocks):
+    """Against a plain count of spans of 0 to 5 pixels, on enabled clocks alone."""
+    rng = np.random.default_rng(clocks)
+    m, valid, length, advance = Module(), Signal(), Signal(3), Signal()
+    active, ends = count_down(m, valid, length, advance)
+    seen = []
+
+    async def bench(ctx):
+        left = 0
+        for _ in range(400):
+            assert (ctx.get(active), ctx.get(ends)) == (left > 0, left <= 1)
+            moves, given = bool(rng.random() < 1 / clocks), int(rng.integers(6))
+            offered = bool(rng.random() < 0.7)
+            begins = moves and left <= 1 and offered
+            ctx.set(advance, moves)
+            ctx.set(valid, offered)
+            ctx.set(length, given)
+            await ctx.tick()
+            if begins:
+                left = given
+                seen.append(given)
+            elif moves:
+                left = max(left - 1, 0)
+
+    simulator = Simulator(m)
+    simulator.add_clock(1e-8)
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert set(seen) == set(range(6))
+
+
 class Delay(PipelinedUnit):
     """The input, plus 1 for every register but the first; one register a clock of latency."""
 
@@ -185,12 +247,23 @@ def test_constants_are_a_member_only_where_asked_for():
     assert unit.constants.shape() == FixedShape(unit.constants.format)
 
 
-@pytest.mark.parametrize(("latency", "interval"), [(1, 1), (4, 1), (2, 2), (5, 3), (9, 4)])
+UNITS = [
+    pytest.param(make, id=f"{make.func.__name__}-{'-'.join(map(str, make.args))}")
+    for make in (
+        *(partial(Delay, *timing) for timing in ((1, 1), (4, 1), (2, 2), (5, 3), (9, 4))),
+        partial(Registers, 1),
+        partial(Registers, 3),
+    )
+]
+
+
+@pytest.mark.parametrize("make", UNITS)
 @pytest.mark.parametrize(("input_share", "output_share"), [(0, 0), (0.4, 0.4), (0.9, 0.1), (0.1, 0.9)])
-def test_stalls_and_distance(latency, interval, input_share, output_share):
+def test_stalls_and_distance(make, input_share, output_share):
     """Nothing lost, repeated, or changed while it waits; without stalls every clock is as said."""
-    rng = np.random.default_rng(latency)
-    unit = Delay(latency, interval)
+    unit = make()
+    rng = np.random.default_rng(unit.latency)
+    latency, interval = unit.latency, unit.initiation_interval
     codes = rng.integers(0, 2**15, 60)
     stalls = {
         "input_stalls": rng.random(97) < input_share,
@@ -203,6 +276,47 @@ def test_stalls_and_distance(latency, interval, input_share, output_share):
     if not output_share:
         np.testing.assert_array_equal(run.clocks, run.input_clocks + latency)
     assert (run.clocks - run.input_clocks >= latency).all()
+
+
+@pytest.mark.parametrize("make", UNITS)
+def test_a_stall_costs_its_own_clock(make):
+    """After beats have waited, those behind them follow on every clock that the interval allows."""
+    unit = make()
+    codes = np.arange(60)
+    stalled = simulate(unit, codes, count=60, engine="pysim", output_stalls=np.arange(1000) % 40 == 20)
+    free = simulate(unit, codes, count=60, engine="pysim")
+    lost = stalled.clocks - free.clocks
+    assert np.all(np.diff(lost) >= 0)
+    assert lost[-1] <= np.count_nonzero(np.arange(stalled.clocks[-1]) % 40 == 20)
+
+
+@pytest.mark.parametrize("make", UNITS)
+def test_ready_waits_for_no_other_ready(make):
+    """Input ready, output valid and payload are what registers say: no path leads to them from a port."""
+    unit = make()
+    rng = np.random.default_rng(unit.latency)
+    seen = set()
+
+    async def bench(ctx):
+        for _ in range(200):
+            found = set()
+            for ready, valid in ((0, 0), (0, 1), (1, 0), (1, 1)):
+                ctx.set(unit.o.ready, ready)
+                ctx.set(unit.i.valid, valid)
+                await ctx.delay(1e-9)
+                found.add((ctx.get(unit.i.ready), ctx.get(unit.o.valid), ctx.get(unit.o.payload)))
+            assert len(found) == 1
+            seen.add(next(iter(found))[:2])
+            ctx.set(unit.i.payload, int(rng.integers(2**15)))
+            ctx.set(unit.i.valid, bool(rng.random() < 0.8))
+            ctx.set(unit.o.ready, bool(rng.random() < 0.3))
+            await ctx.tick()
+
+    simulator = Simulator(unit)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert {(0, 1), (1, 0)} <= seen
 
 
 @pytest.mark.parametrize("interval", [2, 5])

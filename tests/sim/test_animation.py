@@ -1,7 +1,6 @@
 """Turntables: where the camera goes, who draws the frames, and that they are those drawn one by one."""
 
 import multiprocessing
-import os
 import random
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -19,11 +18,9 @@ from golden.scene import Scene
 from sim.animation import (
     Crew,
     Film,
-    check_address,
     cluster,
     equal_distance,
     process_pool,
-    processors,
     shoot,
     shot,
     turned,
@@ -228,25 +225,7 @@ def test_a_process_that_dies(film, cameras):
     assert set(multiprocessing.active_children()) == children
 
 
-def test_processors():
-    assert 1 <= processors() <= (os.cpu_count() or 1)
-
-
 # A cluster.
-
-
-@pytest.mark.parametrize(
-    "address", ["", "foo", "tcp://", "zzz://a:1", "tcp://a", "tcp://a:b", "a b:1", "http://a:1"]
-)
-def test_no_address(address):
-    with pytest.raises(InputError, match="not the address of a Dask scheduler"):
-        check_address(address)
-
-
-def test_without_dask(monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name, *rest: None)
-    with pytest.raises(InputError, match=r"Dask is not installed; pip install 'blysk\[cluster\]'"):
-        check_address("tcp://127.0.0.1:8786")
 
 
 @pytest.fixture(scope="module")
@@ -280,7 +259,7 @@ def test_a_cluster_without_workers(film):
 
 def test_nobody_at_the_address(film, monkeypatch):
     pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
-    monkeypatch.setattr("sim.animation._CONNECT_SECONDS", 1)
+    monkeypatch.setattr("sim.workers._CONNECT_SECONDS", 1)
     with (
         pytest.raises(InputError, match=r"no Dask scheduler answers \(.*; start one with `dask scheduler`"),
         cluster(film, "tcp://127.0.0.1:1"),

@@ -22,7 +22,7 @@ from PIL import Image
 import sim.mesh
 from golden.camera import Camera
 from golden.lighting import Light, Material
-from golden.pipeline import METHODS, ShadingPipeline
+from golden.pipeline import METHODS, PRINTED, ShadingPipeline
 from golden.scene import Scene
 from sim.cli import main
 from sim.frame import FrameSimulator
@@ -135,7 +135,7 @@ def test_no_mesh(refused):
 
 # Options.
 
-KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS)}"
+KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS | PRINTED)}"
 
 
 @pytest.mark.parametrize(
@@ -600,6 +600,9 @@ def test_point_lights(folder, refused, capsys):
     )
     assert main(["render", "a.toml", "--size", "48x36", "-o", "b.png"]) == 0
     np.testing.assert_array_equal(picture("a.png"), picture("b.png"))
+    fitted = ["--fit", "--engine", "pysim", "--triangles", "64", "--size", "16x12", "--json", "c.json"]
+    assert main(["render", "teapot", *local, *fitted, "-o", "c.png"]) == 0
+    assert json.loads(Path("c.json").read_text())["fit"]["different_pixels"] == 0
     capsys.readouterr()
     what = "need the values of a span; use chord-local"
     refused("render", "teapot", "--point-light", "3,4,5", thing="--method quadratic", says=what)

@@ -138,6 +138,20 @@ def test_black_lights():
     assert_same_frame(scene, fit)
 
 
+def test_methods_that_no_gate_serves():
+    """Spans that carry values are cut by all lights, the dark one too, and have no normals for a gate."""
+    scene = scene_of(replace(CLAY, exponent=400), (KEY, BLACK, FILL))
+    for method in ("chord-local", "quadratic-printed"):
+        fit = for_scene(scene, ShadingPipeline(method, lights=3))
+        assert ("lights" in reasons(fit)) == (method != "chord-local")
+        assert reasons(fit)["exponent"] == "exponent fixed at 400: PROM folded"
+        assert_same_frame(scene, fit)
+    dark = scene_of(lights=(BLACK,))
+    fit = for_scene(dark, ShadingPipeline("chord-local"))
+    assert reasons(fit)["lights"] == "no light path: no light lights anything"
+    assert_same_frame(dark, fit)
+
+
 @pytest.mark.parametrize(
     ("material", "lights"),
     [(CLAY, ()), (CLAY, (BLACK,)), (replace(CLAY, diffuse=(0, 0, 0), specular=(0, 0, 0)), (KEY,))],

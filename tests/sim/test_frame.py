@@ -61,7 +61,8 @@ def simulator():
 
 
 def twin_pixels(scene):
-    cut, _ = cut_wide_spans(rasterise(scene), MAX_SPAN_ANGLE)
+    bend = DESIGN.interpolator.largest_bend(scene.materials[0].exponent)
+    cut, _ = cut_wide_spans(rasterise(scene), MAX_SPAN_ANGLE, bend)
     return cut, DESIGN.compute(
         quantise_spans(cut, scene.mesh.material), FrameConstants.of(scene, DESIGN.lights)
     )
@@ -272,8 +273,10 @@ def test_frame_of_three_materials(engine):
     one = ShadingPipeline(lights=1)
     for index, material in enumerate(MATERIALS):
         alone = dataclasses.replace(lone, material=material)
-        widest = min(several.interpolator.widest_span(material.exponent) for material in MATERIALS)
-        cut, _ = cut_wide_spans(rasterise(alone), widest)
+        method = several.interpolator
+        widest = min(method.widest_span(material.exponent) for material in MATERIALS)
+        bend = min(method.largest_bend(material.exponent) for material in MATERIALS)
+        cut, _ = cut_wide_spans(rasterise(alone), widest, bend)
         spans = quantise_spans(cut, alone.mesh.material)
         pixels = one.compute(spans, FrameConstants.of(alone, 1))
         image = np.zeros((scene.height * scene.width, 3), dtype=np.uint8)
