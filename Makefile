@@ -9,7 +9,7 @@ COMMA := ,
 # The tests compile their models; without a C++ compiler one comes from PyPI.
 TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang++),[test],[test$(COMMA)native])
 
-.PHONY: demo test test-all bench pages lint clean
+.PHONY: demo test test-all prove bench pages lint clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
@@ -20,11 +20,14 @@ test: $(VENV)/.installed-test lint
 test-all: $(VENV)/.installed-test lint
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile -m ""
 
+prove: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) -m prove tests/formal
+
 bench: $(VENV)/.installed-bench
+	$(BIN)/blysk bench report
 	$(BIN)/python -m bench.engines
 	$(BIN)/python -m bench.throughput
 	$(BIN)/python -m bench.renderer
-	$(BIN)/python -m bench.accuracy
 	$(BIN)/python -m bench.gate
 	$(BIN)/python -m bench.sweep
 
@@ -45,7 +48,7 @@ $(VENV)/.installed-test: $(VENV)/.installed
 	touch $@
 
 $(VENV)/.installed-bench: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[bench]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[bench,fpga,report]'
 	touch $@
 
 clean:

