@@ -1,0 +1,181 @@
+"""Proofs of hardware: what is claimed of a unit for all inputs, decided by Yosys and ABC (package pyosys)."""
+
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from amaranth.back import rtlil
+from amaranth.hdl import Assert, Assume, Fragment, Module, ShapeLike, Signal, Value, ValueLike
+from amaranth.lib.wiring import Component, In
+
+__all__ = ["Harness", "Verdict", "decide", "missing_tool"]
+
+_YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
+
+# Cut are products and tables: what holds whatever they give holds for what they do give.
+_SCRIPT = """\
+read_rtlil top.il
+hierarchy -auto-top
+proc
+flatten
+opt_clean
+memory_collect
+opt_clean
+select -set cut t:$mul t:$mem_v2 r:WR_PORTS=0 %i %u
+cutpoint @cut
+memory_map
+async2sync
+dffunmap
+opt_expr
+opt_merge
+opt_clean
+chformal -lower
+setundef -undriven -anyseq
+techmap
+aigmap
+write_aiger -zinit -symbols top.aig
+"""
+
+_SECONDS = 150
+"""After which a proof is given up."""
+
+
+class Harness:
+    """A unit whose inputs are free, on every clock, and what is claimed of it.
+
+    All input members, ``rst`` too, may take any value on any clock: a claim holds for every stimulus, and
+    with a reset at any time. Registers of `m` are reset with the unit. Multipliers and tables without a write
+    port give anything on every clock: claims that hold so hold for the unit, but not the other way round.
+
+    Parameters
+    ----------
+    unit : Component
+        Unit; it is elaborated at once, so that claims may name what its `elaborate` keeps.
+
+    Attributes
+    ----------
+    m : Module
+        Module for the registers of a model.
+    """
+
+    def __init__(self, unit: Component | None = None):
+        self.m = Module()
+        self.unit = unit
+        self._ports: list[Value] = []
+        if unit is not None:
+            self.m.submodules.unit = self._fragment = Fragment.get(unit, None)
+            self._ports = [
+                Value.cast(value) for _, member, value in unit.signature.flatten(unit) if member.flow is In
+            ]
+
+    def free(self, shape: ShapeLike = 1, name: str = "free") -> Signal:
+        """A signal that takes any value on every clock."""
+        signal = Signal(shape, name=name)
+        self._ports.append(Value.cast(signal))
+        return signal
+
+    def register(self, name: str) -> Signal:
+        """The unit's own register of a name, not those of its submodules.
+
+        Raises
+        ------
+        KeyError
+            If it has none, or several.
+        """
+        statements = self._fragment.statements["sync"]
+        found = (signal for statement in statements for signal in statement._lhs_signals())
+        named = {id(signal): signal for signal in found if signal.name == name}
+        if len(named) != 1:
+            raise KeyError(f"{len(named)} registers are named {name}")
+        return named.popitem()[1]
+
+    def claim(self, condition: ValueLike) -> None:
+        """Claim that a condition holds on every clock."""
+        self.m.d.comb += Assert(condition)
+
+    def assume(self, condition: ValueLike) -> None:
+        """Leave out the runs in which a condition does not hold on every clock."""
+        self.m.d.comb += Assume(condition)
+
+    def netlist(self) -> str:
+        """RTLIL text."""
+        return rtlil.convert(self.m, ports=self._ports)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of the claims.
+
+    Parameters
+    ----------
+    holds : bool or None
+        Whether they hold, on every clock or on so many as asked for; ``None``: not decided in time.
+    clocks : int
+        Clocks after the first of the counterexample's last, or the frames that the search has seen.
+    trace : str
+        The counterexample: a line a clock, the bits of the inputs that are 1; empty if there is none.
+    """
+
+    holds: bool | None
+    clocks: int
+    trace: str = ""
+
+
+def missing_tool() -> str:
+    """Why nothing can be proved here; empty if it can."""
+    return "" if find_spec("pyosys") else "pyosys is not installed: pip install 'blysk[fpga]'"
+
+
+def _run_yosys(script: str, folder: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", _YOSYS], input=script, capture_output=True, encoding="utf-8", cwd=folder
+    )
+    if done.returncode:
+        raise RuntimeError(f"Yosys failed: {done.stderr[-2000:] or done.stdout[-2000:]}")
+
+
+def decide(harness: Harness, folder: Path, clocks: int | None = None) -> Verdict:
+    """Decide whether the claims of a harness hold.
+
+    Parameters
+    ----------
+    harness : Harness
+        The claims.
+    folder : path
+        For the netlist.
+    clocks : int or None
+        Look for a counterexample of at most so many clocks from power-up, by bounded model checking.
+        ``None``: prove the claims for runs of any length, by property-directed reachability (IC3), which
+        finds an inductive invariant and verifies it.
+
+    Raises
+    ------
+    RuntimeError
+        If Yosys or ABC fails.
+    """
+    (folder / "top.il").write_text(harness.netlist())
+    _run_yosys(_SCRIPT, folder)
+    engine = f"pdr -T {_SECONDS}" if clocks is None else f"bmc3 -F {clocks} -T {_SECONDS}"
+    abc = Path(find_spec("pyosys").origin).parent / "yosys-abc"
+    command = f"read_aiger top.aig; fold; {engine}; print_status; write_cex -n top.cex"
+    done = subprocess.run([abc, "-c", command], capture_output=True, encoding="utf-8", cwd=folder)
+    status = re.search(r"Status = (-?\d+) +Frames = (-?\d+)", done.stdout)
+    if done.returncode or status is None:
+        raise RuntimeError(f"ABC failed: {done.stdout[-2000:]}{done.stderr[-2000:]}")
+    code, frames = int(status[1]), int(status[2])
+    if code == 0:
+        return Verdict(False, frames, _trace(folder / "top.cex"))
+    if code == 1 or (clocks is not None and f"No output asserted in {clocks} frames" in done.stdout):
+        return Verdict(True, frames)
+    return Verdict(None, frames)
+
+
+def _trace(path: Path) -> str:
+    """Inputs of a counterexample: for each clock the names of the bits that are 1."""
+    clocks: dict[int, list[str]] = {}
+    for name, clock, bit in re.findall(r"^(\S+)@(\d+)=([01])$", path.read_text(), re.MULTILINE):
+        clocks.setdefault(int(clock), []).extend([name] if bit == "1" else [])
+    return "\n".join(f"{clock}: {' '.join(names)}" for clock, names in sorted(clocks.items()))

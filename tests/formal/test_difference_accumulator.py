@@ -1,0 +1,158 @@
+"""Proofs of the accumulator: a span's pixels, all and in order, as exact sums that never wrap."""
+
+import pytest
+from amaranth.hdl import Mux, Signal, Value, signed, unsigned
+from amaranth.lib import data
+
+from golden.difference_accumulator import DifferenceAccumulator
+from golden.fixed import SQ
+from hdl import difference_accumulator
+from hdl.chord_interpolator import ChordAccumulatorUnit
+from hdl.difference_accumulator import AccumulatorUnit, DifferenceAccumulatorUnit
+from hdl.fixed import FixedShape
+
+from .prover import Harness
+from .rules import answers, pixels_follow, stays, taken
+
+pytestmark = pytest.mark.prove
+
+# The words of a normal's component, cut from 44 bits to 5 and from 18 to 3: as there, the sum and the
+# differences have an integer bit more than the result.
+FORMATS = DifferenceAccumulator(SQ(1, 2), SQ(2, 3), SQ(2, 3), SQ(1, 2))
+LENGTH_BITS = 3
+
+
+class Narrow(AccumulatorUnit):
+    """One quadratic of narrow words."""
+
+    def __init__(self):
+        words = {name: FixedShape(FORMATS.difference_format) for name in ("first", "second")}
+        start = {"start": FixedShape(FORMATS.start_format), "length": unsigned(LENGTH_BITS)}
+        super().__init__(data.StructLayout(start | words), FixedShape(FORMATS.result_format))
+
+    def quadratics(self, values):
+        span = self.i.payload
+        yield "value", FORMATS, (span.start, span.first, span.second), values
+
+
+def of_pixels():
+    """Pixels are counted; those of a chosen span are exact sums, as long as these stay in the domain."""
+    unit = Narrow()
+    h = Harness(unit)
+    span = unit.i.payload
+    stays(h, unit.o)
+    # Two spans inside at most: what waits, the values, and what the sums stand at.
+    owed = pixels_follow(h, unit.i, unit.o, span.length, 2 + (1 << LENGTH_BITS) - 1)
+    answers(h, owed.any(), taken(unit.o), unit.latency - 1, unit.o.ready)
+    answers(h, unit.i.valid, unit.i.ready, (1 << LENGTH_BITS) - 1, unit.o.ready)
+    return h
+
+
+def test_pixels_are_as_many_as_asked_for(prove):
+    """Inductive, lengths 0 to 7: what waits stays, as many values leave as the lengths say, no deadlock.
+
+    While the output is ready, the first value leaves 2 clocks after its span was taken, then one every clock,
+    and a span is taken at the latest when the one before it has had a clock for each pixel.
+    """
+    prove(of_pixels())
+
+
+def fits(code, format):
+    """Whether a code is one of a format."""
+    return (code >= format.min_code) & (code <= format.max_code)
+
+
+def of_sums(unit):
+    """Exact sums in words that cannot wrap move beside those of the unit; what they would give leaves.
+
+    The domain: at every pixel of a span the exact value is in the format of the sum. Where the differences
+    have fewer bits, every one from a pixel to the next is in theirs.
+    """
+    h = Harness(unit)
+    m, span = h.m, unit.i.payload
+    waits, active, valid = stays(h, unit.o), Signal(), Signal()
+    left = Signal(len(span.length))
+    load = taken(unit.i)
+    m.d.comb += active.eq(left.any())
+    with m.If(load):
+        m.d.sync += left.eq(span.length)
+    with m.Elif(~waits & active):
+        m.d.sync += left.eq(left - 1)
+    with m.If(~waits):
+        m.d.sync += valid.eq(active)
+    h.claim(unit.o.valid == (valid | waits))
+    h.claim(h.register("active") == active)
+    h.claim(~active | (h.register("remaining") == left))
+    h.claim(h.register("ends") == (left <= 1))
+    for name, p, operands, found in unit.quadratics(unit.o.payload):
+        width = p.format.width + 2 * len(span.length)
+        exact, change, bend = (
+            Signal(signed(width), name=f"{name}_{word}") for word in ("exact", "change", "bend")
+        )
+        start, first, second = (Value.cast(operand) for operand in operands)
+        shift = p.format.fraction_bits - p.start_format.fraction_bits
+        cut = p.format.fraction_bits - p.result_format.fraction_bits
+        with m.If(load):
+            m.d.sync += [
+                exact.eq((start << shift) + (1 << (cut - 1))),
+                change.eq(first),
+                bend.eq(second),
+            ]
+        with m.Elif(~waits):
+            m.d.sync += [exact.eq(exact + change), change.eq(change + bend)]
+        h.assume(~active | fits(exact, p.format))
+        if p.difference_format.width < p.format.width:
+            h.assume((left <= 1) | fits(change, p.difference_format))
+        words = (name, exact), (f"{name}_difference", change), (f"{name}_second_difference", bend)
+        for register, model in words:
+            code = Value.cast(h.register(register))
+            h.claim(~active | (code.as_unsigned() == model[: len(code)]))
+        rounded, result = exact >> cut, p.result_format
+        value = Signal(signed(width), name=f"{name}_value")
+        with m.If(~waits):
+            raised = Mux(rounded < result.min_code, result.min_code, rounded)
+            m.d.sync += value.eq(Mux(raised > result.max_code, result.max_code, raised))
+        h.claim(~valid | waits | (Value.cast(found) == value))
+    return h
+
+
+SUMS = {
+    "normal": DifferenceAccumulatorUnit,
+    "chord": lambda: ChordAccumulatorUnit(1),
+}
+
+
+@pytest.mark.parametrize("name", SUMS)
+def test_sums_are_exact(prove, name):
+    """Inductive, all formats and lengths as built: the values that leave are the exact sums, cut and clamped.
+
+    So no sum wraps as long as the exact values of a span's pixels fit its format. Differences of a normal may
+    be any: these may wrap, and do no harm. Those of the chord method, two bits shorter than the sums, must
+    fit theirs.
+    """
+    prove(of_sums(SUMS[name]()))
+
+
+BUGS = {
+    "a bit too few": (
+        "difference + bend).wrap(p.difference_format)",
+        "difference).wrap(p.difference_format)",
+    ),
+    "no half step": ("(start + half_step).wrap(p.format)", "start.extend(p.format)"),
+    "wraps": (".saturate(p.result_format)", ".wrap(p.result_format)"),
+    "sums while it stands": ("m.Elif(advance)", "m.Else()"),
+    "a clock late": ("valid.eq(active)", "valid.eq(active & ~ends)"),
+}
+
+
+@pytest.mark.parametrize("bug", BUGS)
+def test_bugs_are_found(refute, plant, bug):
+    """Planted in `AccumulatorUnit`, each refutes the claim of exact sums."""
+    plant(AccumulatorUnit, "elaborate", *BUGS[bug])
+    refute(of_sums(DifferenceAccumulatorUnit()), 10)
+
+
+def test_bugs_of_the_offered_output_are_found(refute, plant):
+    """A value that is dropped while it waits refutes the count of pixels."""
+    plant(difference_accumulator, "offer", "Mux(held, spare, Value.cast(payload))", "payload")
+    refute(of_pixels(), 20)

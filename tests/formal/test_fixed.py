@@ -1,0 +1,96 @@
+"""Proofs of fixed-point arithmetic: saturation never wraps, rounding errs by half a step at most."""
+
+import pytest
+from amaranth.hdl import Mux, Shape, Signal, Value
+
+from golden.fixed import SQ, UQ
+from hdl.fixed import FixedValue
+
+from .prover import Harness
+
+pytestmark = pytest.mark.prove
+
+# From and to: pairs that units use, each way of signs, and the same number of bits.
+PAIRS = [
+    (SQ(3, 17), SQ(1, 17)),
+    (SQ(4, 34), UQ(1, 34)),
+    (SQ(5, 25), UQ(1, 25)),
+    (UQ(10, 16), UQ(1, 16)),
+    (UQ(13, 0), UQ(8, 0)),
+    (UQ(2, 17), SQ(1, 17)),
+    (SQ(1, 17), UQ(0, 17)),
+]
+
+
+def any_code(source):
+    """A register that takes any code of a format."""
+    h = Harness()
+    code = Signal(Shape(source.width, source.signed))
+    h.m.d.sync += code.eq(h.free(source.width, "given"))
+    return h, code
+
+
+def of_saturation(source, target):
+    """Against comparisons of the codes."""
+    h, code = any_code(source)
+    result = Value.cast(FixedValue(source, code).saturate(target))
+    raised = Mux(code < target.min_code, target.min_code, code)
+    h.claim(result == Mux(raised > target.max_code, target.max_code, raised))
+    return h
+
+
+def of_rounding(source, bits):
+    """The error, times two, is from over minus one step to one step."""
+    h, code = any_code(source)
+    dropped = source.fraction_bits - bits
+    error = (Value.cast(FixedValue(source, code).round_half_up(bits)) << dropped) - code
+    h.claim((error << 1 > -(1 << dropped)) & (error << 1 <= 1 << dropped))
+    cut = (Value.cast(FixedValue(source, code).truncate(bits)) << dropped) - code
+    h.claim((cut > -(1 << dropped)) & (cut <= 0))
+    return h
+
+
+@pytest.mark.parametrize(("source", "target"), PAIRS)
+def test_saturation_never_wraps(prove, source, target):
+    """For every code: the nearest of the format's, by comparison."""
+    prove(of_saturation(source, target))
+
+
+@pytest.mark.parametrize(("source", "bits"), [(SQ(4, 34), 17), (UQ(1, 25), 17), (SQ(2, 20), 0)])
+def test_rounding_errs_by_half_a_step(prove, source, bits):
+    """For every code: rounding half up by half a step at most, cutting by less than one, never upwards."""
+    prove(of_rounding(source, bits))
+
+
+BUGS = {
+    "negatives saturate upwards": (
+        (SQ(4, 34), UQ(1, 34)),
+        "(~negative).replicate(format.width)",
+        "Const(1, 1).replicate(format.width)",
+    ),
+    "the top bit is forgotten": (
+        (UQ(10, 16), UQ(1, 16)),
+        "self._code[format.width :]",
+        "self._code[format.width : -1]",
+    ),
+    "the wrong end": (
+        (SQ(3, 17), SQ(1, 17)),
+        "(~negative).replicate(format.width - 1)",
+        "negative.replicate(17)",
+    ),
+    "it wraps": ((SQ(3, 17), SQ(1, 17)), "Mux(fits, low, end)", "low"),
+}
+
+
+@pytest.mark.parametrize("bug", BUGS)
+def test_bugs_of_saturation_are_found(refute, plant, bug):
+    """Planted in `FixedValue.saturate`, each refutes the claim for a pair of formats."""
+    formats, *change = BUGS[bug]
+    plant(FixedValue, "saturate", *change)
+    refute(of_saturation(*formats), 4)
+
+
+def test_bug_of_rounding_is_found(refute, plant):
+    """Cut instead."""
+    plant(FixedValue, "round_half_up", "self._code[dropped - 1]", "0")
+    refute(of_rounding(SQ(4, 34), 17), 4)

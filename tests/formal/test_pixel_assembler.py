@@ -1,0 +1,98 @@
+"""Proofs of the pixel assembler: every colour gets its place, and every span all its pixels."""
+
+import pytest
+from amaranth.hdl import Cat, Signal
+
+from hdl.pixel_assembler import PixelAssemblerUnit
+
+from .prover import Harness
+from .rules import answers, follows, pixels_follow, stays, taken
+
+pytestmark = pytest.mark.prove
+
+
+def of_places():
+    """Coordinates and lengths of 2 bits: spans of 1 to 3 pixels, which run past the largest column, too."""
+    unit = PixelAssemblerUnit(2, 1, 2)
+    h = Harness(unit)
+    h.assume(unit.places.payload.length != 0)
+
+    def image(span, place, last, pixel):
+        return (pixel.x == (span.x + place)[:2]) & (pixel.y == span.y) & (pixel.last == last)
+
+    stays(h, unit.o)
+    # Two places wait, one is told of, and the pixels of two more.
+    owed = pixels_follow(h, unit.places, unit.o, unit.places.payload.length, 4 * 3 + 2, image)
+    # Spans whose last pixel has not left.
+    spans = Signal(range(unit.PLACES + 2))
+    finished = taken(unit.o) & unit.o.payload.last
+    h.m.d.sync += spans.eq(spans + taken(unit.places) - finished)
+    h.claim(spans <= unit.PLACES)
+    h.claim(spans.any() == owed.any())
+    return h
+
+
+def of_progress():
+    """The same spans, counted alone, while colours are offered and the output is ready."""
+    unit = PixelAssemblerUnit(2, 1, 2)
+    h = Harness(unit)
+    h.assume(unit.places.payload.length != 0)
+    owed = pixels_follow(h, unit.places, unit.o, unit.places.payload.length, 4 * 3 + 2)
+    flows = unit.o.ready & unit.colors.valid
+    answers(h, owed.any(), taken(unit.o), unit.place_latency - 1, flows)
+    answers(h, unit.places.valid, unit.places.ready, 3 + 2, flows)
+    return h
+
+
+def of_colors():
+    """Colours of one bit a channel: the first of red, green and blue is free, the others are its."""
+    unit = PixelAssemblerUnit(1, 1, 2)
+    h = Harness(unit)
+    color = unit.colors.payload
+    h.assume(unit.places.payload.length != 0)
+    for channel in "rgb":
+        h.assume(color[channel][2:] == 0)
+
+    def image(came, leaves):
+        return Cat(came[name] for name in "rgb") == Cat(leaves[name] for name in "rgb")
+
+    # One in the register for the pixel, and one that waits.
+    follows(h, unit.colors, unit.o, 2, image)
+    return h
+
+
+def test_places(prove):
+    """Inductive: a span's pixels leave in order, from x on, modulo 2^x_bits, with y, the last of them marked.
+
+    At most `PixelAssemblerUnit.PLACES` spans are inside.
+    """
+    prove(of_places())
+
+
+def test_progress(prove):
+    """Inductive: with colours offered and the output ready, a pixel leaves every 3 clocks at the latest, and
+    a place is taken in 5: the pixels of a span, and two registers."""
+    prove(of_progress())
+
+
+def test_colors(prove):
+    """Inductive: each colour leaves once, in order, with a pixel; at most two are inside."""
+    prove(of_colors())
+
+
+BUGS = {
+    "x stands": (of_places, "m.Elif(moves)", "m.Elif(0)"),
+    "x moves while it stands": (of_places, "m.Elif(moves)", "m.Else()"),
+    "a colour is taken without a place": (of_colors, "advance & spot.valid", "advance"),
+    "a place is taken without a colour": (of_places, "advance & self.colors.valid", "advance"),
+    "the next span comes early": (of_places, "moves & ends", "moves"),
+    "a pixel is overwritten": (of_colors, "m.If(advance)", "m.If(1)"),
+}
+
+
+@pytest.mark.parametrize("bug", BUGS)
+def test_bugs_are_found(refute, plant, bug):
+    """Planted in `PixelAssemblerUnit`, each refutes the claims on places or on colours."""
+    claims, *change = BUGS[bug]
+    plant(PixelAssemblerUnit, "elaborate", *change)
+    refute(claims(), 20)

@@ -1,0 +1,211 @@
+"""Proofs of what every streaming unit shares: offered outputs, registers, buffers, pixel counters."""
+
+import itertools
+
+import pytest
+from amaranth.hdl import Cat, Module, Mux, Signal, unsigned
+from amaranth.lib import stream, wiring
+from amaranth.lib.wiring import In, Out
+
+import hdl.stream
+from hdl.stream import PipelinedUnit, connect_buffered, connect_registered
+
+from .prover import Harness
+from .rules import answers, follows, stays, taken
+
+pytestmark = pytest.mark.prove
+
+TAG = unsigned(2)
+
+
+class Delay(PipelinedUnit):
+    """A tag through registers, one a clock of latency."""
+
+    def __init__(self, latency, initiation_interval=1):
+        super().__init__(TAG, TAG, latency=latency, initiation_interval=initiation_interval)
+
+    def datapath(self, m, operands):
+        stages = self.latency
+        if self.initiation_interval > 1:
+            # Read as late as the operand stands.
+            age = min(self.initiation_interval, self.latency - 1)
+            if age:
+                operands = self.register(m, operands, "late", when=self.at(age))
+            stages -= age + 1
+        for stage in range(stages):
+            operands = self.register(m, operands, f"stage_{stage}")
+        return operands
+
+
+class Chain(wiring.Component):
+    """Streams in a row, connected by a function of the module, the number, and both streams."""
+
+    def __init__(self, connect, count=1):
+        self.connect, self.count = connect, count
+        super().__init__({"i": In(stream.Signature(TAG)), "o": Out(stream.Signature(TAG))})
+
+    def elaborate(self, platform):
+        m = Module()
+        between = [stream.Signature(TAG).create(path=(str(k),)) for k in range(self.count - 1)]
+        streams = [wiring.flipped(self.i), *between, wiring.flipped(self.o)]
+        for number, (source, sink) in enumerate(itertools.pairwise(streams)):
+            self.connect(m, number, source, sink)
+        return m
+
+
+def registered(m, number, source, sink):
+    connect_registered(m, source, sink)
+
+
+def buffered(depth):
+    return lambda m, number, source, sink: connect_buffered(m, f"buffer_{number}", source, sink, depth)
+
+
+def equal(came, leaves):
+    return came == leaves
+
+
+def of_stream(unit, capacity, latency, distance):
+    """What is claimed of every stream: a beat leaves in ``latency`` clocks, one is taken in ``distance``."""
+    h = Harness(unit)
+    stays(h, unit.o)
+    inside = follows(h, unit.i, unit.o, capacity, equal)
+    answers(h, inside.any(), taken(unit.o), latency, unit.o.ready)
+    answers(h, unit.i.valid, unit.i.ready, distance, unit.o.ready)
+    return h
+
+
+TIMINGS = [(1, 1), (2, 1), (4, 1), (1, 2), (2, 2), (5, 2), (3, 4), (9, 4), (10, 7)]
+
+
+def of_delay(latency, interval):
+    """The claims of a stream, and those of the turns."""
+    unit = Delay(latency, interval)
+    h = of_stream(unit, -(-latency // interval) + 1, latency - 1, interval)
+    m, ages, came = h.m, Signal(latency), Signal()
+    stands, turn = Signal(), Signal(range(interval))
+    m.d.sync += [
+        stands.eq(unit.o.valid & ~unit.o.ready),
+        ages.eq(unit._ages),
+        came.eq(taken(unit.i)),
+    ]
+    stood = Signal()
+    m.d.sync += stood.eq(stands)
+    h.claim(unit._ages == Mux(stood, ages, Cat(came, ages)[:latency]))
+    # Enabled clocks since the last beat was taken, modulo the interval.
+    with m.If(taken(unit.i)):
+        m.d.sync += turn.eq(1 % interval)
+    with m.Elif(~stands):
+        m.d.sync += turn.eq(Mux(turn == interval - 1, 0, turn + 1))
+    h.claim(~(taken(unit.i) & unit._ages[:-1].any()) | (turn == 0))
+    return h
+
+
+@pytest.mark.parametrize(("latency", "interval"), TIMINGS)
+def test_pipelined_unit(prove, latency, interval):
+    """Inductive: stable, in order, none lost or invented, capacity, no deadlock, turns.
+
+    A unit holds a beat for each interval of its latency, and one that waits. While the output is ready, a
+    beat that is inside leaves ``latency`` clocks later at most, and one that is offered is taken after
+    ``initiation_interval`` clocks at most. All ages move on every clock but one after a clock on which a beat
+    was not taken; while a beat is inside, the next comes a whole multiple of the interval of such clocks on.
+    """
+    prove(of_delay(latency, interval))
+
+
+def of_registers(count):
+    """Two beats inside each, one clock through it; a clock for its ready to come back through it, too."""
+    return of_stream(Chain(registered, count), 2 * count, count - 1, count)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_registers(prove, count):
+    """Inductive, for so many in a row: the claims of a stream."""
+    prove(of_registers(count))
+
+
+@pytest.mark.parametrize("depth", [3, 4, 6])
+def test_buffer(prove, depth):
+    """Inductive: the claims of a stream; ``depth`` beats inside, two clocks through."""
+    prove(of_stream(Chain(buffered(depth)), depth, 1, 1))
+
+
+OFFER_BUGS = {
+    "drops what it holds": ("Mux(held, spare, Value.cast(payload))", "payload"),
+    "moves while it holds": ("return ~held", "return Value.cast(1)"),
+    "forgets that it holds": ("held | valid", "valid"),
+    "takes in while it holds": ("m.If(~held)", "m.If(1)"),
+    "holds what was taken": ("output.valid & ~output.ready", "output.valid"),
+    "holds through a reset": ('name="held"', 'name="held", reset_less=True'),
+}
+
+
+@pytest.mark.parametrize("bug", OFFER_BUGS)
+@pytest.mark.parametrize("make", [lambda: of_delay(2, 1), lambda: of_registers(2)])
+def test_bugs_of_an_offered_output_are_found(refute, plant, make, bug):
+    """Planted in `hdl.stream.offer`, each refutes the claims of a stream."""
+    plant(hdl.stream, "offer", *OFFER_BUGS[bug])
+    refute(make())
+
+
+UNIT_BUGS = {
+    "an age is lost": (
+        (4, 1),
+        "elaborate",
+        "Cat(accept, self._ages[:-1])",
+        "Cat(accept, self._ages[:-1]) & ~4",
+    ),
+    "the control moves while the data stands": ((4, 1), "elaborate", "m.If(advance)", "m.If(1)"),
+    "the data moves while it should stand": (
+        (4, 1),
+        "elaborate",
+        "Inserter(advance)",
+        "Inserter(Value.cast(1))",
+    ),
+    "any operand is taken in": ((10, 4), "elaborate", "when=self.i.ready", "when=Value.cast(1)"),
+    "the turn is a clock short": ((10, 4), "_turn", "self.initiation_interval - 1", "2"),
+    "the turn goes on": ((10, 4), "_turn", "opens, turn == 0", "opens, opens"),
+    "ready while it stands": ((10, 4), "_turn", "~waits & ", ""),
+}
+
+
+@pytest.mark.parametrize("bug", UNIT_BUGS)
+def test_bugs_of_a_pipelined_unit_are_found(refute, plant, bug):
+    """Planted in `PipelinedUnit`, each refutes the claims of a stream or those of the turns."""
+    timing, *change = UNIT_BUGS[bug]
+    plant(PipelinedUnit, *change)
+    refute(of_delay(*timing))
+
+
+def of_counter():
+    """A span of up to 7 pixels begins at any time that is allowed; a model counts those that are left."""
+    h = Harness()
+    length, valid, advance = h.free(3, "length"), h.free(name="valid"), h.free(name="advance")
+    active, ends = hdl.stream.count_down(h.m, valid, length, advance)
+    left = Signal(3)
+    with h.m.If(valid & advance & (left <= 1)):
+        h.m.d.sync += left.eq(length)
+    with h.m.Elif(advance & left.any()):
+        h.m.d.sync += left.eq(left - 1)
+    h.claim((active == left.any()) & (ends == (left <= 1)))
+    return h
+
+
+def test_pixel_counter(prove):
+    """Inductive, lengths 0 to 7: active and ends are those of a model that counts, whatever the stalls."""
+    prove(of_counter())
+
+
+COUNTER_BUGS = {
+    "a span of no pixels ends never": ("length <= 1", "length == 1"),
+    "a span of no pixels has one": ("length != 0", "1"),
+    "it counts while it stands": ("m.If(advance)", "m.If(1)"),
+    "it ends a pixel early": ("remaining == 2", "remaining == 3"),
+    "it never stops": ("active.eq(valid & (length != 0))", "active.eq(active | valid)"),
+}
+
+
+@pytest.mark.parametrize("bug", COUNTER_BUGS)
+def test_bugs_of_a_pixel_counter_are_found(refute, plant, bug):
+    plant(hdl.stream, "count_down", *COUNTER_BUGS[bug])
+    refute(of_counter())

@@ -1,0 +1,212 @@
+# amaranth: UnusedElaboratable=no
+"""Proofs about every streaming unit: what is offered stays, beats are as many as came, none is stuck."""
+
+from functools import partial
+
+import pytest
+from amaranth.hdl import Cat, Mux, Signal
+
+import hdl.stream
+from golden.angular_interpolator import AngularInterpolator
+from golden.bisection_interpolator import BisectionInterpolator
+from golden.chord_interpolator import ChordInterpolator
+from golden.linear_interpolator import LinearInterpolator
+from golden.local_chord_interpolator import LocalChordInterpolator
+from golden.pipeline import ShadingPipeline
+from golden.quadratic_evaluator import QuadraticEvaluator
+from golden.quadratic_interpolator import QuadraticInterpolator
+from golden.recurrence import Recurrence
+from golden.recurrence_interpolator import RecurrenceInterpolator
+from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
+from hdl.angular_interpolator import AngularInterpolatorUnit
+from hdl.angular_setup import AngularSetupUnit
+from hdl.arccos import ArccosUnit, HalfChordUnit
+from hdl.bisection import BisectionUnit
+from hdl.bisection_chain import BisectionChainUnit
+from hdl.bisection_interpolator import BisectionInterpolatorUnit
+from hdl.chord import ChordUnit
+from hdl.chord_interpolator import ChordAccumulatorUnit, ChordInterpolatorUnit
+from hdl.chord_setup import ChordSetupUnit
+from hdl.difference_accumulator import DifferenceAccumulatorUnit
+from hdl.difference_setup import DifferenceSetupUnit
+from hdl.diffuse import DiffuseUnit
+from hdl.dot_product import DotProductUnit
+from hdl.gpq import GPQUnit
+from hdl.highlight_cosine import HighlightCosineUnit
+from hdl.highlight_gate import HighlightGateUnit
+from hdl.intensity import IntensityUnit
+from hdl.interpolator import LightProductsUnit
+from hdl.light import LightUnit
+from hdl.linear_interpolator import LinearInterpolatorUnit
+from hdl.local_chord_interpolator import LocalChordInterpolatorUnit
+from hdl.local_chord_setup import LocalChordSetupUnit
+from hdl.middle_normal import MiddleNormalUnit
+from hdl.pipeline import ShadingPipelineUnit
+from hdl.power import PowerUnit
+from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
+from hdl.quadratic_interpolator import QuadraticInterpolatorUnit
+from hdl.recurrence import RecurrenceUnit
+from hdl.recurrence_interpolator import RecurrenceInterpolatorUnit
+from hdl.recurrence_setup import RecurrenceSetupUnit
+from hdl.renormaliser import RenormaliserUnit
+from hdl.specular import SpecularUnit
+from hdl.stream import PipelinedUnit
+
+from .prover import Harness
+from .rules import answers, stays, taken
+
+pytestmark = pytest.mark.prove
+
+PIPELINED = {
+    "angular_setup": partial(AngularSetupUnit, initiation_interval=4),
+    "arccos": ArccosUnit,
+    "arccos-sequential": partial(ArccosUnit, form="sequential"),
+    "half_chord": HalfChordUnit,
+    "bisection": BisectionUnit,
+    "chord": ChordUnit,
+    "chord_setup": ChordSetupUnit,
+    "difference_setup": DifferenceSetupUnit,
+    "diffuse": DiffuseUnit,
+    "dot_product": DotProductUnit,
+    "gpq": GPQUnit,
+    "highlight_gate": HighlightGateUnit,
+    "intensity": IntensityUnit,
+    "light_products": partial(LightProductsUnit, LinearInterpolator(), 1, True, 3),
+    "local_chord_setup": LocalChordSetupUnit,
+    "middle_normal": MiddleNormalUnit,
+    "power": PowerUnit,
+    "power-sequential": partial(PowerUnit, form="sequential"),
+    "recurrence_setup": RecurrenceSetupUnit,
+    "renormaliser": RenormaliserUnit,
+    "specular": SpecularUnit,
+    "specular-3": partial(SpecularUnit, initiation_interval=3),
+}
+
+OTHERS = {
+    "adaptive_normaliser": AdaptiveNormaliserUnit,
+    "angular": partial(AngularInterpolatorUnit, AngularInterpolator(), 1),
+    "bisection_chain": BisectionChainUnit,
+    "bisection_interpolator": partial(BisectionInterpolatorUnit, BisectionInterpolator(), 1),
+    "chord_accumulator": partial(ChordAccumulatorUnit, 1),
+    "chord_interpolator": partial(ChordInterpolatorUnit, ChordInterpolator(), 1),
+    "difference_accumulator": DifferenceAccumulatorUnit,
+    "highlight_cosine": HighlightCosineUnit,
+    "intensity-compact": partial(IntensityUnit, style="compact"),
+    "light": LightUnit,
+    "light-3": partial(LightUnit, initiation_interval=3),
+    "linear": partial(LinearInterpolatorUnit, LinearInterpolator(), 1),
+    "local_chord_interpolator": partial(LocalChordInterpolatorUnit, LocalChordInterpolator(), 1),
+    "quadratic": partial(QuadraticInterpolatorUnit, QuadraticInterpolator(), 1),
+    "quadratic_evaluator": QuadraticEvaluatorUnit,
+    "quadratic_evaluator-horner": partial(QuadraticEvaluatorUnit, QuadraticEvaluator("horner")),
+    "recurrence": RecurrenceUnit,
+    "recurrence-direct": partial(RecurrenceUnit, Recurrence("direct")),
+    "recurrence-interleaved": partial(RecurrenceUnit, Recurrence(interleave=4)),
+    "recurrence_interpolator": partial(RecurrenceInterpolatorUnit, RecurrenceInterpolator(), 1),
+    "renormalise": partial(LinearInterpolatorUnit, LinearInterpolator(renormalised=True), 1),
+    "pipeline": ShadingPipelineUnit,
+    "pipeline-compact": partial(ShadingPipelineUnit, ShadingPipeline(method="chord"), style="compact"),
+    "pipeline-gated": partial(ShadingPipelineUnit, ShadingPipeline(method="chord", gate=True)),
+}
+UNITS = PIPELINED | OTHERS
+
+# Two chains of setup and cosine in lockstep, each with a length of its own: no invariant is found in time.
+STAYS_CLOCKS = {"angular": 50}
+
+# Products decide how often a span is divided, and products are free: there is no bound on its clocks.
+DIVIDES = {"adaptive_normaliser": 60}
+
+# Not counted: too long for the bound; their parts, and the other pipelines, are.
+COUNTED = [name for name in OTHERS if name not in ("bisection_interpolator", "pipeline-compact")]
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_what_waits_stays(prove, name):
+    """Inductive, but for `STAYS_CLOCKS`: a beat once offered stays, with its payload, until it is taken."""
+    unit = UNITS[name]()
+    harness = Harness(unit)
+    stays(harness, unit.o)
+    prove(harness, STAYS_CLOCKS.get(name))
+
+
+def of_beats(unit):
+    """A model has a place for every clock of the latency, in which each beat that comes moves on."""
+    h = Harness(unit)
+    m, waits, places = h.m, Signal(), Signal(unit.latency)
+    m.d.sync += waits.eq(unit.o.valid & ~unit.o.ready)
+    with m.If(~waits):
+        m.d.sync += places.eq(Cat(taken(unit.i), places))
+    h.claim(unit._ages == places)
+    h.claim(unit.o.valid == (waits | places[-1]))
+    h.claim(~(waits & taken(unit.i)))
+    answers(h, unit.i.valid, unit.i.ready, unit.initiation_interval, unit.o.ready)
+    return h
+
+
+@pytest.mark.parametrize("name", PIPELINED)
+def test_beats_of_a_pipelined_unit(prove, name):
+    """Inductive: each beat that comes leaves ``latency`` clocks after, not counting those on which it stands.
+
+    It stands on those alone that follow one on which a beat was not taken. So none is lost or invented, and
+    all leave in order. While the output is ready, one is taken in ``initiation_interval`` clocks.
+    """
+    prove(of_beats(PIPELINED[name]()))
+
+
+def of_counts(unit, latency=None):
+    """Pixels are counted where spans come, of 3 at most, else beats; without a latency nothing is due."""
+    h = Harness(unit)
+    length = 1
+    if "length" in getattr(unit.i.payload.shape(), "members", {}):
+        length = unit.i.payload.length
+        h.assume(length <= 3)
+    owed = Signal(10)
+    h.m.d.sync += owed.eq(owed + Mux(taken(unit.i), length, 0) - taken(unit.o))
+    h.claim(~taken(unit.o) | owed.any())
+    if latency is not None:
+        answers(h, owed.any(), taken(unit.o), latency, unit.o.ready)
+    return h
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_pixels_of_other_units(prove, name):
+    """In 8 clocks more than the latency: what leaves has come; as long as a pixel is to come and the output
+    is ready, one leaves in as many clocks as the latency, but for `DIVIDES`. A chain has one level."""
+    unit = OTHERS[name]()
+    if name in DIVIDES:
+        prove(of_counts(unit), DIVIDES[name])
+        return
+    is_chain = isinstance(unit, BisectionChainUnit)
+    latency = unit.latency(1) if is_chain else unit.latency
+    harness = of_counts(unit, latency)
+    if is_chain:
+        harness.assume(unit.i.payload.level == 1)
+    prove(harness, latency + 8)
+
+
+BUGS = {
+    "an age is lost": ("elaborate", "Cat(accept, self._ages[:-1])", "Cat(accept, self._ages[:-1]) & ~4"),
+    "the control moves while it stands": ("elaborate", "m.If(advance)", "m.If(1)"),
+}
+
+
+@pytest.mark.parametrize("bug", BUGS)
+@pytest.mark.parametrize("name", ["chord", "specular-3"])
+def test_bugs_of_pipelined_units_are_found(refute, plant, name, bug):
+    """Planted in `PipelinedUnit`, each refutes the claims on the beats of a unit."""
+    plant(PipelinedUnit, *BUGS[bug])
+    refute(of_beats(PIPELINED[name]()))
+
+
+def test_bug_of_an_offered_output_is_found(refute, plant):
+    """A payload that is dropped while it waits, planted in `hdl.stream.offer`: of a pipelined unit."""
+    plant(hdl.stream, "offer", "Mux(held, spare, Value.cast(payload))", "payload")
+    harness = Harness(unit := DotProductUnit())
+    stays(harness, unit.o)
+    refute(harness, 10)
+
+
+def test_bug_of_a_counter_is_found(refute, plant):
+    """A pixel too many, planted in the recurrence unit's counter."""
+    plant(RecurrenceUnit, "elaborate", "span.length - 1", "span.length")
+    refute(of_counts(RecurrenceUnit(), 3), 16)
