@@ -128,9 +128,9 @@ class ShadingPipelineUnit(wiring.Component):
     what a pipeline may do without.
 
     The first pixel of a span leaves `latency` clocks after an idle pipeline has taken it. Without stalls each
-    span then takes at most ``max(clocks_per_pixel length, setup_interval)`` clocks; three spans are held
-    ready, so that a long one pays for short ones after it. (``bisection`` takes longer where it divides
-    spans.) A span of length 0 is taken like any other and gives nothing.
+    span then takes at most ``max(clocks_per_pixel length, setup_interval)`` clocks; two spans are held
+    ready, so that a long one pays for short ones after it, but for a clock. (``bisection`` takes longer where
+    it divides spans.) A span of length 0 is taken like any other and gives nothing.
 
     With a gate a highlight gate looks at each span beside the interpolator, and tells the light units which
     spans hold no highlight: their specular units stand still, or are passed by in the compact style. It takes

@@ -86,7 +86,8 @@ def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, seconds, missed)
     """The spans, the pixels expected of them, the table and the exit status, without the runs."""
     asked = {}
 
-    def measured(gate, beats, **others):
+    def measured(unit, beats, **others):
+        gate = unit.gate
         assert others["rival"] is not gate
         if gate:
             assert others["expected"] is asked["expected"]
@@ -96,7 +97,8 @@ def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, seconds, missed)
 
     monkeypatch.setattr(bench.engines, "measure", measured)
     # Amaranth complains of components that are made and not used.
-    monkeypatch.setattr(bench.engines, "ShadingPipelineUnit", lambda design: design.gate)
+    monkeypatch.setattr(bench.engines, "ShadingPipelineUnit", lambda design: design)
+    monkeypatch.setattr(bench.engines, "beats_of", lambda design, spans: vars(spans))
     monkeypatch.setattr(bench.engines, "picture_seconds", lambda: seconds)
     assert main(1000, 750) == (0 if missed is None else 1)
     lines = capsys.readouterr().out.splitlines()

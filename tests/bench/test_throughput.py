@@ -39,7 +39,7 @@ def test_clocks_are_those_of_the_arithmetic(method, interval, monkeypatch):
 
     monkeypatch.setattr(throughput, "simulate", simulated)
     lengths = np.repeat([20, 1, 9, 3, interval], 30)
-    # A long span pays for a short one after it, while the FIFO holds them ready.
+    # A long span pays for a short one after it, but for a clock.
     lengths = np.append(lengths, [1, 2 * interval - 1] * 8)
     unit = ShadingPipelineUnit(ShadingPipeline(method), interval)
     pixels, total = measure(unit, spans(lengths), CONSTANTS, engine="pysim")
@@ -50,7 +50,7 @@ def test_clocks_are_those_of_the_arithmetic(method, interval, monkeypatch):
     for group in range(5):
         last = ends[30 * group + 25 : 30 * group + 30]
         assert np.diff(last).tolist() == [max(lengths[30 * group], interval)] * 4
-    assert np.diff(ends[-7::2]).tolist() == [2 * interval] * 3
+    assert np.diff(ends[-7::2]).tolist() == [2 * interval + 1] * 3
 
 
 def test_no_spans_take_no_clock():
