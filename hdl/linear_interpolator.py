@@ -11,7 +11,7 @@ from .difference_setup import DifferenceSetupUnit
 from .interpolator import NormalInterpolatorUnit
 from .middle_normal import normal_shape
 from .renormaliser import RenormaliserUnit
-from .stream import connect, connect_registered, offer
+from .stream import REGISTER_LATENCY, connect, connect_registered, offer
 
 __all__ = ["LinearInterpolatorUnit"]
 
@@ -56,7 +56,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
         if parameters.renormalised:
             self._renormaliser = RenormaliserUnit()
             units.append(self._renormaliser)
-        self.latency = sum(unit.latency for unit in units) + 1 + self.product_latency
+        self.latency = sum(unit.latency for unit in units) + REGISTER_LATENCY + self.product_latency
 
     def source(self, m):
         """Difference, its share a pixel, the sums."""

@@ -10,7 +10,7 @@ from golden.local_chord_interpolator import LocalChordInterpolator
 from .chord_interpolator import ChordAccumulatorUnit
 from .interpolator import operands_shape
 from .local_chord_setup import LocalChordSetupUnit, span_values_shape
-from .stream import connect, connect_registered
+from .stream import REGISTER_LATENCY, connect, connect_registered
 
 __all__ = ["LocalChordInterpolatorUnit"]
 
@@ -73,7 +73,7 @@ class LocalChordInterpolatorUnit(wiring.Component):
         self.length_bits = length_bits
         self._setup = LocalChordSetupUnit(lights, setup_interval, length_bits, highlights)
         self._accumulator = ChordAccumulatorUnit(lights, highlights)
-        self.latency = self._setup.latency + 1 + self._accumulator.latency
+        self.latency = self._setup.latency + REGISTER_LATENCY + self._accumulator.latency
         super().__init__(
             {
                 "i": In(stream.Signature(span_values_shape(lights, highlights, length_bits))),

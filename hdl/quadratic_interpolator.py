@@ -11,7 +11,7 @@ from .gpq import GPQUnit
 from .interpolator import NormalInterpolatorUnit
 from .middle_normal import MiddleNormalUnit
 from .quadratic_evaluator import QuadraticEvaluatorUnit
-from .stream import connect_registered
+from .stream import REGISTER_LATENCY, connect_registered
 
 __all__ = ["QuadraticInterpolatorUnit"]
 
@@ -60,7 +60,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
             )
             self._accumulator = DifferenceAccumulatorUnit()
             self.setup_interval = setup_interval
-            after = self._setup.latency + 1 + self._accumulator.latency
+            after = self._setup.latency + REGISTER_LATENCY + self._accumulator.latency
         else:
             self._evaluator = QuadraticEvaluatorUnit(QuadraticEvaluator(parameters.form))
             # A pixel comes every two clocks, on which an interval of 7 does not end.

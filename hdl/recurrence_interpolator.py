@@ -9,7 +9,7 @@ from .fixed import FixedValue
 from .interpolator import InterpolatorUnit, span_words
 from .recurrence import RecurrenceUnit
 from .recurrence_setup import RecurrenceSetupUnit
-from .stream import connect_registered
+from .stream import REGISTER_LATENCY, connect_registered
 
 __all__ = ["RecurrenceInterpolatorUnit"]
 
@@ -47,7 +47,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
         self._setup = RecurrenceSetupUnit(parameters.setup, lights, setup_interval)
         self._recurrences = [RecurrenceUnit(parameters.setup.recurrence) for _ in range(lights)]
         unit = self._recurrences[0]
-        self.latency = self._setup.latency + 1 + unit.latency
+        self.latency = self._setup.latency + REGISTER_LATENCY + unit.latency
 
     def elaborate(self, platform):
         """Registers between the two hold spans ready, so that a long one pays for short ones after it."""

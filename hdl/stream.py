@@ -8,6 +8,7 @@ from .fixed import FixedShape
 
 __all__ = [
     "BUFFER_LATENCY",
+    "REGISTER_LATENCY",
     "PipelinedUnit",
     "connect",
     "connect_buffered",
@@ -19,6 +20,9 @@ __all__ = [
 
 BUFFER_LATENCY = 2
 """Clocks that a payload takes through an empty buffer."""
+
+REGISTER_LATENCY = 1
+"""Clocks that a payload takes through the register of `connect_registered`."""
 
 
 def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> None:
@@ -150,7 +154,7 @@ def offer(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueL
 
 
 def connect_registered(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
-    """Connect two streams through a register, for a clock of latency; the source's ready is one, too.
+    """Connect two streams through a register, which takes `REGISTER_LATENCY`; the source's ready is one, too.
 
     Parameters
     ----------

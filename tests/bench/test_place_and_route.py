@@ -20,7 +20,7 @@ def lay_out(name, component, seeds):
 def found_tools(monkeypatch):
     """As if the tools were there; no hardware is built, which would warn that nothing uses it."""
     monkeypatch.setattr(place_and_route, "ShadingPipelineUnit", lambda design: design)
-    monkeypatch.setattr(place_and_route, "_tool_versions", lambda: TOOLS)
+    monkeypatch.setattr(place_and_route, "tool_versions", lambda: TOOLS)
 
 
 def test_every_method_has_a_line(found_tools, monkeypatch):
@@ -57,14 +57,15 @@ def test_a_design_that_fails_says_so(found_tools, monkeypatch, error):
 
 
 def test_missing_tools_are_named(monkeypatch):
-    monkeypatch.setattr(place_and_route, "_TOOLS", ("blysk", "no-such-tool"))
+    versions = {"blysk": "1", "no-such-tool": None}
+    monkeypatch.setattr(place_and_route, "tool_versions", lambda: versions)
     todo = tasks(False)
     found = section(todo, [{"reason": "none"}] * len(todo))
     assert "no-such-tool not installed" in found.text[0]
     assert "blysk[fpga]" in found.text[0]
     assert found.parts == []
     # Measured again when they are there.
-    monkeypatch.setattr(place_and_route, "_TOOLS", ("blysk",))
+    monkeypatch.setattr(place_and_route, "tool_versions", lambda: {"blysk": "1"})
     assert tasks(False)[0].key != todo[0].key
 
 

@@ -15,6 +15,7 @@ from golden.frame_constants import (
     MATERIAL_ADDRESS,
     MAX_MATERIALS,
     FrameConstants,
+    writes_of,
 )
 from golden.geometry import normalise
 from golden.intensity import Intensity
@@ -219,14 +220,6 @@ def random_materials(rng, lights, materials):
         )
         for index in range(materials)
     ]
-
-
-def writes_of(constants):
-    """Beats for one material, or for each of several."""
-    if len(constants) == 1:
-        return constants[0].writes()
-    writes = [of_material.writes(index) for index, of_material in enumerate(constants)]
-    return {name: np.concatenate([beats[name] for beats in writes]) for name in writes[0]}
 
 
 class Driver:

@@ -23,6 +23,7 @@ from hdl.cost import cost_of
 from hdl.pipeline import INTERPOLATORS, STYLES, ShadingPipelineUnit
 from sim.beats import dtype_of, pack, unpack
 from sim.engine import simulate
+from sim.frame import beats_of
 
 FROM_NORMALS = [method for method in METHODS if method != "chord-local"]
 
@@ -52,10 +53,6 @@ def make_constants(rng, lights, exponent=20, brightness=1.0):
     )
 
 
-def beats_of(spans, unit):
-    return {name: getattr(spans, name) for name in unit.i.payload.shape().members}
-
-
 def assert_pixels(run, pixels):
     np.testing.assert_array_equal(run.beats["x"], pixels.x)
     np.testing.assert_array_equal(run.beats["y"], pixels.y)
@@ -66,7 +63,7 @@ def assert_pixels(run, pixels):
 
 def run(unit, spans, constants, pixels, **options):
     options.setdefault("engine", "auto")
-    return simulate(unit, beats_of(spans, unit), count=len(pixels.x), write=constants.writes(), **options)
+    return simulate(unit, beats_of(unit, spans), count=len(pixels.x), write=constants.writes(), **options)
 
 
 def run_under_stalls(rng, unit, spans, constants, pixels):
@@ -458,7 +455,7 @@ def test_reset_in_mid_span(method, normal_pairs):
     others = make_spans(rng, rng.integers(1, 30, 40), normal_pairs, 60)
     constants = make_constants(rng, 1)
     pixels = design.compute(spans, constants)
-    codes, other_codes = (words(driver.shapes["i"], beats_of(s, unit)) for s in (spans, others))
+    codes, other_codes = (words(driver.shapes["i"], beats_of(unit, s)) for s in (spans, others))
     writes = words(driver.shapes["write"], constants.writes())
     runs = []
 
@@ -495,7 +492,7 @@ def test_constants_never_change_under_a_span(method, normal_pairs):
     expected = [
         design.compute(spans, constants) for spans, constants in zip((before, after), frames, strict=True)
     ]
-    codes = [words(driver.shapes["i"], beats_of(s, unit)) for s in (before, after)]
+    codes = [words(driver.shapes["i"], beats_of(unit, s)) for s in (before, after)]
     writes = [words(driver.shapes["write"], constants.writes()) for constants in frames]
     found = []
 
@@ -768,7 +765,7 @@ def test_without_lights_there_is_ambient_light(materials, normal_pairs, never_bu
     constants = [make_constants(rng, 0) for _ in range(materials)]
     result = simulate(
         unit,
-        beats_of(spans, unit),
+        beats_of(unit, spans),
         count=int(spans.length.sum()),
         write={
             name: np.concatenate(
