@@ -4,11 +4,9 @@
 float64 mathematics, times from the units or a simulation of them, parts from their netlists.
 """
 
-import multiprocessing
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -79,9 +77,11 @@ from hdl.recurrence_setup import RecurrenceSetupUnit
 from hdl.renormaliser import RenormaliserUnit
 from hdl.specular import SpecularUnit
 from sim.beats import dtype_of
+from sim.cli import OutputFile
 from sim.engine import simulate
 from sim.errors import InputError
 from sim.output import check_writable, write_json
+from sim.workers import local_executor
 
 __all__ = [
     "BLOCKS",
@@ -1339,15 +1339,10 @@ def rows(
         for block in blocks:
             yield _row(block, samples, seed)
         return
-    # Workers that start afresh: a fork would copy the threads of a progress bar.
-    with ProcessPoolExecutor(min(jobs, len(blocks)), multiprocessing.get_context("spawn")) as pool:
+    with local_executor(min(jobs, len(blocks))) as pool:
         waiting = [pool.submit(_row, block, samples, seed) for block in blocks]
-        try:
-            for block, row in zip(blocks, waiting, strict=True):
-                yield replace(row.result(), block=block)
-        finally:
-            for row in waiting:
-                row.cancel()
+        for block, row in zip(blocks, waiting, strict=True):
+            yield replace(row.result(), block=block)
 
 
 def _row(block: Block, samples: int, seed: int) -> Row:
@@ -1467,7 +1462,7 @@ class _Count(click.ParamType):
     show_default="number of cores, 4 at most",
     help="Processes, of a quarter of a GB each.",
 )
-@click.option("--json", "figures", type=click.Path(), help="Every figure, with domains and notes.")
+@click.option("--json", "figures", type=OutputFile(), help="Every figure, with domains and notes.")
 def command(samples, seed, jobs, figures):
     """Measure every device and variant, and print a table.
 

@@ -40,7 +40,7 @@ from golden.specular import MAX_EXPONENT
 from hdl.cost import cost_of
 from hdl.pipeline import STYLES, ShadingPipelineUnit
 from sim.animation import turned
-from sim.cli import Choice, Size, Whole
+from sim.cli import Choice, OutputFile, Size, Whole
 from sim.errors import InputError
 from sim.frame import compare, twin_frame
 from sim.output import check_writable, write_json
@@ -646,7 +646,7 @@ _USUAL = Sweep()
 @click.option(
     "--cluster", "address", metavar="ADDRESS", help="Dask scheduler whose workers measure: tcp://host:8786."
 )
-@click.option("--json", "figures", type=click.Path(), help="Every design, with every figure.")
+@click.option("--json", "figures", type=OutputFile(), help="Every design, with every figure.")
 def command(mesh, exponent, size, largest, error, cost, highlights, limit, jobs, address, figures, **choices):
     """Draw a scene with every design of a sweep, and list the cheapest under an error.
 

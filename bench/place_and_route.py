@@ -1,4 +1,4 @@
-"""The report's section on place and route: parts and clock rate of the pipeline of every method."""
+"""The report's section on place and route: parts and clock rate of the pipeline, a table a family."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,13 +7,18 @@ from golden.pipeline import METHODS, ShadingPipeline
 from hdl.pipeline import ShadingPipelineUnit
 from sim.errors import InputError
 
-from .fpga import DEVICE, SEEDS, ToolError, lay_out, tool_versions
+from .fpga import ECP5, FAMILIES, SEEDS, ToolError, lay_out, tool_versions
 from .section import Cell, Section, Table
 from .store import Task
 
 __all__ = ["measure", "section", "tasks"]
 
 MODEL = "cosquad"
+
+OTHERS = ("quadratic", "chord")
+"""Methods for the families after the first."""
+
+OTHERS_SEEDS = 3
 
 _FIGURES = {
     "look-up tables": "luts",
@@ -27,38 +32,56 @@ _FIGURES = {
 }
 
 
-def measure(method: str, model: str, seeds: int, tools: dict[str, str | None]) -> dict[str, Any]:
+def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, str | None]) -> dict[str, Any]:
     """Layout of a pipeline with one light: `bench.fpga.Layout.as_dict`, or a ``reason`` why there is none.
 
     Parameters
     ----------
     method, model : str
         The design.
+    family : str
+        Of `bench.fpga.FAMILIES`.
     seeds : int
         Placements.
     tools : dict of str to str or None
         Versions of the tools, which the result depends on.
     """
+    design = ShadingPipelineUnit(ShadingPipeline(method, model))
     try:
-        return lay_out(method, ShadingPipelineUnit(ShadingPipeline(method, model)), seeds).as_dict()
+        return lay_out(method, design, seeds, family=FAMILIES[family]).as_dict()
     except (InputError, ToolError) as error:
         return {"reason": str(error)}
 
 
 def tasks(quick: bool) -> list[Task]:
-    """A task a method, of minutes each.
+    """A task a method and family, of minutes each: every method for one family, some for the others.
 
     Parameters
     ----------
     quick : bool
         None.
     """
-    settings = {"model": MODEL, "seeds": SEEDS, "tools": tool_versions()}
-    return [] if quick else [Task(measure, {"method": method, **settings}) for method in METHODS]
+    if quick:
+        return []
+    return [
+        Task(
+            measure,
+            {
+                "method": method,
+                "model": MODEL,
+                "family": name,
+                "seeds": seeds,
+                "tools": tool_versions(family),
+            },
+        )
+        for name, family in FAMILIES.items()
+        for methods, seeds in [(METHODS, SEEDS) if family is ECP5 else (OTHERS, OTHERS_SEEDS)]
+        for method in methods
+    ]
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """A table of the methods, or why there is none.
+    """A table a family, or why there is none.
 
     Parameters
     ----------
@@ -70,30 +93,47 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     name, title = "place-and-route", "Place and route"
     if not tasks:
         return Section(name, title, ["Left out of a quick report; `blysk fpga` does it alone."], [])
-    versions = tasks[0].settings["tools"]
+    text = [
+        f"The pipeline, {MODEL}, one light, three channels, out of context. Placement starts from a seed; "
+        "clock rates are over some of them. At one pixel a clock, 1920x1080 pixels 60 times a second ask for "
+        f"{1920 * 1080 * 60 / 1e6:.0f} MHz."
+    ]
+    tables = []
+    for family in FAMILIES:
+        of_family = [
+            (task.settings, result)
+            for task, result in zip(tasks, results, strict=True)
+            if task.settings["family"] == family
+        ]
+        said, table = _table(family, of_family)
+        text.append(said)
+        tables += [table] if table else []
+    return Section(name, title, text, tables)
+
+
+def _table(family: str, results: Sequence[tuple[dict[str, Any], Any]]) -> tuple[str, Table | None]:
+    """What is to say of a family, and its table; results are pairs of settings and figures."""
+    device = FAMILIES[family].device
+    settings = results[0][0]
+    versions = settings["tools"]
     missing = [package for package, version in versions.items() if version is None]
     if missing:
-        text = (
-            f"Not measured: {' and '.join(missing)} not installed. `pip install 'blysk[fpga]'` brings what "
-            "is needed; the next report then has the table."
-        )
-        return Section(name, title, [text], [])
+        return (
+            f"{device}: not measured, {' and '.join(missing)} not installed. `pip install 'blysk[fpga]'` "
+            "brings what is needed; the next report then has the table."
+        ), None
     rows: list[tuple[Cell, ...]] = [
-        (task.settings["method"], *(result.get(key) for key in _FIGURES.values()), result.get("reason", ""))
-        for task, result in zip(tasks, results, strict=True)
+        (settings["method"], *(result.get(key) for key in _FIGURES.values()), result.get("reason", ""))
+        for settings, result in results
     ]
-    text = (
-        f"The pipeline of every method, {MODEL}, one light, three channels, on an {DEVICE}, out of context, "
-        f"by {' and '.join(f'{package} {version}' for package, version in versions.items())}. Placement "
-        f"starts from a seed; clock rates are over {SEEDS} of them. At one pixel a clock, 1920x1080 pixels "
-        f"60 times a second ask for {1920 * 1080 * 60 / 1e6:.0f} MHz."
-    )
+    tools = " and ".join(f"{package} {version}" for package, version in versions.items())
     note = (
         "Look-up tables have four inputs; those that serve as carries, as memories and as wires count. "
-        "Multipliers have 18x18 bits and are used without the registers inside them, through which the tool "
-        "does not time. Ports have a register each, which is not counted."
+        f"Multipliers have 18x18 bits. {FAMILIES[family].registers} Ports have a register each, which is not "
+        "counted."
     )
     columns = ("method", *_FIGURES, "why there is no figure")
-    return Section(
-        name, title, [text], [Table(name, "Parts and clock rate of every method", columns, rows, note)]
+    return (
+        f"{device}: {settings['seeds']} seeds, by {tools}.",
+        Table(f"place-and-route-{family}", f"Parts and clock rate, {device}", columns, rows, note),
     )

@@ -60,6 +60,7 @@ __all__ = [
     "frames",
     "front",
     "hardware",
+    "map_colors",
     "place_of",
     "readme_table",
     "scenes_of",
@@ -412,7 +413,7 @@ def _png(picture: Image.Image, **options: Any) -> str:
     return f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}"
 
 
-def _colors() -> list[list[int]]:
+def map_colors() -> list[list[int]]:
     """Red, green and blue of each of `STEPS`."""
     from matplotlib import colormaps
 
@@ -431,7 +432,7 @@ def _pictures(image: np.ndarray, references: Mapping[str, np.ndarray], mask: np.
         error = _largest(np.abs(image - reference * 255).max(axis=-1)[shown] * mask[shown], factor)
         codes = np.where(inside, np.searchsorted(STEPS, error), len(STEPS)).astype(np.uint8)
         picture = Image.fromarray(codes).convert("P")
-        picture.putpalette(np.ravel([*_colors(), [0, 0, 0]]).tolist())
+        picture.putpalette(np.ravel([*map_colors(), [0, 0, 0]]).tolist())
         pictures[name] = _png(picture, transparency=len(STEPS), bits=4)
     return pictures
 
@@ -692,7 +693,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             "times": TIMES,
             "fronts": fronts,
             "error_map": {
-                "colors": ["#{:02x}{:02x}{:02x}".format(*color) for color in _colors()],
+                "colors": ["#{:02x}{:02x}{:02x}".format(*color) for color in map_colors()],
                 "limits": list(STEPS),
             },
         },

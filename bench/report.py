@@ -25,7 +25,7 @@ from tqdm import tqdm
 
 from sim.cli import Whole
 from sim.errors import InputError
-from sim.output import check_writable, write_json, write_text
+from sim.output import files_within, write_json, write_text
 from sim.workers import local_executor, processors
 
 from . import (
@@ -44,7 +44,18 @@ from . import (
 from .section import Cell, Section, Table
 from .store import Task, results_of, version_of
 
-__all__ = ["AXES", "SECTIONS", "about", "check_folder", "command", "page", "shown", "write_report"]
+__all__ = [
+    "AXES",
+    "SECTIONS",
+    "about",
+    "check_folder",
+    "command",
+    "embedded",
+    "environment",
+    "page",
+    "shown",
+    "write_report",
+]
 
 SECTIONS: dict[str, ModuleType] = {
     "points": points,
@@ -146,8 +157,14 @@ def _data_uri(svg: str) -> str:
     return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
 
 
-def _embedded(value: Any) -> str:
-    """JSON that may stand in a script element."""
+def embedded(value: Any) -> str:
+    """JSON that may stand in a script element.
+
+    Parameters
+    ----------
+    value
+        Of what JSON has.
+    """
     return json.dumps(value, allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
 
 
@@ -163,7 +180,14 @@ def _without_pictures(value: Any) -> Any:
 
 
 @functools.cache
-def _environment() -> Any:
+def environment() -> Any:
+    """Jinja's environment of the pages, with their filters.
+
+    Raises
+    ------
+    InputError
+        If a library of the ``report`` extra is missing.
+    """
     try:
         from jinja2 import Environment, PackageLoader, StrictUndefined
         from markdown_it import MarkdownIt
@@ -172,20 +196,20 @@ def _environment() -> Any:
         reason = f"{error.name} is not installed"
         raise InputError("bench", reason, "pip install 'blysk[report]'") from None
     markdown = MarkdownIt("commonmark", {"html": False})
-    environment = Environment(
+    found = Environment(
         loader=PackageLoader("bench"), undefined=StrictUndefined, autoescape=True, trim_blocks=True
     )
-    environment.filters |= {
+    found.filters |= {
         "markdown": lambda text: Markup(markdown.render(text)),
         "inline": lambda text: Markup(markdown.renderInline(text)),
         "shown": shown,
         "kinds": _kinds,
         "data_uri": _data_uri,
-        "embedded": lambda value: Markup(_embedded(value)),
+        "embedded": lambda value: Markup(embedded(value)),
     }
-    environment.tests["table"] = lambda part: isinstance(part, Table)
-    environment.tests["number"] = _is_number
-    return environment
+    found.tests["table"] = lambda part: isinstance(part, Table)
+    found.tests["number"] = _is_number
+    return found
 
 
 def page(sections: Sequence[Section], about: Mapping[str, Any]) -> str:
@@ -204,14 +228,14 @@ def page(sections: Sequence[Section], about: Mapping[str, Any]) -> str:
     InputError
         If a library of the ``report`` extra is missing.
     """
-    environment = _environment()
     texts = {
         name: resources.files("bench").joinpath("templates", f"report.{name}").read_text(encoding="utf-8")
         for name in ("css", "js")
     }
     (explored,) = [section for section in sections if "points" in section.figures] or (None,)
     figures = _without_pictures(explored.figures) if explored else None
-    return environment.get_template("report.html").render(
+    template = environment().get_template("report.html")
+    return template.render(
         sections=sections, about=about, explored=explored, figures=figures, axes=AXES, **texts
     )
 
@@ -291,17 +315,7 @@ def check_folder(folder: Path) -> None:
     InputError
         If it is a file, holds anything else, or may not be written.
     """
-    if not folder.exists():
-        check_writable(folder)
-        return
-    if not folder.is_dir():
-        raise InputError(str(folder), "it is a file", "give the name of a folder")
-    check_writable(folder / _PAGE)
-    try:
-        names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
-    except OSError as error:
-        reason = f"cannot be read, {error.strerror}"
-        raise InputError(str(folder), reason, "choose another folder") from error
+    names = files_within(folder, _PAGE)
     others = [name for name in names if name not in (_PAGE, _JSON) and not name.endswith(".csv")]
     if others or (names and not _earlier(folder)):
         reason = f"holds {(others or names)[0]}, which is of no report"
@@ -429,7 +443,7 @@ def command(folder, quick, meshes, names, jobs):
         blysk bench report --mesh model.obj
     """
     check_folder(folder)
-    _environment()
+    environment()
     names = [name for name in SECTIONS if name in names or not names]
     chosen = []
     for name in names:

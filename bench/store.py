@@ -18,7 +18,7 @@ import hdl
 import sim
 from sim.cxxrtl import cache_folder
 from sim.errors import InputError
-from sim.output import write_json
+from sim.output import plain, write_json
 
 __all__ = ["Task", "results_of", "version_of"]
 
@@ -102,9 +102,16 @@ def _bench(file: Path) -> str:
 
 
 def _load(path: Path) -> Any:
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-        return json.loads(path.read_text(encoding="utf-8"))["result"]
+    """The result in an entry, or ``None``: a spoilt one is as good as none."""
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
+        entry = json.loads(path.read_text(encoding="utf-8"))
+        if entry["digest"] == _digest(entry["result"]):
+            return entry["result"]
     return None
+
+
+def _digest(result: Any) -> str:
+    return hashlib.sha256(json.dumps(plain(result)).encode()).hexdigest()
 
 
 def results_of(
@@ -112,7 +119,8 @@ def results_of(
 ) -> list[Any]:
     """Results of measurements, in their order: from the cache, or measured now and kept there.
 
-    Each result is kept as soon as it is there, so that a run that was stopped goes on where it was.
+    Each result is kept as soon as it is there, so that a run that was stopped goes on where it was. An entry
+    that is not as it was written is measured again.
 
     Parameters
     ----------
@@ -126,10 +134,11 @@ def results_of(
     Raises
     ------
     Exception
-        What a measurement raises; those before it are kept, those behind it not begun.
+        What a measurement raises; those that are done are kept, those behind it not begun.
     """
     folder = cache_folder() / "results"
-    folder.mkdir(mode=0o700, exist_ok=True)
+    with contextlib.suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
     paths = [folder / f"{task.key}.json" for task in tasks]
     results = [_load(path) for path in paths]
     missing = [index for index, result in enumerate(results) if result is None]
@@ -140,8 +149,8 @@ def results_of(
         results[index] = result
         # A cache that fills up or goes away costs the next run its time, no more.
         with contextlib.suppress(InputError, OSError):
-            entry = {"task": tasks[index].name, "settings": tasks[index].settings, "result": result}
-            write_json(paths[index], entry)
+            entry = {"task": tasks[index].name, "settings": tasks[index].settings}
+            write_json(paths[index], {**entry, "digest": _digest(result), "result": result})
         progress()
 
     here = [index for index in missing if executor is None or tasks[index].timed]
@@ -150,9 +159,12 @@ def results_of(
     try:
         for done in as_completed(waiting):
             keep(waiting[done], done.result())
+            del waiting[done]
     finally:
-        for future in waiting:
-            future.cancel()
+        for future, index in waiting.items():
+            # Of those that were done together the failed one may have been the first to be looked at.
+            if not future.cancel() and future.done() and future.exception() is None:
+                keep(index, future.result())
     for index in here:
         keep(index, tasks[index].run())
     return results

@@ -36,9 +36,9 @@ class AngularSetupUnit(PipelinedUnit):
     =================== == == == == == ==
     initiation interval 1  2  3  4  5  6
     =================== == == == == == ==
-    latency             50 53 53 53 53 56
+    latency             59 60 62 67 71 64
     multipliers         26 13 9  7  6  5
-    by arccos: latency  50 53 54 53 53 57
+    by arccos: latency  59 60 63 63 66 66
     multipliers         23 13 9  8  7  6
     =================== == == == == == ==
 

@@ -186,7 +186,7 @@ class HalfChordUnit(PipelinedUnit):
     =================== == == == == == ==
     initiation interval 1  2  3  4  5  6
     =================== == == == == == ==
-    latency             20 22 22 21 22 22
+    latency             35 38 37 36 36 40
     multipliers         6  3  2  2  2  1
     =================== == == == == == ==
 

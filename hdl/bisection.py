@@ -71,7 +71,7 @@ class BisectionUnit(PipelinedUnit):
         self.parameters = parameters or Bisection()
         steps = self.parameters.steps
         interval = checked_interval(initiation_interval, steps + 6, steps + 3)
-        self._graph = Dataflow(interval, steps + 6)
+        self._graph = Dataflow(interval, steps + 6, hurries=True)
         self._words = self._describe()
         super().__init__(
             data.StructLayout({"normal_a": normal_shape(), "normal_b": normal_shape()}),
@@ -103,8 +103,8 @@ class BisectionUnit(PipelinedUnit):
         a, b = (
             g.input(name, lambda operands, name=name: operands[name]) for name in ("normal_a", "normal_b")
         )
-        one = FixedValue.constant(ONE_SQUARED.format, ONE_SQUARED.values.item())
-        difference = g.register("difference", lambda cosine: one - cosine, dot(g, "dot", a, b))
+        squared = FixedValue.constant(ONE_SQUARED.format, ONE_SQUARED.values.item())
+        difference = g.register("difference", lambda cosine: squared - cosine, dot(g, "dot", a, b))
         rounded = g.register("difference_rounded", lambda x: x.round_half_up(17), difference)
         u = g.register("u", lambda x: x.saturate(p.ANGLE_FORMAT), rounded)
         limits = [FixedValue.constant(p.ANGLE_FORMAT, w.values.item()) for w in (p.widest_narrow, p.widest)]

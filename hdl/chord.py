@@ -63,8 +63,8 @@ def chord(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]
 class ChordUnit(PipelinedUnit):
     """``u = |a - b|^2 / 2``; `golden.chord.Chord` is the bit-true twin.
 
-    The latency is 8 clocks (difference, halving, operand, product, two sums, alignment, saturation) and the
-    initiation interval 1. Three multipliers of 18x18 bits.
+    The latency is 11 clocks (difference, halving, operand, four for the product, two sums, alignment,
+    saturation) and the initiation interval 1. Three multipliers of 18x18 bits.
 
     Members
     -------

@@ -12,10 +12,23 @@ from golden.fixed import Format
 from .fixed import FixedShape, FixedValue
 from .stream import PipelinedUnit
 
-__all__ = ["MULTIPLIER_BITS", "Dataflow", "Operator", "Word", "checked_interval", "dot", "shared_sums"]
+__all__ = [
+    "MULTIPLIER_BITS",
+    "MULTIPLIER_LATENCY",
+    "Dataflow",
+    "Operator",
+    "Word",
+    "checked_interval",
+    "dot",
+    "registered_product",
+    "shared_sums",
+]
 
 MULTIPLIER_BITS = 18
 """Bits of a multiplier's signed operands."""
+
+MULTIPLIER_LATENCY = 4
+"""Clocks of `registered_product`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +98,8 @@ class Dataflow:
         Initiation interval of the unit, at least 1.
     multiplications : int
         How many there will be.
+    hurries : bool
+        Whether a product takes a single register, two clocks in all: for a unit whose results are waited for.
 
     Raises
     ------
@@ -92,7 +107,7 @@ class Dataflow:
         If the interval is less than 1.
     """
 
-    def __init__(self, interval: int, multiplications: int = 0):
+    def __init__(self, interval: int, multiplications: int = 0, *, hurries: bool = False):
         if interval < 1:
             raise ValueError(f"interval must be at least 1, not {interval}")
         self.interval = interval
@@ -102,8 +117,8 @@ class Dataflow:
             "multiplier",
             multiplications,
             (operand, operand),
-            1,
-            lambda register, a, b: register(a * b, "product"),
+            1 if hurries else MULTIPLIER_LATENCY,
+            (lambda register, a, b: register(a * b, "product")) if hurries else registered_product,
         )
 
     def _add(self, name: str, age: int, stands: int, make: Callable[["_Build"], Any]) -> Word:
@@ -208,7 +223,7 @@ class Dataflow:
         right: Callable[[Any], FixedValue] = lambda value: value,
         since: int = 0,
     ) -> Word:
-        """Exact product of two words on a shared multiplier, two clocks: operands, product.
+        """Exact product of two words on a shared multiplier, `MULTIPLIER_LATENCY` clocks after its operands'.
 
         Parameters
         ----------
@@ -283,6 +298,25 @@ class Dataflow:
         for word, make in self._makers:
             build.values[word] = {word.age: make(build)}
         return build.at
+
+
+def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> Any:
+    """Exact product, `MULTIPLIER_LATENCY` clocks: two registers for each operand, two for the product.
+
+    An FPGA's multipliers lie in few places, far from the multiplexers that operands come from and the adders
+    that products go to. Of registers in a row each wire is short wherever those are; and some go into the
+    multiplier block.
+
+    Parameters
+    ----------
+    register : callable
+        Makes a register: from a value and its name, the register.
+    a, b
+        Operands.
+    """
+    for step in range(2):
+        a, b = register(a, f"a_{step}"), register(b, f"b_{step}")
+    return register(register(a * b, "product_0"), "product")
 
 
 def shared_sums(graph: Dataflow, uses: int, product: Format) -> Operator:

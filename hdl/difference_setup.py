@@ -11,7 +11,7 @@ from golden.fixed import SQ, UQ, Fixed
 from golden.gpq import GPQ
 from golden.unit_vector import COMPONENT
 
-from .dataflow import Dataflow, Word, checked_interval
+from .dataflow import MULTIPLIER_LATENCY, Dataflow, Word, checked_interval, registered_product
 from .fixed import FixedShape, FixedValue
 from .middle_normal import normal_shape
 from .stream import PipelinedUnit
@@ -141,7 +141,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     =========== == == == == == == ==
     interval    1  2  3  4  5  6  7
     =========== == == == == == == ==
-    latency     15 17 17 19 19 17 18
+    latency     21 22 23 25 23 24 28
     multipliers 7  4  3  2  2  2  1
     =========== == == == == == == ==
 
@@ -150,7 +150,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     =========== == == == == == == ==
     interval    1  2  3  4  5  6  7
     =========== == == == == == == ==
-    latency     10 12 13 13 13 13 13
+    latency     13 15 16 16 16 16 16
     multipliers 3  2  1  1  1  1  1
     =========== == == == == == == ==
 
@@ -159,7 +159,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     =========== == == == == == == == == ==
     interval    1  2  3  4  5  6  7  8  9
     =========== == == == == == == == == ==
-    latency     18 20 19 20 23 21 20 21 27
+    latency     24 25 25 25 28 29 26 26 28
     multipliers 9  5  3  3  2  2  2  2  1
     =========== == == == == == == == == ==
 
@@ -208,7 +208,7 @@ class DifferenceSetupUnit(PipelinedUnit):
         interval = checked_interval(initiation_interval, longest, uses)
         self._graph = Dataflow(interval)
         shapes = FixedShape(DifferenceSetup.RECIPROCAL_FORMAT), FixedShape(COMPONENT), unsigned(5)
-        self._multiplier = self._graph.share("multiplier", uses, shapes, 4, _multiply)
+        self._multiplier = self._graph.share("multiplier", uses, shapes, MULTIPLIER_LATENCY + 3, _multiply)
         self._words = self._describe()
         coefficients = {
             "g": data.ArrayLayout(FixedShape(GPQ.G_FORMAT), 3),
@@ -323,7 +323,12 @@ class DifferenceSetupUnit(PipelinedUnit):
             return factor, wiring(operand), Const(0, 5)
 
         return self._graph.use(
-            self._multiplier, name, (factor, operand), operands, lambda results: results[0], latency=1
+            self._multiplier,
+            name,
+            (factor, operand),
+            operands,
+            lambda results: results[0],
+            latency=MULTIPLIER_LATENCY,
         )
 
     def _shifted(
@@ -349,7 +354,9 @@ def _twice(second: FixedValue) -> FixedValue:
 
 def _multiply(register, a: FixedValue, b: FixedValue, amount: Value) -> Sequence[FixedValue]:
     """Product; and ``4 product 2^-amount`` in two stages, rounded half up to 42 fraction bits."""
-    product, amount = register(a * b, "product"), register(amount, "amount")
+    product = registered_product(register, a, b)
+    for clock in range(MULTIPLIER_LATENCY):
+        amount = register(amount, f"amount_{clock}")
     scaled = product.scale(2).extend(SQ(3, 43))
     coarse = FixedValue(scaled.format, Value.cast(scaled) >> Cat(Const(0, 3), amount[3:]))
     coarse, fine = register(coarse, "coarse"), register(amount[:3], "fine_amount")

@@ -32,10 +32,11 @@ class IntensityUnit(PipelinedUnit):
     Formats and error are those of `golden.intensity.Intensity`, the bit-true twin. Nothing wraps: the sum
     grows by a bit at each level of the adder tree.
 
-    In the throughput style the latency is ``6 + ceil(log2(2 lights + 1))`` clocks (terms, products, two that
-    the channels are apart, adder tree, rounding, saturation) and the initiation interval is 1. The channels
-    follow each other by a clock: each multiplier has registers of its own for both its term and its product.
-    Six multipliers a light. Without specular terms there are ``lights`` in place of ``2 lights``, with one
+    In the throughput style the latency is ``9 + ceil(log2(2 lights + 1))`` clocks (terms, two for the
+    factors, two for the products, two that the channels are apart, adder tree, rounding, saturation) and the
+    initiation interval is 1. The channels follow each other by a clock: each multiplier has registers of its
+    own, two in a row for its factor and for its product, as in `hdl.dataflow.registered_product`. Six
+    multipliers a light. Without specular terms there are ``lights`` in place of ``2 lights``, with one
     channel a third of the multipliers and two clocks less.
 
     In the compact style there is one multiplier of 17 by 17 bits, and no product of a term that is 0. A pixel
@@ -89,7 +90,7 @@ class IntensityUnit(PipelinedUnit):
         super().__init__(
             data.StructLayout(dict.fromkeys(self.kinds, terms)),
             pixel_color_shape(),
-            latency=clocks + 5 if style == "compact" else 3 + channels + self._terms.bit_length(),
+            latency=clocks + 5 if style == "compact" else 6 + channels + self._terms.bit_length(),
             initiation_interval=clocks,
             constants=data.StructLayout({"ambient": color_shape(), "diffuse": colors, "specular": colors}),
         )
@@ -108,8 +109,11 @@ class IntensityUnit(PipelinedUnit):
             terms = [self.constants.ambient[channel]]
             for light in range(self.parameters.lights):
                 for kind in self.kinds:
-                    term = operands[kind][light] * self.constants[kind][light][channel]
-                    for clock in range(channel, len(channels)):
+                    factor = operands[kind][light]
+                    for step in range(2):
+                        factor = register(m, factor, f"factor_{kind}_{light}_{name}_{step}")
+                    term = factor * self.constants[kind][light][channel]
+                    for clock in range(channel, len(channels) + 1):
                         term = register(m, term, f"{kind}_{light}_{name}_{clock}")
                     terms.append(term)
             level = 0

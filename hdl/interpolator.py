@@ -113,9 +113,9 @@ class InterpolatorUnit(wiring.Component):
 class LightProductsUnit(PipelinedUnit):
     """Products of a normal with L and H of every light: ``N . L``, and ``N . H`` or the chord.
 
-    With an initiation interval of 1 the latency is 4 clocks (operands, products, two sums), with the chord 8.
-    Six products a light, three without highlights; with a longer interval they take turns at fewer
-    multipliers.
+    With an initiation interval of 1 the latency is 7 clocks (operands, four for the products, two sums), with
+    the chord 11. Six products a light, three without highlights; with a longer interval they take turns at
+    fewer multipliers.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
     =================== === === === === ===
     initiation interval 1   2   4   8   46
     =================== === === === === ===
-    latency             99  108 114 121 230
+    latency             141 144 156 172 282
     multipliers         46  23  12  6   1
     shifters            18  9   5   3   1
     =================== === === === === ===

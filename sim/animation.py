@@ -268,7 +268,8 @@ def shoot(crew: Crew, cameras: Sequence[Camera]) -> Iterator[tuple[int, Shot]]:
             if not pending:
                 return
             done, _ = wait(pending, return_when=FIRST_COMPLETED)
-            for future in done:
+            # What is finished comes before what failed beside it.
+            for future in sorted(done, key=lambda future: future.exception() is not None):
                 yield pending.pop(future), future.result()
                 del future
     finally:

@@ -4,10 +4,12 @@ import dataclasses
 import math
 import os
 import re
+import signal
 import sys
+import threading
 import warnings
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from importlib.metadata import entry_points, version
 from pathlib import Path
 from time import perf_counter
@@ -29,6 +31,7 @@ from golden.scene import BACK_FACES, LARGEST_SIDE, VIEWERS, Scene
 from golden.specular import MAX_EXPONENT
 from hdl.pipeline import INTERPOLATORS, PORT_DESCRIPTIONS, STYLES, ShadingPipelineUnit
 from hdl.verilog import emit
+from hdl.yosys import NetlistError
 from sim.animation import (
     Film,
     cluster,
@@ -40,7 +43,7 @@ from sim.animation import (
     write_gif,
 )
 from sim.engine import CompilerMissing, SimulationError
-from sim.errors import InputError
+from sim.errors import InputError, one_line
 from sim.fit import Fit, for_scene
 from sim.frame import FrameSimulator, SimulatedFrame, compare
 from sim.mesh import LoadedMesh, load_mesh, surfaces
@@ -56,9 +59,10 @@ from sim.report import (
     worst_errors,
 )
 from sim.scene_file import HIGHLIGHTS, read_scene_file
+from sim.testbench import check_folder, write_testbench
 from sim.workers import check_address, processors
 
-__all__ = ["Choice", "Settings", "Size", "Whole", "chosen_design", "design_options", "main"]
+__all__ = ["Choice", "OutputFile", "Settings", "Size", "Whole", "chosen_design", "design_options", "main"]
 
 ENGINES = ("auto", "cxxrtl", "pysim")
 
@@ -117,6 +121,16 @@ class Whole(click.ParamType):
         if not self.least <= int(value) <= self.most:
             raise InputError(f"{param.opts[0]} {value}", "out of range", remedy)
         return int(value)
+
+
+class OutputFile(click.Path):
+    """Name of a file to write; an empty one, as of a shell's variable that is not set, is none."""
+
+    def convert(self, value, param, ctx):
+        """The name."""
+        if not value:
+            raise InputError(f"{param.opts[-1]} ''", "is no file's name", "give one, or leave it out")
+        return super().convert(value, param, ctx)
 
 
 class Size(click.ParamType):
@@ -300,8 +314,7 @@ def _over_file(context: click.Context, mesh: str, options: dict) -> Settings:
         values["lights"] += tuple(Light(color=numbers[3:], position=numbers[:3]) for numbers in at)
     if "position" in values:
         options = {**options, "view": None}
-    shown = "".join(c if c.isprintable() else "?" for c in mesh)
-    origins = {name: f"{shown}, {file.keys[name]}" for name in values}
+    origins = {name: f"{mesh}, {file.keys[name]}" for name in values}
     return Settings({**options, **values, "given": given | set(file.values)}, origins)
 
 
@@ -451,11 +464,11 @@ def cli():
 @click.option(
     "-o",
     "--output",
-    type=click.Path(),
+    type=OutputFile(),
     help="Picture of the simulated frame.  [default: MESH's name, -blysk.png]",
 )
-@click.option("--compare", "comparison", type=click.Path(), help="Picture: simulated, golden, error map.")
-@click.option("--json", "figures", type=click.Path(), help="Every printed figure.")
+@click.option("--compare", "comparison", type=OutputFile(), help="Picture: simulated, golden, error map.")
+@click.option("--json", "figures", type=OutputFile(), help="Every printed figure.")
 @click.option(
     "--fit/--full",
     default=False,
@@ -468,7 +481,7 @@ def cli():
     show_default=True,
     help="With --fit: also shorter words, where the error bound stays; pixels may change by a step.",
 )
-@click.option("--vcd", type=click.Path(), help="Waveforms; implies --engine pysim.")
+@click.option("--vcd", type=OutputFile(), help="Waveforms; implies --engine pysim.")
 @click.option(
     "--frames",
     type=Whole(1, MAX_FRAMES),
@@ -601,21 +614,34 @@ def _fitted(scenes: Sequence[Scene], design: ShadingPipeline, settings: Settings
     help="Number of materials.",
 )
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
-@click.option("-o", "--output", type=click.Path(), help="Verilog file.  [default: standard output]")
-def verilog(lights, materials, name, output, **settings):
+@click.option(
+    "-o", "--output", type=OutputFile(), help="Verilog file.  [default: standard output; --testbench: none]"
+)
+@click.option(
+    "--testbench",
+    metavar="DIR",
+    type=click.Path(),
+    help="New or empty folder for the Verilog with a cocotb test bench, which needs nothing of blysk.",
+)
+def verilog(lights, materials, name, output, testbench, **settings):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
+    A test bench holds it against the pixels of a small frame, in Icarus Verilog or Verilator: pip install
+    cocotb, then python DIR/run.py. DIR/README.md tells the rest.
+
     \b
-    Example:
+    Examples:
         blysk verilog --model cosquad_lin --lights 2 -o core.v
+        blysk verilog --method chord --testbench bench
     """
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise InputError(f"--name {name}", "no Verilog name", "use letters, digits and underscores")
     design = chosen_design(Settings(settings), lights)
     setup_interval, style = settings["setup_interval"], settings["style"]
     design = dataclasses.replace(design, materials=materials)
-    if output:
-        check_writable(output)
+    _check_outputs([testbench] if testbench else [], pictures=[], others=[output])
+    if testbench is not None:
+        check_folder(testbench)
     unit = ShadingPipelineUnit(design, setup_interval, style)
     header = [
         f"blysk {version('blysk')} shading pipeline",
@@ -637,7 +663,9 @@ def verilog(lights, materials, name, output, **settings):
         raise InputError(f"--name {name}", str(error), "choose another name") from None
     if output:
         write_text(output, text)
-    else:
+    if testbench is not None:
+        write_testbench(testbench, unit, name, text, header[:4])
+    elif not output:
         click.echo(text, nl=False)
 
 
@@ -927,14 +955,18 @@ def _run(arguments: list[str]) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit status.
 
-    0: done. 1: a simulation went wrong. 2: bad input, in one line on standard error. 130: interrupted.
+    0: done. 1: a simulation went wrong. 2: bad input, in one line on standard error. 130: interrupted, by a
+    terminal or by SIGTERM.
     """
 
     def show(message, *_):
-        tqdm.write(f"blysk: warning: {message}", file=sys.stderr)
+        tqdm.write(f"blysk: warning: {one_line(str(message))}", file=sys.stderr)
 
+    # A file's name may have letters that the terminal's encoding lacks, or bytes that are none.
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        with warnings.catch_warnings():
+        with _termination_as_interrupt(), warnings.catch_warnings():
             warnings.simplefilter("default", RuntimeWarning)
             warnings.showwarning = show
             status = _run(sys.argv[1:] if arguments is None else list(arguments))
@@ -948,13 +980,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"blysk: {error}", file=sys.stderr)
         return 2
     except click.ClickException as error:
-        print(f"blysk: {error.format_message().rstrip('.')}; see blysk --help", file=sys.stderr)
+        print(f"blysk: {one_line(error.format_message().rstrip('.'))}; see blysk --help", file=sys.stderr)
         return 2
     except CompilerMissing as error:
         print(f"blysk: {error}", file=sys.stderr)
         return 2
-    except SimulationError as error:
-        print(f"blysk: {error}", file=sys.stderr)
+    except (NetlistError, SimulationError) as error:
+        print(f"blysk: {one_line(str(error))}", file=sys.stderr)
         return 1
     except MemoryError:
         print("blysk: out of memory; use a smaller --size or mesh", file=sys.stderr)
@@ -963,13 +995,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _give_up_output()
         return 141
     except OSError as error:
-        print(
-            f"blysk: {error.filename or 'standard output'}: {error.strerror or error}; "
-            "free some space or send it elsewhere",
-            file=sys.stderr,
-        )
+        text = one_line(f"{error.filename or 'standard output'}: {error.strerror or error}")
+        print(f"blysk: {text}; free some space or send it elsewhere", file=sys.stderr)
         _give_up_output()
         return 2
+
+
+@contextmanager
+def _termination_as_interrupt() -> Iterator[None]:
+    """Else workers would outlive this process, and half-written files stay."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _give_up_output() -> None:

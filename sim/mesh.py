@@ -5,6 +5,7 @@ import io
 import json
 import logging
 import math
+import os
 import re
 import struct
 import warnings
@@ -23,7 +24,7 @@ from golden.frame_constants import MAX_MATERIALS
 from golden.geometry import Mesh, normalise
 from golden.lighting import Material, Triple
 from golden.specular import MAX_EXPONENT
-from sim.errors import InputError
+from sim.errors import InputError, one_line
 from sim.teapot import teapot
 
 __all__ = ["MAX_FACES", "SUFFIXES", "FileMaterial", "LoadedMesh", "load_mesh", "surfaces"]
@@ -145,9 +146,9 @@ def load_mesh(
     InputError
         If a number is out of range, or the file is missing, empty, of unknown type, damaged, refers to
         files outside its folder, needs a decoder that is not installed, or holds no triangle, a vertex
-        that is not finite, an index out of range, or more than 20 million triangles; or a material in use
-        has a colour that is not three numbers from 0 to 1 or an exponent over 1000, or there are more than
-        1024 of them.
+        that is not finite, an index out of range, nodes that are no trees, or more than 20 million
+        triangles; or a material in use has a colour that is not three numbers from 0 to 1 or an exponent
+        over 1000, or there are more than 1024 of them.
     """
     if not 0 <= crease_angle <= 180:
         raise InputError(
@@ -157,7 +158,6 @@ def load_mesh(
         return LoadedMesh(teapot(triangles), "teapot", 0, 0)
 
     path = Path(source)
-    shown = "".join(c if c.isprintable() else "?" for c in source)
     try:
         data = _read(path)
         with _quiet_trimesh():
@@ -166,13 +166,17 @@ def load_mesh(
         with np.errstate(over="ignore", invalid="ignore"):
             return _assemble(scene, found, path, data, crease_angle)
     except _Refused as refusal:
-        raise InputError(shown, refusal.reason, refusal.remedy) from None
+        raise InputError(source, refusal.reason, refusal.remedy) from None
+    except RecursionError as error:
+        raise InputError(source, "is nested too deeply", _REEXPORT) from error
     # The loaders raise whatever a damaged file makes them trip over.
     except Exception as error:
         text = str(error).strip().split("\n")[0]
         kind = type(error).__name__
-        reason = f"cannot be read ({kind}: {text})" if text else f"cannot be read ({kind})"
-        raise InputError(shown, reason, _REEXPORT) from error
+        misshapen = isinstance(error, AttributeError | IndexError | KeyError | TypeError)
+        what = "is damaged, a part is missing or of a wrong kind" if misshapen else "cannot be read"
+        reason = f"{what} ({kind}: {text})" if text else f"{what} ({kind})"
+        raise InputError(source, reason, _REEXPORT) from error
 
 
 def surfaces(
@@ -291,7 +295,7 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> tuple[trimesh.Scene
     elif suffix == ".ply":
         data = _tidy_ply(data)
         head = data.partition(b"end_header")[0]
-        if re.search(rb"^\s*property\s+\w+\s+(diffuse_)?red\s*$", head, re.MULTILINE):
+        if re.search(rb"^[ \t]*property[ \t]+\w+[ \t]+(diffuse_)?red\s*$", head, re.MULTILINE):
             found.ignored.append("vertex colours")
         if re.search(rb"^comment\s+TextureFile\b", head, re.MULTILINE):
             found.ignored.append("1 texture")
@@ -313,9 +317,8 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> tuple[trimesh.Scene
 
 
 def _shown(text: str) -> str:
-    """Text of a file in one line, and not too long."""
-    text = "".join(c if c.isprintable() else "?" for c in text)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    """Text of a file in a message."""
+    return one_line(text, 60)
 
 
 def _utf8(text: bytes) -> bytes:
@@ -353,9 +356,9 @@ def _find_obj_materials(libraries: list[str], folder: Path, found: _Found) -> No
     texts = {}
     for name in dict.fromkeys(libraries):
         # A name with spaces, or several names.
-        for part in [name] if _inside(folder, name).is_file() else name.split():
+        for part in [name] if os.path.isfile(_inside(folder, name)) else name.split():
             target = _inside(folder, part)
-            if not target.is_file():
+            if not os.path.isfile(target):
                 found.ignored.append(f"the material file {_shown(part)!r}, which does not exist")
                 continue
             if target.stat().st_size > _MAX_LIBRARY:
@@ -439,7 +442,7 @@ def _tidy_ply(data: bytes) -> bytes:
     head, mark, body = data.partition(b"end_header")
     if not mark:
         raise _Refused("the PLY header has no end")
-    rows = sum(int(count) for count in re.findall(rb"^\s*element\s+\S+\s+(\d+)", head, re.MULTILINE))
+    rows = sum(int(count) for count in re.findall(rb"^[ \t]*element[ \t]+\S+[ \t]+(\d+)", head, re.MULTILINE))
     if b"format ascii" in head:
         lines = sum(1 for line in body.splitlines()[1:] if line.strip())
         if lines < rows:
@@ -470,8 +473,8 @@ def _gltf_document(data: bytes, suffix: str) -> dict:
         if len(data) < 20 or data[:4] != b"glTF":
             raise _Refused("it is no GLB file")
         length, json_length = struct.unpack_from("<II", data, 8)
-        if len(data) < length or len(data) < 20 + json_length:
-            raise _Refused(f"it is cut short: the header says {length} bytes, there are {len(data)}")
+        if len(data) < (said := max(length, 20 + json_length)):
+            raise _Refused(f"it is cut short: the header says {said} bytes, there are {len(data)}")
         data = data[20 : 20 + json_length]
     try:
         document = json.loads(data.decode("utf-8-sig"))
@@ -488,6 +491,7 @@ def _check_gltf(document: dict) -> None:
         raise _Refused(
             f"it is compressed with {extension}, for which there is no decoder", "export it uncompressed"
         )
+    _check_nodes(document)
     accessors = document.get("accessors", [])
     for accessor in accessors:
         if accessor["count"] > 3 * MAX_FACES:
@@ -508,6 +512,26 @@ def _check_gltf(document: dict) -> None:
                         "it is Draco-compressed and the decoder DracoPy is not installed",
                         "pip install DracoPy",
                     )
+
+
+def _check_nodes(document: dict) -> None:
+    """Refuse nodes that are no trees: trimesh would draw one of several places, or none, or never end."""
+    nodes = document.get("nodes", [])
+    children = [node.get("children", []) for node in nodes]
+    roots = [scene.get("nodes", []) for scene in document.get("scenes", [])]
+    below = [child for row in children for child in row]
+    for index in [*below, *(root for row in roots for root in row)]:
+        if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(nodes):
+            raise _Refused(f"it refers to node {_shown(str(index))} (from 0), there are {len(nodes)}")
+    if len(set(below)) < len(below):
+        raise _Refused("one of its nodes hangs on two others", "export it with one parent a node")
+    reached = list(set(range(len(nodes))).difference(below))
+    for index in reached:
+        reached += children[index]
+    if len(reached) < len(nodes):
+        raise _Refused("its nodes hang on each other in a circle")
+    if any(len(set(row)) < len(row) or not set(row).isdisjoint(below) for row in roots):
+        raise _Refused("one of its nodes is twice in a scene", "export it with the roots alone in the scene")
 
 
 def _find_gltf_materials(document: dict, materials: bool, found: _Found) -> None:
@@ -557,7 +581,9 @@ def _gltf_material(text: dict, name: str, given_name: str) -> tuple[FileMaterial
 
 
 def _plain_gltf(document: dict, data: bytes, suffix: str) -> bytes:
-    """A GLB or glTF file with another document."""
+    """A GLB or glTF file with another document, without cameras: trimesh would lose what hangs on one."""
+    for node in document.get("nodes", []):
+        node.pop("camera", None)
     text = json.dumps(document).encode()
     if suffix == ".gltf":
         return text
@@ -575,7 +601,7 @@ def _gltf_references(document: dict, folder: Path) -> dict[str, bytes]:
         if uri is None or uri.startswith("data:"):
             continue
         target = _inside(folder, uri, unquote(uri))
-        if not target.is_file():
+        if not os.path.isfile(target):
             raise _Refused(f"it refers to {uri!r}, which does not exist", "put that file beside it")
         references[uri] = target.read_bytes()
     return references
@@ -584,7 +610,8 @@ def _gltf_references(document: dict, folder: Path) -> dict[str, bytes]:
 def _inside(folder: Path, reference: str, name: str | None = None) -> Path:
     """The file that a reference means, in the folder or one below; it need not exist."""
     name = reference if name is None else name
-    target = (folder / name).resolve()
+    # Of a name that is too long, or links in a circle, `Path` has exceptions to tell.
+    target = Path(os.path.realpath(folder / name))
     outside = re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", reference) or reference.startswith(("/", "\\"))
     if outside or ".." in Path(name).parts or not target.is_relative_to(folder.resolve()):
         raise _Refused(f"it refers to {reference!r}, outside its folder", "put that file beside it")
@@ -595,7 +622,7 @@ def _assemble(
     scene: trimesh.Scene, found: _Found, path: Path, data: bytes, crease_angle: float
 ) -> LoadedMesh:
     """All triangles of a scene in world coordinates, as one mesh."""
-    nodes = [scene.graph[node] for node in scene.graph.nodes_geometry]
+    nodes = _placed(scene)
     numbers = {name: _number(name, scene.geometry[name], path) for _, name in nodes}
     nodes = [(matrix, scene.geometry[name], numbers[name]) for matrix, name in nodes]
     nodes = [node for node in nodes if isinstance(node[1], trimesh.Trimesh) and len(node[1].faces)]
@@ -620,14 +647,15 @@ def _assemble(
             stored = np.array(geometry.vertex_normals)
         elif promised:
             lost += len(np.unique(triangles))
-        rotation = np.array(matrix[:3, :3])
-        # The cofactors are the inverse transpose times the determinant, and exist if it is 0.
-        cofactors = np.cross(np.roll(rotation, -1, axis=0), np.roll(rotation, -2, axis=0))
-        mirrored = np.linalg.det(rotation) < 0
         if not np.array_equal(matrix, np.eye(4)):
+            rotation = np.array(matrix[:3, :3])
+            # The cofactors are the inverse transpose times the determinant, and exist if it is 0.
+            cofactors = np.cross(np.roll(rotation, -1, axis=0), np.roll(rotation, -2, axis=0))
+            mirrored = np.linalg.det(rotation) < 0
             part = part @ rotation.T + matrix[:3, 3]
             stored = _transformed(stored, -cofactors if mirrored else cofactors)
-        faces.append((triangles[:, ::-1] if mirrored else triangles) + offset)
+            triangles = triangles[:, ::-1] if mirrored else triangles
+        faces.append(triangles + offset)
         material.append(np.full(len(triangles), number))
         vertices.append(part)
         normals.append((stored, np.full(len(part), has_normals)))
@@ -643,6 +671,22 @@ def _assemble(
         crease_angle,
     )
     return _with_materials(loaded, found)
+
+
+def _placed(scene: trimesh.Scene) -> list[tuple[np.ndarray, str]]:
+    """Matrix into the world, and name, of the geometry of every node that has one.
+
+    trimesh's own way takes time by the cube of a node's level.
+    """
+    graph = scene.graph.transforms
+    below = {}
+    for (parent, child), edge in graph.edge_data.items():
+        below.setdefault(parent, []).append((child, edge["matrix"]))
+    frames = [(scene.graph.base_frame, np.eye(4))]
+    for frame, matrix in frames:
+        frames += [(child, matrix @ step) for child, step in below.get(frame, [])]
+    names = [(matrix, graph.node_data[frame].get("geometry")) for frame, matrix in frames]
+    return [(matrix, name) for matrix, name in names if name is not None]
 
 
 def _number(name: str, geometry: object, path: Path) -> int:

@@ -12,7 +12,7 @@ from typing import Any
 
 from sim.errors import InputError
 
-__all__ = ["atomic_writer", "check_writable", "write_json", "write_text"]
+__all__ = ["atomic_writer", "check_writable", "files_within", "plain", "write_json", "write_text"]
 
 _REASONS = {
     errno.ENOSPC: ("the disk is full", "free some space or choose another disk"),
@@ -61,6 +61,40 @@ def check_writable(path: str | os.PathLike) -> None:
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
         raise _unwritable(path, error) from error
+
+
+def files_within(folder: str | os.PathLike, first: str) -> list[str]:
+    """Check, before long work, that files can be written into a folder, and list what it holds already.
+
+    Parameters
+    ----------
+    folder : path
+        The output folder, which may exist.
+    first : str
+        Name of a file that will be written.
+
+    Returns
+    -------
+    list of str
+        Names of the files in it at any depth, in order, without hidden ones; none if there is no folder yet.
+
+    Raises
+    ------
+    InputError
+        If it is a file, or it or ``first`` may not be written.
+    """
+    folder = Path(folder)
+    if not folder.exists():
+        check_writable(folder)
+        return []
+    if not folder.is_dir():
+        raise InputError(str(folder), "it is a file", "give the name of a folder")
+    check_writable(folder / first)
+    return [
+        path.relative_to(folder).as_posix()
+        for path in sorted(folder.rglob("*"))
+        if not path.is_dir() and not path.name.startswith(".")
+    ]
 
 
 @contextmanager
@@ -139,16 +173,17 @@ def write_json(path: str | os.PathLike, value: Any) -> None:
     TypeError
         If the value holds something that JSON cannot.
     """
-    write_text(path, json.dumps(_plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    write_text(path, json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """A value as `write_json` writes it: dictionaries, lists, texts, finite numbers, ``None``."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if hasattr(value, "tolist"):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

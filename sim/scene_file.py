@@ -15,7 +15,7 @@ from golden.pipeline import METHODS, MODELS, PRINTED
 from golden.scene import BACK_FACES, LARGEST_SIDE, VIEWERS
 from golden.specular import MAX_EXPONENT
 from hdl.pipeline import STYLES
-from sim.errors import InputError
+from sim.errors import InputError, one_line
 
 __all__ = ["HIGHLIGHTS", "MAX_BYTES", "SceneFile", "read_scene_file"]
 
@@ -119,11 +119,10 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         If the file cannot be read, is no TOML, or holds an unknown key, a value of another type or out of
         range, or no mesh. The message names the file and the key.
     """
-    shown = _printable(os.fspath(path))
     try:
         document = _parse(Path(path))
     except _Refused as refusal:
-        raise InputError(shown, refusal.reason, refusal.remedy) from None
+        raise InputError(os.fspath(path), refusal.reason, refusal.remedy) from None
     values, keys = {}, {}
     try:
         _read_table(document, _TOP, "", values, keys)
@@ -136,7 +135,7 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         if "triangles" in values and values["mesh"] != "teapot":
             raise _KeyRefused("mesh.triangles", "only the teapot is tessellated", "leave it out for a file")
     except _KeyRefused as refusal:
-        raise InputError(f"{shown}, {refusal.key}", refusal.reason, refusal.remedy) from None
+        raise InputError(f"{os.fspath(path)}, {refusal.key}", refusal.reason, refusal.remedy) from None
     _part_lights(values, keys)
     if values["mesh"] != "teapot":
         values["mesh"] = os.path.join(os.path.dirname(os.fspath(path)), values["mesh"])
@@ -169,7 +168,7 @@ def _parse(path: Path) -> dict:
         raise _Refused("is nested too deeply", "see blysk render --help for the keys") from error
     # A syntax error, or a whole number of more than 4300 digits.
     except ValueError as error:
-        text = _printable(str(error).split("\n")[0])
+        text = str(error).split("\n")[0]
         raise _Refused(f"is no TOML ({text})", "mend it there; text stands in quotes") from error
 
 
@@ -204,10 +203,6 @@ def _read_table(table: dict, schema: dict, prefix: str, values: dict, keys: dict
             keys[option] = key
 
 
-def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() else "?" for c in text)
-
-
 def _shown(value: Any) -> str:
     """A value in a message: in one line, and not too long."""
     if isinstance(value, dict):
@@ -218,8 +213,7 @@ def _shown(value: Any) -> str:
         return str(value).lower()
     if isinstance(value, int) and abs(value) >= 10**18:
         return "a huge number"
-    text = _printable(repr(value) if isinstance(value, str) else str(value))
-    return text if len(text) <= 40 else f"{text[:37]}..."
+    return one_line(repr(value) if isinstance(value, str) else str(value), 40)
 
 
 # Readers: a value of the file to that of the option, or `_Refused`.

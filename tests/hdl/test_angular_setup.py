@@ -88,8 +88,8 @@ def check(verify, normal_pairs, parameters, interval):
 @pytest.mark.long
 def test_times_and_multipliers_as_stated():
     for variant, latencies, counts, longest in (
-        ("half_chord", [50, 53, 53, 53, 53, 56], [26, 13, 9, 7, 6, 5], 26),
-        ("arccos", [50, 53, 54, 53, 53, 57], [23, 13, 9, 8, 7, 6], 21),
+        ("half_chord", [59, 60, 62, 67, 71, 64], [26, 13, 9, 7, 6, 5], 26),
+        ("arccos", [59, 60, 63, 63, 66, 66], [23, 13, 9, 8, 7, 6], 21),
     ):
         units = [AngularSetupUnit(VARIANTS[variant], interval) for interval in range(1, 7)]
         assert [unit.latency for unit in units] == latencies

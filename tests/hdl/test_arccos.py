@@ -66,7 +66,7 @@ def test_half_chord_equals_twin(verify, interval):
 
 def test_half_chord_times_as_stated():
     units = [HalfChordUnit(initiation_interval=interval) for interval in range(1, 7)]
-    assert [unit.latency for unit in units] == [20, 22, 22, 21, 22, 22]
+    assert [unit.latency for unit in units] == [35, 38, 37, 36, 36, 40]
     assert [cost_of(unit).multiplier_count for unit in units] == [6, 3, 2, 2, 2, 1]
     with pytest.raises(ValueError, match=r"^initiation_interval must be 1 to 6, not 7$"):
         HalfChordUnit(initiation_interval=7)

@@ -63,6 +63,8 @@ def test_equals_twin(verify, normal_pairs, parameters, interval):
     left, right = np.vstack([left, corners[:, :3]]), np.vstack([right, corners[:, 3:]])
     order = rng.permutation(len(left))
     left, right = left[order], right[order]
+    # 1 - cosine is halfway between two words: 180994.5.
+    left[0], right[0] = (35421, 119829, 39572), (-5993, -85566, 99107)
     middle, u, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
     assert wide.any()
     assert not wide.all()

@@ -29,5 +29,5 @@ def test_equals_twin(verify, normal_pairs):
 
 def test_timing_and_cost():
     unit = ChordUnit()
-    assert (unit.latency, unit.initiation_interval) == (8, 1)
+    assert (unit.latency, unit.initiation_interval) == (11, 1)
     assert cost_of(unit).multipliers == {(18, 18): 3}

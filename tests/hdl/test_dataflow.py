@@ -52,7 +52,7 @@ def beats_of(rng, count=200):
 
 @pytest.mark.parametrize(("interval", "first"), [(1, 0), (2, 1), (7, 1)])
 def test_earliest_ages(interval, first):
-    """An input stands at its register, or at once; a register takes one clock, a multiplication two."""
+    """An input stands at its register, or at once; a register takes one clock, a multiplication five."""
     g = Dataflow(interval, 1)
     a, b = (g.input(name, lambda operands: operands) for name in "ab")
     assert (a.age, b.age) == (first, first)
@@ -62,7 +62,10 @@ def test_earliest_ages(interval, first):
     both = g.register("both", lambda a, b: a + b, b, late)
     assert both.age == first + 3
     product = g.multiply("product", late, both)
-    assert (product.age, product.stands) == (first + 5, 1)
+    assert (product.age, product.stands) == (first + 8, 1)
+    hurried = Dataflow(interval, 1, hurries=True)
+    a = hurried.input("a", lambda operands: operands)
+    assert hurried.multiply("product", a, a).age == first + 2
     table = g.look_up("table", [0] * 4, 3, late)
     assert (table.age, table.stands) == (first + 3, late.stands)
 
@@ -73,12 +76,12 @@ def test_turns_by_hand():
     assert g.multiplier.count == 1
     a = g.input("a", lambda operands: operands)
     ages = [g.multiply(f"product_{k}", a, a).age for k in range(3)]
-    assert ages == [3, 4, 5]
+    assert ages == [6, 7, 8]
     # With two clocks there are two multipliers, and the third multiplication takes the first's next turn.
     g = Dataflow(2, 3)
     assert g.multiplier.count == 2
     a = g.input("a", lambda operands: operands)
-    assert [g.multiply(f"product_{k}", a, a).age for k in range(3)] == [3, 3, 4]
+    assert [g.multiply(f"product_{k}", a, a).age for k in range(3)] == [6, 6, 7]
 
 
 @pytest.mark.parametrize("interval", [1, 2, 3, 4, 5, 6, 7, 11])
@@ -266,7 +269,7 @@ def test_words_stand_no_earlier_than_asked(interval):
     assert g.register("late", lambda a: a, a, since=9).age == 9
     assert g.register("soon", lambda a: a, a, since=1).age == a.age + 1
     assert g.multiply("late", a, a, since=9).age == 9
-    assert g.multiply("soon", a, a, since=1).age == a.age + 2
+    assert g.multiply("soon", a, a, since=1).age == a.age + 5
     # An age whose turn is taken is passed over.
     operator = g.share("operator", 2, (unsigned(1),), 3, lambda register, a: a)
     first, second = (g.use(operator, "use", (a,), lambda a: (a,), since=12).age for _ in range(2))

@@ -54,6 +54,13 @@ def test_equals_twin_under_stalls(seed):
     np.testing.assert_array_equal(run.beats, expected)
 
 
+def test_every_bit_counts_in_long_spans():
+    """What the differences' last bits give shows after thousands of pixels."""
+    beats, expected = spans(np.random.default_rng(11).integers(3000, 4096, 40), 11)
+    run = simulate(DifferenceAccumulatorUnit(), beats, count=len(expected), engine="auto")
+    np.testing.assert_array_equal(run.beats, expected)
+
+
 def test_engines_agree():
     rng = np.random.default_rng(5)
     beats, expected = spans(rng.integers(0, 12, 40), 5)

@@ -14,10 +14,10 @@ from hdl.difference_setup import DifferenceSetupUnit
 OWN, DOCUMENTED = DifferenceSetup(), DifferenceSetup(as_documented=True)
 # Latency and multipliers for the initiation intervals 1, 2, ..., as the unit's text states them.
 STATED = {
-    OWN: [(15, 7), (17, 4), (17, 3), (19, 2), (19, 2), (17, 2), (18, 1)],
-    DOCUMENTED: [(18, 9), (20, 5), (19, 3), (20, 3), (23, 2), (21, 2), (20, 2), (21, 2), (27, 1)],
+    OWN: [(21, 7), (22, 4), (23, 3), (25, 2), (23, 2), (24, 2), (28, 1)],
+    DOCUMENTED: [(24, 9), (25, 5), (25, 3), (25, 3), (28, 2), (29, 2), (26, 2), (26, 2), (28, 1)],
 }
-STRAIGHT = [(10, 3), (12, 2), *[(13, 1)] * 5]
+STRAIGHT = [(13, 3), (15, 2), *[(16, 1)] * 5]
 VARIANTS = [
     (parameters, interval) for parameters in STATED for interval in range(1, len(STATED[parameters]) + 1)
 ]
@@ -45,7 +45,7 @@ def test_straight_lines_and_what_they_cost(interval):
 
 def test_is_sequential_by_default():
     assert DifferenceSetupUnit(order=1).initiation_interval == 3
-    for parameters, latency, interval in ((None, 18, 7), (DOCUMENTED, 27, 9)):
+    for parameters, latency, interval in ((None, 28, 7), (DOCUMENTED, 28, 9)):
         unit = DifferenceSetupUnit(parameters)
         assert (unit.latency, unit.initiation_interval) == (latency, interval)
 

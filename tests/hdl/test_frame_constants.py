@@ -376,11 +376,11 @@ def test_reset_clears_the_constants(normal_pairs):
         bright = FrameConstants(
             1, np.full(3, 2**17 - 1), *[np.array([[0, 0, ONE]])] * 2, *[np.full((1, 3), 999)] * 2
         )
-        result.append(await driver.run(ctx, 100, spans, bright.writes()))
+        result.append(await driver.run(ctx, 150, spans, bright.writes()))
         ctx.set(driver.reset, 1)
         await ctx.tick()
         ctx.set(driver.reset, 0)
-        result.append(await driver.run(ctx, 100, spans, none))
+        result.append(await driver.run(ctx, 150, spans, none))
 
     run_bench(driver.module, bench)
     (before, *_), (after, *_) = result

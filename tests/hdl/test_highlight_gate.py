@@ -93,7 +93,7 @@ def test_equals_twin_at_reduced_width(fraction_bits):
 @pytest.mark.long
 def test_times_and_multipliers_as_stated():
     units = [HighlightGateUnit(initiation_interval=interval) for interval in range(1, 16)]
-    assert [unit.latency for unit in units] == [16, 18, 19, 19, 19, 20, 22, 27, 28, 24, 22, 23, 23, 24, 33]
+    assert [unit.latency for unit in units] == [25, 29, 28, 26, 31, 29, 26, 30, 32, 34, 36, 37, 33, 28, 49]
     counts = [cost_of(unit).multiplier_count for unit in units]
     assert counts == [15, 8, 5, 4, 3, 3, 3, *[2] * 7, 1]
     assert HighlightGateUnit().initiation_interval == 6

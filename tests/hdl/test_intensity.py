@@ -44,6 +44,19 @@ def test_equals_twin(verify, lights):
         verify(IntensityUnit(Intensity(lights)), beats, expected, constants=constants)
 
 
+@pytest.mark.parametrize("brightness", [1, 2, 8])
+def test_every_bit_counts(brightness):
+    """Many colours: each bit of them, and the last bits of the products, which are rounded off."""
+    rng = np.random.default_rng(brightness)
+    unit = IntensityUnit()
+    for _ in range(20):
+        terms = rng.integers(0, TERM.max_code + 1, (2, 5000, 1)) >> rng.integers(0, 12, (2, 5000, 1))
+        beats, constants, expected = case(rng, 1, brightness, terms)
+        run = simulate(unit, beats, count=5000, constants=constants, engine="auto")
+        for name in "rgb":
+            np.testing.assert_array_equal(run.beats[name], expected[name])
+
+
 def sparse_terms(rng, lights, count):
     """Terms of which any part is 0; none and all of them; all of the largest."""
     terms = rng.integers(1, TERM.max_code + 1, (2, count, lights))

@@ -64,7 +64,7 @@ def test_equals_exact_integers(verify, normal_pairs, lights, interval, operand):
     verify(unit, normals, expected, constants=constants)
 
 
-@pytest.mark.parametrize(("operand", "latency"), [("cosine", 4), ("one_minus_cosine", 8)])
+@pytest.mark.parametrize(("operand", "latency"), [("cosine", 7), ("one_minus_cosine", 11)])
 def test_timing_and_multipliers(operand, latency):
     for lights in (1, 3):
         unit = LightProductsUnit(LinearInterpolator(operand=operand), lights)

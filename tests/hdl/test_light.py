@@ -81,6 +81,21 @@ def test_equals_twins(verify, normal_pairs, model, operand, exponent):
     verify(unit, codes_of(operands), expected, constants={"exponent": exponent})
 
 
+def test_every_bit_counts(normal_pairs):
+    """Every bit of the exponent and of its slope; of the products those too that are rounded off."""
+    rng = np.random.default_rng(7)
+    unit = LightUnit()
+    for exponent in [*1 << np.arange(10), *rng.integers(1, 1001, 50)]:
+        direction, halfway = (quantise(v)[0] for v in normal_pairs(rng, 1, 35.0))
+        normals = halfway / ONE + rng.normal(size=(4000, 3)) / np.sqrt(exponent)
+        normals = quantise(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+        operands = operands_of(Specular(), Diffuse(), normals, direction, halfway)
+        constants = {"exponent": exponent}
+        run = simulate(unit, codes_of(operands), count=len(normals), constants=constants, engine="auto")
+        for name, expected in terms(Specular(), Diffuse(), operands, exponent).items():
+            np.testing.assert_array_equal(run.beats[name], expected)
+
+
 def test_terminator(verify):
     """N.L of one code above 0, 0, and one below: the highlight, however bright, comes and goes with it."""
     direction, halfway = np.array([1, 0, 0]), np.array([0, 0, ONE])

@@ -48,6 +48,17 @@ def test_equals_twin(verify, operand, form):
             np.testing.assert_array_equal(run.beats, expected)
 
 
+@pytest.mark.parametrize("exponent", [255, 341, 682, 1000])
+def test_every_bit_counts(exponent):
+    """The last bits of the products are rounded off: each decides once in many thousands."""
+    parameters = Power()
+    codes, dark = operands(parameters, exponent, 100_000)
+    expected = parameters.compute(Fixed(parameters.operand_format, codes), dark, exponent).codes
+    beats, constants = {"operand": codes, "dark": dark.astype(np.uint8)}, {"exponent": exponent}
+    run = simulate(PowerUnit(), beats, count=len(codes), constants=constants, engine="auto")
+    np.testing.assert_array_equal(run.beats, expected)
+
+
 @pytest.mark.long
 def test_every_exponent():
     parameters = Power()

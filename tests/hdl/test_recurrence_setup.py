@@ -61,12 +61,12 @@ def test_equals_twin(verify, normal_pairs, setup_spans, light_constants, paramet
 @pytest.mark.parametrize(
     ("lights", "interval", "multipliers", "shifters", "latency"),
     [
-        pytest.param(1, 1, 46, 18, 99, marks=pytest.mark.long),
-        pytest.param(1, 2, 23, 9, 108, marks=pytest.mark.long),
-        (1, 4, 12, 5, 114),
-        (1, 8, 6, 3, 121),
-        (1, 46, 1, 1, 230),
-        pytest.param(2, 4, 20, 9, 114, marks=pytest.mark.long),
+        pytest.param(1, 1, 46, 18, 141, marks=pytest.mark.long),
+        pytest.param(1, 2, 23, 9, 144, marks=pytest.mark.long),
+        (1, 4, 12, 5, 156),
+        (1, 8, 6, 3, 172),
+        (1, 46, 1, 1, 282),
+        pytest.param(2, 4, 20, 9, 156, marks=pytest.mark.long),
     ],
 )
 def test_multipliers(lights, interval, multipliers, shifters, latency):

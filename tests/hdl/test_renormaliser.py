@@ -8,6 +8,7 @@ from golden.fixed import Fixed
 from golden.renormaliser import Renormaliser
 from golden.unit_vector import COMPONENT, ONE
 from hdl.renormaliser import RenormaliserUnit
+from sim.engine import simulate
 
 
 def test_equals_twin(verify):
@@ -35,6 +36,18 @@ def test_every_segment_and_its_ends(verify):
     normals, outside = parameters.compute(Fixed(COMPONENT, codes))
     assert set(outside.tolist()) == {True, False}
     verify(RenormaliserUnit(), codes, {"normal": normals.codes, "outside": outside})
+
+
+def test_every_bit_counts():
+    """The last bits of the products are rounded off: each decides once in many thousands."""
+    rng = np.random.default_rng(2)
+    vectors = rng.normal(size=(300_000, 3))
+    vectors *= rng.uniform(0.68, 1.02, (len(vectors), 1)) / np.linalg.norm(vectors, axis=1, keepdims=True)
+    codes = np.clip(np.floor(vectors / COMPONENT.step), COMPONENT.min_code, COMPONENT.max_code).astype(int)
+    normals, outside = Renormaliser().compute(Fixed(COMPONENT, codes))
+    run = simulate(RenormaliserUnit(), codes, count=len(codes), engine="auto")
+    np.testing.assert_array_equal(run.beats["normal"], normals.codes)
+    np.testing.assert_array_equal(run.beats["outside"], outside)
 
 
 def test_stiff_words_and_lengths(verify):

@@ -258,7 +258,7 @@ def texts():
     return Texts()
 
 
-@pytest.fixture(params=["often", pytest.param("all", marks=pytest.mark.long)])
+@pytest.fixture(params=[pytest.param(name, marks=pytest.mark.long) for name in ("often", "all")])
 def together(request, texts):
     """Texts of many cores."""
     return {name: texts[name] for name in CORES if request.param == "all" or not SELDOM.match(name)}

@@ -5,12 +5,15 @@ import io
 import json
 import logging
 import os
+import re
 import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 import sim.mesh
 from golden.camera import Camera
@@ -653,6 +656,36 @@ def test_cut_short_text(tmp_path):
     check_refused(path, "cut short")
 
 
+@pytest.mark.parametrize("word", ["", "element", "property", "element vertex", "property float"])
+def test_much_space_in_a_ply_header(tmp_path, word):
+    """The time grows with the length, and not with its square: of that this would take minutes."""
+    path = tmp_path / "a.ply"
+    for space in ("\n", " ", "\t"):
+        path.write_text(f"ply\nformat ascii 1.0\n{word}{300_000 * space}x\nend_header\n")
+        check_refused(path)
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "loop", "loop/a"])
+def test_references_that_are_no_files(tmp_path, name):
+    (tmp_path / "loop").symlink_to("loop")
+    document, _ = mesh_gltf(TRIANGLE, [0, 1, 2])
+    document["buffers"][0]["uri"] = name
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    check_refused(
+        tmp_path / "a.gltf", f"it refers to {name!r}, which does not exist; put that file beside it"
+    )
+
+
+def test_many_material_files_in_a_line(tmp_path):
+    names = [f"{number}.mtl" for number in range(100)]
+    (tmp_path / "99.mtl").write_text("newmtl a\nKd 1 0 0\n")
+    text = f"mtllib {' '.join(names)}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n"
+    (tmp_path / "a.obj").write_text(text)
+    loaded = load_mesh(str(tmp_path / "a.obj"))
+    assert loaded.materials == (FileMaterial("a", diffuse=RED),)
+    assert len(loaded.ignored) == 99
+
+
 @pytest.mark.parametrize("count", [10**6, 2**31, 2**32 - 1, 10**18, 10**30])
 def test_absurd_counts(tmp_path, count):
     # None of these may be believed: allocated for, or waited for.
@@ -1245,10 +1278,8 @@ def test_odd_material_files(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "pipe.mtl")
     assert "the material file 'pipe.mtl', which does not exist" in loaded("pipe.mtl").ignored
     (tmp_path / "loop.mtl").symlink_to("loop.mtl")
-    path.write_text(f"mtllib loop.mtl\n{vertices}usemtl a\n{faces[0]}")
-    check_refused(path, "loop")
-    path.write_text(f"mtllib {'x' * 5000}.mtl\n{vertices}usemtl a\n{faces[0]}")
-    check_refused(path)
+    assert "the material file 'loop.mtl', which does not exist" in loaded("loop.mtl").ignored
+    assert loaded("x" * 5000 + ".mtl").ignored[0].endswith("x...', which does not exist")
     (tmp_path / "c.mtl").write_bytes(b"newmtl a\nKd 1 0 0\n# f\xfcr\n")
     assert loaded("c.mtl").materials == (FileMaterial("a", RED),)
     monkeypatch.setattr(sim.mesh, "_MAX_LIBRARY", 10)
@@ -1289,11 +1320,108 @@ def test_bad_gltf_materials(tmp_path, materials, index, reason):
     assert load_mesh(path, materials=False).materials == (FileMaterial(),)
 
 
-def test_gltf_nodes_in_a_circle(tmp_path):
-    nodes = [{"mesh": 0, "children": [1]}, {"mesh": 0, "children": [0]}]
+@pytest.mark.parametrize(
+    ("children", "reason"),
+    [
+        ([[0]], "in a circle"),
+        ([[1], [0]], "in a circle"),
+        ([[], [2], [1]], "in a circle"),
+        ([[1], [2], [1]], "hangs on two others"),
+        ([[1, 2], [2], []], "hangs on two others"),
+        ([[1, 1], []], "hangs on two others"),
+        ([[k + 1] for k in range(9999)] + [[0]], "in a circle"),
+        ([[1]], "refers to node 1 (from 0), there are 1"),
+        ([[-1]], "refers to node -1 (from 0)"),
+        ([["0"]], "refers to node 0 (from 0)"),
+        ([[True], []], "refers to node True (from 0)"),
+        ([0], "a part is missing"),
+        ([[1], []], "is twice in a scene"),
+    ],
+    ids=lambda value: str(value)[:30],
+)
+def test_gltf_nodes_that_are_no_trees(tmp_path, children, reason):
+    nodes = [{"mesh": 0, "children": below} for below in children]
     path = material_glb(tmp_path / "a.glb", [base(1, 0, 0, 1)], [0], nodes)
-    loaded, refusal = loaded_or_refused(path)
-    assert loaded or "\n" not in refusal
+    check_refused(path, reason)
+
+
+def test_gltf_nodes_of_many_levels(tmp_path):
+    """In a moment, and each in its place."""
+    nodes = [{"mesh": 0, "translation": [1, 0, 0], "children": [k + 1]} for k in range(999)]
+    document, buffer = mesh_gltf(TRIANGLE, [0, 1, 2], None, [*nodes, {"mesh": 0}])
+    (tmp_path / "a.glb").write_bytes(glb(document, buffer))
+    mesh = load_mesh(str(tmp_path / "a.glb")).mesh
+    assert len(mesh.faces) == 1000
+    assert np.array_equal(np.unique(mesh.vertices[:, 0]), np.arange(1.0, 1001))
+
+
+def test_gltf_meshes_that_hang_on_a_camera(tmp_path):
+    nodes = [
+        {"translation": [5, 0, 0], "camera": 0, "mesh": 0, "children": [1]},
+        {"mesh": 0, "scale": [2, 2, 2]},
+    ]
+    camera = {"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}
+    document, buffer = mesh_gltf(TRIANGLE, [0, 1, 2], None, nodes, cameras=[camera])
+    (tmp_path / "a.glb").write_bytes(glb(document, buffer))
+    mesh = load_mesh(str(tmp_path / "a.glb")).mesh
+    assert sorted(mesh.vertices[:, 0]) == [5, 5, 5, 5, 6, 7]
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_obj_however_it_is_written(tmp_path, data):
+    """Triangles side by side, in any spacing, order and numbering, with lines between that are none."""
+    space, end = (
+        data.draw(st.sampled_from([" ", "  ", "\t", " \t "])),
+        data.draw(st.sampled_from(["\n", "\r\n"])),
+    )
+    tail = st.sampled_from(["", " ", "\t", " # note", "#"])
+    other = st.sampled_from(
+        ["", "# f 1 2 3", "o a", "g a b", "s off", "s 1", "usemtl m", "vt 0 0", "mtllib a.mtl"]
+    )
+    number = st.sampled_from(["{:g}", "{:.3f}", "{:+e}", "{:.0f}."])
+    form = data.draw(st.sampled_from(["{}", "{}/1", "{}/1/1", "{}//1"]))
+    places, relative = [], data.draw(st.booleans())
+    lines = ["vt 0 0", "vn 0 0 1"]
+    for triangle in range(data.draw(st.integers(1, 5))):
+        places.append([(2 * triangle + x, y, 0) for x, y in ((0, 0), (1, 0), (0, 1))])
+        lines += [space.join(["v", *(data.draw(number).format(part) for part in p)]) for p in places[-1]]
+    count = 3 * len(places)
+    faces = [
+        [3 * k + corner - relative * count + (not relative) for corner in range(3)]
+        for k in range(len(places))
+    ]
+    for face in data.draw(st.permutations(faces)):
+        lines += [space.join(["f", *(form.format(corner) for corner in face)])]
+    text = "".join(
+        f"{data.draw(st.sampled_from(['', ' ']))}{line}{data.draw(tail)}{end}{data.draw(other)}{end}"
+        for line in lines
+    )
+    (tmp_path / "a.obj").write_text(text, newline="")
+    loaded = load_mesh(str(tmp_path / "a.obj"))
+    found = loaded.mesh.vertices[loaded.mesh.faces].round(9).tolist()
+    assert sorted(sorted(map(tuple, triangle)) for triangle in found) == [sorted(place) for place in places]
+    assert (loaded.dropped_faces, loaded.repaired_normals) == (0, 0)
+
+
+_WORDS = st.sampled_from(["Kd", "Ks", "Ns", "newmtl", "a", "0.5", "1", "-1", "nan", "1e9", "map_Kd", "#"])
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(lines=st.lists(st.lists(_WORDS | st.text(max_size=5), max_size=5).map(" ".join), max_size=6))
+def test_any_material_file(tmp_path, lines):
+    """It gives a material in its ranges, or is refused in one line."""
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
+    text = "\n".join(["newmtl a", *lines])
+    (tmp_path / "a.mtl").write_text(text, encoding="utf-8", errors="surrogatepass")
+    loaded, refusal = loaded_or_refused(tmp_path / "a.obj")
+    if loaded is None:
+        assert refusal.isprintable()
+        assert re.search("has K[ds] .* not three numbers from 0 to 1|has Ns .* not a number from 0", refusal)
+    else:
+        check_mesh(loaded.mesh)
+        check_materials(loaded)
+        assert all(text.isprintable() for text in loaded.ignored)
 
 
 @pytest.mark.parametrize("kind", [".mtl", ".glb", ".obj"])

@@ -283,6 +283,74 @@ def test_mutated_files_are_read_or_refused_in_one_line(write, data):
     assert str(refusal).isprintable()
 
 
+NUMBERS = st.floats(-1e300, 1e300, allow_nan=False)
+VECTORS = st.tuples(NUMBERS, NUMBERS, NUMBERS).filter(any)
+
+
+def colors(most):
+    shares = st.floats(0, most)
+    return st.tuples(shares, shares, shares)
+
+
+LIGHTS = st.lists(st.tuples(VECTORS, st.none() | colors(1e300)), max_size=MAX_LIGHTS)
+VALUES = {
+    "size": st.tuples(st.integers(1, 4095), st.integers(1, 4095)),
+    "background": colors(1),
+    "ambient_light": colors(8),
+    "back_faces": st.sampled_from(["flip", "show", "cull"]),
+    "mesh.crease": st.floats(0, 180),
+    "mesh.materials": st.sampled_from(["file", "one"]),
+    "mesh.triangles": st.integers(64, 4_000_000),
+    "camera.projection": st.sampled_from(["perspective", "orthographic"]),
+    "camera.view": VECTORS,
+    "camera.up": VECTORS,
+    "camera.field_of_view": st.floats(1, 179),
+    "camera.viewer": st.sampled_from(["distant", "near"]),
+    "material.ambient": colors(1),
+    "material.diffuse": colors(1),
+    "material.specular": colors(1),
+    "material.exponent": st.integers(1, 1000),
+    "pipeline.method": st.sampled_from(sorted(METHODS)),
+    "pipeline.model": st.sampled_from(sorted(MODELS)),
+    "pipeline.highlight": st.sampled_from(["dot", "chord"]),
+    "pipeline.setup_interval": st.integers(1, 46),
+    "pipeline.style": st.sampled_from(["throughput", "compact"]),
+    "pipeline.gate": st.booleans(),
+    "pipeline.fit": st.booleans(),
+    "pipeline.words": st.booleans(),
+}
+
+
+def toml(value):
+    """A value as TOML has it; of a float, every bit."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(toml, value))}]"
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(values=st.fixed_dictionaries({}, optional=VALUES), lights=st.none() | LIGHTS)
+def test_what_is_written_is_read(write, values, lights):
+    """Every key with any value of its range, to the bit, and nothing else."""
+    lines = ["mesh.file = 'teapot'", *(f"{key} = {toml(value)}" for key, value in values.items())]
+    expected = {"mesh": "teapot"} | {key.split(".")[-1]: value for key, value in values.items()}
+    if lights is not None:
+        lines += ["lights = []"] * (not lights)
+        for direction, color in lights:
+            lines += ["[[lights]]", f"direction = {toml(direction)}"]
+            lines += [f"color = {toml(color)}"] if color else []
+        expected["lights"] = tuple((*direction, *(color or (1, 1, 1))) for direction, color in lights)
+    assert read_scene_file(write("\n".join(lines))).values == expected
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(content=st.binary(max_size=200))
+def test_any_bytes_are_refused_in_one_line(write, content):
+    with pytest.raises(InputError) as error:
+        read_scene_file(write(content))
+    assert str(error.value).isprintable()
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
 def test_examples_are_read(path):
     file = read_scene_file(path)

@@ -1,0 +1,704 @@
+"""Mutants: how many small faults in the hardware of every device its tests would find.
+
+``python -m bench.mutants [DEVICE ...]`` takes faults of a device at random (a bit of a cell that is stuck,
+inverted, or inverted by a neighbour: Yosys' pass ``mutate``), and gives each the vectors of the device's
+tests. These are the real ones: the tests run, and what they send through the unit is kept. A mutant is killed
+if an output beat, or its clock, is not that of the unit; in a run without stalls the clocks of the inputs
+count, too. Of the others, those are equivalent that no stimulus could tell from the unit, as Yosys and ABC
+(package pyosys) prove; they count for nothing. The *score* is the share of the rest that is killed. Clocks
+are not mutated, and reset stays low: tests and proofs of their own hold each unit to it.
+
+All mutants are one compiled model, an input of which chooses. The exit status is 1 when a device's score is
+less than `LEAST`, or a mutant survives that `mutants.json` gives no reason for; 2 for bad input.
+"""
+
+import contextlib
+import ctypes
+import functools
+import hashlib
+import io
+import json
+import multiprocessing
+import re
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import pytest
+from amaranth.back import rtlil
+from amaranth.hdl import Module, Mux, Value
+from amaranth.lib.wiring import Component, In, Member
+from amaranth.sim import Simulator
+from tqdm import tqdm
+
+from golden.pipeline import METHODS, ShadingPipeline
+from hdl.pipeline import INTERPOLATORS, ShadingPipelineUnit
+from sim import cxxrtl, engine, pysim
+from sim.engine import CompilerMissing, Ports, SimulationError, Stimulus, Trace
+from sim.errors import InputError
+from sim.output import check_writable, write_json
+
+from .blocks import BLOCKS
+from .fpga import _YOSYS, ToolError
+from .store import Task, results_of, version_of
+
+__all__ = [
+    "DEVICES",
+    "LEAST",
+    "Device",
+    "Score",
+    "Wrapped",
+    "main",
+    "measure",
+    "scores",
+    "table",
+    "vectors_of",
+]
+
+COUNT = 200
+SEED = 7
+
+LEAST = 0.95
+"""Target: the least score of a device."""
+
+_TESTS = Path(__file__).parents[1] / "tests"
+_ARGUED = "mutants.json"
+_SECONDS = 10
+"""After which a proof that a mutant is equivalent is given up."""
+
+
+@dataclass(frozen=True)
+class Device:
+    """What is mutated, and by what its faults are looked for.
+
+    Parameters
+    ----------
+    name : str
+        As in the device table.
+    unit : callable
+        Makes the unit that the tests drive.
+    tests : tuple of str
+        Files of ``tests/hdl``.
+    within : str
+        Submodule of the unit that is mutated, where it is not all of it.
+    """
+
+    name: str
+    unit: Callable[[], Component]
+    tests: tuple[str, ...]
+    within: str = ""
+
+
+def _devices() -> dict[str, Device]:
+    """The first variant of every device that has tests of its own; interpolators inside their pipelines."""
+    found: dict[str, Device] = {}
+    methods = {name: INTERPOLATORS[type(p)].__module__.removeprefix("hdl.") for name, p in METHODS.items()}
+    for block in BLOCKS:
+        name = block.device
+        if name in found:
+            continue
+        unit, module, within = block.unit, name, ""
+        if methods.get(block.variant) == name and name != "local_chord_interpolator":
+            unit = partial(ShadingPipelineUnit, ShadingPipeline(block.variant))
+            module, within = "pipeline", "interpolator"
+        else:
+            unit = block.unit
+            module = _class_of(unit).__module__.removeprefix("hdl.")
+        tests = [f"test_{stem}.py" for stem in dict.fromkeys((module, name))]
+        found[name] = Device(name, unit, tuple(t for t in tests if (_TESTS / "hdl" / t).exists()), within)
+    return found
+
+
+def _class_of(unit: Callable[[], Component]) -> type:
+    return unit.func if isinstance(unit, partial) else unit
+
+
+DEVICES: dict[str, Device] = _devices()
+"""Every device, by name, in the order of the device table."""
+
+
+# The vectors of the tests.
+
+
+class _Recorder:
+    """Keeps what tests send through one unit, and skips those of other units and those without an engine.
+
+    The compiled engine stands in for Amaranth's simulator, of which it is known to give the same.
+    """
+
+    def __init__(self, unit: Component):
+        self._type, self._netlist = type(unit), rtlil.convert(unit, emit_src=False)
+        self._known: dict[int, tuple[Component, bool]] = {}
+        self.runs: list[tuple[Stimulus, Trace]] = []
+
+    def _check(self, unit: Component) -> None:
+        if id(unit) not in self._known:
+            same = type(unit) is self._type and rtlil.convert(unit, emit_src=False) == self._netlist
+            self._known[id(unit)] = unit, same
+        if not self._known[id(unit)][1]:
+            pytest.skip("another unit")
+
+    @contextlib.contextmanager
+    def watching(self) -> Iterator[None]:
+        """Stand between tests and engines."""
+        recorder, compiled, cache = self, engine._compiled, str(cxxrtl.cache_folder())
+        checking = pysim.Simulator
+
+        class Watched:
+            def __init__(self, component, vcd=None):
+                recorder._check(component)
+                # That of the tests is empty.
+                with pytest.MonkeyPatch.context() as patch:
+                    patch.setenv("BLYSK_CACHE", cache)
+                    self._model = compiled(component)
+
+            def run(self, stimulus, progress):
+                trace = self._model.run(stimulus, progress)
+                recorder.runs.append((stimulus, trace))
+                return trace
+
+        class Own(checking):
+            """The simulator that a new model is compared with."""
+
+        def initialise(simulator, *arguments, **options):
+            if not isinstance(simulator, Own):
+                pytest.skip("without an engine")
+            make(simulator, *arguments, **options)
+
+        make = Simulator.__init__
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(engine, "_compiled", Watched)
+            patch.setattr(engine, "_interpreted", Watched)
+            patch.setattr(pysim, "Simulator", Own)
+            patch.setattr(Simulator, "__init__", initialise)
+            yield
+
+
+def _record(name: str) -> list[tuple[Stimulus, Trace]]:
+    """Run the tests of a device, and keep what they send."""
+    device = DEVICES[name]
+    recorder = _Recorder(device.unit())
+    files = [str(_TESTS / "hdl" / name) for name in device.tests]
+    output = io.StringIO()
+    with recorder.watching(), contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
+        status = pytest.main(["--quiet", "-p", "no:cacheprovider", "-W", "ignore", *files])
+    if status or not recorder.runs:
+        lines = output.getvalue().strip().splitlines()
+        raise ToolError(f"the tests of {name} fail or do not drive it: {lines[-1]}")
+    return recorder.runs
+
+
+def vectors_of(name: str) -> list[tuple[Stimulus, Trace]]:
+    """What the tests of a device send through it, and what comes of it, shortest first.
+
+    Parameters
+    ----------
+    name : str
+        A key of `DEVICES`.
+
+    Raises
+    ------
+    ToolError
+        If a test fails, or none drives the unit.
+    """
+    # The tests may themselves be run by a test.
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as executor:
+        runs = executor.submit(_record, name).result()
+    return sorted(runs, key=lambda run: len(run[0].input))
+
+
+# The mutants.
+
+
+class Wrapped(Component):
+    """A unit inside another component.
+
+    Parameters
+    ----------
+    unit : Component
+        The unit.
+    **members : Member
+        Members beside those of the unit, or in place of its ``status``.
+    """
+
+    def __init__(self, unit: Component, **members: Member):
+        self.unit = unit
+        super().__init__({**unit.signature.members, **members})
+
+    def elaborate(self, platform) -> Module:
+        """Connect the unit's members; the unit itself is for those to add who wrap it."""
+        m = Module()
+        for name, member in self.unit.signature.members.items():
+            inner, outer = getattr(self.unit, name), getattr(self, name)
+            if not member.is_port:
+                source, sink = (inner, outer) if name == "o" else (outer, inner)
+                m.d.comb += [
+                    Value.cast(sink.payload).eq(Value.cast(source.payload)),
+                    sink.valid.eq(source.valid),
+                    source.ready.eq(sink.ready),
+                ]
+            elif member.flow is In:
+                m.d.comb += Value.cast(inner).eq(Value.cast(outer))
+            elif self.signature.members[name] == member:
+                m.d.comb += Value.cast(outer).eq(Value.cast(inner))
+        return m
+
+
+class _Observed(Wrapped):
+    """A unit, an input that chooses a mutant, and outputs that are 0 where no partner of a stream looks.
+
+    A ``ready`` is seen while ``valid`` is high, a payload likewise.
+
+    Parameters
+    ----------
+    unit : Component
+        The unit.
+    width : int
+        Bits of that input, ``mutant``.
+    """
+
+    def __init__(self, unit: Component, width: int):
+        super().__init__(unit, mutant=In(width))
+
+    def elaborate(self, platform):
+        """Add the unit."""
+        m = super().elaborate(platform)
+        m.submodules.unit = self.unit
+        payload = Value.cast(self.o.payload)
+        m.d.comb += payload.eq(Mux(self.o.valid, Value.cast(self.unit.o.payload).as_unsigned(), 0))
+        for name in ("i", "write"):
+            if name in self.signature.members:
+                outer = getattr(self, name)
+                m.d.comb += outer.ready.eq(getattr(self.unit, name).ready & outer.valid)
+        return m
+
+
+# Reset is held low, so that it goes.
+_LIST = """\
+read_rtlil top.il
+hierarchy -auto-top
+proc
+flatten
+delete -input w:rst
+setundef -undriven -zero
+opt_expr
+opt_merge
+zinit -all
+opt_clean
+write_rtlil flat.il
+write_json flat.json
+mutate -list {count} -seed {seed} -ctrl mutant {width} 1 -o list.txt c:*{cells}.*"""
+
+# What has several drivers is split: a word whose bits depend on each other would be evaluated several times.
+_MUTATE = """\
+read_rtlil flat.il
+script mutants.txt
+setundef -zero -init
+opt_clean
+splitnets -driver
+write_rtlil mutated.il"""
+
+
+def _yosys(script: str, folder: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", _YOSYS], input=script, capture_output=True, encoding="utf-8", cwd=folder
+    )
+    if done.returncode:
+        raise ToolError(f"Yosys failed: {(done.stderr or done.stdout).strip().splitlines()[-1]}")
+
+
+def _mutate(unit: Component, within: str, count: int, seed: int, folder: Path) -> dict[int, str]:
+    """Write ``flat.il``, the unit, and ``mutated.il``, with all its mutants: what each is, by number."""
+    width = count.bit_length()
+    netlist = rtlil.convert(_Observed(unit, width), name="top", emit_src=False)
+    (folder / "top.il").write_text(netlist)
+    cells = ".*".join(part for part in ("unit", within) if part)
+    _yosys(_LIST.format(count=count, seed=seed, width=width, cells=cells), folder)
+    top = json.loads((folder / "flat.json").read_text())["modules"]["top"]
+    behind = _registers_behind(top)
+    kept, known = [], {}
+    for number, text in enumerate((folder / "list.txt").read_text().splitlines(), 1):
+        mutant = _described(text, top["cells"], behind)
+        # Another clock is no small fault, and a table's words must be constant.
+        if not re.search(r"^\w+ (\$meminit|\S+ [A-Z_]*CLK\[)", mutant):
+            kept.append(text)
+            known[number] = mutant
+    (folder / "mutants.txt").write_text("\n".join(kept))
+    _yosys(_MUTATE, folder)
+    return known
+
+
+def _described(command: str, cells: Mapping[str, Any], behind: Callable[[str], str]) -> str:
+    """Name of a mutant that does not depend on the netlist's numbers."""
+    found = re.search(r"-mode (\S+) .*-cell (\S+) -port (\S+) -portbit (\d+)(?: -ctrlbit (\d+))?", command)
+    mode, cell, port, bit, by = found.groups()
+    cell = cell.removeprefix("\\")
+    return f"{mode} {cells[cell]['type']} {port}[{bit}]{f' by [{by}]' if by else ''} -> {behind(cell)}"
+
+
+def _registers_behind(module: Mapping[str, Any]) -> Callable[[str], str]:
+    """Name, by a cell's name, of the first register or output that its results come to."""
+    cells, readers, names = module["cells"], defaultdict(list), {}
+    for name, net in sorted(module["netnames"].items(), key=lambda item: item[1]["hide_name"]):
+        names.update({bit: name for bit in net["bits"] if bit not in names})
+    for name, cell in cells.items():
+        for port, bits in cell["connections"].items():
+            if cell["port_directions"][port] == "input":
+                for bit in bits:
+                    readers[bit].append(name)
+    ports = {
+        bit for port in module["ports"].values() if port["direction"] == "output" for bit in port["bits"]
+    }
+
+    def behind(start: str) -> str:
+        seen, open_ = {start}, [start]
+        for name in open_:
+            cell = cells[name]
+            outputs = [p for p, direction in cell["port_directions"].items() if direction == "output"]
+            bits = [bit for port in outputs for bit in cell["connections"][port]]
+            shown = bits if cell["type"] == "$dff" else [bit for bit in bits if bit in ports]
+            if shown:
+                return names[shown[0]]
+            following = [reader for bit in bits for reader in readers[bit] if reader not in seen]
+            seen.update(following)
+            open_ += dict.fromkeys(following)
+        return "nothing"
+
+    return behind
+
+
+class _Mutants(cxxrtl.Model):
+    """All mutants of a unit, compiled."""
+
+    def __init__(self, unit: Component, folder: Path):
+        self.ports = Ports(unit)
+        source = resources.files(__package__).joinpath("mutants.cc").read_text(encoding="utf-8")
+        driver = cxxrtl._members(self.ports) + cxxrtl._source("cxxrtl_driver.cc") + source
+        compiler = next(cxxrtl.find_compilers(), None)
+        if compiler is None:
+            raise CompilerMissing("no C++ compiler")
+        # Compiling takes longer than running.
+        compiler = replace(compiler, compile=(*compiler.compile, "-O1"))
+        failure = cxxrtl._build((folder / "mutated.il").read_text(), driver, compiler, "mutants", folder)
+        if failure:
+            raise ToolError(failure)
+        self._library = library = cxxrtl._load(folder / "model", "mutants")
+        library.blysk_open_mutant.restype = ctypes.c_void_p
+        library.blysk_open = library.blysk_open_mutant
+
+    def choose(self, mutant: int) -> None:
+        """Which mutant runs from now on; 0 for the unit."""
+        ctypes.c_uint64.in_dll(self._library, "blysk_mutant").value = mutant
+
+    def trace(self, stimulus: Stimulus) -> Trace:
+        """A run of so many clocks as the stimulus says."""
+        return self._run(stimulus, None)
+
+
+def _killed(model: _Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants: Iterable[int]) -> set[int]:
+    """Those of the mutants that the vectors kill."""
+    alive = set(mutants)
+    for stimulus, trace in vectors:
+        model.choose(0)
+        if difference := model.trace(stimulus).differs(trace):
+            raise ToolError(f"the unit among its mutants is not the unit: {difference} differs")
+        limited = replace(stimulus, limit=trace.clock)
+        expected = _seen(limited, model.trace(limited))
+        for mutant in sorted(alive):
+            model.choose(mutant)
+            if not all(map(np.array_equal, _seen(limited, model.trace(limited)), expected)):
+                alive.remove(mutant)
+    return set(mutants) - alive
+
+
+def _seen(stimulus: Stimulus, trace: Trace) -> tuple:
+    """What a test sees of a run. Clocks of the inputs follow from those of the outputs, but under stalls."""
+    free = not (stimulus.input_stalls.any() or stimulus.output_stalls.any())
+    clocks = (trace.input_clocks,) if free else ()
+    return trace.end, trace.clock, trace.output, trace.clocks, trace.status, *clocks
+
+
+# Equivalence.
+
+_MITER = """\
+read_rtlil gold.il
+rename top gold
+read_rtlil gate.il
+rename top gate
+miter -equiv -flatten gold gate miter
+hierarchy -top miter
+memory_collect
+memory_map
+async2sync
+dffunmap
+opt_expr
+opt_merge
+opt_clean
+setundef -undriven -zero
+techmap
+aigmap
+write_aiger -zinit -map miter.map miter.aig"""
+
+_STAYS = """\
+  cell $dff $stays
+    parameter \\WIDTH {width}
+    parameter \\CLK_POLARITY 1
+    connect \\CLK \\clk
+    connect \\D \\mutant
+    connect \\Q \\mutant
+  end
+end
+"""
+
+
+class _Miter:
+    """A unit beside its mutants, and whether any output ever differs; ``mutant`` is a register of it.
+
+    Parameters
+    ----------
+    folder : path
+        With the netlists that `_mutate` wrote.
+    """
+
+    def __init__(self, folder: Path, width: int):
+        self._folder = folder
+        for name, copy in (("flat.il", "gold.il"), ("mutated.il", "gate.il")):
+            register = f"  attribute \\\\init {width}'0\n  wire width {width} \\\\mutant\n"
+            netlist = re.sub(
+                r"^  wire (width \d+ )?input \d+ \\mutant\n",
+                register,
+                (folder / name).read_text(),
+                flags=re.M,
+            )
+            (folder / copy).write_text(netlist.removesuffix("end\n") + _STAYS.format(width=width))
+        _yosys(_MITER, folder)
+        self._header, *lines = (folder / "miter.aig").read_bytes().split(b"\n", 1)
+        latches = int(self._header.split()[3])
+        *self._latches, self._rest = lines[0].split(b"\n", latches)
+        named = re.findall(r"^latch (\d+) (\d+) gate\.mutant$", (folder / "miter.map").read_text(), re.M)
+        self._places = {int(bit): int(index) for index, bit in named}
+        if len(self._places) != width:
+            raise ToolError("the mutants cannot be told apart in the netlist of the proofs")
+
+    def is_equivalent(self, mutant: int) -> bool | None:
+        """Whether a mutant does what the unit does, whatever comes; ``None``: not decided in time."""
+        latches = list(self._latches)
+        for bit, place in self._places.items():
+            latches[place] += b" 1" * (mutant >> bit & 1)
+        (self._folder / "mutant.aig").write_bytes(b"\n".join([self._header, *latches, self._rest]))
+        abc = Path(find_spec("pyosys").origin).parent / "yosys-abc"
+        script = f"read_aiger mutant.aig; strash; zero; scleanup; scorr; pdr -a -T {_SECONDS}"
+        try:
+            done = subprocess.run(
+                [abc, "-c", script],
+                capture_output=True,
+                encoding="utf-8",
+                cwd=self._folder,
+                timeout=6 * _SECONDS,
+            )
+        except subprocess.TimeoutExpired:
+            return None
+        found = re.search(r"Proved = (\d). +Disproved = (\d)", done.stdout)
+        if done.returncode or found is None:
+            raise ToolError(f"ABC failed: {(done.stderr or done.stdout).strip().splitlines()[-1]}")
+        return {("1", "0"): True, ("0", "1"): False}.get(found.groups())
+
+
+# The scores.
+
+
+@dataclass(frozen=True)
+class Score:
+    """What became of the mutants of a device.
+
+    Parameters
+    ----------
+    device : str
+        Its name.
+    mutants : int
+        How many there were.
+    equivalent : tuple of str
+        Those that are proved to do what the device does.
+    survived : tuple of str
+        Those that are neither killed nor proved equivalent.
+    """
+
+    device: str
+    mutants: int
+    equivalent: tuple[str, ...]
+    survived: tuple[str, ...]
+
+    @property
+    def killed(self) -> int:
+        """How many the vectors kill."""
+        return self.mutants - len(self.equivalent) - len(self.survived)
+
+    @property
+    def score(self) -> float:
+        """Share of those that are not equivalent that is killed; 1 without any."""
+        return self.killed / max(1, self.mutants - len(self.equivalent)) if self.survived else 1.0
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """Survivors that the list gives no reason for."""
+        return tuple(mutant for mutant in self.survived if mutant not in _argued().get(self.device, {}))
+
+
+@functools.cache
+def _argued() -> dict[str, dict[str, str]]:
+    """Reasons why mutants may survive, by device and mutant."""
+    return json.loads(resources.files(__package__).joinpath(_ARGUED).read_text(encoding="utf-8"))
+
+
+def measure(device: str, count: int, seed: int, tests: str) -> dict[str, Any]:
+    """Make mutants of a device and run its tests' vectors on them.
+
+    Parameters
+    ----------
+    device : str
+        A key of `DEVICES`.
+    count, seed : int
+        How many mutants, and the seed of their choice.
+    tests : str
+        Hash of the tests, which the vectors depend on.
+
+    Returns
+    -------
+    dict
+        The fields of a `Score`.
+
+    Raises
+    ------
+    ToolError
+        If a tool or a test fails, or the unit among its mutants is not the unit.
+    """
+    chosen = DEVICES[device]
+    vectors = vectors_of(device)
+    with tempfile.TemporaryDirectory(prefix="blysk-") as name:
+        folder = Path(name)
+        unit = chosen.unit()
+        mutants = _mutate(unit, chosen.within, count, seed, folder)
+        model = _Mutants(unit, folder)
+        alive = sorted(set(mutants) - _killed(model, vectors, mutants))
+        miter = _Miter(folder, count.bit_length()) if alive else None
+        verdicts = {mutant: miter.is_equivalent(mutant) for mutant in alive}
+    return {
+        "device": device,
+        "mutants": len(mutants),
+        "equivalent": [mutants[k] for k, same in verdicts.items() if same],
+        "survived": [mutants[k] for k, same in verdicts.items() if not same],
+    }
+
+
+def scores(
+    devices: Sequence[str],
+    count: int = COUNT,
+    seed: int = SEED,
+    executor: Executor | None = None,
+    progress: Callable[[], object] = lambda: None,
+) -> list[Score]:
+    """Scores of devices, in their order; those that are known are not measured again.
+
+    Parameters
+    ----------
+    devices : sequence of str
+        Keys of `DEVICES`.
+    count, seed : int
+        As for `measure`.
+    executor, progress
+        As for `results_of`.
+    """
+    tasks = []
+    for device in devices:
+        files = [_TESTS / "conftest.py", *(_TESTS / "hdl" / name for name in DEVICES[device].tests)]
+        tests = hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
+        tasks.append(Task(measure, {"device": device, "count": count, "seed": seed, "tests": tests}))
+    return [
+        Score(r["device"], r["mutants"], tuple(r["equivalent"]), tuple(r["survived"]))
+        for r in results_of(tasks, executor, progress)
+    ]
+
+
+def table(rows: Sequence[Score]) -> str:
+    """Table in Markdown."""
+    lines = [
+        "| device | mutants | equivalent | killed | survived | score |",
+        "|---|---:|---:|---:|---:|---:|",
+    ]
+    lines += [
+        f"| {row.device} | {row.mutants} | {len(row.equivalent)} | {row.killed} | {len(row.survived)} "
+        f"| {row.score:.1%} |"
+        for row in rows
+    ]
+    return "\n".join(lines)
+
+
+@click.command()
+@click.argument("devices", nargs=-1, metavar="[DEVICE ...]")
+@click.option(
+    "--count", type=click.IntRange(1, 10_000), default=COUNT, show_default=True, help="Mutants a device."
+)
+@click.option("--seed", default=SEED, show_default=True, help="Of their choice.")
+@click.option("--jobs", type=click.IntRange(1), help="Processes; by default one a processor.")
+@click.option("--json", "figures", type=click.Path(), help="File for every figure.")
+def _command(devices, count, seed, jobs, figures) -> int:
+    """Break every device, or those named, in small ways, and tell how many of them its tests find."""
+    unknown = [device for device in devices if device not in DEVICES]
+    if unknown:
+        raise InputError(unknown[0], "is no device", f"choose from {', '.join(DEVICES)}")
+    missing = [package for package in ("pyosys", "pytest") if version_of(package) is None]
+    if missing:
+        raise InputError("mutants", f"without {' and '.join(missing)}", "pip install 'blysk[test]'")
+    if not _TESTS.exists():
+        raise InputError("mutants", f"there are no tests in {_TESTS}", "run it in the project's own folder")
+    if figures:
+        check_writable(figures)
+    names = devices or tuple(DEVICES)
+    with (
+        ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as executor,
+        tqdm(total=len(names), unit=" devices", leave=False, disable=None) as bar,
+    ):
+        rows = scores(names, count, seed, executor, bar.update)
+    if figures:
+        write_json(figures, [asdict(row) | {"killed": row.killed, "score": row.score} for row in rows])
+    click.echo(table(rows))
+    for row in rows:
+        for mutant in row.open:
+            click.echo(f"survived without a reason: {row.device}: {mutant}", err=True)
+    return 1 if any(row.score < LEAST or row.open for row in rows) else 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table, and judge.
+
+    Returns
+    -------
+    int
+        0; 1 when a score is less than `LEAST`, a mutant survives without a reason or a tool fails, 2 for bad
+        input, told in one line.
+    """
+    try:
+        return _command.main(arguments, prog_name="bench.mutants", standalone_mode=False)
+    except click.ClickException as error:
+        print(f"bench.mutants: {error.format_message().rstrip('.')}; see --help", file=sys.stderr)
+    except (InputError, CompilerMissing) as error:
+        print(f"bench.mutants: {error}", file=sys.stderr)
+    except SimulationError as error:
+        print(f"bench.mutants: {error}", file=sys.stderr)
+        return 1
+    return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,65 @@
+"""Every device as Verilog, in Icarus Verilog and in Verilator, against its twin, beat by beat, under stalls.
+
+The quick run has two devices, the long one every structure: 10^6 beats of each in Verilator; in Icarus
+Verilog, which takes some ten to some hundred times as long, as many as it does in a minute.
+"""
+
+import numpy as np
+import pytest
+
+from bench.blocks import BLOCKS
+from sim.engine import simulate
+
+from .devices import DEVICES
+from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool
+
+QUICK = ("quadratic_evaluator, horner", "intensity, compact")
+QUICK_BEATS = 2000
+BEATS = {"verilator": 1_000_000, "icarus": 20_000}
+"""Of a long run."""
+
+FEWER = {"bisection_chain": 4_000, "recurrence_setup": 5_000}
+"""In Icarus Verilog, where a beat takes 150 clocks, or a second has a thousand."""
+
+
+@pytest.fixture
+def check(tmp_path):
+    """Hold a device's Verilog against its twin; what was run, and the clocks found."""
+
+    def check(name, simulator, beats, **options):
+        if missing_tool(simulator):
+            pytest.skip(missing_tool(simulator))
+        rng = np.random.default_rng(2026)
+        case = DEVICES[name](rng, beats)
+        stalls = {"input_stalls": rng.random(997) < 0.3, "output_stalls": rng.random(1009) < 0.3}
+        bench = VerilogBench(case.unit, tmp_path, **options)
+        found = bench.run(simulator, case.beats, beats, constants=case.constants, **stalls)
+        assert_beats(found.beats, case.expected)
+        return case, stalls, found.clocks
+
+    return check
+
+
+@pytest.mark.parametrize("simulator", SIMULATORS)
+@pytest.mark.parametrize("name", QUICK)
+def test_device(check, name, simulator):
+    """On the clocks of the compiled engine, too."""
+    case, stalls, clocks = check(name, simulator, QUICK_BEATS)
+    run = simulate(
+        case.unit, case.beats, count=QUICK_BEATS, constants=case.constants, engine="auto", **stalls
+    )
+    np.testing.assert_array_equal(clocks, run.clocks)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("simulator", SIMULATORS)
+@pytest.mark.parametrize("name", DEVICES)
+def test_every_device(check, name, simulator):
+    beats = BEATS[simulator]
+    check(name, simulator, FEWER.get(name, beats) if simulator == "icarus" else beats, optimise=True)
+
+
+def test_no_device_is_left_out():
+    """Every device of the device table is here; the pipelines have a file of their own."""
+    here = {name.split(", ")[0] for name in DEVICES}
+    assert here == {block.device for block in BLOCKS} - {"pipeline"}

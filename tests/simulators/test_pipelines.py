@@ -1,0 +1,72 @@
+"""Pipelines as Verilog, in Icarus Verilog and in Verilator, against their twin, pixel by pixel, under stalls.
+
+A frame of each in the long run, and a small one of a few in the quick one.
+"""
+
+import numpy as np
+import pytest
+
+from golden.frame_constants import writes_of
+from golden.pipeline import METHODS, ShadingPipeline
+from hdl.pipeline import ShadingPipelineUnit
+from sim.frame import beats_of
+from sim.testbench import pixel_beats, teapot_frame
+
+from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool
+
+PIPELINES = {
+    **{method: (ShadingPipeline(method), "throughput") for method in METHODS},
+    "compact": (ShadingPipeline("chord"), "compact"),
+    "compact, normals and a power": (ShadingPipeline("linear", "blinn"), "compact"),
+    "gate": (ShadingPipeline("chord", "exp", gate=True), "throughput"),
+    "gate, compact": (ShadingPipeline("quadratic", "lyon3", gate=True), "compact"),
+    "lights and materials": (
+        ShadingPipeline("quadratic", "cosquad_lin", lights=3, materials=4, operand="one_minus_cosine"),
+        "throughput",
+    ),
+    "exponent": (ShadingPipeline("chord", "coscos4", lights=2, exponent=60), "throughput"),
+    "grey": (ShadingPipeline("chord", None, grey=True), "throughput"),
+    "without lights": (ShadingPipeline(lights=0, materials=2), "throughput"),
+}
+QUICK = ("chord",)
+FRAMES = {"verilator": ((640, 480), 10_000), "icarus": ((160, 120), 1500)}
+"""Size of the picture, and triangles, of a long run."""
+
+
+@pytest.fixture
+def check(tmp_path):
+    """Hold a pipeline's Verilog against its twin."""
+
+    def check(name, simulator, *size, **options):
+        if missing_tool(simulator):
+            pytest.skip(missing_tool(simulator))
+        design, style = PIPELINES[name]
+        spans, constants, pixels = teapot_frame(design, *size)
+        unit = ShadingPipelineUnit(design, style=style)
+        rng = np.random.default_rng(2026)
+        found = VerilogBench(unit, tmp_path, **options).run(
+            simulator,
+            beats_of(unit, spans),
+            len(pixels.x),
+            write=writes_of(constants),
+            input_stalls=rng.random(997) < 0.3,
+            output_stalls=rng.random(1009) < 0.3,
+        )
+        assert_beats(found.beats, pixel_beats(pixels))
+        assert len(np.unique(pixels.color)) > 10 * min(design.lights, 1)
+        assert (found.status["wide_spans"], found.status["empty_spans"]) == (pixels.wide_spans, 1)
+
+    return check
+
+
+@pytest.mark.parametrize("simulator", SIMULATORS)
+@pytest.mark.parametrize("name", QUICK)
+def test_pipeline(check, name, simulator):
+    check(name, simulator)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("simulator", SIMULATORS)
+@pytest.mark.parametrize("name", PIPELINES)
+def test_a_frame_of_every_pipeline(check, name, simulator):
+    check(name, simulator, *FRAMES[simulator], optimise=True)
