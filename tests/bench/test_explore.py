@@ -504,6 +504,7 @@ def test_processes_and_a_cluster_give_the_same(monkeypatch, tmp_path):
 # The section.
 
 
+@pytest.mark.long
 def test_section_of_real_results():
     """A few designs at the size of the quick report: every row against its results."""
     todo = tasks(quick=True)

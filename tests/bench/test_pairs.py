@@ -97,6 +97,7 @@ def test_bad_mesh_is_one_line(capsys):
     assert capsys.readouterr().err.startswith("bench.pairs: missing.obj: ")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "method", [pytest.param(name, marks=() if "quad" in name else pytest.mark.long) for name in PRINTED]
 )

@@ -79,6 +79,7 @@ def stimulus(ports, beats, write, count, **others):
     )
 
 
+@pytest.mark.long
 @needed
 def test_equal_to_the_engine(tmp_path):
     rng = np.random.default_rng(3)

@@ -120,6 +120,7 @@ class Chain(wiring.Component):
         return m
 
 
+@pytest.mark.long
 def test_with_the_highlight_cosine_unit(normal_pairs):
     rng = np.random.default_rng(3)
     count = 120

@@ -110,6 +110,7 @@ def test_reset_leaves_nothing_behind(normal_pairs, verify_reset, interval):
     assert len({payload for _, payload in found}) == 6
 
 
+@pytest.mark.long
 def test_shorter_spans_need_a_smaller_table(verify, normal_pairs):
     """The same results for every length that fits."""
     rng = np.random.default_rng(9)
@@ -123,6 +124,7 @@ def test_shorter_spans_need_a_smaller_table(verify, normal_pairs):
     verify(unit, beats, expected_of(unit, beats, vectors), constants=constants_of(unit, vectors))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("terms", "fraction_bits", "interval"),
     [(1, 36, 4), *(pytest.param(*p, marks=pytest.mark.long) for p in ((2, 46, 5), (3, 40, 1)))],

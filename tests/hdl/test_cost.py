@@ -96,7 +96,10 @@ def test_devices_cost_what_the_readme_states(name):
         assert f"at most `max(length, {unit.setup_interval})`" in README
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    "method",
+    [m if m in ("quadratic", "chord") else pytest.param(m, marks=pytest.mark.long) for m in METHODS],
+)
 def test_methods_cost_what_the_readme_states(method):
     unit = ShadingPipelineUnit(ShadingPipeline(method))
     cost = cost_of(unit)

@@ -479,6 +479,7 @@ def test_cost_of_a_material_change(normal_pairs):
     assert run.clocks[first[1]] - run.clocks[first[1] - 1] == 1
 
 
+@pytest.mark.long
 def test_indices_of_no_material_change_nothing(normal_pairs):
     """Writes for a material past the last one are taken and lost: 3 words have indices of 2 bits."""
     rng = np.random.default_rng(35)

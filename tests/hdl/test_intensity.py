@@ -33,7 +33,7 @@ def case(rng, lights, brightness, terms):
     )
 
 
-@pytest.mark.parametrize("lights", [1, 2, 3, 16])
+@pytest.mark.parametrize("lights", [1, 2, 3, pytest.param(16, marks=pytest.mark.long)])
 def test_equals_twin(verify, lights):
     rng = np.random.default_rng(lights)
     for brightness in (1, 8):

@@ -169,6 +169,7 @@ def test_dark_beats_pass_the_specular_unit_by(model, operand, interval, gated, n
         assert clocks[249] - clocks[230] == 19
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", ["cosquad", "blinn"])
 def test_exponent_for_good(verify, model, normal_pairs):
     rng = np.random.default_rng(1)

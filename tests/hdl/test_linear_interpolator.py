@@ -31,6 +31,7 @@ def spans_of_every_kind(rng, normal_pairs, count):
     return left, right, rng.integers(0, 12, count)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("method", "interval"), [("linear", 4), ("renormalise", 1), ("renormalise", 4)])
 def test_stiff_flags_under_stalls(normal_pairs, method, interval):
     """As many as the twin has, whichever spans come together; runs of one kind, and all mixed."""

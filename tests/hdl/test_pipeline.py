@@ -134,7 +134,7 @@ def test_clocks(lights, normal_pairs):
     starts = np.cumsum(lengths) - lengths
     first_pixels = result.clocks[starts]
     assert first_pixels[0] == result.input_clocks[0] + unit.latency
-    assert unit.latency == 65 + math.ceil(math.log2(2 * lights + 1))
+    assert unit.latency == 94 + math.ceil(math.log2(2 * lights + 1))
     assert unit.setup_interval == 4
     taken = np.diff(first_pixels)
     assert np.all(taken >= lengths[:-1])
@@ -147,6 +147,7 @@ def test_clocks(lights, normal_pairs):
     assert np.all(within == 1)
 
 
+@pytest.mark.long
 def test_engines_agree(normal_pairs):
     rng = np.random.default_rng(8)
     parameters = ShadingPipeline(model="cosquad_lin", lights=2)
@@ -567,6 +568,7 @@ def test_compact_style_equals_twin_under_stalls(method, model, lights, normal_pa
         assert_pixels(run(unit, spans, constants, pixels, **stalls), pixels)
 
 
+@pytest.mark.long
 def test_compact_style_takes_three_clocks_a_term(normal_pairs):
     """Highlights cost clocks, and what has none does not."""
     rng = np.random.default_rng(1)
@@ -588,6 +590,7 @@ def test_compact_style_takes_three_clocks_a_term(normal_pairs):
     assert cost_of(unit).multiplier_count == 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("lights", "style", "materials"), [(2, "throughput", 1), (1, "compact", 3)])
 def test_spans_with_values(lights, style, materials):
     """The local chord method: its spans carry values of each light, and no normals."""
@@ -662,6 +665,7 @@ def test_gate_changes_no_pixel(method, model, lights, operand, style, normal_pai
                 assert result.clocks[0] == result.input_clocks[0] + unit.latency
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "interval"),
     [("chord", 4), ("chord", 1), pytest.param("quadratic", 7, marks=pytest.mark.long)],

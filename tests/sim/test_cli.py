@@ -303,6 +303,7 @@ def test_scene_file_says_what_the_options_say(scenes, capsys):
     assert (figures["lights"], figures["width"], figures["mesh"]) == (2, 64, "a")
 
 
+@pytest.mark.long
 def test_options_go_before_the_scene_file(scenes, capsys):
     given = [
         "--size",
@@ -332,6 +333,7 @@ def test_options_go_before_the_scene_file(scenes, capsys):
     assert figures_of("a.json")["exponent"] == 50
 
 
+@pytest.mark.long
 def test_place_of_the_camera(capsys):
     """A camera by its place, in any unit of the mesh, and the middle of the mesh as its target."""
 
@@ -563,6 +565,7 @@ def test_output_over_the_mesh(refused):
 # Help and version.
 
 
+@pytest.mark.long
 def test_fit_says_what_it_leaves_out(folder, capsys):
     options = ["--method", "chord", "--gate", "--fit", "--size", "64x48", "--specular", "0"]
     options += ["--engine", "pysim", "--triangles", "64"]
@@ -590,6 +593,7 @@ def test_fitted_turntable(folder, capsys):
         np.testing.assert_array_equal(picture(f"a-000{number}.png"), picture(f"b-000{number}.png"))
 
 
+@pytest.mark.long
 def test_point_lights(folder, refused, capsys):
     local = ["--method", "chord-local", "--point-light", "3,4,5,1,0.5,0.5", "--viewer", "near"]
     assert main(["render", "teapot", *local, "--size", "48x36", "-o", "a.png", "--json", "a.json"]) == 0

@@ -70,6 +70,7 @@ def test_everything_is_needed():
     assert_same_frame(scene, fit)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("style", ["throughput", pytest.param("compact", marks=pytest.mark.long)])
 def test_no_specular_path(style):
     scene = scene_of(replace(CLAY, specular=(0, 0, 0)))
@@ -113,6 +114,7 @@ def test_fixed_exponent():
     assert step.multiplier_count == full.multiplier_count - 1
 
 
+@pytest.mark.long
 def test_equal_materials():
     mesh = teapot(2000)
     mesh = replace(mesh, material=np.arange(len(mesh.faces)) % 3)
@@ -184,6 +186,7 @@ def test_widths():
     assert_same_frame(scene, fit)
 
 
+@pytest.mark.long
 def test_shorter_words():
     """Narrow and short spans; the pixels change by a step at most, and cost less."""
     for mesh, terms in ((teapot(2000), 2), (FLOOR, 1)):

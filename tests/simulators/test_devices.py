@@ -40,7 +40,7 @@ def check(tmp_path):
     return check
 
 
-@pytest.mark.parametrize("simulator", SIMULATORS)
+@pytest.mark.parametrize("simulator", ["icarus", pytest.param("verilator", marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", QUICK)
 def test_device(check, name, simulator):
     """On the clocks of the compiled engine, too."""
