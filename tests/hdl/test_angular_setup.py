@@ -46,7 +46,7 @@ def beats_of(left, right, vector, length, parameters=VARIANTS["half_chord"]):
     ("variant", "interval"),
     [
         ("half_chord", 4),
-        ("arccos", 4),
+        pytest.param("arccos", 4, marks=pytest.mark.long),
         *(
             pytest.param(*variant, marks=pytest.mark.long)
             for variant in (("half_chord", None), ("half_chord", 26), ("arccos_printed", None))

@@ -104,6 +104,7 @@ def test_no_gate():
     assert "gate" not in reasons(for_scene(scene, full_of(scene, gate=False)))
 
 
+@pytest.mark.long
 def test_fixed_exponent():
     scene = scene_of()
     fit = for_scene(scene, full_of(scene))
