@@ -33,6 +33,7 @@ from sim.workers import local_executor, processors
 
 from .accuracy import scene_for
 from .blocks import BLOCKS, Block
+from .command import run
 from .store import Task, results_of
 
 __all__ = [
@@ -229,13 +230,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0; 1 when a figure moved by more than `TOLERANCE`, 2 for bad input, told in one line, 130 when
         interrupted.
     """
-    try:
-        return _command.main(arguments, prog_name="bench.baselines", standalone_mode=False)
-    except click.ClickException as error:
-        print(f"bench.baselines: {error.format_message().rstrip('.')}; see --help", file=sys.stderr)
-    except InputError as error:
-        print(f"bench.baselines: {error}", file=sys.stderr)
-    return 2
+    return run(_command, "bench.baselines", arguments)
 
 
 if __name__ == "__main__":

@@ -31,14 +31,14 @@ from golden.specular import MAX_EXPONENT
 from golden.unit_vector import COMPONENT
 from hdl.pipeline import ShadingPipelineUnit
 from sim.cli import Size
-from sim.engine import CompilerMissing, Run, SimulationError, simulate
-from sim.errors import InputError
+from sim.engine import Run, simulate
 from sim.frame import beats_of, prepare
 from sim.mesh import load_mesh
 from sim.output import check_writable, write_json
 from sim.toggles import ToggleCounter
 
 from .accuracy import scene_for
+from .command import run
 
 __all__ = [
     "EXPONENTS",
@@ -387,16 +387,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0; 1 when a frame differs or a simulation goes wrong, 2 for bad input, told in one line.
     """
-    try:
-        return _command.main(arguments, prog_name="bench.gate", standalone_mode=False)
-    except click.ClickException as error:
-        print(f"bench.gate: {error.format_message().rstrip('.')}; see --help", file=sys.stderr)
-    except (InputError, CompilerMissing) as error:
-        print(f"bench.gate: {error}", file=sys.stderr)
-    except SimulationError as error:
-        print(f"bench.gate: {error}", file=sys.stderr)
-        return 1
-    return 2
+    return run(_command, "bench.gate", arguments)
 
 
 if __name__ == "__main__":

@@ -18,14 +18,13 @@ import functools
 import hashlib
 import io
 import json
-import multiprocessing
 import re
 import subprocess
 import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib import resources
@@ -35,7 +34,6 @@ from typing import Any
 
 import click
 import numpy as np
-import pytest
 from amaranth.back import rtlil
 from amaranth.hdl import Module, Mux, Value
 from amaranth.lib.wiring import Component, In, Member
@@ -45,11 +43,14 @@ from tqdm import tqdm
 from golden.pipeline import METHODS, ShadingPipeline
 from hdl.pipeline import INTERPOLATORS, ShadingPipelineUnit
 from sim import cxxrtl, engine, pysim
-from sim.engine import CompilerMissing, Ports, SimulationError, Stimulus, Trace
+from sim.cli import Whole
+from sim.engine import CompilerMissing, Ports, Stimulus, Trace
 from sim.errors import InputError
 from sim.output import check_writable, write_json
+from sim.workers import local_executor, processors
 
 from .blocks import BLOCKS
+from .command import run
 from .fpga import _YOSYS, ToolError
 from .store import Task, results_of, version_of
 
@@ -143,6 +144,8 @@ class _Recorder:
         self.runs: list[tuple[Stimulus, Trace]] = []
 
     def _check(self, unit: Component) -> None:
+        import pytest
+
         if id(unit) not in self._known:
             same = type(unit) is self._type and rtlil.convert(unit, emit_src=False) == self._netlist
             self._known[id(unit)] = unit, same
@@ -152,6 +155,8 @@ class _Recorder:
     @contextlib.contextmanager
     def watching(self) -> Iterator[None]:
         """Stand between tests and engines."""
+        import pytest
+
         recorder, compiled, cache = self, engine._compiled, str(cxxrtl.cache_folder())
         checking = pysim.Simulator
 
@@ -187,6 +192,8 @@ class _Recorder:
 
 def _record(name: str) -> list[tuple[Stimulus, Trace]]:
     """Run the tests of a device, and keep what they send."""
+    import pytest
+
     device = DEVICES[name]
     recorder = _Recorder(device.unit())
     files = [str(_TESTS / "hdl" / name) for name in device.tests]
@@ -213,7 +220,7 @@ def vectors_of(name: str) -> list[tuple[Stimulus, Trace]]:
         If a test fails, or none drives the unit.
     """
     # The tests may themselves be run by a test.
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as executor:
+    with local_executor(1) as executor:
         runs = executor.submit(_record, name).result()
     return sorted(runs, key=lambda run: len(run[0].input))
 
@@ -650,7 +657,7 @@ def table(rows: Sequence[Score]) -> str:
     "--count", type=click.IntRange(1, 10_000), default=COUNT, show_default=True, help="Mutants a device."
 )
 @click.option("--seed", default=SEED, show_default=True, help="Of their choice.")
-@click.option("--jobs", type=click.IntRange(1), help="Processes; by default one a processor.")
+@click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
 @click.option("--json", "figures", type=click.Path(), help="File for every figure.")
 def _command(devices, count, seed, jobs, figures) -> int:
     """Break every device, or those named, in small ways, and tell how many of them its tests find."""
@@ -666,7 +673,7 @@ def _command(devices, count, seed, jobs, figures) -> int:
         check_writable(figures)
     names = devices or tuple(DEVICES)
     with (
-        ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as executor,
+        local_executor(jobs) as executor,
         tqdm(total=len(names), unit=" devices", leave=False, disable=None) as bar,
     ):
         rows = scores(names, count, seed, executor, bar.update)
@@ -688,16 +695,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0; 1 when a score is less than `LEAST`, a mutant survives without a reason or a tool fails, 2 for bad
         input, told in one line.
     """
-    try:
-        return _command.main(arguments, prog_name="bench.mutants", standalone_mode=False)
-    except click.ClickException as error:
-        print(f"bench.mutants: {error.format_message().rstrip('.')}; see --help", file=sys.stderr)
-    except (InputError, CompilerMissing) as error:
-        print(f"bench.mutants: {error}", file=sys.stderr)
-    except SimulationError as error:
-        print(f"bench.mutants: {error}", file=sys.stderr)
-        return 1
-    return 2
+    return run(_command, "bench.mutants", arguments)
 
 
 if __name__ == "__main__":

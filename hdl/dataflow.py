@@ -112,14 +112,11 @@ class Dataflow:
             raise ValueError(f"interval must be at least 1, not {interval}")
         self.interval = interval
         self._makers: list[tuple[Word, Callable[[_Build], Any]]] = []
+        latency, product = MULTIPLIER_LATENCY, registered_product
+        if hurries:
+            latency, product = 1, lambda register, a, b: register(a * b, "product")
         operand = signed(MULTIPLIER_BITS)
-        self.multiplier = self.share(
-            "multiplier",
-            multiplications,
-            (operand, operand),
-            1 if hurries else MULTIPLIER_LATENCY,
-            (lambda register, a, b: register(a * b, "product")) if hurries else registered_product,
-        )
+        self.multiplier = self.share("multiplier", multiplications, (operand, operand), latency, product)
 
     def _add(self, name: str, age: int, stands: int, make: Callable[["_Build"], Any]) -> Word:
         word = Word(name, age, stands)

@@ -1,12 +1,10 @@
 """Mutants: known faults and known equivalents, scores, the list of reasons, bad input."""
 
-import multiprocessing
-from concurrent.futures import ProcessPoolExecutor
-
 import pytest
 
 from bench import mutants
 from bench.mutants import DEVICES, LEAST, Score, main, scores, table
+from sim.workers import local_executor
 
 ROWS = [
     Score("one", 10, ("a", "b"), ("c", "d")),
@@ -21,7 +19,7 @@ def diffuse_vectors():
 
 
 def measured(names, count=mutants.COUNT):
-    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as executor:
+    with local_executor(2) as executor:
         return scores(names, count, executor=executor)
 
 
