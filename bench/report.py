@@ -49,9 +49,11 @@ __all__ = [
     "SECTIONS",
     "about",
     "check_folder",
+    "chosen_tasks",
     "command",
     "embedded",
     "environment",
+    "measured",
     "page",
     "shown",
     "write_report",
@@ -391,6 +393,46 @@ def _measure(tasks: Sequence[Task], jobs: int, progress: Callable[[], object]) -
     return [next(of_times if task.timed else found) for task in tasks]
 
 
+def chosen_tasks(
+    quick: bool, meshes: Sequence[str] = (), names: Sequence[str] = tuple(SECTIONS)
+) -> list[tuple[ModuleType, list[Task]]]:
+    """What is to be measured: sections, in the order of the page, and the tasks of each.
+
+    Parameters
+    ----------
+    quick, meshes, names
+        As for `about`.
+
+    Raises
+    ------
+    InputError
+        If a mesh cannot be read.
+    """
+    return [
+        (module, module.tasks(quick, **({"meshes": meshes} if module is points else {})))
+        for name, module in SECTIONS.items()
+        if name in names
+    ]
+
+
+def measured(
+    chosen: Sequence[tuple[ModuleType, list[Task]]], jobs: int, progress: Callable[[], object]
+) -> list[Section]:
+    """The sections of `chosen_tasks`; what was measured before comes from the cache.
+
+    Parameters
+    ----------
+    chosen
+        From `chosen_tasks`.
+    jobs : int
+        Processes.
+    progress : callable
+        Called after each task.
+    """
+    results = iter(_measure([task for _, own in chosen for task in own], jobs, progress))
+    return [module.section(own, [next(results) for _ in own]) for module, own in chosen]
+
+
 class _Name(click.ParamType):
     """A name of a section."""
 
@@ -445,13 +487,9 @@ def command(folder, quick, meshes, names, jobs):
     check_folder(folder)
     environment()
     names = [name for name in SECTIONS if name in names or not names]
-    chosen = []
-    for name in names:
-        further = {"meshes": meshes} if name == "points" else {}
-        chosen.append((SECTIONS[name], SECTIONS[name].tasks(quick, **further)))
-    tasks = [task for _, own in chosen for task in own]
-    kept = 0
-    with tqdm(total=len(tasks), unit=" measurements", leave=False, disable=None) as bar:
+    chosen = chosen_tasks(quick, meshes, names)
+    total, kept = sum(len(own) for _, own in chosen), 0
+    with tqdm(total=total, unit=" measurements", leave=False, disable=None) as bar:
 
         def count():
             nonlocal kept
@@ -459,12 +497,10 @@ def command(folder, quick, meshes, names, jobs):
             bar.update()
 
         try:
-            results = iter(_measure(tasks, jobs, count))
-            sections = [module.section(own, [next(results) for _ in own]) for module, own in chosen]
-            write_report(folder, sections, about(quick, meshes, names))
+            write_report(folder, measured(chosen, jobs, count), about(quick, meshes, names))
         except KeyboardInterrupt:
             bar.close()
-            text = f"stopped; {kept} of {len(tasks)} measurements are kept, run again to go on"
+            text = f"stopped; {kept} of {total} measurements are kept, run again to go on"
             click.echo(f"blysk: {text}", err=True)
             raise click.exceptions.Exit(130) from None
     click.echo(f"{'report':<12}{folder / _PAGE}")

@@ -11,6 +11,7 @@ import json
 import posixpath
 import re
 import shutil
+import tempfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -48,7 +49,7 @@ from . import accuracy
 from .cosine_quadratic import sphere
 from .pages import PROJECT
 from .points import STEPS, map_colors
-from .report import embedded, environment
+from .report import SECTIONS, about, chosen_tasks, embedded, environment, measured, write_report
 from .store import Task, results_of, version_of
 
 __all__ = [
@@ -127,7 +128,7 @@ REFERENCES = {
 
 _MARK = "site.json"
 _PAGE = "index.html"
-_EXTRAS = ("ziglang", "jinja2", "markdown_it")
+_EXTRAS = ("ziglang", "jinja2", "markdown_it", "flip_evaluator", "skimage")
 
 
 # What is drawn.
@@ -625,7 +626,7 @@ class _Design(click.ParamType):
     "--report",
     type=click.Path(path_type=Path),
     metavar="FOLDER",
-    help="A report by `blysk bench`, to be part of the site.",
+    help="A report by `blysk bench`, in place of the quick one that is measured for the site.",
 )
 @click.option(
     "--design",
@@ -645,8 +646,9 @@ def command(folder, report, designs, jobs):
     """Write a static site: the pipeline as WebAssembly, simulated live while the light is moved.
 
     The page index.html opens from disk and from any web server, and asks for nothing but the site's own
-    files. A first time takes some minutes; modules and spans are kept in the cache, and made again when the
-    code has changed.
+    files. With it come the report of error against run time and the pages of the devices. A first time takes
+    some minutes; modules, spans and measurements are kept in the cache, and made again when the code has
+    changed.
 
     \b
     Example:
@@ -658,8 +660,12 @@ def command(folder, report, designs, jobs):
         _report_files(report)
     _missing()
     work = tasks(designs or DESIGNS, {name: body.views for name, body in MESHES.items()})
-    kept = 0
-    with tqdm(total=len(work), unit=" parts", leave=False, disable=None) as bar:
+    chosen = chosen_tasks(quick=True) if report is None else []
+    total, kept = len(work) + sum(len(own) for _, own in chosen), 0
+    with (
+        tqdm(total=total, unit=" parts", leave=False, disable=None) as bar,
+        tempfile.TemporaryDirectory(prefix="blysk-") as temporary,
+    ):
 
         def count():
             nonlocal kept
@@ -669,9 +675,12 @@ def command(folder, report, designs, jobs):
         try:
             with local_executor(jobs) as executor:
                 results = results_of(work, executor, count)
+            if report is None:
+                report = Path(temporary, "report")
+                write_report(report, measured(chosen, jobs, count), about(True, (), list(SECTIONS)))
+            write_site(folder, work, results, report)
         except KeyboardInterrupt:
             bar.close()
-            click.echo(f"blysk: stopped; {kept} of {len(work)} parts are kept, run again to go on", err=True)
+            click.echo(f"blysk: stopped; {kept} of {total} parts are kept, run again to go on", err=True)
             raise click.exceptions.Exit(130) from None
-    write_site(folder, work, results, report)
     click.echo(f"{'site':<12}{folder / _PAGE}")

@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from bench import web
+from bench.report import chosen_tasks
 from golden.frame_constants import FrameConstants
 from golden.pipeline import ShadingPipeline
 from sim.cli import main
@@ -258,7 +259,7 @@ def test_report_in_the_site(tmp_path, work, results):
     # Without it the link and the files go.
     web.write_site(tmp_path / "site", work, results)
     assert not (tmp_path / "site" / "report" / "a.csv").exists()
-    assert "blysk bench" in (tmp_path / "site" / "index.html").read_text()
+    assert "report/index.html" not in (tmp_path / "site" / "index.html").read_text()
 
 
 # The command.
@@ -277,9 +278,14 @@ def test_command(tmp_path, monkeypatch, work, results):
             progress()
         return [results[0] if task.function is web.module_of else results[-1] for task in tasks]
 
+    # Of the report that is measured with it, one quick section.
+    monkeypatch.setattr(web, "chosen_tasks", lambda quick: chosen_tasks(quick, names=["errata"]))
     monkeypatch.setattr(web, "results_of", made)
     found = run("-o", tmp_path / "site", "--design", "chord/cosquad", "--design", "linear/exp")
     assert found.exit_code == 0, found.output
+    report = json.loads((tmp_path / "site" / "report" / "report.json").read_text())
+    assert report["quick"]
+    assert list(report["sections"]) == ["errata"]
     assert found.output.split() == ["site", str(tmp_path / "site" / "index.html")]
     modules = [task.settings for task in asked if task.function is web.module_of]
     assert modules == [{"method": method, "model": model} for method, model in DESIGNS]
@@ -309,7 +315,7 @@ def test_command_refuses(tmp_path, monkeypatch, arguments, line):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("name", ["ziglang", "jinja2", "markdown_it"])
+@pytest.mark.parametrize("name", ["ziglang", "jinja2", "markdown_it", "flip_evaluator", "skimage"])
 def test_command_without_the_extra(tmp_path, monkeypatch, name):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda n, *rest: None if n == name else find(n, *rest))
