@@ -9,7 +9,7 @@ COMMA := ,
 # The tests compile their models; without a C++ compiler one comes from PyPI.
 TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang++),[test],[test$(COMMA)native])
 
-.PHONY: demo test test-all prove mutants coverage bench pages lint clean
+.PHONY: demo test test-all prove mutants soak coverage bench pages lint clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
@@ -25,6 +25,9 @@ prove: $(VENV)/.installed-test
 
 mutants: $(VENV)/.installed-test
 	$(BIN)/python -m bench.mutants
+
+soak: $(VENV)/.installed-bench
+	$(BIN)/python -m bench.soak
 
 coverage: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --cov
