@@ -31,7 +31,7 @@ class BisectionChain:
     word          format     why
     ============= ========== ================================================================
     u, l, m       SQ(2, 20)  three bits below the operands; rounded
-    operands      SQ(1, 17)  18 bits of u, ``cos``, ``(l + 1)/2`` and ``m/2`` (cut), l and m (rounded)
+    operands      SQ(1, 17)  18 bits of u, ``cos``, ``(l + 1)/2``, ``m/2`` (cut), l, m (rounded); saturate
     e             SQ(-1, 19) as in `Bisection`
     N             SQ(1, 17)  rounded, saturates
     ============= ========== ================================================================
@@ -173,6 +173,6 @@ class BisectionChain:
 
     def _scaled(self, half: Fixed, e: Fixed) -> Fixed:
         """``2 half (1/2 + e)``."""
-        operand = half.truncate(17).wrap(COMPONENT)
+        operand = half.truncate(17).saturate(COMPONENT)
         total = half + (operand * e).scale(1).truncate(21)
         return total.round_half_up(20).saturate(self.WEIGHT_FORMAT)

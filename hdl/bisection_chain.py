@@ -158,8 +158,8 @@ class BisectionChainUnit(wiring.Component):
                             m.d.sync += total.eq((aligned.round_half_up(18) + added).wrap(p.SUM_FORMAT))
                 after = 3 + 3 * p.steps
                 issue(after, e.scale(2), cosine)
-                issue(after + 1, e.scale(2), half_l.truncate(17).wrap(COMPONENT))
-                issue(after + 2, e.scale(2), half_m.truncate(17).wrap(COMPONENT))
+                issue(after + 1, e.scale(2), half_l.truncate(17).saturate(COMPONENT))
+                issue(after + 2, e.scale(2), half_m.truncate(17).saturate(COMPONENT))
                 with m.If((step == 4) & first_round):
                     m.d.sync += [self.o.payload.wide.eq(angle > limits[1]), first_round.eq(0)]
                 with m.If(step == after + 2):

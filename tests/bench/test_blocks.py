@@ -16,6 +16,7 @@ from golden.arccos import ARCCOS_TABLES, Arccos, HalfChord
 from golden.bisection import Bisection
 from golden.bisection_chain import BisectionChain
 from golden.chord_setup import ChordSetup
+from golden.fixed import Fixed
 from golden.highlight_cosine import HighlightCosine
 from golden.local_chord_setup import LocalChordSetup
 from golden.middle_normal import MIDDLE_NORMAL_FITS, MiddleNormal
@@ -384,6 +385,25 @@ def test_errors_keep_the_bounds_that_are_stated(block):
         assert error <= bound
     assert found[0] > 0 or bounds[0] < 1e-8
     assert found[2] > 0 or block.device in ("dot_product", "gpq")
+
+
+@pytest.mark.parametrize("samples", [FEW, pytest.param(200_000, marks=pytest.mark.long)])
+def test_no_word_wraps_in_its_domain(monkeypatch, samples):
+    """But the phases of the angular setup, where a turn is 1 and goes back to 0."""
+    wraps, found = Fixed.wrap, set()
+
+    def watched(number, format):
+        result = wraps(number, format)
+        if not np.array_equal(result.codes, number.codes):
+            found.add((block.device, format))
+        return result
+
+    monkeypatch.setattr(Fixed, "wrap", watched)
+    for block in BLOCKS:
+        sample_of(block, samples)
+    devices, formats = (set(names) for names in zip(*found, strict=True))
+    assert devices <= {"angular_setup", "angular_interpolator", "pipeline"}
+    assert formats == {AngularSetup.PHASE_FORMAT, AngularSetup.DIRECTION_FORMAT}
 
 
 @pytest.mark.parametrize("device", sorted({block.device for block in BLOCKS}))
