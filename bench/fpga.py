@@ -61,6 +61,7 @@ __all__ = [
     "Parts",
     "Place",
     "Registered",
+    "TooLarge",
     "ToolError",
     "command",
     "lay_out",
@@ -103,6 +104,10 @@ _MANY = 1000
 
 class ToolError(SimulationError):
     """Yosys or nextpnr failed, or made what cannot be timed."""
+
+
+class TooLarge(ToolError):
+    """A design takes more than the FPGA has."""
 
 
 @dataclass(frozen=True)
@@ -447,6 +452,19 @@ def _refuse_untimed(netlist: Mapping[str, Any], family: Family) -> None:
                 raise ToolError(f"the netlist has a cell {name}, which nextpnr does not time paths through")
 
 
+def _refuse_too_large(kinds: Mapping[str, int], family: Family) -> None:
+    """Refuse a netlist, of so many cells by kind, that does not fit: the placer would try for ever."""
+    for name, pattern, most in (
+        ("flip-flops", family.flip_flop, family.capacity.flip_flops),
+        ("multipliers", family.multiplier, family.capacity.multipliers),
+        ("block RAMs", family.block_ram, family.capacity.block_rams),
+        ("look-up tables", "LUT4", family.capacity.luts),
+    ):
+        count = sum(number for kind, number in kinds.items() if re.fullmatch(pattern, kind))
+        if count > most:
+            raise TooLarge(f"does not fit: {count:,} {name}, ports too, on {most:,} of the {family.device}")
+
+
 def _signal(cell: str, family: Family) -> str:
     """The register or memory that a cell is named by."""
     # nextpnr names the pieces of a cell by a `$` or `/` and a word.
@@ -558,6 +576,8 @@ def lay_out(
     ------
     InputError
         If a tool is not installed.
+    TooLarge
+        If it does not fit.
     ToolError
         If a tool fails, or the netlist cannot be timed.
     """
@@ -599,6 +619,7 @@ def _run(
             mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
             _refuse_untimed(mapped, family)
             kinds = Counter(cell["type"] for cell in mapped["modules"]["top"]["cells"].values())
+            _refuse_too_large(kinds, family)
             options = (*family.options, *(family.large if kinds["LUT4"] >= _MANY else ()))
 
             def route(seed: int) -> tuple[int, tuple[Parts, Place]]:
@@ -735,11 +756,16 @@ def command(context, family_name, lights, every_method, devices, seeds, jobs, fi
         check_writable(figures)
     designs = list(_devices(devices) if devices else _pipelines(settings, lights, every_method))
     versions = _versions(family)
-    layouts = []
+    layouts, too_large = [], {}
     with tqdm(total=len(designs) * seeds, unit=" placements", leave=False, disable=None) as bar:
         for name, unit in designs:
             bar.set_description_str(name)
-            layouts.append(lay_out(name, unit(), seeds, jobs, bar.update, family))
+            try:
+                layouts.append(lay_out(name, unit(), seeds, jobs, bar.update, family))
+            except TooLarge as error:
+                if len(designs) == 1:
+                    raise
+                too_large[name] = str(error)
     if figures:
         write_json(
             figures,
@@ -748,6 +774,9 @@ def command(context, family_name, lights, every_method, devices, seeds, jobs, fi
                 "capacity": asdict(family.capacity),
                 "tools": versions,
                 "designs": [layout.as_dict() for layout in layouts],
+                "too_large": too_large,
             },
         )
     click.echo(table(layouts, family))
+    for name, reason in too_large.items():
+        click.echo(f"{name}: {reason}")

@@ -24,6 +24,7 @@ from bench.fpga import (
     Parts,
     Place,
     Registered,
+    TooLarge,
     ToolError,
     lay_out,
     parts_of,
@@ -236,6 +237,56 @@ def test_what_nextpnr_does_not_time_is_not_placed(family, cell, name, cache, mon
     monkeypatch.setattr(fpga, "_versions", lambda family: {})
     with pytest.raises(ToolError, match=f"has a cell {name}, which nextpnr does not time paths through"):
         lay_out("counter", Counter(), 1, family=family)
+
+
+@pytest.mark.parametrize(
+    ("family", "cell", "most", "name"),
+    [
+        (ECP5, "TRELLIS_FF", 24_288, "flip-flops"),
+        (ECP5, "MULT18X18D", 28, "multipliers"),
+        (ECP5, "DP16KD", 56, "block RAMs"),
+        (ECP5, "LUT4", 24_288, "look-up tables"),
+        (NEXUS, "MULT18X18", 56, "multipliers"),
+    ],
+)
+def test_what_does_not_fit_is_not_placed(family, cell, most, name, cache, monkeypatch):
+    """nextpnr's static placer would never end."""
+    count = most
+
+    def run(self, tool, code, arguments, folder, text=""):
+        if tool == "Yosys":
+            (folder / "netlist.json").write_text(json.dumps(netlist(*[(cell, {}, 3, 4)] * count)))
+        else:
+            raise ToolError("it is placed")
+
+    monkeypatch.setattr(fpga._Runner, "run", run)
+    monkeypatch.setattr(fpga, "_versions", lambda family: {})
+    with pytest.raises(ToolError, match=r"^it is placed$"):
+        lay_out("counter", Counter(), 1, family=family)
+    count += 1
+    with pytest.raises(TooLarge, match=f"^does not fit: {count:,} {name}, ports too, on {most:,} of the "):
+        lay_out("counter", Counter(), 1, family=family)
+
+
+def test_command_goes_on_after_what_does_not_fit(calls, cache, tmp_path, capsys, monkeypatch):
+    lay_out = fpga.lay_out
+
+    def refuses(name, *arguments):
+        layout = lay_out(name, *arguments)
+        if name == "diffuse":
+            raise TooLarge("does not fit: 30 multipliers")
+        return layout
+
+    monkeypatch.setattr(fpga, "lay_out", refuses)
+    path = tmp_path / "out.json"
+    assert main(["fpga", "--device", "diffuse", "--device", "gpq", "--seeds", "1", "--json", str(path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[2].startswith("gpq ")
+    assert lines[3] == "diffuse: does not fit: 30 multipliers"
+    assert json.loads(path.read_text())["too_large"] == {"diffuse": "does not fit: 30 multipliers"}
+    # Alone it is an error.
+    assert main(["fpga", "--device", "diffuse", "--seeds", "1"]) == 1
+    assert capsys.readouterr().err == "blysk: does not fit: 30 multipliers\n"
 
 
 def test_every_port_has_a_register():
