@@ -5,13 +5,12 @@ from typing import Any
 
 from golden.pipeline import METHODS, ShadingPipeline
 from hdl.pipeline import ShadingPipelineUnit
-from sim.errors import InputError
 
-from .fpga import ECP5, FAMILIES, SEEDS, ToolError, lay_out, tool_versions
+from .fpga import ECP5, FAMILIES, SEEDS, TooLarge, lay_out, tool_versions
 from .section import Cell, Section, Table
 from .store import Task
 
-__all__ = ["measure", "section", "tasks"]
+__all__ = ["measure", "section", "task", "tasks"]
 
 MODEL = "cosquad"
 
@@ -47,10 +46,27 @@ def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, s
         Versions of the tools, which the result depends on.
     """
     design = ShadingPipelineUnit(ShadingPipeline(method, model))
+    if None in tools.values():
+        return {"reason": "place and route is not installed: pip install 'blysk[fpga]'"}
     try:
         return lay_out(method, design, seeds, family=FAMILIES[family]).as_dict()
-    except (InputError, ToolError) as error:
+    except TooLarge as error:
         return {"reason": str(error)}
+
+
+def task(method: str, model: str = MODEL, family: str = "ecp5") -> Task:
+    """`measure` of a pipeline; one seed for printed methods and other models than `MODEL`.
+
+    Parameters
+    ----------
+    method, model, family
+        As for `measure`.
+    """
+    seeds = 1
+    if method in METHODS and model == MODEL:
+        seeds = SEEDS if FAMILIES[family] is ECP5 else OTHERS_SEEDS
+    settings = {"method": method, "model": model, "family": family, "seeds": seeds}
+    return Task(measure, settings | {"tools": tool_versions(FAMILIES[family])})
 
 
 def tasks(quick: bool) -> list[Task]:
@@ -64,19 +80,9 @@ def tasks(quick: bool) -> list[Task]:
     if quick:
         return []
     return [
-        Task(
-            measure,
-            {
-                "method": method,
-                "model": MODEL,
-                "family": name,
-                "seeds": seeds,
-                "tools": tool_versions(family),
-            },
-        )
+        task(method, family=name)
         for name, family in FAMILIES.items()
-        for methods, seeds in [(METHODS, SEEDS) if family is ECP5 else (OTHERS, OTHERS_SEEDS)]
-        for method in methods
+        for method in (METHODS if family is ECP5 else OTHERS)
     ]
 
 

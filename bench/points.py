@@ -7,8 +7,10 @@ what the hardware takes, its picture with two maps of errors, and the settings t
 import base64
 import hashlib
 import io
+import json
 import math
 import shlex
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import lru_cache, partial
@@ -16,6 +18,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 from PIL import Image
 
@@ -32,9 +35,10 @@ from sim.errors import InputError
 from sim.frame import FrameSimulator, method_in_float64, prepare, twin_frame
 from sim.mesh import load_mesh
 
-from . import accuracy
+from . import accuracy, place_and_route
 from .accuracy import scene_for
-from .fpga import DEVICE, ToolError, lay_out, tool_versions
+from .command import run
+from .fpga import DEVICE, tool_versions
 from .perception import (
     CIEDE2000_MAX,
     CIEDE2000_P99,
@@ -56,7 +60,6 @@ __all__ = [
     "QUICK_SIMULATED",
     "STEPS",
     "TIMES",
-    "clock_rate",
     "frames",
     "front",
     "hardware",
@@ -77,7 +80,7 @@ EXPONENTS = accuracy.EXPONENTS
 GROUPS = {
     "documented": "methods of the documents",
     "own": "methods of this project",
-    "rival": "rivals: what one would build without the documents",
+    "rival": "rivals: normals as they come, or each divided by its length",
     "printed": "as the documents print them",
     "software": "golden renderer, software alone",
 }
@@ -132,11 +135,7 @@ def _axes(kinds: Iterable[str], figures: Mapping[str, tuple[str, str, str]]) -> 
             }
 
 
-ERRORS = [
-    *_axes(("total",), _FIGURES | _PERCEIVED),
-    *_axes(("method",), _FIGURES | _PERCEIVED),
-    *_axes(("arithmetic", "model"), _FIGURES),
-]
+ERRORS = [*_axes(("total", "method", "arithmetic", "model"), _FIGURES | _PERCEIVED)]
 """Measures of error: key, title, unit, and whether ``"less"`` or ``"more"`` is better."""
 
 TIMES = [
@@ -149,8 +148,6 @@ TIMES = [
     )
 ]
 """Measures of run time, in the same form."""
-
-_SEEDS = 3
 
 _REPEATS = 3
 
@@ -309,10 +306,9 @@ def _judged(
     for kind, (shown, reference) in pairs.items():
         figures = error_figures(shown, reference * 255, exact.mask)
         values |= {f"{kind}_{key}": value for key, value in asdict(figures).items()}
-        if kind in ("method", "total"):
-            difference = perceived(shown, reference * 255, exact.mask)
-            values |= {f"{kind}_{key}": value for key, value in asdict(difference).items()}
-            verdicts[kind] = identical_to_the_eye(figures.max_lsb, difference)
+        difference = perceived(shown, reference * 255, exact.mask)
+        values |= {f"{kind}_{key}": value for key, value in asdict(difference).items()}
+        verdicts[kind] = identical_to_the_eye(figures.max_lsb, difference)
     return {
         "errors": {key: value if math.isfinite(value) else None for key, value in values.items()},
         "verdicts": verdicts,
@@ -330,21 +326,6 @@ def hardware(method: str, model: str) -> dict[str, int]:
         See `hdl.cost.Cost.totals`.
     """
     return cost_of(ShadingPipelineUnit(ShadingPipeline(method, model))).totals
-
-
-def clock_rate(method: str, model: str, seeds: int) -> dict[str, Any]:
-    """Clock rate of a design after place and route, see `bench.fpga.lay_out`.
-
-    Returns
-    -------
-    dict
-        ``fmax_mhz``, the median of the seeds, or ``None`` with a ``reason``: the design does not fit.
-    """
-    try:
-        layout = lay_out(f"{method}, {model}", ShadingPipelineUnit(ShadingPipeline(method, model)), seeds)
-    except ToolError as error:
-        return {"fmax_mhz": None, "reason": str(error)}
-    return {"fmax_mhz": layout.fmax[1], "reason": ""}
 
 
 def speeds(
@@ -528,7 +509,7 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
         if not quick or (method, model) in QUICK_SIMULATED:
             found.append(Task(hardware, {"method": method, "model": model}))
         if not quick and all(tool_versions().values()):
-            found.append(Task(clock_rate, {"method": method, "model": model, "seeds": _SEEDS}))
+            found.append(place_and_route.task(method, model))
     return found
 
 
@@ -560,8 +541,9 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
     of_design: dict[tuple, dict] = {}
     of_frame: dict[tuple, dict] = {}
     for task, result in zip(tasks, results, strict=True):
-        if task.function in (hardware, clock_rate):
-            of_design.setdefault((task.settings["method"], task.settings["model"]), {}).update(result)
+        if task.function in (hardware, place_and_route.measure):
+            taken = result if task.function is hardware else {"fmax_mhz": result.get("fmax_median_mhz")}
+            of_design.setdefault((task.settings["method"], task.settings["model"]), {}).update(taken)
         elif task.function in (speeds, software_speeds):
             for key, speed in zip(_keys(task), result, strict=True):
                 of_frame[key] = speed
@@ -660,8 +642,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         bit-true twin, ``float64``: the golden renderer);
       - ``command``: a line for a shell that makes it again;
       - ``errors``: value or ``None`` by key of ``errors``; ``times``: by key of ``times``;
-      - ``verdicts``: ``{"total": bool, "method": bool}``, whether the frame looks identical to the exact
-        frame, and to the exactly interpolated one of the same model;
+      - ``verdicts``: whether both frames look identical, by kind of error: ``total``, ``method``,
+        ``arithmetic``, ``model``;
       - ``hardware``: ``multipliers``, ``cells``, ``register_bits``, ``memory_bits``, ``fmax_mhz``, or
         ``None``;
       - ``counts``: ``pixels``, ``shown``, ``spans``, ``wide_spans``, ``clocks``;
@@ -709,14 +691,20 @@ def _text(points: Sequence[Mapping[str, Any]]) -> list[str]:
         "frame, and the coefficients of a printed variant count as arithmetic. *Method*: against exactly "
         "normalised interpolation along the spans with the same model. *Total*: against the exact "
         "frame, Phong shading as on a GPU with Blinn's model. FLIP and CIEDE2000 tell what an eye sees of "
-        "the method and the total error; *identical to the eye* is a largest error "
+        "an error; *identical to the eye* is a largest error "
         f"of {LARGEST_LSB:g} LSB, or FLIP to {FLIP_P99:g} in 99 % of the pixels and {FLIP_MAX:g} in all, and "
         f"CIEDE2000 to {CIEDE2000_P99:g} and {CIEDE2000_MAX:g}."
     )
+    placed = any(point["hardware"]["fmax_mhz"] for point in points)
     of_time = (
-        "Run times: clocks a pixel from the simulation, first write of a constant to last pixel; "
-        f"nanoseconds at the clock rate after place and route on an {DEVICE} (median of {_SEEDS} seeds); "
-        "pixels that the simulation of the hardware does in a second; and nanoseconds a shown pixel of the "
+        "Run times: clocks a pixel from the simulation, first write of a constant to last pixel; nanoseconds "
+        + (
+            f"at the clock rate after place and route on an {DEVICE}, the median of some seeds, of one for "
+            f"printed methods and other models than `{place_and_route.MODEL}`; "
+            if placed
+            else "in a full report; "
+        )
+        + "pixels that the simulation of the hardware does in a second; and nanoseconds a shown pixel of the "
         "same method and model in float64 NumPy, spans at hand, vectorised over the pixels. White light on a "
         "grey, glossy surface. The golden renderer's own shadings have software times alone; their frames "
         "are rounded to 8 bits."
@@ -745,17 +733,18 @@ def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
                 " The exact frame interpolates normals over triangles, the hardware along spans: that alone "
                 f"is up to {apart:.1f} LSB (`{point['label']}`)."
             )
-    clocked = [point for point in hardware if point["times"]["clocks_per_pixel"] is not None]
     for title, kind, key in (
         ("Fewest clocks", "times", "clocks_per_pixel"),
         ("Smallest total error", "errors", "total_max_lsb"),
         ("Smallest method error", "errors", "method_max_lsb"),
     ):
-        if clocked:
-            best = clocked[int(np.argmin([point[kind][key] for point in clocked]))]
+        measured = [point for point in hardware if point[kind][key] is not None]
+        if measured:
+            best = measured[int(np.argmin([point[kind][key] for point in measured]))]
             errors, clocks = best["errors"], best["times"]["clocks_per_pixel"]
+            speed = "not simulated here" if clocks is None else f"{clocks:.3f} clocks a pixel"
             text += (
-                f" {title}: `{best['label']}`, {clocks:.3f} clocks a pixel, largest total error "
+                f" {title}: `{best['label']}`, {speed}, largest total error "
                 f"{errors['total_max_lsb']:.1f} LSB, method error {errors['method_max_lsb']:.2f}."
             )
     return text
@@ -786,6 +775,8 @@ def _table(points: Sequence[Mapping[str, Any]]) -> Table:
         **{title: _getter("hardware", key) for key, title in hardware.items()},
         **{_heading(axis): _getter("errors", axis["key"]) for axis in others},
         "identical to exact interpolation": lambda point: point["verdicts"]["method"],
+        "identical to the same in float64": lambda point: point["verdicts"]["arithmetic"],
+        "model identical to Blinn's": lambda point: point["verdicts"]["model"],
         **{name: _getter("settings", name) for name in ("method", "model", "engine")},
     }
     rows = [[value(point) for value in columns.values()] for point in points]
@@ -797,8 +788,8 @@ def _table(points: Sequence[Mapping[str, Any]]) -> Table:
         rows=rows,
         note="Engine cxxrtl: simulated RTL; twin: its bit-true twin; float64: the golden renderer, rounded "
         "to 8 bits. Multipliers, cells, register and memory bits are counted before technology mapping. "
-        "Identical to the eye: to the exact frame, and to exact interpolation with the same model; good: "
-        "yes, bad: no.",
+        "Identical to the eye: to the exact frame, to exact interpolation with the same model, and to the "
+        "same method and model in float64; good: yes, bad: no.",
         grades=[[graded[cell] if isinstance(cell, bool) else "" for cell in row] for row in rows],
     )
 
@@ -837,7 +828,7 @@ def _front_table(points: Sequence[Mapping[str, Any]], fronts: Mapping[str, Seque
     )
 
 
-def readme_table(tasks: Sequence[Task], results: Sequence[Any]) -> str:
+def readme_table(points: Sequence[Mapping[str, Any]]) -> str:
     """README's table of accuracy, as Markdown: the designs of `bench.accuracy.DESIGNS`.
 
     Largest arithmetic and method error in LSB at each exponent; largest total error, clocks a pixel and
@@ -845,10 +836,10 @@ def readme_table(tasks: Sequence[Task], results: Sequence[Any]) -> str:
 
     Parameters
     ----------
-    tasks, results
-        Those of `tasks`, in any order; every design was simulated, and exponent 100 is among the exponents.
+    points : sequence of dict
+        Those of `section`; every design was simulated, and exponent 100 is among the exponents.
     """
-    points = [point for point in _points(tasks, results) if point["group"] != "software"]
+    points = [point for point in points if point["group"] != "software"]
     exponents = sorted({point["settings"]["exponent"] for point in points})
     lines = [
         "| mesh | method | model | "
@@ -874,3 +865,18 @@ def readme_table(tasks: Sequence[Task], results: Sequence[Any]) -> str:
         cells += [f"{times['simulated_pixels_per_second'] / 1e6:.1f}"]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join([*lines, ""])
+
+
+@click.command()
+@click.argument("report", type=click.Path())
+def _print(report):
+    """Print README's table of accuracy from the report.json of a full report."""
+    try:
+        sections = json.loads(Path(report).read_text(encoding="utf-8"))["sections"]
+        click.echo(readme_table(sections["points"]["figures"]["points"]), nl=False)
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(report, "is no full report", "give the report.json of `blysk bench`") from None
+
+
+if __name__ == "__main__":
+    sys.exit(run(_print, "bench.points", None))

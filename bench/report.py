@@ -6,6 +6,7 @@ The page is one file: styles, script, pictures and figures are in it, and it ask
 import base64
 import csv
 import functools
+import importlib.util
 import io
 import json
 import math
@@ -181,6 +182,10 @@ def _without_pictures(value: Any) -> Any:
     return [_without_pictures(item) for item in value] if isinstance(value, list | tuple) else value
 
 
+def _missing(name: str) -> InputError:
+    return InputError("bench", f"{name} is not installed", "pip install 'blysk[report]'")
+
+
 @functools.cache
 def environment() -> Any:
     """Jinja's environment of the pages, with their filters.
@@ -195,8 +200,10 @@ def environment() -> Any:
         from markdown_it import MarkdownIt
         from markupsafe import Markup
     except ImportError as error:
-        reason = f"{error.name} is not installed"
-        raise InputError("bench", reason, "pip install 'blysk[report]'") from None
+        raise _missing(error.name) from None
+    for name in ("flip_evaluator", "skimage"):
+        if importlib.util.find_spec(name) is None:
+            raise _missing(name)
     markdown = MarkdownIt("commonmark", {"html": False})
     found = Environment(
         loader=PackageLoader("bench"), undefined=StrictUndefined, autoescape=True, trim_blocks=True
@@ -237,8 +244,9 @@ def page(sections: Sequence[Section], about: Mapping[str, Any]) -> str:
     (explored,) = [section for section in sections if "points" in section.figures] or (None,)
     figures = _without_pictures(explored.figures) if explored else None
     template = environment().get_template("report.html")
+    whole = about["chosen"] == list(SECTIONS)
     return template.render(
-        sections=sections, about=about, explored=explored, figures=figures, axes=AXES, **texts
+        sections=sections, about=about, explored=explored, figures=figures, axes=AXES, whole=whole, **texts
     )
 
 
@@ -380,7 +388,7 @@ def _begin(folder: str) -> None:
         signal.signal(signal.SIGTERM, lambda *_: os.killpg(0, signal.SIGKILL))
 
 
-def _measure(tasks: Sequence[Task], jobs: int, progress: Callable[[], object]) -> list[Any]:
+def measure_all(tasks: Sequence[Task], jobs: int, progress: Callable[[], object]) -> list[Any]:
     """Results of tasks in their order; times are measured at the end, alone, with all models built."""
     timed = [task for task in tasks if task.timed]
     others = [task for task in tasks if not task.timed]
@@ -429,7 +437,7 @@ def measured(
     progress : callable
         Called after each task.
     """
-    results = iter(_measure([task for _, own in chosen for task in own], jobs, progress))
+    results = iter(measure_all([task for _, own in chosen for task in own], jobs, progress))
     return [module.section(own, [next(results) for _ in own]) for module, own in chosen]
 
 

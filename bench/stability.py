@@ -883,7 +883,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     ]
     bad = [grade for _, grade in worst["prepared"].values() if grade == "bad"]
     silent = [method for (_, method), (_, grade) in worst["given"].items() if grade == "bad"]
-    safe = [case["given"] for method in methods for group in cases[method].values() for case in group]
+    everything = [case for method in methods for group in cases[method].values() for case in group]
+    safe = [case["given"] for case in everything if case["inside"]]
     unsafe = sum(case["safe_grade"] == "bad" for case in safe)
     runs = [case for method in streams for case in streams[method]]
     text = [
@@ -902,7 +903,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         f"Bad cells with spans cut: {len(bad)} of {len(worst['prepared'])}. With spans as they come: "
         f"{len(silent)}"
         + (f", of {_listed(sorted(set(silent), key=methods.index))}" if silent else "")
-        + f"; within the safe ranges {unsafe} of {len(safe)} cases are bad.",
+        + f"; of the {len(safe)} cases with spans that the method serves, {unsafe} are bad there.",
         f"In simulation {sum(case['runs'] for case in runs)} runs with stalls, empty spans and resets gave "
         f"{sum(case['runs'] * case['pixels'] for case in runs):,} pixels, "
         f"{sum(case['wrong'] or 0 for case in runs):,} of them wrong"
@@ -947,7 +948,9 @@ def _range_table(ranges: dict[str, dict]) -> Table:
     rows, grades = [], []
     for method, found in ranges.items():
         row: list = [method, *(found["widest"][str(exponent)] for exponent in RANGE_EXPONENTS)]
-        row += [found["none_flagged"], found["all_flagged"]]
+        off = [of["given"]["error"] > GOOD for of in found["sweep"]]
+        good = off.index(True) if True in off else len(off)
+        row += [SWEEP[good - 1] if good else None, found["none_flagged"], found["all_flagged"]]
         grade: list[Grade] = [""] * len(row)
         by_factor = {of["factor"]: of for of in found["outside"]}
         for factor in FACTORS:
@@ -966,6 +969,7 @@ def _range_table(ranges: dict[str, dict]) -> Table:
         rows.append(row)
         grades.append([*grade, "", ""])
     columns = ["method", *(f"widest span at n = {exponent}, degrees" for exponent in RANGE_EXPONENTS)]
+    columns += [f"error to {GOOD:g} LSB up to, degrees"]
     columns += ["no span flagged to, degrees", "every span flagged from, degrees"]
     for factor in FACTORS:
         at = f"at {factor:g} of the widest" if factor != 1 else "at the widest"
@@ -977,7 +981,7 @@ def _range_table(ranges: dict[str, dict]) -> Table:
         "highlight in them; no figure where every span is flagged. Of `chord-local` the widest span is "
         "measured: it depends on the light, and is that of which none of a sample is cut."
     )
-    title = "Safe range of each method, and what it does outside"
+    title = "Range of each method: served whole, exact to a step, flagged; and what it does outside"
     return Table("safe-ranges", title, [*columns, "pixels of a span", "exponents"], rows, note, grades)
 
 

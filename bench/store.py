@@ -141,7 +141,9 @@ def results_of(
         folder.mkdir(mode=0o700, exist_ok=True)
     paths = [folder / f"{task.key}.json" for task in tasks]
     results = [_load(path) for path in paths]
-    missing = [index for index, result in enumerate(results) if result is None]
+    # What two sections ask for is measured once.
+    first = {path: index for index, path in reversed([*enumerate(paths)])}
+    missing = sorted(index for index in first.values() if results[index] is None)
     for _ in range(len(tasks) - len(missing)):
         progress()
 
@@ -167,4 +169,4 @@ def results_of(
                 keep(index, future.result())
     for index in here:
         keep(index, tasks[index].run())
-    return results
+    return [results[first[path]] for path in paths]

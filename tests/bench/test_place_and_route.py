@@ -3,10 +3,9 @@
 import pytest
 
 from bench import place_and_route
-from bench.fpga import FAMILIES, Layout, Parts, Place, ToolError
+from bench.fpga import FAMILIES, Layout, Parts, Place, TooLarge, ToolError
 from bench.place_and_route import OTHERS, OTHERS_SEEDS, measure, section, tasks
 from golden.pipeline import METHODS
-from sim.errors import InputError
 
 
 def versions(family):
@@ -53,20 +52,21 @@ def test_a_table_a_family(found_tools):
     assert "where the tool times them" in found.parts[1].note
 
 
-@pytest.mark.parametrize(
-    "error", [ToolError("it does not fit"), InputError("fpga", "a tool is gone", "bring it")]
-)
-def test_a_design_that_fails_says_so(error, found_tools, monkeypatch):
+def test_a_design_that_does_not_fit_says_so_and_other_failures_are_not_kept(found_tools, monkeypatch):
     def fail(*_, **__):
         raise error
 
+    error = TooLarge("it does not fit")
     monkeypatch.setattr(place_and_route, "lay_out", fail)
     todo = tasks(False)
     found = section(todo, [measure(**task.settings) for task in todo])
     for table in found.parts:
         for line in table.records():
-            assert line["why there is no figure"] == str(error)
+            assert line["why there is no figure"] == "it does not fit"
             assert line["clock rate, median, MHz"] is None
+    error = ToolError("nextpnr ends with status -9")
+    with pytest.raises(ToolError, match="status -9"):
+        measure(**todo[0].settings)
 
 
 def test_missing_tools_are_named(found_tools, monkeypatch):

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from PIL import Image
 
-from bench import accuracy, fpga, points
+from bench import accuracy, place_and_route, points
 from bench.points import (
     DESIGNS,
     ERRORS,
@@ -96,7 +97,7 @@ def test_quick_tasks():
     assert {(s["method"], s["model"]) for s in of_frames(chosen) if s["simulated"]} == set(QUICK_SIMULATED)
     assert [one.settings["shading"] for one in chosen if one.function is software_frames] == [*SHADINGS]
     assert all(one.timed == (one.function in (speeds, software_speeds)) for one in chosen)
-    assert points.clock_rate not in {one.function for one in chosen}
+    assert place_and_route.measure not in {one.function for one in chosen}
     (place,) = {json.dumps(s["place"]) for s in of_frames(chosen)}
     assert len(teapot(json.loads(place)["triangles"]).faces) == 992
     json.dumps([one.settings for one in chosen])
@@ -106,9 +107,9 @@ def test_full_tasks(monkeypatch):
     monkeypatch.setattr(points, "tool_versions", lambda: {"pyosys": "1"})
     chosen = tasks(quick=False)
     assert all(s["simulated"] and s["exponents"] == list(EXPONENTS) for s in of_frames(chosen))
-    assert sum(one.function is points.clock_rate for one in chosen) == len(DESIGNS)
+    assert sum(one.function is place_and_route.measure for one in chosen) == len(DESIGNS)
     monkeypatch.setattr(points, "tool_versions", lambda: {"pyosys": None})
-    assert sum(one.function is points.clock_rate for one in tasks(quick=False)) == 0
+    assert sum(one.function is place_and_route.measure for one in tasks(quick=False)) == 0
 
 
 def test_without_a_compiler_nothing_is_simulated(monkeypatch):
@@ -253,26 +254,19 @@ def test_fronts(measured):
     assert fast["id"] in figures["fronts"]["total_max_lsb|simulated_pixels_per_second"]
 
 
-def test_clock_rate(monkeypatch, measured):
-    def lay_out(name, component, seeds):
-        places = tuple(fpga.Place(k, 80.0 + 10 * k, "", "", 0, 0, {}) for k in range(1, seeds + 1))
-        return fpga.Layout(name, None, places)
-
-    monkeypatch.setattr(points, "ShadingPipelineUnit", lambda design: None)
-    monkeypatch.setattr(points, "lay_out", lay_out)
-    rate = points.clock_rate(*SIMULATED, 3)
-    assert rate == {"fmax_mhz": 100, "reason": ""}
+def test_clock_rate(measured):
+    """That of the section on place and route, without which there are no nanoseconds."""
     chosen, results = measured
-    settings = {"method": SIMULATED[0], "model": SIMULATED[1], "seeds": 3}
-    figures = section([*chosen, Task(points.clock_rate, settings)], [*results, rate]).figures
-    point = next(p for p in figures["points"] if p["id"] == "teapot/chord-local/cosquad/10")
-    assert point["times"]["ns_per_pixel"] == pytest.approx(10 * point["times"]["clocks_per_pixel"])
-
-    def fail(*_):
-        raise fpga.ToolError("too large")
-
-    monkeypatch.setattr(points, "lay_out", fail)
-    assert points.clock_rate(*SIMULATED, 3) == {"fmax_mhz": None, "reason": "too large"}
+    task = place_and_route.task(*SIMULATED)
+    for found, expected in (
+        ({"fmax_median_mhz": 100, "multipliers": 3}, 10),
+        ({"reason": "too large"}, None),
+    ):
+        figures = section([*chosen, task], [*results, found]).figures
+        point = next(p for p in figures["points"] if p["id"] == "teapot/chord-local/cosquad/10")
+        clocks = point["times"]["clocks_per_pixel"]
+        assert point["times"]["ns_per_pixel"] == (expected and pytest.approx(expected * clocks))
+        assert point["hardware"]["multipliers"] != 3
 
 
 def test_section(measured):
@@ -287,6 +281,16 @@ def test_section(measured):
         assert record["total error, largest, LSB"] == point["errors"]["total_max_lsb"]
         assert record["hardware, clocks, clocks a pixel"] == point["times"]["clocks_per_pixel"]
     assert on_front.rows
+    # The best of all designs, those too that were not simulated.
+    exponents = sorted({point["settings"]["exponent"] for point in made.figures["points"]})
+    for exponent, text in zip(exponents, made.text, strict=False):
+        designs = [
+            point
+            for point in made.figures["points"]
+            if point["settings"]["exponent"] == exponent and point["group"] != "software"
+        ]
+        best = min(designs, key=lambda point: point["errors"]["total_max_lsb"])
+        assert f"Smallest total error: `{best['label']}`, " in text
     groups = {point["label"]: point["group"] for point in made.figures["points"]}
     assert groups == {
         "chord-local, cosquad": "own",
@@ -403,7 +407,8 @@ def test_command_of_a_file():
 def test_readme_table(measured):
     chosen, results = measured
     kept = [(t, r) for t, r in zip(chosen, results, strict=True) if t.settings.get("method") == SIMULATED[0]]
-    head, rule, line, end = readme_table(*zip(*kept, strict=True)).split("\n")
+    made = section(*zip(*kept, strict=True))
+    head, rule, line, end = readme_table(made.figures["points"]).split("\n")
     assert head.startswith("| mesh | method | model | n = 10 | n = 100 | total | clocks a pixel |")
     assert len(rule.split("|")) == len(head.split("|")) == len(line.split("|"))
     assert end == ""
@@ -418,6 +423,14 @@ def test_readme_table(measured):
             assert cells[5:7] == [f"{result.total_error.max_lsb:.1f}", f"{frame.clocks / frame.pixels:.3f}"]
 
 
+def test_readme_table_of_no_report(tmp_path):
+    (tmp_path / "report.json").write_text("{}")
+    for name in ("report.json", "none.json"):
+        found = CliRunner().invoke(points._print, [str(tmp_path / name)])
+        assert isinstance(found.exception, InputError)
+        assert "is no full report; give the report.json of `blysk bench`" in str(found.exception)
+
+
 @pytest.mark.parametrize(
     ("method", "model"),
     [
@@ -429,6 +442,7 @@ def test_readme_states_what_is_measured(method, model):
     place = points.place_of("teapot", 10_000, 640, 480)
     settings = {"method": method, "model": model, "place": place, "simulated": True}
     chosen = [Task(function, {**settings, "exponents": [*EXPONENTS]}) for function in (frames, speeds)]
-    line = readme_table(chosen, [one.run() for one in chosen]).splitlines()[2]
+    made = section(chosen, [one.run() for one in chosen])
+    line = readme_table(made.figures["points"]).splitlines()[2]
     # The last column is a time.
     assert line.rsplit("|", 2)[0] in (Path(__file__).parents[2] / "README.md").read_text()

@@ -1,6 +1,7 @@
 """The report: its page, its files, its command."""
 
 import csv
+import importlib.util
 import json
 import os
 import re
@@ -256,10 +257,13 @@ def test_bad_options(run, tmp_path, arguments, message):
     assert not (tmp_path / "report").exists()
 
 
-@pytest.mark.parametrize("module", ["jinja2", "markdown_it"])
+@pytest.mark.parametrize("module", ["jinja2", "markdown_it", "flip_evaluator", "skimage"])
 def test_missing_library_is_named_before_the_work(run, tmp_path, monkeypatch, module):
     report.environment.cache_clear()
-    monkeypatch.setitem(sys.modules, module, None)
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda n, *rest: None if n == module else find(n, *rest))
+    if module in ("jinja2", "markdown_it"):
+        monkeypatch.setitem(sys.modules, module, None)
     monkeypatch.setattr(report, "results_of", lambda *_: pytest.fail("work was begun"))
     result = run(tmp_path / "report")
     assert str(result.exception) == f"bench: {module} is not installed; pip install 'blysk[report]'"

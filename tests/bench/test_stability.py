@@ -19,6 +19,7 @@ from bench.stability import (
     QUICK_METHODS,
     RANGE_EXPONENTS,
     STREAM_GROUP,
+    SWEEP,
     Case,
     arcs,
     cases_of,
@@ -254,6 +255,10 @@ def test_section():
     [row] = tables["safe-ranges"].records()
     assert row["method"] == "chord"
     assert row["widest span at n = 1, degrees"] == 15
+    errors = dict(zip(SWEEP, (of["given"]["error"] for of in results[1]["sweep"]), strict=True))
+    up_to = row["error to 1 LSB up to, degrees"]
+    assert max(error for angle, error in errors.items() if angle <= up_to) <= 1
+    assert errors[min(angle for angle in SWEEP if angle > up_to)] > 1
     text = " ".join(made.text)
     assert f"Bad cells with spans cut: 1 of {len(GROUPS)}." in text
     assert "5 runs" in text

@@ -57,6 +57,15 @@ def test_results_are_in_the_order_of_the_tasks_and_kept(tmp_path, threads):
     assert len(entries(tmp_path)) == 3
 
 
+@pytest.mark.parametrize("threads", [0, 2])
+def test_what_is_asked_for_twice_is_measured_once(tmp_path, threads):
+    tasks = [Task(square, {"number": number}) for number in (3, 1, 3, 3)]
+    executor = ThreadPoolExecutor(threads) if threads else None
+    assert results_of(tasks, executor) == [{"square": 9}, {"square": 1}, {"square": 9}, {"square": 9}]
+    assert sorted(made) == [1, 3]
+    assert results_of(tasks, executor)[3] == {"square": 9}
+
+
 def test_what_changes_a_result_changes_its_key(monkeypatch):
     keys = {Task(square, {"number": 1}).key, Task(square, {"number": 2}).key}
     keys |= {Task(square, {"number": 1, "offset": 0}).key, Task(process, {"number": 1}).key}

@@ -12,6 +12,7 @@ from amaranth.hdl import Fragment
 from bench import thesis
 from bench.accuracy import scene_for
 from bench.errata import FACTOR_PRINTED, ROOT_PRINTED
+from bench.fpga import TooLarge
 from bench.renderer import Timing
 from bench.thesis import (
     CLAIMS,
@@ -32,7 +33,6 @@ from bench.thesis import (
 )
 from golden.interpolation import interpolate
 from golden.renderer import render
-from sim.errors import InputError
 from sim.teapot import teapot
 
 LEFT, RIGHT, VECTORS = thesis._operands()
@@ -176,20 +176,17 @@ def test_devices_are_in_the_table():
 
 
 def test_without_place_and_route(monkeypatch):
-    found = clock_rate("forward differences", 1, has_tools=False)
+    found = clock_rate("forward differences", 1, {"pyosys": None})
     assert found["fmax"] is None
     assert "pip install" in found["reason"]
 
     def refused(name, unit, seeds):
         # A unit that nothing elaborates gives a warning.
         Fragment.get(unit, None)
-        raise InputError("nextpnr", "is not installed", "install it")
+        raise TooLarge("does not fit")
 
     monkeypatch.setattr(thesis, "lay_out", refused)
-    assert clock_rate("forward differences", 1, has_tools=True) == {
-        "fmax": None,
-        "reason": str(InputError("nextpnr", "is not installed", "install it")),
-    }
+    assert clock_rate("forward differences", 1, {"pyosys": "1"}) == {"fmax": None, "reason": "does not fit"}
 
 
 def test_shading_share():
