@@ -16,16 +16,18 @@ import contextlib
 import ctypes
 import functools
 import hashlib
+import inspect
 import io
+import itertools
 import json
 import re
 import subprocess
 import sys
 import tempfile
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, is_dataclass, replace
 from functools import partial
 from importlib import resources
 from importlib.util import find_spec
@@ -75,7 +77,7 @@ LEAST = 0.95
 
 _TESTS = Path(__file__).parents[1] / "tests"
 _ARGUED = "mutants.json"
-_SECONDS = 10
+_SECONDS = 5
 """After which a proof that a mutant is equivalent is given up."""
 
 
@@ -102,13 +104,14 @@ class Device:
 
 
 def _devices() -> dict[str, Device]:
-    """The first variant of every device that has tests of its own; interpolators inside their pipelines."""
+    """Every device that has tests of its own, as it is by default; interpolators inside their pipelines."""
     found: dict[str, Device] = {}
     methods = {name: INTERPOLATORS[type(p)].__module__.removeprefix("hdl.") for name, p in METHODS.items()}
+    blocks = {}
     for block in BLOCKS:
-        name = block.device
-        if name in found:
-            continue
+        if not _is_default(blocks.setdefault(block.device, block).unit) and _is_default(block.unit):
+            blocks[block.device] = block
+    for name, block in blocks.items():
         unit, module, within = block.unit, name, ""
         if methods.get(block.variant) == name and name != "local_chord_interpolator":
             unit = partial(ShadingPipelineUnit, ShadingPipeline(block.variant))
@@ -119,6 +122,18 @@ def _devices() -> dict[str, Device]:
         tests = [f"test_{stem}.py" for stem in dict.fromkeys((module, name))]
         found[name] = Device(name, unit, tuple(t for t in tests if (_TESTS / "hdl" / t).exists()), within)
     return found
+
+
+def _is_default(unit: Callable[[], Component]) -> bool:
+    """Whether a unit is the one that its class makes without arguments."""
+    if not isinstance(unit, partial):
+        return True
+    signature = inspect.signature(unit.func)
+    for name, value in signature.bind(*unit.args, **unit.keywords).arguments.items():
+        default = signature.parameters[name].default
+        if value != (type(value)() if default is None and is_dataclass(value) else default):
+            return False
+    return True
 
 
 def _class_of(unit: Callable[[], Component]) -> type:
@@ -313,6 +328,7 @@ read_rtlil flat.il
 script mutants.txt
 setundef -zero -init
 opt_clean
+write_rtlil whole.il
 splitnets -driver
 write_rtlil mutated.il"""
 
@@ -326,7 +342,10 @@ def _yosys(script: str, folder: Path) -> None:
 
 
 def _mutate(unit: Component, within: str, count: int, seed: int, folder: Path) -> dict[int, str]:
-    """Write ``flat.il``, the unit, and ``mutated.il``, with all its mutants: what each is, by number."""
+    """Write ``flat.il``, the unit, and ``whole.il`` and ``mutated.il``, with all its mutants.
+
+    Returns what each is, by number.
+    """
     width = count.bit_length()
     netlist = rtlil.convert(_Observed(unit, width), name="top", emit_src=False)
     (folder / "top.il").write_text(netlist)
@@ -439,9 +458,9 @@ def _seen(stimulus: Stimulus, trace: Trace) -> tuple:
 # Equivalence.
 
 _MITER = """\
-read_rtlil gold.il
+read_rtlil flat.il
 rename top gold
-read_rtlil gate.il
+read_rtlil whole.il
 rename top gate
 miter -equiv -flatten gold gate miter
 hierarchy -top miter
@@ -453,59 +472,99 @@ opt_expr
 opt_merge
 opt_clean
 setundef -undriven -zero
+zinit -all
 techmap
 aigmap
 write_aiger -zinit -map miter.map miter.aig"""
 
-_STAYS = """\
-  cell $dff $stays
-    parameter \\WIDTH {width}
-    parameter \\CLK_POLARITY 1
-    connect \\CLK \\clk
-    connect \\D \\mutant
-    connect \\Q \\mutant
-  end
-end
-"""
+_ROUNDS = 3
+_NARROW = 12
+
+
+def _numbers(data: bytes) -> Iterator[int]:
+    """Those of AIGER's binary format: seven bits a byte, lowest first, and whether there are more."""
+    value = shift = 0
+    for byte in data:
+        value |= (byte & 127) << shift
+        shift += 7
+        if byte < 128:
+            yield value
+            value = shift = 0
+
+
+def _coded(number: int) -> bytes:
+    code = bytearray()
+    while number > 127:
+        code.append(number & 127 | 128)
+        number >>= 7
+    return bytes([*code, number])
 
 
 class _Miter:
-    """A unit beside its mutants, and whether any output ever differs; ``mutant`` is a register of it.
+    """A unit beside its mutants, and whether any output ever differs: AND gates and one-bit registers.
+
+    Products are too much for a proof. So first, registers become inputs that both units have, and what the
+    units would put into them must be the same, whatever is there: if so, both stay the same by induction.
+    Registers stay registers that are narrow, or tell where beats are, for these control, the mutant's own,
+    and those bits that do differ.
 
     Parameters
     ----------
     folder : path
         With the netlists that `_mutate` wrote.
+    width : int
+        Bits of the input ``mutant``.
     """
 
     def __init__(self, folder: Path, width: int):
         self._folder = folder
-        for name, copy in (("flat.il", "gold.il"), ("mutated.il", "gate.il")):
-            register = f"  attribute \\\\init {width}'0\n  wire width {width} \\\\mutant\n"
-            netlist = re.sub(
-                r"^  wire (width \d+ )?input \d+ \\mutant\n",
-                register,
-                (folder / name).read_text(),
-                flags=re.M,
-            )
-            (folder / copy).write_text(netlist.removesuffix("end\n") + _STAYS.format(width=width))
         _yosys(_MITER, folder)
-        self._header, *lines = (folder / "miter.aig").read_bytes().split(b"\n", 1)
-        latches = int(self._header.split()[3])
-        *self._latches, self._rest = lines[0].split(b"\n", latches)
-        named = re.findall(r"^latch (\d+) (\d+) gate\.mutant$", (folder / "miter.map").read_text(), re.M)
-        self._places = {int(bit): int(index) for index, bit in named}
-        if len(self._places) != width:
-            raise ToolError("the mutants cannot be told apart in the netlist of the proofs")
+        header, rest = (folder / "miter.aig").read_bytes().split(b"\n", 1)
+        self._inputs, latches, outputs, gates = map(int, header.split()[2:6])
+        *lines, rest = rest.split(b"\n", latches + outputs)
+        literals = [int(line.split()[0]) for line in lines]
+        self._next, self._outputs = literals[:latches], literals[latches:]
+        deltas = list(itertools.islice(_numbers(rest), 2 * gates))
+        first = 2 * (1 + self._inputs + latches)
+        left = [first + 2 * k - delta for k, delta in enumerate(deltas[::2])]
+        self._gates = [(a, a - delta) for a, delta in zip(left, deltas[1::2], strict=True)]
+        named = re.findall(r"^(input|latch) (\d+) (\d+) (\S+)$", (folder / "miter.map").read_text(), re.M)
+        places = {(name, int(bit)): int(index) for _, index, bit, name in named}
+        self._mutant = [places["in_mutant", bit] for bit in range(width)]
+        links, same, names = {}, {}, defaultdict(set)
+        for kind, index, bit, name in named:
+            twin = places.get((name.replace("gold.", "gate.", 1), int(bit)))
+            if kind == "latch" and name.startswith("gold.") and twin is not None:
+                # The last of a register's names, of which each bit has the same.
+                links[int(index), twin] = name
+                names[int(index)].add(name.removeprefix("gold."))
+        widths = Counter(links.values())
+        for pair, name in links.items():
+            if widths[name] > _NARROW and not re.search(r"\b(ages|valid)$", name):
+                # Registers of one unit that are always the same may be one.
+                group = set().union(*(same.get(latch, {latch}) for latch in pair))
+                same.update(dict.fromkeys(group, group))
+        groups = sorted({tuple(sorted(group)) for group in same.values()})
+        self._same = {group: set().union(*(names[latch] for latch in group)) for group in groups}
 
-    def is_equivalent(self, mutant: int) -> bool | None:
-        """Whether a mutant does what the unit does, whatever comes; ``None``: not decided in time."""
-        latches = list(self._latches)
-        for bit, place in self._places.items():
-            latches[place] += b" 1" * (mutant >> bit & 1)
-        (self._folder / "mutant.aig").write_bytes(b"\n".join([self._header, *latches, self._rest]))
+    def is_equivalent(self, mutant: int, register: str = "") -> bool:
+        """Whether a mutant, of whatever comes to a register, is proved to do what the unit does."""
+        whole = re.compile(re.escape(register) + r"(\W|$)")
+        cut = [
+            group for group, names in self._same.items() if not (register and any(map(whole.match, names)))
+        ]
+        for _ in range(_ROUNDS):
+            proved, differing = self._prove(mutant, cut)
+            if proved or not differing:
+                return proved
+            cut = [group for group in cut if group not in differing]
+        return False
+
+    def _prove(self, mutant: int, cut: Sequence[tuple[int, ...]]) -> tuple[bool, set[tuple[int, ...]]]:
+        """Whether nothing differs while the ``cut`` groups of registers are inputs, and which of them do."""
+        compared = self._write(mutant, cut)
+        script = f"read_aiger mutant.aig; strash; scleanup; scorr; pdr -a -v -T {_SECONDS}"
         abc = Path(find_spec("pyosys").origin).parent / "yosys-abc"
-        script = f"read_aiger mutant.aig; strash; zero; scleanup; scorr; pdr -a -T {_SECONDS}"
         try:
             done = subprocess.run(
                 [abc, "-c", script],
@@ -515,11 +574,56 @@ class _Miter:
                 timeout=6 * _SECONDS,
             )
         except subprocess.TimeoutExpired:
-            return None
-        found = re.search(r"Proved = (\d). +Disproved = (\d)", done.stdout)
+            return False, set()
+        found = re.search(r"Properties: +All = (\d+). +Proved = (\d+)", done.stdout)
         if done.returncode or found is None:
             raise ToolError(f"ABC failed: {(done.stderr or done.stdout).strip().splitlines()[-1]}")
-        return {("1", "0"): True, ("0", "1"): False}.get(found.groups())
+        asserted = (int(k) for k in re.findall(r"Output +(\d+) was (?:trivially )?asserted", done.stdout))
+        differing = {compared[k - len(self._outputs)] for k in asserted if k >= len(self._outputs)}
+        return found[1] == found[2], differing
+
+    def _write(self, mutant: int, cut: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
+        """Write ``mutant.aig``; of each of its further outputs, the group of registers that it compares."""
+        known, codes = {}, []
+        inputs = self._inputs + len(cut)
+        gone = {latch for group in cut for latch in group}
+        latches = [k for k in range(len(self._next)) if k not in gone]
+        first = 1 + inputs + len(latches)
+
+        def both(a: int, b: int) -> int:
+            a, b = max(a, b), min(a, b)
+            if b < 2 or a ^ b < 2:
+                return a * b if b < 2 else b * (a == b)
+            if (a, b) not in known:
+                known[a, b] = 2 * (first + len(known))
+                codes.append(_coded(known[a, b] - a) + _coded(a - b))
+            return known[a, b]
+
+        new = [0, *range(2, 2 * self._inputs + 2, 2), *[0] * len(self._next)]
+        for bit, place in enumerate(self._mutant):
+            new[1 + place] = mutant >> bit & 1
+        for k, group in enumerate(cut):
+            for latch in group:
+                new[1 + self._inputs + latch] = 2 * (1 + self._inputs + k)
+        for k, latch in enumerate(latches):
+            new[1 + self._inputs + latch] = 2 * (1 + inputs + k)
+
+        def now(literal: int) -> int:
+            return new[literal >> 1] ^ literal & 1
+
+        for a, b in self._gates:
+            new.append(both(now(a), now(b)))
+        outputs, compared = [now(literal) for literal in self._outputs], []
+        for group in cut:
+            a, *others = (now(self._next[latch]) for latch in group)
+            for b in {*others} - {a}:
+                outputs.append(both(both(a, b) ^ 1, both(a ^ 1, b ^ 1) ^ 1))
+                compared.append(group)
+        last = first + len(known) - 1
+        lines = [f"aig {last} {inputs} {len(latches)} {len(outputs)} {len(known)}"]
+        lines += map(str, [*(now(self._next[latch]) for latch in latches), *outputs, ""])
+        (self._folder / "mutant.aig").write_bytes("\n".join(lines).encode() + b"".join(codes))
+        return compared
 
 
 # The scores.
@@ -599,7 +703,7 @@ def measure(device: str, count: int, seed: int, tests: str) -> dict[str, Any]:
         model = _Mutants(unit, folder)
         alive = sorted(set(mutants) - _killed(model, vectors, mutants))
         miter = _Miter(folder, count.bit_length()) if alive else None
-        verdicts = {mutant: miter.is_equivalent(mutant) for mutant in alive}
+        verdicts = {k: miter.is_equivalent(k, mutants[k].rpartition(" ")[2]) for k in alive}
     return {
         "device": device,
         "mutants": len(mutants),

@@ -54,6 +54,7 @@ __all__ = [
     "command",
     "embedded",
     "environment",
+    "measure_all",
     "measured",
     "page",
     "shown",
@@ -389,7 +390,24 @@ def _begin(folder: str) -> None:
 
 
 def measure_all(tasks: Sequence[Task], jobs: int, progress: Callable[[], object]) -> list[Any]:
-    """Results of tasks in their order; times are measured at the end, alone, with all models built."""
+    """Results of tasks in their order; times are measured at the end, alone, with all models built.
+
+    Processes that an interrupt ends take with them what they began, and their files.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        What to measure; what was measured before comes from the cache.
+    jobs : int
+        Processes.
+    progress : callable
+        Called after each.
+
+    Returns
+    -------
+    list
+        See `bench.store.results_of`, which also says what it raises.
+    """
     timed = [task for task in tasks if task.timed]
     others = [task for task in tasks if not task.timed]
     with (

@@ -43,14 +43,23 @@ from sim.output import atomic_writer, files_within, write_json, write_text
 from sim.probes import ObservedPipeline, probes_of
 from sim.teapot import teapot
 from sim.wasm import build, format_of, ports_of
-from sim.workers import local_executor, processors
+from sim.workers import processors
 
 from . import accuracy
 from .cosine_quadratic import sphere
 from .pages import PROJECT
 from .points import STEPS, map_colors
-from .report import SECTIONS, about, chosen_tasks, embedded, environment, measured, write_report
-from .store import Task, results_of, version_of
+from .report import (
+    SECTIONS,
+    about,
+    chosen_tasks,
+    embedded,
+    environment,
+    measure_all,
+    measured,
+    write_report,
+)
+from .store import Task, version_of
 
 __all__ = [
     "BANDS",
@@ -673,8 +682,7 @@ def command(folder, report, designs, jobs):
             bar.update()
 
         try:
-            with local_executor(jobs) as executor:
-                results = results_of(work, executor, count)
+            results = measure_all(work, jobs, count)
             if report is None:
                 report = Path(temporary, "report")
                 write_report(report, measured(chosen, jobs, count), about(True, (), list(SECTIONS)))

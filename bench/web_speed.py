@@ -10,7 +10,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import click
+
 from sim.errors import InputError
+
+from .command import run
 
 __all__ = ["OPTIONS", "find_chromium", "frame_rates", "main"]
 
@@ -90,18 +94,22 @@ def frame_rates(site: Path, designs: Sequence[str] = (), frames: int = 40) -> di
     Raises
     ------
     InputError
-        If there is no site, no Chromium or no playwright.
+        If there is no site, no such module in it, no Chromium or no playwright.
     """
     page_file = Path(site).absolute() / "index.html"
     if not page_file.is_file():
         raise InputError(str(site), "is no site", "make one with `blysk web -o FOLDER`")
+    modules = sorted(path.stem for path in Path(site, "modules").glob("*.js"))
+    unknown = [name for name in designs if name not in modules]
+    if unknown:
+        raise InputError(unknown[0], f"is no module of {site}", f"choose from {', '.join(modules)}")
     chromium = find_chromium()
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
-        raise InputError("bench.web_speed", "playwright is not installed", "pip install playwright") from None
+        raise InputError("browser", "playwright is not installed", "pip install playwright") from None
     if chromium is None:
-        raise InputError("bench.web_speed", "there is no Chromium", "install one") from None
+        raise InputError("browser", "there is no Chromium", "install one")
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     found = {}
@@ -124,21 +132,30 @@ def frame_rates(site: Path, designs: Sequence[str] = (), frames: int = 40) -> di
     return found
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the rates of a site's modules; the argument is its folder, ``site`` by default."""
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
-    try:
-        found = frame_rates(Path(arguments[0] if arguments else "site"), arguments[1:])
-    except InputError as error:
-        print(f"web_speed: {error}", file=sys.stderr)
-        return 2
+@click.command()
+@click.argument("site", type=click.Path(path_type=Path), default="site")
+@click.argument("designs", nargs=-1, metavar="[MODULE ...]")
+def _command(site, designs) -> int:
+    """Measure the frames a second of a SITE by `blysk web`, of all its modules or of those named."""
+    found = frame_rates(site, designs)
     head = f"{'module, mesh':<32}{'frames/s':>9}{'frames/CPU s':>14}{'pixels':>9}{'clocks':>9}"
-    print(f"{head}{'Mpixel/s simulated':>20}")
+    click.echo(f"{head}{'Mpixel/s simulated':>20}")
     for name, row in found.items():
         speed = row["pixels"] / row["seconds"] / 1e6
         rates = f"{row['rate']:>9.1f}{row['processor_rate']:>14.1f}"
-        print(f"{name:<32}{rates}{row['pixels']:>9}{row['clocks']:>9}{speed:>20.2f}")
+        click.echo(f"{name:<32}{rates}{row['pixels']:>9}{row['clocks']:>9}{speed:>20.2f}")
     return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the rates of a site's modules.
+
+    Returns
+    -------
+    int
+        0; 2 for bad input, told in one line.
+    """
+    return run(_command, "bench.web_speed", arguments)
 
 
 if __name__ == "__main__":

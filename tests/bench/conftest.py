@@ -1,9 +1,14 @@
-"""A browser, and a report of made-up figures: what tests share."""
+"""A browser, a command that is stopped, and a report of made-up figures: what tests share."""
 
 import base64
 import io
 import math
-import shutil
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,27 +21,77 @@ from bench.pages import svg
 from bench.report import command
 from bench.section import Drawing, Section, Table
 from bench.store import Task
+from bench.web_speed import OPTIONS, find_chromium
 
 DESIGNS = [*points.DESIGNS[:10], ("chord", "exp"), ("renormalise", "blinn"), points.DESIGNS[-1]]
 EXPONENTS = [10, 100]
 
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-OPTIONS = [
-    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
-    *("--disable-background-networking", "--disable-component-update"),
-]
-
-
 @pytest.fixture(scope="module")
 def browser():
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    if CHROMIUM is None:
+    chromium = find_chromium()
+    if chromium is None:
         pytest.skip("no Chromium on this machine")
     with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        browser = tools.chromium.launch(executable_path=chromium, args=list(OPTIONS))
         yield browser
         browser.close()
+
+
+def session_of(process):
+    """Running processes of the session that a process began: their names by number."""
+    found = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            start, _, rest = path.read_text().rpartition(")")
+        except OSError:
+            continue
+        state, _, _, session = rest.split()[:4]
+        if int(session) == process.pid and state != "Z":
+            found[int(path.parent.name)] = start.partition("(")[2]
+    return found
+
+
+@pytest.fixture
+def interrupted(tmp_path):
+    """Interrupt a script once a process that it began is called ``sleep``: its status, and what it says.
+
+    Neither a process nor a file of it is left.
+    """
+    if not Path("/proc/self/stat").exists():
+        pytest.skip("needs /proc")
+
+    def interrupted(code):
+        script = tmp_path / "script.py"
+        script.write_text(code)
+        process = subprocess.Popen(
+            [sys.executable, str(script)],
+            start_new_session=True,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=tmp_path,
+            env=os.environ | {"TMPDIR": str(tmp_path)},
+        )
+        try:
+            deadline = time.monotonic() + 60
+            while "sleep" not in session_of(process).values():
+                assert time.monotonic() < deadline
+                assert process.poll() is None, process.stderr.read()
+                time.sleep(0.1)
+            process.send_signal(signal.SIGINT)
+            _, text = process.communicate(timeout=30)
+            deadline = time.monotonic() + 10
+            while session_of(process):
+                assert time.monotonic() < deadline, session_of(process)
+                time.sleep(0.1)
+        finally:
+            for number in session_of(process):
+                os.kill(number, signal.SIGKILL)
+        assert list(tmp_path.iterdir()) == [script]
+        return process.returncode, text
+
+    return interrupted
 
 
 def picture(value):
@@ -65,7 +120,9 @@ def frame(rng, task, exponent, simulated):
             "engine": "cxxrtl" if simulated else "twin",
         },
         "errors": errors,
-        "verdicts": {"total": errors["total_max_lsb"] < 1, "method": errors["method_max_lsb"] < 1},
+        "verdicts": {
+            kind: errors[f"{kind}_max_lsb"] < 1 for kind in ("total", "method", "arithmetic", "model")
+        },
         "pictures": {name: picture(value) for name, value in (("frame", 90), ("error", 20), ("total", 200))},
         "pixels": pixels,
         "shown": pixels - 100,

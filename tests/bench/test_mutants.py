@@ -12,6 +12,12 @@ ROWS = [
     Score("three", 3, ("a", "b", "c"), ()),
 ]
 
+# The others take minutes each, and their survivors are not looked through yet.
+MEASURED = [
+    *("dot_product", "gpq", "difference_accumulator", "diffuse", "chord", "half_chord", "highlight_cosine"),
+    *("arccos", "renormaliser", "power", "bisection"),
+]
+
 
 @pytest.fixture(scope="module")
 def diffuse_vectors():
@@ -69,13 +75,13 @@ def test_small_device():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("device", ["dot_product", "gpq", "difference_accumulator", "diffuse"])
+@pytest.mark.parametrize("device", MEASURED)
 def test_mutants_are_killed(device):
     (row,) = measured([device])
     assert row.score >= LEAST
     assert not row.open
-    # Nothing is argued that need not be.
-    assert set(mutants._argued().get(device, {})) <= set(row.survived)
+    # Nothing is argued that is killed; a quick machine may prove what another has to argue.
+    assert set(mutants._argued().get(device, {})) <= {*row.survived, *row.equivalent}
 
 
 def test_bad_input_is_told_in_one_line(capsys, tmp_path):

@@ -5,12 +5,8 @@ import importlib.util
 import json
 import os
 import re
-import signal
-import subprocess
 import sys
-import time
 from html.parser import HTMLParser
-from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -291,23 +287,9 @@ def test_interrupt_says_what_is_kept(run, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def session_of(process):
-    """Running processes of the session that a process began."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            state, _, _, session = path.read_text().rpartition(")")[2].split()[:4]
-        except OSError:
-            continue
-        if int(session) == process.pid and state != "Z":
-            found.append(int(path.parent.name))
-    return found
-
-
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
-def test_interrupt_leaves_nothing_behind(tmp_path):
+def test_interrupt_leaves_nothing_behind(interrupted):
     """A worker in the midst of a program of its own."""
-    code = (
+    status, text = interrupted(
         "import subprocess, sys, bench.report as r\n"
         "def sleep(seconds): subprocess.run(['sleep', str(seconds)])\n"
         "if __name__ == '__main__':\n"
@@ -318,35 +300,8 @@ def test_interrupt_leaves_nothing_behind(tmp_path):
         "    r.SECTIONS['slow'] = Slow()\n"
         "    sys.exit(r.command.main(['report', '--jobs', '1'], standalone_mode=False))\n"
     )
-    script = tmp_path / "script.py"
-    script.write_text(code)
-    process = subprocess.Popen(
-        [sys.executable, str(script)], start_new_session=True, stderr=subprocess.PIPE, text=True, cwd=tmp_path
-    )
-    try:
-        deadline = time.monotonic() + 60
-        while not any(_name(pid) == "sleep" for pid in session_of(process)):
-            assert time.monotonic() < deadline
-            assert process.poll() is None, process.stderr.read()
-            time.sleep(0.1)
-        process.send_signal(signal.SIGINT)
-        _, text = process.communicate(timeout=30)
-        assert process.returncode == 130
-        assert text == "blysk: stopped; 0 of 1 measurements are kept, run again to go on\n"
-        while session_of(process):
-            assert time.monotonic() < deadline
-            time.sleep(0.1)
-    finally:
-        for pid in session_of(process):
-            os.kill(pid, signal.SIGKILL)
-    assert [path.name for path in tmp_path.iterdir()] == ["script.py"]
-
-
-def _name(pid):
-    try:
-        return Path(f"/proc/{pid}/comm").read_text().strip()
-    except OSError:
-        return ""
+    assert status == 130
+    assert text == "blysk: stopped; 0 of 1 measurements are kept, run again to go on\n"
 
 
 @pytest.mark.parametrize("name", SECTIONS)

@@ -3,20 +3,25 @@
 import base64
 import importlib.util
 import json
+import re
 import zlib
 from html.parser import HTMLParser
+from importlib import resources
 
 import numpy as np
 import pytest
+from amaranth.hdl import Fragment
 from click.testing import CliRunner
 
 from bench import web
 from bench.report import chosen_tasks
 from golden.frame_constants import FrameConstants
 from golden.pipeline import ShadingPipeline
+from hdl.pipeline import ShadingPipelineUnit
 from sim.cli import main
 from sim.errors import InputError
 from sim.frame import prepare
+from sim.probes import probes_of
 
 pytest.importorskip("ziglang", reason="ziglang is not installed")
 
@@ -104,6 +109,57 @@ def test_addresses_are_those_of_the_write_port():
     assert beats == list(zip(writes["address"].tolist(), writes["data"].tolist(), strict=True))
 
 
+# Names of words that the page's script lists by hand.
+
+
+@pytest.fixture(scope="module")
+def probes():
+    """Of all modules of the page."""
+    return [probe for pair in web.DESIGNS for probe in probes_of(ShadingPipelineUnit(web.design_of(*pair)))]
+
+
+@pytest.fixture(scope="module")
+def script():
+    return resources.files("bench").joinpath("templates", "web", "app.js").read_text(encoding="utf-8")
+
+
+def names_in(braces):
+    """Names in an object that a script writes down, those of objects spread out in it too."""
+    values = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
+    entries = re.split(r"[,{}]", values.sub("", braces))
+    return [name for entry in entries if (name := entry.partition(":")[0].strip()) not in ("", "...")]
+
+
+def test_exact_values_are_those_of_the_probes(script, probes):
+    (braces,) = re.findall(r"found\.set\(n, \{(.*?)\n +\}\);", script, re.DOTALL)
+    names = names_in(braces)
+    assert len(names) == len(set(names))
+    assert set(names) == {probe.exact for probe in probes if probe.exact}
+
+
+def test_dark_words_are_probes(script, probes):
+    (names,) = re.findall(r"const isDark = (\[.*?\])", script)
+    dark = set(json.loads(names))
+    assert dark <= {probe.name for probe in probes}
+    # All words of the specular data path that are numbers: under the gate they are of another pixel.
+    assert dark == {probe.name for probe in probes if probe.block == "specular" and probe.name != "specular"}
+
+
+def test_every_block_has_a_stage(script, probes, monkeypatch):
+    def uncompiled(component):
+        Fragment.get(component, None)
+        return b""
+
+    monkeypatch.setattr(web, "build", uncompiled)
+    stages = {stage["name"] for stage in web.module_of("chord", "cosquad")["stages"]}
+    (braces,) = re.findall(r"const stageOf = (\{.*?\})", script)
+    stage_of = dict(re.findall(r'(\w+): "(\w+)"', braces))
+    assert list(stage_of) == names_in(braces)
+    blocks = {probe.block for probe in probes}
+    assert set(stage_of) <= blocks
+    assert {stage_of.get(block, block) for block in blocks} == stages
+
+
 # The site, of modules that are none.
 
 
@@ -160,6 +216,9 @@ def test_files_of_the_site(site):
     assert {"index.html", "modules/chord-cosquad.js", "models/blinn.js", "spans/square-1-1.js"} <= set(there)
     page = Addresses((site / "index.html").read_text())
     assert len(page.ids) == len(set(page.ids))
+    text = " ".join((site / "index.html").read_text().split())
+    *lower, highest = web.BANDS
+    assert f"cut for the exponent {', '.join(map(str, lower))} or {highest}, the smallest" in text
     data = json.loads(page.data)
     assert list(data["designs"]) == ["chord-cosquad", "linear-exp"]
     assert data["start"] == {**web.START, "method": "chord", "model": "cosquad"}
@@ -272,7 +331,7 @@ def run(*arguments):
 def test_command(tmp_path, monkeypatch, work, results):
     asked = []
 
-    def made(tasks, executor, progress):
+    def made(tasks, jobs, progress):
         asked.extend(tasks)
         for _ in tasks:
             progress()
@@ -280,7 +339,7 @@ def test_command(tmp_path, monkeypatch, work, results):
 
     # Of the report that is measured with it, one quick section.
     monkeypatch.setattr(web, "chosen_tasks", lambda quick: chosen_tasks(quick, names=["errata"]))
-    monkeypatch.setattr(web, "results_of", made)
+    monkeypatch.setattr(web, "measure_all", made)
     found = run("-o", tmp_path / "site", "--design", "chord/cosquad", "--design", "linear/exp")
     assert found.exit_code == 0, found.output
     report = json.loads((tmp_path / "site" / "report" / "report.json").read_text())
@@ -325,12 +384,31 @@ def test_command_without_the_extra(tmp_path, monkeypatch, name):
 
 
 def test_command_interrupted(tmp_path, monkeypatch):
-    def stop(tasks, executor, progress):
+    def stop(tasks, jobs, progress):
         progress()
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(web, "results_of", stop)
+    monkeypatch.setattr(web, "measure_all", stop)
     found = run("-o", tmp_path / "site")
     assert found.exit_code == 130
     assert "stopped; 1 of" in found.output
     assert not (tmp_path / "site").exists()
+
+
+@pytest.mark.long
+def test_interrupt_leaves_nothing_behind(interrupted):
+    """A worker in the midst of a program of its own, with files of its own."""
+    status, text = interrupted(
+        "import subprocess, sys, tempfile\n"
+        "from bench import web\n"
+        "from bench.store import Task\n"
+        "def sleep(seconds):\n"
+        "    with tempfile.TemporaryDirectory(prefix='blysk-'):\n"
+        "        subprocess.run(['sleep', str(seconds)])\n"
+        "if __name__ == '__main__':\n"
+        "    web.tasks = lambda designs, views: [Task(sleep, {'seconds': 300})]\n"
+        "    web.chosen_tasks = lambda quick: []\n"
+        "    sys.exit(web.command.main(['--jobs', '1'], standalone_mode=False))\n"
+    )
+    assert status == 130
+    assert text == "blysk: stopped; 0 of 1 parts are kept, run again to go on\n"

@@ -19,13 +19,19 @@ from golden.metrics import error_figures
 from golden.renderer import shade_spans
 from golden.unit_vector import ONE
 from sim.beats import pack, unpack
+from sim.cxxrtl import find_compilers
 from sim.engine import Stimulus, simulate
-from sim.frame import _picture, beats_of, prepare
+from sim.frame import FrameSimulator, _picture, beats_of, prepare
 from sim.probes import ObservedPipeline
 from sim.pysim import Model
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 pytest.importorskip("ziglang", reason="ziglang is not installed")
+
+
+def has_compiler():
+    return next(find_compilers(), None) is not None
+
 
 WIDTHS = {"desktop": (1280, 800), "phone": (375, 740)}
 DESIGNS = [("chord", "cosquad"), ("chord", "exp"), ("linear", "cosquad")]
@@ -44,9 +50,9 @@ def site(tmp_path_factory):
 @pytest.fixture
 def open_page(browser, site):
     """Open the page and wait for its first frame; afterwards there was no error, and no request left it."""
-    contexts, errors, requests = [], [], []
+    contexts, folders, errors, requests = [], [], [], []
 
-    def open_page(width="desktop", script=None, waits=True, **options):
+    def open_page(width="desktop", script=None, waits=True, folder=site, **options):
         size = dict(zip(("width", "height"), WIDTHS[width], strict=True))
         context = browser.new_context(viewport=size, **options)
         contexts.append(context)
@@ -58,7 +64,8 @@ def open_page(browser, site):
         page.on("request", lambda request: requests.append(request.url))
         if script:
             page.add_init_script(script)
-        page.goto((site / "index.html").as_uri())
+        folders.append(folder.as_uri())
+        page.goto((folder / "index.html").as_uri())
         if waits:
             page.wait_for_selector("body[data-frame]")
         return page
@@ -69,7 +76,7 @@ def open_page(browser, site):
         context.close()
     assert [text for text in errors if open_page.allowed not in text] == []
     asked = [url for url in requests if not url.startswith("blob:")]
-    assert all(url.startswith(site.as_uri()) for url in asked)
+    assert all(url.startswith(tuple(folders)) for url in asked)
 
 
 def settle(page):
@@ -160,7 +167,33 @@ def test_first_frame_is_that_of_the_native_engine(open_page):
     assert digest(picture_of(page)) == digest(image)
     assert figure(page, "clocks") == run.total_clocks
     assert figure(page, "gated") == run.status["gated_spans"] > 0
+    # What the gate does not prove may have no highlight either.
+    assert page.locator("[data-figure=gated]").inner_text().startswith("≥ ")
     assert 0.3 < figure(page, "largest") < 1
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not has_compiler(), reason="no C++ compiler: pysim would take hours")
+def test_every_module_gives_the_frame_of_the_native_engine(open_page, tmp_path):
+    """All that the command builds by itself: fourteen modules to compile, in both engines."""
+    work = web.tasks(web.DESIGNS, {"teapot": 1})
+    web.write_site(tmp_path / "site", work, results_of(work))
+    page = open_page(folder=tmp_path / "site")
+    assert page.evaluate("() => Object.keys(blysk.site.designs)") == ["-".join(pair) for pair in web.DESIGNS]
+    digests = set()
+    for method, model in web.DESIGNS:
+        page.locator("#method").select_option(method)
+        change(page, "model", model)
+        state = state_of(page)
+        assert (state["method"], state["model"]) == (method, model)
+        image, run = natively(state)
+        shown = digest(picture_of(page))
+        assert shown == digest(image), (method, model)
+        assert figure(page, "clocks") == run.total_clocks, (method, model)
+        assert figure(page, "gated") == run.status["gated_spans"], (method, model)
+        digests.add(shown)
+    # Those that differ by their arithmetic do so in some pixel: none is shown for another.
+    assert len(digests) > len(web.DESIGNS) // 2
 
 
 def test_drag_moves_the_light(open_page):
@@ -217,8 +250,6 @@ def test_every_control_changes_the_frame(open_page):
 @pytest.mark.long
 def test_same_frame_as_the_command_renders(open_page):
     """Where the exponent is that of the spans, the frame is that of `blysk render` for the scene."""
-    from sim.frame import FrameSimulator
-
     page = open_page()
     change(page, "exponent", web.BANDS[0])
     state = state_of(page)
@@ -226,12 +257,6 @@ def test_same_frame_as_the_command_renders(open_page):
     rendered = frame.render(web.scene_of(state))
     assert digest(rendered.image) == digest(picture_of(page))
     assert figure(page, "clocks") == rendered.clocks
-
-
-def has_compiler():
-    from sim.cxxrtl import find_compilers
-
-    return next(find_compilers(), None) is not None
 
 
 def test_constants_are_those_of_python(open_page):
@@ -566,15 +591,83 @@ def test_empty_place(open_page):
     page.evaluate("() => blysk.setClock(4)")
 
 
-def test_light_goes_round_and_the_page_stays_free(open_page):
+def test_light_goes_round(open_page):
     page = open_page()
     count = page.evaluate("() => blysk.frames")
     page.locator("#orbit").click()
     page.wait_for_function(f"() => blysk.frames > {count + 5}")
-    # The page answers while the worker simulates.
     assert page.locator("#orbit").get_attribute("aria-pressed") == "true"
     page.locator("#orbit").click()
     settle(page)
+    assert digest(picture_of(page)) == digest(by_twin(state_of(page)))
+
+
+def test_page_stays_free_while_the_worker_simulates(open_page):
+    """The browser draws all through one long frame: that of fifty times the spans."""
+    page = open_page()
+    assert len(page.workers) == 1
+    _, _, frame = prepared(state_of(page))
+    often = np.tile(np.arange(len(frame.spans)), 50)
+    data = web.encode(frame.spans[often], np.tile(frame.cut_raster.visible, 50))
+    script = """async data => {
+        const bytes = await blysk.core.unpacked(data);
+        await blysk.ask('spans', {name: 'long', bytes});
+        const settings = {...blysk.settingsNow(), spans: 'long'};
+        const model = {kind: 'exp'};
+        let [last, longest, drawn, busy] = [performance.now(), 0, 0, true];
+        const draw = () => {
+            const now = performance.now();
+            [longest, last, drawn] = [Math.max(longest, now - last), now, drawn + 1];
+            if (busy) requestAnimationFrame(draw);
+        };
+        requestAnimationFrame(draw);
+        const {figures} = await blysk.ask('frame', {settings, model});
+        busy = false;
+        longest = Math.max(longest, performance.now() - last);
+        return {longest, drawn, pixels: figures.pixels, job: figures.milliseconds};
+    }"""
+    found = page.evaluate(script, base64.b64encode(data).decode())
+    assert found["pixels"] == 50 * len(frame.cut_raster.span)
+    assert found["longest"] < found["job"] / 4, found
+    assert found["drawn"] > 4
+
+
+COARSE = """
+    const told = performance.now.bind(performance);
+    performance.now = () => Math.floor(told() / 100) * 100;
+"""
+
+
+def test_coarse_clock(open_page):
+    """A browser that tells the time in steps of 100 ms, in the worker too."""
+    in_worker = """
+        const Plain = Blob;
+        window.Blob = class extends Plain {
+            constructor(parts, options) {
+                super(options?.type === 'text/javascript' ? [coarse, ...parts] : parts, options);
+            }
+        };
+    """
+    page = open_page(script=f"{COARSE} const coarse = {json.dumps(COARSE)}; {in_worker}")
+    seconds = []
+    for step in range(40):
+        change(page, "ambient", step / 100)
+        seconds.append(page.evaluate("() => blysk.latest.figures.seconds"))
+        texts = page.locator("#figures dd").all_inner_texts()
+        assert not any("NaN" in text or "∞" in text or "Infinity" in text for text in texts)
+        if not seconds[-1]:
+            break
+    assert not np.any(np.round(10 * np.array(seconds), 6) % 1)
+    assert seconds[-1] == 0
+    assert page.locator("[data-figure=speed]").inner_text() == "–"
+    assert page.locator("#failure").is_hidden()
+    page.locator("#orbit").click()
+    count = page.evaluate("() => blysk.frames")
+    page.wait_for_function(f"() => blysk.frames > {count + 30}")
+    page.locator("#orbit").click()
+    settle(page)
+    rate = page.locator("[data-figure=rate]").inner_text()
+    assert rate == "–" or 0 < float(rate) < 1000
     assert digest(picture_of(page)) == digest(by_twin(state_of(page)))
 
 

@@ -109,6 +109,17 @@ def test_equals_twin_under_stalls(normal_pairs):
     np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
 
 
+def test_every_bit_counts(normal_pairs):
+    """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
+    rng = np.random.default_rng(9)
+    parameters = AdaptiveNormaliser()
+    lengths = np.r_[rng.integers(1, 70, 2000), rng.integers(1000, 4096, 20)]
+    angles = np.where(rng.random(2020) < 0.5, rng.uniform(0, 95, 2020), 10.0 ** rng.uniform(-4, 1, 2020))
+    beats, expected, _ = spans(normal_pairs, parameters, angles, lengths)
+    run = simulate(AdaptiveNormaliserUnit(parameters), beats, count=lengths.sum(), engine="auto")
+    assert_equal(run, expected)
+
+
 @pytest.mark.parametrize("clock", [1, 20, 60, 120, 148, 152, 160, 168])
 def test_reset_leaves_nothing(normal_pairs, clock):
     # Two levels: bisection to 80, segments to 150, pixels to 170.

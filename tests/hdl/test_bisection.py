@@ -6,9 +6,10 @@ import pytest
 
 from golden.bisection import Bisection
 from golden.fixed import Fixed
-from golden.unit_vector import COMPONENT, quantise
+from golden.unit_vector import COMPONENT, ONE_SQUARED, quantise
 from hdl.bisection import BisectionUnit
 from hdl.cost import cost_of
+from sim.engine import simulate
 
 # Latency and multipliers for the initiation intervals 1, 2, ..., as the unit's text states them.
 NARROW_1, NARROW_2, WIDE = Bisection(1, 45), Bisection(2, 45), Bisection()
@@ -73,3 +74,21 @@ def test_equals_twin(verify, normal_pairs, parameters, interval):
         {"normal_a": left, "normal_b": right},
         {"normal_middle": middle.codes, "one_minus_cosine": u.codes, "wide": wide},
     )
+
+
+def test_every_bit_counts(normal_pairs):
+    """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
+    rng = np.random.default_rng(3)
+    angles = rng.uniform(0, 100, 300_000)
+    left, right = (quantise(normals) for normals in normal_pairs(rng, len(angles), angles))
+    # Of the cosine's, those at the border of its rounding: an eighth, so that all of them are there.
+    below = (ONE_SQUARED.codes - np.einsum("ij,ij->i", left, right)) % (1 << 17) - (1 << 16)
+    chosen = np.r_[:20_000, 20_000 + np.flatnonzero(abs(below[20_000:]) < 1 << 13)]
+    left, right = left[chosen], right[chosen]
+    middle, u, wide = WIDE.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    run = simulate(
+        BisectionUnit(WIDE), {"normal_a": left, "normal_b": right}, count=len(chosen), engine="auto"
+    )
+    np.testing.assert_array_equal(run.beats["normal_middle"], middle.codes)
+    np.testing.assert_array_equal(run.beats["one_minus_cosine"], u.codes)
+    np.testing.assert_array_equal(run.beats["wide"], wide)

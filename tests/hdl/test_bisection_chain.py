@@ -58,6 +58,14 @@ def test_equals_twin(normal_pairs, bisection):
     assert run.clocks[0] - run.input_clocks[0] == unit.latency(16)
 
 
+def test_every_bit_counts(normal_pairs):
+    """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
+    beats, normal, wide = spans(normal_pairs, BisectionChain(), 5, 4000)
+    run = simulate(BisectionChainUnit(), beats, count=len(wide), engine="auto")
+    np.testing.assert_array_equal(run.beats["normal"], normal)
+    np.testing.assert_array_equal(run.beats["wide"], wide)
+
+
 @pytest.mark.parametrize("clock", [0, 3, 8, 20, 33, 42, 50, 51, 52])
 def test_reset_in_mid_span_leaves_nothing(normal_pairs, clock):
     """In every state, the wait for a ready sink included; the next span comes out as if it were the first."""

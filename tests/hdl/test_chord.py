@@ -7,6 +7,7 @@ from golden.fixed import Fixed
 from golden.unit_vector import COMPONENT, ONE, quantise
 from hdl.chord import ChordUnit
 from hdl.cost import cost_of
+from sim.engine import simulate
 
 
 def test_equals_twin(verify, normal_pairs):
@@ -16,6 +17,8 @@ def test_equals_twin(verify, normal_pairs):
     ends = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (400, 6))
     # Differences of exactly one and a step more and less.
     border = np.array([[ONE, 0, 0, ONE - d, 0, 0] for d in (2**17 - 1, 2**17, 2**17 + 1)])
+    # The largest differences.
+    border = np.vstack([border, [COMPONENT.min_code] * 3 + [COMPONENT.max_code] * 3])
     border = np.vstack([border, np.roll(border, 3, axis=1)])
     left = np.vstack([left, ends[:, :3], border[:, :3]])
     right = np.vstack([right, ends[:, 3:], border[:, 3:]])
@@ -25,6 +28,16 @@ def test_equals_twin(verify, normal_pairs):
     assert expected.codes.max() == Chord.ARGUMENT_FORMAT.max_code
     assert expected.codes.min() == 0
     verify(ChordUnit(), {"a": left, "b": right}, expected.codes)
+
+
+def test_every_bit_counts(normal_pairs):
+    """Bits that are cut off carry into the others once in many thousands."""
+    rng = np.random.default_rng(2)
+    angles = np.r_[10.0 ** rng.uniform(-4, 0, 50_000), rng.uniform(0, 180, 150_000)]
+    left, right = (quantise(v) for v in normal_pairs(rng, len(angles), angles))
+    expected = Chord().operand(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    run = simulate(ChordUnit(), {"a": left, "b": right}, count=len(angles), engine="auto")
+    np.testing.assert_array_equal(run.beats, expected.codes)
 
 
 def test_timing_and_cost():

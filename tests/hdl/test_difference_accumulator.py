@@ -14,6 +14,12 @@ from sim.engine import simulate
 FORMAT = DifferenceAccumulator().format
 
 
+def half_step(rng, shape):
+    """Differences of half a step of a normal, give or take a code."""
+    half = 1 << FORMAT.fraction_bits - COMPONENT.fraction_bits - 1
+    return half * rng.choice([-1, 1], shape) + rng.integers(-1, 2, shape)
+
+
 def spans(lengths, seed):
     """Spans with differences of every size, the words' ends among them, and their normals by the twin."""
     rng = np.random.default_rng(seed)
@@ -22,6 +28,8 @@ def spans(lengths, seed):
     size = 2.0 ** rng.uniform(0, FORMAT.width - 1, (2, len(lengths), 3))
     first, second = (np.trunc(s * rng.choice([-1, 1], s.shape)).astype(np.int64) for s in size)
     first[::17], second[::19] = FORMAT.min_code, FORMAT.max_code
+    # The second pixel a code below the border of the rounding, on it, and above.
+    first[1::17], second[1::17] = half_step(rng, first[1::17].shape), 0
     span = np.repeat(np.arange(len(lengths)), lengths)
     step = np.arange(len(span)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
     normals = DifferenceAccumulator().compute(

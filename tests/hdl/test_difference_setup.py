@@ -10,6 +10,7 @@ from golden.gpq import GPQ
 from golden.unit_vector import COMPONENT
 from hdl.cost import cost_of
 from hdl.difference_setup import DifferenceSetupUnit
+from sim.engine import simulate
 
 OWN, DOCUMENTED = DifferenceSetup(), DifferenceSetup(as_documented=True)
 # Latency and multipliers for the initiation intervals 1, 2, ..., as the unit's text states them.
@@ -115,3 +116,13 @@ def test_equals_twin_for_every_length(verify, parameters, interval):
     rng = np.random.default_rng(4)
     beats = operands(rng, np.r_[np.arange(1, 4096), rng.integers(1, 40, 500)])
     verify(DifferenceSetupUnit(parameters, interval), beats, expected_of(parameters, beats))
+
+
+def test_every_bit_counts():
+    """What the last bits of the products and of the reciprocal give is mostly shifted out."""
+    rng = np.random.default_rng(7)
+    beats = operands(rng, np.r_[np.arange(1, 4096), np.trunc(2 ** rng.uniform(0, 12, 20_000)).astype(int)])
+    expected = expected_of(OWN, beats)
+    run = simulate(DifferenceSetupUnit(OWN), beats, count=len(beats["length"]), engine="auto")
+    for name, codes in expected.items():
+        np.testing.assert_array_equal(run.beats[name], codes)

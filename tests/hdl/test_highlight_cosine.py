@@ -20,6 +20,10 @@ def spans(lengths, seed, parameters=None):
     phase[2::8] = rng.choice([-(1 << 39), (1 << 39) - 1, -(1 << 38), 1 << 38, -1, 0, 1], len(phase[2::8]))
     step = np.trunc(2.0 ** rng.uniform(0, 39, count)).astype(np.int64)
     step[::17] = rng.choice([0, (1 << 40) - 1, 1 << 38, 1 << 39], len(step[::17]))
+    # The second value about a border of what the table is addressed with: of lower bits, only a carry counts.
+    bit = rng.integers(0, 15, len(phase[4::8]))
+    phase[4::8] = (phase[4::8] >> 15 << 15) + (1 << bit)
+    step[4::8] = (1 << bit) + rng.integers(0, 2, len(bit))
     cos_beta = rng.integers(0, (1 << 25) + 1, count)
     cos_beta[3::8] = rng.choice([0, 1 << 25, (1 << 26) - 1, (1 << 26) - 256], len(cos_beta[3::8]))
     span = np.repeat(np.arange(count), lengths)
@@ -44,6 +48,14 @@ def test_one_value_a_clock_without_gaps():
     first_pixel = np.repeat(run.input_clocks, lengths) + HighlightCosineUnit.latency
     step = np.arange(len(expected)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
     np.testing.assert_array_equal(run.clocks, first_pixel + step)
+
+
+def test_every_bit_counts():
+    """Of the lengths, too; the last bits of the products are rounded off: each decides once in thousands."""
+    powers = 1 << np.arange(12)
+    beats, expected = spans(np.r_[powers, powers + 1, np.random.default_rng(9).integers(1, 4, 40_000)], 9)
+    run = simulate(HighlightCosineUnit(), beats, count=len(expected), engine="auto")
+    np.testing.assert_array_equal(run.beats, expected)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from hdl.highlight_gate import HighlightGateUnit
 from sim.engine import simulate
 
 
-def spans(rng, normal_pairs, count, halfway, cosine):
+def spans(rng, normal_pairs, count, halfway, cosine, spread=1e-3):
     """Spans about a cosine to H, so that the comparisons are decided late, and corners of the words."""
     left, right = normal_pairs(rng, count, rng.choice([0, 1e-3, 1, 10, 30, 44.9, 45.1, 90], count))
     axis = np.cross(left, right) + 1e-9
@@ -22,7 +22,7 @@ def spans(rng, normal_pairs, count, halfway, cosine):
     # Turned so that H stands where the maximum over the arc is about the threshold.
     middle = left + right * rng.uniform(0.2, 2, (count, 1)) + 1e-12
     middle /= np.linalg.norm(middle, axis=1, keepdims=True)
-    near = np.clip(cosine + rng.normal(size=(count, 1)) * 1e-3, -1, 1)
+    near = np.clip(cosine + rng.normal(size=(count, 1)) * spread, -1, 1)
     target = middle * near + axis * np.sqrt(1 - near**2)
     # A rotation that takes each target to H.
     mirror = target - halfway
@@ -57,6 +57,29 @@ def test_equals_twin(verify, normal_pairs, model, interval):
     assert shares[0] == 1
     assert min(shares) > 0.3
     assert max(shares[1:]) < 0.9
+
+
+def test_every_bit_counts(normal_pairs):
+    """Every bit of the exponent and of its threshold; of the products those too that are rounded off."""
+    parameters = HighlightGate(Specular("cosquad"))
+    unit = HighlightGateUnit(parameters)
+    rng = np.random.default_rng(12)
+    for exponent in [*1 << np.arange(10), *rng.integers(1, 1001, 20)]:
+        halfway = rng.normal(size=3)
+        halfway /= np.linalg.norm(halfway)
+        code = quantise(halfway)
+        cosine = np.sqrt(parameters.thresholds.values[exponent])
+        spread = 10.0 ** rng.uniform(-6, -2, (1000, 1))
+        left, right = (quantise(n) for n in spans(rng, normal_pairs, 1000, halfway, cosine, spread))
+        operands = (Fixed(COMPONENT, n) for n in (left, right, code))
+        run = simulate(
+            unit,
+            {"normal_left": left, "normal_right": right},
+            count=len(left),
+            constants={"halfway": code[np.newaxis], "exponent": exponent},
+            engine="auto",
+        )
+        np.testing.assert_array_equal(run.beats, parameters.compute(*operands, exponent))
 
 
 @pytest.mark.parametrize("fraction_bits", [5, 6, 9])

@@ -16,7 +16,7 @@ from sim.beats import dtype_of, pack
 from sim.engine import simulate
 
 METHOD = LocalChordInterpolator()
-VARIANTS = [*((1, interval) for interval in (1, 2, 4, 6)), (2, 4)]
+VARIANTS = [(1, 4), (2, 4), *(pytest.param(1, interval, marks=pytest.mark.long) for interval in (1, 2, 6))]
 
 
 def spans(rng, lights, count, longest=24):
@@ -103,6 +103,15 @@ def test_long_spans_leave_no_gap():
     run = simulate(unit, beats_of(unit, values, length), count=len(expected), engine="auto")
     np.testing.assert_array_equal(run.beats, expected)
     np.testing.assert_array_equal(run.clocks, unit.latency + np.arange(len(expected)))
+
+
+def test_every_bit_counts():
+    """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
+    unit = LocalChordInterpolatorUnit(METHOD, 1)
+    values, length = spans(np.random.default_rng(9), 1, 8000)
+    expected, _ = expected_of(unit, values, length)
+    run = simulate(unit, beats_of(unit, values, length), count=len(expected), engine="auto")
+    np.testing.assert_array_equal(run.beats, expected)
 
 
 def test_without_highlights():

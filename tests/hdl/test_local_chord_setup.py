@@ -9,6 +9,7 @@ from golden.local_chord_setup import LocalChordSetup
 from hdl.cost import cost_of
 from hdl.local_chord_setup import LocalChordSetupUnit
 from sim.beats import dtype_of
+from sim.engine import simulate
 
 VARIANTS = [*((1, interval) for interval in (1, 2, 3, 4, 5, 6)), (2, 4), (3, 16)]
 
@@ -71,6 +72,15 @@ def test_equals_twin(verify, lights, interval):
     expected = expected_of(unit, values, length)
     assert 50 < np.count_nonzero(expected["wide"]) < 300
     verify(unit, beats_of(unit, values, length), expected)
+
+
+def test_every_bit_counts():
+    """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
+    unit = LocalChordSetupUnit()
+    values, length = spans(np.random.default_rng(12), 1, 30_000)
+    expected = expected_of(unit, values, length)
+    run = simulate(unit, beats_of(unit, values, length), count=len(expected), engine="auto")
+    np.testing.assert_array_equal(run.beats, expected)
 
 
 def test_without_highlights(verify):

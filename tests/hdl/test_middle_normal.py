@@ -9,6 +9,7 @@ from golden.middle_normal import MiddleNormal
 from golden.unit_vector import COMPONENT, quantise
 from hdl.cost import cost_of
 from hdl.middle_normal import MiddleNormalUnit
+from sim.engine import simulate
 
 # Latency and multipliers for the initiation intervals 1 to 9, as the unit's text states them.
 STATED = [(36, 9), (37, 5), (40, 3), (39, 3), (40, 2), (40, 2), (40, 2), (44, 2), (52, 1)]
@@ -58,3 +59,15 @@ def test_equals_twin(verify, normal_pairs, interval, fit):
         {"normal_left": left, "normal_right": right},
         {"normal_left": left, "normal_right": right, "normal_middle": middle.codes, "wide": wide},
     )
+
+
+def test_every_bit_counts(normal_pairs):
+    """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
+    rng = np.random.default_rng(3)
+    angles = rng.uniform(0, 60, 40_000)
+    left, right = (quantise(normals) for normals in normal_pairs(rng, len(angles), angles))
+    middle, wide = MiddleNormal().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    beats = {"normal_left": left, "normal_right": right}
+    run = simulate(MiddleNormalUnit(), beats, count=len(angles), engine="auto")
+    np.testing.assert_array_equal(run.beats["normal_middle"], middle.codes)
+    np.testing.assert_array_equal(run.beats["wide"], wide)

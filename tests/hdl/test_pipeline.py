@@ -551,7 +551,7 @@ def test_method_without_a_choice_of_interval(method, never_built):
     ("method", "model", "lights"),
     [
         ("chord", "lyon3", 2),
-        ("linear", "blinn", 1),
+        pytest.param("linear", "blinn", 1, marks=pytest.mark.long),
         pytest.param("chord", "cosquad", 1, marks=pytest.mark.long),
         pytest.param("quadratic", "exp", 1, marks=pytest.mark.long),
     ],

@@ -35,7 +35,8 @@ def test_equals_twin(verify, operand, form):
     parameters = Power(operand)
     unit = PowerUnit(parameters, form)
     assert (unit.latency, unit.initiation_interval) == ((32, 1) if form == "pipelined" else (44, 42))
-    for exponent in (1, 2, 3, 512, 511, 682, 341, 1000):
+    # A bit of the exponent alone, too: its square is large where the term is not 0.
+    for exponent in (*(1 << np.arange(10)).tolist(), 3, 511, 682, 341, 1000):
         codes, dark = operands(parameters, exponent, 400 if form == "pipelined" else 60)
         expected = parameters.compute(Fixed(parameters.operand_format, codes), dark, exponent).codes
         assert expected.max() == 2**17 - 1
@@ -55,7 +56,10 @@ def test_every_bit_counts(exponent):
     codes, dark = operands(parameters, exponent, 100_000)
     expected = parameters.compute(Fixed(parameters.operand_format, codes), dark, exponent).codes
     beats, constants = {"operand": codes, "dark": dark.astype(np.uint8)}, {"exponent": exponent}
-    run = simulate(PowerUnit(), beats, count=len(codes), constants=constants, engine="auto")
+    stalls = np.random.default_rng(exponent).random(1009) < 0.3
+    run = simulate(
+        PowerUnit(), beats, count=len(codes), constants=constants, engine="auto", output_stalls=stalls
+    )
     np.testing.assert_array_equal(run.beats, expected)
 
 

@@ -130,6 +130,15 @@ def test_lengths_over_the_whole_range():
     np.testing.assert_array_equal(run.beats, expected)
 
 
+def test_every_bit_counts():
+    """Every length, and what the last bits of the products and of the step give, which are rounded off."""
+    parameters = QuadraticEvaluator()
+    rng = np.random.default_rng(7)
+    beats, expected = spans(parameters, np.r_[rng.permutation(4096)[:60], rng.integers(0, 40, 3000)], 7)
+    run = simulate(QuadraticEvaluatorUnit(parameters), beats, count=len(expected), engine="auto")
+    np.testing.assert_array_equal(run.beats, expected)
+
+
 @pytest.mark.parametrize("form", QUADRATIC_FORMS)
 def test_stiff_reset_in_mid_span_leaves_nothing(form):
     unit = QuadraticEvaluatorUnit(QuadraticEvaluator(form))

@@ -11,6 +11,7 @@ from golden.unit_vector import COMPONENT, quantise
 from hdl.cost import cost_of
 from hdl.recurrence_setup import RecurrenceSetupUnit
 from sim.beats import dtype_of
+from sim.engine import simulate
 
 DIRECT = RecurrenceSetup(Recurrence("direct", interleave=4, result_format=SQ(2, 25)))
 VARIANTS = [
@@ -94,3 +95,15 @@ def test_beats_after_a_pause(normal_pairs, setup_spans, light_constants, verify_
     vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
     expected = expected_of(unit, beats, vectors)
     verify_pauses(unit, beats, expected, 150, light_constants(unit, *vectors))
+
+
+def test_every_bit_counts(normal_pairs, setup_spans, light_constants):
+    """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
+    rng = np.random.default_rng(12)
+    unit = RecurrenceSetupUnit()
+    for _ in range(2):
+        beats = spans(rng, setup_spans, 3000)
+        vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+        expected, constants = expected_of(unit, beats, vectors), light_constants(unit, *vectors)
+        run = simulate(unit, beats, count=len(expected), constants=constants, engine="auto")
+        np.testing.assert_array_equal(run.beats, expected)

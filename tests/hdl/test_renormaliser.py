@@ -44,6 +44,9 @@ def test_every_bit_counts():
     vectors = rng.normal(size=(300_000, 3))
     vectors *= rng.uniform(0.68, 1.02, (len(vectors), 1)) / np.linalg.norm(vectors, axis=1, keepdims=True)
     codes = np.clip(np.floor(vectors / COMPONENT.step), COMPONENT.min_code, COMPONENT.max_code).astype(int)
+    # Along an axis the sum may come to 1, and saturates.
+    along = np.arange(90_000, COMPONENT.max_code, 3)[:, np.newaxis]
+    codes = np.vstack([codes, *(along * axis for axis in np.eye(3, dtype=int))])
     normals, outside = Renormaliser().compute(Fixed(COMPONENT, codes))
     run = simulate(RenormaliserUnit(), codes, count=len(codes), engine="auto")
     np.testing.assert_array_equal(run.beats["normal"], normals.codes)

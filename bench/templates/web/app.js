@@ -15,7 +15,7 @@ const blysk = (() => {
   }
 
   function shown(value, digits = 4) {
-    if (value === null || value === undefined || Number.isNaN(value)) return "–";
+    if (!Number.isFinite(value)) return "–";
     if (Number.isInteger(value) && Math.abs(value) < 1e15)
       return String(value)
         .replace("-", "−")
@@ -137,7 +137,7 @@ const blysk = (() => {
   let busy = false;
   let again = false;
   let painted = 0;
-  let rate = 0;
+  let pause = 0;
 
   async function refresh() {
     again = true;
@@ -186,7 +186,9 @@ const blysk = (() => {
     const now = performance.now();
     const between = now - painted;
     painted = now;
-    rate = between < 400 ? (rate ? 0.9 * rate + 100 / between : 1000 / between) : 1000 / result.figures.milliseconds;
+    // A mean of times, not of rates: a browser may tell the time in coarse steps, and between two frames none.
+    if (between < 400) pause = pause ? 0.9 * pause + 0.1 * between : between;
+    else pause = result.figures.milliseconds;
     if (orbiting && now - told < 200) return;
     told = now;
     showLight();
@@ -196,9 +198,9 @@ const blysk = (() => {
       p999: `${shown(figures.p999, 3)} LSB`,
       clocks: shown(figures.clocks),
       each: shown(figures.clocks / figures.pixels, 3),
-      gated: `${shown((100 * figures.gated) / figures.spans, 3)} %`,
+      gated: `≥ ${shown((100 * figures.gated) / figures.spans, 3)} %`,
       speed: shown(Math.round(figures.pixels / figures.seconds / 1000) * 1000),
-      rate: shown(rate, 2),
+      rate: shown(1000 / pause, 2),
     };
     for (const [name, text] of Object.entries(texts)) {
       const cell = document.querySelector(`[data-figure=${name}]`);
