@@ -625,7 +625,12 @@ def _run(
             def route(seed: int) -> tuple[int, tuple[Parts, Place]]:
                 path = folder / f"{seed}.json"
                 files = ["--json", f"{_MOUNT}/top.json", "--report", f"{_MOUNT}/{path.name}"]
-                runner.run("nextpnr", nextpnr, [*options, *files, "--seed", str(seed)], folder)
+                try:
+                    runner.run("nextpnr", nextpnr, [*options, *files, "--seed", str(seed)], folder)
+                except ToolError as error:
+                    if "legal placement" in str(error):
+                        raise TooLarge(f"does not fit: from seed {seed} {error}") from None
+                    raise
                 report = json.loads(path.read_text(encoding="utf-8"))
                 return seed, (parts_of(mapped, report, family), read_report(report, seed, family))
 

@@ -268,6 +268,23 @@ def test_what_does_not_fit_is_not_placed(family, cell, most, name, cache, monkey
         lay_out("counter", Counter(), 1, family=family)
 
 
+def test_what_finds_no_place_does_not_fit(calls, cache, monkeypatch):
+    run = fpga._Runner.run
+
+    def fails(self, name, *arguments):
+        if name == "nextpnr":
+            raise ToolError(
+                "nextpnr ends with status 125: ERROR: Unable to find legal placement for all cells"
+            )
+        run(self, name, *arguments)
+
+    monkeypatch.setattr(fpga._Runner, "run", fails)
+    with pytest.raises(
+        TooLarge, match=r"^does not fit: from seed 1 nextpnr ends with status 125: ERROR: Unable"
+    ):
+        lay_out("counter", Counter(), 1)
+
+
 def test_command_goes_on_after_what_does_not_fit(calls, cache, tmp_path, capsys, monkeypatch):
     lay_out = fpga.lay_out
 
