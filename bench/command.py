@@ -1,14 +1,45 @@
-"""The end of a command of this folder that is run as a module: its errors in one line, its exit status."""
+"""What commands of this folder share: progress that can be interrupted; the end of one run as a module."""
 
+import contextlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import click
+from tqdm import tqdm
 
 from sim.engine import CompilerMissing, SimulationError
 from sim.errors import InputError
 
-__all__ = ["run"]
+__all__ = ["resumable", "run"]
+
+
+@contextlib.contextmanager
+def resumable(total: int, unit: str) -> Iterator[Callable[[], None]]:
+    """Show the progress of work whose parts are kept; the value is to be called after each.
+
+    An interrupt ends the command with status 130 and a line that says how many parts are kept.
+
+    Parameters
+    ----------
+    total : int
+        Number of the parts.
+    unit : str
+        What they are called.
+    """
+    kept = 0
+    with tqdm(total=total, unit=f" {unit}", leave=False, disable=None) as bar:
+
+        def count() -> None:
+            nonlocal kept
+            kept += 1
+            bar.update()
+
+        try:
+            yield count
+        except KeyboardInterrupt:
+            bar.close()
+            click.echo(f"blysk: stopped; {kept} of {total} {unit} are kept, run again to go on", err=True)
+            raise click.exceptions.Exit(130) from None
 
 
 def run(command: click.Command, name: str, arguments: Sequence[str] | None) -> int:

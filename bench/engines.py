@@ -33,12 +33,13 @@ from golden.frame_constants import FrameConstants
 from golden.pipeline import ShadingPipeline, Spans
 from hdl.pipeline import ShadingPipelineUnit
 from sim.beats import pack
-from sim.engine import Ports, Run, Stimulus, simulate
+from sim.engine import Run, simulate
 from sim.frame import beats_of, prepare
 from sim.mesh import load_mesh
+from sim.testbench import pixel_beats
 
 from .accuracy import scene_for
-from .verilator import Verilated
+from .verilator import Verilated, free_stimulus
 
 __all__ = ["LEAST_LENGTH", "LEAST_PIXELS", "LEAST_RATIO", "LEAST_RIVAL", "LONGEST_SECONDS", "Speed"]
 __all__ += ["main", "measure", "picture_seconds", "teapot_spans"]
@@ -187,7 +188,7 @@ def measure(
             times.append(seconds)
             runs.append(run)
             if model is not None:
-                stimulus = _stimulus(model.ports, beats, write, len(run.beats))
+                stimulus = free_stimulus(model.ports, beats, write, len(run.beats), _WAIT)
                 seconds, (output, clocks) = _timed(lambda stimulus=stimulus: model.run(stimulus))
                 rival_times.append(seconds)
                 same = _digest(output) == _digest(pack(model.ports.o, run.beats))
@@ -213,20 +214,6 @@ def _timed(work: Callable[[], Any]) -> tuple[float, Any]:
     start = time.process_time()
     result = work()
     return time.process_time() - start, result
-
-
-def _stimulus(ports: Ports, beats, write, count: int) -> Stimulus:
-    free = np.zeros(1, dtype=bool)
-    return Stimulus(
-        input=pack(ports.i, beats),
-        write=np.zeros((0, 0), dtype=np.uint32) if write is None else pack(ports.write, write),
-        constants=np.zeros((0, 0), dtype=np.uint32),
-        input_stalls=free,
-        output_stalls=free,
-        count=count,
-        patience=_WAIT,
-        settle=0,
-    )
 
 
 def teapot_spans(
@@ -297,8 +284,7 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
     design = ShadingPipeline(method="chord", model="cosquad", lights=1)
     spans, constants = teapot_spans(design, width, height, LEAST_LENGTH)
     pixels = design.compute(spans, [constants])
-    expected = {"x": pixels.x, "y": pixels.y, "last": pixels.last}
-    expected |= dict(zip("rgb", pixels.color.T, strict=True))
+    expected = pixel_beats(pixels)
     units = {gate: ShadingPipelineUnit(replace(design, gate=gate)) for gate in (False, True)}
     # An empty cache: the build is a part of what is measured.
     with (

@@ -22,7 +22,6 @@ from types import ModuleType
 from typing import Any
 
 import click
-from tqdm import tqdm
 
 from sim.cli import Whole
 from sim.errors import InputError
@@ -42,6 +41,7 @@ from . import (
     stability,
     thesis,
 )
+from .command import resumable
 from .section import Cell, Section, Table
 from .store import Task, results_of, version_of
 
@@ -514,19 +514,6 @@ def command(folder, quick, meshes, names, jobs):
     environment()
     names = [name for name in SECTIONS if name in names or not names]
     chosen = chosen_tasks(quick, meshes, names)
-    total, kept = sum(len(own) for _, own in chosen), 0
-    with tqdm(total=total, unit=" measurements", leave=False, disable=None) as bar:
-
-        def count():
-            nonlocal kept
-            kept += 1
-            bar.update()
-
-        try:
-            write_report(folder, measured(chosen, jobs, count), about(quick, meshes, names))
-        except KeyboardInterrupt:
-            bar.close()
-            text = f"stopped; {kept} of {total} measurements are kept, run again to go on"
-            click.echo(f"blysk: {text}", err=True)
-            raise click.exceptions.Exit(130) from None
+    with resumable(sum(len(own) for _, own in chosen), "measurements") as count:
+        write_report(folder, measured(chosen, jobs, count), about(quick, meshes, names))
     click.echo(f"{'report':<12}{folder / _PAGE}")

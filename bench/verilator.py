@@ -8,7 +8,7 @@ wants it: with the clock low, after which the outputs are read, and with the clo
 import ctypes
 import os
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -18,11 +18,11 @@ from amaranth.lib import data
 from amaranth.lib.wiring import Component
 
 from hdl.verilog import emit
-from sim.beats import word_count
+from sim.beats import pack, word_count
 from sim.cxxrtl import find_compilers
 from sim.engine import Ports, SimulationError, Stimulus
 
-__all__ = ["OPTIONS", "Verilated", "verilator_folder"]
+__all__ = ["OPTIONS", "Verilated", "free_stimulus", "verilator_folder"]
 
 OPTIONS = ("-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-assert", "-Wno-fatal", "-Wno-lint")
 """Verilator's options for speed, by its manual."""
@@ -144,6 +144,34 @@ def _run(command: list, folder: Path, **options) -> None:
         lines = (done.stderr or done.stdout).strip().splitlines()
         line = next((line for line in lines if "rror" in line), (lines or ["no message"])[0])
         raise SimulationError(f"{Path(command[0]).name} ends with status {done.returncode}: {line}")
+
+
+def free_stimulus(
+    ports: Ports, beats: np.ndarray | Mapping, write: np.ndarray | Mapping | None, count: int, patience: int
+) -> Stimulus:
+    """What `Verilated.run` takes: beats without a stall on either side.
+
+    Parameters
+    ----------
+    ports : Ports
+        Of the component, without ``constants``.
+    beats, write
+        As `sim.engine.simulate` takes them.
+    count : int
+        Output beats.
+    patience : int
+        Clocks without one after which the component counts as stuck.
+    """
+    return Stimulus(
+        input=pack(ports.i, beats),
+        write=np.zeros((0, 0), dtype=np.uint32) if write is None else pack(ports.write, write),
+        constants=np.zeros((0, 0), dtype=np.uint32),
+        input_stalls=np.zeros(1, dtype=bool),
+        output_stalls=np.zeros(1, dtype=bool),
+        count=count,
+        patience=patience,
+        settle=0,
+    )
 
 
 class Verilated:

@@ -22,7 +22,6 @@ from typing import Any
 
 import click
 import numpy as np
-from tqdm import tqdm
 
 from golden.camera import Camera
 from golden.frame_constants import FIELDS_OF_A_FRAME, FIELDS_OF_A_LIGHT, LIGHT_STRIDE
@@ -46,6 +45,7 @@ from sim.wasm import build, format_of, ports_of
 from sim.workers import processors
 
 from . import accuracy
+from .command import resumable
 from .cosine_quadratic import sphere
 from .pages import PROJECT
 from .points import STEPS, map_colors
@@ -670,25 +670,11 @@ def command(folder, report, designs, jobs):
     _missing()
     work = tasks(designs or DESIGNS, {name: body.views for name, body in MESHES.items()})
     chosen = chosen_tasks(quick=True) if report is None else []
-    total, kept = len(work) + sum(len(own) for _, own in chosen), 0
-    with (
-        tqdm(total=total, unit=" parts", leave=False, disable=None) as bar,
-        tempfile.TemporaryDirectory(prefix="blysk-") as temporary,
-    ):
-
-        def count():
-            nonlocal kept
-            kept += 1
-            bar.update()
-
-        try:
-            results = measure_all(work, jobs, count)
-            if report is None:
-                report = Path(temporary, "report")
-                write_report(report, measured(chosen, jobs, count), about(True, (), list(SECTIONS)))
-            write_site(folder, work, results, report)
-        except KeyboardInterrupt:
-            bar.close()
-            click.echo(f"blysk: stopped; {kept} of {total} parts are kept, run again to go on", err=True)
-            raise click.exceptions.Exit(130) from None
+    total = len(work) + sum(len(own) for _, own in chosen)
+    with resumable(total, "parts") as count, tempfile.TemporaryDirectory(prefix="blysk-") as temporary:
+        results = measure_all(work, jobs, count)
+        if report is None:
+            report = Path(temporary, "report")
+            write_report(report, measured(chosen, jobs, count), about(True, (), list(SECTIONS)))
+        write_site(folder, work, results, report)
     click.echo(f"{'site':<12}{folder / _PAGE}")

@@ -220,7 +220,9 @@ class Dataflow:
         right: Callable[[Any], FixedValue] = lambda value: value,
         since: int = 0,
     ) -> Word:
-        """Exact product of two words on a shared multiplier, `MULTIPLIER_LATENCY` clocks after its operands'.
+        """Exact product of two words on a shared multiplier.
+
+        It is there `MULTIPLIER_LATENCY` clocks after its operands; one, in a graph that ``hurries``.
 
         Parameters
         ----------
