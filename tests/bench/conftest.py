@@ -1,6 +1,7 @@
 """A browser, a command that is stopped, and a report of made-up figures: what tests share."""
 
 import base64
+import contextlib
 import io
 import math
 import os
@@ -37,6 +38,34 @@ def browser():
         browser = tools.chromium.launch(executable_path=chromium, args=list(OPTIONS))
         yield browser
         browser.close()
+
+
+@pytest.fixture
+def watching(browser):
+    """Pages without a network, and what goes wrong in them and is asked for, until all are closed."""
+
+    @contextlib.contextmanager
+    def watching():
+        contexts, errors, requests = [], [], []
+
+        def new_page(size, seconds, **options):
+            context = browser.new_context(
+                viewport=dict(zip(("width", "height"), size, strict=True)), **options
+            )
+            contexts.append(context)
+            context.set_offline(True)
+            page = context.new_page()
+            page.set_default_timeout(1000 * seconds)
+            page.on("console", lambda message: errors.append(message.text))
+            page.on("pageerror", lambda error: errors.append(str(error)))
+            page.on("request", lambda request: requests.append(request.url))
+            return page
+
+        yield new_page, errors, requests
+        for context in contexts:
+            context.close()
+
+    return watching
 
 
 def session_of(process):

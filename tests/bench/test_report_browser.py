@@ -26,30 +26,20 @@ def figures(report):
 
 
 @pytest.fixture
-def open_page(browser, report):
+def open_page(watching, report):
     """Open the page; afterwards there was no error, and nothing was asked for but the page."""
-    contexts, pages, errors, requests = [], [], [], []
+    pages = []
+    with watching() as (new_page, errors, requests):
 
-    def open_page(width="desktop", folder=report, **options):
-        size = dict(zip(("width", "height"), WIDTHS[width], strict=True))
-        context = browser.new_context(viewport=size, **options)
-        contexts.append(context)
-        context.set_offline(True)
-        page = context.new_page()
-        page.set_default_timeout(10_000)
-        page.on("console", lambda message: errors.append(message.text))
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("request", lambda request: requests.append(request.url.partition(",")[0]))
-        pages.append((folder / "index.html").as_uri())
-        page.goto(pages[-1])
-        return page
+        def open_page(width="desktop", folder=report, **options):
+            page = new_page(WIDTHS[width], 10, **options)
+            pages.append((folder / "index.html").as_uri())
+            page.goto(pages[-1])
+            return page
 
-    yield open_page
-    for context in contexts:
-        context.close()
+        yield open_page
     assert errors == []
-    asked = [url for url in requests if not url.startswith("data:image/")]
-    assert asked == pages
+    assert [url for url in requests if not url.startswith("data:image/")] == pages
 
 
 def drawn(figures, error, time, exponent=100):

@@ -48,32 +48,23 @@ def site(tmp_path_factory):
 
 
 @pytest.fixture
-def open_page(browser, site):
+def open_page(watching, site):
     """Open the page and wait for its first frame; afterwards there was no error, and no request left it."""
-    contexts, folders, errors, requests = [], [], [], []
+    folders = []
+    with watching() as (new_page, errors, requests):
 
-    def open_page(width="desktop", script=None, waits=True, folder=site, **options):
-        size = dict(zip(("width", "height"), WIDTHS[width], strict=True))
-        context = browser.new_context(viewport=size, **options)
-        contexts.append(context)
-        context.set_offline(True)
-        page = context.new_page()
-        page.set_default_timeout(30_000)
-        page.on("console", lambda message: errors.append(message.text))
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("request", lambda request: requests.append(request.url))
-        if script:
-            page.add_init_script(script)
-        folders.append(folder.as_uri())
-        page.goto((folder / "index.html").as_uri())
-        if waits:
-            page.wait_for_selector("body[data-frame]")
-        return page
+        def open_page(width="desktop", script=None, waits=True, folder=site, **options):
+            page = new_page(WIDTHS[width], 30, **options)
+            if script:
+                page.add_init_script(script)
+            folders.append(folder.as_uri())
+            page.goto((folder / "index.html").as_uri())
+            if waits:
+                page.wait_for_selector("body[data-frame]")
+            return page
 
-    open_page.allowed = "none"
-    yield open_page
-    for context in contexts:
-        context.close()
+        open_page.allowed = "none"
+        yield open_page
     assert [text for text in errors if open_page.allowed not in text] == []
     asked = [url for url in requests if not url.startswith("blob:")]
     assert all(url.startswith(tuple(folders)) for url in asked)
