@@ -9,7 +9,6 @@ measured once: results are kept, so that a run that was stopped goes on where it
 import json
 import math
 import shlex
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
@@ -24,7 +23,6 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
-from tqdm import tqdm
 
 from golden.bisection_interpolator import BisectionInterpolator
 from golden.chord_interpolator import ChordInterpolator
@@ -48,6 +46,7 @@ from sim.report import ERRORS
 from sim.scene_file import HIGHLIGHTS
 from sim.workers import check_address, cluster_executor, local_executor, processors
 
+from .command import resumable
 from .pages import svg
 from .points import front, place_of, scenes_of
 from .section import Drawing, Section, Table
@@ -677,22 +676,11 @@ def command(mesh, exponent, size, largest, error, cost, highlights, limit, jobs,
         reason = f"no pixel shows the surface at {size[0]}x{size[1]}"
         raise InputError(mesh, reason, "choose another mesh, or a larger --size")
     todo = tasks_of(candidates, place, exponent)
-    done = 0
-    with tqdm(total=len(todo), unit=" measurements", leave=False, disable=None) as bar:
-
-        def progress() -> None:
-            nonlocal done
-            done += 1
-            bar.update()
-
-        try:
-            with _executor(jobs or processors(), address) as executor:
-                results = results_of(todo, executor, progress)
-        except KeyboardInterrupt:
-            bar.close()
-            kept = f"{done} of {len(todo)} measurements are kept, run it again to go on"
-            print(f"blysk: interrupted; {kept}", file=sys.stderr)
-            raise click.exceptions.Exit(130) from None
+    with (
+        resumable(len(todo), "measurements") as progress,
+        _executor(jobs or processors(), address) as executor,
+    ):
+        results = results_of(todo, executor, progress)
     designs = explored(todo, results)
     on_front = front_of(designs, error, cost)
     if figures:

@@ -382,7 +382,7 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
     options += ("--fraction-bits", "46", "--styles", "throughput", "--highlights", "chord")
     stopped = run(*options)
     assert stopped.exit_code == 130
-    assert stopped.output == "blysk: interrupted; 4 of 6 measurements are kept, run it again to go on\n"
+    assert stopped.output == "blysk: stopped; 4 of 6 measurements are kept, run again to go on\n"
     resumed = run(*options)
     assert resumed.exit_code == 0
     assert calls == ["linear", "renormalise", "chord", "chord"]
