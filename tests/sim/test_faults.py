@@ -253,7 +253,13 @@ def test_full_disk(small_disk, name):
 LIMITED = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)); "
 
 
-def test_largest_file_of_a_process(tmp_path):
+@pytest.fixture
+def unmeasured(monkeypatch):
+    """Line coverage of a process would be in a file that is larger than it may write."""
+    monkeypatch.delenv("COVERAGE_PROCESS_CONFIG", raising=False)
+
+
+def test_largest_file_of_a_process(unmeasured, tmp_path):
     """A limit of the shell in place of a full disk."""
     program = "from sim.output import write_text; write_text(sys.argv[1], 5000 * 'x')"
     path = tmp_path / "a.txt"
@@ -267,7 +273,7 @@ def test_largest_file_of_a_process(tmp_path):
     assert left_in(tmp_path) == [path]
 
 
-def test_yosys_that_cannot_work(cache):
+def test_yosys_that_cannot_work(unmeasured, cache):
     """What it runs in ends with a traceback, of which the last line tells."""
     run = start(LIMITED + "simulate(Triple(), np.arange(5), count=5, engine='cxxrtl')")
     _, errors = run.communicate(timeout=60)
