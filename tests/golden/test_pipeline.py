@@ -455,6 +455,49 @@ def test_bad_arguments_are_refused():
         ShadingPipeline(lights=2).compute(spans, constants)
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"terms": 3}, "terms and fraction_bits are for the method chord, not quadratic"),
+        ({"materials": 0}, "materials must be 1 to 1024, not 0"),
+        ({"materials": 1025}, "materials must be 1 to 1024, not 1025"),
+        ({"gate": True, "model": None}, "without specular light there is nothing to gate"),
+        ({"gate": True, "method": "chord-local"}, "method chord-local has no normals for a gate"),
+        ({"exponent": 0}, "exponent must be 1 to 1000, not 0"),
+        ({"exponent": 1001}, "exponent must be 1 to 1000, not 1001"),
+        ({"x_bits": 0}, "x_bits must be 1 to 12, not 0"),
+        ({"y_bits": 13}, "y_bits must be 1 to 12, not 13"),
+        ({"length_bits": 1}, "length_bits must be 2 to 12, not 1"),
+    ],
+)
+def test_parameters_that_no_pipeline_has(given, message):
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        ShadingPipeline(**given)
+
+
+@pytest.mark.parametrize(
+    ("given", "changed", "message"),
+    [
+        ({"materials": 2}, {}, "the constants are for 1 materials, not 2"),
+        ({"exponent": 30}, {}, "the exponent is 30 for good, not 20"),
+        ({}, {"material": -1}, "material must be 0 to 0"),
+        ({}, {"material": 1}, "material must be 0 to 0"),
+        ({}, {"x": 4096}, "x must be 0 to 4095"),
+        ({"y_bits": 3}, {"y": 8}, "y must be 0 to 7"),
+        ({}, {"length": 4096}, "length must be 0 to 4095"),
+        ({"method": "chord-local"}, {}, "method chord-local takes spans with values for 1 lights"),
+    ],
+)
+def test_spans_that_a_pipeline_does_not_take(given, changed, message):
+    normal = np.array([[0, 0, ONE]])
+    words = {"x": 0, "y": 0, "length": 1, "material": 0} | changed
+    words = {name: np.array([code]) for name, code in words.items()}
+    spans = Spans(**words, normal_left=normal, normal_right=normal)
+    constants = constants_of([(UP, 0.5, 0.5)])
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        ShadingPipeline(**given).compute(spans, constants)
+
+
 def spans_near_a_highlight(rng, halfway, level, angle):
     """Ends of arcs whose great circle comes as near to H as a cosine says, there or a bit before or after."""
     count = len(level)
