@@ -1,0 +1,185 @@
+"""Codes of which only bounds are known, in place of arrays of codes in the bit-true twins."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["Bounds", "unknown"]
+
+
+@dataclass(frozen=True, eq=False)
+class Unknown:
+    """A number of which all that is known is that it lies between two others."""
+
+    low: float
+    high: float
+
+
+class Bounds:
+    """An array of integers, known by two enclosures at once; either may be the tighter one.
+
+    One is an interval. The other is a sum of `Unknown` numbers times factors, and of a rest between two
+    numbers: ``N_r - N_l - G`` and ``t (1 - t) G`` stay what they are, whatever order a twin adds them in. A
+    product of two such sums starts anew from its interval. Shifts to the right leave what they cut to the
+    rest.
+
+    Arithmetic is in float64, which is exact for integers under 2^53; larger ones are moved outwards. Factors
+    of about 1, of numbers to 2^46, are off by far less than the sixteenth by which a sum's ends are moved.
+
+    Parameters
+    ----------
+    low, high : array
+        The interval, both ends included.
+    parts : dict of Unknown to array, optional
+        Factors of the sum.
+    rest : tuple of arrays, optional
+        Of the sum; ``None``: there is none but the interval itself.
+    """
+
+    def __init__(self, low, high, parts=None, rest=None):
+        low, high = np.asarray(low, float), np.asarray(high, float)
+        self.parts = {} if parts is None else parts
+        self.rest = (low, high) if rest is None else rest
+        if self.parts:
+            ends = [
+                (np.minimum(f * x.low, f * x.high), np.maximum(f * x.low, f * x.high))
+                for x, f in self.parts.items()
+            ]
+            least, most = (sum(end[k] for end in ends) + self.rest[k] for k in range(2))
+            # Outwards, then to the next whole number inwards: codes are whole numbers.
+            pad = 2.0**-4 + 2.0**-48 * (np.abs(least) + np.abs(most))
+            low, high = np.maximum(low, np.ceil(least - pad)), np.minimum(high, np.floor(most + pad))
+        # Neither enclosure rounds inwards: over 2^53 a step of float64 is added.
+        self.low = np.where(np.abs(low) < 2.0**53, low, np.nextafter(low, -np.inf))
+        self.high = np.where(np.abs(high) < 2.0**53, high, np.nextafter(high, np.inf))
+        assert (self.low <= self.high).all(), "no number is within both enclosures"
+
+    @classmethod
+    def of(cls, codes) -> "Bounds":
+        """Known codes."""
+        return codes if isinstance(codes, Bounds) else cls(codes, codes)
+
+    @property
+    def shape(self):
+        return np.broadcast_shapes(self.low.shape, *(np.shape(factor) for factor in self.parts.values()))
+
+    def __len__(self):
+        return self.shape[0]
+
+    def _each(self, function) -> "Bounds":
+        """The same wiring of every array."""
+        arrays = (self.low, self.high, *self.rest, *self.parts.values())
+        low, high, *others = (function(np.broadcast_to(array, self.shape)) for array in arrays)
+        return Bounds(low, high, dict(zip(self.parts, others[2:], strict=True)), tuple(others[:2]))
+
+    def __getitem__(self, key):
+        return self._each(lambda array: array[key])
+
+    def any(self, axis=None):
+        return Bounds(self.low.any(axis=axis), self.high.any(axis=axis))
+
+    def within(self, low, high) -> bool:
+        """Whether no code can be outside of a range."""
+        return bool((self.low >= low).all() and (self.high <= high).all())
+
+    def known(self, low, high) -> "Bounds":
+        """The same code, of which it is known besides that it is in a range."""
+        return Bounds(np.maximum(self.low, low), np.minimum(self.high, high), self.parts, self.rest)
+
+    def clip(self, low, high) -> "Bounds":
+        """A code that is in range stays what it is."""
+        if self.within(low, high):
+            return self
+        return Bounds(np.clip(self.low, low, high), np.clip(self.high, low, high))
+
+    def __add__(self, other):
+        other = Bounds.of(other)
+        parts = {x: self.parts.get(x, 0) + other.parts.get(x, 0) for x in {**self.parts, **other.parts}}
+        rest = tuple(a + b for a, b in zip(self.rest, other.rest, strict=True))
+        return Bounds(self.low + other.low, self.high + other.high, parts, rest)
+
+    def __mul__(self, other):
+        if isinstance(other, Bounds):
+            if other.parts and not self.parts:
+                return other * self
+            ends = [a * b for a in (self.low, self.high) for b in (other.low, other.high)]
+            low, high = np.minimum.reduce(ends), np.maximum.reduce(ends)
+            if other.parts or not self.parts:
+                return Bounds(low, high)
+            # By the middle of the other, and by what is left of it.
+            middle, left = (other.low + other.high) / 2, (other.high - other.low) / 2
+            linear, rest = self * middle, left * np.maximum(np.abs(self.low), np.abs(self.high))
+            return Bounds(low, high, linear.parts, (linear.rest[0] - rest, linear.rest[1] + rest))
+        factor = np.asarray(other, float)
+        (low, high), (least, most) = (
+            (np.minimum(a * factor, b * factor), np.maximum(a * factor, b * factor))
+            for a, b in ((self.low, self.high), self.rest)
+        )
+        return Bounds(low, high, {x: f * factor for x, f in self.parts.items()}, (least, most))
+
+    def __neg__(self):
+        return self * -1
+
+    def __sub__(self, other):
+        return self + -Bounds.of(other)
+
+    def __lshift__(self, count):
+        return self * 2.0 ** np.asarray(count)
+
+    def __rshift__(self, count):
+        scale = 2.0 ** -np.asarray(count)
+        parts = {x: f * scale for x, f in self.parts.items()}
+        low, high = np.floor(self.low * scale), np.floor(self.high * scale)
+        if not parts:
+            return Bounds(low, high)
+        return Bounds(low, high, parts, (self.rest[0] * scale - (1 - scale), self.rest[1] * scale))
+
+    def __and__(self, mask):
+        """The low bits."""
+        assert mask & (mask + 1) == 0, "a mask has ones below and none above"
+        return self if self.within(0, mask) else Bounds(np.zeros(self.shape), np.full(self.shape, mask))
+
+    def __or__(self, other):
+        other = Bounds.of(other)
+        return Bounds(np.maximum(self.low, other.low), np.maximum(self.high, other.high))
+
+    def __gt__(self, other):
+        other = Bounds.of(other)
+        return Bounds(self.low > other.high, self.high > other.low)
+
+    def __lt__(self, other):
+        return Bounds.of(other) > self
+
+    def __ne__(self, other):
+        other = Bounds.of(other)
+        return Bounds(
+            (self > other).low + (self < other).low > 0, (self > other).high + (self < other).high > 0
+        )
+
+    __hash__ = None
+    __radd__, __rmul__, __ror__ = __add__, __mul__, __or__
+
+    def __rsub__(self, other):
+        return -self + other
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **_):
+        """An array on the left; and NumPy's functions by name."""
+        operations = {
+            np.add: lambda a, b: Bounds.of(a) + b,
+            np.subtract: lambda a, b: Bounds.of(a) - b,
+            np.multiply: lambda a, b: b * a if isinstance(b, Bounds) else a * b,
+            np.bitwise_or: lambda a, b: Bounds.of(a) | b,
+            np.greater: lambda a, b: Bounds.of(a) > b,
+            np.less: lambda a, b: Bounds.of(a) < b,
+            np.not_equal: lambda a, b: Bounds.of(a) != b,
+        }
+        return operations[ufunc](*inputs) if method == "__call__" and ufunc in operations else NotImplemented
+
+    def __array_function__(self, function, _, args, kwargs):
+        return Bounds.clip(*args, **kwargs) if function is np.clip else NotImplemented
+
+
+def unknown(low, high, reach=1.0) -> Bounds:
+    """A code of which nothing else is known, times ``reach``, an array of shape (..., 1)."""
+    reach = np.atleast_2d(reach)
+    return Bounds(low * reach, high * reach, {Unknown(low, high): reach}, (np.zeros_like(reach),) * 2)

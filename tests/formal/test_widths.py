@@ -1,0 +1,504 @@
+"""Proofs that no word of a setup or a sum wraps: the bit-true twins, run on bounds or on every code."""
+
+from dataclasses import replace
+from functools import partial
+from itertools import product
+
+import numpy as np
+import pytest
+from amaranth.hdl import Fragment
+
+from golden.arccos import HalfChord
+from golden.bisection import Bisection
+from golden.chord import Chord
+from golden.chord_interpolator import ChordInterpolator
+from golden.chord_setup import ChordSetup
+from golden.difference_accumulator import DifferenceAccumulator
+from golden.difference_setup import DifferenceSetup
+from golden.dot_product import DotProduct
+from golden.fixed import SQ, UQ, Fixed, Format
+from golden.gpq import GPQ
+from golden.interpolator import pixels_of
+from golden.local_chord_setup import LocalChordSetup
+from golden.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
+from golden.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
+from golden.recurrence import Recurrence
+from golden.recurrence_setup import RecurrenceSetup
+from golden.renormaliser import Renormaliser
+from golden.unit_vector import CODE_LENGTH_ERROR, COMPONENT
+from hdl.arccos import HalfChordUnit
+from hdl.bisection import BisectionUnit
+from hdl.chord_interpolator import ChordAccumulatorUnit
+from hdl.chord_setup import ChordSetupUnit
+from hdl.difference_accumulator import DifferenceAccumulatorUnit
+from hdl.difference_setup import DifferenceSetupUnit
+from hdl.fixed import FixedValue
+from hdl.local_chord_setup import LocalChordSetupUnit
+from hdl.middle_normal import MiddleNormalUnit
+from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
+from hdl.recurrence_setup import RecurrenceSetupUnit
+from hdl.renormaliser import RenormaliserUnit
+
+from .bounds import Bounds, unknown
+
+pytestmark = pytest.mark.prove
+
+LENGTHS = np.arange(1, 1 << DifferenceSetup.LENGTH_BITS)
+
+
+@pytest.fixture(autouse=True)
+def wraps(monkeypatch):
+    """Formats in which a twin wraps or makes words; it fails where one may not hold a code.
+
+    All other operations have results of formats that hold whatever there is, or saturate.
+    """
+    found, wrap, new = [], Format.wrap, Fixed.__init__
+
+    def checked(format, codes):
+        found.append(format)
+        bounds = codes if isinstance(codes, Bounds) else Bounds(codes.min(), codes.max())
+        assert bounds.within(format.min_code, format.max_code), (
+            f"{bounds.low.min():.0f} to {bounds.high.max():.0f} wraps in {format}"
+        )
+        return codes if isinstance(codes, Bounds) else wrap(format, codes)
+
+    def made(number, format, codes):
+        if not isinstance(codes, Bounds):
+            return new(number, format, codes)
+        found.append(format)
+        assert codes.within(format.min_code, format.max_code), f"a word wraps in {format}"
+        number.format, number.codes = format, codes
+
+    monkeypatch.setattr(Format, "wrap", checked)
+    monkeypatch.setattr(Fixed, "__init__", made)
+    return found
+
+
+def word(format, *shape):
+    """Any code of a format, in each place."""
+    return Fixed(format, Bounds(np.full(shape, format.min_code), np.full(shape, format.max_code)))
+
+
+def of_middle_normal(fit):
+    MiddleNormal(fit).compute(word(COMPONENT, 1, 3), word(COMPONENT, 1, 3))
+
+
+def of_difference_setup(as_documented):
+    DifferenceSetup(as_documented).compute(word(GPQ.G_FORMAT, 1, 1), word(GPQ.P_FORMAT, 1, 1), LENGTHS)
+
+
+def of_quadratic_evaluator(form):
+    unit = QuadraticEvaluator(form)
+    parameter = unit.parameter(unit.step(LENGTHS), Bounds(np.zeros(len(LENGTHS)), LENGTHS - 1))
+    unit.evaluate(*(word(format, 1, 1) for format in (GPQ.G_FORMAT, GPQ.P_FORMAT, GPQ.Q_FORMAT)), parameter)
+
+
+def of_local_chord_setup():
+    unit = LocalChordSetup()
+    unit.compute(word(unit.DIFFUSE_FORMAT, 1, 1, 3), word(unit.HIGHLIGHT_FORMAT, 1, 1, 3), LENGTHS)
+
+
+def of_chord_differences(fraction_bits):
+    unit = ChordSetup(fraction_bits=fraction_bits)
+    slope, bend = word(unit.SLOPE_FORMAT, 1, 1), word(unit.BEND_FORMAT, 1, 1)
+    unit.differences(None, slope, bend, *unit.steps(LENGTHS))
+
+
+def of_chord_setup(monkeypatch, terms, fraction_bits):
+    """Every w that is not flagged.
+
+    ``u_r - u_l`` is ``(|N_r|^2 - |N_l|^2)/2 - (N_r - N_l).H``, so it is at most the chord, ``sqrt(2 w)``,
+    twice an error of the length, and what `Chord` cuts of two; ``f_r - f_l`` is at most the chord.
+    """
+    unit = ChordSetup(terms, fraction_bits)
+    w = np.arange(unit.widest.codes + 1)
+    chord = np.sqrt(2 * (w + 0.5) * unit.ANGLE_FORMAT.step)[:, np.newaxis]
+    cut = 2 * np.sqrt(3) * COMPONENT.step + 3 * 2.0**-35
+    one = 1 << 35
+    u_left = unknown(0, (2 + cut) * one)
+    u_right = (u_left + unknown(-one, one, chord + 2 * CODE_LENGTH_ERROR + 2 * cut)).known(0, (2 + cut) * one)
+    f_left = unknown(-one / 2, one / 2)
+    f_right = (f_left + unknown(-one / 2, one / 2, chord)).known(-one / 2, one / 2)
+    chords = iter([Fixed(Chord.FORMAT, code) for code in (w << 15, u_left, u_right)])
+    cosines = iter([Fixed(DotProduct().result_format, code) for code in (f_left, f_right)])
+    monkeypatch.setattr(Chord, "compute", lambda *_: next(chords))
+    monkeypatch.setattr(DotProduct, "compute", lambda *_: next(cosines))
+    normals = (Fixed(COMPONENT, np.zeros((len(w), 3), dtype=np.int64)) for _ in range(2))
+    vectors = (Fixed(COMPONENT, np.zeros((1, 3), dtype=np.int64)) for _ in range(2))
+    unit.compute(*normals, *vectors, np.full(len(w), 2))
+
+
+def parts_of_lengths():
+    """All lengths, by some 100,000 pixels, and the pixels: their spans and places."""
+    for lengths in np.array_split(LENGTHS, np.searchsorted(np.cumsum(LENGTHS), np.arange(1, 84) * 100_000)):
+        yield lengths, *pixels_of(lengths)
+
+
+def rows(bounds, lengths):
+    """A row for every length."""
+    return bounds + np.zeros((len(lengths), 1))
+
+
+def walk(unit, start, first, second, span, step):
+    """Sums of every pixel; and the differences, of all but the last."""
+    unit.compute(start, first, second, span, step)
+    before = np.flatnonzero(np.diff(span, append=-1) == 0)
+    changes = first.codes[span[before]] + step[before, np.newaxis] * second.codes[span[before]]
+    if unit.difference_format.width < unit.format.width:
+        unit.difference_format.wrap(changes)
+
+
+def of_normals(as_documented, fits, format=DifferenceSetup.FORMAT):
+    """Spans to 45 degrees, as of the middle normal's flag.
+
+    By vectors of exactly unit length ``|N_r - N_l| = 2 sin(psi/2)``, ``|G| = 4 (1 - cos(psi/2))``, one across
+    the other, and P is their difference; lengths are off, N_c is, and the flag is a little beyond.
+    """
+    half = np.radians(MAX_SPAN_ANGLE) / 2
+    error = 2.0**-12 + 4 * max(MiddleNormal(fit).error for fit in fits)
+    most = np.array(
+        [2 * np.sin(half), 4 * (1 - np.cos(half)), np.hypot(2 * np.sin(half), 4 * (1 - np.cos(half)))]
+    )
+    chord, bend, slope = ((most + error) / COMPONENT.step).tolist()
+    left = unknown(COMPONENT.min_code, COMPONENT.max_code)
+    g, d = unknown(-bend, bend), unknown(-chord, chord)
+    p = (d - g).known(-slope, slope)
+    for lengths, span, step in parts_of_lengths():
+        n, g_rows, p_rows = (rows(bounds, lengths) for bounds in (left, g, p))
+        g_word, p_word = Fixed(GPQ.G_FORMAT, g_rows), Fixed(GPQ.P_FORMAT, p_rows)
+        differences = DifferenceSetup(as_documented).compute(g_word, p_word, lengths)
+        walk(DifferenceAccumulator(format=format), Fixed(COMPONENT, n), *differences, span, step)
+
+
+def of_lines(format=DifferenceSetup.FORMAT):
+    """Straight lines: any ends."""
+    left, right = (unknown(COMPONENT.min_code, COMPONENT.max_code) for _ in range(2))
+    p = (right - left).known(GPQ.P_FORMAT.min_code, GPQ.P_FORMAT.max_code)
+    for lengths, span, step in parts_of_lengths():
+        n, zero, p_rows = (rows(bounds, lengths) for bounds in (left, Bounds.of([[0]]), p))
+        differences = DifferenceSetup().compute(
+            Fixed(GPQ.G_FORMAT, zero), Fixed(GPQ.P_FORMAT, p_rows), lengths
+        )
+        walk(DifferenceAccumulator(format=format), Fixed(COMPONENT, n), *differences, span, step)
+
+
+def of_chord_sums(name, fraction_bits, integer_bits=3):
+    """Any slope and bend; starts of unit vectors: f from -1 to 1, u to 2 and what `Chord` cuts."""
+    unit = ChordInterpolator(fraction_bits=fraction_bits)
+    sums, setup = replace(unit.accumulators[name], format=SQ(integer_bits, fraction_bits)), unit.setup
+    one = 1 << sums.start_format.fraction_bits
+    start = unknown(*{"diffuse": (-one, one), "highlight": (0, 2.001 * one)}[name])
+    slope, bend = (unknown(f.min_code, f.max_code) for f in (setup.SLOPE_FORMAT, setup.BEND_FORMAT))
+    for lengths, span, step in parts_of_lengths():
+        words = Fixed(sums.start_format, rows(start, lengths)), Fixed(setup.SLOPE_FORMAT, slope)
+        walk(
+            sums,
+            *setup.differences(*words, Fixed(setup.BEND_FORMAT, bend), *setup.steps(lengths)),
+            span,
+            step,
+        )
+
+
+def of_bisection(degree, max_angle, as_documented):
+    unit = Bisection(degree, max_angle, as_documented)
+    unit.factor(Fixed(unit.ANGLE_FORMAT, np.arange(-2, unit.widest.codes + 1)))
+
+
+def of_renormaliser():
+    unit = Renormaliser()
+    offset = np.arange(unit.SEGMENTS << unit.OFFSET_FORMAT.width)
+    unit.correction(Fixed(SQ(4, 34), offset + UQ(0, 22).code(unit.LOW) << 12))
+
+
+def of_half_chord():
+    for shift, count in ((0, 1 << 22), (1, 1 << 23)):
+        for chord in np.array_split(np.arange(count) << 13 - 2 * shift, count >> 18):
+            HalfChord().compute(Fixed(UQ(2, 34), chord), np.zeros(chord.shape, bool))
+
+
+def sectors(degrees, one, like):
+    """A and x of ``a^2 + x^2 <= 1``, for each sector between two radii: the box about it.
+
+    No sector has an axis inside.
+    """
+    assert 90 % degrees == 0
+    for low in range(-180, 180, degrees):
+        ends = np.radians([low, low + degrees])
+        yield tuple(unknown(*np.sort(one * f(ends)), np.ones((len(like), 1)))[:, 0] for f in (np.cos, np.sin))
+
+
+def of_recurrence_slopes(monkeypatch):
+    """Every word of q from 1/8 on, and of each shift after that the largest: others are within.
+
+    With T a unit vector across N_l, ``N_r = (1 - q) N_l + sin(psi) T``, so ``b = (1 - q) a + sin(psi) x``,
+    x = T.H. Of q the word is off by half a step, and by what `Chord` cuts. The span has two pixels.
+    """
+    unit = RecurrenceSetup()
+    word = np.r_[np.tile(np.arange(1 << 16, 1 << 17), 3), np.full(32, (1 << 17) - 1)]
+    shift = np.r_[np.repeat(np.arange(3), 1 << 16), np.arange(3, 35)]
+    q = word * 2.0 ** (-17 - shift)
+    one = (1 << 34) * (1 + 2.0**-16)
+    cut = unknown(-one, one, np.full((len(q), 1), 2.0**-14))[:, 0]
+    vectors = [Fixed(COMPONENT, np.zeros((len(q), 3), dtype=np.int64)) for _ in range(3)]
+    monkeypatch.setattr(Chord, "compute", lambda *_: Fixed(Chord.FORMAT, word << 18 >> shift))
+    monkeypatch.setattr(Recurrence, "prologue", lambda _, first, second, *__: (first, second))
+    for a, x in sectors(45, one, q):
+        b = (a * (1 - q) + x * np.sqrt(q * (2 - q)) + cut).known(-one, one)
+        cosines = iter([Fixed(unit.COSINE_FORMAT, code) for code in (a, b)])
+        monkeypatch.setattr(RecurrenceSetup, "_cosine", lambda *_, cosines=cosines: next(cosines))
+        unit.compute(*vectors, np.full(len(q), 2))
+
+
+def of_recurrence_prologue(format=None):
+    """Every word of K, for steps to 90 degrees; K and D(0) may be off by 1 %, the setup's are by under 0.1 %.
+
+    ``D(0) = x sin d - a K/2`` with x as in the slopes, ``a^2 + x^2 <= 1``: in sectors of 15 degrees.
+    """
+    unit = RecurrenceSetup().steps
+    state = format or unit.state_format
+    shift, low = (axis.ravel() for axis in np.indices((9, 1 << 12)))
+    low = (low << 4) + (1 << 16)
+    near = low * 2.0 ** (-15 - shift) <= 2.02
+    # The last box stands for all K under 2^-7.
+    shift, low, high = (
+        np.append(x[near], last) for x, last in ((shift, 9), (low, 0), (low + 15, (1 << 17) - 1))
+    )
+    factor, k = Bounds(low, high), (low + high) * 2.0 ** (-16 - shift)
+    left = (high + 1 - low) * 2.0 ** (-16 - shift) + 0.01 * k
+    sine = np.sqrt(k * (1 - k / 4))
+    one = (1 << 44) * (1 + 2.0**-16)
+    off = unknown(-one, one, np.where(shift == 9, 0.1, 0.01 * sine + left)[:, np.newaxis])[:, 0]
+    for a, x in sectors(15, one, k):
+        second = x * sine - a * (k / 2) + off
+        total = state.wrap(a + unit._half_operand)
+        state.wrap(second)
+        for step in range(7):
+            total, second = unit._reinsch(total, second, factor, shift, step == 0)
+            state.wrap(total)
+
+
+def wrapped_by(unit):
+    """Formats to which a unit wraps."""
+    found, wrap = set(), FixedValue.wrap
+
+    def noted(value, format):
+        found.add(format)
+        return wrap(value, format)
+
+    def elaborate(part):
+        for inner, *_ in Fragment.get(part, None).subfragments:
+            elaborate(inner)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(FixedValue, "wrap", noted)
+        elaborate(unit)
+    assert found
+    return found
+
+
+UNITS = {
+    "middle_normal-exact": MiddleNormalUnit,
+    "difference_setup": DifferenceSetupUnit,
+    "quadratic_evaluator-direct": QuadraticEvaluatorUnit,
+    "local_chord_setup": LocalChordSetupUnit,
+}
+"""Units wrap in no other formats than their twins, to which they are equal to the bit (`tests/hdl`)."""
+
+
+WHOLE = {
+    **{f"middle_normal-{fit}": partial(of_middle_normal, fit) for fit in MIDDLE_NORMAL_FITS},
+    "difference_setup": partial(of_difference_setup, False),
+    "difference_setup-documented": partial(of_difference_setup, True),
+    **{f"quadratic_evaluator-{form}": partial(of_quadratic_evaluator, form) for form in QUADRATIC_FORMS},
+    "local_chord_setup": of_local_chord_setup,
+    **{f"chord_setup-{bits}": partial(of_chord_differences, bits) for bits in range(36, 47, 2)},
+}
+"""Any codes of the operands: in the chord setup of P and G."""
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_no_word_wraps_whatever_the_operands(wraps, name):
+    """By bounds: any code of every operand, whatever angle and lengths vectors have; 1 to 4095 pixels."""
+    WHOLE[name]()
+    assert name not in UNITS or wrapped_by(UNITS[name]()) <= set(wraps)
+
+
+@pytest.mark.parametrize(("terms", "bits"), [*product((1, 2, 3), (36, 46))])
+def test_slopes_of_the_chord_setup_do_not_wrap(monkeypatch, wraps, terms, bits):
+    """By bounds, for every word of w up to the flag; with the words above all of the chord setup."""
+    of_chord_setup(monkeypatch, terms, bits)
+    assert wrapped_by(ChordSetupUnit(parameters=ChordSetup(terms, bits))) <= set(wraps)
+
+
+@pytest.mark.parametrize("parameters", [*product((1, 2), (45, 90), (False, True))])
+def test_no_word_of_a_bisection_wraps(wraps, parameters):
+    """Every word of u up to the flag, and those under 0 that lengths over 1 give."""
+    of_bisection(*parameters)
+    assert wrapped_by(BisectionUnit(Bisection(*parameters))) <= set(wraps)
+
+
+def test_no_word_of_a_renormaliser_wraps(wraps):
+    """Every squared length that is served, to the bits that are read."""
+    of_renormaliser()
+    assert wrapped_by(RenormaliserUnit()) <= set(wraps)
+
+
+def test_no_word_of_a_half_chord_wraps(wraps):
+    """Every address and fraction of the table, every word of z, to a squared chord of 2."""
+    of_half_chord()
+    assert wrapped_by(HalfChordUnit()) <= set(wraps)
+
+
+def test_slopes_of_the_recurrence_setup_do_not_wrap(monkeypatch, wraps):
+    """By bounds, for every word of q; and the first difference of spans of two pixels."""
+    of_recurrence_slopes(monkeypatch)
+    assert wrapped_by(RecurrenceSetupUnit()) <= set(wraps)
+
+
+def test_first_steps_of_the_recurrence_do_not_wrap():
+    """By bounds, for every word of K to 90 degrees: the first difference, and x and D of the seven steps."""
+    of_recurrence_prologue()
+
+
+@pytest.mark.parametrize(("as_documented", "fits"), [(False, MIDDLE_NORMAL_FITS), (True, ("exact",))])
+def test_sums_of_normals_do_not_wrap(as_documented, fits):
+    """By bounds, for spans to 45 degrees: at every pixel of each length from 1 to 4095."""
+    of_normals(as_documented, fits)
+
+
+def test_sums_of_straight_lines_do_not_wrap(wraps):
+    """The same, for any two ends of which no component of the difference is over 1."""
+    of_lines()
+    assert wrapped_by(DifferenceAccumulatorUnit()) <= set(wraps)
+
+
+@pytest.mark.parametrize(("name", "bits"), [("diffuse", 46), ("highlight", 36), ("highlight", 46)])
+def test_sums_of_chords_do_not_wrap(wraps, name, bits):
+    """The same, for unit vectors and any P and G; so differences of a pixel to the next. Local chords too."""
+    of_chord_sums(name, bits)
+    assert wrapped_by(ChordAccumulatorUnit(1, True, ChordInterpolator(fraction_bits=bits))) <= set(wraps)
+
+
+def test_bounds_hold():
+    """What twins give for random codes is within what they give for bounds, and not far within."""
+    rng, unit = np.random.default_rng(1), ChordSetup()
+    lengths = np.repeat(rng.integers(1, 4096, 100), 1000)
+    words = [Fixed(f, rng.integers(f.min_code, f.max_code + 1, (len(lengths), 1))) for f in FORMATS]
+    bounds = [Fixed(f, unknown(f.min_code, f.max_code)) for f in FORMATS]
+    results = [unit.differences(None, *pair, *unit.steps(lengths))[1:] for pair in (words, bounds)]
+    for found, known in zip(*results, strict=True):
+        low, high = (end.reshape(100, 1000) for end in (known.codes.low[:, 0], known.codes.high[:, 0]))
+        codes = found.codes.reshape(100, 1000)
+        assert ((codes >= low) & (codes <= high)).all()
+        assert (codes.max(axis=1) - codes.min(axis=1) > 0.8 * (high - low)[:, 0]).all()
+
+
+FORMATS = ChordSetup.SLOPE_FORMAT, ChordSetup.BEND_FORMAT
+
+SHORTER_FORMATS = {
+    "differences": (WHOLE["difference_setup"], DifferenceSetup, "FORMAT", SQ(1, 42)),
+    "G of the documented order": (
+        WHOLE["difference_setup-documented"],
+        DifferenceSetup,
+        "SLOPE_FORMAT",
+        SQ(-1, 18),
+    ),
+    "t": (WHOLE["quadratic_evaluator-horner"], QuadraticEvaluator, "SUM_FORMAT", SQ(0, 29)),
+    "differences of chords": (
+        WHOLE["chord_setup-46"],
+        ChordSetup,
+        "format",
+        property(lambda p: SQ(0, p.fraction_bits)),
+    ),
+    "differences of local chords": (
+        WHOLE["local_chord_setup"],
+        ChordSetup,
+        "format",
+        property(lambda p: SQ(0, p.fraction_bits)),
+    ),
+    "factor of the renormaliser": (of_renormaliser, Renormaliser, "FACTOR_FORMAT", SQ(-1, 18)),
+}
+
+
+@pytest.mark.parametrize("word", SHORTER_FORMATS)
+def test_formats_a_bit_too_short_are_found(monkeypatch, word):
+    """An integer bit less, planted in the parameters."""
+    prove, *change = SHORTER_FORMATS[word]
+    monkeypatch.setattr(*change)
+    with pytest.raises(AssertionError, match=" wraps in "):
+        prove()
+
+
+@pytest.mark.parametrize("format", ["SLOPE_FORMAT", "HIGH_FORMAT"])
+def test_slopes_a_bit_too_short_are_found(monkeypatch, format):
+    """The same."""
+    full = getattr(ChordSetup, format)
+    monkeypatch.setattr(ChordSetup, format, SQ(full.integer_bits - 1, full.fraction_bits))
+    with pytest.raises(AssertionError, match=" wraps in "):
+        of_chord_setup(monkeypatch, 3, 46)
+
+
+def test_slope_of_the_recurrence_a_bit_too_short_is_found(monkeypatch):
+    """The same."""
+    monkeypatch.setattr(RecurrenceSetup, "SLOPE_FORMAT", SQ(1, 28))
+    with pytest.raises(AssertionError, match=" wraps in "):
+        of_recurrence_slopes(monkeypatch)
+
+
+SHORTER_WORDS = {
+    "sums of the middle normal": (
+        WHOLE["middle_normal-exact"],
+        *(MiddleNormal, "compute"),
+        "(u * total.wrap(self.SUM_FORMAT)).round_half_up(21)",
+        "(u * total.wrap(UQ(-3, 19))).round_half_up(21)",
+    ),
+    "-t^2": (
+        WHOLE["quadratic_evaluator-direct"],
+        *(QuadraticEvaluator, "evaluate", "wrap(COMPONENT)", "wrap(SQ(0, 17))"),
+    ),
+    "sums of the bisection": (
+        partial(of_bisection, 2, 90, False),
+        *(Bisection, "factor", "wrap(self.SUM_FORMAT)", "wrap(SQ(-1, 18))"),
+    ),
+    "factor of the bisection": (
+        partial(of_bisection, 2, 90, False),
+        *(Bisection, "factor", "wrap(self.FACTOR_FORMAT)", "wrap(SQ(-2, 19))"),
+    ),
+    "slope of the renormaliser": (
+        of_renormaliser,
+        *(Renormaliser, "correction", "wrap(self.C1_FORMAT)", "wrap(UQ(0, 16))"),
+    ),
+    "sums of the half chord": (
+        of_half_chord,
+        HalfChord,
+        "compute",
+        "wrap(self.SUM_FORMAT)",
+        "wrap(UQ(-3, 19))",
+    ),
+    "rise of the half chord": (of_half_chord, HalfChord, "compute", "wrap(UQ(0, 21))", "wrap(UQ(-10, 21))"),
+}
+
+
+@pytest.mark.parametrize("word", SHORTER_WORDS)
+def test_words_a_bit_too_short_are_found(plant, word):
+    """An integer bit less, planted in the twin."""
+    prove, *change = SHORTER_WORDS[word]
+    plant(*change)
+    with pytest.raises(AssertionError, match=" wraps in "):
+        prove()
+
+
+SHORTER_SUMS = {
+    "normal": partial(of_normals, False, ("exact",), SQ(1, 42)),
+    "straight line": partial(of_lines, SQ(1, 42)),
+    "N.L": partial(of_chord_sums, "diffuse", 46, 1),
+    "u": partial(of_chord_sums, "highlight", 46, 2),
+    "first steps of the recurrence": partial(of_recurrence_prologue, SQ(1, 44)),
+}
+
+
+@pytest.mark.parametrize("word", SHORTER_SUMS)
+def test_sums_a_bit_too_short_are_found(word):
+    """The same; of N.L two bits less, as its sum has the format of that of u."""
+    with pytest.raises(AssertionError, match=" wraps in "):
+        SHORTER_SUMS[word]()
