@@ -25,7 +25,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, is_dataclass, replace
 from functools import partial
@@ -37,8 +37,8 @@ from typing import Any
 import click
 import numpy as np
 from amaranth.back import rtlil
-from amaranth.hdl import Module, Mux, Value
-from amaranth.lib.wiring import Component, In, Member
+from amaranth.hdl import Module, Mux, Value, unsigned
+from amaranth.lib.wiring import Component, In, Member, Out
 from amaranth.sim import Simulator
 from tqdm import tqdm
 
@@ -77,7 +77,7 @@ LEAST = 0.95
 
 _TESTS = Path(__file__).parents[1] / "tests"
 _ARGUED = "mutants.json"
-_SECONDS = 5
+_SECONDS = 10
 """After which a proof that a mutant is equivalent is given up."""
 
 
@@ -280,7 +280,8 @@ class Wrapped(Component):
 class _Observed(Wrapped):
     """A unit, an input that chooses a mutant, and outputs that are 0 where no partner of a stream looks.
 
-    A ``ready`` is seen while ``valid`` is high, a payload likewise.
+    A ``ready`` is seen while ``valid`` is high, a payload likewise. The clocks on which a unit's ``wide`` is
+    high are its status, as in a pipeline.
 
     Parameters
     ----------
@@ -291,12 +292,17 @@ class _Observed(Wrapped):
     """
 
     def __init__(self, unit: Component, width: int):
-        super().__init__(unit, mutant=In(width))
+        members = {"mutant": In(width)}
+        if _flags(unit):
+            members["status"] = Out(32)
+        super().__init__(unit, **members)
 
     def elaborate(self, platform):
         """Add the unit."""
         m = super().elaborate(platform)
         m.submodules.unit = self.unit
+        if _flags(self.unit):
+            m.d.sync += self.status.eq(self.status + self.unit.wide)
         payload = Value.cast(self.o.payload)
         m.d.comb += payload.eq(Mux(self.o.valid, Value.cast(self.unit.o.payload).as_unsigned(), 0))
         for name in ("i", "write"):
@@ -304,6 +310,11 @@ class _Observed(Wrapped):
                 outer = getattr(self, name)
                 m.d.comb += outer.ready.eq(getattr(self.unit, name).ready & outer.valid)
         return m
+
+
+def _flags(unit: Component) -> bool:
+    """Whether a unit has a flag that no run of its own shows."""
+    return "wide" in unit.signature.members and "status" not in unit.signature.members
 
 
 # Reset is held low, so that it goes.
@@ -409,6 +420,8 @@ class _Mutants(cxxrtl.Model):
 
     def __init__(self, unit: Component, folder: Path):
         self.ports = Ports(unit)
+        if _flags(unit):
+            self.ports.status = unsigned(32)
         source = resources.files(__package__).joinpath("mutants.cc").read_text(encoding="utf-8")
         driver = cxxrtl._members(self.ports) + cxxrtl._source("cxxrtl_driver.cc") + source
         compiler = next(cxxrtl.find_compilers(), None)
@@ -437,7 +450,8 @@ def _killed(model: _Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants:
     alive = set(mutants)
     for stimulus, trace in vectors:
         model.choose(0)
-        if difference := model.trace(stimulus).differs(trace):
+        found = model.trace(stimulus)
+        if difference := found.differs(trace if trace.status.size else replace(trace, status=found.status)):
             raise ToolError(f"the unit among its mutants is not the unit: {difference} differs")
         limited = replace(stimulus, limit=trace.clock)
         expected = _seen(limited, model.trace(limited))
@@ -457,13 +471,8 @@ def _seen(stimulus: Stimulus, trace: Trace) -> tuple:
 
 # Equivalence.
 
-_MITER = """\
-read_rtlil flat.il
-rename top gold
+_AIGER = """\
 read_rtlil whole.il
-rename top gate
-miter -equiv -flatten gold gate miter
-hierarchy -top miter
 memory_collect
 memory_map
 async2sync
@@ -475,7 +484,7 @@ setundef -undriven -zero
 zinit -all
 techmap
 aigmap
-write_aiger -zinit -map miter.map miter.aig"""
+write_aiger -zinit -map unit.map unit.aig"""
 
 _ROUNDS = 3
 _NARROW = 12
@@ -501,25 +510,23 @@ def _coded(number: int) -> bytes:
 
 
 class _Miter:
-    """A unit beside its mutants, and whether any output ever differs: AND gates and one-bit registers.
+    """A unit and a mutant of it, and whether any output ever differs: AND gates and one-bit registers.
 
-    Products are too much for a proof. So first, registers become inputs that both units have, and what the
-    units would put into them must be the same, whatever is there: if so, both stay the same by induction.
-    Registers stay registers that are narrow, or tell where beats are, for these control, the mutant's own,
-    and those bits that do differ.
+    Products are too much for a proof. So first, the two share their registers, and what either would put into
+    them must be the same: if so, they stay the same by induction. Those that are narrow, or tell where beats
+    are, go on as in the unit, for these control; the others are inputs: whatever they hold. Not shared are
+    the mutant's own, and those bits that do differ.
 
     Parameters
     ----------
     folder : path
-        With the netlists that `_mutate` wrote.
-    width : int
-        Bits of the input ``mutant``.
+        With the netlist of all mutants that `_mutate` wrote; without any, it is the unit.
     """
 
-    def __init__(self, folder: Path, width: int):
+    def __init__(self, folder: Path):
         self._folder = folder
-        _yosys(_MITER, folder)
-        header, rest = (folder / "miter.aig").read_bytes().split(b"\n", 1)
+        _yosys(_AIGER, folder)
+        header, rest = (folder / "unit.aig").read_bytes().split(b"\n", 1)
         self._inputs, latches, outputs, gates = map(int, header.split()[2:6])
         *lines, rest = rest.split(b"\n", latches + outputs)
         literals = [int(line.split()[0]) for line in lines]
@@ -528,41 +535,38 @@ class _Miter:
         first = 2 * (1 + self._inputs + latches)
         left = [first + 2 * k - delta for k, delta in enumerate(deltas[::2])]
         self._gates = [(a, a - delta) for a, delta in zip(left, deltas[1::2], strict=True)]
-        named = re.findall(r"^(input|latch) (\d+) (\d+) (\S+)$", (folder / "miter.map").read_text(), re.M)
-        places = {(name, int(bit)): int(index) for _, index, bit, name in named}
-        self._mutant = [places["in_mutant", bit] for bit in range(width)]
-        links, same, names = {}, {}, defaultdict(set)
-        for kind, index, bit, name in named:
-            twin = places.get((name.replace("gold.", "gate.", 1), int(bit)))
-            if kind == "latch" and name.startswith("gold.") and twin is not None:
-                # The last of a register's names, of which each bit has the same.
-                links[int(index), twin] = name
-                names[int(index)].add(name.removeprefix("gold."))
-        widths = Counter(links.values())
-        for pair, name in links.items():
-            if widths[name] > _NARROW and not re.search(r"\b(ages|valid)$", name):
-                # Registers of one unit that are always the same may be one.
-                group = set().union(*(same.get(latch, {latch}) for latch in pair))
-                same.update(dict.fromkeys(group, group))
-        groups = sorted({tuple(sorted(group)) for group in same.values()})
-        self._same = {group: set().union(*(names[latch] for latch in group)) for group in groups}
+        named = re.findall(r"^(input|latch) (\d+) (\d+) (\S+)$", (folder / "unit.map").read_text(), re.M)
+        self._mutant = {
+            int(i): int(bit) for kind, i, bit, name in named if (kind, name) == ("input", "mutant")
+        }
+        widths = Counter(name for kind, _, _, name in named if kind == "latch")
+        self._names, self._free = defaultdict(set), set()
+        for kind, index, _, name in named:
+            if kind == "latch":
+                self._names[int(index)].add(name)
+                if widths[name] > _NARROW and not re.search(r"\b(ages|valid)$", name):
+                    self._free.add(int(index))
 
     def is_equivalent(self, mutant: int, register: str = "") -> bool:
         """Whether a mutant, of whatever comes to a register, is proved to do what the unit does."""
         whole = re.compile(re.escape(register) + r"(\W|$)")
-        cut = [
-            group for group, names in self._same.items() if not (register and any(map(whole.match, names)))
-        ]
+        shared = {
+            latch
+            for latch in range(len(self._next))
+            if not (register and any(map(whole.match, self._names[latch])))
+        }
         for _ in range(_ROUNDS):
-            proved, differing = self._prove(mutant, cut)
+            proved, differing = self._prove(mutant, shared)
             if proved or not differing:
                 return proved
-            cut = [group for group in cut if group not in differing]
+            shared -= differing
         return False
 
-    def _prove(self, mutant: int, cut: Sequence[tuple[int, ...]]) -> tuple[bool, set[tuple[int, ...]]]:
-        """Whether nothing differs while the ``cut`` groups of registers are inputs, and which of them do."""
-        compared = self._write(mutant, cut)
+    def _prove(self, mutant: int, shared: Set[int]) -> tuple[bool, set[int]]:
+        """Whether nothing differs while registers are ``shared``, and which of them do."""
+        compared = self._write(mutant, shared)
+        if not compared:
+            return True, set()
         script = f"read_aiger mutant.aig; strash; scleanup; scorr; pdr -a -v -T {_SECONDS}"
         abc = Path(find_spec("pyosys").origin).parent / "yosys-abc"
         try:
@@ -579,49 +583,66 @@ class _Miter:
         if done.returncode or found is None:
             raise ToolError(f"ABC failed: {(done.stderr or done.stdout).strip().splitlines()[-1]}")
         asserted = (int(k) for k in re.findall(r"Output +(\d+) was (?:trivially )?asserted", done.stdout))
-        differing = {compared[k - len(self._outputs)] for k in asserted if k >= len(self._outputs)}
-        return found[1] == found[2], differing
+        return found[1] == found[2], {compared[k] for k in asserted} - {-1}
 
-    def _write(self, mutant: int, cut: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
-        """Write ``mutant.aig``; of each of its further outputs, the group of registers that it compares."""
-        known, codes = {}, []
-        inputs = self._inputs + len(cut)
-        gone = {latch for group in cut for latch in group}
-        latches = [k for k in range(len(self._next)) if k not in gone]
-        first = 1 + inputs + len(latches)
+    def _write(self, mutant: int, shared: Set[int]) -> list[int]:
+        """Write ``mutant.aig``; of each of its outputs, the register that it compares, or -1."""
+        known, gates = {}, []
+        places = itertools.count(1 + self._inputs)
+        units = [[0, *range(2, 2 * self._inputs + 2, 2)] for _ in range(2)]
+        for latch in range(len(self._next)):
+            literal = 2 * next(places)
+            units[0].append(literal)
+            units[1].append(literal if latch in shared else 2 * next(places))
+        first = next(places)
 
         def both(a: int, b: int) -> int:
             a, b = max(a, b), min(a, b)
             if b < 2 or a ^ b < 2:
                 return a * b if b < 2 else b * (a == b)
             if (a, b) not in known:
-                known[a, b] = 2 * (first + len(known))
-                codes.append(_coded(known[a, b] - a) + _coded(a - b))
+                known[a, b] = 2 * (first + len(gates))
+                gates.append((a, b))
             return known[a, b]
 
-        new = [0, *range(2, 2 * self._inputs + 2, 2), *[0] * len(self._next)]
-        for bit, place in enumerate(self._mutant):
-            new[1 + place] = mutant >> bit & 1
-        for k, group in enumerate(cut):
-            for latch in group:
-                new[1 + self._inputs + latch] = 2 * (1 + self._inputs + k)
-        for k, latch in enumerate(latches):
-            new[1 + self._inputs + latch] = 2 * (1 + inputs + k)
-
-        def now(literal: int) -> int:
-            return new[literal >> 1] ^ literal & 1
-
-        for a, b in self._gates:
-            new.append(both(now(a), now(b)))
-        outputs, compared = [now(literal) for literal in self._outputs], []
-        for group in cut:
-            a, *others = (now(self._next[latch]) for latch in group)
-            for b in {*others} - {a}:
+        for unit, chosen in zip(units, (0, mutant), strict=True):
+            for place, bit in self._mutant.items():
+                unit[1 + place] = chosen >> bit & 1
+            for a, b in self._gates:
+                unit.append(both(unit[a >> 1] ^ a & 1, unit[b >> 1] ^ b & 1))
+        outputs, compared, following = [], [], {}
+        for latch, end in [*((-1, end) for end in self._outputs), *enumerate(self._next)]:
+            a, b = (unit[end >> 1] ^ end & 1 for unit in units)
+            if latch >= 0 and not (latch in shared and latch in self._free):
+                now = (unit[1 + self._inputs + latch] >> 1 for unit in units)
+                # Of a register that is shared the unit's comes last.
+                following |= dict(zip(now, (a, a if latch in shared else b), strict=True))
+            if a != b and (latch < 0 or latch in shared):
                 outputs.append(both(both(a, b) ^ 1, both(a ^ 1, b ^ 1) ^ 1))
-                compared.append(group)
-        last = first + len(known) - 1
-        lines = [f"aig {last} {inputs} {len(latches)} {len(outputs)} {len(known)}"]
-        lines += map(str, [*(now(self._next[latch]) for latch in latches), *outputs, ""])
+                compared.append(latch)
+        # What these depend on, through the registers.
+        needed, open_ = {0}, [end >> 1 for end in outputs]
+        while open_:
+            node = open_.pop()
+            if node not in needed:
+                needed.add(node)
+                ends = gates[node - first] if node >= first else (following.get(node, 0),)
+                open_ += [end >> 1 for end in ends]
+        order = sorted(needed, key=lambda node: (node >= first, node in following, node))
+        place = {node: k for k, node in enumerate(order)}
+
+        def new(literal: int) -> int:
+            return 2 * place[literal >> 1] ^ literal & 1
+
+        latches = [node for node in order if node in following]
+        codes = []
+        for node in order:
+            if node >= first:
+                b, a = sorted(map(new, gates[node - first]))
+                codes.append(_coded(2 * place[node] - a) + _coded(a - b))
+        inputs = len(order) - 1 - len(latches) - len(codes)
+        lines = [f"aig {len(order) - 1} {inputs} {len(latches)} {len(outputs)} {len(codes)}"]
+        lines += map(str, [*(new(following[node]) for node in latches), *map(new, outputs), ""])
         (self._folder / "mutant.aig").write_bytes("\n".join(lines).encode() + b"".join(codes))
         return compared
 
@@ -702,7 +723,7 @@ def measure(device: str, count: int, seed: int, tests: str) -> dict[str, Any]:
         mutants = _mutate(unit, chosen.within, count, seed, folder)
         model = _Mutants(unit, folder)
         alive = sorted(set(mutants) - _killed(model, vectors, mutants))
-        miter = _Miter(folder, count.bit_length()) if alive else None
+        miter = _Miter(folder) if alive else None
         verdicts = {k: miter.is_equivalent(k, mutants[k].rpartition(" ")[2]) for k in alive}
     return {
         "device": device,

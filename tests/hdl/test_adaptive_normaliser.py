@@ -8,7 +8,7 @@ from amaranth.sim import Simulator
 from golden.adaptive_normaliser import AdaptiveNormaliser
 from golden.bisection import Bisection
 from golden.fixed import Fixed
-from golden.unit_vector import COMPONENT, quantise
+from golden.unit_vector import COMPONENT, ONE_SQUARED, quantise
 from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
 from sim.engine import simulate
 
@@ -89,7 +89,7 @@ def test_long_spans_follow_without_a_gap(normal_pairs):
 
 def test_equals_twin_under_stalls(normal_pairs):
     rng = np.random.default_rng(7)
-    parameters = AdaptiveNormaliser(2.0**-8)
+    parameters = AdaptiveNormaliser()
     unit = AdaptiveNormaliserUnit(parameters)
     lengths = rng.integers(0, 200, 150)
     angles = np.where(rng.random(150) < 0.5, rng.uniform(0, 95, 150), rng.uniform(0, 4, 150))
@@ -109,6 +109,18 @@ def test_equals_twin_under_stalls(normal_pairs):
     np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
 
 
+def test_front_runs_ahead_until_the_fifo_is_full(normal_pairs):
+    """While the output waits: spans of one pixel are one segment each."""
+    parameters, wait = AdaptiveNormaliser(), 6000
+    lengths = np.ones(100, dtype=int)
+    beats, expected, _ = spans(normal_pairs, parameters, np.linspace(0, 3, 100), lengths)
+    stalls = np.arange(2 * wait) < wait
+    run = simulate(AdaptiveNormaliserUnit(), beats, count=100, engine="auto", output_stalls=stalls)
+    assert_equal(run, expected)
+    # One span more is in the front, and one in the back.
+    assert (run.input_clocks < wait).sum() == (2 << parameters.depth) + 2
+
+
 def test_every_bit_counts(normal_pairs):
     """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
     rng = np.random.default_rng(9)
@@ -118,6 +130,17 @@ def test_every_bit_counts(normal_pairs):
     beats, expected, _ = spans(normal_pairs, parameters, angles, lengths)
     run = simulate(AdaptiveNormaliserUnit(parameters), beats, count=lengths.sum(), engine="auto")
     assert_equal(run, expected)
+    # Of all pairs of ends (float64 has every bit of their products) those up to 90 degrees whose 1 - cosine
+    # is at the border of its rounding. The third of five pixels is the normal half-way.
+    left, right = (quantise(normals) for normals in normal_pairs(rng, 1500, 90))
+    u = ONE_SQUARED.codes - (left.astype(float) @ right.T.astype(float)).astype(int)
+    first, second = np.nonzero((u < ONE_SQUARED.codes) & (abs(u % (1 << 17) - (1 << 16)) < 4))
+    beats = {"normal_left": left[first], "normal_right": right[second], "length": np.full(len(first), 5)}
+    normal, *_ = parameters.compute(
+        *(Fixed(COMPONENT, beats[name]) for name in ("normal_left", "normal_right")), beats["length"]
+    )
+    run = simulate(AdaptiveNormaliserUnit(parameters), beats, count=5 * len(first), engine="auto")
+    np.testing.assert_array_equal(run.beats["normal"], normal.codes)
 
 
 @pytest.mark.parametrize("clock", [1, 20, 60, 120, 148, 152, 160, 168])

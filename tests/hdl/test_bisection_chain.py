@@ -7,8 +7,9 @@ from amaranth.sim import Simulator
 
 from golden.bisection import Bisection
 from golden.bisection_chain import BisectionChain
+from golden.dot_product import DotProduct
 from golden.fixed import Fixed
-from golden.unit_vector import COMPONENT, quantise
+from golden.unit_vector import COMPONENT, ONE_SQUARED, quantise
 from hdl.bisection_chain import BisectionChainUnit
 from sim.engine import simulate
 
@@ -60,10 +61,33 @@ def test_equals_twin(normal_pairs, bisection):
 
 def test_every_bit_counts(normal_pairs):
     """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
-    beats, normal, wide = spans(normal_pairs, BisectionChain(), 5, 4000)
+    beats, normal, wide = spans(normal_pairs, BisectionChain(), 5, 2000)
     run = simulate(BisectionChainUnit(), beats, count=len(wide), engine="auto")
     np.testing.assert_array_equal(run.beats["normal"], normal)
     np.testing.assert_array_equal(run.beats["wide"], wide)
+
+
+def test_last_bits_of_all_count(normal_pairs):
+    """Spans at the borders of roundings, where a single step of a product decides."""
+    rng, parameters = np.random.default_rng(6), BisectionChain()
+    # Of all pairs of these ends those to 90 degrees whose u is at a border of both its roundings.
+    ends = [quantise(normals) for normals in normal_pairs(rng, 2000, 90)]
+    # Exact: float64 has all bits of a dot product.
+    u = ONE_SQUARED.codes - (ends[0].astype(float) @ ends[1].T.astype(float)).astype(int)
+    border = abs((u - (7 << 13) + 20) % (1 << 17) - 20) < 20
+    first = [end[k] for end, k in zip(ends, np.nonzero(border & (u < ONE_SQUARED.codes)), strict=True)]
+    # Level 1 is the sum of the ends times f: those with a component at the border of its rounding.
+    ends = [quantise(normals) for normals in normal_pairs(rng, 50_000, rng.uniform(0, 90, 50_000))]
+    u = (ONE_SQUARED - DotProduct().compute(*(Fixed(COMPONENT, end) for end in ends))).round_half_up(20)
+    e, _ = parameters.bisection.factor(u.round_half_up(17).wrap(Bisection.ANGLE_FORMAT))
+    f = (e.codes + (1 << 18) + 2) >> 2
+    border = abs(f[:, np.newaxis] * (ends[0] + ends[1]) % (1 << 17) - (1 << 16)) < 20
+    left, right = (np.vstack([a, end[border.any(axis=1)]]) for a, end in zip(first, ends, strict=True))
+    level = np.ones(len(left), dtype=int)
+    normal, _ = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right), level)
+    beats = {"normal_left": left, "normal_right": right, "level": level}
+    run = simulate(BisectionChainUnit(), beats, count=len(level), engine="auto")
+    np.testing.assert_array_equal(run.beats["normal"], normal.codes)
 
 
 @pytest.mark.parametrize("clock", [0, 3, 8, 20, 33, 42, 50, 51, 52])

@@ -60,8 +60,12 @@ def test_equals_twin(verify, normal_pairs, lights, interval):
     unit = ChordSetupUnit(lights, interval)
     beats = spans(rng, normal_pairs)
     vectors = [quantise(normal_pairs(rng, lights, 0.0)[0]) for _ in range(2)]
+    vectors[1] = np.abs(vectors[1])
     # Near the peak u and its differences are small.
     beats["normal_left"][:50] = vectors[1][0]
+    # Components of N - H of -1, the most that is not halved.
+    less = np.repeat(np.vstack([np.eye(3, dtype=np.int64), [1, 1, 1]]) << 17, 10, axis=0)
+    beats["normal_left"][50:90] = beats["normal_right"][60:100] = vectors[1][0] - less
     expected = expected_of(unit, beats, vectors)
     assert 50 < np.count_nonzero(expected["wide"]) < 200
     verify(unit, beats, expected, constants=constants_of(unit, vectors))

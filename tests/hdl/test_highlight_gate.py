@@ -13,10 +13,12 @@ from hdl.cost import cost_of
 from hdl.highlight_gate import HighlightGateUnit
 from sim.engine import simulate
 
+ANGLES = [0, 1e-3, 1, 10, 30, 44.9, 45.1, 90]
 
-def spans(rng, normal_pairs, count, halfway, cosine, spread=1e-3):
+
+def spans(rng, normal_pairs, count, halfway, cosine, spread=1e-3, angles=ANGLES):
     """Spans about a cosine to H, so that the comparisons are decided late, and corners of the words."""
-    left, right = normal_pairs(rng, count, rng.choice([0, 1e-3, 1, 10, 30, 44.9, 45.1, 90], count))
+    left, right = normal_pairs(rng, count, rng.choice(angles, count))
     axis = np.cross(left, right) + 1e-9
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     # Turned so that H stands where the maximum over the arc is about the threshold.
@@ -60,7 +62,10 @@ def test_equals_twin(verify, normal_pairs, model, interval):
 
 
 def test_every_bit_counts(normal_pairs):
-    """Every bit of the exponent and of its threshold; of the products those too that are rounded off."""
+    """Every bit of the exponent and of its threshold; of words that wait; of products those rounded off.
+
+    Spans of all angles, of which the maximum is the threshold but for the rounding of the normals.
+    """
     parameters = HighlightGate(Specular("cosquad"))
     unit = HighlightGateUnit(parameters)
     rng = np.random.default_rng(12)
@@ -69,8 +74,8 @@ def test_every_bit_counts(normal_pairs):
         halfway /= np.linalg.norm(halfway)
         code = quantise(halfway)
         cosine = np.sqrt(parameters.thresholds.values[exponent])
-        spread = 10.0 ** rng.uniform(-6, -2, (1000, 1))
-        left, right = (quantise(n) for n in spans(rng, normal_pairs, 1000, halfway, cosine, spread))
+        near = spans(rng, normal_pairs, 3000, halfway, cosine, 1e-5, np.geomspace(0.1, 45, 400))
+        left, right = (quantise(n) for n in near)
         operands = (Fixed(COMPONENT, n) for n in (left, right, code))
         run = simulate(
             unit,
@@ -78,6 +83,7 @@ def test_every_bit_counts(normal_pairs):
             count=len(left),
             constants={"halfway": code[np.newaxis], "exponent": exponent},
             engine="auto",
+            output_stalls=rng.random(1009) < 0.3,
         )
         np.testing.assert_array_equal(run.beats, parameters.compute(*operands, exponent))
 

@@ -57,6 +57,29 @@ def test_every_bit_counts(brightness):
             np.testing.assert_array_equal(run.beats[name], expected[name])
 
 
+@pytest.mark.parametrize("style", ["throughput", "compact"])
+def test_halves_round_up(style):
+    """Channels of a half, and of the least step less: there every bit of a product and of a sum counts."""
+    rng = np.random.default_rng(9)
+    colors = np.repeat([[[8191]], [[6003]]], 3, axis=-1)
+    ambient = np.array([3, 100, 40]) * 64 + 5
+    specular = rng.integers(0, TERM.max_code + 1, (2, 40_000))
+    wanted = (1 << 22) - np.arange(2)[:, np.newaxis]
+    # An odd colour's term gives all bits that are wanted below those of the ambient light.
+    diffuse = (wanted - 6003 * specular) * pow(8191, -1, 1 << 17) % (1 << 17)
+    total = (5 << 17) + 8191 * diffuse + 6003 * specular
+    chosen = total % (1 << 23) == wanted
+    assert np.all(np.count_nonzero(chosen, axis=1) > 500)
+    lit = (total[chosen] + (1 << 22) >> 23)[:, np.newaxis] + [3, 100, 40]
+    beats = {"diffuse": diffuse[chosen][:, np.newaxis], "specular": specular[chosen][:, np.newaxis]}
+    constants = {"ambient": ambient, "diffuse": colors[0], "specular": colors[1]}
+    unit = IntensityUnit(Intensity(), style)
+    stalls = rng.random(1009) < 0.3
+    run = simulate(unit, beats, count=len(lit), constants=constants, engine="auto", output_stalls=stalls)
+    for channel, name in enumerate("rgb"):
+        np.testing.assert_array_equal(run.beats[name], np.minimum(lit[:, channel], 255))
+
+
 def sparse_terms(rng, lights, count):
     """Terms of which any part is 0; none and all of them; all of the largest."""
     terms = rng.integers(1, TERM.max_code + 1, (2, count, lights))

@@ -97,12 +97,16 @@ def test_every_bit_counts(normal_pairs):
 
 
 def test_terminator(verify):
-    """N.L of one code above 0, 0, and one below: the highlight, however bright, comes and goes with it."""
+    """The highlight, however bright, comes and goes with N.L: 0, one code above and below, any one bit."""
     direction, halfway = np.array([1, 0, 0]), np.array([0, 0, ONE])
     normals = np.array([[1, 0, ONE], [0, 0, ONE], [-1, 0, ONE]])
     operands = codes_of(operands_of(Specular(), Diffuse(), normals, direction, halfway))
     np.testing.assert_array_equal(operands["cosine"], [1, 0, -1])
-    expected = {"diffuse": np.zeros(3, int), "specular": np.array([2**17 - 2, 0, 0])}
+    bits = 1 << np.arange(1, 34)
+    cosine = np.r_[operands["cosine"], np.c_[bits, -bits].ravel()]
+    lit = cosine > 0
+    expected = {"diffuse": lit * (cosine + 2**16 >> 17), "specular": lit * (2**17 - 2)}
+    operands = {"cosine": cosine, "highlight": np.resize(operands["highlight"], len(cosine))}
     verify(LightUnit(), operands, expected, constants={"exponent": 10})
 
 

@@ -132,7 +132,14 @@ def test_beats_after_a_pause(verify_pauses):
     """The results of a beat do not depend on what came before, or on how long ago it was."""
     unit = LocalChordSetupUnit(1, 4)
     values, length = spans(np.random.default_rng(3), 1)
-    verify_pauses(unit, beats_of(unit, values, length)[:40], expected_of(unit, values, length)[:40], 60)
+    beats, expected = beats_of(unit, values, length)[:40], expected_of(unit, values, length)[:40]
+    verify_pauses(unit, beats, expected, 60)
+    # Of each pair the first waits alone at the output: the second goes in on the clock after that has left.
+    stalls = {"input_stalls": np.arange(60) != 0, "output_stalls": np.arange(120) < 65}
+    run = simulate(unit, beats, count=len(beats), engine="auto", **stalls)
+    np.testing.assert_array_equal(run.beats, expected)
+    np.testing.assert_array_equal(run.input_clocks[1::2], run.clocks[::2] + 1)
+    np.testing.assert_array_equal(run.clocks[1::2], run.input_clocks[1::2] + unit.latency)
 
 
 @pytest.mark.parametrize("interval", [1, 4])

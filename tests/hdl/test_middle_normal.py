@@ -6,7 +6,7 @@ import pytest
 
 from golden.fixed import Fixed
 from golden.middle_normal import MiddleNormal
-from golden.unit_vector import COMPONENT, quantise
+from golden.unit_vector import COMPONENT, ONE_SQUARED, quantise
 from hdl.cost import cost_of
 from hdl.middle_normal import MiddleNormalUnit
 from sim.engine import simulate
@@ -64,10 +64,14 @@ def test_equals_twin(verify, normal_pairs, interval, fit):
 def test_every_bit_counts(normal_pairs):
     """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
     rng = np.random.default_rng(3)
-    angles = rng.uniform(0, 60, 40_000)
-    left, right = (quantise(normals) for normals in normal_pairs(rng, len(angles), angles))
+    left, right = (quantise(normals) for normals in normal_pairs(rng, 40_000, rng.uniform(0, 60, 40_000)))
+    # Of all pairs of the first 1500 (float64 has every bit of their products) those up to 60 degrees whose u
+    # is at the border of a step.
+    u = ONE_SQUARED.codes - (left[:1500].astype(float) @ right[:1500].T.astype(float)).astype(int)
+    first, second = np.nonzero((u < ONE_SQUARED.codes // 2) & ((u + 8) % (1 << 16) < 16))
+    left, right = np.vstack([left, left[first]]), np.vstack([right, right[second]])
     middle, wide = MiddleNormal().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
     beats = {"normal_left": left, "normal_right": right}
-    run = simulate(MiddleNormalUnit(), beats, count=len(angles), engine="auto")
+    run = simulate(MiddleNormalUnit(), beats, count=len(left), engine="auto")
     np.testing.assert_array_equal(run.beats["normal_middle"], middle.codes)
     np.testing.assert_array_equal(run.beats["wide"], wide)

@@ -376,12 +376,135 @@ def test_wide_spans_of_every_method_are_counted(method, narrow, wide, flagged, n
     spans = Spans(np.zeros(100, int), np.zeros(100, int), rng.integers(1, 4, 100), left, right)
     constants = make_constants(rng, 1)
     pixels = design.compute(spans, constants)
-    # Of divided spans there are many clocks.
-    engine = "auto" if method == "bisection" else "pysim"
+    # Other tests compile these.
+    engine = "auto" if method in ("linear", "bisection", "chord") else "pysim"
     result = run(ShadingPipelineUnit(design), spans, constants, pixels, engine=engine)
     assert_pixels(result, pixels)
     assert flagged <= pixels.wide_spans <= 50
     assert result.status["wide_spans"] == pixels.wide_spans
+
+
+# How many spans, and the longest, for `test_every_bit_counts`.
+LONG_AND_SHORT = ((200, 4095), (3000, 12))
+
+
+def unit_vectors(vectors):
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def spans_about(rng, widest, middles, longest, orders=4):
+    """Spans whose middle normals are given; as many of each order of width, and of length."""
+    across = unit_vectors(np.cross(middles, rng.normal(size=middles.shape)))
+    angles = np.radians(widest * 10.0 ** rng.uniform(-orders, 0, (len(middles), 1)))
+    left, right = (
+        quantise(middles * np.cos(angles / 2) + side * across * np.sin(angles / 2)) for side in (-1, 1)
+    )
+    length = ((longest + 1) ** rng.uniform(0, 1, len(middles))).astype(int)
+    return Spans(rng.integers(0, 4097 - length), rng.integers(0, 4096, len(middles)), length, left, right)
+
+
+def spans_at_rim(rng, widest, code):
+    """Spans on the border of light and shade of a light with a vector of this code.
+
+    Among them those that start within some last bits of it, as whether there is a highlight hangs on the
+    sign of N.L, of 34 bits or rounded to 25; those that cross it as slowly as they can; and those along which
+    N.L rises by half a step of 18 bits more than a whole number of them, to which the chord method rounds.
+    """
+    light = unit_vectors(code)
+
+    def normals(count, least=0.0, most=0.0):
+        height = rng.uniform(least, most, (count, 1))
+        return unit_vectors(unit_vectors(np.cross(rng.normal(size=(count, 3)), light)) + height * light)
+
+    moves = np.stack(np.mgrid[-30:31, -30:31, -30:31], axis=-1).reshape(-1, 3)
+    moves = moves[np.argsort(moves @ code)]
+    rises = moves @ code
+    edge, tie = (spans_about(rng, 0.1, normals(count), 60) for count in (6000, 1500))
+    crossing = spans_about(rng, 0.01, normals(250), 4095, orders=1)
+    assert np.gcd.reduce(code) == 1
+    away = rng.choice([0, 1 << 8], len(edge)) + rng.integers(-16, 17, len(edge)) - edge.normal_left @ code
+    nearest = np.searchsorted(rises[:-1], away)
+    edge.normal_left[:] += moves[nearest]
+    edge = edge[np.argsort(np.abs(away - rises[nearest]))[:600]]
+    halves = np.argsort(np.abs((rises & 0xFFFF) - 0x8000))[:40]
+    tie.normal_right[:] = tie.normal_left + moves[rng.choice(halves, len(tie))]
+    # Among short ones some are too wide.
+    lit = (
+        spans_about(rng, most, normals(count, -0.02, 0.12), longest)
+        for most, (count, longest) in zip((widest, 180.0), LONG_AND_SHORT, strict=True)
+    )
+    return joined(rng, [*lit, edge, tie, crossing])
+
+
+def joined(rng, kinds):
+    """All spans of several kinds, mixed."""
+    names = ("x", "y", "length", "normal_left", "normal_right")
+    spans = Spans(*(np.concatenate([getattr(kind, name) for kind in kinds]) for name in names))
+    return spans[rng.permutation(len(spans))]
+
+
+def spans_at_peak(rng, widest, halfway, exponent):
+    """Spans inside a highlight, 1 - N.H up to 2/n; most where it is an eighth of its peak and less."""
+    kinds = []
+    for count, longest in LONG_AND_SHORT:
+        outside = np.where(rng.random((count, 1)) < 0.2, 0.0, 0.6)
+        cosine = 1 - rng.uniform(outside, 0.9) * 2 / exponent
+        across = unit_vectors(np.cross(rng.normal(size=(count, 3)), halfway))
+        middles = cosine * halfway + np.sqrt(1 - cosine**2) * across
+        kinds.append(spans_about(rng, widest, middles, longest))
+    return joined(rng, kinds)
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        *("linear", "bisection", "quadratic", "recurrence", "chord"),
+        # Compiled for nothing else.
+        pytest.param("angular", marks=pytest.mark.long),
+    ],
+)
+def test_every_bit_counts(method):
+    """What is worked out for a span shows in some pixel, to the last bit.
+
+    It does where colours are far from their ends and steep: on the border of light and shade with eight times
+    the full light, and in a narrow highlight; and at the ends of the longest spans.
+    """
+    rng = np.random.default_rng(15)
+    design = ShadingPipeline(method)
+    unit = ShadingPipelineUnit(design)
+    widest = design.interpolator.MAX_ANGLE - 0.01
+    light, halfway = unit_vectors(rng.normal(size=(2, 3)))
+    vectors = light, unit_vectors(light + 3 * halfway), halfway
+    light_code, near_code, peak_code = (quantise(vector) for vector in vectors)
+    rim = spans_at_rim(rng, widest, light_code)
+    frames = [(rim, light_code, peak_code, 1, (8, 7, 6), (0.03, 0.5, 0.1), 0.3)]
+    # Then a direction and its opposite, so that every bit is 0 once, and 1 once.
+    for direction, peak, exponent, share in (
+        (near_code, peak_code, 1000, 0),
+        (~near_code, ~peak_code, 30, 0.3),
+    ):
+        spans = spans_at_peak(rng, widest, unit_vectors(peak), exponent)
+        frames.append((spans, direction, peak, exponent, (0, 0.01, 0), (8, 7, 6), share))
+    for spans, direction, peak, exponent, diffuse, specular, share in frames:
+        colors = (Intensity.color(np.array([color])) for color in (diffuse, specular))
+        constants = FrameConstants(
+            exponent, np.zeros(3, dtype=int), direction[np.newaxis], peak[np.newaxis], *colors
+        )
+        pixels = design.compute(spans, constants)
+        # The constants over others with all bits 1.
+        write = {name: np.tile(beats, 2) for name, beats in constants.writes().items()}
+        write["data"][: len(write["data"]) // 2] = 0x3FFFF
+        result = simulate(
+            unit,
+            beats_of(unit, spans),
+            count=len(pixels.x),
+            write=write,
+            engine="auto",
+            input_stalls=rng.random(997) < share,
+            output_stalls=rng.random(1009) < share,
+        )
+        assert_pixels(result, pixels)
+        assert result.status["wide_spans"] == pixels.wide_spans
 
 
 def words(layout, beats):

@@ -95,6 +95,31 @@ def test_longest_span(recurrence):
     assert_equal(run, expected)
 
 
+def test_every_bit_counts():
+    """Spans of hardly any angle, which go to the border of the result's rounding: one step decides there."""
+    rng, recurrence = np.random.default_rng(6), Recurrence()
+    count, length = 100, 12
+    beats = {"coefficient": np.zeros(count, int), "shift": np.full(count, 63)}
+    beats["length"] = np.full(count, length)
+    span, index = np.repeat(np.arange(count), length), np.tile(np.arange(length), count)
+    expected, format = {}, recurrence.state_format
+    cut = format.fraction_bits - recurrence.result_format.fraction_bits
+    for copy in COPIES:
+        difference = rng.choice([-1, 1], count) << rng.integers(0, 8, count)
+        border = rng.integers(-(1 << 17), 1 << 17, count) * (1 << cut) + (1 << (cut - 1))
+        first = border - rng.integers(1, length, count) * difference - rng.integers(0, 2, count)
+        beats[copy] = {"first": first, "second": difference}
+        words = (
+            Fixed(format, first),
+            Fixed(format, difference),
+            Fixed(recurrence.coefficient_format, beats["coefficient"]),
+        )
+        expected[copy] = recurrence.compute(*words, beats["shift"], span, index).codes
+    for stalls in (np.zeros(1, bool), rng.random(1009) < 0.4):
+        run = simulate(RecurrenceUnit(), beats, count=len(span), engine="auto", output_stalls=stalls)
+        assert_equal(run, expected)
+
+
 @pytest.mark.parametrize("recurrence", FORMS, ids=str)
 def test_engines_agree(recurrence):
     rng = np.random.default_rng(5)

@@ -83,12 +83,14 @@ def test_equals_twin(verify, model, operand):
 
 
 def test_every_bit_counts():
-    """Every bit of the exponent and of its slope; of the products those too that are rounded off."""
+    """Every bit of the exponent and of its slope, which waits with a beat; of products those rounded off."""
     parameters = Specular()
     unit = SpecularUnit(parameters)
-    for exponent in [*1 << np.arange(10), *np.random.default_rng(7).integers(1, 1001, 50)]:
+    rng = np.random.default_rng(7)
+    for exponent in [*1 << np.arange(10), *rng.integers(1, 1001, 50)]:
         codes = operands(parameters, exponent, exponent, 4000)
-        check(unit, exponent, *beats_of(parameters, exponent, codes))
+        stalls = rng.random(1009) < 0.3
+        check(unit, exponent, *beats_of(parameters, exponent, codes), output_stalls=stalls)
 
 
 @pytest.mark.parametrize("operand", ["cosine", "one_minus_cosine"])
