@@ -486,7 +486,7 @@ techmap
 aigmap
 write_aiger -zinit -map unit.map unit.aig"""
 
-_ROUNDS = 10
+_ROUNDS = 20
 _NARROW = 12
 
 
