@@ -10,7 +10,7 @@ import pytest
 from amaranth.hdl import ResetInserter, Signal, Value
 from amaranth.sim import Simulator
 
-from golden.unit_vector import COMPONENT, quantise
+from golden.unit_vector import COMPONENT, ONE_SQUARED, quantise
 from sim.beats import dtype_of, pack
 from sim.engine import simulate
 
@@ -96,6 +96,16 @@ def normal_pairs():
         return left, left * np.cos(angle) + across * np.sin(angle)
 
     return normal_pairs
+
+
+@pytest.fixture(scope="session")
+def one_minus_cosines():
+    """One minus the dot product of every vector of codes with every other; float64 has all bits of these."""
+
+    def one_minus_cosines(left, right):
+        return ONE_SQUARED.codes - (left.astype(float) @ right.T.astype(float)).astype(int)
+
+    return one_minus_cosines
 
 
 @pytest.fixture(scope="session")

@@ -182,10 +182,12 @@ def of_lines(format=DifferenceSetup.FORMAT):
         walk(DifferenceAccumulator(format=format), Fixed(COMPONENT, n), *differences, span, step)
 
 
-def of_chord_sums(name, fraction_bits, integer_bits=3):
+def of_chord_sums(name, fraction_bits, format=None):
     """Any slope and bend; starts of unit vectors: f from -1 to 1, u to 2 and what `Chord` cuts."""
     unit = ChordInterpolator(fraction_bits=fraction_bits)
-    sums, setup = replace(unit.accumulators[name], format=SQ(integer_bits, fraction_bits)), unit.setup
+    sums, setup = unit.accumulators[name], unit.setup
+    if format is not None:
+        sums = replace(sums, format=format)
     one = 1 << sums.start_format.fraction_bits
     start = unknown(*{"diffuse": (-one, one), "highlight": (0, 2.001 * one)}[name])
     slope, bend = (unknown(f.min_code, f.max_code) for f in (setup.SLOPE_FORMAT, setup.BEND_FORMAT))
@@ -491,8 +493,8 @@ def test_words_a_bit_too_short_are_found(plant, word):
 SHORTER_SUMS = {
     "normal": partial(of_normals, False, ("exact",), SQ(1, 42)),
     "straight line": partial(of_lines, SQ(1, 42)),
-    "N.L": partial(of_chord_sums, "diffuse", 46, 1),
-    "u": partial(of_chord_sums, "highlight", 46, 2),
+    "N.L": partial(of_chord_sums, "diffuse", 46, SQ(1, 46)),
+    "u": partial(of_chord_sums, "highlight", 46, SQ(2, 46)),
     "first steps of the recurrence": partial(of_recurrence_prologue, SQ(1, 44)),
 }
 

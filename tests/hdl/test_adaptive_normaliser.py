@@ -121,7 +121,7 @@ def test_front_runs_ahead_until_the_fifo_is_full(normal_pairs):
     assert (run.input_clocks < wait).sum() == (2 << parameters.depth) + 2
 
 
-def test_every_bit_counts(normal_pairs):
+def test_every_bit_counts(normal_pairs, one_minus_cosines):
     """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
     rng = np.random.default_rng(9)
     parameters = AdaptiveNormaliser()
@@ -130,10 +130,10 @@ def test_every_bit_counts(normal_pairs):
     beats, expected, _ = spans(normal_pairs, parameters, angles, lengths)
     run = simulate(AdaptiveNormaliserUnit(parameters), beats, count=lengths.sum(), engine="auto")
     assert_equal(run, expected)
-    # Of all pairs of ends (float64 has every bit of their products) those up to 90 degrees whose 1 - cosine
-    # is at the border of its rounding. The third of five pixels is the normal half-way.
+    # Of all pairs of ends those up to 90 degrees whose 1 - cosine is at the border of its rounding. The third
+    # of five pixels is the normal half-way.
     left, right = (quantise(normals) for normals in normal_pairs(rng, 1500, 90))
-    u = ONE_SQUARED.codes - (left.astype(float) @ right.T.astype(float)).astype(int)
+    u = one_minus_cosines(left, right)
     first, second = np.nonzero((u < ONE_SQUARED.codes) & (abs(u % (1 << 17) - (1 << 16)) < 4))
     beats = {"normal_left": left[first], "normal_right": right[second], "length": np.full(len(first), 5)}
     normal, *_ = parameters.compute(

@@ -67,13 +67,12 @@ def test_every_bit_counts(normal_pairs):
     np.testing.assert_array_equal(run.beats["wide"], wide)
 
 
-def test_last_bits_of_all_count(normal_pairs):
+def test_last_bits_of_all_count(normal_pairs, one_minus_cosines):
     """Spans at the borders of roundings, where a single step of a product decides."""
     rng, parameters = np.random.default_rng(6), BisectionChain()
     # Of all pairs of these ends those to 90 degrees whose u is at a border of both its roundings.
     ends = [quantise(normals) for normals in normal_pairs(rng, 2000, 90)]
-    # Exact: float64 has all bits of a dot product.
-    u = ONE_SQUARED.codes - (ends[0].astype(float) @ ends[1].T.astype(float)).astype(int)
+    u = one_minus_cosines(*ends)
     border = abs((u - (7 << 13) + 20) % (1 << 17) - 20) < 20
     first = [end[k] for end, k in zip(ends, np.nonzero(border & (u < ONE_SQUARED.codes)), strict=True)]
     # Level 1 is the sum of the ends times f: those with a component at the border of its rounding.

@@ -61,6 +61,13 @@ def test_equals_twin(verify, normal_pairs, model, interval):
     assert max(shares[1:]) < 0.9
 
 
+def lit_by(unit, left, right, halfway, exponent, **stalls):
+    """What the unit says of spans under one light."""
+    beats = {"normal_left": left, "normal_right": right}
+    constants = {"halfway": halfway[np.newaxis], "exponent": exponent}
+    return simulate(unit, beats, count=len(left), constants=constants, engine="auto", **stalls).beats
+
+
 def test_every_bit_counts(normal_pairs):
     """Every bit of the exponent and of its threshold; of words that wait; of products those rounded off.
 
@@ -77,15 +84,8 @@ def test_every_bit_counts(normal_pairs):
         near = spans(rng, normal_pairs, 3000, halfway, cosine, 1e-5, np.geomspace(0.1, 45, 400))
         left, right = (quantise(n) for n in near)
         operands = (Fixed(COMPONENT, n) for n in (left, right, code))
-        run = simulate(
-            unit,
-            {"normal_left": left, "normal_right": right},
-            count=len(left),
-            constants={"halfway": code[np.newaxis], "exponent": exponent},
-            engine="auto",
-            output_stalls=rng.random(1009) < 0.3,
-        )
-        np.testing.assert_array_equal(run.beats, parameters.compute(*operands, exponent))
+        lit = lit_by(unit, left, right, code, exponent, output_stalls=rng.random(1009) < 0.3)
+        np.testing.assert_array_equal(lit, parameters.compute(*operands, exponent))
 
 
 @pytest.mark.parametrize("fraction_bits", [5, 6, 9])
@@ -108,14 +108,7 @@ def test_equals_twin_at_reduced_width(fraction_bits):
         right *= np.sign(right @ halfway)[:, np.newaxis] | 1
         expected = parameters.compute(*(Fixed(format, v) for v in (left, right, halfway)), exponent)
         shares.append(expected.mean())
-        run = simulate(
-            unit,
-            {"normal_left": left, "normal_right": right},
-            count=len(left),
-            constants={"halfway": halfway[np.newaxis], "exponent": exponent},
-            engine="auto",
-        )
-        np.testing.assert_array_equal(run.beats, expected)
+        np.testing.assert_array_equal(lit_by(unit, left, right, halfway, exponent), expected)
     assert 0.01 < min(shares) < 0.8
 
 

@@ -61,13 +61,12 @@ def test_equals_twin(verify, normal_pairs, interval, fit):
     )
 
 
-def test_every_bit_counts(normal_pairs):
+def test_every_bit_counts(normal_pairs, one_minus_cosines):
     """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
     rng = np.random.default_rng(3)
     left, right = (quantise(normals) for normals in normal_pairs(rng, 40_000, rng.uniform(0, 60, 40_000)))
-    # Of all pairs of the first 1500 (float64 has every bit of their products) those up to 60 degrees whose u
-    # is at the border of a step.
-    u = ONE_SQUARED.codes - (left[:1500].astype(float) @ right[:1500].T.astype(float)).astype(int)
+    # Of all pairs of the first 1500 those up to 60 degrees whose u is at the border of a step.
+    u = one_minus_cosines(left[:1500], right[:1500])
     first, second = np.nonzero((u < ONE_SQUARED.codes // 2) & ((u + 8) % (1 << 16) < 16))
     left, right = np.vstack([left, left[first]]), np.vstack([right, right[second]])
     middle, wide = MiddleNormal().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))

@@ -14,6 +14,7 @@ from amaranth.sim import Simulator
 from golden.diffuse import Diffuse
 from golden.fixed import Fixed
 from golden.frame_constants import FrameConstants
+from golden.geometry import normalise
 from golden.intensity import Intensity
 from golden.local_chord_interpolator import SpanValues
 from golden.pipeline import METHODS, MODELS, ShadingPipeline, Spans
@@ -388,13 +389,9 @@ def test_wide_spans_of_every_method_are_counted(method, narrow, wide, flagged, n
 LONG_AND_SHORT = ((200, 4095), (3000, 12))
 
 
-def unit_vectors(vectors):
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
 def spans_about(rng, widest, middles, longest, orders=4):
     """Spans whose middle normals are given; as many of each order of width, and of length."""
-    across = unit_vectors(np.cross(middles, rng.normal(size=middles.shape)))
+    across = normalise(np.cross(middles, rng.normal(size=middles.shape)))
     angles = np.radians(widest * 10.0 ** rng.uniform(-orders, 0, (len(middles), 1)))
     left, right = (
         quantise(middles * np.cos(angles / 2) + side * across * np.sin(angles / 2)) for side in (-1, 1)
@@ -410,11 +407,11 @@ def spans_at_rim(rng, widest, code):
     sign of N.L, of 34 bits or rounded to 25; those that cross it as slowly as they can; and those along which
     N.L rises by half a step of 18 bits more than a whole number of them, to which the chord method rounds.
     """
-    light = unit_vectors(code)
+    light = normalise(code)
 
     def normals(count, least=0.0, most=0.0):
         height = rng.uniform(least, most, (count, 1))
-        return unit_vectors(unit_vectors(np.cross(rng.normal(size=(count, 3)), light)) + height * light)
+        return normalise(normalise(np.cross(rng.normal(size=(count, 3)), light)) + height * light)
 
     moves = np.stack(np.mgrid[-30:31, -30:31, -30:31], axis=-1).reshape(-1, 3)
     moves = moves[np.argsort(moves @ code)]
@@ -449,7 +446,7 @@ def spans_at_peak(rng, widest, halfway, exponent):
     for count, longest in LONG_AND_SHORT:
         outside = np.where(rng.random((count, 1)) < 0.2, 0.0, 0.6)
         cosine = 1 - rng.uniform(outside, 0.9) * 2 / exponent
-        across = unit_vectors(np.cross(rng.normal(size=(count, 3)), halfway))
+        across = normalise(np.cross(rng.normal(size=(count, 3)), halfway))
         middles = cosine * halfway + np.sqrt(1 - cosine**2) * across
         kinds.append(spans_about(rng, widest, middles, longest))
     return joined(rng, kinds)
@@ -473,8 +470,8 @@ def test_every_bit_counts(method):
     design = ShadingPipeline(method)
     unit = ShadingPipelineUnit(design)
     widest = design.interpolator.MAX_ANGLE - 0.01
-    light, halfway = unit_vectors(rng.normal(size=(2, 3)))
-    vectors = light, unit_vectors(light + 3 * halfway), halfway
+    light, halfway = normalise(rng.normal(size=(2, 3)))
+    vectors = light, normalise(light + 3 * halfway), halfway
     light_code, near_code, peak_code = (quantise(vector) for vector in vectors)
     rim = spans_at_rim(rng, widest, light_code)
     frames = [(rim, light_code, peak_code, 1, (8, 7, 6), (0.03, 0.5, 0.1), 0.3)]
@@ -483,7 +480,7 @@ def test_every_bit_counts(method):
         (near_code, peak_code, 1000, 0),
         (~near_code, ~peak_code, 30, 0.3),
     ):
-        spans = spans_at_peak(rng, widest, unit_vectors(peak), exponent)
+        spans = spans_at_peak(rng, widest, normalise(peak), exponent)
         frames.append((spans, direction, peak, exponent, (0, 0.01, 0), (8, 7, 6), share))
     for spans, direction, peak, exponent, diffuse, specular, share in frames:
         colors = (Intensity.color(np.array([color])) for color in (diffuse, specular))
