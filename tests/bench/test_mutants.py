@@ -12,9 +12,6 @@ ROWS = [
     Score("three", 3, ("a", "b", "c"), ()),
 ]
 
-# Survivors of these are not looked through yet.
-OPEN = ("bisection_interpolator", "angular_interpolator", "recurrence_interpolator", "pipeline")
-
 
 @pytest.fixture(scope="module")
 def diffuse_vectors():
@@ -72,7 +69,7 @@ def test_small_device():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("device", [name for name in DEVICES if name not in OPEN])
+@pytest.mark.parametrize("device", DEVICES)
 def test_mutants_are_killed(device):
     (row,) = measured([device])
     assert row.score >= LEAST

@@ -433,6 +433,30 @@ def spans_at_rim(rng, widest, code):
     return joined(rng, [*lit, edge, tie, crossing])
 
 
+def spans_at_tie(rng, widest, light, one_minus_cosines):
+    """Spans along the border of light and shade whose 1 - cosine hangs on its last bits.
+
+    Either it is at the border of its rounding, or the number of segments into which bisection divides the
+    span is about to change.
+    """
+    normaliser = METHODS["bisection"].normaliser
+    across = normalise(np.cross(light, rng.normal(size=3)))
+    turn = np.radians(rng.uniform(-widest / 2, widest / 2, (3000, 1)))
+    height = rng.uniform(0, 0.1, (3000, 1))
+    arc = np.cos(turn) * across + np.sin(turn) * np.cross(light, across) + height * light
+    left, right = np.split(quantise(normalise(arc)), 2)
+    u = one_minus_cosines(left, right)
+    nearer, wider = (
+        normaliser.levels(Fixed(normaliser.bisection.ANGLE_FORMAT, (u + (1 << 16) >> 17) + move), False)
+        for move in (-1, 1)
+    )
+    tie = abs((u + (1 << 15)) % (1 << 16) - (1 << 15)) < 8
+    pairs = [rng.choice(np.argwhere(chosen), count) for chosen, count in ((tie, 500), (nearer != wider, 200))]
+    first, second = np.concatenate(pairs).T
+    length, (x, y) = rng.integers(3, 60, len(first)), rng.integers(0, 4000, (2, len(first)))
+    return Spans(x, y, length, left[first], right[second])
+
+
 def joined(rng, kinds):
     """All spans of several kinds, mixed."""
     names = ("x", "y", "length", "normal_left", "normal_right")
@@ -452,15 +476,8 @@ def spans_at_peak(rng, widest, halfway, exponent):
     return joined(rng, kinds)
 
 
-@pytest.mark.parametrize(
-    "method",
-    [
-        *("linear", "bisection", "quadratic", "recurrence", "chord"),
-        # Compiled for nothing else.
-        pytest.param("angular", marks=pytest.mark.long),
-    ],
-)
-def test_every_bit_counts(method):
+@pytest.mark.parametrize("method", ["linear", "bisection", "quadratic", "angular", "recurrence", "chord"])
+def test_every_bit_counts(method, one_minus_cosines):
     """What is worked out for a span shows in some pixel, to the last bit.
 
     It does where colours are far from their ends and steep: on the border of light and shade with eight times
@@ -482,6 +499,15 @@ def test_every_bit_counts(method):
     ):
         spans = spans_at_peak(rng, widest, normalise(peak), exponent)
         frames.append((spans, direction, peak, exponent, (0, 0.01, 0), (8, 7, 6), share))
+    # Components of 1 are rounded to the largest word; of long and wide spans in a row setups wait for room.
+    axes = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 40, axis=0)
+    more = np.random.default_rng(16)
+    exact = joined(
+        more, [spans_at_tie(more, widest, light, one_minus_cosines), spans_about(more, widest, axes, 60)]
+    )
+    row = spans_about(more, widest, normalise(rim.normal_left[:300]), 4095, orders=1)
+    row = row[row.length > 600][:60]
+    frames += [(each, light_code, *frames[0][2:-1], share) for each, share in ((exact, 0.3), (row, 0))]
     for spans, direction, peak, exponent, diffuse, specular, share in frames:
         colors = (Intensity.color(np.array([color])) for color in (diffuse, specular))
         constants = FrameConstants(
@@ -502,6 +528,50 @@ def test_every_bit_counts(method):
         )
         assert_pixels(result, pixels)
         assert result.status["wide_spans"] == pixels.wide_spans
+
+
+def test_halves_round_up():
+    """Channels of a half, and of the least step less: there every bit of either term's product counts.
+
+    For a pixel's terms d and s and a diffuse colour c the specular colour is
+    (2^22 - 0 or 1 - 2^17 ambient - c d) / s modulo 2^23, where it is a colour.
+    """
+    rng = np.random.default_rng(22)
+    design = ShadingPipeline()
+    unit = ShadingPipelineUnit(design)
+    diffuse_unit, highlight, count = Diffuse(), design.highlight, 8192
+    for share in np.repeat([0.0, 0.5], 12):
+        halfway = normalise(rng.normal(size=3))
+        constants = make_constants(rng, 1, int(1000 ** rng.uniform()), brightness=0.5)
+        constants.halfway[:] = quantise(halfway)
+        constants.direction[:] = quantise(normalise(halfway + 0.5 * rng.normal(size=3)))
+        away = rng.normal(size=(count, 3)) / np.sqrt(constants.exponent)
+        normal, zero = quantise(normalise(halfway + away)), np.zeros(count, dtype=int)
+        flat = Spans(zero, zero, zero + 1, normal, normal)
+        vectors = (flat.normal_left, flat.normal_right, constants.direction, constants.halfway)
+        left, right, direction, peak = (Fixed(COMPONENT, codes) for codes in vectors)
+        operands = design.interpolator.compute(left, right, flat.length, direction, peak)
+        d = diffuse_unit.compute(operands.cosine).codes
+        dark = diffuse_unit.dark(operands.cosine)
+        s = highlight.compute(operands.highlight, dark, constants.exponent).codes
+        # The inverse of an odd number: each step doubles its bits, of which three are right at the start.
+        inverse = s
+        for _ in range(3):
+            inverse = inverse * (2 - s * inverse % (1 << 23)) % (1 << 23)
+        others = (constants.ambient << 17) + constants.diffuse * d
+        half = (1 << 22) - rng.integers(0, 2, (count, 3))
+        color = (half - others) * inverse % (1 << 23)
+        total = others + color * s
+        fits = (s % 2 == 1) & (color <= Intensity.color(8.0)) & (total < 255 << 23)
+        chosen = [rng.choice(np.flatnonzero(fits[:, channel])) for channel in range(3)]
+        constants.specular[0] = color[chosen, range(3)]
+        np.testing.assert_array_equal(total[chosen, range(3)] % (1 << 23), half[chosen, range(3)])
+        spans = flat[np.repeat(chosen, 10)]
+        pixels = design.compute(spans, constants)
+        lit = (total[chosen, range(3)] >> 23) + (half[chosen, range(3)] == 1 << 22)
+        np.testing.assert_array_equal(pixels.color[::10].diagonal(), lit)
+        stalls = {"input_stalls": rng.random(97) < share, "output_stalls": rng.random(89) < share}
+        assert_pixels(run(unit, spans, constants, pixels, **stalls), pixels)
 
 
 def words(layout, beats):

@@ -1,15 +1,21 @@
 """The recurrence method in the pipeline: RTL against its twin, pixel by pixel and clock by clock."""
 
+import functools
+
 import numpy as np
 import pytest
 
+from golden.fixed import Fixed
 from golden.frame_constants import FrameConstants
+from golden.geometry import normalise
 from golden.intensity import Intensity
 from golden.pipeline import METHODS, ShadingPipeline, Spans
 from golden.recurrence_interpolator import RecurrenceInterpolator
-from golden.unit_vector import quantise
+from golden.unit_vector import COMPONENT, quantise
 from hdl.pipeline import ShadingPipelineUnit
 from sim.engine import simulate
+
+from .edges import SHADE, assert_equals_twin, constants_of, highlight_edges, spans_on_edges
 
 
 def make_spans(rng, lengths, normal_pairs, degrees):
@@ -32,6 +38,12 @@ def make_constants(rng, lights, exponent, halfway):
         diffuse=Intensity.color(rng.uniform(0.3, 1, (lights, 3))),
         specular=Intensity.color(rng.uniform(0.3, 1, (lights, 3))),
     )
+
+
+@functools.cache
+def unit_of(method, model, lights, interval):
+    """One for all tests, as it is made and compiled but once."""
+    return ShadingPipelineUnit(ShadingPipeline(method, model, lights), interval)
 
 
 def run(unit, spans, constants, pixels, **stalls):
@@ -59,8 +71,8 @@ def test_equals_twin(normal_pairs, monkeypatch, method, model, lights, interval)
     # Unstable, so no method for use.
     monkeypatch.setitem(METHODS, "recurrence-direct", RecurrenceInterpolator("direct"))
     rng = np.random.default_rng(lights)
-    parameters = ShadingPipeline(method, model, lights)
-    unit = ShadingPipelineUnit(parameters, interval)
+    unit = unit_of(method, model, lights, interval)
+    parameters = unit.parameters
     assert (unit.setup_interval, unit.clocks_per_pixel) == (interval, 1)
     lengths = np.r_[rng.integers(0, 40, 150), np.full(30, 1), np.full(30, 7), [4095, 1, 1], np.arange(1, 10)]
     for exponent in (1, 1000):
@@ -83,3 +95,43 @@ def test_equals_twin(normal_pairs, monkeypatch, method, model, lights, interval)
                 "output_stalls": rng.random(1009) < output_share,
             }
             run(unit, spans, constants, pixels, **stalls)
+
+
+def test_last_bits_count():
+    """What is worked out for a pixel counts to the last of 44 fraction bits, where its cosine is on an edge.
+
+    That is where light and shade meet, from either side, or, for N.H, where the colour changes.
+    """
+    rng = np.random.default_rng(5)
+    unit = unit_of("recurrence", "cosquad", 1, 4)
+    setup = unit.parameters.interpolator.setup
+    code = quantise(normalise(rng.normal(size=3)))
+    count = 12000
+    # The words of a narrow span are the finest; a wide one needs all of its tables.
+    angles = 90 * np.r_[10.0 ** rng.uniform(-4.5, -2.5, count), rng.uniform(0.03, 1, count)]
+    steps = np.r_[rng.integers(0, 25, count), rng.integers(3, 13, count)]
+    for vector, edges, exponent in (
+        (code, SHADE, 1),
+        (~code, SHADE, 1),
+        (code, highlight_edges(unit.parameters, 1000), 1000),
+    ):
+
+        def cosine(left, right, length, steps, vector=vector):
+            *start, _ = setup.compute(*(Fixed(COMPONENT, codes) for codes in (left, right, vector)), length)
+            states = setup.recurrence.states(*start, steps.max() + 1) + setup.recurrence.exchange
+            return np.ldexp(states.codes[steps, np.arange(len(steps))], 34 - states.format.fraction_bits)
+
+        spans = spans_on_edges(rng, vector, edges, angles, steps, cosine)
+        assert_equals_twin(unit, spans, constants_of(vector, exponent), rng.random(1009) < 0.2)
+
+
+def test_ends_of_the_words():
+    """Words that are no unit vectors saturate as in the twin, and upset no span that follows."""
+    rng = np.random.default_rng(8)
+    unit, count = unit_of("recurrence", "cosquad", 1, 4), 200
+    ends = rng.choice([COMPONENT.min_code, COMPONENT.max_code], (3, count, 3))
+    ends[:2, ::2] = quantise(normalise(rng.normal(size=(2, count // 2, 3))))
+    place = np.zeros(count, dtype=np.int64)
+    spans = Spans(place, place, rng.integers(1, 20, count), ends[0], ends[1])
+    for code in ends[2, :2]:
+        assert_equals_twin(unit, spans, constants_of(code, 1), rng.random(1009) < 0.2)
