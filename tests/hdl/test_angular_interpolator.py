@@ -67,3 +67,47 @@ def test_vector_at_the_pole(unit):
     constants = constants_of(peak[0], 1)
     constants = replace(constants, direction=light, specular=Intensity.color(np.array([[3.9, 3.8, 3.7]])))
     assert_equals_twin(unit, spans, constants, rng.random(1009) < 0.4)
+
+
+def longer(code):
+    """How much longer a code is than that of length 1."""
+    return np.linalg.norm(code, axis=-1) - ONE
+
+
+def test_words_at_their_ends(unit):
+    """Spans for which the words of the setup are as large as rounding makes those of unit vectors.
+
+    Normals are opposite, and 60 and 90 degrees apart; the vector is a normal, along the step from one to the
+    next, and at right angles to a span's middle.
+    """
+    rng = np.random.default_rng(18)
+
+    def rounded(about, count):
+        return np.rint(normalise(about + rng.uniform(-0.002, 0.002, (count, 3))) * ONE).astype(int)
+
+    codes = rounded(np.sqrt(1 / 3), 100_000)
+    vector = codes[np.argmax(longer(codes))]
+    about = normalise(vector)
+    # Of a step by one in each component at most one end is a unit vector's code but for its last bits.
+    step = np.floor(normalise(vector + rng.integers(-100, 101, (200_000, 3))) * ONE).astype(int)
+    step = step[np.argsort(np.abs(longer(step) + np.sqrt(3) / 2))[:40]]
+    codes = (rounded(np.array(side) / 3, 200_000) for side in ((2, 2, 1), (1, -2, 2)))
+    first, second = (code[np.argsort(-longer(code))[:1000]] for code in codes)
+    tie = np.argsort(np.abs(first @ second.T), axis=None)[:400]
+    first, second = first[tie // 1000], second[tie % 1000]
+    middle, side = (normalise(np.cross(about, rng.normal(size=(400, 3)))) for _ in range(2))
+    half = np.radians(10.0 ** rng.uniform(-1, 1.5, (400, 1)))
+    sixty = np.cos(np.pi / 3) * side + np.sin(np.pi / 3) * np.cross(side, about)
+    pairs = [
+        (quantise(side[:1]), -quantise(side[:1])),
+        (step, step + 1),
+        (first, second),
+        tuple(quantise(middle * np.cos(turn) + about * np.sin(turn)) for turn in (-half, half)),
+        (quantise(side), quantise(sixty)),
+        (vector[np.newaxis], vector[np.newaxis]),
+        (quantise(side[1:2]), quantise(sixty[1:2])),
+    ]
+    ends = (np.concatenate(end) for end in zip(*pairs, strict=True))
+    place = np.zeros(sum(len(left) for left, _ in pairs), dtype=np.int64)
+    spans = Spans(place, place, place + 3, *ends)
+    assert_equals_twin(unit, spans, constants_of(vector, 1), np.zeros(1, dtype=bool))

@@ -506,7 +506,9 @@ def test_every_bit_counts(method, one_minus_cosines):
         more, [spans_at_tie(more, widest, light, one_minus_cosines), spans_about(more, widest, axes, 60)]
     )
     row = spans_about(more, widest, normalise(rim.normal_left[:300]), 4095, orders=1)
-    row = row[row.length > 600][:60]
+    farthest = spans_about(more, widest, normalise(rim.normal_left[:4]), 4095, orders=0)
+    farthest.x[:], farthest.length[:] = 0, 4095
+    row = joined(more, [row[row.length > 600][:60], farthest])
     frames += [(each, light_code, *frames[0][2:-1], share) for each, share in ((exact, 0.3), (row, 0))]
     for spans, direction, peak, exponent, diffuse, specular, share in frames:
         colors = (Intensity.color(np.array([color])) for color in (diffuse, specular))
@@ -572,6 +574,42 @@ def test_halves_round_up():
         np.testing.assert_array_equal(pixels.color[::10].diagonal(), lit)
         stalls = {"input_stalls": rng.random(97) < share, "output_stalls": rng.random(89) < share}
         assert_pixels(run(unit, spans, constants, pixels, **stalls), pixels)
+
+
+def test_brightest_light_saturates(normal_pairs):
+    """Three terms of eight times the full channel are white, and in the dark the ambient term alone is.
+
+    The constants are written over others with all bits 1, and again over such with all bits 0.
+    """
+    rng = np.random.default_rng(16)
+    design = ShadingPipeline()
+    spans = make_spans(rng, rng.integers(1, 30, 60), normal_pairs)
+    constants = lit_constants(rng, spans, 1, 30)
+    constants.direction[:] = constants.halfway
+    brightest = Intensity.color(np.array(8.0))
+    for color in (constants.ambient, constants.diffuse, constants.specular):
+        color[...] = brightest
+    pixels = design.compute(spans, constants)
+    assert np.all(pixels.color == 255)
+    unit = ShadingPipelineUnit(design)
+    write = {name: np.tile(beats, 4) for name, beats in constants.writes().items()}
+    write["data"].reshape(4, -1)[[0, 2]] = [[0x3FFFF], [0]]
+    found = simulate(unit, beats_of(unit, spans), count=len(pixels.x), write=write, engine="auto")
+    assert_pixels(found, pixels)
+
+
+def test_counters_stop_at_their_largest_value(normal_pairs):
+    rng = np.random.default_rng(17)
+    design = ShadingPipeline()
+    kinds = make_spans(rng, [1, 0], normal_pairs, 0)
+    kinds.normal_right[0] = -kinds.normal_left[0]
+    spans = kinds[np.repeat([0, 1], (1 << 16) + 2)]
+    constants = make_constants(rng, 1)
+    pixels = design.compute(spans, constants)
+    result = run(ShadingPipelineUnit(design), spans, constants, pixels)
+    assert_pixels(result, pixels)
+    assert pixels.wide_spans == (1 << 16) + 2
+    assert result.status["wide_spans"] == result.status["empty_spans"] == 65535
 
 
 def words(layout, beats):

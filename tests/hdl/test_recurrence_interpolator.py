@@ -135,3 +135,12 @@ def test_ends_of_the_words():
     spans = Spans(place, place, rng.integers(1, 20, count), ends[0], ends[1])
     for code in ends[2, :2]:
         assert_equals_twin(unit, spans, constants_of(code, 1), rng.random(1009) < 0.2)
+
+
+def test_half_the_square_of_a_radian(normal_pairs):
+    """It is 1/2 but for rounding, which brings the normalised word of some spans to 1."""
+    rng = np.random.default_rng(19)
+    unit = unit_of("recurrence", "cosquad", 1, 4)
+    spans = make_spans(rng, rng.integers(1, 20, 100), normal_pairs, np.degrees(1))
+    constants = make_constants(rng, 1, 20, spans.normal_left[:1])
+    run(unit, spans, constants, unit.parameters.compute(spans, constants))

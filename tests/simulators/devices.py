@@ -199,8 +199,8 @@ def _bisection(rng, count, twin):
 
 def _bisection_chain(rng, count):
     left, right = _normals(rng, count)
-    # Few as often as many: each takes 17 clocks.
-    level = np.floor((1 << BisectionChain.LEVEL_BITS) ** rng.random(count)).astype(np.int64)
+    # Most are short, as a level takes 17 clocks.
+    level = 1 + (rng.zipf(2, count) - 1) % ((1 << BisectionChain.LEVEL_BITS) - 1)
     normal, wide = BisectionChain().compute(*_fixed(left, right), level)
     return Case(
         BisectionChainUnit(),
