@@ -549,14 +549,13 @@ class _Miter:
 
     def is_equivalent(self, mutant: int, register: str = "") -> bool:
         """Whether a mutant, of whatever comes to a register, is proved to do what the unit does."""
-        if not self._write(mutant, set(range(len(self._next)))):
+        shared = set(range(len(self._next)))
+        # What changes nothing is seen before a register is taken apart, and then hardly.
+        if not self._write(mutant, shared):
             return True
-        whole = re.compile(re.escape(register) + r"(\W|$)")
-        shared = {
-            latch
-            for latch in range(len(self._next))
-            if not (register and any(map(whole.match, self._names[latch])))
-        }
+        if register:
+            whole = re.compile(re.escape(register) + r"(\W|$)")
+            shared = {latch for latch in shared if not any(map(whole.match, self._names[latch]))}
         for _ in range(_ROUNDS):
             proved, differing = self._prove(mutant, shared)
             if proved or not differing:

@@ -10,11 +10,8 @@ from golden.geometry import normalise
 from golden.intensity import Intensity
 from golden.pipeline import ShadingPipeline, Spans
 from golden.unit_vector import ONE, quantise
-from hdl.pipeline import ShadingPipelineUnit
-from sim.engine import simulate
-from sim.frame import beats_of
 
-__all__ = ["SHADE", "assert_equals_twin", "constants_of", "highlight_edges", "spans_on_edges"]
+__all__ = ["SHADE", "constants_of", "highlight_edges", "spans_on_edges"]
 
 SHADE = np.array([1])
 """Edge of light and shade, as one of `highlight_edges`."""
@@ -96,22 +93,3 @@ def spans_on_edges(
     nearest = rng.permutation(nearest)
     place = np.zeros(len(nearest), dtype=np.int64)
     return Spans(place, place, length[nearest], left[nearest], right[nearest])
-
-
-def assert_equals_twin(
-    unit: ShadingPipelineUnit, spans: Spans, constants: FrameConstants, stalls: np.ndarray
-) -> None:
-    """Hold the pixels against those of the twin, under stalls of the output."""
-    pixels = unit.parameters.compute(spans, constants)
-    assert len(np.unique(pixels.color)) > 1
-    result = simulate(
-        unit,
-        beats_of(unit, spans),
-        count=len(pixels.x),
-        write=constants.writes(),
-        engine="auto",
-        output_stalls=stalls,
-    )
-    for channel, name in enumerate("rgb"):
-        np.testing.assert_array_equal(result.beats[name], pixels.color[:, channel])
-    assert result.status["wide_spans"] == pixels.wide_spans

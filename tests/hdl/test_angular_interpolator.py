@@ -13,7 +13,8 @@ from golden.pipeline import ShadingPipeline, Spans
 from golden.unit_vector import COMPONENT, ONE, quantise
 from hdl.pipeline import ShadingPipelineUnit
 
-from .edges import SHADE, assert_equals_twin, constants_of, highlight_edges, spans_on_edges
+from .edges import SHADE, constants_of, highlight_edges, spans_on_edges
+from .pixels import assert_equals_twin
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,9 @@ def test_last_bits_count(unit):
         (highlight_edges(parameters, 1000), 1000),
     ):
         spans = spans_on_edges(rng, code, edges, angles, steps, cosine)
-        assert_equals_twin(unit, spans, constants_of(code, exponent), rng.random(1009) < 0.4)
+        constants, stalls = constants_of(code, exponent), rng.random(1009) < 0.4
+        pixels = parameters.compute(spans, constants)
+        assert_equals_twin(unit, spans, constants, pixels, output_stalls=stalls)
 
 
 def test_vector_at_the_pole(unit):
@@ -66,7 +69,8 @@ def test_vector_at_the_pole(unit):
     peak, light = ONE * np.eye(3, dtype=np.int64)[[0, 2], np.newaxis]
     constants = constants_of(peak[0], 1)
     constants = replace(constants, direction=light, specular=Intensity.color(np.array([[3.9, 3.8, 3.7]])))
-    assert_equals_twin(unit, spans, constants, rng.random(1009) < 0.4)
+    pixels = unit.parameters.compute(spans, constants)
+    assert_equals_twin(unit, spans, constants, pixels, output_stalls=rng.random(1009) < 0.4)
 
 
 def longer(code):
@@ -110,4 +114,5 @@ def test_words_at_their_ends(unit):
     ends = (np.concatenate(end) for end in zip(*pairs, strict=True))
     place = np.zeros(sum(len(left) for left, _ in pairs), dtype=np.int64)
     spans = Spans(place, place, place + 3, *ends)
-    assert_equals_twin(unit, spans, constants_of(vector, 1), np.zeros(1, dtype=bool))
+    constants = constants_of(vector, 1)
+    assert_equals_twin(unit, spans, constants, unit.parameters.compute(spans, constants))

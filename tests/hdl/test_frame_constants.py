@@ -25,6 +25,8 @@ from hdl.frame_constants import FrameConstantsUnit
 from hdl.pipeline import ShadingPipelineUnit
 from sim.engine import simulate
 
+from .pixels import assert_pixels
+
 
 def run_bench(m, bench):
     simulator = Simulator(m)
@@ -396,13 +398,6 @@ def run_pipeline(unit, spans, constants, count, **options):
     fields = ("x", "y", "length", "normal_left", "normal_right", "material")
     beats = {name: getattr(spans, name) for name in fields}
     return simulate(unit, beats, count=count, write=writes_of(constants), **options)
-
-
-def assert_pixels(run, pixels):
-    for name, expected in zip("xy", (pixels.x, pixels.y), strict=True):
-        np.testing.assert_array_equal(run.beats[name], expected)
-    np.testing.assert_array_equal(np.stack([run.beats[c] for c in "rgb"], axis=-1), pixels.color)
-    np.testing.assert_array_equal(run.beats["last"], pixels.last)
 
 
 @pytest.mark.parametrize("method", [pytest.param("linear", marks=pytest.mark.long), "quadratic"])

@@ -26,6 +26,8 @@ from sim.beats import dtype_of, pack, unpack
 from sim.engine import simulate
 from sim.frame import beats_of
 
+from .pixels import assert_pixels
+
 FROM_NORMALS = [method for method in METHODS if method != "chord-local"]
 
 
@@ -52,14 +54,6 @@ def make_constants(rng, lights, exponent=20, brightness=1.0):
         diffuse=Intensity.color(rng.uniform(0, brightness, (lights, 3))),
         specular=Intensity.color(rng.uniform(0, brightness, (lights, 3))),
     )
-
-
-def assert_pixels(run, pixels):
-    np.testing.assert_array_equal(run.beats["x"], pixels.x)
-    np.testing.assert_array_equal(run.beats["y"], pixels.y)
-    for channel, name in enumerate("rgb"):
-        np.testing.assert_array_equal(run.beats[name], pixels.color[:, channel])
-    np.testing.assert_array_equal(run.beats["last"], pixels.last)
 
 
 def run(unit, spans, constants, pixels, **options):
@@ -476,6 +470,14 @@ def spans_at_peak(rng, widest, halfway, exponent):
     return joined(rng, kinds)
 
 
+def operands_of(design, spans, constants):
+    """N.L and what the highlight is worked out from, by the twin; and where the light is behind."""
+    vectors = (spans.normal_left, spans.normal_right, constants.direction, constants.halfway)
+    left, right, direction, halfway = (Fixed(COMPONENT, codes) for codes in vectors)
+    operands = design.interpolator.compute(left, right, spans.length, direction, halfway)
+    return operands.cosine, operands.highlight, Diffuse(operands.cosine.format).dark(operands.cosine)
+
+
 @pytest.mark.parametrize("method", ["linear", "bisection", "quadratic", "angular", "recurrence", "chord"])
 def test_every_bit_counts(method, one_minus_cosines):
     """What is worked out for a span shows in some pixel, to the last bit.
@@ -491,7 +493,8 @@ def test_every_bit_counts(method, one_minus_cosines):
     vectors = light, normalise(light + 3 * halfway), halfway
     light_code, near_code, peak_code = (quantise(vector) for vector in vectors)
     rim = spans_at_rim(rng, widest, light_code)
-    frames = [(rim, light_code, peak_code, 1, (8, 7, 6), (0.03, 0.5, 0.1), 0.3)]
+    border = light_code, peak_code, 1, (8, 7, 6), (0.03, 0.5, 0.1)
+    frames = [(rim, *border, 0.3)]
     # Then a direction and its opposite, so that every bit is 0 once, and 1 once.
     for direction, peak, exponent, share in (
         (near_code, peak_code, 1000, 0),
@@ -509,7 +512,7 @@ def test_every_bit_counts(method, one_minus_cosines):
     farthest = spans_about(more, widest, normalise(rim.normal_left[:4]), 4095, orders=0)
     farthest.x[:], farthest.length[:] = 0, 4095
     row = joined(more, [row[row.length > 600][:60], farthest])
-    frames += [(each, light_code, *frames[0][2:-1], share) for each, share in ((exact, 0.3), (row, 0))]
+    frames += [(exact, *border, 0.3), (row, *border, 0)]
     for spans, direction, peak, exponent, diffuse, specular, share in frames:
         colors = (Intensity.color(np.array([color])) for color in (diffuse, specular))
         constants = FrameConstants(
@@ -541,7 +544,7 @@ def test_halves_round_up():
     rng = np.random.default_rng(22)
     design = ShadingPipeline()
     unit = ShadingPipelineUnit(design)
-    diffuse_unit, highlight, count = Diffuse(), design.highlight, 8192
+    count = 8192
     for share in np.repeat([0.0, 0.5], 12):
         halfway = normalise(rng.normal(size=3))
         constants = make_constants(rng, 1, int(1000 ** rng.uniform()), brightness=0.5)
@@ -550,12 +553,9 @@ def test_halves_round_up():
         away = rng.normal(size=(count, 3)) / np.sqrt(constants.exponent)
         normal, zero = quantise(normalise(halfway + away)), np.zeros(count, dtype=int)
         flat = Spans(zero, zero, zero + 1, normal, normal)
-        vectors = (flat.normal_left, flat.normal_right, constants.direction, constants.halfway)
-        left, right, direction, peak = (Fixed(COMPONENT, codes) for codes in vectors)
-        operands = design.interpolator.compute(left, right, flat.length, direction, peak)
-        d = diffuse_unit.compute(operands.cosine).codes
-        dark = diffuse_unit.dark(operands.cosine)
-        s = highlight.compute(operands.highlight, dark, constants.exponent).codes
+        cosine, highlight, dark = operands_of(design, flat, constants)
+        d = Diffuse(cosine.format).compute(cosine).codes
+        s = design.highlight.compute(highlight, dark, constants.exponent).codes
         # The inverse of an odd number: each step doubles its bits, of which three are right at the start.
         inverse = s
         for _ in range(3):
@@ -803,13 +803,9 @@ def test_compact_style_takes_three_clocks_a_term(normal_pairs):
     design = ShadingPipeline("chord")
     spans = make_spans(rng, np.full(30, 60), normal_pairs, 20.0)
     constants = make_constants(rng, 1, exponent=3)
-    vectors = (spans.normal_left, spans.normal_right, constants.direction, constants.halfway)
-    left, right, direction, halfway = (Fixed(COMPONENT, codes) for codes in vectors)
-    operands = design.interpolator.compute(left, right, spans.length, direction, halfway)
-    diffuse = Diffuse(operands.cosine.format)
-    dark = diffuse.dark(operands.cosine)
-    specular = design.highlight.compute(operands.highlight, dark, constants.exponent)
-    clocks = Intensity().clocks(diffuse.compute(operands.cosine), specular)
+    cosine, highlight, dark = operands_of(design, spans, constants)
+    specular = design.highlight.compute(highlight, dark, constants.exponent)
+    clocks = Intensity().clocks(Diffuse(cosine.format).compute(cosine), specular)
     assert set(clocks.tolist()) == {3, 6}
     unit = ShadingPipelineUnit(design, style="compact")
     found = run(unit, spans, constants, design.compute(spans, constants))
@@ -922,10 +918,7 @@ def test_gate_spares_the_compact_style_clocks(normal_pairs):
     constants = make_constants(rng, 1, exponent=300)
     constants.halfway[:] = spans.normal_left[:1]
     constants.direction[:] = constants.halfway
-    vectors = (spans.normal_left, spans.normal_right, constants.direction, constants.halfway)
-    left, right, direction, halfway = (Fixed(COMPONENT, codes) for codes in vectors)
-    operands = design.interpolator.compute(left, right, spans.length, direction, halfway)
-    behind = Diffuse(operands.cosine.format).dark(operands.cosine)[:, 0]
+    behind = operands_of(design, spans, constants)[2][:, 0]
     pixels = design.compute(spans, constants)
     clocks = []
     for gate in (False, True):

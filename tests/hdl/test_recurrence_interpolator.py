@@ -13,9 +13,9 @@ from golden.pipeline import METHODS, ShadingPipeline, Spans
 from golden.recurrence_interpolator import RecurrenceInterpolator
 from golden.unit_vector import COMPONENT, quantise
 from hdl.pipeline import ShadingPipelineUnit
-from sim.engine import simulate
 
-from .edges import SHADE, assert_equals_twin, constants_of, highlight_edges, spans_on_edges
+from .edges import SHADE, constants_of, highlight_edges, spans_on_edges
+from .pixels import assert_equals_twin
 
 
 def make_spans(rng, lengths, normal_pairs, degrees):
@@ -46,17 +46,6 @@ def unit_of(method, model, lights, interval):
     return ShadingPipelineUnit(ShadingPipeline(method, model, lights), interval)
 
 
-def run(unit, spans, constants, pixels, **stalls):
-    beats = {name: getattr(spans, name) for name in ("x", "y", "length", "normal_left", "normal_right")}
-    result = simulate(unit, beats, count=len(pixels.x), write=constants.writes(), engine="auto", **stalls)
-    for name, expected in (("x", pixels.x), ("y", pixels.y), ("last", pixels.last)):
-        np.testing.assert_array_equal(result.beats[name], expected)
-    for channel, name in enumerate("rgb"):
-        np.testing.assert_array_equal(result.beats[name], pixels.color[:, channel])
-    assert result.status["wide_spans"] == pixels.wide_spans
-    return result
-
-
 @pytest.mark.parametrize(
     ("method", "model", "lights", "interval"),
     [
@@ -81,7 +70,7 @@ def test_equals_twin(normal_pairs, monkeypatch, method, model, lights, interval)
         pixels = parameters.compute(spans, constants)
         assert len(np.unique(pixels.color)) > 100
         assert 0 < pixels.wide_spans < 20
-        result = run(unit, spans, constants, pixels)
+        result = assert_equals_twin(unit, spans, constants, pixels)
         shown = lengths[lengths > 0]
         starts = np.cumsum(shown) - shown
         first = result.clocks[starts]
@@ -94,7 +83,7 @@ def test_equals_twin(normal_pairs, monkeypatch, method, model, lights, interval)
                 "input_stalls": rng.random(997) < input_share,
                 "output_stalls": rng.random(1009) < output_share,
             }
-            run(unit, spans, constants, pixels, **stalls)
+            assert_equals_twin(unit, spans, constants, pixels, **stalls)
 
 
 def test_last_bits_count():
@@ -122,7 +111,9 @@ def test_last_bits_count():
             return np.ldexp(states.codes[steps, np.arange(len(steps))], 34 - states.format.fraction_bits)
 
         spans = spans_on_edges(rng, vector, edges, angles, steps, cosine)
-        assert_equals_twin(unit, spans, constants_of(vector, exponent), rng.random(1009) < 0.2)
+        constants, stalls = constants_of(vector, exponent), rng.random(1009) < 0.2
+        pixels = unit.parameters.compute(spans, constants)
+        assert_equals_twin(unit, spans, constants, pixels, output_stalls=stalls)
 
 
 def test_ends_of_the_words():
@@ -134,7 +125,9 @@ def test_ends_of_the_words():
     place = np.zeros(count, dtype=np.int64)
     spans = Spans(place, place, rng.integers(1, 20, count), ends[0], ends[1])
     for code in ends[2, :2]:
-        assert_equals_twin(unit, spans, constants_of(code, 1), rng.random(1009) < 0.2)
+        constants, stalls = constants_of(code, 1), rng.random(1009) < 0.2
+        pixels = unit.parameters.compute(spans, constants)
+        assert_equals_twin(unit, spans, constants, pixels, output_stalls=stalls)
 
 
 def test_half_the_square_of_a_radian(normal_pairs):
@@ -143,4 +136,4 @@ def test_half_the_square_of_a_radian(normal_pairs):
     unit = unit_of("recurrence", "cosquad", 1, 4)
     spans = make_spans(rng, rng.integers(1, 20, 100), normal_pairs, np.degrees(1))
     constants = make_constants(rng, 1, 20, spans.normal_left[:1])
-    run(unit, spans, constants, unit.parameters.compute(spans, constants))
+    assert_equals_twin(unit, spans, constants, unit.parameters.compute(spans, constants))
