@@ -53,7 +53,7 @@ class AdaptiveNormaliser:
     E_(j+1) - E_j    SQ(1, 17)  operand; saturates, which a threshold up to 1/8 keeps from happening
     1/(m - 1)        UQ(0, 17)  table, with the shift of `DifferenceSetup`
     phi              UQ(0, 17)  operand; cut
-    N                SQ(2, 32)  cut; half a step of the result is added at the start; wraps
+    N                SQ(2, 32)  cut; half a step of the result is added at the start; never wraps
     step             SQ(1, 32)  cut: 2^-32 a pixel, 9.5e-7 after 4095
     normal           SQ(1, 17)  rounded half up, saturates
     ================ ========== ==================================================================
@@ -188,25 +188,70 @@ class AdaptiveNormaliser:
             middle, _, _ = self.bisection.compute(Fixed(COMPONENT, before), Fixed(COMPONENT, after))
             ends[active, half :: 2 * half] = middle.codes
 
+        span, segment, place, index = self.places(length, levels)
+        spacing = whole >> levels[span]
+        left = Fixed(COMPONENT, ends[span, segment * spacing])
+        right = Fixed(COMPONENT, ends[span, np.minimum((segment + 1) * spacing, whole)])
+        difference = (right - left).saturate(COMPONENT)
+        normal = self.walk(left, difference, length, levels, span, place, index)
+        return normal.truncate(COMPONENT.fraction_bits).saturate(COMPONENT), wide, levels
+
+    def places(
+        self, length: np.ndarray, levels: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Where the pixels of spans lie on their segments, in raster order.
+
+        Parameters
+        ----------
+        length, levels : int array, shape (spans,)
+            m and k.
+
+        Returns
+        -------
+        span, segment : int array, shape (pixels,)
+            Span of each pixel, and j, 0 to ``2^k``.
+        place : int array, shape (pixels,)
+            Of the first pixel of the segment: ``phi (m - 1)``.
+        index : int array, shape (pixels,)
+            Pixels since that one.
+        """
         span, pixel = pixels_of(length)
-        steps = np.maximum(length - 1, 1)
-        reciprocal, shift = self.reciprocal(steps)
-        steps, reciprocal, shift, level = (x[span] for x in (steps, reciprocal, shift, levels))
+        steps, level = np.maximum(length - 1, 1)[span], levels[span]
         segment = (pixel << level) // steps
         first_pixel = -((-segment * steps) >> level)
-        place = (first_pixel << level) - segment * steps
-        spacing = whole >> level
-        left = Fixed(COMPONENT, ends[span, segment * spacing])
-        right = Fixed(COMPONENT, ends[span, np.minimum(segment + 1, 1 << level) * spacing])
-        difference = (right - left).saturate(COMPONENT)
+        return span, segment, (first_pixel << level) - segment * steps, pixel - first_pixel
+
+    def walk(
+        self,
+        left: Fixed,
+        difference: Fixed,
+        length: np.ndarray,
+        levels: np.ndarray,
+        span: np.ndarray,
+        place: np.ndarray,
+        index: np.ndarray,
+    ) -> Fixed:
+        """Bit-true sums of pixels along their segments.
+
+        Parameters
+        ----------
+        left, difference : Fixed, shape (pixels, components), SQ(1, 17)
+            ``E_j``, and ``E_(j+1) - E_j``.
+        length, levels, span, place, index
+            Of `places`.
+
+        Returns
+        -------
+        Fixed, shape (pixels, components), SQ(2, 32)
+            With half a step of the result added.
+        """
+        reciprocal, shift = (x[span] for x in self.reciprocal(np.maximum(length - 1, 1)))
         phi = Fixed(COMPONENT, ((place * reciprocal) << 1 >> shift)[:, np.newaxis])
         start = left + (difference * phi).truncate(32) + self.half_step
         slope = (difference * Fixed(COMPONENT, reciprocal[:, np.newaxis])).codes
-        slope = Fixed(SQ(2, 34), slope >> np.maximum(shift - 1 - level, 0)[:, np.newaxis]).truncate(32)
-        walked = start.codes + (pixel - first_pixel)[:, np.newaxis] * slope.wrap(self.STEP_FORMAT).codes
-        walked = Fixed(self.ACCUMULATOR_FORMAT, self.ACCUMULATOR_FORMAT.wrap(walked))
-        normal = walked.truncate(COMPONENT.fraction_bits)
-        return normal.saturate(COMPONENT), wide, levels
+        slope = Fixed(SQ(2, 34), slope >> np.maximum(shift - 1 - levels[span], 0)[:, np.newaxis]).truncate(32)
+        walked = start.codes + index[:, np.newaxis] * slope.wrap(self.STEP_FORMAT).codes
+        return Fixed(self.ACCUMULATOR_FORMAT, self.ACCUMULATOR_FORMAT.wrap(walked))
 
     @property
     def half_step(self) -> Fixed:

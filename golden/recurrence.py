@@ -56,7 +56,8 @@ class Recurrence:
     The result has the format `result_format`.
 
     With d to 90 degrees and ``|A| <= 1 - 2^-16``, the product of two unit vectors, nothing wraps or saturates
-    (|D| <= sqrt 2).
+    (|D| <= sqrt 2) in spans of any length, with 16 fraction bits and 20 guard bits or more. What shorter
+    words cut adds up: with 8 and 10 bits spans of hardly any step wrap after 1,300 pixels or so.
 
     Error of the result, at most `error`: an error e of one step comes back after j more steps as
     ``e sin(j d)/sin d``, at most ``j e``, so a span of m pixels sums up to ``(m-1)(m-2)/2`` times the

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from amaranth.hdl import Fragment
 
+from golden.adaptive_normaliser import AdaptiveNormaliser
 from golden.arccos import HalfChord
 from golden.bisection import Bisection
 from golden.chord import Chord
@@ -25,7 +26,9 @@ from golden.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
 from golden.recurrence import Recurrence
 from golden.recurrence_setup import RecurrenceSetup
 from golden.renormaliser import Renormaliser
+from golden.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
 from golden.unit_vector import CODE_LENGTH_ERROR, COMPONENT
+from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
 from hdl.arccos import HalfChordUnit
 from hdl.bisection import BisectionUnit
 from hdl.chord_interpolator import ChordAccumulatorUnit
@@ -182,6 +185,24 @@ def of_lines(format=DifferenceSetup.FORMAT):
         walk(DifferenceAccumulator(format=format), Fixed(COMPONENT, n), *differences, span, step)
 
 
+def of_segments(levels):
+    """Any two ends; of those further apart than the word of a difference, left is on the other side of 0."""
+    unit = AdaptiveNormaliser()
+    low, high = COMPONENT.min_code, COMPONENT.max_code
+    left, right = (unknown(low, high) for _ in range(2))
+    ends = (
+        (left, (right - left).known(low, high)),
+        (unknown(low, 0), Bounds.of([[high]])),
+        (unknown(0, high), Bounds.of([[low]])),
+    )
+    for lengths, *_ in parts_of_lengths():
+        each = np.full(len(lengths), levels)
+        span, _, *places = unit.places(lengths, each)
+        for pair in ends:
+            words = (Fixed(COMPONENT, rows(bounds, span)) for bounds in pair)
+            unit.walk(*words, lengths, each, span, *places)
+
+
 def of_chord_sums(name, fraction_bits, format=None):
     """Any slope and bend; starts of unit vectors: f from -1 to 1, u to 2 and what `Chord` cuts."""
     unit = ChordInterpolator(fraction_bits=fraction_bits)
@@ -216,6 +237,10 @@ def of_half_chord():
     for shift, count in ((0, 1 << 22), (1, 1 << 23)):
         for chord in np.array_split(np.arange(count) << 13 - 2 * shift, count >> 18):
             HalfChord().compute(Fixed(UQ(2, 34), chord), np.zeros(chord.shape, bool))
+
+
+def of_specular_slopes(model):
+    assert len(Specular(model).slopes.codes) == 1 << Specular.EXPONENT_BITS
 
 
 def sectors(degrees, one, like):
@@ -351,6 +376,13 @@ def test_no_word_of_a_half_chord_wraps(wraps):
     assert wrapped_by(HalfChordUnit()) <= set(wraps)
 
 
+@pytest.mark.parametrize("model", [m for m in SPECULAR_MODELS + FURTHER_MODELS if Specular(m).slope_terms])
+def test_slopes_of_the_specular_unit_do_not_wrap(wraps, model):
+    """Every exponent; other models read a table."""
+    of_specular_slopes(model)
+    assert wraps == [Specular.SLOPE_FORMAT]
+
+
 def test_slopes_of_the_recurrence_setup_do_not_wrap(monkeypatch, wraps):
     """By bounds, for every word of q; and the first difference of spans of two pixels."""
     of_recurrence_slopes(monkeypatch)
@@ -372,6 +404,14 @@ def test_sums_of_straight_lines_do_not_wrap(wraps):
     """The same, for any two ends of which no component of the difference is over 1."""
     of_lines()
     assert wrapped_by(DifferenceAccumulatorUnit()) <= set(wraps)
+
+
+@pytest.mark.parametrize("levels", range(AdaptiveNormaliser(2.0**-14).depth + 1))
+def test_sums_of_segments_do_not_wrap(wraps, levels):
+    """The same, for any two ends of a segment, and as many segments as there can be."""
+    of_segments(levels)
+    formats = wrapped_by(AdaptiveNormaliserUnit()) - wrapped_by(BisectionUnit())
+    assert AdaptiveNormaliser.ACCUMULATOR_FORMAT in formats <= set(wraps)
 
 
 @pytest.mark.parametrize(("name", "bits"), [("diffuse", 46), ("highlight", 36), ("highlight", 46)])
@@ -418,13 +458,17 @@ SHORTER_FORMATS = {
         "format",
         property(lambda p: SQ(0, p.fraction_bits)),
     ),
+    # It stays between the ends of the segment, so that of its two integer bits one is to spare.
+    "sum of a segment": (partial(of_segments, 2), AdaptiveNormaliser, "ACCUMULATOR_FORMAT", SQ(0, 32)),
+    "step of a segment": (partial(of_segments, 2), AdaptiveNormaliser, "STEP_FORMAT", SQ(0, 32)),
+    "slope": (partial(of_specular_slopes, "cosquad"), Specular, "SLOPE_FORMAT", UQ(8, 18)),
     "factor of the renormaliser": (of_renormaliser, Renormaliser, "FACTOR_FORMAT", SQ(-1, 18)),
 }
 
 
 @pytest.mark.parametrize("word", SHORTER_FORMATS)
 def test_formats_a_bit_too_short_are_found(monkeypatch, word):
-    """An integer bit less, planted in the parameters."""
+    """An integer bit less than what is needed, planted in the parameters."""
     prove, *change = SHORTER_FORMATS[word]
     monkeypatch.setattr(*change)
     with pytest.raises(AssertionError, match=" wraps in "):
