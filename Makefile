@@ -31,6 +31,10 @@ soak: $(VENV)/.installed-bench
 
 coverage: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --cov
+	@for package in golden hdl sim; do \
+		printf '%s: %% ' $$package; \
+		$(BIN)/coverage report --include="$$package/*" --format=total || exit 1; \
+	done
 
 bench: $(VENV)/.installed-bench
 	$(BIN)/blysk bench report

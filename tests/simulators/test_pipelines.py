@@ -29,8 +29,8 @@ PIPELINES = {
     "without lights": (ShadingPipeline(lights=0, materials=2), "throughput"),
 }
 QUICK = ("chord",)
-FRAMES = {"verilator": ((640, 480), 10_000), "icarus": ((160, 120), 1500)}
-"""Size of the picture, and triangles, of a long run."""
+FRAME = (640, 480), 10_000
+"""Size of the picture, and triangles, of the long run."""
 
 
 @pytest.fixture
@@ -69,4 +69,4 @@ def test_pipeline(check, name, simulator):
 @pytest.mark.parametrize("simulator", SIMULATORS)
 @pytest.mark.parametrize("name", PIPELINES)
 def test_a_frame_of_every_pipeline(check, name, simulator):
-    check(name, simulator, *FRAMES[simulator], optimise=True)
+    check(name, simulator, *FRAME, optimise=True)
