@@ -1,10 +1,18 @@
-"""Codes of which only bounds are known, in place of arrays of codes in the bit-true twins."""
+"""Codes of which only bounds are known, for the bit-true twins; and where hardware wraps and cuts."""
 
+import inspect
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
+from amaranth.hdl import Elaboratable, Fragment, Signal, Value
+from amaranth.hdl._ast import Operator, Slice, SwitchValue
 
-__all__ = ["Bounds", "unknown"]
+from golden.fixed import Fixed, Format
+from hdl.fixed import FixedValue
+
+__all__ = ["Bounds", "cut_by", "registers_of", "unknown", "word", "wrapped_by"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,3 +191,70 @@ def unknown(low, high, reach=1.0) -> Bounds:
     """A code of which nothing else is known, times ``reach``, an array of shape (..., 1)."""
     reach = np.atleast_2d(reach)
     return Bounds(low * reach, high * reach, {Unknown(low, high): reach}, (np.zeros_like(reach),) * 2)
+
+
+def word(format: Format, *shape: int) -> Fixed:
+    """Any code of a format, in each place."""
+    return Fixed(format, Bounds(np.full(shape, format.min_code), np.full(shape, format.max_code)))
+
+
+def _fragments(part: Elaboratable) -> Iterator[Fragment]:
+    """A unit's hardware and that of all in it."""
+    yield (fragment := Fragment.get(part, None))
+    for inner, *_ in fragment.subfragments:
+        yield from _fragments(inner)
+
+
+def wrapped_by(unit: Elaboratable) -> set[Format]:
+    """Formats to which a unit wraps, by `FixedValue.wrap`. What it cuts by raw slices: `cut_by`."""
+    found, wrap = set(), FixedValue.wrap
+
+    def noted(value, format):
+        found.add(format)
+        return wrap(value, format)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(FixedValue, "wrap", noted)
+        list(_fragments(unit))
+    assert found
+    return found
+
+
+def _inner(value: Value) -> Value:
+    """What low bits are taken from, whatever their sign."""
+    if isinstance(value, Slice) and value.start == 0:
+        return _inner(value.value)
+    if isinstance(value, Operator) and value.operator in ("s", "u"):
+        return _inner(value.operands[0])
+    return value
+
+
+def cut_by(unit: Elaboratable) -> set[str]:
+    """Functions in which a unit's hardware cuts top bits of a sum, a product, a left shift or a choice.
+
+    By raw slices, not by operations of `FixedValue`. What is cut of a register, or by an assignment to a
+    shorter one, is not seen.
+    """
+    found, make = set(), Slice.__init__
+
+    def noted(bits, value, start, stop, **options):
+        make(bits, value, start, stop, **options)
+        inner = _inner(value)
+        arithmetic = isinstance(inner, Operator) and inner.operator in ("+", "-", "*", "<<")
+        if start == 0 and stop < len(value) and (arithmetic or isinstance(inner, SwitchValue)):
+            frame = inspect.currentframe().f_back
+            while frame.f_globals["__name__"].startswith("amaranth."):
+                frame = frame.f_back
+            if (module := frame.f_globals["__name__"]) != FixedValue.__module__:
+                found.add(f"{module}.{frame.f_code.co_qualname.split('.<locals>')[0]}")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Slice, "__init__", noted)
+        list(_fragments(unit))
+    return found
+
+
+def registers_of(unit: Elaboratable) -> list[Signal]:
+    """Registers of a unit and of all in it."""
+    statements = (x for fragment in _fragments(unit) for x in fragment.statements.get("sync", ()))
+    return [signal for statement in statements for signal in statement._lhs_signals()]

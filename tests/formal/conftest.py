@@ -5,12 +5,19 @@ import textwrap
 
 import pytest
 
+from golden.fixed import Fixed, Format
+
+from .bounds import Bounds
 from .prover import decide, missing_tool
+from .rules import never_resumes
 
 
 @pytest.fixture
 def prove(tmp_path):
-    """Prove the claims of a harness, for runs of any length, or of so many clocks from power-up."""
+    """Prove the claims of a harness, for runs of any length, or of so many clocks from power-up.
+
+    So many must be enough for a beat to wait, another to come, and one to leave.
+    """
     if missing_tool():
         pytest.skip(missing_tool())
 
@@ -18,6 +25,10 @@ def prove(tmp_path):
         verdict = decide(harness, tmp_path, clocks)
         assert verdict.holds is not None, f"not decided in time, after {verdict.clocks} clocks"
         assert verdict.holds, f"refuted after {verdict.clocks} clocks:\n{verdict.trace}"
+        if clocks is not None:
+            runs = harness.without_claims()
+            never_resumes(runs)
+            assert decide(runs, tmp_path, clocks).holds is False, f"nothing moves on in {clocks} clocks"
 
     return prove
 
@@ -48,3 +59,31 @@ def plant(monkeypatch):
         monkeypatch.setattr(owner, name, namespace[name])
 
     return plant
+
+
+@pytest.fixture
+def wraps(monkeypatch):
+    """Formats in which a twin wraps or makes words; it fails where one may not hold a code.
+
+    All other operations have results of formats that hold whatever there is, or saturate.
+    """
+    found, wrap, new = [], Format.wrap, Fixed.__init__
+
+    def checked(format, codes):
+        found.append(format)
+        bounds = codes if isinstance(codes, Bounds) else Bounds(codes.min(), codes.max())
+        assert bounds.within(format.min_code, format.max_code), (
+            f"{bounds.low.min():.0f} to {bounds.high.max():.0f} wraps in {format}"
+        )
+        return codes if isinstance(codes, Bounds) else wrap(format, codes)
+
+    def made(number, format, codes):
+        if not isinstance(codes, Bounds):
+            return new(number, format, codes)
+        found.append(format)
+        assert codes.within(format.min_code, format.max_code), f"a word wraps in {format}"
+        number.format, number.codes = format, codes
+
+    monkeypatch.setattr(Format, "wrap", checked)
+    monkeypatch.setattr(Fixed, "__init__", made)
+    return found

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from amaranth.back import rtlil
-from amaranth.hdl import Assert, Assume, Fragment, Module, ShapeLike, Signal, Value, ValueLike
+from amaranth.hdl import Assert, Assume, DomainRenamer, Fragment, Module, ShapeLike, Signal, Value, ValueLike
 from amaranth.lib.wiring import Component, In
 
 __all__ = ["Harness", "Verdict", "decide", "missing_tool"]
@@ -65,6 +65,7 @@ class Harness:
         self.m = Module()
         self.unit = unit
         self._ports: list[Value] = []
+        self._claims: list[Value] = []
         if unit is not None:
             self.m.submodules.unit = self._fragment = Fragment.get(unit, None)
             self._ports = [
@@ -94,15 +95,25 @@ class Harness:
 
     def claim(self, condition: ValueLike) -> None:
         """Claim that a condition holds on every clock."""
-        self.m.d.comb += Assert(condition)
+        self._claims.append(Value.cast(condition))
 
     def assume(self, condition: ValueLike) -> None:
         """Leave out the runs in which a condition does not hold on every clock."""
         self.m.d.comb += Assume(condition)
 
+    def without_claims(self) -> "Harness":
+        """The same runs, of which nothing is claimed yet."""
+        other = Harness()
+        other.m.submodules.runs, other.unit, other._ports = self.m, self.unit, self._ports
+        return other
+
     def netlist(self) -> str:
         """RTLIL text."""
-        return rtlil.convert(self.m, ports=self._ports)
+        top = Module()
+        top.submodules.runs = self.m
+        top.d.comb += [Assert(condition) for condition in self._claims]
+        # A copy, as what is converted cannot be used again.
+        return rtlil.convert(DomainRenamer({})(Fragment.get(top, None)), ports=self._ports)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from amaranth.lib import stream
 
 from .prover import Harness
 
-__all__ = ["answers", "follows", "pixels_follow", "stays", "taken"]
+__all__ = ["answers", "follows", "never_resumes", "pixels_follow", "stays", "taken"]
 
 
 def taken(channel: stream.Interface) -> Value:
@@ -22,6 +22,19 @@ def stays(harness: Harness, channel: stream.Interface) -> Signal:
     harness.m.d.sync += [waits.eq(channel.valid & ~channel.ready), before.eq(payload)]
     harness.claim(~waits | (channel.valid & (payload == before)))
     return waits
+
+
+def never_resumes(harness: Harness) -> None:
+    """Claim that of the harness's unit no beat leaves once one has waited and another come: to be refuted.
+
+    If that holds for so many clocks, a proof of so many has seen no beat lost, or dropped, that waited.
+    """
+    unit, waited, came = harness.unit, Signal(name="waited"), Signal(name="came")
+    harness.m.d.sync += [
+        waited.eq(waited | (unit.o.valid & ~unit.o.ready)),
+        came.eq(came | (waited & taken(unit.i))),
+    ]
+    harness.claim(~(came & taken(unit.o)))
 
 
 def answers(harness: Harness, due: Value, answer: Value, clocks: int, when: Value) -> None:

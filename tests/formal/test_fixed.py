@@ -20,6 +20,8 @@ PAIRS = [
     (UQ(2, 17), SQ(1, 17)),
     (SQ(1, 17), UQ(0, 17)),
 ]
+# From, and fraction bits that stay.
+CUTS = [(SQ(4, 34), 17), (UQ(1, 25), 17), (SQ(2, 20), 0)]
 
 
 def any_code(source):
@@ -45,8 +47,15 @@ def of_rounding(source, bits):
     dropped = source.fraction_bits - bits
     error = (Value.cast(FixedValue(source, code).round_half_up(bits)) << dropped) - code
     h.claim((error << 1 > -(1 << dropped)) & (error << 1 <= 1 << dropped))
-    cut = (Value.cast(FixedValue(source, code).truncate(bits)) << dropped) - code
-    h.claim((cut > -(1 << dropped)) & (cut <= 0))
+    return h
+
+
+def of_cutting(source, bits):
+    """The error is from over minus one step to 0."""
+    h, code = any_code(source)
+    dropped = source.fraction_bits - bits
+    error = (Value.cast(FixedValue(source, code).truncate(bits)) << dropped) - code
+    h.claim((error > -(1 << dropped)) & (error <= 0))
     return h
 
 
@@ -56,10 +65,16 @@ def test_saturation_never_wraps(prove, source, target):
     prove(of_saturation(source, target))
 
 
-@pytest.mark.parametrize(("source", "bits"), [(SQ(4, 34), 17), (UQ(1, 25), 17), (SQ(2, 20), 0)])
+@pytest.mark.parametrize(("source", "bits"), CUTS)
 def test_rounding_errs_by_half_a_step(prove, source, bits):
-    """For every code: rounding half up by half a step at most, cutting by less than one, never upwards."""
+    """For every code: half up, by half a step at most."""
     prove(of_rounding(source, bits))
+
+
+@pytest.mark.parametrize(("source", "bits"), CUTS)
+def test_cutting_errs_by_less_than_a_step(prove, source, bits):
+    """For every code: never upwards."""
+    prove(of_cutting(source, bits))
 
 
 BUGS = {
@@ -94,3 +109,10 @@ def test_bug_of_rounding_is_found(refute, plant):
     """Cut instead."""
     plant(FixedValue, "round_half_up", "self._code[dropped - 1]", "0")
     refute(of_rounding(SQ(4, 34), 17), 4)
+
+
+def test_bug_of_cutting_is_found(refute, plant):
+    """Towards 0 instead: negative codes go up."""
+    kept = "self._code[self.format.fraction_bits - fraction_bits :]"
+    plant(FixedValue, "truncate", kept, f"({kept} + self._code[-1])[: format.width]")
+    refute(of_cutting(SQ(4, 34), 17), 4)

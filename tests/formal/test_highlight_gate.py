@@ -7,7 +7,7 @@ import pytest
 
 from golden.fixed import Fixed
 from golden.highlight_gate import HighlightGate
-from golden.specular import MAX_EXPONENT
+from golden.specular import MAX_EXPONENT, Specular
 from hdl.highlight_gate import HighlightGateUnit
 from sim.engine import simulate
 
@@ -113,15 +113,20 @@ def test_no_span_that_reaches_a_threshold_is_stopped(bits, spans, cases):
     assert 0.5 < stopped(gate, left, right, halfways) < 0.9
 
 
+def shades_nothing_under(gate):
+    """The unit's term of the largest N.H under each threshold is 0."""
+    thresholds, specular = gate.thresholds.codes.tolist(), gate.specular
+    for exponent in np.flatnonzero(thresholds[: MAX_EXPONENT + 1]).tolist():
+        under = isqrt((thresholds[exponent] << 68 - gate.fraction_bits) - 1)
+        operand = Fixed(specular.operand_format, np.array([under]))
+        term = specular.compute(operand, np.zeros(1, bool), exponent).codes.item()
+        assert term == 0, f"lit under the threshold, exponent {exponent}"
+
+
 @pytest.mark.parametrize("bits", [5, 6, 17])
 def test_nothing_is_shaded_under_a_threshold(bits):
     """At any exponent, the term of the largest N.H under its threshold is 0; none is larger farther down."""
-    gate = HighlightGate(fraction_bits=bits)
-    thresholds, specular = gate.thresholds.codes.tolist(), gate.specular
-    for exponent in np.flatnonzero(thresholds[: MAX_EXPONENT + 1]).tolist():
-        under = isqrt((thresholds[exponent] << 68 - bits) - 1)
-        operand = Fixed(specular.operand_format, np.array([under]))
-        assert specular.compute(operand, np.zeros(1, bool), exponent).codes == 0
+    shades_nothing_under(HighlightGate(fraction_bits=bits))
 
 
 BUGS = {
@@ -157,3 +162,21 @@ def test_bug_of_wide_spans_is_found(plant):
     gate = HighlightGate(fraction_bits=5)
     with pytest.raises(AssertionError, match=r"^lost highlights"):
         stopped(gate, *in_a_plane(gate))
+
+
+@pytest.mark.parametrize(("bits", "steps"), [(5, 1), (6, 1), (17, 12)])
+def test_bug_of_thresholds_is_found(monkeypatch, bits, steps):
+    """Words of the PROM too high: by a step, or by more than the margin for the pixels' errors."""
+    gate = HighlightGate(fraction_bits=bits)
+    codes = gate.thresholds.codes
+    high = np.minimum(codes + steps * (codes > 0), gate.level_format.max_code)
+    monkeypatch.setitem(vars(gate), "thresholds", Fixed(gate.level_format, high))
+    with pytest.raises(AssertionError, match=r"^lit under the threshold"):
+        shades_nothing_under(gate)
+
+
+def test_bug_of_the_cutoff_is_found(plant):
+    """The specular unit shades as far as its parabola goes."""
+    plant(Specular, "compute", "lit &= shifted <= self.boundaries[exponent]", "pass")
+    with pytest.raises(AssertionError, match=r"^lit under the threshold"):
+        shades_nothing_under(HighlightGate())

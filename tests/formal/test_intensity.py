@@ -1,12 +1,14 @@
-"""Proof of the compact intensity unit: the sum of a channel holds every term that there can be."""
+"""Proofs of the compact intensity unit: no sum wraps, and each pixel leaves as the sum of its own terms."""
 
 import pytest
-from amaranth.hdl import Array, Mux, Signal, Value
+from amaranth.hdl import Array, Cat, Mux, Signal, Value
 
 from golden.intensity import Intensity
+from hdl.fixed import FixedValue
 from hdl.intensity import IntensityUnit
 
 from .prover import Harness
+from .rules import answers, follows, stays, taken
 
 pytestmark = pytest.mark.prove
 
@@ -42,3 +44,68 @@ def test_bug_is_found(refute, plant):
     """A bit less, planted in the unit."""
     plant(IntensityUnit, "_compact", "UQ(11 + self._terms.bit_length(), 23)", "UQ(12, 23)")
     refute(of_sums(1))
+
+
+@pytest.fixture
+def choices(monkeypatch):
+    """The product with a term of a half or of none, exact; products of any terms would be cut."""
+
+    def half(term, color):
+        format = term.format * color.format
+        code = Mux(Value.cast(term)[-1], Value.cast(color) << (Intensity.TERM_FORMAT.fraction_bits - 1), 0)
+        return FixedValue(format, code[: format.width])
+
+    monkeypatch.setattr(FixedValue, "__mul__", half)
+
+
+def of_pixels(channels):
+    """Each term is a half or nothing; half of its colour is a bit of its own in the channel."""
+    unit = IntensityUnit(Intensity(channels=channels), "compact")
+    h = Harness(unit)
+    terms = [Value.cast(term) for kind in unit.kinds for term in unit.i.payload[kind]]
+    colors = [color for kind in unit.kinds for color in unit.constants[kind]]
+    for term in terms:
+        h.assume(term[:-1] == 0)
+    for channel in range(channels):
+        h.assume(Value.cast(unit.constants.ambient[channel]) == 0)
+        for place, color in enumerate(colors):
+            bit = 1 << (place + channel) + 1 + Intensity.COLOR_FORMAT.fraction_bits
+            h.assume(Value.cast(color[channel]) == bit)
+
+    def image(came, leaves):
+        bits = Cat(Value.cast(term)[-1] for kind in unit.kinds for term in came[kind])
+        return Cat(leaves["rgb"[k]] == bits << k for k in range(channels)).all()
+
+    stays(h, unit.o)
+    inside = follows(h, unit.i, unit.o, 3 if channels == 3 else 7, image)
+    answers(h, inside.any(), taken(unit.o), unit.latency - 1, unit.o.ready)
+    answers(h, unit.i.valid, unit.i.ready, unit.initiation_interval, unit.o.ready)
+    return h
+
+
+# One channel: no invariant is found in time.
+PIXELS_CLOCKS = {3: None, 1: 16}
+
+
+@pytest.mark.parametrize("channels", PIXELS_CLOCKS)
+def test_pixels(prove, choices, channels):
+    """Inductive, but for `PIXELS_CLOCKS`, one light: what waits stays; pixels leave in order, each once, each
+    as the sum of its own terms; while the output is ready, one leaves in the clocks of a pixel with every
+    term, and one is taken in as many as that has products, and one."""
+    prove(of_pixels(channels), PIXELS_CLOCKS[channels])
+
+
+PIXEL_BUGS = {
+    "a pixel is taken while it stands": ("advance & (~busy | ends_pixel)", "~busy | ends_pixel"),
+    "it moves while it stands": ("m.If(advance)", "m.If(1)"),
+    "a pixel ends with a channel": ("ends_channel & (channel == last_channel)", "ends_channel"),
+    "a term is left out": ("left.eq(Mux(ends_channel, used, rest))", "left.eq(Mux(ends_channel, used, 0))"),
+    "a sum goes on": ("Mux(multiplied.first, ", "Mux(multiplied.first & ~valid, "),
+}
+
+
+@pytest.mark.parametrize("bug", PIXEL_BUGS)
+def test_bugs_of_pixels_are_found(refute, plant, choices, bug):
+    """Planted in the unit, each refutes the claims on pixels."""
+    plant(IntensityUnit, "_compact", *PIXEL_BUGS[bug])
+    refute(of_pixels(3), 24)

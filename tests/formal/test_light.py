@@ -1,49 +1,39 @@
-"""Proofs of the light unit: dark beats that pass the specular unit by keep their places."""
+"""Proofs of the light unit: no term is lost, and dark beats keep their places beside the specular unit."""
 
 import pytest
-from amaranth.hdl import Cat, Const, Mux, Value
+from amaranth.hdl import Mux, Value
 
 import hdl.light
 from golden.diffuse import Diffuse
-from hdl.fixed import FixedShape
 from hdl.light import LightUnit
-from hdl.specular import highlight_shape
-from hdl.stream import PipelinedUnit
+from hdl.specular import SpecularUnit
 
 from .prover import Harness
 from .rules import answers, follows, stays, taken
+from .stand_ins import short
 
 pytestmark = pytest.mark.prove
 
 
-class Tag(PipelinedUnit):
-    """In the specular unit's place: two bits of the operand, a clock after the interval."""
-
-    def __init__(self, parameters, initiation_interval, **options):
-        super().__init__(
-            highlight_shape(parameters),
-            FixedShape(parameters.RESULT_FORMAT),
-            latency=initiation_interval + 1,
-            initiation_interval=initiation_interval,
-        )
-
-    def datapath(self, m, operands):
-        value = Value.cast(operands.operand)[:2]
-        value = self.register(m, value, "late", when=self.at(1))
-        for stage in range(self.latency - 2):
-            value = self.register(m, value, f"stage_{stage}")
-        return Cat(value, Const(0, len(Value.cast(self.o.payload)) - 2))
+def two_bits(light, term):
+    """Of the operand, 0 where it is dark."""
+    yield Value.cast(term).eq(Mux(light.dark, 0, Value.cast(light.operand)[:2]))
 
 
-@pytest.fixture(autouse=True)
-def tags(monkeypatch):
-    """Light units have tags for specular terms."""
-    monkeypatch.setattr(hdl.light, "SpecularUnit", Tag)
+@pytest.fixture
+def make(monkeypatch):
+    """A light unit with `two_bits` for specular terms, a clock after the interval."""
+
+    def make(interval):
+        stand_in = short(SpecularUnit, two_bits, interval + 1)
+        monkeypatch.setattr(hdl.light, "SpecularUnit", stand_in)
+        return LightUnit(initiation_interval=interval)
+
+    return make
 
 
-def of_light(interval):
+def of_light(unit):
     """Beats of one bit of N.L, its sign, and two of the specular operand."""
-    unit = LightUnit(initiation_interval=interval)
     h = Harness(unit)
     cosine, highlight = (Value.cast(unit.i.payload[name]) for name in ("cosine", "highlight"))
     step = unit.i.payload.cosine.format.fraction_bits - Diffuse.RESULT_FORMAT.fraction_bits
@@ -57,15 +47,22 @@ def of_light(interval):
 
     stays(h, unit.o)
     inside = follows(h, unit.i, unit.o, 5, image)
-    answers(h, inside.any(), taken(unit.o), interval + 3, unit.o.ready)
+    late = unit.latency + 2 if unit.skips_dark else unit.latency - 1
+    answers(h, inside.any(), taken(unit.o), late, unit.o.ready)
     return h
 
 
+def test_both_units_move_in_lockstep(prove, make):
+    """Inductive, with an interval of 1: both terms of each beat leave once, in order, 2 clocks on; the
+    specular one 0 where N.L is not above 0; what waits stays; no deadlock."""
+    prove(of_light(make(1)))
+
+
 @pytest.mark.parametrize("interval", [2, 3])
-def test_dark_beats_keep_their_places(prove, interval):
+def test_dark_beats_keep_their_places(prove, make, interval):
     """In 12 clocks, with specular terms every so many: both terms of each beat leave once, in order, the
     specular one 0 where N.L is not above 0; what waits stays; no deadlock."""
-    prove(of_light(interval), 12)
+    prove(of_light(make(interval)), 12)
 
 
 BUGS = {
@@ -76,12 +73,30 @@ BUGS = {
     ),
     "a dark beat is given": ("self.i.valid & takes & ~dark", "self.i.valid & takes"),
     "it leaves before its term is there": ("(skip | specular.o.valid)", "1"),
+    "a term is lost while the light stands": ("specular.o.ready.eq(gives & ~skip)", "specular.o.ready.eq(1)"),
+    "what waits beside it is lost": ("terms.ready.eq(gives)", "terms.ready.eq(1)"),
     "the term of a dark beat is kept": ("Mux(skip, 0, ", "Mux(0, 0, "),
 }
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(refute, plant, bug):
+def test_bugs_are_found(refute, plant, make, bug):
     """Planted in `LightUnit`, each refutes the claims."""
     plant(LightUnit, "_skip", *BUGS[bug])
-    refute(of_light(2), 12)
+    refute(of_light(make(2)), 12)
+
+
+LOCKSTEP_BUGS = {
+    "the specular unit goes on alone": ("unit.o.ready.eq(self.o.ready)", "unit.o.ready.eq(unit is specular)"),
+    "it takes what the light does not": (
+        "self.i.ready.eq(diffuse.i.ready)",
+        "self.i.ready.eq(diffuse.i.ready & self.o.ready)",
+    ),
+}
+
+
+@pytest.mark.parametrize("bug", LOCKSTEP_BUGS)
+def test_bugs_in_lockstep_are_found(refute, plant, make, bug):
+    """Planted in `LightUnit`, each refutes the claims."""
+    plant(LightUnit, "elaborate", *LOCKSTEP_BUGS[bug])
+    refute(of_light(make(1)), 12)

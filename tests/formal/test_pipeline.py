@@ -1,18 +1,98 @@
 """Proofs of the pipeline: spans go to all that take them or to none, constants stay under a running span."""
 
 import pytest
-from amaranth.hdl import Mux, Signal
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 
+import hdl.light
+import hdl.pipeline
 from golden.frame_constants import FIELDS_OF_A_FRAME
+from golden.linear_interpolator import LinearInterpolator
 from golden.pipeline import ShadingPipeline
+from hdl.diffuse import DiffuseUnit
+from hdl.frame_constants import FrameConstantsUnit
+from hdl.highlight_gate import HighlightGateUnit
+from hdl.intensity import IntensityUnit
+from hdl.interpolator import InterpolatorUnit
 from hdl.pipeline import ShadingPipelineUnit
+from hdl.specular import SpecularUnit
+from hdl.stream import count_down, offer
 
 from .prover import Harness
-from .rules import pixels_follow, stays, taken
+from .rules import answers, pixels_follow, stays, taken
+from .stand_ins import short
 
 pytestmark = pytest.mark.prove
 
 NARROW = {"x_bits": 2, "y_bits": 1, "length_bits": 2}
+
+
+class Line(InterpolatorUnit):
+    """In the interpolator's place: two bits of the left normal, one more for each pixel and light."""
+
+    latency = setup_interval = 1
+
+    @classmethod
+    def setup_intervals(cls, parameters):
+        return range(1, 2)
+
+    def __init__(self, parameters, lights, setup_interval=1, product_interval=1, **options):
+        super().__init__(parameters, lights, **options)
+
+    def elaborate(self, platform):
+        m = Module()
+        span, code, advance = self.i.payload, Signal(2), Signal()
+        active, ends = count_down(m, self.i.valid, span.length, advance)
+        m.d.comb += self.i.ready.eq(advance & ends)
+        with m.If(taken(self.i)):
+            m.d.sync += code.eq(Value.cast(span.normal_left[0]))
+        with m.Elif(advance):
+            m.d.sync += code.eq(code + 1)
+        operands = Signal(self.o.payload.shape())
+        for index, light in enumerate(operands):
+            words = (Value.cast(light[name]) for name in light.shape().members)
+            m.d.comb += [word.eq((code + index)[:2]) for word in words]
+        m.d.comb += advance.eq(offer(m, self.o, active, operands))
+        return m
+
+
+def diffuse(cosine, term):
+    yield Value.cast(term).eq(Value.cast(cosine)[:2])
+
+
+def specular(light, term):
+    yield Value.cast(term).eq(Mux(light.dark, 0, Value.cast(light.operand)[:2]))
+
+
+def colors(terms, color):
+    kinds = terms.shape().members
+    yield color.r.eq(Cat(Value.cast(term)[:2] for kind in kinds for term in terms[kind]))
+
+
+def decisions(span, lit):
+    yield Value.cast(lit).eq(Value.cast(span.normal_right[0]))
+
+
+@pytest.fixture
+def stand_ins(monkeypatch):
+    """A pipeline with three places, a `Line`, and units of a clock or two that hand its codes on."""
+
+    def pipeline(parameters, style="throughput"):
+        interval = 2 if style == "compact" else 1
+        units = (
+            (hdl.pipeline, DiffuseUnit, diffuse, 1, 1),
+            # A light unit builds it for the latency of its specular unit.
+            (hdl.light, DiffuseUnit, diffuse, 2, 1),
+            (hdl.light, SpecularUnit, specular, 2, interval),
+            (hdl.pipeline, IntensityUnit, colors, interval, interval),
+            (hdl.pipeline, HighlightGateUnit, decisions, 2, 2),
+        )
+        for module, unit, *options in units:
+            monkeypatch.setattr(module, unit.__name__, short(unit, *options))
+        monkeypatch.setitem(hdl.pipeline.INTERPOLATORS, LinearInterpolator, Line)
+        monkeypatch.setattr(ShadingPipelineUnit, "_places", 3)
+        return ShadingPipelineUnit(parameters, style=style)
+
+    return pipeline
 
 
 def of_writes(parameters):
@@ -28,7 +108,7 @@ def of_writes(parameters):
     h.m.d.sync += inside.eq(inside + admitted - finished)
     h.assume(~finished | inside.any())
     h.assume(inside <= unit._places + unit._assembler.PLACES)
-    h.claim(~taken(unit.write) | ~inside.any())
+    h.claim(unit.write.ready == ~inside.any())
     h.claim(~(taken(unit.write) & taken(unit.i)))
     # What makes it inductive.
     h.claim((h.register("inside") == inside) & (h.register("idle") == ~inside.any()))
@@ -47,16 +127,37 @@ def of_constants():
     return h
 
 
-def of_places(parameters):
-    """Pixels, and spans that the interpolator takes."""
-    h = Harness(unit := ShadingPipelineUnit(parameters))
-    span = unit.i.payload
+def of_places(unit, late):
+    """Pixels, and spans that the interpolator takes; what is due comes in so many clocks.
+
+    No span is taken while a write or another span is offered, and a pixel leaves until that is taken: so it
+    is, in the end.
+    """
+    h = Harness(unit)
+    span, parameters = unit.i.payload, unit.parameters
 
     def image(span, place, last, pixel):
-        return (pixel.x == (span.x + place)[:2]) & (pixel.y == span.y) & (pixel.last == last)
+        right = (pixel.x == (span.x + place)[:2]) & (pixel.y == span.y) & (pixel.last == last)
+        if not parameters.lights:
+            return right
+        codes = [(Value.cast(span.normal_left[0]) + place + k)[:2] for k in range(parameters.lights)]
+        lit = Value.cast(span.normal_right[0]) if parameters.gate else Const(-1, parameters.lights)
+        terms = (
+            codes
+            if parameters.model is None
+            else [*codes, *(Mux(lit[k], code, 0) for k, code in enumerate(codes))]
+        )
+        return right & (pixel.r == Cat(terms))
 
     stays(h, unit.o)
-    pixels_follow(h, unit.i, unit.o, span.length, 120, image)
+    capacity = 3 * (unit._places + unit._assembler.PLACES)
+    owed = pixels_follow(h, unit.i, unit.o, span.length, capacity, image)
+    # Pixels that are inside leave first.
+    leaves = taken(unit.o)
+    answers(h, owed.any(), leaves, late, unit.o.ready)
+    answers(h, unit.i.valid, unit.i.ready | leaves, late, unit.o.ready & ~unit.write.valid)
+    answers(h, unit.write.valid, unit.write.ready | leaves, late, unit.o.ready)
+    h.claim(~(unit.write.valid & taken(unit.i)))
     if parameters.lights:
         h.claim(taken(unit._interpolator.i) == (taken(unit.i) & (span.length != 0)))
     return h
@@ -65,11 +166,13 @@ def of_places(parameters):
 AMBIENT = ShadingPipeline(lights=0, grey=True, **NARROW)
 LINEAR = ShadingPipeline(method="linear", model=None, grey=True, **NARROW)
 GATED = ShadingPipeline(method="linear", exponent=10, gate=True, grey=True, **NARROW)
+LIT = ShadingPipeline(method="linear", exponent=10, grey=True, **NARROW)
+TWO_LIGHTS = ShadingPipeline(method="linear", exponent=10, grey=True, lights=2, **NARROW)
 
 
 @pytest.mark.parametrize("parameters", [AMBIENT, LINEAR, GATED], ids=["ambient", "linear", "gated"])
 def test_writes_wait_for_spans(prove, parameters):
-    """Inductive: no write is taken while a span is inside, nor on the clock on which one is taken in."""
+    """Inductive: a write is taken as soon as no span is inside, not before, nor beside one that comes."""
     prove(of_writes(parameters))
 
 
@@ -78,24 +181,94 @@ def test_constants_stay(prove):
     prove(of_constants(), 16)
 
 
-@pytest.mark.parametrize(("parameters", "clocks"), [(AMBIENT, 12), (LINEAR, 34)], ids=["ambient", "linear"])
-def test_admission_is_to_all_or_to_none(prove, parameters, clocks):
-    """In so many clocks, spans of 0 to 3 pixels: every span that is taken in goes to the interpolator and to
-    the places round it, so that its pixels leave in order, each at its place, the last of them marked."""
-    prove(of_places(parameters), clocks)
+# Clocks that the output, ready, stands at most, and clocks of the proof.
+PIPELINES = {
+    "ambient": (AMBIENT, "throughput", 4, 12),
+    "diffuse": (LINEAR, "throughput", 4, 14),
+    "lit": (LIT, "throughput", 5, 13),
+    "gated": (GATED, "throughput", 10, 20),
+    "compact": (TWO_LIGHTS, "compact", 8, 16),
+    "compact-gated": (GATED, "compact", 12, 24),
+}
+
+
+@pytest.mark.parametrize("name", PIPELINES)
+def test_pixels(prove, stand_ins, name):
+    """In so many clocks, spans of 0 to 3 pixels, with `stand_ins`: every span that is taken in goes to the
+    interpolator and to the places round it, so that its pixels leave in order, each once, each at its place
+    and of its colour, the last of them marked; what is due comes, a waiting write too."""
+    *pipeline, late, clocks = PIPELINES[name]
+    prove(of_places(stand_ins(*pipeline), late), clocks)
 
 
 BUGS = {
-    "constants change under a span": (of_writes, AMBIENT, "frame.hold.eq(~idle)", "frame.hold.eq(0)"),
-    "a span is taken in beside a write": (of_writes, AMBIENT, "free.eq(~self.write.valid & ", "free.eq("),
-    "the interpolator takes what waits": (of_places, LINEAR, "others, offered & free", "others, offered"),
-    "empty spans are counted": (of_writes, AMBIENT, "self.i.valid & ~empty", "self.i.valid"),
+    "a place of another row": ("diffuse", "elaborate", "place.y.eq(span.y)", "place.y.eq(~span.y)"),
+    "the interpolator takes what waits": (
+        "diffuse",
+        "elaborate",
+        "others, offered & free",
+        "others, offered",
+    ),
+    "a place is lost": (
+        "diffuse",
+        "elaborate",
+        "places.r_en.eq(assembler.places.ready)",
+        "places.r_en.eq(1)",
+    ),
+    "spans overtake a write": ("ambient", "elaborate", "free.eq(~self.write.valid & ", "free.eq("),
+    "a light takes what the other does not": (
+        "compact",
+        "_shade",
+        "(other.i.ready for other in others)",
+        "()",
+    ),
+    "a pixel passes the gate alone": (
+        "gated",
+        "_decide",
+        "source.ready.eq(operands.ready & decisions.r_rdy)",
+        "source.ready.eq(operands.ready)",
+    ),
+    "a decision is for a pixel": ("gated", "_decide", "last.eq(place == lengths.r_data - 1)", "last.eq(1)"),
 }
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(refute, plant, bug):
-    """Planted in `ShadingPipelineUnit`, each refutes one of the claims."""
-    claims, parameters, *change = BUGS[bug]
-    plant(ShadingPipelineUnit, "elaborate", *change)
-    refute(claims(parameters), 20)
+def test_bugs_are_found(refute, plant, stand_ins, bug):
+    """Planted in `ShadingPipelineUnit`, each refutes the claims, in the clocks of the proof."""
+    name, *change = BUGS[bug]
+    *pipeline, late, clocks = PIPELINES[name]
+    plant(ShadingPipelineUnit, *change)
+    refute(of_places(stand_ins(*pipeline), late), clocks)
+
+
+WRITE_BUGS = {
+    "constants change under a span": ("frame.hold.eq(~idle)", "frame.hold.eq(0)"),
+    "a write waits for ever": ("finished & (inside == 1)", "finished & (inside == 2)"),
+    "a span is taken in beside a write": ("free.eq(~self.write.valid & ", "free.eq("),
+    "empty spans are counted": ("self.i.valid & ~empty", "self.i.valid"),
+}
+
+
+@pytest.mark.parametrize("bug", WRITE_BUGS)
+def test_bugs_of_writes_are_found(refute, plant, bug):
+    """Planted in `ShadingPipelineUnit`, each refutes the claims on writes."""
+    plant(ShadingPipelineUnit, "elaborate", *WRITE_BUGS[bug])
+    refute(of_writes(AMBIENT), 20)
+
+
+CONSTANT_BUGS = {
+    "constants change under a span": (ShadingPipelineUnit, "frame.hold.eq(~idle)", "frame.hold.eq(0)"),
+    "a write is kept before it is taken": (
+        FrameConstantsUnit,
+        "written.eq(taken & ",
+        "written.eq(self.write.valid & ",
+    ),
+}
+
+
+@pytest.mark.parametrize("bug", CONSTANT_BUGS)
+def test_bugs_of_constants_are_found(refute, plant, bug):
+    """Planted in the pipeline or behind its write port, each refutes the claim on colours."""
+    owner, *change = CONSTANT_BUGS[bug]
+    plant(owner, "elaborate", *change)
+    refute(of_constants(), 16)

@@ -86,13 +86,23 @@ BUGS = {
     "a colour is taken without a place": (of_colors, "advance & spot.valid", "advance"),
     "a place is taken without a colour": (of_places, "advance & self.colors.valid", "advance"),
     "the next span comes early": (of_places, "moves & ends", "moves"),
+    "a pixel needs another span": (
+        of_progress,
+        "spot.valid & self.colors.valid",
+        "following.valid & self.colors.valid",
+    ),
+    "a span that waits stops the one before it": (
+        of_progress,
+        "moves.eq(offer(m, spot, active, Cat(x, y, ends)))",
+        "moves.eq(offer(m, spot, active, Cat(x, y, ends)) & ~following.valid)",
+    ),
     "a pixel is overwritten": (of_colors, "m.If(advance)", "m.If(1)"),
 }
 
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, plant, bug):
-    """Planted in `PixelAssemblerUnit`, each refutes the claims on places or on colours."""
+    """Planted in `PixelAssemblerUnit`, each refutes the claims on places, on progress or on colours."""
     claims, *change = BUGS[bug]
     plant(PixelAssemblerUnit, "elaborate", *change)
     refute(claims(), 20)

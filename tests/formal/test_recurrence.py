@@ -5,21 +5,37 @@ from itertools import product
 import numpy as np
 import pytest
 
-from golden.fixed import SQ, Format
+from golden.fixed import SQ, Fixed, Format
 from golden.recurrence import Recurrence
+from golden.recurrence_setup import RecurrenceSetup
+from golden.unit_vector import CODE_LENGTH_ERROR, COMPONENT, quantise
 
 from .bounds import unknown
 
 pytestmark = pytest.mark.prove
 
 LENGTH = (1 << Recurrence.LENGTH_BITS) - 1
-OFF = 0.01
-"""Part by which K, and D(0) beside ``sin d``, may be off; those of the setup are by under 0.001."""
+WIDEST_BEND = 2.02
+"""Of c, for steps to 90 degrees: 2, and 1 %."""
 
 
 def squared_norm(x, difference, c):
     """``N^2 = D^2 + c x D + c x^2``, which is ``(D + c x/2)^2 + (c - c^2/4) x^2``, of 0 < c < 4."""
     return difference * difference + c * x * difference + c * x * x
+
+
+def most_at_start(c):
+    """Largest N that start values may have: that of an amplitude of 1, 1 % more, and 2^-30.
+
+    ``x(k) = A cos(phase - k d)`` has ``N = A sin d``, and ``sin d = sqrt(c - c^2/4)``. A is that of unit
+    vectors, but the lengths of codes are off. The difference of two ends, hardly longer than that, then
+    points along them and not across: A is up to ``sqrt(1 + 2 e/sin d)``, never over sqrt 2. The rest is for
+    roundings of the words, and for steps so small that the word of c is 0.
+    """
+    sine = np.sqrt(c - c * c / 4)
+    with np.errstate(divide="ignore"):
+        amplitude = np.sqrt(1 + np.minimum(2 * CODE_LENGTH_ERROR / sine, 1))
+    return 1.01 * amplitude * sine + 2.0**-30
 
 
 def of_one_step(unit, monkeypatch, shift):
@@ -32,10 +48,10 @@ def of_one_step(unit, monkeypatch, shift):
     one = 1 << unit.state_format.fraction_bits
     register, before = (unknown(-2 * one, 2 * one)[:, 0] for _ in range(2))
     total, difference = unit._reinsch(register, before, factor, shift, False)
+    c = factor * 2.0 ** (1 - unit.fraction_bits - shift)
     (x,), (d,) = register.parts, before.parts
     assert set(total.parts) == set(difference.parts) == {x, d}
-    c = -difference.parts[x]
-    np.testing.assert_array_equal(c, factor * 2.0 ** (1 - unit.fraction_bits - shift))
+    np.testing.assert_array_equal(difference.parts[x], -c)
     np.testing.assert_array_equal(total.parts[x], 1 - c)
     np.testing.assert_array_equal(total.rest, difference.rest)
     for sums in (total, difference):
@@ -46,26 +62,22 @@ def of_one_step(unit, monkeypatch, shift):
     return c, e
 
 
-def largest_words(unit, c, e):
-    """Bounds of |x| and |D| at every pixel of every span, for steps to 90 degrees.
+def largest_words(c, e):
+    """Bounds of |x| and |D| at every pixel of every span, whose start values keep `most_at_start`.
 
     Without e a step leaves N as it is, so with it N grows by ``N(0, e) = |e|`` at most, as N is a norm.
     That bounds ``x <= N / sqrt(c - c^2/4)`` and ``D <= N / sqrt(1 - c/4)``. For the smallest c, where a step
     of the word is more than what bends, sums of absolute values do better.
     """
-    word = unit.state_format.step
-    # With d the span's step, and the held c off by OFF.
-    bend = np.minimum(c / (1 - OFF), 2)
-    sine, own = (np.sqrt(x * (1 - x / 4)) for x in (bend, c))
-    first, second = 1 + word, np.sqrt(bend) + OFF * sine + word
-    norm = np.maximum(sine, own) + OFF * (bend / 2 + sine) + (1 + np.sqrt(c)) * word + LENGTH * e
+    flat = np.sqrt(1 - c / 4)
+    start = most_at_start(c)
     with np.errstate(divide="ignore"):
-        x, difference = norm / own, norm / np.sqrt(1 - c / 4)
+        x = (start + LENGTH * e) / np.sqrt(c - c * c / 4)
     # As long as |x| is under 2.
-    steepest = second + LENGTH * (2 * c + e)
-    farthest = first + LENGTH * steepest
+    steepest = start / flat + LENGTH * (2 * c + e)
+    farthest = 1.01 + LENGTH * steepest
     small = farthest < np.minimum(x, 2)
-    return np.where(small, farthest, x), np.where(small, steepest, difference)
+    return np.where(small, farthest, x), np.where(small, steepest, (start + LENGTH * e) / flat)
 
 
 def of_spans(unit, monkeypatch, format=None):
@@ -73,24 +85,29 @@ def of_spans(unit, monkeypatch, format=None):
     format = format or unit.state_format
     for shift in range(1 << unit.SHIFT_BITS):
         c, e = of_one_step(unit, monkeypatch, shift)
-        # Steps to 90 degrees, c = 2.
-        served = c <= 2 * (1 + OFF)
-        x, difference = largest_words(unit, c[served], e[served])
+        served = c <= WIDEST_BEND
+        x, difference = largest_words(c[served], e[served])
         most = -format.min_code * format.step
         assert x.max() + 2.0 ** -(unit.fraction_bits + 1) < most, f"x to {x.max()} wraps in {format}"
         assert difference.max() < most, f"D to {difference.max()} wraps in {format}"
 
 
+def is_invariant(change):
+    """Whether a step of no e leaves N. Of degree 2 in x, D and c, it does if it does on 3 x 3 x 3 points."""
+    return all(
+        squared_norm(x + d, d - change * c * (x + d), c) == squared_norm(x, d, c)
+        for x, d, c in product(range(3), repeat=3)
+    )
+
+
 def test_a_step_leaves_the_norm():
-    """The polynomials are of degree 2 in each of x, D and c: equal on 3 x 3 x 3 points, they are the same."""
-    for x, difference, c in product(range(3), repeat=3):
-        after = x + difference
-        assert squared_norm(after, difference - c * after, c) == squared_norm(x, difference, c)
+    """A step the other way, or of half the bend, does not."""
+    assert [change for change in (-1, 0, 0.5, 1, 2) if is_invariant(change)] == [1]
 
 
 @pytest.mark.parametrize("guard_bits", [20, 28])
 def test_x_and_d_never_wrap(monkeypatch, guard_bits):
-    """Every word of K and every shift, steps to 90 degrees, to 4095 pixels; K and D(0) may be off by 1 %."""
+    """Every word of K and every shift, steps to 90 degrees, to 4095 pixels, for one phase or each of four."""
     of_spans(Recurrence(guard_bits=guard_bits), monkeypatch)
 
 
@@ -124,3 +141,45 @@ def test_bugs_are_found(plant, monkeypatch, bug):
     plant(Recurrence, "_reinsch", *BUGS[bug])
     with pytest.raises(AssertionError):
         of_one_step(Recurrence(), monkeypatch, 3)
+
+
+def share_at_start(unit, first, second, coefficient, shift):
+    """Largest N of start values by what it may be, and |x| by the same."""
+    if unit.interleave > 1:
+        coefficient, shift = coefficient[:, np.newaxis], shift[:, np.newaxis]
+    c = coefficient.values * 2.0 ** (2 - shift)
+    assert c.max() <= WIDEST_BEND
+    norm = np.sqrt(squared_norm(first.values, second.values, c))
+    return max((norm / most_at_start(c)).max(), np.abs(first.values).max() / 1.01)
+
+
+@pytest.mark.parametrize("interleave", [1, 4])
+def test_stated_start_values_keep_the_bound(interleave):
+    """Those of any amplitude to ``1 - 2^-16``, any phase, and steps from none to 90 degrees."""
+    rng, unit = np.random.default_rng(1), Recurrence(interleave=interleave)
+    step = np.r_[0, np.pi / 2 * 10.0 ** rng.uniform(-13, 0, 100_000), np.pi / 2]
+    if interleave > 1:
+        # Of longer steps nothing reads the second values.
+        step /= interleave
+    amplitude = (1 - 2.0**-16) * rng.choice([-1, 1, 0.1], len(step))
+    start = unit.start(amplitude, rng.uniform(0, 2 * np.pi, len(step)), step)
+    assert 0.98 < share_at_start(unit, *start, *unit.coefficient(step)) <= 1
+
+
+def test_start_values_of_the_setup_keep_the_bound(normal_pairs):
+    """Unit vectors to 90 degrees apart; and those one or two codes apart, whose A may be sqrt 2."""
+    rng = np.random.default_rng(2)
+    setup = RecurrenceSetup()
+    # Shorter spans read no second values, or no coefficient.
+    lengths = np.r_[9, 10, 17, 100, 1000, 4095]
+    shares = []
+    for degrees in (*10.0 ** np.linspace(-4, 1, 11), 30, 60, 89.9):
+        left, right = (quantise(normals) for normals in normal_pairs(rng, 20_000, degrees))
+        near = rng.random((len(left), 1)) < 0.5
+        vector = np.where(near, left, quantise(normal_pairs(rng, len(left), 0.0)[0]))
+        *start, wide = setup.compute(
+            *(Fixed(COMPONENT, codes) for codes in (left, right, vector)), rng.choice(lengths, len(left))
+        )
+        assert not wide.any()
+        shares.append(share_at_start(setup.recurrence, *start))
+    assert 0.98 < max(shares) <= 1

@@ -1,20 +1,84 @@
-"""Proof by exhaustion of the specular unit: its term never rises with the argument, and ends."""
+"""Proofs of the specular unit: what it reads, by SAT; its term never rises and ends, by exhaustion."""
 
 import numpy as np
 import pytest
+from amaranth.hdl import Cat, Fragment, Mux, Signal, Value
+from amaranth.hdl._ast import Switch
 
+import hdl.specular
 from golden.fixed import Fixed
 from golden.reflection import reflect
 from golden.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from golden.unit_vector import ONE_SQUARED
 from hdl.specular import SpecularUnit
 from sim.engine import simulate
 
+from .prover import Harness
+
 pytestmark = pytest.mark.prove
 
-# Of other models than the first: small ones, those next to a power of two, where the scale jumps, and others.
+OPERANDS = ("cosine", "one_minus_cosine")
+
+# All but those of the first model and operand: small ones, those next to a power of two, where the scale
+# jumps, and others.
 SOME = sorted(
     {*range(1, 12), *(2**k + step for k in range(4, 10) for step in (-1, 0, 1)), 100, 777, 999, 1000}
 )
+
+
+def assignments(statements):
+    """All of them, those under a condition too."""
+    for statement in statements:
+        if isinstance(statement, Switch):
+            for _, inner, _ in statement.cases:
+                yield from assignments(inner)
+        else:
+            yield statement
+
+
+def words_of(unit, fragment):
+    """Registers of the data path by name; which are made of ``1 - cos gamma``; which of a beat, but that."""
+    (path,) = (inner for inner, name, _ in fragment.subfragments if name == "datapath")
+    found = [one for statements in path.statements.values() for one in assignments(statements)]
+    words = {signal.name: signal for one in found for signal in one.lhs._lhs_signals()}
+
+    def made_of(signal):
+        return {s.name for one in found if signal in one.rhs._rhs_signals() for s in one.lhs._lhs_signals()}
+
+    first = "one_minus_cosine"
+    return words, made_of(words[first]), made_of(Value.cast(unit.i.payload)) - {first}
+
+
+def reads_one_word(unit, name):
+    """All that is made of the operand is ``1 - cos gamma``, of which one register is made."""
+    _, made_of_operand, others = words_of(unit, Fragment.get(unit, None))
+    assert made_of_operand == {name}, "more is made of 1 - cos gamma"
+    assert len(others) == 1, "more is made of the operand"
+
+
+def of_argument(unit, name, format, if_dark):
+    """That register has it two clocks on, cut and limited, and a code of its own if the beat is dark."""
+    h = Harness(unit)
+    words, _, (dark,) = words_of(unit, h._fragment)
+    argument, first, dark = words[name], words["one_minus_cosine"], words[dark]
+    beat, stand = Signal(unit.i.payload.shape(), name="beat"), Signal(2, name="stand")
+    past, past_dark = Signal.like(first, name="past"), Signal(name="past_dark")
+    with h.m.If(~h.register("held")):
+        h.m.d.sync += [beat.eq(unit.i.payload), past.eq(first), past_dark.eq(dark), stand.eq(Cat(1, stand))]
+    exact = Value.cast(beat.operand)
+    if unit.parameters.operand == "cosine":
+        exact = ONE_SQUARED.codes.item() - exact
+    cut = unit.parameters.operand_format.fraction_bits - format.fraction_bits
+    exact = exact >> cut if cut > 0 else exact << -cut
+    h.claim(~stand[0] | ((first == exact) & (dark == beat.dark)))
+    raised = Mux(past < 0, 0, past)
+    limited = Mux(raised > format.max_code, format.max_code, raised)
+    h.claim(~stand[1] | (argument == Mux(past_dark, if_dark, limited)))
+    return h
+
+
+def of_specular(model, operand):
+    return of_argument(SpecularUnit(Specular(model, operand)), "argument", Specular.ARGUMENT_FORMAT, 0)
 
 
 def every_argument(unit, exponent):
@@ -31,48 +95,119 @@ def every_argument(unit, exponent):
     return np.r_[np.arange(0, reach, step), np.sort(beyond)]
 
 
+def operands(unit, arguments):
+    """Operands of the arguments: of a cosine both ends of those that have each, and of the whole word."""
+    if unit.operand == "one_minus_cosine":
+        return arguments
+    step = 1 << unit.operand_format.fraction_bits - unit.ARGUMENT_FORMAT.fraction_bits
+    ends = ONE_SQUARED.codes - step * arguments[:, np.newaxis] - [0, step - 1]
+    return np.r_[unit.operand_format.max_code, ends.ravel(), unit.operand_format.min_code]
+
+
 def check(unit, exponent):
-    """Every term is the twin's, none is larger than that of a smaller argument, none is lit past the end."""
+    """No term is larger than that of a smaller argument; all are the twin's.
+
+    It is 0 where the exact one is under 2^-14, and not where that is over it, but for a hundredth of that;
+    and 0 for a dark beat at the peak.
+    """
     parameters = unit.parameters
-    codes = every_argument(parameters, exponent)
-    run = simulate(
-        unit,
-        {"operand": codes, "dark": np.zeros(len(codes), dtype=np.uint8)},
-        count=len(codes),
-        constants={"exponent": exponent},
-    )
-    terms = run.beats.astype(np.int64)
-    assert (np.diff(terms) <= 0).all()
-    assert terms[0] >= 2**17 - 9
-    assert not terms[reflect(parameters.model, 1 - codes * 2.0**-25, exponent) == 0].any()
-    operand = Fixed(parameters.ARGUMENT_FORMAT, codes)
-    np.testing.assert_array_equal(
-        terms, parameters.compute(operand, np.zeros(len(codes), dtype=bool), exponent).codes
-    )
+    codes = operands(parameters, every_argument(parameters, exponent))
+    codes, dark = np.r_[codes, codes[0]], np.arange(len(codes) + 1) == len(codes)
+    run = simulate(unit, {"operand": codes, "dark": dark}, count=len(codes), constants={"exponent": exponent})
+    operand, terms = Fixed(parameters.operand_format, codes), run.beats.astype(np.int64)
+    assert terms[0] >= 2**17 - 9, "no peak"
+    assert not terms[-1], "a dark beat is lit"
+    assert (np.diff(terms) <= 0).all(), "a term rises"
+    cosine = operand.values + (1 - ONE_SQUARED.values)
+    if parameters.operand == "one_minus_cosine":
+        cosine = 1 - operand.values
+    exact = reflect(parameters.model, np.maximum(cosine, -1), exponent) * 2.0**14
+    assert not terms[exact < 0.99].any(), "a term goes on past the cutoff"
+    assert terms[~dark & (exact > 1.01)].all(), "a term ends before the cutoff"
+    np.testing.assert_array_equal(terms, parameters.compute(operand, dark, exponent).codes)
 
 
+@pytest.mark.parametrize("operand", OPERANDS)
 @pytest.mark.parametrize("model", SPECULAR_MODELS + FURTHER_MODELS)
-def test_term_never_rises(model):
-    """Every exponent for the first model, `SOME` for the others; every argument."""
-    unit = SpecularUnit(Specular(model, "one_minus_cosine"))
-    for exponent in range(1, 1001) if model == SPECULAR_MODELS[0] else SOME:
+def test_term_follows_from_the_argument(prove, model, operand):
+    """Inductive, for every operand: ``1 - cos gamma``, cut and limited, is all that a term is made of.
+
+    So it never rises with the cosine, and where the operand is 1 - cos gamma it is that operand: what holds
+    of the terms of every argument holds for both. A dark beat has the argument 0.
+    """
+    reads_one_word(SpecularUnit(Specular(model, operand)), "argument")
+    prove(of_specular(model, operand))
+
+
+@pytest.mark.parametrize("operand", OPERANDS)
+@pytest.mark.parametrize("model", SPECULAR_MODELS + FURTHER_MODELS)
+def test_term_never_rises(model, operand):
+    """Every argument; every exponent for the first model and 1 - cos gamma, `SOME` for the others."""
+    unit = SpecularUnit(Specular(model, operand))
+    is_first = (model, operand) == (SPECULAR_MODELS[0], "one_minus_cosine")
+    for exponent in range(1, 1001) if is_first else SOME:
         check(unit, exponent)
 
 
-BUGS = {
-    "nothing is cut off": ("((wide <= boundary) | Value.cast(boundary).all()) & ~dark", "~dark"),
-    "the second lobe comes through": (
-        "(wide <= boundary)",
-        "(Value.cast(wide)[:18] <= Value.cast(boundary))",
-    ),
-    "the largest shift loses a bit": ("<< self._slope[1])[:36]", "<< self._slope[1])[:36] & 0x7FFFFFFFF"),
+BUGS_OF_ARGUMENT = {
+    "1 is not that of unit vectors": (hdl.specular, "one_minus", "ONE_SQUARED.values.item()", "1"),
+    "it wraps": (SpecularUnit, "_describe", "argument.saturate", "argument.wrap"),
+    "a dark beat has an argument": (SpecularUnit, "_describe", "Mux(dark, 0, argument)", "argument"),
 }
 
 
+@pytest.mark.parametrize("bug", BUGS_OF_ARGUMENT)
+def test_bugs_of_the_argument_are_found(refute, plant, bug):
+    """Planted in the unit, each refutes the claims."""
+    plant(*BUGS_OF_ARGUMENT[bug])
+    refute(of_specular("cosquad", "cosine"), 4)
+
+
+def test_bug_of_another_word_is_found(plant):
+    """What is shifted is made of the argument and the operand, planted in the unit."""
+    text = 'g.register("shifted_wide", shifted, argument)'
+    bug = 'g.register("shifted_wide", lambda x, _: shifted(x), argument, operand)'
+    plant(SpecularUnit, "_describe", text, bug)
+    with pytest.raises(AssertionError, match=r"^more is made of the operand"):
+        reads_one_word(SpecularUnit(), "argument")
+
+
+BUGS = {
+    "nothing is cut off": (
+        "((wide <= boundary) | Value.cast(boundary).all()) & ~dark",
+        "~dark",
+        "a term rises",
+    ),
+    "the cutoff is late": (
+        "(wide <= boundary)",
+        "(Value.cast(wide) <= Value.cast(boundary) + 16)",
+        "a term goes on",
+    ),
+    "the cutoff is early": (
+        "(wide <= boundary)",
+        "(Value.cast(wide) <= Value.cast(boundary) - 16)",
+        "a term ends",
+    ),
+    "the second lobe comes through": (
+        "(wide <= boundary)",
+        "(Value.cast(wide)[:18] <= Value.cast(boundary))",
+        "a term rises",
+    ),
+    "the largest shift loses a bit": (
+        "<< self._slope[1])[:36]",
+        "<< self._slope[1])[:36] & 0x7FFFFFFFF",
+        "a term rises",
+    ),
+    "a dark beat is lit": (".all()) & ~dark", ".all())", "a dark beat is lit"),
+}
+
+
+@pytest.mark.parametrize("operand", OPERANDS)
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(plant, bug):
+def test_bugs_are_found(plant, bug, operand):
     """Planted in the unit, each breaks a claim."""
-    plant(SpecularUnit, "_describe", *BUGS[bug])
-    unit = SpecularUnit(Specular("cosquad", "one_minus_cosine"))
-    with pytest.raises(AssertionError):
+    text, change, claim = BUGS[bug]
+    plant(SpecularUnit, "_describe", text, change)
+    unit = SpecularUnit(Specular("cosquad", operand))
+    with pytest.raises(AssertionError, match=f"^{claim}"):
         check(unit, 1000)

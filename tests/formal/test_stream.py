@@ -8,7 +8,7 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 import hdl.stream
-from hdl.stream import PipelinedUnit, connect_buffered, connect_registered
+from hdl.stream import PipelinedUnit, connect_registered
 
 from .prover import Harness
 from .rules import answers, follows, stays, taken
@@ -58,7 +58,9 @@ def registered(m, number, source, sink):
 
 
 def buffered(depth):
-    return lambda m, number, source, sink: connect_buffered(m, f"buffer_{number}", source, sink, depth)
+    return lambda m, number, source, sink: hdl.stream.connect_buffered(
+        m, f"buffer_{number}", source, sink, depth
+    )
 
 
 def equal(came, leaves):
@@ -128,6 +130,27 @@ def test_registers(prove, count):
 def test_buffer(prove, depth):
     """Inductive: the claims of a stream; ``depth`` beats inside, two clocks through."""
     prove(of_stream(Chain(buffered(depth)), depth, 1, 1))
+
+
+BUFFER_BUGS = {
+    "what waits is dropped": ("buffer.r_en.eq(sink.ready)", "buffer.r_en.eq(1)"),
+    "it takes in what it has no room for": ("source.ready.eq(buffer.w_rdy)", "source.ready.eq(1)"),
+    "a beat is given again": ("buffer.r_en.eq(sink.ready)", "buffer.r_en.eq(sink.ready & source.valid)"),
+    "any beat is taken in": ("buffer.w_en.eq(source.valid)", "buffer.w_en.eq(1)"),
+}
+
+
+@pytest.mark.parametrize("bug", BUFFER_BUGS)
+def test_bugs_of_a_buffer_are_found(refute, plant, bug):
+    """Planted in `hdl.stream.connect_buffered`, each refutes the claims of a stream."""
+    plant(hdl.stream, "connect_buffered", *BUFFER_BUGS[bug])
+    refute(of_stream(Chain(buffered(3)), 3, 1, 1))
+
+
+def test_a_proof_of_too_few_clocks_is_found(prove):
+    """Nothing that waited leaves in 6 clocks of a unit of 4: what is lost then is not seen."""
+    with pytest.raises(AssertionError, match="nothing moves on in 6 clocks"):
+        prove(of_stream(Delay(4), 5, 3, 1), 6)
 
 
 OFFER_BUGS = {

@@ -6,18 +6,18 @@ from itertools import product
 
 import numpy as np
 import pytest
-from amaranth.hdl import Fragment
 
 from golden.adaptive_normaliser import AdaptiveNormaliser
 from golden.arccos import HalfChord
 from golden.bisection import Bisection
+from golden.bisection_chain import BisectionChain
 from golden.chord import Chord
 from golden.chord_interpolator import ChordInterpolator
 from golden.chord_setup import ChordSetup
 from golden.difference_accumulator import DifferenceAccumulator
-from golden.difference_setup import DifferenceSetup
+from golden.difference_setup import DifferenceSetup, reciprocal_place
 from golden.dot_product import DotProduct
-from golden.fixed import SQ, UQ, Fixed, Format
+from golden.fixed import SQ, UQ, Fixed
 from golden.gpq import GPQ
 from golden.interpolator import pixels_of
 from golden.local_chord_setup import LocalChordSetup
@@ -27,59 +27,27 @@ from golden.recurrence import Recurrence
 from golden.recurrence_setup import RecurrenceSetup
 from golden.renormaliser import Renormaliser
 from golden.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
-from golden.unit_vector import CODE_LENGTH_ERROR, COMPONENT
+from golden.unit_vector import CODE_LENGTH_ERROR, COMPONENT, ONE_SQUARED
 from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
 from hdl.arccos import HalfChordUnit
 from hdl.bisection import BisectionUnit
+from hdl.bisection_chain import BisectionChainUnit
 from hdl.chord_interpolator import ChordAccumulatorUnit
 from hdl.chord_setup import ChordSetupUnit
 from hdl.difference_accumulator import DifferenceAccumulatorUnit
 from hdl.difference_setup import DifferenceSetupUnit
-from hdl.fixed import FixedValue
 from hdl.local_chord_setup import LocalChordSetupUnit
 from hdl.middle_normal import MiddleNormalUnit
 from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
+from hdl.recurrence import RecurrenceUnit
 from hdl.recurrence_setup import RecurrenceSetupUnit
 from hdl.renormaliser import RenormaliserUnit
 
-from .bounds import Bounds, unknown
+from .bounds import Bounds, cut_by, registers_of, unknown, word, wrapped_by
 
-pytestmark = pytest.mark.prove
+pytestmark = [pytest.mark.prove, pytest.mark.usefixtures("wraps")]
 
 LENGTHS = np.arange(1, 1 << DifferenceSetup.LENGTH_BITS)
-
-
-@pytest.fixture(autouse=True)
-def wraps(monkeypatch):
-    """Formats in which a twin wraps or makes words; it fails where one may not hold a code.
-
-    All other operations have results of formats that hold whatever there is, or saturate.
-    """
-    found, wrap, new = [], Format.wrap, Fixed.__init__
-
-    def checked(format, codes):
-        found.append(format)
-        bounds = codes if isinstance(codes, Bounds) else Bounds(codes.min(), codes.max())
-        assert bounds.within(format.min_code, format.max_code), (
-            f"{bounds.low.min():.0f} to {bounds.high.max():.0f} wraps in {format}"
-        )
-        return codes if isinstance(codes, Bounds) else wrap(format, codes)
-
-    def made(number, format, codes):
-        if not isinstance(codes, Bounds):
-            return new(number, format, codes)
-        found.append(format)
-        assert codes.within(format.min_code, format.max_code), f"a word wraps in {format}"
-        number.format, number.codes = format, codes
-
-    monkeypatch.setattr(Format, "wrap", checked)
-    monkeypatch.setattr(Fixed, "__init__", made)
-    return found
-
-
-def word(format, *shape):
-    """Any code of a format, in each place."""
-    return Fixed(format, Bounds(np.full(shape, format.min_code), np.full(shape, format.max_code)))
 
 
 def of_middle_normal(fit):
@@ -227,6 +195,33 @@ def of_bisection(degree, max_angle, as_documented):
     unit.factor(Fixed(unit.ANGLE_FORMAT, np.arange(-2, unit.widest.codes + 1)))
 
 
+def of_bisection_chain(degree, max_angle, as_documented):
+    """Every word of u up to the flag, through all levels: u alone decides the factors of each.
+
+    Angles that a level gives to the bisection's factor are those of `of_bisection`.
+    """
+    unit = BisectionChain(Bisection(degree, max_angle, as_documented))
+    p, factor, levels = unit.bisection, unit.bisection.factor, (1 << unit.LEVEL_BITS) - 1
+    # Of eight words one angle; from -2, as lengths may be over 1.
+    u = np.arange(-2, p.widest.codes + 0.5, 1 / 8)
+    u = Fixed.round(unit.WEIGHT_FORMAT, u * p.ANGLE_FORMAT.step)
+    dot = Fixed(DotProduct().result_format, ONE_SQUARED.codes - (u.codes << 14))
+    found = []
+
+    def noted(_, angle):
+        found.append(angle)
+        assert angle.format == p.ANGLE_FORMAT
+        assert -2 <= angle.codes.min() <= angle.codes.max() <= p.widest.codes, "no angle of a bisection"
+        return factor(angle)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(DotProduct, "compute", lambda *_: dot)
+        patch.setattr(Bisection, "factor", noted)
+        normal = Fixed(COMPONENT, np.zeros((1, 3), dtype=np.int64))
+        unit.compute(normal, normal, np.full(len(dot.codes), levels))
+    assert len(found) == levels
+
+
 def of_renormaliser():
     unit = Renormaliser()
     offset = np.arange(unit.SEGMENTS << unit.OFFSET_FORMAT.width)
@@ -258,7 +253,8 @@ def of_recurrence_slopes(monkeypatch):
     """Every word of q from 1/8 on, and of each shift after that the largest: others are within.
 
     With T a unit vector across N_l, ``N_r = (1 - q) N_l + sin(psi) T``, so ``b = (1 - q) a + sin(psi) x``,
-    x = T.H. Of q the word is off by half a step, and by what `Chord` cuts. The span has two pixels.
+    x = T.H. Of q the word is off by half a step, and by what `Chord` cuts; b by more than twice what lengths
+    of codes are. The span has two pixels.
     """
     unit = RecurrenceSetup()
     word = np.r_[np.tile(np.arange(1 << 16, 1 << 17), 3), np.full(32, (1 << 17) - 1)]
@@ -279,7 +275,9 @@ def of_recurrence_slopes(monkeypatch):
 def of_recurrence_prologue(format=None):
     """Every word of K, for steps to 90 degrees; K and D(0) may be off by 1 %, the setup's are by under 0.1 %.
 
-    ``D(0) = x sin d - a K/2`` with x as in the slopes, ``a^2 + x^2 <= 1``: in sectors of 15 degrees.
+    ``D(0) = x sin d - a K/2`` with x as in the slopes, ``a^2 + x^2 <= 1``: in sectors of 15 degrees. Where
+    K is under 2^-7, D(0) may be off by 0.1: so it may be anything that ends a few codes apart give, whose
+    lengths are off by as much as they differ.
     """
     unit = RecurrenceSetup().steps
     state = format or unit.state_format
@@ -304,29 +302,45 @@ def of_recurrence_prologue(format=None):
             state.wrap(total)
 
 
-def wrapped_by(unit):
-    """Formats to which a unit wraps."""
-    found, wrap = set(), FixedValue.wrap
+def of_recurrence_shifts(bits=6, bits_of_length=4):
+    """Places by which words are shifted: 65 words of q of the ends of its shifts, and 0; every length."""
+    words = np.r_[0, np.arange(1 << 16, 1 << 17, 1 << 10), (1 << 17) - 1]
+    word, shift, length = (axis.ravel() for axis in np.meshgrid(words, np.r_[0, 1, 2, 34], LENGTHS))
+    shifts, decided = [], []
 
-    def noted(value, format):
-        found.add(format)
-        return wrap(value, format)
+    def note(function):
+        def noted(*operands):
+            result = function(*operands)
+            decided.append(result[1])
+            return result
 
-    def elaborate(part):
-        for inner, *_ in Fragment.get(part, None).subfragments:
-            elaborate(inner)
+        return noted
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(FixedValue, "wrap", noted)
-        elaborate(unit)
-    assert found
-    return found
+        patch.setattr(Chord, "compute", lambda *_: Fixed(Chord.FORMAT, word << 18 >> shift))
+        patch.setattr(Recurrence, "prologue", lambda *operands: (operands[-1], shifts.append(operands[-1])))
+        for name in ("_under_one", "_over_half"):
+            patch.setattr(RecurrenceSetup, name, note(getattr(RecurrenceSetup, name)))
+        vectors = [Fixed(COMPONENT, np.zeros((1, 3), dtype=np.int64)) for _ in range(3)]
+        RecurrenceSetup().compute(*vectors, length)
+    (step_shift,), (over, under, rho_over) = shifts, decided
+    _, halvings = reciprocal_place(length - 1)
+    exponent = step_shift + 1
+    for places in (exponent - under, exponent, step_shift, np.maximum(exponent - 5, 0)):
+        Fixed(UQ(bits, 0), Bounds.of(places))
+    for places in (halvings, halvings - rho_over):
+        Fixed(UQ(bits_of_length, 0), Bounds.of(places))
+    assert set(over) == set(under) == {0, 1}
 
 
 UNITS = {
-    "middle_normal-exact": MiddleNormalUnit,
+    **{f"middle_normal-{fit}": partial(MiddleNormalUnit, MiddleNormal(fit)) for fit in MIDDLE_NORMAL_FITS},
     "difference_setup": DifferenceSetupUnit,
-    "quadratic_evaluator-direct": QuadraticEvaluatorUnit,
+    "difference_setup-documented": partial(DifferenceSetupUnit, DifferenceSetup(True)),
+    **{
+        f"quadratic_evaluator-{form}": partial(QuadraticEvaluatorUnit, QuadraticEvaluator(form))
+        for form in QUADRATIC_FORMS
+    },
     "local_chord_setup": LocalChordSetupUnit,
 }
 """Units wrap in no other formats than their twins, to which they are equal to the bit (`tests/hdl`)."""
@@ -364,6 +378,13 @@ def test_no_word_of_a_bisection_wraps(wraps, parameters):
     assert wrapped_by(BisectionUnit(Bisection(*parameters))) <= set(wraps)
 
 
+@pytest.mark.parametrize("parameters", [*product((1, 2), (45, 90), (False, True))])
+def test_no_word_of_a_chain_of_bisections_wraps(wraps, parameters):
+    """Every word of u up to the flag, and what each of 15 levels makes of it; u and the weights saturate."""
+    of_bisection_chain(*parameters)
+    assert wrapped_by(BisectionChainUnit(BisectionChain(Bisection(*parameters)))) <= set(wraps)
+
+
 def test_no_word_of_a_renormaliser_wraps(wraps):
     """Every squared length that is served, to the bits that are read."""
     of_renormaliser()
@@ -383,6 +404,56 @@ def test_slopes_of_the_specular_unit_do_not_wrap(wraps, model):
     assert wraps == [Specular.SLOPE_FORMAT]
 
 
+def test_shifts_of_the_recurrence_setup_do_not_wrap():
+    """None is less than 0, and all fit their registers."""
+    of_recurrence_shifts()
+    widths = {register.name: len(register) for register in registers_of(RecurrenceSetupUnit())}
+    assert {widths[f"{name}_shift"] for name in ("step", "phase")} == {6}
+    assert {widths[name] for name in ("exponent_of_span", "exponent")} == {6}
+    assert {widths[f"{name}_shift"] for name in ("place", "rho")} == {4}
+
+
+@pytest.mark.parametrize("bits", [(5, 4), (6, 3)])
+def test_shifts_of_the_recurrence_a_bit_too_short_are_found(bits):
+    """A bit less."""
+    with pytest.raises(AssertionError, match=" wraps in "):
+        of_recurrence_shifts(*bits)
+
+
+CUTS = {
+    "hdl.difference_setup.reciprocal_words": "the leading one of m - 1, which no table has; m is 1 or more",
+    "hdl.adaptive_normaliser.AdaptiveNormaliserUnit._front": "the same; 2^levels - 1, of levels to the depth",
+    "hdl.arccos.normalised_words": "v: `test_angular_setup`",
+    "hdl.arccos.half_chord_words": "half a turn less psi, as the twin wraps it",
+    "hdl.recurrence_setup.RecurrenceSetupUnit._describe": "shifts: `of_recurrence_shifts`",
+    "hdl.recurrence_setup.RecurrenceSetupUnit._steps": "the same; and the leading one of m - 1",
+    "hdl.recurrence_setup.RecurrenceSetupUnit._normalised": "q, of which the twin makes a word that refuses",
+    "hdl.recurrence_setup.RecurrenceSetupUnit._under_one": "twice what is under 1, in a word up to 2",
+}
+"""Where hardware cuts bits of a sum, a shift or a choice, and why what it cuts is 0, or not wanted."""
+
+
+def test_sums_are_cut_in_these_places_alone():
+    """Of units above, with those of their interpolators; `test_angular_setup` has the other."""
+    units = (
+        *(make() for make in UNITS.values()),
+        *(make() for make in (BisectionUnit, BisectionChainUnit, RenormaliserUnit, HalfChordUnit)),
+        *(make() for make in (ChordSetupUnit, RecurrenceSetupUnit, RecurrenceUnit)),
+        *(make() for make in (DifferenceAccumulatorUnit, AdaptiveNormaliserUnit)),
+        ChordAccumulatorUnit(1),
+    )
+    assert set.union(*map(cut_by, units)) == set(CUTS)
+
+
+def test_a_sum_that_is_cut_is_found(plant):
+    """A slice, planted in place of the format that a word has."""
+    plant(
+        *(DifferenceAccumulatorUnit, "elaborate", "value.eq((value + difference).wrap(p.format))"),
+        "value.as_value().eq((value + difference).as_value()[: p.format.width])",
+    )
+    assert cut_by(DifferenceAccumulatorUnit()) == {"hdl.difference_accumulator.elaborate"}
+
+
 def test_slopes_of_the_recurrence_setup_do_not_wrap(monkeypatch, wraps):
     """By bounds, for every word of q; and the first difference of spans of two pixels."""
     of_recurrence_slopes(monkeypatch)
@@ -392,6 +463,13 @@ def test_slopes_of_the_recurrence_setup_do_not_wrap(monkeypatch, wraps):
 def test_first_steps_of_the_recurrence_do_not_wrap():
     """By bounds, for every word of K to 90 degrees: the first difference, and x and D of the seven steps."""
     of_recurrence_prologue()
+
+
+@pytest.mark.parametrize("parameters", [{}, {"guard_bits": 20}, {"interleave": 4}])
+def test_words_of_the_recurrence_wrap_in_the_format_of_its_state(parameters):
+    """Of which it is proved that it holds them, in `test_recurrence`; a direct recurrence saturates."""
+    parameters = Recurrence(**parameters)
+    assert wrapped_by(RecurrenceUnit(parameters)) == {parameters.state_format}
 
 
 @pytest.mark.parametrize(("as_documented", "fits"), [(False, MIDDLE_NORMAL_FITS), (True, ("exact",))])
@@ -510,6 +588,14 @@ SHORTER_WORDS = {
         partial(of_bisection, 2, 90, False),
         *(Bisection, "factor", "wrap(self.FACTOR_FORMAT)", "wrap(SQ(-2, 19))"),
     ),
+    "sums of the chain": (
+        partial(of_bisection_chain, 2, 90, False),
+        *(Bisection, "factor", "wrap(self.SUM_FORMAT)", "wrap(SQ(-1, 18))"),
+    ),
+    "factor of the chain": (
+        partial(of_bisection_chain, 2, 90, False),
+        *(Bisection, "factor", "wrap(self.FACTOR_FORMAT)", "wrap(SQ(-2, 19))"),
+    ),
     "slope of the renormaliser": (
         of_renormaliser,
         *(Renormaliser, "correction", "wrap(self.C1_FORMAT)", "wrap(UQ(0, 16))"),
@@ -532,6 +618,13 @@ def test_words_a_bit_too_short_are_found(plant, word):
     plant(*change)
     with pytest.raises(AssertionError, match=" wraps in "):
         prove()
+
+
+def test_angles_beyond_the_proof_are_found(plant):
+    """A level that takes too much off u, planted in the chain."""
+    plant(BisectionChain, "compute", "u.scale(-1) - e - ", "u.scale(-1) - e - e - e - ")
+    with pytest.raises(AssertionError, match="no angle of a bisection"):
+        of_bisection_chain(2, 45, False)
 
 
 SHORTER_SUMS = {

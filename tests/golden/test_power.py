@@ -37,7 +37,7 @@ def test_error_at_every_exponent():
         codes = np.sort(np.floor(argument * 2**25).astype(np.int64))
         result = shade(unit, np.minimum(codes, unit.operand_format.max_code), exponent)
         error = result.values - exact(codes * 2.0**-25, exponent)
-        # The cuts of neighbours differ, by less than the bound.
+        # The cuts of neighbours differ, by less than the bound; of any two, `tests/formal/test_power.py`.
         assert (np.diff(result.codes) <= 5).all()
         largest, smallest = max(largest, error.max()), min(smallest, error.min())
     # Every cut makes the result smaller.

@@ -1,0 +1,189 @@
+# amaranth: UnusedElaboratable=no
+"""Proofs of the adaptive normaliser: its segments have the pixels of their span, and each pixel leaves once.
+
+Between its two halves is a queue of segments, `amaranth.lib.fifo.SyncFIFOBuffered`, which hands on what it
+takes. In its place is one that takes segments on any clocks and gives any: what is claimed of either half
+holds whatever the other does. The bisection is a stand-in of 3 clocks whose results are free; products are,
+too, and thus the number of levels. Lengths have 3 bits, and a segment is prepared in 6 clocks instead of 14,
+of which the others are for its start and step.
+"""
+
+from types import SimpleNamespace
+
+import pytest
+from amaranth.hdl import Module, Mux, Signal
+from amaranth.lib import data, wiring
+from amaranth.lib.wiring import In, Out
+
+import hdl.adaptive_normaliser
+from golden.adaptive_normaliser import AdaptiveNormaliser
+from golden.difference_setup import DifferenceSetup
+from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
+from hdl.bisection import BisectionUnit
+
+from .prover import Harness
+from .rules import answers, pixels_follow, stays, taken
+from .stand_ins import short
+
+pytestmark = pytest.mark.prove
+
+LENGTH_BITS = 3
+PROGRESS_CLOCKS = 25
+THRESHOLDS = {1: 1 / 8, 3: 2.0**-6}
+"""By the levels that they lead to, at most."""
+
+SEGMENT = data.StructLayout({"count": LENGTH_BITS, "last": 1, "wide": 1})
+"""Upper bits of what goes through the queue."""
+
+
+class Queue(wiring.Component):
+    """Takes segments and gives others, each on any clocks."""
+
+    def __init__(self, width, depth):
+        super().__init__(
+            {
+                **{"w_data": In(width), "w_en": In(1), "w_rdy": Out(1)},
+                **{"r_data": Out(width), "r_en": In(1), "r_rdy": Out(1)},
+            }
+        )
+        self.depth = depth
+        self.free = [Signal.like(port) for port in (self.w_rdy, self.r_data, self.r_rdy)]
+
+    def elaborate(self, platform):
+        m = Module()
+        m.d.comb += [
+            port.eq(free) for port, free in zip((self.w_rdy, self.r_data, self.r_rdy), self.free, strict=True)
+        ]
+        return m
+
+
+@pytest.fixture
+def harness(monkeypatch):
+    """A harness of the unit and its queue, for a threshold."""
+    queues = []
+
+    def queue(width, depth):
+        queues.append(Queue(width, depth))
+        return queues[-1]
+
+    monkeypatch.setattr(AdaptiveNormaliser, "LENGTH_BITS", LENGTH_BITS)
+    # Tables are cut: of this one only the size counts.
+    table = DifferenceSetup().reciprocals[: 1 << LENGTH_BITS - 1]
+    monkeypatch.setattr(DifferenceSetup, "reciprocals", table)
+    unit = hdl.adaptive_normaliser
+    monkeypatch.setattr(unit, "SyncFIFOBuffered", queue)
+    monkeypatch.setattr(unit, "SEGMENT_CLOCKS", 6)
+    monkeypatch.setattr(unit, "BisectionUnit", short(BisectionUnit, lambda *_: [], 3, 2))
+
+    def make(threshold):
+        h = Harness(AdaptiveNormaliserUnit(AdaptiveNormaliser(threshold)))
+        (made,) = queues
+        for signal in made.free:
+            h.m.d.comb += signal.eq(h.free(len(signal), signal.name))
+        return h, made
+
+    return make
+
+
+def segment_of(port):
+    return data.View(SEGMENT, port[-SEGMENT.as_shape().width :])
+
+
+def pixels_left(h, queue):
+    """Whether the front gives a segment, and how many pixels of its span are to come."""
+    left, gives = Signal(LENGTH_BITS), queue.w_en & queue.w_rdy
+    with h.m.If(taken(h.unit.i)):
+        h.m.d.sync += left.eq(h.unit.i.payload.length)
+    with h.m.Elif(gives):
+        h.m.d.sync += left.eq(left - segment_of(queue.w_data).count)
+    return gives, left
+
+
+def of_segments(h, queue):
+    """A span's segments have its pixels, one or more each; the last is marked; then the next span comes."""
+    segment, (gives, left) = segment_of(queue.w_data), pixels_left(h, queue)
+    h.claim(~queue.w_en | (segment.count.any() & (segment.count <= left)))
+    h.claim(~queue.w_en | (segment.last == (segment.count == left)))
+    h.claim(~(taken(h.unit.i) & left.any()))
+    # The queue has room for all of a span's.
+    count = Signal(range(queue.depth + 2))
+    h.m.d.sync += count.eq(Mux(taken(h.unit.i), 0, count + gives))
+    h.claim(count <= queue.depth)
+    return h
+
+
+def of_progress(h, queue):
+    """A segment comes in so many clocks; a span is taken when there are no more."""
+    gives, left = pixels_left(h, queue)
+    answers(h, left.any(), gives, PROGRESS_CLOCKS, queue.w_rdy)
+    answers(h, h.unit.i.valid & ~left.any(), h.unit.i.ready, 1, 1)
+    return h
+
+
+def of_pixels(h, queue):
+    """A segment of n pixels, n over 0, has n, in order; the last of a span is marked."""
+    before, stood = Signal.like(queue.r_data), Signal()
+    h.m.d.sync += [before.eq(queue.r_data), stood.eq(queue.r_rdy & ~queue.r_en)]
+    h.assume(~stood | (queue.r_rdy & (queue.r_data == before)))
+    segment = segment_of(queue.r_data)
+    h.assume(~queue.r_rdy | segment.count.any())
+    source = SimpleNamespace(valid=queue.r_rdy, ready=queue.r_en, payload=segment)
+
+    def image(came, place, last, pixel):
+        return (pixel.last == (last & came.last)) & (pixel.wide == came.wide)
+
+    stays(h, h.unit.o)
+    owed = pixels_follow(h, source, h.unit.o, segment.count, 2 * ((1 << LENGTH_BITS) - 1) + 2, image)
+    answers(h, owed.any(), taken(h.unit.o), 1, h.unit.o.ready)
+    # Spans that are in the queue with all of their segments.
+    inside, spans = Signal(), Signal(range(queue.depth + 2))
+    completes = queue.w_en & queue.w_rdy & segment_of(queue.w_data).last
+    h.m.d.sync += spans.eq(spans + completes - (taken(source) & ~inside))
+    with h.m.If(taken(source)):
+        h.m.d.sync += inside.eq(~segment.last)
+    h.assume(spans <= queue.depth)
+    h.claim(~taken(source) | inside | spans.any())
+    due = queue.r_rdy & (inside | spans.any())
+    answers(h, due, queue.r_en, (1 << LENGTH_BITS) - 1, h.unit.o.ready)
+    return h
+
+
+@pytest.mark.parametrize("levels", THRESHOLDS)
+def test_segments(prove, harness, levels):
+    """Inductive, up to so many levels: the claims on segments; the queue has room for all of a span."""
+    prove(of_segments(*harness(THRESHOLDS[levels])))
+
+
+def test_progress(prove, harness):
+    """Inductive, up to one level: while the queue takes them, segments come 25 clocks apart at most."""
+    prove(of_progress(*harness(THRESHOLDS[1])))
+
+
+def test_pixels(prove, harness):
+    """Inductive: what waits stays; pixels come in order, one a clock; a segment follows the one before.
+
+    It does as soon as all segments of its span have come. As these go through the queue one after the other,
+    a span's pixels leave in order.
+    """
+    prove(of_pixels(*harness(THRESHOLDS[1])))
+
+
+BUGS = {
+    "a segment is not taken off": (of_segments, "remaining.eq(remaining - count)", "remaining.eq(remaining)"),
+    "the last is not marked": (of_segments, ">= remaining)", "> remaining)"),
+    "a segment that finds no room is lost": (of_segments, "m.If(fifo.w_rdy)", "m.If(1)"),
+    "segments are not given": (of_progress, "fifo.w_en.eq(1)", "fifo.w_en.eq(0)"),
+    "a pixel that waits is lost": (of_pixels, "advance.eq(offer(m, self.o, valid, pixel))", "advance.eq(1)"),
+    "segments are taken while pixels wait": (of_pixels, "fifo.r_en.eq(load)", "fifo.r_en.eq(ends & given)"),
+    "the last of every segment is marked": (of_pixels, "active & ends & ~inside", "active & ends"),
+    "a span begins before it is complete": (of_pixels, "(inside | (ready_spans != 0))", "1"),
+    "a span is begun with every segment": (of_pixels, "begun.eq(load & ~inside)", "begun.eq(load)"),
+}
+
+
+@pytest.mark.parametrize("bug", BUGS)
+def test_bugs_are_found(refute, plant, harness, bug):
+    """Planted in the unit, each refutes a claim."""
+    claims, *change = BUGS[bug]
+    plant(AdaptiveNormaliserUnit, "_back" if claims is of_pixels else "_front", *change)
+    refute(claims(*harness(THRESHOLDS[1])))

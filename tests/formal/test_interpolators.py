@@ -1,0 +1,555 @@
+# amaranth: UnusedElaboratable=no
+"""Proofs about interpolators, of proven units put together: a span's pixels leave, all and in order.
+
+The parts are proved by themselves. In the place of each `PipelinedUnit` is one of the same streams and
+control and of 1 to 3 clocks, which hands on a word: a tag of the span, and the pixel's place in it.
+Accumulators, recurrence and highlight cosine keep their control, and take words of few bits from pixel to
+pixel; normaliser and quadratic evaluator are accumulators.
+"""
+
+import itertools
+from collections.abc import Callable, Iterator
+from functools import partial
+from operator import itemgetter
+from typing import NamedTuple
+
+import pytest
+from amaranth.hdl import Cat, Const, Fragment, Signal, Value
+from amaranth.lib import stream
+
+import hdl.angular_interpolator
+import hdl.bisection_interpolator
+import hdl.chord_interpolator
+import hdl.difference_accumulator
+import hdl.highlight_cosine
+import hdl.interpolator
+import hdl.linear_interpolator
+import hdl.local_chord_interpolator
+import hdl.quadratic_interpolator
+import hdl.recurrence_interpolator
+from golden.angular_interpolator import AngularInterpolator
+from golden.bisection_interpolator import BisectionInterpolator
+from golden.chord_interpolator import ChordInterpolator
+from golden.difference_accumulator import DifferenceAccumulator
+from golden.fixed import SQ
+from golden.linear_interpolator import LinearInterpolator
+from golden.local_chord_interpolator import LocalChordInterpolator
+from golden.quadratic_interpolator import QuadraticInterpolator
+from golden.recurrence_interpolator import RecurrenceInterpolator
+from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
+from hdl.angular_interpolator import AngularInterpolatorUnit
+from hdl.bisection_interpolator import BisectionInterpolatorUnit
+from hdl.chord_interpolator import ChordAccumulatorUnit, ChordInterpolatorUnit
+from hdl.difference_accumulator import AccumulatorUnit, DifferenceAccumulatorUnit
+from hdl.fixed import FixedValue
+from hdl.highlight_cosine import HighlightCosineUnit
+from hdl.interpolator import NormalInterpolatorUnit
+from hdl.linear_interpolator import LinearInterpolatorUnit
+from hdl.local_chord_interpolator import LocalChordInterpolatorUnit
+from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
+from hdl.quadratic_interpolator import QuadraticInterpolatorUnit
+from hdl.recurrence import RecurrenceUnit
+from hdl.recurrence_interpolator import RecurrenceInterpolatorUnit
+from hdl.stream import PipelinedUnit, offer
+
+from .prover import Harness
+from .rules import answers, follows, pixels_follow, stays, taken
+from .stand_ins import short
+
+pytestmark = pytest.mark.prove
+
+# Spans of 0 to 3 pixels, and the clocks from one to the next that setups are built for.
+LENGTH_BITS, INTERVAL = 2, 2
+TAG_BITS = 2
+WORD_BITS = LENGTH_BITS + TAG_BITS
+NARROW = DifferenceAccumulator(SQ(1, WORD_BITS), SQ(2, WORD_BITS + 1), SQ(2, WORD_BITS + 1), SQ(1, WORD_BITS))
+
+
+def word(number: FixedValue) -> Value:
+    """Of a pixel: its place in its span, and the tag of the span."""
+    return Value.cast(number)[:WORD_BITS]
+
+
+def tag(number: FixedValue) -> Value:
+    """Of a span."""
+    return word(number)[LENGTH_BITS:]
+
+
+def first_word(number: FixedValue, place: int = 0) -> Value:
+    """Of the pixel at a place of the span."""
+    return Cat(Const(place, LENGTH_BITS), tag(number))
+
+
+def put(number: FixedValue, code: Value):
+    """Assign a code."""
+    return Value.cast(number).eq(code)
+
+
+def left(span):
+    return span.normal_left[0]
+
+
+def middle_value(span):
+    return span["values"][0].diffuse[0]
+
+
+def constant_coefficient(span):
+    return span.q[0]
+
+
+def start(span):
+    return span.start[0]
+
+
+def light_start(span):
+    return span.lights[0].diffuse.start
+
+
+def phase(span):
+    return span.phase
+
+
+def first_value(span, light, copy="diffuse"):
+    return span.lights[light][copy].first[0]
+
+
+def itself(pixel):
+    return pixel
+
+
+def normal(pixel):
+    return pixel[0]
+
+
+def cosine(pixel):
+    return pixel[0].cosine
+
+
+def difference_setup(span, gives):
+    yield put(gives.start[0], first_word(span.q[0]))
+    yield gives.length.eq(span.length)
+
+
+def chord_setup(span, gives):
+    find = middle_value if "values" in span.shape().members else left
+    yield put(light_start(gives), first_word(find(span)))
+    yield gives.length.eq(span.length)
+
+
+def middle_normal(span, gives):
+    yield put(gives.normal_left[0], word(span.normal_left[0]))
+
+
+def coefficients(span, gives):
+    yield put(gives.q[0], word(span.normal_left[0]))
+
+
+def renormaliser(vector, gives):
+    yield put(gives.normal[0], word(vector[0]))
+
+
+def products(vector, gives):
+    yield put(gives[0].cosine, word(vector[0]))
+
+
+def angular_setup(span, gives):
+    # The angle falls from pixel to pixel.
+    yield put(gives.phase, Cat(Const(3, LENGTH_BITS), tag(left(span))))
+    yield put(gives.step, 1)
+    yield gives.length.eq(span.length)
+
+
+def recurrence_setup(span, gives):
+    for light in gives.lights:
+        for copy in (light.diffuse, light.highlight):
+            for place, number in enumerate(copy.first):
+                yield put(number, first_word(left(span), place))
+    yield gives.length.eq(span.length)
+
+
+def wave(self, m, theta, cos_beta):
+    """In place of stages 2 to 12 of the highlight-cosine unit."""
+    result = Signal(self.o.payload.shape())
+    m.d.comb += put(result, Cat(~theta[:LENGTH_BITS], theta[LENGTH_BITS:WORD_BITS]))
+    for stage in range(2, self.latency + 1):
+        result = PipelinedUnit.register(m, result, f"stage_{stage}")
+    return result
+
+
+def loop(self, m, name, start, starts, *others):
+    """In place of the recurrence unit's: of each of a span's first four pixels the value that was given."""
+    x = Signal(WORD_BITS, name=name)
+    with m.If(starts):
+        m.d.sync += x.eq(word(start[0]))
+    format = self.parameters.result_format
+    return FixedValue(format, Cat(x, Const(0, format.width - WORD_BITS)))
+
+
+def walk(find, place):
+    """In place of an accumulator's quadratics: one of few bits, from a span's word by one a pixel."""
+
+    def quadratics(self, values):
+        one, none = (
+            FixedValue.constant(NARROW.difference_format, value) for value in (NARROW.result_format.step, 0)
+        )
+        begin = FixedValue(NARROW.start_format, Cat(first_word(find(self.i.payload)), Const(0, 1)))
+        result = FixedValue(NARROW.result_format, Value.cast(place(values))[: WORD_BITS + 1])
+        yield "word", NARROW, (begin, one, none), result
+
+    return quadratics
+
+
+class Line(AccumulatorUnit):
+    """In place of a unit that takes spans to normals: an accumulator of its streams."""
+
+    clocks_per_pixel = 1
+
+    def __init__(self, parameters):
+        unit = self.OF(parameters)
+        # Else its parts count as forgotten.
+        Fragment.get(unit, None)
+        super().__init__(unit.i.payload.shape(), unit.o.payload.shape())
+
+
+class Normaliser(Line):
+    """Of a span that is not divided; the unit itself takes 69 clocks to its first pixel."""
+
+    OF = AdaptiveNormaliserUnit
+    quadratics = walk(left, lambda values: values.normal[0])
+
+    def preparation(self, levels):
+        return self.latency
+
+
+class Evaluator(Line):
+    """Of either form."""
+
+    OF = QuadraticEvaluatorUnit
+    quadratics = walk(constant_coefficient, normal)
+
+
+@pytest.fixture(autouse=True)
+def stand_ins(monkeypatch):
+    """Units of 2 or 3 clocks, and accumulators of few bits, hand words on."""
+    for module, name, hand_on, latency in (
+        (hdl.interpolator, "LightProductsUnit", products, 2),
+        (hdl.linear_interpolator, "DifferenceSetupUnit", difference_setup, 3),
+        (hdl.linear_interpolator, "RenormaliserUnit", renormaliser, 2),
+        # A length takes three clocks round these two.
+        (hdl.quadratic_interpolator, "MiddleNormalUnit", middle_normal, 3),
+        (hdl.quadratic_interpolator, "GPQUnit", coefficients, 1),
+        (hdl.quadratic_interpolator, "DifferenceSetupUnit", difference_setup, 3),
+        (hdl.chord_interpolator, "ChordSetupUnit", chord_setup, 3),
+        (hdl.local_chord_interpolator, "LocalChordSetupUnit", chord_setup, 3),
+        (hdl.angular_interpolator, "AngularSetupUnit", angular_setup, 3),
+        (hdl.recurrence_interpolator, "RecurrenceSetupUnit", recurrence_setup, 3),
+    ):
+        monkeypatch.setattr(module, name, short(getattr(module, name), hand_on, latency))
+    monkeypatch.setattr(DifferenceAccumulatorUnit, "quadratics", walk(start, normal))
+    monkeypatch.setattr(ChordAccumulatorUnit, "quadratics", walk(light_start, cosine))
+    monkeypatch.setattr(HighlightCosineUnit, "latency", 3)
+    monkeypatch.setattr(HighlightCosineUnit, "_wave", wave)
+    monkeypatch.setattr(RecurrenceUnit, "_reinsch", loop)
+    monkeypatch.setattr(hdl.bisection_interpolator, "AdaptiveNormaliserUnit", Normaliser)
+    monkeypatch.setattr(hdl.quadratic_interpolator, "QuadraticEvaluatorUnit", Evaluator)
+
+
+class Stretch(NamedTuple):
+    """From a stream of the unit to another: spans or pixels, and where both have their word."""
+
+    source: stream.Interface
+    sink: stream.Interface
+    find: Callable
+    found: Callable
+    capacity: int
+
+    def follow(self, harness: Harness, *, exact: bool = True) -> Signal:
+        """Claim that what comes leaves, in order, each once; the result: how much is inside."""
+        source, sink, find, found, capacity = self
+        if has_length(source) and not has_length(sink):
+
+            def pixel_of(span, place, last, pixel):
+                return word(found(pixel)) == Cat(place, tag(find(span)))
+
+            length = source.payload.length[:LENGTH_BITS]
+            return pixels_follow(harness, source, sink, length, capacity, pixel_of if exact else None)
+
+        def same(came, leaves):
+            if has_length(source):
+                return (tag(find(came)) == tag(found(leaves))) & (came.length == leaves.length)
+            return word(find(came)) == word(found(leaves))
+
+        return follows(harness, source, sink, capacity, same if exact else None)
+
+
+def has_length(channel: stream.Interface) -> bool:
+    """Whether it has spans, not pixels."""
+    return "length" in getattr(channel.payload.shape(), "members", {})
+
+
+def held(*units: PipelinedUnit) -> int:
+    """Beats that units hold at most."""
+    return sum(-(-unit.latency // unit.initiation_interval) + 1 for unit in units)
+
+
+def pixels_held(unit) -> int:
+    """Pixels that a unit holds at most: in its registers, one that waits, and the rest of a span."""
+    return unit.latency + (1 << LENGTH_BITS) - 1
+
+
+REGISTERED = 2
+"""Beats that a connection with registers holds at most."""
+
+
+def curve_stretches(unit, source=None, find=left) -> Iterator[Stretch]:
+    """Setup, registers, accumulator, a renormaliser, products."""
+    setup, accumulator, products = unit._setup, unit._accumulator, unit._products
+    yield Stretch(source or unit.i, setup.o, find, start, held(setup))
+    yield Stretch(setup.o, accumulator.i, start, start, REGISTERED)
+    yield Stretch(accumulator.i, accumulator.o, start, normal, pixels_held(accumulator))
+    normals = accumulator.o
+    if hasattr(unit, "_renormaliser"):
+        yield Stretch(normals, products.i, normal, normal, held(unit._renormaliser))
+        normals = products.i
+    yield Stretch(normals, unit.o, normal, cosine, held(products))
+
+
+def quadratic_stretches(unit) -> Iterator[Stretch]:
+    """Preparation with the lengths round it, then those of a curve."""
+    setup = unit._setup
+    yield Stretch(unit.i, setup.i, left, constant_coefficient, held(unit._middle, unit._gpq))
+    yield from curve_stretches(unit, setup.i, constant_coefficient)
+
+
+def evaluator_stretches(unit) -> Iterator[Stretch]:
+    """Preparation with the lengths round it, evaluator, products."""
+    evaluator, products = unit._evaluator, unit._products
+    capacity = held(unit._middle, unit._gpq)
+    yield Stretch(unit.i, evaluator.i, left, constant_coefficient, capacity)
+    yield Stretch(evaluator.i, evaluator.o, constant_coefficient, normal, pixels_held(evaluator))
+    yield Stretch(evaluator.o, unit.o, normal, cosine, held(products))
+
+
+def chord_stretches(unit) -> Iterator[Stretch]:
+    """Setup, registers, accumulator."""
+    setup, accumulator = unit._setup, unit._accumulator
+    find = middle_value if isinstance(unit, LocalChordInterpolatorUnit) else left
+    yield Stretch(unit.i, setup.o, find, light_start, held(setup))
+    yield Stretch(setup.o, accumulator.i, light_start, light_start, REGISTERED)
+    yield Stretch(accumulator.i, unit.o, light_start, cosine, pixels_held(accumulator))
+
+
+def angular_stretches(unit) -> Iterator[Stretch]:
+    """Setup, registers, cosine, of each chain."""
+    for setup, cosines in unit._chains.values():
+        yield Stretch(unit.i, setup.o, left, phase, held(setup))
+        yield Stretch(setup.o, cosines.i, phase, phase, REGISTERED)
+        yield Stretch(cosines.i, cosines.o, phase, itself, pixels_held(cosines))
+
+
+def recurrence_stretches(unit) -> Iterator[Stretch]:
+    """Setup; registers and recurrence of L of the first light and of H of the second."""
+    setup = unit._setup
+    yield Stretch(unit.i, setup.o, left, partial(first_value, light=0), held(setup))
+    for light, copy in enumerate(("diffuse", "highlight")):
+        recurrence = unit._recurrences[light]
+        source, sink = partial(first_value, light=light, copy=copy), itemgetter(copy)
+        first = lambda span, copy=copy: span[copy].first[0]  # noqa: E731
+        yield Stretch(setup.o, recurrence.i, source, first, REGISTERED)
+        yield Stretch(recurrence.i, recurrence.o, first, sink, pixels_held(recurrence))
+
+
+def bisection_stretches(unit) -> Iterator[Stretch]:
+    """Normaliser, products."""
+    products = unit._products
+    yield Stretch(unit.i, products.i, left, normal, pixels_held(unit._normaliser))
+    yield Stretch(products.i, unit.o, normal, cosine, held(products))
+
+
+OPTIONS = {"setup_interval": INTERVAL, "length_bits": LENGTH_BITS}
+
+UNITS = {
+    "linear": (partial(LinearInterpolatorUnit, LinearInterpolator(), 1, **OPTIONS), curve_stretches),
+    "renormalise": (
+        partial(LinearInterpolatorUnit, LinearInterpolator(renormalised=True), 1, **OPTIONS),
+        curve_stretches,
+    ),
+    "quadratic": (
+        partial(QuadraticInterpolatorUnit, QuadraticInterpolator(), 1, **OPTIONS),
+        quadratic_stretches,
+    ),
+    "quadratic-eval": (
+        partial(QuadraticInterpolatorUnit, QuadraticInterpolator(form="direct"), 1, **OPTIONS),
+        evaluator_stretches,
+    ),
+    "chord_interpolator": (
+        partial(ChordInterpolatorUnit, ChordInterpolator(), 1, **OPTIONS),
+        chord_stretches,
+    ),
+    "local_chord_interpolator": (
+        partial(LocalChordInterpolatorUnit, LocalChordInterpolator(), 1, **OPTIONS),
+        chord_stretches,
+    ),
+    "angular": (partial(AngularInterpolatorUnit, AngularInterpolator(), 1, **OPTIONS), angular_stretches),
+    "recurrence_interpolator": (
+        partial(RecurrenceInterpolatorUnit, RecurrenceInterpolator(), 2, **OPTIONS),
+        recurrence_stretches,
+    ),
+    "bisection_interpolator": (
+        partial(BisectionInterpolatorUnit, BisectionInterpolator(), 1, length_bits=LENGTH_BITS),
+        bisection_stretches,
+    ),
+}
+
+
+def in_step(harness: Harness) -> None:
+    """Claim that units side by side are ready, and offer what they have, on the same clocks."""
+    unit = harness.unit
+    if isinstance(unit, AngularInterpolatorUnit):
+        rows = list(zip(*unit._chains.values(), strict=True))
+    elif isinstance(unit, RecurrenceInterpolatorUnit):
+        rows = [unit._recurrences]
+    else:
+        return
+    for row in rows:
+        for one, other in itertools.pairwise(row):
+            harness.claim((one.i.ready == other.i.ready) & (one.o.valid == other.o.valid))
+    for last in rows[-1]:
+        harness.claim(taken(last.o) == taken(unit.o))
+
+
+def of_stretch(name: str, place: int) -> Harness:
+    """One of the stretches of a unit, and that units side by side are in step."""
+    make, stretches = UNITS[name]
+    h = Harness(unit := make())
+    in_step(h)
+    list(stretches(unit))[place].follow(h)
+    return h
+
+
+def of_clocks(name: str, *, exact: bool = False) -> Harness:
+    """Spans of a pixel or more, on all stretches at once: counted, or followed exactly."""
+    make, stretches = UNITS[name]
+    h = Harness(unit := make())
+    h.assume(unit.i.payload.length != 0)
+    in_step(h)
+    stays(h, unit.o)
+    found = list(stretches(unit))
+    # Of all stretches each begins where another ends.
+    ends = {id(unit.i), *(id(stretch.sink) for stretch in found)}
+    assert len(found) == STRETCHES[name]
+    assert all(id(stretch.source) in ends for stretch in found)
+    inside = [stretch.follow(h, exact=exact).any() for stretch in found]
+    answers(h, Cat(inside).any(), taken(unit.o), unit.latency, unit.o.ready)
+    answers(h, unit.i.valid, unit.i.ready, unit.latency, unit.o.ready)
+    return h
+
+
+STRETCHES = {
+    "linear": 4,
+    "renormalise": 5,
+    "quadratic": 5,
+    "quadratic-eval": 3,
+    "chord_interpolator": 3,
+    "local_chord_interpolator": 3,
+    "angular": 6,
+    "recurrence_interpolator": 5,
+    "bisection_interpolator": 2,
+}
+
+
+@pytest.mark.parametrize(("name", "place"), [(name, k) for name, n in STRETCHES.items() for k in range(n)])
+def test_pixels(prove, name, place):
+    """Inductive, spans of 0 to 3 pixels, setups of an interval of 2: what comes to a stretch leaves it, in
+    order, each once, as what it is, and no more are inside than its units hold.
+
+    The stretches follow each other from the input to the output: one ends with the stream with which the next
+    begins. So a span's pixels leave the whole, all and in order, each at its place, with the tag of its span.
+    Units side by side take and give on the same clocks, those of the output.
+    """
+    prove(of_stretch(name, place))
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_stability_and_progress(prove, name):
+    """Inductive, spans of 1 to 3 pixels: what waits stays; while the output is ready, a pixel that is to come
+    leaves, and a span that is offered is taken, in as many clocks as the latency and one."""
+    prove(of_clocks(name))
+
+
+# Of each bug the unit of which it refutes the claims, the text where it is planted, and the bug.
+BUGS = {
+    "any span is taken in": ("linear", "setup.i.valid.eq(self.i.valid)", "setup.i.valid.eq(1)"),
+    "spans are lost at the input": ("linear", "self.i.ready.eq(setup.i.ready)", "self.i.ready.eq(1)"),
+    "vectors are lost": (
+        "renormalise",
+        "renormaliser.o.ready.eq(normals.ready)",
+        "renormaliser.o.ready.eq(1)",
+    ),
+    "coefficients are lost": ("quadratic", "gpq.o.ready.eq(curve.i.ready)", "gpq.o.ready.eq(1)"),
+    "middle normals are lost": ("quadratic", "middle.o.ready.eq(gpq.i.ready)", "middle.o.ready.eq(1)"),
+    "a length goes before its span": (
+        "quadratic",
+        "length.ready.eq(gpq.o.valid & curve.i.ready)",
+        "length.ready.eq(curve.i.ready)",
+    ),
+    "there is no room for a length": ("quadratic", "gpq.latency + 2", "gpq.latency - 2"),
+    "prepared spans are lost": (
+        "chord_interpolator",
+        "setup.constants.eq(self.constants)",
+        "setup.o.ready.eq(1)",
+    ),
+    "prepared local spans are lost": (
+        "local_chord_interpolator",
+        "m.d.comb += self.wide",
+        "m.d.comb += setup.o.ready.eq(1); m.d.comb += self.wide",
+    ),
+    "angles are lost": ("angular", "setup.o.ready.eq(prepared.ready)", "setup.o.ready.eq(1)"),
+    "cosines are lost": ("angular", "cosine.o.ready.eq(self.o.ready)", "cosine.o.ready.eq(1)"),
+    "one light has a span too many": (
+        "recurrence_interpolator",
+        "unit.i.valid.eq(prepared.valid)",
+        "unit.i.valid.eq(prepared.valid | (light == 1))",
+    ),
+    "values are lost": (
+        "recurrence_interpolator",
+        "unit.o.ready.eq(self.o.ready)",
+        "unit.o.ready.eq(1)",
+    ),
+    "normals of lines are lost": (
+        "bisection_interpolator",
+        "normaliser.o.ready.eq(normals.ready)",
+        "normaliser.o.ready.eq(1)",
+    ),
+}
+
+
+@pytest.mark.parametrize("bug", BUGS)
+def test_bugs_are_found(refute, plant, bug):
+    """Planted in an interpolator, each refutes one of its claims."""
+    name, *change = BUGS[bug]
+    unit = UNITS[name][0].func
+    plant(unit, "source" if issubclass(unit, NormalInterpolatorUnit) else "elaborate", *change)
+    refute(of_clocks(name, exact=True), 30)
+
+
+@pytest.mark.parametrize(
+    "name", ["linear", "renormalise", "quadratic", "quadratic-eval", "bisection_interpolator"]
+)
+def test_lost_products_are_found(refute, plant, name):
+    """Products that are dropped while they wait, planted in all methods that find normals."""
+    bug = "products.o.ready.eq(1), self.wide.eq(wide)"
+    plant(NormalInterpolatorUnit, "elaborate", "self.wide.eq(wide)", bug)
+    refute(of_clocks(name, exact=True), 30)
+
+
+def test_dropped_cosines_are_found(refute, monkeypatch):
+    """What waits is dropped at the output of the highlight-cosine unit."""
+
+    def dropping(m, output, valid, payload):
+        advance = offer(m, output, valid, payload)
+        m.d.comb += Value.cast(output.payload).eq(Value.cast(payload))
+        return advance
+
+    monkeypatch.setattr(hdl.highlight_cosine, "offer", dropping)
+    refute(of_clocks("angular"), 30)
