@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Iterable
 
-from amaranth.hdl import Signal
+from amaranth.hdl import Signal, Value
 
 from hdl.stream import PipelinedUnit
 
-__all__ = ["short"]
+__all__ = ["short", "short_wave"]
 
 
 def short(
@@ -47,3 +47,22 @@ def short(
             return result
 
     return Short
+
+
+def short_wave(hand_on: Callable[[Value, Value], Value]) -> Callable:
+    """In place of stages 2 on of the highlight-cosine unit, up to its latency: registers for a code.
+
+    Parameters
+    ----------
+    hand_on : callable
+        Of theta and cos beta: the code of the result.
+    """
+
+    def wave(unit, m, theta, cos_beta):
+        result = Signal(unit.o.payload.shape())
+        m.d.comb += Value.cast(result).eq(hand_on(theta, cos_beta))
+        for stage in range(2, unit.latency + 1):
+            result = PipelinedUnit.register(m, result, f"stage_{stage}")
+        return result
+
+    return wave

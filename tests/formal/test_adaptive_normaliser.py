@@ -11,9 +11,9 @@ of which the others are for its start and step.
 from types import SimpleNamespace
 
 import pytest
-from amaranth.hdl import Module, Mux, Signal
-from amaranth.lib import data, wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.hdl import Elaboratable, Module, Mux, Signal
+from amaranth.lib import data
+from amaranth.lib.fifo import FIFOInterface
 
 import hdl.adaptive_normaliser
 from golden.adaptive_normaliser import AdaptiveNormaliser
@@ -36,25 +36,11 @@ SEGMENT = data.StructLayout({"count": LENGTH_BITS, "last": 1, "wide": 1})
 """Upper bits of what goes through the queue."""
 
 
-class Queue(wiring.Component):
-    """Takes segments and gives others, each on any clocks."""
-
-    def __init__(self, width, depth):
-        super().__init__(
-            {
-                **{"w_data": In(width), "w_en": In(1), "w_rdy": Out(1)},
-                **{"r_data": Out(width), "r_en": In(1), "r_rdy": Out(1)},
-            }
-        )
-        self.depth = depth
-        self.free = [Signal.like(port) for port in (self.w_rdy, self.r_data, self.r_rdy)]
+class Queue(Elaboratable, FIFOInterface):
+    """Takes segments and gives others, each on any clocks: what it says is left open."""
 
     def elaborate(self, platform):
-        m = Module()
-        m.d.comb += [
-            port.eq(free) for port, free in zip((self.w_rdy, self.r_data, self.r_rdy), self.free, strict=True)
-        ]
-        return m
+        return Module()
 
 
 @pytest.fixture
@@ -63,7 +49,7 @@ def harness(monkeypatch):
     queues = []
 
     def queue(width, depth):
-        queues.append(Queue(width, depth))
+        queues.append(Queue(width=width, depth=depth))
         return queues[-1]
 
     monkeypatch.setattr(AdaptiveNormaliser, "LENGTH_BITS", LENGTH_BITS)
@@ -78,8 +64,8 @@ def harness(monkeypatch):
     def make(threshold):
         h = Harness(AdaptiveNormaliserUnit(AdaptiveNormaliser(threshold)))
         (made,) = queues
-        for signal in made.free:
-            h.m.d.comb += signal.eq(h.free(len(signal), signal.name))
+        for port in (made.w_rdy, made.r_data, made.r_rdy):
+            h.m.d.comb += port.eq(h.free(len(port), port.name))
         return h, made
 
     return make

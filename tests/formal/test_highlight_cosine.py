@@ -1,13 +1,13 @@
 """Proofs of the highlight-cosine unit: a span's pixels, all and in order, each at its angle."""
 
 import pytest
-from amaranth.hdl import Cat, Signal, Value
+from amaranth.hdl import Cat, Value
 
 from hdl.highlight_cosine import HighlightCosineUnit
-from hdl.stream import PipelinedUnit
 
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
+from .stand_ins import short_wave
 
 pytestmark = pytest.mark.prove
 
@@ -15,18 +15,14 @@ LATENCY = 3
 
 
 @pytest.fixture(autouse=True)
-def short_wave(monkeypatch):
+def stand_in(monkeypatch):
     """Of the angle two bits, of cos beta one, through two registers."""
 
-    def wave(unit, m, theta, cos_beta):
-        result = Signal(unit.o.payload.shape())
-        m.d.comb += Value.cast(result).eq(Cat(theta[:2], Value.cast(cos_beta)[0]))
-        for stage in range(2, LATENCY + 1):
-            result = PipelinedUnit.register(m, result, f"stage_{stage}")
-        return result
+    def bits(theta, cos_beta):
+        return Cat(theta[:2], Value.cast(cos_beta)[0])
 
     monkeypatch.setattr(HighlightCosineUnit, "latency", LATENCY)
-    monkeypatch.setattr(HighlightCosineUnit, "_wave", wave)
+    monkeypatch.setattr(HighlightCosineUnit, "_wave", short_wave(bits))
 
 
 def of_pixels():

@@ -54,7 +54,7 @@ from hdl.stream import PipelinedUnit, offer
 
 from .prover import Harness
 from .rules import answers, follows, pixels_follow, stays, taken
-from .stand_ins import short
+from .stand_ins import short, short_wave
 
 pytestmark = pytest.mark.prove
 
@@ -167,13 +167,8 @@ def recurrence_setup(span, gives):
     yield gives.length.eq(span.length)
 
 
-def wave(self, m, theta, cos_beta):
-    """In place of stages 2 to 12 of the highlight-cosine unit."""
-    result = Signal(self.o.payload.shape())
-    m.d.comb += put(result, Cat(~theta[:LENGTH_BITS], theta[LENGTH_BITS:WORD_BITS]))
-    for stage in range(2, self.latency + 1):
-        result = PipelinedUnit.register(m, result, f"stage_{stage}")
-    return result
+def angle(theta, cos_beta):
+    return Cat(~theta[:LENGTH_BITS], theta[LENGTH_BITS:WORD_BITS])
 
 
 def loop(self, m, name, start, starts, *others):
@@ -248,7 +243,7 @@ def stand_ins(monkeypatch):
     monkeypatch.setattr(DifferenceAccumulatorUnit, "quadratics", walk(start, normal))
     monkeypatch.setattr(ChordAccumulatorUnit, "quadratics", walk(light_start, cosine))
     monkeypatch.setattr(HighlightCosineUnit, "latency", 3)
-    monkeypatch.setattr(HighlightCosineUnit, "_wave", wave)
+    monkeypatch.setattr(HighlightCosineUnit, "_wave", short_wave(angle))
     monkeypatch.setattr(RecurrenceUnit, "_reinsch", loop)
     monkeypatch.setattr(hdl.bisection_interpolator, "AdaptiveNormaliserUnit", Normaliser)
     monkeypatch.setattr(hdl.quadratic_interpolator, "QuadraticEvaluatorUnit", Evaluator)
