@@ -24,10 +24,10 @@ prove: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) -m prove tests/formal
 
 mutants: $(VENV)/.installed-test
-	$(BIN)/python -m bench.mutants
+	$(BIN)/python -m blysk.bench.quality.mutants
 
 soak: $(VENV)/.installed-bench
-	$(BIN)/python -m bench.soak
+	$(BIN)/python -m blysk.bench.quality.soak
 
 coverage: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --cov
@@ -38,11 +38,11 @@ coverage: $(VENV)/.installed-test
 
 bench: $(VENV)/.installed-bench
 	$(BIN)/blysk bench report
-	$(BIN)/python -m bench.engines
-	$(BIN)/python -m bench.throughput
-	$(BIN)/python -m bench.renderer
-	$(BIN)/python -m bench.gate
-	$(BIN)/python -m bench.sweep
+	$(BIN)/python -m blysk.bench.speed.engines
+	$(BIN)/python -m blysk.bench.speed.throughput
+	$(BIN)/python -m blysk.bench.speed.renderer
+	$(BIN)/python -m blysk.bench.report.gate
+	$(BIN)/python -m blysk.bench.quality.sweep
 
 pages: $(VENV)/.installed
 	$(BIN)/blysk pages docs/blocks

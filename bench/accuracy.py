@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 
-from golden.camera import Camera
-from golden.geometry import Mesh
-from golden.lighting import Light, Material
-from golden.pipeline import METHODS, ShadingPipeline
-from golden.scene import Scene
-from sim.frame import Comparison, FrameSimulator, SimulatedFrame, compare
+from blysk.golden.pipeline import METHODS, ShadingPipeline
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.scene import Scene
+from blysk.sim.frames.frame import Comparison, FrameSimulator, SimulatedFrame, compare
 
 __all__ = ["DESIGNS", "EXPONENTS", "measure", "scene_for"]
 

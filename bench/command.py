@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 import click
 from tqdm import tqdm
 
-from sim.engine import CompilerMissing, SimulationError
-from sim.errors import InputError
+from blysk.sim.engines.engine import CompilerMissing, SimulationError
+from blysk.sim.errors import InputError
 
 __all__ = ["resumable", "run"]
 

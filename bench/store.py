@@ -13,12 +13,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import golden
-import hdl
-import sim
-from sim.cxxrtl import cache_folder
-from sim.errors import InputError
-from sim.output import plain, write_json
+import blysk.bench
+import blysk.golden
+import blysk.hdl
+import blysk.sim
+from blysk.sim.engines.cxxrtl import cache_folder
+from blysk.sim.errors import InputError
+from blysk.sim.output import plain, write_json
 
 __all__ = ["Task", "results_of", "version_of"]
 
@@ -76,7 +77,7 @@ def version_of(package: str) -> str | None:
 def _code() -> str:
     installed = {name: version for name in _LIBRARIES if (version := version_of(name))}
     digest = hashlib.sha256(repr(installed).encode())
-    for package in (golden, hdl, sim):
+    for package in (blysk.golden, blysk.hdl, blysk.sim):
         for path in sorted(Path(package.__path__[0]).rglob("*.*")):
             if "__pycache__" not in path.parts:
                 digest.update(path.name.encode() + b"\0" + path.read_bytes())
@@ -85,17 +86,19 @@ def _code() -> str:
 
 @functools.cache
 def _bench(file: Path) -> str:
-    """Hash of a module and of those beside it that it imports, directly or not."""
+    """Hash of a module and of those of `bench` that it imports, directly or not."""
     digest, seen, open_ = hashlib.sha256(), set(), [file]
+    folder = Path(blysk.bench.__path__[0])
     while open_:
         path = open_.pop()
         if path in seen or not path.exists():
             continue
         seen.add(path)
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.level == 1:
-                names = [node.module] if node.module else [alias.name for alias in node.names]
-                open_ += [file.with_name(f"{name}.py") for name in names]
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("blysk.bench"):
+                _, _, *parts = node.module.split(".")
+                place = folder.joinpath(*parts)
+                open_ += [place.with_suffix(".py"), *(place / f"{alias.name}.py" for alias in node.names)]
     for path in sorted(seen):
         digest.update(path.read_bytes())
     return digest.hexdigest()

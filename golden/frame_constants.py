@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .intensity import MAX_INTENSITY, MAX_LIGHTS, Intensity
-from .lighting import halfway_vector
-from .reflection import energy_factor
-from .scene import Scene
-from .unit_vector import quantise
+from blysk.golden.lighting.intensity import MAX_INTENSITY, MAX_LIGHTS, Intensity
+from blysk.golden.number.unit_vector import quantise
+from blysk.golden.reference.lighting import halfway_vector
+from blysk.golden.reference.reflection import energy_factor
+from blysk.golden.reference.scene import Scene
 
 __all__ = [
     "FIELDS_OF_A_FRAME",
@@ -72,7 +72,7 @@ class FrameConstants:
         there are no vectors of a frame: they are 0.
 
         With ``energy`` the highlight is that of the energy-normalised form: the factor of
-        `golden.reflection.energy_factor` multiplies k_s here, once a frame, and the specular unit stays as it
+        `energy_factor` multiplies k_s here, once a frame, and the specular unit stays as it
         is. Its error counts as many times. A colour operand holds ``k_s I_i`` times the factor up to 8, which
         with ``k_s I_i = 1`` allows exponents up to 48 (``phong``), 195 (``blinn``) and 36 (``cosquad_lin``);
         higher ones need a darker k_s.

@@ -6,27 +6,34 @@ from functools import cached_property
 
 import numpy as np
 
-from .angular_interpolator import AngularInterpolator
-from .angular_setup import AngularSetup
-from .arccos import Arccos
-from .bisection import Bisection
-from .bisection_interpolator import BisectionInterpolator
-from .chord_interpolator import ChordInterpolator
-from .difference_setup import LENGTH_BITS
-from .diffuse import Diffuse
-from .fixed import Fixed
-from .frame_constants import MAX_MATERIALS, FrameConstants
-from .highlight_gate import HighlightGate
-from .intensity import Intensity
-from .interpolator import Interpolator, NormalInterpolator, Operand, Operands, pixels_of, runs_of
-from .linear_interpolator import LinearInterpolator
-from .local_chord_interpolator import LocalChordInterpolator, SpanValues
-from .middle_normal import MiddleNormal
-from .power import Power
-from .quadratic_interpolator import QuadraticInterpolator
-from .recurrence_interpolator import RecurrenceInterpolator
-from .specular import FURTHER_MODELS, MAX_EXPONENT, SPECULAR_MODELS, Specular
-from .unit_vector import COMPONENT
+from blysk.golden.cosines.angular_setup import AngularSetup
+from blysk.golden.cosines.arccos import Arccos
+from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.highlight_gate import HighlightGate
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.power import Power
+from blysk.golden.lighting.specular import FURTHER_MODELS, MAX_EXPONENT, SPECULAR_MODELS, Specular
+from blysk.golden.methods.angular_interpolator import AngularInterpolator
+from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.interpolator import (
+    Interpolator,
+    NormalInterpolator,
+    Operand,
+    Operands,
+    pixels_of,
+    runs_of,
+)
+from blysk.golden.methods.linear_interpolator import LinearInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
+from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
+from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
+from blysk.golden.normals.bisection import Bisection
+from blysk.golden.normals.difference_setup import LENGTH_BITS
+from blysk.golden.normals.middle_normal import MiddleNormal
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT
 
 __all__ = ["METHODS", "MODELS", "PRINTED", "Pixels", "ShadingPipeline", "Spans"]
 
@@ -142,11 +149,11 @@ class ShadingPipeline:
         Number of lights, 0 to 16. Without any there is ambient light alone, and no method.
     operand : str or None
         What the specular unit is given, ``"cosine"`` or ``"one_minus_cosine"``, for methods that find normals
-        (see `golden.interpolator.NormalInterpolator`). ``None``: what the method gives by itself.
+        (see `NormalInterpolator`). ``None``: what the method gives by itself.
     materials : int
-        Number of materials, 1 to `golden.frame_constants.MAX_MATERIALS`.
+        Number of materials, 1 to `MAX_MATERIALS`.
     gate : bool
-        Whether a `golden.highlight_gate.HighlightGate` tells the lights which spans have no highlight. For
+        Whether a `HighlightGate` tells the lights which spans have no highlight. For
         unit normals that changes no pixel.
     exponent : int or None
         A specular exponent for good; ``None``: that of the frame constants.
@@ -156,7 +163,7 @@ class ShadingPipeline:
         Bits of the coordinates, 1 to 12, and of a span's length, 2 to 12.
     terms, fraction_bits : int or None
         Of the chord method alone: terms of its polynomial, and bits of its differences, where they are to be
-        fewer than those of `golden.chord_setup.ChordSetup`.
+        fewer than those of `ChordSetup`.
 
     Raises
     ------

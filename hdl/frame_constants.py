@@ -5,17 +5,16 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from golden.frame_constants import (
+from blysk.golden.frame_constants import (
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
     LIGHT_STRIDE,
     MATERIAL_ADDRESS,
     MAX_MATERIALS,
 )
-from golden.specular import Specular
-
-from .intensity import color_shape
-from .middle_normal import normal_shape
+from blysk.golden.lighting.specular import Specular
+from blysk.hdl.lighting.intensity import color_shape
+from blysk.hdl.normals.middle_normal import normal_shape
 
 __all__ = ["FrameConstantsUnit", "frame_constants_shape", "write_shape"]
 

@@ -8,37 +8,36 @@ from amaranth.hdl import Module, Mux, Shape, Signal, Value, unsigned
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from golden.angular_interpolator import AngularInterpolator
-from golden.bisection_interpolator import BisectionInterpolator
-from golden.chord_interpolator import ChordInterpolator
-from golden.diffuse import Diffuse
-from golden.intensity import Intensity
-from golden.interpolator import Interpolator, NormalInterpolator
-from golden.linear_interpolator import LinearInterpolator
-from golden.local_chord_interpolator import LocalChordInterpolator
-from golden.pipeline import ShadingPipeline
-from golden.power import Power
-from golden.quadratic_interpolator import QuadraticInterpolator
-from golden.recurrence_interpolator import RecurrenceInterpolator
-
-from .angular_interpolator import AngularInterpolatorUnit
-from .bisection_interpolator import BisectionInterpolatorUnit
-from .chord_interpolator import ChordInterpolatorUnit
-from .diffuse import DiffuseUnit
-from .frame_constants import FrameConstantsUnit, write_shape
-from .highlight_gate import HighlightGateUnit
-from .intensity import IntensityUnit
-from .interpolator import InterpolatorUnit
-from .light import LightUnit
-from .linear_interpolator import LinearInterpolatorUnit
-from .local_chord_interpolator import LocalChordInterpolatorUnit
-from .local_chord_setup import span_values_shape
-from .middle_normal import normal_shape
-from .pixel_assembler import PixelAssemblerUnit, pixel_shape, place_shape
-from .quadratic_interpolator import QuadraticInterpolatorUnit
-from .recurrence_interpolator import RecurrenceInterpolatorUnit
-from .specular import SlopeUnit, SpecularUnit
-from .stream import BUFFER_LATENCY, connect, connect_buffered
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.power import Power
+from blysk.golden.methods.angular_interpolator import AngularInterpolator
+from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
+from blysk.golden.methods.linear_interpolator import LinearInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
+from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.hdl.core.stream import BUFFER_LATENCY, connect, connect_buffered
+from blysk.hdl.cosines.local_chord_setup import span_values_shape
+from blysk.hdl.frame_constants import FrameConstantsUnit, write_shape
+from blysk.hdl.lighting.diffuse import DiffuseUnit
+from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
+from blysk.hdl.lighting.intensity import IntensityUnit
+from blysk.hdl.lighting.light import LightUnit
+from blysk.hdl.lighting.specular import SlopeUnit, SpecularUnit
+from blysk.hdl.methods.angular_interpolator import AngularInterpolatorUnit
+from blysk.hdl.methods.bisection_interpolator import BisectionInterpolatorUnit
+from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit
+from blysk.hdl.methods.interpolator import InterpolatorUnit
+from blysk.hdl.methods.linear_interpolator import LinearInterpolatorUnit
+from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
+from blysk.hdl.methods.quadratic_interpolator import QuadraticInterpolatorUnit
+from blysk.hdl.methods.recurrence_interpolator import RecurrenceInterpolatorUnit
+from blysk.hdl.normals.middle_normal import normal_shape
+from blysk.hdl.pixel_assembler import PixelAssemblerUnit, pixel_shape, place_shape
 
 __all__ = [
     "INTERPOLATORS",
@@ -124,7 +123,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     An interpolator takes spans to the operands of their pixels; a light unit for each light takes these to
     terms, and the intensity unit to colours. The setup of the next spans overlaps the pixels of this one; a
-    FIFO carries the spans' places round it. `golden.pipeline.ShadingPipeline` is the bit-true twin, and says
+    FIFO carries the spans' places round it. `ShadingPipeline` is the bit-true twin, and says
     what a pipeline may do without.
 
     The first pixel of a span leaves `latency` clocks after an idle pipeline has taken it. Without stalls each

@@ -4,8 +4,8 @@ from amaranth.hdl import Cat, Module, Signal, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from .intensity import pixel_color_shape
-from .stream import connect_registered, count_down, offer
+from blysk.hdl.core.stream import connect_registered, count_down, offer
+from blysk.hdl.lighting.intensity import pixel_color_shape
 
 __all__ = ["PixelAssemblerUnit", "pixel_shape", "place_shape"]
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from sim.errors import InputError
+from blysk.sim.errors import InputError
 
 __all__ = ["atomic_writer", "check_writable", "files_within", "plain", "write_json", "write_text"]
 

@@ -10,9 +10,9 @@ import pytest
 from amaranth.hdl import ResetInserter, Signal, Value
 from amaranth.sim import Simulator
 
-from golden.unit_vector import COMPONENT, ONE_SQUARED, quantise
-from sim.beats import dtype_of, pack
-from sim.engine import simulate
+from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED, quantise
+from blysk.sim.engines.beats import dtype_of, pack
+from blysk.sim.engines.simulate import simulate
 
 
 @pytest.fixture(scope="session", autouse=True)

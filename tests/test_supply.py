@@ -73,7 +73,7 @@ def test_wheel_holds_the_packages_and_no_more(wheel):
     assert any(name.endswith("licenses/LICENSE") for name in names)
     unwanted = [name for name in names if re.search(r"test|\.(png|gif|vcd|obj|glb|pyc)$", name)]
     # What writes a bench to take away, and the bench.
-    assert unwanted == ["sim/testbench.py", "sim/templates/test_pipeline.py"]
+    assert unwanted == ["sim/frames/testbench.py", "sim/frames/templates/test_pipeline.py"]
     assert wheel.stat().st_size < 1_000_000
 
 
@@ -84,7 +84,7 @@ def test_wheel_holds_the_packages_and_no_more(wheel):
 )
 def test_wheel_renders_with_the_oldest_versions(wheel, tmp_path):
     """The same picture as here, from a new environment that has nothing else."""
-    from sim.cli import main
+    from blysk.sim.cli.main import main
 
     python = tmp_path / "environment" / "bin" / "python"
     run(sys.executable, "-m", "venv", tmp_path / "environment")

@@ -17,12 +17,12 @@ from click.testing import CliRunner
 from matplotlib.figure import Figure
 from PIL import Image
 
-from bench import points
-from bench.pages import svg
-from bench.report import command
-from bench.section import Drawing, Section, Table
-from bench.store import Task
-from bench.web_speed import OPTIONS, find_chromium
+from blysk.bench.report import points
+from blysk.bench.report.report import command
+from blysk.bench.report.section import Drawing, Section, Table
+from blysk.bench.speed.web_speed import OPTIONS, find_chromium
+from blysk.bench.store import Task
+from blysk.bench.tools.pages import svg
 
 DESIGNS = [*points.DESIGNS[:10], ("chord", "exp"), ("renormalise", "blinn"), points.DESIGNS[-1]]
 EXPONENTS = [10, 100]
@@ -130,7 +130,7 @@ def picture(value):
 
 
 def frame(rng, task, exponent, simulated):
-    """What `bench.points.frames` would give, of random figures."""
+    """What `frames` would give, of random figures."""
     settings = task.settings
     errors = {axis["key"]: float(10 ** rng.uniform(-1.5, 2)) for axis in points.ERRORS}
     if exponent == 10 and settings.get("model") == "exp":

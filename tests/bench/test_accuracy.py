@@ -1,8 +1,8 @@
 """Frames of the exponents asked for, and their errors."""
 
-from bench.accuracy import measure
-from golden.pipeline import ShadingPipeline
-from sim.teapot import teapot
+from blysk.bench.accuracy import measure
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.sim.meshes.teapot import teapot
 
 
 def test_measures_every_exponent():

@@ -3,9 +3,9 @@
 import click
 import pytest
 
-from bench.command import run
-from sim.engine import CompilerMissing, SimulationError
-from sim.errors import InputError
+from blysk.bench.command import run
+from blysk.sim.engines.engine import CompilerMissing, SimulationError
+from blysk.sim.errors import InputError
 
 
 @pytest.mark.parametrize(

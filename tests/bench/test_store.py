@@ -12,9 +12,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bench import store
-from bench.store import Task, results_of
-from sim.workers import local_executor
+from blysk.bench import store
+from blysk.bench.store import Task, results_of
+from blysk.sim.frames.workers import local_executor
 
 made = []
 
@@ -78,8 +78,10 @@ def test_what_changes_a_result_changes_its_key(monkeypatch):
     assert Task(square, {"number": 1}, timed=True).key in keys
 
 
-def test_key_depends_on_the_modules_that_are_imported(tmp_path):
-    for name, text in (("a", "from .b import x\n"), ("b", "from . import c\n"), ("c", ""), ("d", "")):
+def test_key_depends_on_the_modules_that_are_imported(tmp_path, monkeypatch):
+    monkeypatch.setattr("blysk.bench.__path__", [str(tmp_path)])
+    texts = {"a": "from blysk.bench.b import x\n", "b": "from blysk.bench import c\n", "c": "", "d": ""}
+    for name, text in texts.items():
         (tmp_path / f"{name}.py").write_text(text)
     digests = set()
     for changed in "xabcd":

@@ -9,8 +9,8 @@ import pytest
 from amaranth.hdl import Elaboratable, Fragment, Signal, Value
 from amaranth.hdl._ast import Operator, Slice, SwitchValue
 
-from golden.fixed import Fixed, Format
-from hdl.fixed import FixedValue
+from blysk.golden.number.fixed import Fixed, Format
+from blysk.hdl.core.fixed import FixedValue
 
 __all__ = ["Bounds", "cut_by", "registers_of", "unknown", "word", "wrapped_by"]
 

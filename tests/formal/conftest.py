@@ -5,7 +5,7 @@ import textwrap
 
 import pytest
 
-from golden.fixed import Fixed, Format
+from blysk.golden.number.fixed import Fixed, Format
 
 from .bounds import Bounds
 from .prover import decide, missing_tool

@@ -15,11 +15,11 @@ from amaranth.hdl import Elaboratable, Module, Mux, Signal
 from amaranth.lib import data
 from amaranth.lib.fifo import FIFOInterface
 
-import hdl.adaptive_normaliser
-from golden.adaptive_normaliser import AdaptiveNormaliser
-from golden.difference_setup import DifferenceSetup
-from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
-from hdl.bisection import BisectionUnit
+import blysk.hdl.normals.adaptive_normaliser
+from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
+from blysk.golden.normals.difference_setup import DifferenceSetup
+from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
+from blysk.hdl.normals.bisection import BisectionUnit
 
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
@@ -56,7 +56,7 @@ def harness(monkeypatch):
     # Tables are cut: of this one only the size counts.
     table = DifferenceSetup().reciprocals[: 1 << LENGTH_BITS - 1]
     monkeypatch.setattr(DifferenceSetup, "reciprocals", table)
-    unit = hdl.adaptive_normaliser
+    unit = blysk.hdl.normals.adaptive_normaliser
     monkeypatch.setattr(unit, "SyncFIFOBuffered", queue)
     monkeypatch.setattr(unit, "SEGMENT_CLOCKS", 6)
     monkeypatch.setattr(unit, "BisectionUnit", short(BisectionUnit, lambda *_: [], 3, 2))

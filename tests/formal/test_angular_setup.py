@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from amaranth.hdl import Mux, Signal, signed
 
-import hdl.angular_setup
-from golden.angular_setup import SPAN_ANGLES, AngularSetup
-from golden.arccos import Arccos, HalfChord
-from golden.difference_setup import DifferenceSetup, reciprocal_place
-from golden.dot_product import DotProduct
-from golden.fixed import SQ, UQ, Fixed, Format
-from golden.highlight_cosine import HighlightCosine
-from golden.unit_vector import COMPONENT, ONE, quantise
-from hdl.angular_setup import AngularSetupUnit
-from hdl.arccos import HalfChordUnit
-from hdl.highlight_cosine import HighlightCosineUnit
+import blysk.hdl.cosines.angular_setup
+from blysk.golden.cosines.angular_setup import SPAN_ANGLES, AngularSetup
+from blysk.golden.cosines.arccos import Arccos, HalfChord
+from blysk.golden.cosines.highlight_cosine import HighlightCosine
+from blysk.golden.normals.difference_setup import DifferenceSetup, reciprocal_place
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
+from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.hdl.cosines.angular_setup import AngularSetupUnit
+from blysk.hdl.cosines.arccos import HalfChordUnit
+from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 
 from .bounds import Bounds, cut_by, registers_of, unknown, word, wrapped_by
 from .prover import Harness
@@ -177,9 +177,9 @@ def of_adders():
     negate = h.free()
     total = Mux(negate, a - b, a + b)
     fits = (total >= format.min_code) & (total <= format.max_code)
-    h.claim(~fits | (hdl.angular_setup._added(a, b, negate).as_signed() == total))
+    h.claim(~fits | (blysk.hdl.cosines.angular_setup._added(a, b, negate).as_signed() == total))
     for step in range(AngularSetup.CORDIC_STEPS):
-        h.claim(hdl.angular_setup._halved(b, step).as_signed() == b >> step)
+        h.claim(blysk.hdl.cosines.angular_setup._halved(b, step).as_signed() == b >> step)
     return h
 
 
@@ -195,16 +195,25 @@ V_FORMAT, PLACES_FORMAT = UQ(0, 36), UQ(5, 0)
 SIZE_FORMAT, GAIN_FORMAT = SQ(5, 34), SQ(4, AngularSetup.GAIN_BITS)
 
 CUTS = {
-    "hdl.arccos.normalised_words",
-    "hdl.difference_setup.reciprocal_words",
-    *(f"hdl.angular_setup.{name}" for name in ("_sum", "AngularSetupUnit._minor", "AngularSetupUnit._polar")),
+    "blysk.hdl.cosines.arccos.normalised_words",
+    "blysk.hdl.normals.difference_setup.reciprocal_words",
+    *(
+        f"blysk.hdl.cosines.angular_setup.{name}"
+        for name in ("_sum", "AngularSetupUnit._minor", "AngularSetupUnit._polar")
+    ),
 }
 CUTS_BY_ANGLE = {
-    "half_chord": {"hdl.angular_setup.AngularSetupUnit._step", "hdl.arccos.half_chord_words"},
+    "half_chord": {
+        "blysk.hdl.cosines.angular_setup.AngularSetupUnit._step",
+        "blysk.hdl.cosines.arccos.half_chord_words",
+    },
     "arccos": {
-        "hdl.angular_setup.AngularSetupUnit._by_arccos",
-        *(f"hdl.arccos.{name}" for name in ("_rounded", "ArccosUnit._aligned", "ArccosUnit._pipelined")),
-        "hdl.arccos.ArccosUnit.datapath",
+        "blysk.hdl.cosines.angular_setup.AngularSetupUnit._by_arccos",
+        *(
+            f"blysk.hdl.cosines.arccos.{name}"
+            for name in ("_rounded", "ArccosUnit._aligned", "ArccosUnit._pipelined")
+        ),
+        "blysk.hdl.cosines.arccos.ArccosUnit.datapath",
     },
 }
 """Whose words are below; or in `test_widths`, of `reciprocal_words`; or those of the arccos unit."""
@@ -294,7 +303,7 @@ def test_adders_of_cordic_are_those_of_the_twin(prove):
 
 def test_bug_of_an_adder_is_found(refute, plant):
     """A carry that is lost, planted in the hardware."""
-    plant(hdl.angular_setup, "_added", "Cat(negate, b", "Cat(~negate, b")
+    plant(blysk.hdl.cosines.angular_setup, "_added", "Cat(negate, b", "Cat(~negate, b")
     refute(of_adders(), 4)
 
 
@@ -369,7 +378,7 @@ def test_bugs_of_cordic_are_found(plant, bug):
 
 
 SHORTER_REGISTERS = {
-    "v": (hdl.angular_setup, "normalised_words", "shift[2:]))[:36]", "shift[2:]))[:35]"),
+    "v": (blysk.hdl.cosines.angular_setup, "normalised_words", "shift[2:]))[:36]", "shift[2:]))[:35]"),
     "minor 2^j": (AngularSetupUnit, "_minor", "shift[2:]))[:37]", "shift[2:]))[:36]"),
     "half turn": (AngularSetupUnit, "_polar", "-value, value)[:width]", "-value, value)[: width - 1]"),
     "steps of CORDIC": (AngularSetupUnit, "_polar", "else below).as", "else below)[: width - 1].as"),

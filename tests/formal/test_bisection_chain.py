@@ -3,7 +3,7 @@
 import pytest
 from amaranth.hdl import Cat, Mux, Signal
 
-from hdl.bisection_chain import BisectionChainUnit
+from blysk.hdl.normals.bisection_chain import BisectionChainUnit
 
 from .prover import Harness
 from .rules import follows, stays

@@ -4,12 +4,12 @@ import pytest
 from amaranth.hdl import Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data
 
-from golden.difference_accumulator import DifferenceAccumulator
-from golden.fixed import SQ
-from hdl import difference_accumulator
-from hdl.chord_interpolator import ChordAccumulatorUnit
-from hdl.difference_accumulator import AccumulatorUnit, DifferenceAccumulatorUnit
-from hdl.fixed import FixedShape
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
+from blysk.golden.number.fixed import SQ
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
+from blysk.hdl.normals import difference_accumulator
+from blysk.hdl.normals.difference_accumulator import AccumulatorUnit, DifferenceAccumulatorUnit
 
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken

@@ -3,8 +3,8 @@
 import pytest
 from amaranth.hdl import Mux, Shape, Signal, Value
 
-from golden.fixed import SQ, UQ
-from hdl.fixed import FixedValue
+from blysk.golden.number.fixed import SQ, UQ
+from blysk.hdl.core.fixed import FixedValue
 
 from .prover import Harness
 

@@ -3,7 +3,7 @@
 import pytest
 from amaranth.hdl import Cat, Value
 
-from hdl.highlight_cosine import HighlightCosineUnit
+from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken

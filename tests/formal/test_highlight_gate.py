@@ -5,11 +5,11 @@ from math import isqrt
 import numpy as np
 import pytest
 
-from golden.fixed import Fixed
-from golden.highlight_gate import HighlightGate
-from golden.specular import MAX_EXPONENT, Specular
-from hdl.highlight_gate import HighlightGateUnit
-from sim.engine import simulate
+from blysk.golden.lighting.highlight_gate import HighlightGate
+from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
+from blysk.golden.number.fixed import Fixed
+from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
+from blysk.sim.engines.simulate import simulate
 
 pytestmark = pytest.mark.prove
 

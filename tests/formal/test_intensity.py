@@ -3,9 +3,9 @@
 import pytest
 from amaranth.hdl import Array, Cat, Mux, Signal, Value
 
-from golden.intensity import Intensity
-from hdl.fixed import FixedValue
-from hdl.intensity import IntensityUnit
+from blysk.golden.lighting.intensity import Intensity
+from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.lighting.intensity import IntensityUnit
 
 from .prover import Harness
 from .rules import answers, follows, stays, taken

@@ -17,40 +17,40 @@ import pytest
 from amaranth.hdl import Cat, Const, Fragment, Signal, Value
 from amaranth.lib import stream
 
-import hdl.angular_interpolator
-import hdl.bisection_interpolator
-import hdl.chord_interpolator
-import hdl.difference_accumulator
-import hdl.highlight_cosine
-import hdl.interpolator
-import hdl.linear_interpolator
-import hdl.local_chord_interpolator
-import hdl.quadratic_interpolator
-import hdl.recurrence_interpolator
-from golden.angular_interpolator import AngularInterpolator
-from golden.bisection_interpolator import BisectionInterpolator
-from golden.chord_interpolator import ChordInterpolator
-from golden.difference_accumulator import DifferenceAccumulator
-from golden.fixed import SQ
-from golden.linear_interpolator import LinearInterpolator
-from golden.local_chord_interpolator import LocalChordInterpolator
-from golden.quadratic_interpolator import QuadraticInterpolator
-from golden.recurrence_interpolator import RecurrenceInterpolator
-from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
-from hdl.angular_interpolator import AngularInterpolatorUnit
-from hdl.bisection_interpolator import BisectionInterpolatorUnit
-from hdl.chord_interpolator import ChordAccumulatorUnit, ChordInterpolatorUnit
-from hdl.difference_accumulator import AccumulatorUnit, DifferenceAccumulatorUnit
-from hdl.fixed import FixedValue
-from hdl.highlight_cosine import HighlightCosineUnit
-from hdl.interpolator import NormalInterpolatorUnit
-from hdl.linear_interpolator import LinearInterpolatorUnit
-from hdl.local_chord_interpolator import LocalChordInterpolatorUnit
-from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
-from hdl.quadratic_interpolator import QuadraticInterpolatorUnit
-from hdl.recurrence import RecurrenceUnit
-from hdl.recurrence_interpolator import RecurrenceInterpolatorUnit
-from hdl.stream import PipelinedUnit, offer
+import blysk.hdl.cosines.highlight_cosine
+import blysk.hdl.methods.angular_interpolator
+import blysk.hdl.methods.bisection_interpolator
+import blysk.hdl.methods.chord_interpolator
+import blysk.hdl.methods.interpolator
+import blysk.hdl.methods.linear_interpolator
+import blysk.hdl.methods.local_chord_interpolator
+import blysk.hdl.methods.quadratic_interpolator
+import blysk.hdl.methods.recurrence_interpolator
+import blysk.hdl.normals.difference_accumulator
+from blysk.golden.methods.angular_interpolator import AngularInterpolator
+from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.linear_interpolator import LinearInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
+from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
+from blysk.golden.number.fixed import SQ
+from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.core.stream import PipelinedUnit, offer
+from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
+from blysk.hdl.cosines.recurrence import RecurrenceUnit
+from blysk.hdl.methods.angular_interpolator import AngularInterpolatorUnit
+from blysk.hdl.methods.bisection_interpolator import BisectionInterpolatorUnit
+from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit, ChordInterpolatorUnit
+from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
+from blysk.hdl.methods.linear_interpolator import LinearInterpolatorUnit
+from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
+from blysk.hdl.methods.quadratic_interpolator import QuadraticInterpolatorUnit
+from blysk.hdl.methods.recurrence_interpolator import RecurrenceInterpolatorUnit
+from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
+from blysk.hdl.normals.difference_accumulator import AccumulatorUnit, DifferenceAccumulatorUnit
+from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 
 from .prover import Harness
 from .rules import answers, follows, pixels_follow, stays, taken
@@ -227,17 +227,17 @@ class Evaluator(Line):
 def stand_ins(monkeypatch):
     """Units of 2 or 3 clocks, and accumulators of few bits, hand words on."""
     for module, name, hand_on, latency in (
-        (hdl.interpolator, "LightProductsUnit", products, 2),
-        (hdl.linear_interpolator, "DifferenceSetupUnit", difference_setup, 3),
-        (hdl.linear_interpolator, "RenormaliserUnit", renormaliser, 2),
+        (blysk.hdl.methods.interpolator, "LightProductsUnit", products, 2),
+        (blysk.hdl.methods.linear_interpolator, "DifferenceSetupUnit", difference_setup, 3),
+        (blysk.hdl.methods.linear_interpolator, "RenormaliserUnit", renormaliser, 2),
         # A length takes three clocks round these two.
-        (hdl.quadratic_interpolator, "MiddleNormalUnit", middle_normal, 3),
-        (hdl.quadratic_interpolator, "GPQUnit", coefficients, 1),
-        (hdl.quadratic_interpolator, "DifferenceSetupUnit", difference_setup, 3),
-        (hdl.chord_interpolator, "ChordSetupUnit", chord_setup, 3),
-        (hdl.local_chord_interpolator, "LocalChordSetupUnit", chord_setup, 3),
-        (hdl.angular_interpolator, "AngularSetupUnit", angular_setup, 3),
-        (hdl.recurrence_interpolator, "RecurrenceSetupUnit", recurrence_setup, 3),
+        (blysk.hdl.methods.quadratic_interpolator, "MiddleNormalUnit", middle_normal, 3),
+        (blysk.hdl.methods.quadratic_interpolator, "GPQUnit", coefficients, 1),
+        (blysk.hdl.methods.quadratic_interpolator, "DifferenceSetupUnit", difference_setup, 3),
+        (blysk.hdl.methods.chord_interpolator, "ChordSetupUnit", chord_setup, 3),
+        (blysk.hdl.methods.local_chord_interpolator, "LocalChordSetupUnit", chord_setup, 3),
+        (blysk.hdl.methods.angular_interpolator, "AngularSetupUnit", angular_setup, 3),
+        (blysk.hdl.methods.recurrence_interpolator, "RecurrenceSetupUnit", recurrence_setup, 3),
     ):
         monkeypatch.setattr(module, name, short(getattr(module, name), hand_on, latency))
     monkeypatch.setattr(DifferenceAccumulatorUnit, "quadratics", walk(start, normal))
@@ -245,8 +245,8 @@ def stand_ins(monkeypatch):
     monkeypatch.setattr(HighlightCosineUnit, "latency", 3)
     monkeypatch.setattr(HighlightCosineUnit, "_wave", short_wave(angle))
     monkeypatch.setattr(RecurrenceUnit, "_reinsch", loop)
-    monkeypatch.setattr(hdl.bisection_interpolator, "AdaptiveNormaliserUnit", Normaliser)
-    monkeypatch.setattr(hdl.quadratic_interpolator, "QuadraticEvaluatorUnit", Evaluator)
+    monkeypatch.setattr(blysk.hdl.methods.bisection_interpolator, "AdaptiveNormaliserUnit", Normaliser)
+    monkeypatch.setattr(blysk.hdl.methods.quadratic_interpolator, "QuadraticEvaluatorUnit", Evaluator)
 
 
 class Stretch(NamedTuple):
@@ -546,5 +546,5 @@ def test_dropped_cosines_are_found(refute, monkeypatch):
         m.d.comb += Value.cast(output.payload).eq(Value.cast(payload))
         return advance
 
-    monkeypatch.setattr(hdl.highlight_cosine, "offer", dropping)
+    monkeypatch.setattr(blysk.hdl.cosines.highlight_cosine, "offer", dropping)
     refute(of_clocks("angular"), 30)

@@ -3,10 +3,10 @@
 import pytest
 from amaranth.hdl import Mux, Value
 
-import hdl.light
-from golden.diffuse import Diffuse
-from hdl.light import LightUnit
-from hdl.specular import SpecularUnit
+import blysk.hdl.lighting.light
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.hdl.lighting.light import LightUnit
+from blysk.hdl.lighting.specular import SpecularUnit
 
 from .prover import Harness
 from .rules import answers, follows, stays, taken
@@ -26,7 +26,7 @@ def make(monkeypatch):
 
     def make(interval):
         stand_in = short(SpecularUnit, two_bits, interval + 1)
-        monkeypatch.setattr(hdl.light, "SpecularUnit", stand_in)
+        monkeypatch.setattr(blysk.hdl.lighting.light, "SpecularUnit", stand_in)
         return LightUnit(initiation_interval=interval)
 
     return make

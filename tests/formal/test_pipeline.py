@@ -3,19 +3,19 @@
 import pytest
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 
-import hdl.light
-import hdl.pipeline
-from golden.frame_constants import FIELDS_OF_A_FRAME
-from golden.linear_interpolator import LinearInterpolator
-from golden.pipeline import ShadingPipeline
-from hdl.diffuse import DiffuseUnit
-from hdl.frame_constants import FrameConstantsUnit
-from hdl.highlight_gate import HighlightGateUnit
-from hdl.intensity import IntensityUnit
-from hdl.interpolator import InterpolatorUnit
-from hdl.pipeline import ShadingPipelineUnit
-from hdl.specular import SpecularUnit
-from hdl.stream import count_down, offer
+import blysk.hdl.lighting.light
+import blysk.hdl.pipeline
+from blysk.golden.frame_constants import FIELDS_OF_A_FRAME
+from blysk.golden.methods.linear_interpolator import LinearInterpolator
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.hdl.core.stream import count_down, offer
+from blysk.hdl.frame_constants import FrameConstantsUnit
+from blysk.hdl.lighting.diffuse import DiffuseUnit
+from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
+from blysk.hdl.lighting.intensity import IntensityUnit
+from blysk.hdl.lighting.specular import SpecularUnit
+from blysk.hdl.methods.interpolator import InterpolatorUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
 
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
@@ -79,16 +79,16 @@ def stand_ins(monkeypatch):
     def pipeline(parameters, style="throughput"):
         interval = 2 if style == "compact" else 1
         units = (
-            (hdl.pipeline, DiffuseUnit, diffuse, 1, 1),
+            (blysk.hdl.pipeline, DiffuseUnit, diffuse, 1, 1),
             # A light unit builds it for the latency of its specular unit.
-            (hdl.light, DiffuseUnit, diffuse, 2, 1),
-            (hdl.light, SpecularUnit, specular, 2, interval),
-            (hdl.pipeline, IntensityUnit, colors, interval, interval),
-            (hdl.pipeline, HighlightGateUnit, decisions, 2, 2),
+            (blysk.hdl.lighting.light, DiffuseUnit, diffuse, 2, 1),
+            (blysk.hdl.lighting.light, SpecularUnit, specular, 2, interval),
+            (blysk.hdl.pipeline, IntensityUnit, colors, interval, interval),
+            (blysk.hdl.pipeline, HighlightGateUnit, decisions, 2, 2),
         )
         for module, unit, *options in units:
             monkeypatch.setattr(module, unit.__name__, short(unit, *options))
-        monkeypatch.setitem(hdl.pipeline.INTERPOLATORS, LinearInterpolator, Line)
+        monkeypatch.setitem(blysk.hdl.pipeline.INTERPOLATORS, LinearInterpolator, Line)
         monkeypatch.setattr(ShadingPipelineUnit, "_places", 3)
         return ShadingPipelineUnit(parameters, style=style)
 

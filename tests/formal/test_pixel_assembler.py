@@ -3,7 +3,7 @@
 import pytest
 from amaranth.hdl import Cat, Signal
 
-from hdl.pixel_assembler import PixelAssemblerUnit
+from blysk.hdl.pixel_assembler import PixelAssemblerUnit
 
 from .prover import Harness
 from .rules import answers, follows, pixels_follow, stays, taken

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-import hdl.power
-from golden.fixed import UQ
-from golden.power import Power
-from golden.specular import MAX_EXPONENT
-from golden.unit_vector import ONE_SQUARED
-from hdl.power import PowerUnit
-from sim.engine import simulate
+import blysk.hdl.lighting.power
+from blysk.golden.lighting.power import Power
+from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.number.fixed import UQ
+from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.hdl.lighting.power import PowerUnit
+from blysk.sim.engines.simulate import simulate
 
 from .test_specular import OPERANDS, of_argument, reads_one_word
 
@@ -195,7 +195,7 @@ BUGS_OF_ARGUMENT = {
 def test_bugs_of_the_argument_are_found(refute, plant, bug):
     """Planted in the unit, each refutes the claims."""
     name, *change = BUGS_OF_ARGUMENT[bug]
-    plant(hdl.power if name == "one_minus" else PowerUnit, name, *change)
+    plant(blysk.hdl.lighting.power if name == "one_minus" else PowerUnit, name, *change)
     refute(of_power("cosine"), 4)
 
 
@@ -216,7 +216,7 @@ def test_bug_of_the_dark_is_found(plant, operand):
 
 def test_bug_of_cosines_to_0_is_found(plant):
     """1 is not that of unit vectors."""
-    plant(hdl.power, "one_minus", "ONE_SQUARED.values.item()", "1")
+    plant(blysk.hdl.lighting.power, "one_minus", "ONE_SQUARED.values.item()", "1")
     with pytest.raises(AssertionError):
         of_cosines_to_0()
 

@@ -3,10 +3,10 @@
 import pytest
 from amaranth.hdl import Cat, Value
 
-import hdl.quadratic_evaluator
-from golden.quadratic_evaluator import QuadraticEvaluator
-from golden.unit_vector import COMPONENT
-from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
+import blysk.hdl.normals.quadratic_evaluator
+from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
+from blysk.golden.number.unit_vector import COMPONENT
+from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
@@ -43,8 +43,10 @@ def stand_ins(monkeypatch):
         ("_DirectUnit", polynomials, 2, 1),
         ("_HornerUnit", polynomials, 2, 2),
     ):
-        unit = getattr(hdl.quadratic_evaluator, name)
-        monkeypatch.setattr(hdl.quadratic_evaluator, name, short(unit, hand_on, latency, interval))
+        unit = getattr(blysk.hdl.normals.quadratic_evaluator, name)
+        monkeypatch.setattr(
+            blysk.hdl.normals.quadratic_evaluator, name, short(unit, hand_on, latency, interval)
+        )
 
 
 def of_pixels(form):

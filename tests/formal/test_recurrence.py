@@ -5,10 +5,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from golden.fixed import SQ, Fixed, Format
-from golden.recurrence import Recurrence
-from golden.recurrence_setup import RecurrenceSetup
-from golden.unit_vector import CODE_LENGTH_ERROR, COMPONENT, quantise
+from blysk.golden.cosines.recurrence import Recurrence
+from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
+from blysk.golden.number.fixed import SQ, Fixed, Format
+from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT, quantise
 
 from .bounds import unknown
 

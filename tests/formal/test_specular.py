@@ -5,13 +5,13 @@ import pytest
 from amaranth.hdl import Cat, Fragment, Mux, Signal, Value
 from amaranth.hdl._ast import Switch
 
-import hdl.specular
-from golden.fixed import Fixed
-from golden.reflection import reflect
-from golden.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
-from golden.unit_vector import ONE_SQUARED
-from hdl.specular import SpecularUnit
-from sim.engine import simulate
+import blysk.hdl.lighting.specular
+from blysk.golden.lighting.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.reference.reflection import reflect
+from blysk.hdl.lighting.specular import SpecularUnit
+from blysk.sim.engines.simulate import simulate
 
 from .prover import Harness
 
@@ -150,7 +150,12 @@ def test_term_never_rises(model, operand):
 
 
 BUGS_OF_ARGUMENT = {
-    "1 is not that of unit vectors": (hdl.specular, "one_minus", "ONE_SQUARED.values.item()", "1"),
+    "1 is not that of unit vectors": (
+        blysk.hdl.lighting.specular,
+        "one_minus",
+        "ONE_SQUARED.values.item()",
+        "1",
+    ),
     "it wraps": (SpecularUnit, "_describe", "argument.saturate", "argument.wrap"),
     "a dark beat has an argument": (SpecularUnit, "_describe", "Mux(dark, 0, argument)", "argument"),
 }

@@ -7,8 +7,8 @@ from amaranth.hdl import Cat, Module, Mux, Signal, unsigned
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
-import hdl.stream
-from hdl.stream import PipelinedUnit, connect_registered
+import blysk.hdl.core.stream
+from blysk.hdl.core.stream import PipelinedUnit, connect_registered
 
 from .prover import Harness
 from .rules import answers, follows, stays, taken
@@ -58,7 +58,7 @@ def registered(m, number, source, sink):
 
 
 def buffered(depth):
-    return lambda m, number, source, sink: hdl.stream.connect_buffered(
+    return lambda m, number, source, sink: blysk.hdl.core.stream.connect_buffered(
         m, f"buffer_{number}", source, sink, depth
     )
 
@@ -142,8 +142,8 @@ BUFFER_BUGS = {
 
 @pytest.mark.parametrize("bug", BUFFER_BUGS)
 def test_bugs_of_a_buffer_are_found(refute, plant, bug):
-    """Planted in `hdl.stream.connect_buffered`, each refutes the claims of a stream."""
-    plant(hdl.stream, "connect_buffered", *BUFFER_BUGS[bug])
+    """Planted in `connect_buffered`, each refutes the claims of a stream."""
+    plant(blysk.hdl.core.stream, "connect_buffered", *BUFFER_BUGS[bug])
     refute(of_stream(Chain(buffered(3)), 3, 1, 1))
 
 
@@ -166,8 +166,8 @@ OFFER_BUGS = {
 @pytest.mark.parametrize("bug", OFFER_BUGS)
 @pytest.mark.parametrize("make", [lambda: of_delay(2, 1), lambda: of_registers(2)])
 def test_bugs_of_an_offered_output_are_found(refute, plant, make, bug):
-    """Planted in `hdl.stream.offer`, each refutes the claims of a stream."""
-    plant(hdl.stream, "offer", *OFFER_BUGS[bug])
+    """Planted in `offer`, each refutes the claims of a stream."""
+    plant(blysk.hdl.core.stream, "offer", *OFFER_BUGS[bug])
     refute(make())
 
 
@@ -204,7 +204,7 @@ def of_counter():
     """A span of up to 7 pixels begins at any time that is allowed; a model counts those that are left."""
     h = Harness()
     length, valid, advance = h.free(3, "length"), h.free(name="valid"), h.free(name="advance")
-    active, ends = hdl.stream.count_down(h.m, valid, length, advance)
+    active, ends = blysk.hdl.core.stream.count_down(h.m, valid, length, advance)
     left = Signal(3)
     with h.m.If(valid & advance & (left <= 1)):
         h.m.d.sync += left.eq(length)
@@ -230,5 +230,5 @@ COUNTER_BUGS = {
 
 @pytest.mark.parametrize("bug", COUNTER_BUGS)
 def test_bugs_of_a_pixel_counter_are_found(refute, plant, bug):
-    plant(hdl.stream, "count_down", *COUNTER_BUGS[bug])
+    plant(blysk.hdl.core.stream, "count_down", *COUNTER_BUGS[bug])
     refute(of_counter())

@@ -6,49 +6,49 @@ from functools import partial
 import pytest
 from amaranth.hdl import Cat, Mux, Signal
 
-import hdl.stream
-from golden.bisection_interpolator import BisectionInterpolator
-from golden.chord_interpolator import ChordInterpolator
-from golden.linear_interpolator import LinearInterpolator
-from golden.local_chord_interpolator import LocalChordInterpolator
-from golden.pipeline import ShadingPipeline
-from golden.quadratic_evaluator import QuadraticEvaluator
-from golden.quadratic_interpolator import QuadraticInterpolator
-from golden.recurrence import Recurrence
-from golden.recurrence_interpolator import RecurrenceInterpolator
-from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
-from hdl.angular_setup import AngularSetupUnit
-from hdl.arccos import ArccosUnit, HalfChordUnit
-from hdl.bisection import BisectionUnit
-from hdl.bisection_chain import BisectionChainUnit
-from hdl.bisection_interpolator import BisectionInterpolatorUnit
-from hdl.chord import ChordUnit
-from hdl.chord_interpolator import ChordAccumulatorUnit, ChordInterpolatorUnit
-from hdl.chord_setup import ChordSetupUnit
-from hdl.difference_accumulator import DifferenceAccumulatorUnit
-from hdl.difference_setup import DifferenceSetupUnit
-from hdl.diffuse import DiffuseUnit
-from hdl.dot_product import DotProductUnit
-from hdl.gpq import GPQUnit
-from hdl.highlight_cosine import HighlightCosineUnit
-from hdl.highlight_gate import HighlightGateUnit
-from hdl.intensity import IntensityUnit
-from hdl.interpolator import LightProductsUnit
-from hdl.light import LightUnit
-from hdl.linear_interpolator import LinearInterpolatorUnit
-from hdl.local_chord_interpolator import LocalChordInterpolatorUnit
-from hdl.local_chord_setup import LocalChordSetupUnit
-from hdl.middle_normal import MiddleNormalUnit
-from hdl.pipeline import ShadingPipelineUnit
-from hdl.power import PowerUnit
-from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
-from hdl.quadratic_interpolator import QuadraticInterpolatorUnit
-from hdl.recurrence import RecurrenceUnit
-from hdl.recurrence_interpolator import RecurrenceInterpolatorUnit
-from hdl.recurrence_setup import RecurrenceSetupUnit
-from hdl.renormaliser import RenormaliserUnit
-from hdl.specular import SpecularUnit
-from hdl.stream import PipelinedUnit
+import blysk.hdl.core.stream
+from blysk.golden.cosines.recurrence import Recurrence
+from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.linear_interpolator import LinearInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
+from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
+from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.cosines.angular_setup import AngularSetupUnit
+from blysk.hdl.cosines.arccos import ArccosUnit, HalfChordUnit
+from blysk.hdl.cosines.chord import ChordUnit
+from blysk.hdl.cosines.chord_setup import ChordSetupUnit
+from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
+from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit
+from blysk.hdl.cosines.recurrence import RecurrenceUnit
+from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
+from blysk.hdl.lighting.diffuse import DiffuseUnit
+from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
+from blysk.hdl.lighting.intensity import IntensityUnit
+from blysk.hdl.lighting.light import LightUnit
+from blysk.hdl.lighting.power import PowerUnit
+from blysk.hdl.lighting.specular import SpecularUnit
+from blysk.hdl.methods.bisection_interpolator import BisectionInterpolatorUnit
+from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit, ChordInterpolatorUnit
+from blysk.hdl.methods.interpolator import LightProductsUnit
+from blysk.hdl.methods.linear_interpolator import LinearInterpolatorUnit
+from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
+from blysk.hdl.methods.quadratic_interpolator import QuadraticInterpolatorUnit
+from blysk.hdl.methods.recurrence_interpolator import RecurrenceInterpolatorUnit
+from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
+from blysk.hdl.normals.bisection import BisectionUnit
+from blysk.hdl.normals.bisection_chain import BisectionChainUnit
+from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
+from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
+from blysk.hdl.normals.dot_product import DotProductUnit
+from blysk.hdl.normals.gpq import GPQUnit
+from blysk.hdl.normals.middle_normal import MiddleNormalUnit
+from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
+from blysk.hdl.normals.renormaliser import RenormaliserUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
 
 from .prover import Harness
 from .rules import answers, stays, taken
@@ -185,8 +185,8 @@ def test_bugs_of_pipelined_units_are_found(refute, plant, name, bug):
 
 
 def test_bug_of_an_offered_output_is_found(refute, plant):
-    """A payload that is dropped while it waits, planted in `hdl.stream.offer`: of a pipelined unit."""
-    plant(hdl.stream, "offer", "Mux(held, spare, Value.cast(payload))", "payload")
+    """A payload that is dropped while it waits, planted in `offer`: of a pipelined unit."""
+    plant(blysk.hdl.core.stream, "offer", "Mux(held, spare, Value.cast(payload))", "payload")
     harness = Harness(unit := DotProductUnit())
     stays(harness, unit.o)
     refute(harness, 10)

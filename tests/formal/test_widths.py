@@ -7,41 +7,41 @@ from itertools import product
 import numpy as np
 import pytest
 
-from golden.adaptive_normaliser import AdaptiveNormaliser
-from golden.arccos import HalfChord
-from golden.bisection import Bisection
-from golden.bisection_chain import BisectionChain
-from golden.chord import Chord
-from golden.chord_interpolator import ChordInterpolator
-from golden.chord_setup import ChordSetup
-from golden.difference_accumulator import DifferenceAccumulator
-from golden.difference_setup import DifferenceSetup, reciprocal_place
-from golden.dot_product import DotProduct
-from golden.fixed import SQ, UQ, Fixed
-from golden.gpq import GPQ
-from golden.interpolator import pixels_of
-from golden.local_chord_setup import LocalChordSetup
-from golden.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
-from golden.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
-from golden.recurrence import Recurrence
-from golden.recurrence_setup import RecurrenceSetup
-from golden.renormaliser import Renormaliser
-from golden.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
-from golden.unit_vector import CODE_LENGTH_ERROR, COMPONENT, ONE_SQUARED
-from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
-from hdl.arccos import HalfChordUnit
-from hdl.bisection import BisectionUnit
-from hdl.bisection_chain import BisectionChainUnit
-from hdl.chord_interpolator import ChordAccumulatorUnit
-from hdl.chord_setup import ChordSetupUnit
-from hdl.difference_accumulator import DifferenceAccumulatorUnit
-from hdl.difference_setup import DifferenceSetupUnit
-from hdl.local_chord_setup import LocalChordSetupUnit
-from hdl.middle_normal import MiddleNormalUnit
-from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
-from hdl.recurrence import RecurrenceUnit
-from hdl.recurrence_setup import RecurrenceSetupUnit
-from hdl.renormaliser import RenormaliserUnit
+from blysk.golden.cosines.arccos import HalfChord
+from blysk.golden.cosines.chord import Chord
+from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.cosines.local_chord_setup import LocalChordSetup
+from blysk.golden.cosines.recurrence import Recurrence
+from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
+from blysk.golden.lighting.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.interpolator import pixels_of
+from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
+from blysk.golden.normals.bisection import Bisection
+from blysk.golden.normals.bisection_chain import BisectionChain
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
+from blysk.golden.normals.difference_setup import DifferenceSetup, reciprocal_place
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.normals.gpq import GPQ
+from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
+from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
+from blysk.golden.normals.renormaliser import Renormaliser
+from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT, ONE_SQUARED
+from blysk.hdl.cosines.arccos import HalfChordUnit
+from blysk.hdl.cosines.chord_setup import ChordSetupUnit
+from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit
+from blysk.hdl.cosines.recurrence import RecurrenceUnit
+from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
+from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
+from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
+from blysk.hdl.normals.bisection import BisectionUnit
+from blysk.hdl.normals.bisection_chain import BisectionChainUnit
+from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
+from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
+from blysk.hdl.normals.middle_normal import MiddleNormalUnit
+from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
+from blysk.hdl.normals.renormaliser import RenormaliserUnit
 
 from .bounds import Bounds, cut_by, registers_of, unknown, word, wrapped_by
 
@@ -421,14 +421,14 @@ def test_shifts_of_the_recurrence_a_bit_too_short_are_found(bits):
 
 
 CUTS = {
-    "hdl.difference_setup.reciprocal_words": "the leading one of m - 1, which no table has; m is 1 or more",
-    "hdl.adaptive_normaliser.AdaptiveNormaliserUnit._front": "the same; 2^levels - 1, of levels to the depth",
-    "hdl.arccos.normalised_words": "v: `test_angular_setup`",
-    "hdl.arccos.half_chord_words": "half a turn less psi, as the twin wraps it",
-    "hdl.recurrence_setup.RecurrenceSetupUnit._describe": "shifts: `of_recurrence_shifts`",
-    "hdl.recurrence_setup.RecurrenceSetupUnit._steps": "the same; and the leading one of m - 1",
-    "hdl.recurrence_setup.RecurrenceSetupUnit._normalised": "q, of which the twin makes a word that refuses",
-    "hdl.recurrence_setup.RecurrenceSetupUnit._under_one": "twice what is under 1, in a word up to 2",
+    "blysk.hdl.normals.difference_setup.reciprocal_words": "the leading one of m - 1; m is 1 or more",
+    "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._front": "2^levels - 1",
+    "blysk.hdl.cosines.arccos.normalised_words": "v: `test_angular_setup`",
+    "blysk.hdl.cosines.arccos.half_chord_words": "half a turn less psi, as the twin wraps it",
+    "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._describe": "shifts: `of_recurrence_shifts`",
+    "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._steps": "the same; and the leading one of m - 1",
+    "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._normalised": "q; the twin refuses",
+    "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._under_one": "under 1, times 2",
 }
 """Where hardware cuts bits of a sum, a shift or a choice, and why what it cuts is 0, or not wanted."""
 
@@ -451,7 +451,7 @@ def test_a_sum_that_is_cut_is_found(plant):
         *(DifferenceAccumulatorUnit, "elaborate", "value.eq((value + difference).wrap(p.format))"),
         "value.as_value().eq((value + difference).as_value()[: p.format.width])",
     )
-    assert cut_by(DifferenceAccumulatorUnit()) == {"hdl.difference_accumulator.elaborate"}
+    assert cut_by(DifferenceAccumulatorUnit()) == {"blysk.hdl.normals.difference_accumulator.elaborate"}
 
 
 def test_slopes_of_the_recurrence_setup_do_not_wrap(monkeypatch, wraps):

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from golden.camera import Camera
-from golden.frame_constants import (
+from blysk.golden.frame_constants import (
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
     LIGHT_STRIDE,
@@ -12,11 +11,12 @@ from golden.frame_constants import (
     FrameConstants,
     address_table,
 )
-from golden.geometry import Mesh
-from golden.lighting import Light, Material
-from golden.reflection import reflect
-from golden.scene import Scene
-from golden.unit_vector import ONE
+from blysk.golden.number.unit_vector import ONE
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.reflection import reflect
+from blysk.golden.reference.scene import Scene
 
 TRIANGLE = Mesh(
     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]), np.tile([0.0, 0, 1], (3, 1))

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from golden.chord_setup import ChordSetup, largest_span_angle
-from golden.difference_setup import DifferenceSetup
-from golden.fixed import Fixed
-from golden.frame_constants import FrameConstants
-from golden.geometry import normalise
-from golden.intensity import Intensity
-from golden.interpolation import interpolate
-from golden.interpolator import pixels_of
-from golden.lighting import Light, Material, halfway_vector, intensity, saturate
-from golden.middle_normal import MiddleNormal
-from golden.pipeline import METHODS, PRINTED, ShadingPipeline, Spans
-from golden.reflection import reflect, slope
-from golden.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
-from golden.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
+from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from blysk.golden.methods.interpolator import pixels_of
+from blysk.golden.normals.difference_setup import DifferenceSetup
+from blysk.golden.normals.middle_normal import MiddleNormal
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
+from blysk.golden.pipeline import METHODS, PRINTED, ShadingPipeline, Spans
+from blysk.golden.reference.curves import interpolate
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity, saturate
+from blysk.golden.reference.reflection import reflect, slope
 
 AMBIENT, DIFFUSE, SPECULAR = 0.1, 0.6, 0.5
 LARGEST_ANGLE = 20.0

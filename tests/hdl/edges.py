@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from golden.fixed import UQ, Fixed
-from golden.frame_constants import FrameConstants
-from golden.geometry import normalise
-from golden.intensity import Intensity
-from golden.pipeline import ShadingPipeline, Spans
-from golden.unit_vector import ONE, quantise
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.number.fixed import UQ, Fixed
+from blysk.golden.number.unit_vector import ONE, quantise
+from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.reference.geometry import normalise
 
 __all__ = ["SHADE", "constants_of", "highlight_edges", "spans_on_edges"]
 

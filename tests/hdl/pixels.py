@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from golden.frame_constants import FrameConstants
-from golden.pipeline import Pixels, Spans
-from hdl.pipeline import ShadingPipelineUnit
-from sim.engine import Run, simulate
-from sim.frame import beats_of
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.pipeline import Pixels, Spans
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.engines.simulate import Run, simulate
+from blysk.sim.frames.frame import beats_of
 
 __all__ = ["assert_equals_twin", "assert_pixels"]
 

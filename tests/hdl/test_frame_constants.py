@@ -8,7 +8,7 @@ import pytest
 from amaranth.hdl import Module, ResetInserter, Signal, Value
 from amaranth.sim import Simulator
 
-from golden.frame_constants import (
+from blysk.golden.frame_constants import (
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
     LIGHT_STRIDE,
@@ -17,13 +17,13 @@ from golden.frame_constants import (
     FrameConstants,
     writes_of,
 )
-from golden.geometry import normalise
-from golden.intensity import Intensity
-from golden.pipeline import ShadingPipeline, Spans
-from golden.unit_vector import ONE, quantise
-from hdl.frame_constants import FrameConstantsUnit
-from hdl.pipeline import ShadingPipelineUnit
-from sim.engine import simulate
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.number.unit_vector import ONE, quantise
+from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.reference.geometry import normalise
+from blysk.hdl.frame_constants import FrameConstantsUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.engines.simulate import simulate
 
 from .pixels import assert_pixels
 

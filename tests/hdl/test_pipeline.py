@@ -11,20 +11,20 @@ import pytest
 from amaranth.hdl import ResetInserter, Signal, UnusedElaboratable, Value
 from amaranth.sim import Simulator
 
-from golden.diffuse import Diffuse
-from golden.fixed import Fixed
-from golden.frame_constants import FrameConstants
-from golden.geometry import normalise
-from golden.intensity import Intensity
-from golden.local_chord_interpolator import SpanValues
-from golden.pipeline import METHODS, MODELS, ShadingPipeline, Spans
-from golden.specular import SPECULAR_MODELS
-from golden.unit_vector import COMPONENT, quantise
-from hdl.cost import cost_of
-from hdl.pipeline import INTERPOLATORS, STYLES, ShadingPipelineUnit
-from sim.beats import dtype_of, pack, unpack
-from sim.engine import simulate
-from sim.frame import beats_of
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.specular import SPECULAR_MODELS
+from blysk.golden.methods.local_chord_interpolator import SpanValues
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, quantise
+from blysk.golden.pipeline import METHODS, MODELS, ShadingPipeline, Spans
+from blysk.golden.reference.geometry import normalise
+from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.pipeline import INTERPOLATORS, STYLES, ShadingPipelineUnit
+from blysk.sim.engines.beats import dtype_of, pack, unpack
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.frames.frame import beats_of
 
 from .pixels import assert_pixels
 

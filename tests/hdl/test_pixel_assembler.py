@@ -5,7 +5,7 @@ import pytest
 from amaranth.hdl import Module, ResetInserter, Signal
 from amaranth.sim import Simulator
 
-from hdl.pixel_assembler import PixelAssemblerUnit
+from blysk.hdl.pixel_assembler import PixelAssemblerUnit
 
 
 def drive(lengths, seed=0, shares=(0.0, 0.0, 0.0), reset_at=None):

@@ -5,17 +5,17 @@ import pytest
 from amaranth.hdl import ResetInserter, Shape, Signal, Value
 from amaranth.sim import Simulator
 
-from golden.adaptive_normaliser import AdaptiveNormaliser
-from golden.angular_setup import AngularSetup
-from golden.recurrence import Recurrence
-from golden.unit_vector import quantise
-from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
-from hdl.angular_setup import AngularSetupUnit
-from hdl.arccos import ArccosUnit, HalfChordUnit
-from hdl.highlight_cosine import HighlightCosineUnit
-from hdl.highlight_gate import HighlightGateUnit
-from hdl.recurrence import RecurrenceUnit
-from sim.beats import pack
+from blysk.golden.cosines.angular_setup import AngularSetup
+from blysk.golden.cosines.recurrence import Recurrence
+from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
+from blysk.golden.number.unit_vector import quantise
+from blysk.hdl.cosines.angular_setup import AngularSetupUnit
+from blysk.hdl.cosines.arccos import ArccosUnit, HalfChordUnit
+from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
+from blysk.hdl.cosines.recurrence import RecurrenceUnit
+from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
+from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
+from blysk.sim.engines.beats import pack
 
 UNITS = {
     "arccos": ArccosUnit,

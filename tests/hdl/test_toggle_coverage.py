@@ -9,9 +9,9 @@ from amaranth.hdl import Fragment, Signal
 from amaranth.lib import data
 from amaranth.lib.wiring import Out
 
-from bench.mutants import DEVICES, Wrapped, vectors_of
-from sim.cxxrtl import Model
-from sim.toggles import _registers, _words
+from blysk.bench.quality.mutants import DEVICES, Wrapped, vectors_of
+from blysk.sim.engines.cxxrtl import Model
+from blysk.sim.engines.toggles import _registers, _words
 
 # Bits that cannot toggle, by device and reason: registers with their bits. The list is exact.
 SQUARE = "the second bit of a square is 0"
@@ -614,7 +614,7 @@ STILL = {
 class Edges(Wrapped):
     """A unit, and of each bit of its registers whether it has risen and fallen.
 
-    Registers are put together in words of 32 bits, as for `sim.toggles.ToggleCounter`.
+    Registers are put together in words of 32 bits, as for `ToggleCounter`.
     """
 
     def __init__(self, unit, within=""):

@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from sim.errors import InputError, one_line
+from blysk.sim.errors import InputError, one_line
 
 
 @pytest.mark.parametrize(

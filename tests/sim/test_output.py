@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.errors import InputError
-from sim.output import atomic_writer, check_writable, write_json, write_text
+from blysk.sim.errors import InputError
+from blysk.sim.output import atomic_writer, check_writable, write_json, write_text
 
 
 @pytest.fixture
@@ -164,7 +164,7 @@ def test_two_writers_at_once(tmp_path):
 
 
 def test_pipe(tmp_path):
-    program = "from sim.output import write_text; write_text('/dev/stdout', 'x\\n')"
+    program = "from blysk.sim.output import write_text; write_text('/dev/stdout', 'x\\n')"
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, cwd=Path(__file__).parents[2]
     )

@@ -7,61 +7,61 @@ from typing import NamedTuple
 import numpy as np
 from amaranth.lib.wiring import Component
 
-from golden.adaptive_normaliser import AdaptiveNormaliser
-from golden.angular_setup import AngularSetup
-from golden.arccos import Arccos, HalfChord
-from golden.bisection import Bisection
-from golden.bisection_chain import BisectionChain
-from golden.chord import Chord
-from golden.chord_setup import ChordSetup
-from golden.difference_accumulator import DifferenceAccumulator
-from golden.difference_setup import DifferenceSetup
-from golden.diffuse import Diffuse
-from golden.dot_product import DotProduct
-from golden.fixed import Fixed, Format
-from golden.geometry import normalise
-from golden.gpq import GPQ
-from golden.highlight_cosine import HighlightCosine
-from golden.highlight_gate import HighlightGate
-from golden.intensity import Intensity
-from golden.interpolator import pixels_of
-from golden.local_chord_interpolator import LocalChordInterpolator, SpanValues
-from golden.local_chord_setup import LocalChordSetup
-from golden.middle_normal import MiddleNormal
-from golden.pipeline import METHODS
-from golden.power import Power
-from golden.quadratic_evaluator import QuadraticEvaluator
-from golden.recurrence import Recurrence
-from golden.recurrence_setup import RecurrenceSetup
-from golden.renormaliser import Renormaliser
-from golden.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
-from golden.unit_vector import COMPONENT, ONE_SQUARED, quantise
-from hdl.adaptive_normaliser import AdaptiveNormaliserUnit
-from hdl.angular_setup import AngularSetupUnit
-from hdl.arccos import ArccosUnit, HalfChordUnit
-from hdl.bisection import BisectionUnit
-from hdl.bisection_chain import BisectionChainUnit
-from hdl.chord import ChordUnit
-from hdl.chord_setup import ChordSetupUnit
-from hdl.difference_accumulator import DifferenceAccumulatorUnit
-from hdl.difference_setup import DifferenceSetupUnit
-from hdl.diffuse import DiffuseUnit
-from hdl.dot_product import DotProductUnit
-from hdl.gpq import GPQUnit
-from hdl.highlight_cosine import HighlightCosineUnit
-from hdl.highlight_gate import HighlightGateUnit
-from hdl.intensity import IntensityUnit
-from hdl.light import LightUnit
-from hdl.local_chord_setup import LocalChordSetupUnit
-from hdl.middle_normal import MiddleNormalUnit
-from hdl.pipeline import INTERPOLATORS
-from hdl.power import PowerUnit
-from hdl.quadratic_evaluator import QuadraticEvaluatorUnit
-from hdl.recurrence import RecurrenceUnit
-from hdl.recurrence_setup import RecurrenceSetupUnit
-from hdl.renormaliser import RenormaliserUnit
-from hdl.specular import SpecularUnit
-from sim.beats import dtype_of
+from blysk.golden.cosines.angular_setup import AngularSetup
+from blysk.golden.cosines.arccos import Arccos, HalfChord
+from blysk.golden.cosines.chord import Chord
+from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.cosines.highlight_cosine import HighlightCosine
+from blysk.golden.cosines.local_chord_setup import LocalChordSetup
+from blysk.golden.cosines.recurrence import Recurrence
+from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.highlight_gate import HighlightGate
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.power import Power
+from blysk.golden.lighting.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from blysk.golden.methods.interpolator import pixels_of
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
+from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
+from blysk.golden.normals.bisection import Bisection
+from blysk.golden.normals.bisection_chain import BisectionChain
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
+from blysk.golden.normals.difference_setup import DifferenceSetup
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.normals.gpq import GPQ
+from blysk.golden.normals.middle_normal import MiddleNormal
+from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
+from blysk.golden.normals.renormaliser import Renormaliser
+from blysk.golden.number.fixed import Fixed, Format
+from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED, quantise
+from blysk.golden.pipeline import METHODS
+from blysk.golden.reference.geometry import normalise
+from blysk.hdl.cosines.angular_setup import AngularSetupUnit
+from blysk.hdl.cosines.arccos import ArccosUnit, HalfChordUnit
+from blysk.hdl.cosines.chord import ChordUnit
+from blysk.hdl.cosines.chord_setup import ChordSetupUnit
+from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
+from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit
+from blysk.hdl.cosines.recurrence import RecurrenceUnit
+from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
+from blysk.hdl.lighting.diffuse import DiffuseUnit
+from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
+from blysk.hdl.lighting.intensity import IntensityUnit
+from blysk.hdl.lighting.light import LightUnit
+from blysk.hdl.lighting.power import PowerUnit
+from blysk.hdl.lighting.specular import SpecularUnit
+from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
+from blysk.hdl.normals.bisection import BisectionUnit
+from blysk.hdl.normals.bisection_chain import BisectionChainUnit
+from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
+from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
+from blysk.hdl.normals.dot_product import DotProductUnit
+from blysk.hdl.normals.gpq import GPQUnit
+from blysk.hdl.normals.middle_normal import MiddleNormalUnit
+from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
+from blysk.hdl.normals.renormaliser import RenormaliserUnit
+from blysk.hdl.pipeline import INTERPOLATORS
+from blysk.sim.engines.beats import dtype_of
 
 __all__ = ["DEVICES", "Case"]
 
@@ -500,10 +500,10 @@ DEVICES: dict[str, Callable[[np.random.Generator, int], Case]] = {
     "recurrence_setup": _recurrence_setup,
     "local_chord_setup": _local_chord_setup,
     **{
-        f"{INTERPOLATORS[type(twin)].__module__.removeprefix('hdl.')}, {method}": partial(
+        f"{INTERPOLATORS[type(twin)].__module__.rpartition('.')[2]}, {method}": partial(
             _interpolator, method=method
         )
         for method, twin in METHODS.items()
     },
 }
-"""Devices and variants, named as in `bench.blocks.BLOCKS`: every structure, but for the pipelines."""
+"""Devices and variants, named as in `BLOCKS`: every structure, but for the pipelines."""

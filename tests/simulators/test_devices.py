@@ -8,8 +8,8 @@ device in Icarus Verilog, which takes some ten to some hundred times as long; a 
 import numpy as np
 import pytest
 
-from bench.blocks import BLOCKS
-from sim.engine import simulate
+from blysk.bench.tools.blocks import BLOCKS
+from blysk.sim.engines.simulate import simulate
 
 from .devices import DEVICES
 from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool

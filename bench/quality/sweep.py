@@ -1,0 +1,368 @@
+"""The chord method's error at every exponent: the frames of meshes through the twin, beside float64.
+
+``python -m blysk.bench.quality.sweep [MESH ...]`` takes each mesh (the teapot by default) at 320x240, in
+white light and with a grey, glossy material, at every exponent from 1 to 1000 with the model cosquad and at
+30 of them with every other model. Each frame goes through `ShadingPipeline.compute`, which the simulated
+pipeline equals to the bit (``python -m blysk.bench.report.pairs`` and the tests of `pipeline`), and is held
+against exactly normalised interpolation with the same model. ``--json`` keeps the figures of every frame. The
+exit status is 1 when a pixel is more than 1 LSB off, other than where a light is on in one and off in the
+other (see `Point`), 2 for a mesh that cannot be read.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from blysk.bench.accuracy import scene_for
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.local_chord_interpolator import SpanValues
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT
+from blysk.golden.pipeline import METHODS, MODELS, ShadingPipeline, Spans
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.curves import interpolate
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity_of_cosines, saturate
+from blysk.golden.reference.raster import Raster, rasterise
+from blysk.golden.reference.scene import Scene
+from blysk.sim.errors import InputError
+from blysk.sim.frames.spans import cut_local_spans, cut_wide_spans, local_values, quantise_spans
+from blysk.sim.meshes.mesh import load_mesh
+
+__all__ = ["EXPONENTS", "FEW_EXPONENTS", "LARGEST", "LARGEST_COSINE", "Frame", "Point", "Summary", "main"]
+__all__ += ["summarise"]
+
+EXPONENTS = tuple(range(1, MAX_EXPONENT + 1))
+
+FEW_EXPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 22, 29, 38, 50, 65, 85, 100, 130, 170, 220, 270, 330, 400)
+FEW_EXPONENTS += (470, 500, 600, 700, 800, 900, 1000)
+"""Those of the models that are not swept whole."""
+
+LARGEST = 1.0
+"""Target: the largest error of a channel, in LSB."""
+
+LARGEST_COSINE = 0.12 / 255 + ChordInterpolator().largest_bend(1) + 2.0**-15
+"""How near to 0 an exact N·L must be for its sign to be open, 1.3e-3: the error of the chord method's fit
+(see `largest_span_angle`) and of a part's bend, and those of vectors and words."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """Errors of a frame.
+
+    A light with ``N . L <= 0`` gives nothing, and at small exponents a highlight may reach that far. Where
+    the exact N·L is so close to 0 that the method's error decides its sign, the whole highlight is on in one
+    frame and off in the other. Pixels over `LARGEST` where the signs differ, and the exact N·L is within
+    `LARGEST_COSINE`, are counted by themselves, as switched.
+
+    Parameters
+    ----------
+    model : str
+        Reflection model.
+    exponent : int
+        Of the highlight.
+    spans : int
+        Spans after the cutting.
+    pixels : int
+        Pixels that show the surface.
+    max_lsb : float
+        Largest error of a channel of any of them.
+    over : int
+        Pixels with an error over `LARGEST`.
+    switched : int
+        How many of those are switched.
+    switched_cosine : float
+        Largest exact ``|N . L|`` of those, 0 without any.
+    steady_lsb : float
+        Largest error of the pixels that are not switched.
+    """
+
+    model: str
+    exponent: int
+    spans: int
+    pixels: int
+    max_lsb: float
+    over: int
+    switched: int
+    switched_cosine: float
+    steady_lsb: float
+
+
+class Frame:
+    """A picture of a mesh with one directional light, rasterised once for every exponent and model.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The surface.
+    width, height : int
+        Size of the picture.
+    coefficients : three floats, optional
+        k_a, k_d and k_s of every channel; by default, as the next two, those of `scene_for`.
+    view, light : three floats each, optional
+        Directions from the mesh to the viewer and to the light.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        width: int = 320,
+        height: int = 240,
+        coefficients: Sequence[float] | None = None,
+        view: Sequence[float] | None = None,
+        light: Sequence[float] | None = None,
+    ):
+        scene = scene_for(mesh, 1, width, height)
+        if coefficients is not None:
+            scene = replace(scene, material=Material(*((k,) * 3 for k in coefficients), 1))
+        if view is not None:
+            camera = Camera.framing(mesh.vertices, view, scene.camera.projection, width / height)
+            scene = replace(scene, camera=camera)
+        self.scene = scene if light is None else replace(scene, lights=(Light(tuple(light)),))
+        self.raster = raster = rasterise(self.scene)
+        self._shown = np.flatnonzero(raster.visible)
+        span = raster.span[self._shown]
+        t = raster.offset[self._shown] / np.maximum(raster.length[span] - 1, 1)
+        normals = interpolate("normalised", raster.normal_left[span], raster.normal_right[span], t)
+        (light,) = self.scene.lights
+        halfway = halfway_vector(light.direction, self.scene.camera.viewer)
+        self._cosine = normals @ np.asarray(light.direction)
+        self._highlight = normals @ halfway
+
+    @property
+    def pixels(self) -> int:
+        """Pixels that show the surface."""
+        return len(self._shown)
+
+    def scene_of(self, exponent: int) -> Scene:
+        """The scene at an exponent."""
+        return replace(self.scene, material=replace(self.scene.material, exponent=exponent))
+
+    def golden(self, model: str, exponent: int) -> np.ndarray:
+        """Exactly normalised interpolation, in LSB: float64 array, shape (pixels, 3).
+
+        What `shade_spans` draws, pixel by pixel in the order of the fragments.
+        """
+        scene = self.scene_of(exponent)
+        shaded = intensity_of_cosines(
+            scene.material,
+            scene.lights,
+            scene.ambient_light,
+            self._cosine[:, np.newaxis],
+            self._highlight[:, np.newaxis],
+            model,
+        )
+        return 255 * saturate(shaded)
+
+    def spans_of(self, design: ShadingPipeline, exponent: int) -> tuple[Raster, Spans]:
+        """Spans as `prepare` cuts and quantises them for a pipeline."""
+        method, material = design.interpolator, self.scene.mesh.material
+        if design.takes_values:
+            scene = self.scene_of(exponent)
+            cut, _ = cut_local_spans(scene, self.raster, method)
+            return cut, replace(quantise_spans(cut, material), values=local_values(scene, cut, 1))
+        cut, _ = cut_wide_spans(self.raster, method.widest_span(exponent), method.largest_bend(exponent))
+        return cut, quantise_spans(cut, material)
+
+    def points(self, exponent: int, models: Iterable[str], method: str = "chord") -> Iterator[Point]:
+        """Errors of the frames at an exponent.
+
+        Parameters
+        ----------
+        exponent : int
+            1 to 1000.
+        models : iterable of str
+            Reflection models, one frame each.
+        method : str
+            Method of interpolation.
+        """
+        constants = FrameConstants.of(self.scene_of(exponent), 1)
+        cut, spans = self.spans_of(ShadingPipeline(method), exponent)
+        for model in models:
+            design = ShadingPipeline(method, model)
+            color = design.compute(spans, constants).color[self._shown]
+            error = np.abs(color - self.golden(model, exponent)).max(axis=1, initial=0)
+            over = np.flatnonzero(error > LARGEST)
+            switched = over[self._switched(design, cut, spans, constants, over)]
+            steady = error.copy()
+            steady[switched] = 0
+            yield Point(
+                model,
+                exponent,
+                len(spans),
+                self.pixels,
+                float(error.max(initial=0)),
+                len(over),
+                len(switched),
+                float(np.abs(self._cosine[switched]).max(initial=0)),
+                float(steady.max(initial=0)),
+            )
+
+    def _switched(
+        self,
+        design: ShadingPipeline,
+        cut: Raster,
+        spans: Spans,
+        constants: FrameConstants,
+        chosen: np.ndarray,
+    ) -> np.ndarray:
+        """Which of some shown pixels are switched."""
+        fragment = self._shown[chosen]
+        which, place = np.unique(cut.span[fragment], return_inverse=True)
+        length = spans.length[which]
+        if design.takes_values:
+            values = SpanValues(*(codes[which] for codes in spans.values))
+            operands = design.interpolator.compute_values(values, length)
+        else:
+            ends = (Fixed(COMPONENT, codes[which]) for codes in (spans.normal_left, spans.normal_right))
+            light = (Fixed(COMPONENT, codes) for codes in (constants.direction, constants.halfway))
+            operands = design.interpolator.compute(*ends, length, *light)
+        cosine = operands.cosine.codes[:, 0]
+        start = np.cumsum(length) - length
+        of_twin = cosine[start[place] + cut.offset[fragment]]
+        exact = self._cosine[chosen]
+        return ((of_twin > 0) != (exact > 0)) & (np.abs(exact) < LARGEST_COSINE)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The largest errors of a mesh and a model over all exponents.
+
+    Parameters
+    ----------
+    mesh, model : str
+        Names.
+    exponents, pixels : int
+        How many frames, and the pixels of each.
+    steady_lsb, steady_exponent
+        Largest error without switched pixels, and where; see `Point`.
+    over : int
+        Pixels over `LARGEST` of all frames, switched ones left out.
+    max_lsb, exponent
+        The same with switched pixels.
+    switched : int
+        Switched pixels over `LARGEST` of all frames.
+    switched_cosine : float
+        Largest exact ``|N . L|`` of those.
+    missed : tuple of int
+        Exponents with an error over `LARGEST` that is not of a switched pixel.
+    """
+
+    mesh: str
+    model: str
+    exponents: int
+    pixels: int
+    steady_lsb: float
+    steady_exponent: int
+    over: int
+    max_lsb: float
+    exponent: int
+    switched: int
+    switched_cosine: float
+    missed: tuple[int, ...]
+
+
+def summarise(mesh: str, points: Sequence[Point]) -> list[Summary]:
+    """One summary for each model, in the order in which they come."""
+    result = []
+    for model in dict.fromkeys(point.model for point in points):
+        own = [point for point in points if point.model == model]
+        steady = max(own, key=lambda point: point.steady_lsb)
+        largest = max(own, key=lambda point: point.max_lsb)
+        result.append(
+            Summary(
+                mesh,
+                model,
+                len(own),
+                own[0].pixels,
+                steady.steady_lsb,
+                steady.exponent,
+                sum(point.over - point.switched for point in own),
+                largest.max_lsb,
+                largest.exponent,
+                sum(point.switched for point in own),
+                max(point.switched_cosine for point in own),
+                tuple(point.exponent for point in own if point.steady_lsb > LARGEST),
+            )
+        )
+    return result
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print a line for each mesh and model, and judge.
+
+    Returns
+    -------
+    int
+        0; 1 when a steady pixel is over `LARGEST`, 2 when a mesh cannot be read.
+    """
+    parser = argparse.ArgumentParser(prog="blysk.bench.quality.sweep", description="error at every exponent")
+    parser.add_argument("meshes", nargs="*", default=["teapot"])
+    parser.add_argument("--width", type=int, default=320)
+    parser.add_argument("--height", type=int, default=240)
+    parser.add_argument("--method", choices=METHODS, default="chord")
+    parser.add_argument("--models", nargs="+", choices=MODELS, default=MODELS)
+    parser.add_argument("--exponents", nargs="+", type=int, help="those of every model")
+    for name, meaning in (
+        ("coefficients", "k_a, k_d and k_s of every channel"),
+        ("view", "direction to the viewer"),
+        ("light", "direction to the light"),
+    ):
+        parser.add_argument(f"--{name}", nargs=3, type=float, help=meaning)
+    parser.add_argument("--json", help="file for the figures of every frame")
+    options = parser.parse_args(arguments)
+    try:
+        loaded = [load_mesh(source, materials=False) for source in options.meshes]
+    except InputError as error:
+        print(f"blysk.bench.quality.sweep: {error}", file=sys.stderr)
+        return 2
+    whole, few = (set(options.exponents or default) for default in (EXPONENTS, FEW_EXPONENTS))
+    print(
+        "| mesh | model | exponents | pixels a frame | largest error, LSB | at n | pixels over 1 LSB "
+        "| with switched pixels | at n | switched over 1 LSB | their largest N.L |"
+    )
+    print("|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|")
+    figures, summaries = {}, []
+    for one in loaded:
+        frame = Frame(
+            one.mesh, options.width, options.height, options.coefficients, options.view, options.light
+        )
+        points = [
+            point
+            for exponent in sorted(whole | few)
+            for point in frame.points(
+                exponent,
+                [m for m in options.models if exponent in (whole if m == "cosquad" else few)],
+                options.method,
+            )
+        ]
+        figures[one.name] = [asdict(point) for point in points]
+        for row in sorted(summarise(one.name, points), key=lambda row: options.models.index(row.model)):
+            summaries.append(row)
+            print(
+                f"| {row.mesh} | {row.model} | {row.exponents} | {row.pixels:,} | {row.steady_lsb:.3f} "
+                f"| {row.steady_exponent} | {row.over} | {row.max_lsb:.2f} | {row.exponent} "
+                f"| {row.switched} | {row.switched_cosine:.1e} |",
+                flush=True,
+            )
+    if options.json:
+        with open(options.json, "w", encoding="utf-8") as file:
+            json.dump(figures, file)
+    missed = [row for row in summaries if row.missed]
+    for row in missed:
+        print(
+            f"missed: {row.steady_lsb:.3f} LSB: {row.mesh}, {row.model}; at {len(row.missed)} exponents: "
+            f"{', '.join(map(str, row.missed))}",
+            file=sys.stderr,
+        )
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,393 @@
+"""What the highlight gate saves: pixels, clocks of the compact style, and toggled register bits.
+
+``python -m blysk.bench.report.gate [MESH ...]`` renders each mesh (the teapot by default) at 320x240 by the
+chord method with one light, for the models cosquad, coscos4 and blinn and the exponents 2, 10, 50, 200 and
+1000, in the compact and the throughput style, without and with the gate. It prints three tables in Markdown:
+how many spans and pixels are gated, the clocks, and the register bits that change. The exit status is 1 when
+a frame is not the same, to the bit, in all four simulations and by the twin; 2 for bad input.
+
+Toggles are those of registers: what happens inside a multiplier between two of them is not counted. The gate
+works once a span and saves once a pixel, so it is the frame's spans that decide which is more.
+"""
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import NamedTuple
+
+import click
+import numpy as np
+from amaranth.lib.wiring import Component
+from tqdm import tqdm
+
+from blysk.bench.accuracy import scene_for
+from blysk.bench.command import run
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.methods.interpolator import pixels_of
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT
+from blysk.golden.pipeline import MODELS as ALL_MODELS
+from blysk.golden.pipeline import Pixels, ShadingPipeline, Spans
+from blysk.golden.reference.scene import Scene
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.cli.main import Size
+from blysk.sim.engines.simulate import Run, simulate
+from blysk.sim.engines.toggles import ToggleCounter
+from blysk.sim.frames.frame import beats_of, prepare
+from blysk.sim.meshes.mesh import load_mesh
+from blysk.sim.output import check_writable, write_json
+
+__all__ = [
+    "EXPONENTS",
+    "MODELS",
+    "Activity",
+    "GateRow",
+    "GateUnits",
+    "Shares",
+    "main",
+    "measure",
+    "shares_of",
+]
+
+MODELS = ("cosquad", "coscos4", "blinn")
+EXPONENTS = (2, 10, 50, 200, 1000)
+
+_SPECULAR = ("light_0.specular",)
+_GATE = ("highlight_gate", "undecided", "lengths", "decisions")
+
+
+@dataclass(frozen=True)
+class Shares:
+    """How much of a frame the gate keeps from the specular unit, and how much it could, by the twin.
+
+    Parameters
+    ----------
+    spans, pixels : int
+        Of the frame; spans of length 0 do not count.
+    gated_spans, gated_pixels : int
+        Those that the gate tells to be dark.
+    dark_spans, dark_span_pixels : int
+        Spans in which no pixel has a specular term over 0, and their pixels: the most that a gate of spans
+        could tell.
+    dark_pixels : int
+        Pixels whose specular term is 0: the most that any gate could.
+    behind_pixels : int
+        Those of them whose light is behind the surface. They are dark without a gate.
+    """
+
+    spans: int
+    pixels: int
+    gated_spans: int
+    gated_pixels: int
+    dark_spans: int
+    dark_span_pixels: int
+    dark_pixels: int
+    behind_pixels: int
+
+
+class Activity(NamedTuple):
+    """Register bits that toggle in a frame.
+
+    Parameters
+    ----------
+    specular : int
+        Inside the specular unit.
+    gate : int
+        Inside the gate and the FIFOs that lead to it and on.
+    pipeline : int
+        In the whole pipeline, both of these included.
+    """
+
+    specular: int
+    gate: int
+    pipeline: int
+
+
+@dataclass(frozen=True)
+class GateRow:
+    """A frame without and with the gate: pairs are in this order.
+
+    Parameters
+    ----------
+    mesh, model : str
+        What is drawn, and the reflection model.
+    exponent : int
+        Of the highlight.
+    shares : Shares
+        What is gated.
+    clocks, compact_clocks : pair of int
+        Of the throughput and of the compact style, from the first write of a constant to the last pixel.
+    activity : pair of Activity
+        Of the throughput style.
+    identical : bool
+        Whether the pixels of all four simulations, hidden ones too, are those of the twin.
+    """
+
+    mesh: str
+    model: str
+    exponent: int
+    shares: Shares
+    clocks: tuple[int, int]
+    compact_clocks: tuple[int, int]
+    activity: tuple[Activity, Activity]
+    identical: bool
+
+
+def shares_of(design: ShadingPipeline, spans: Spans, constants: FrameConstants) -> Shares:
+    """Count what the gate of a design of one light and one material would do; it need not have one."""
+    kept = np.flatnonzero(spans.length)
+    length = np.asarray(spans.length, dtype=np.int64)[kept]
+    left, right, direction, halfway = (
+        Fixed(COMPONENT, codes)
+        for codes in (
+            spans.normal_left[kept],
+            spans.normal_right[kept],
+            constants.direction,
+            constants.halfway,
+        )
+    )
+    operands = design.interpolator.compute(left, right, length, direction, halfway)
+    behind = Diffuse(operands.cosine.format).dark(operands.cosine)
+    dark = design.highlight.compute(operands.highlight, behind, constants.exponent).codes[:, 0] == 0
+    gated = ~design.lit_spans(spans, constants)[kept, 0]
+    span, _ = pixels_of(length)
+    dark_span = np.bincount(span[~dark], minlength=len(length)) == 0
+    return Shares(
+        spans=len(length),
+        pixels=int(length.sum()),
+        gated_spans=int(gated.sum()),
+        gated_pixels=int(length[gated].sum()),
+        dark_spans=int(dark_span.sum()),
+        dark_span_pixels=int(length[dark_span].sum()),
+        dark_pixels=int(dark.sum()),
+        behind_pixels=int(behind.sum()),
+    )
+
+
+def frames(
+    units: Sequence[Component], spans: Spans, constants: FrameConstants, engine: str = "cxxrtl"
+) -> list[Run]:
+    """Send spans through pipelines of one material, or toggle counters of such.
+
+    Parameters
+    ----------
+    units : sequence of Component
+        Pipelines.
+    spans : Spans
+        What each gets.
+    constants : FrameConstants
+        Written first.
+    engine : str
+        As `simulate` takes it.
+    """
+    count, write = int(np.sum(spans.length)), constants.writes()
+    return [simulate(unit, beats_of(unit, spans), count=count, write=write, engine=engine) for unit in units]
+
+
+def same_pixels(run: Run, expected: Pixels) -> bool:
+    """Whether a run gave such pixels: place, colour and mark of a span's end of each, in their order."""
+    fields = {name: getattr(expected, name) for name in ("x", "y", "last")}
+    fields |= {name: expected.color[:, channel] for channel, name in enumerate("rgb")}
+    return all(np.array_equal(run.beats[name], codes) for name, codes in fields.items())
+
+
+class GateUnits:
+    """The four pipelines of a model, which serve every mesh and exponent.
+
+    Parameters
+    ----------
+    model : str
+        Reflection model.
+    engine : str
+        As `simulate` takes it.
+    """
+
+    def __init__(self, model: str, engine: str = "cxxrtl"):
+        self.model, self.engine = model, engine
+        designs = [ShadingPipeline("chord", model, gate=gate) for gate in (False, True)]
+        self.design = designs[0]
+        self._counters = [ToggleCounter(ShadingPipelineUnit(design)) for design in designs]
+        self._compact = [ShadingPipelineUnit(design, style="compact") for design in designs]
+
+    def compare(self, name: str, scene: Scene) -> GateRow:
+        """A scene of one light and one material through all four."""
+        spans = prepare(scene, self.design).spans
+        constants = FrameConstants.of(scene, 1)
+        expected = self.design.compute(spans, constants)
+        fast = frames(self._counters, spans, constants, self.engine)
+        small = frames(self._compact, spans, constants, self.engine)
+        off, on = map(activity_of, fast)
+        return GateRow(
+            mesh=name,
+            model=self.model,
+            exponent=constants.exponent,
+            shares=shares_of(self.design, spans, constants),
+            clocks=(fast[0].total_clocks, fast[1].total_clocks),
+            compact_clocks=(small[0].total_clocks, small[1].total_clocks),
+            activity=(off, on),
+            identical=all(same_pixels(run, expected) for run in (*fast, *small)),
+        )
+
+
+def activity_of(run: Run) -> Activity:
+    """Toggles of a run of a `ToggleCounter` of a pipeline."""
+    toggles = {path: int(run.status[path]) for path in run.status.dtype.names}
+
+    def inside(names):
+        return sum(
+            count
+            for path, count in toggles.items()
+            if any(path == name or path.startswith(f"{name}.") for name in names)
+        )
+
+    return Activity(inside(_SPECULAR), inside(_GATE), sum(toggles.values()))
+
+
+def measure(
+    meshes: Sequence,
+    models: Sequence[str] = MODELS,
+    exponents: Sequence[int] = EXPONENTS,
+    width: int = 320,
+    height: int = 240,
+    engine: str = "cxxrtl",
+) -> Iterator[GateRow]:
+    """Rows of every model, mesh and exponent.
+
+    Parameters
+    ----------
+    meshes : sequence of blysk.sim.meshes.mesh.LoadedMesh
+        What is drawn.
+    models, exponents : sequences
+        See `GateUnits`; an exponent is a constant of the frame, and needs no model of its own.
+    width, height : int
+        Size of a frame.
+    engine : str
+        As `simulate` takes it.
+    """
+    for model in models:
+        units = GateUnits(model, engine)
+        for loaded in meshes:
+            for exponent in exponents:
+                yield units.compare(loaded.name, scene_for(loaded.mesh, exponent, width, height))
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{part / whole:.1%}" if whole else "-"
+
+
+def _saved(off: int, on: int) -> str:
+    return _share(off - on, off)
+
+
+def _share_cells(row: GateRow) -> tuple[str, ...]:
+    shares = row.shares
+    pixels = (shares.gated_pixels, shares.dark_span_pixels, shares.dark_pixels, shares.behind_pixels)
+    return (
+        f"{shares.spans:,}",
+        f"{shares.pixels:,}",
+        _share(shares.gated_spans, shares.spans),
+        *(_share(count, shares.pixels) for count in pixels),
+    )
+
+
+def _clock_cells(row: GateRow) -> tuple[str, ...]:
+    pairs = (row.compact_clocks, row.clocks)
+    return tuple(cell for pair in pairs for cell in (f"{pair[0]:,}", f"{pair[1]:,}", _saved(*pair)))
+
+
+def _activity_cells(row: GateRow) -> tuple[str, ...]:
+    off, on = row.activity
+    pixels = max(row.shares.pixels, 1)
+    return (
+        *(f"{count / pixels:.1f}" for count in (off.specular, on.specular, on.gate)),
+        _saved(off.specular, on.specular),
+        _saved(off.specular, on.specular + on.gate),
+        *(f"{count / pixels:.1f}" for count in (off.pipeline, on.pipeline)),
+        _saved(off.pipeline, on.pipeline),
+    )
+
+
+_TABLES: tuple[tuple[str, tuple[str, ...], Callable[[GateRow], tuple[str, ...]]], ...] = (
+    (
+        "Share of the spans that are gated, and of the pixels: gated, in spans without a highlight, without "
+        "a highlight, with the light behind.",
+        ("spans", "pixels", "gated", "gated", "in dark spans", "dark", "behind"),
+        _share_cells,
+    ),
+    (
+        "Clocks of the frame, gate off and on: compact style, then one pixel a clock.",
+        ("off", "on", "saved", "off", "on", "saved"),
+        _clock_cells,
+    ),
+    (
+        "Toggled register bits a pixel, one pixel a clock: specular unit, gate; saved in the specular unit, "
+        "and less what the gate takes; whole pipeline, gate included.",
+        ("specular off", "on", "gate", "saved", "net", "pipeline off", "on", "saved"),
+        _activity_cells,
+    ),
+)
+
+
+def _print(rows: Sequence[GateRow]) -> None:
+    for title, head, cells_of in _TABLES:
+        click.echo(f"{title}\n")
+        click.echo(f"| mesh | model | n | {' | '.join(head)} |")
+        click.echo(f"|---|---|---:|{'---:|' * len(head)}")
+        for row in rows:
+            click.echo(f"| {' | '.join((row.mesh, row.model, str(row.exponent), *cells_of(row)))} |")
+        click.echo()
+    same = sum(row.identical for row in rows)
+    click.echo(f"{same} of {len(rows)} frames are the same to the bit with the gate off and on.")
+
+
+@click.command()
+@click.argument("meshes", nargs=-1)
+@click.option("--size", type=Size(), default="320x240", show_default=True, help="Of the frames.")
+@click.option(
+    "--model", "models", type=click.Choice(ALL_MODELS), multiple=True, default=MODELS, help="Repeat for more."
+)
+@click.option(
+    "--exponent",
+    "exponents",
+    type=click.IntRange(1, MAX_EXPONENT),
+    multiple=True,
+    default=EXPONENTS,
+    help="Repeat for more.",
+)
+@click.option("--json", "figures", type=click.Path(), help="File for every figure.")
+def _command(meshes, size, models, exponents, figures) -> int:
+    """Measure what the highlight gate saves: pixels, clocks, and toggled register bits."""
+    if figures:
+        check_writable(figures)
+    loaded = [load_mesh(source) for source in meshes or ["teapot"]]
+    count = len(loaded) * len(models) * len(exponents)
+    rows = list(
+        tqdm(
+            measure(loaded, models, exponents, *size), total=count, unit=" frames", leave=False, disable=None
+        )
+    )
+    if figures:
+        write_json(figures, {"width": size[0], "height": size[1], "frames": [_figures(row) for row in rows]})
+    _print(rows)
+    return 0 if all(row.identical for row in rows) else 1
+
+
+def _figures(row: GateRow) -> dict:
+    return asdict(row) | {"activity": [of._asdict() for of in row.activity]}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the tables, and judge.
+
+    Returns
+    -------
+    int
+        0; 1 when a frame differs or a simulation goes wrong, 2 for bad input, told in one line.
+    """
+    return run(_command, "blysk.bench.report.gate", arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

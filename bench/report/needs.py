@@ -1,0 +1,274 @@
+"""What sample scenes do not need: what their pipelines go without, and what that saves, as a section."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
+from blysk.bench.store import Task
+from blysk.bench.tools.pages import svg
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.scene import Scene
+from blysk.sim.cli.printing import fit_figures
+from blysk.sim.frames.fit import Fit, Omission, for_scene
+from blysk.sim.frames.frame import FrameSimulator, twin_frame
+from blysk.sim.meshes.teapot import teapot
+
+__all__ = ["QUICK_SCENES", "SCENES", "measure", "ring", "section", "simulate_both", "tasks"]
+
+_KEY = Light((-0.5, 0.8, 0.7))
+_COPPER = Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.20), (0.6,) * 3, 50)
+_FULL, _QUICK = (480, 360, 10_000), (160, 120, 1000)
+_RESOURCES = ("cells", "multipliers", "register_bits", "memory_bits")
+_SETTINGS = {"setup_interval": None, "style": "throughput"}
+
+
+def ring(around: int = 36, across: int = 18) -> Mesh:
+    """A ring with exact normals: radii 1 and 0.42, axis y; that of the project's examples.
+
+    Parameters
+    ----------
+    around, across : int
+        Points along each of its circles.
+    """
+    a, b = np.meshgrid(
+        np.linspace(0, 2 * np.pi, around, endpoint=False),
+        np.linspace(0, 2 * np.pi, across, endpoint=False),
+        indexing="ij",
+    )
+    outwards = np.stack([np.cos(a), np.zeros_like(a), np.sin(a)], axis=-1)
+    normals = np.cos(b)[..., np.newaxis] * outwards + np.sin(b)[..., np.newaxis] * (0.0, 1.0, 0.0)
+    index = np.arange(around * across).reshape(around, across)
+    right, up = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1)
+    corner = np.roll(right, -1, axis=1)
+    faces = np.stack([index, up, corner, index, corner, right], axis=-1).reshape(-1, 3)
+    normals = normalise(normals.reshape(-1, 3))
+    return Mesh(outwards.reshape(-1, 3) + 0.42 * normals, faces, normals)
+
+
+def _teapot(width, height, triangles, material=_COPPER, lights=(_KEY,), **options) -> Scene:
+    mesh = teapot(triangles)
+    camera = Camera.framing(mesh.vertices, (0.4, 0.5, 1.0), "perspective", width / height)
+    return Scene(mesh, camera, width, height, material, lights, **options)
+
+
+def _grey(*size: int) -> Scene:
+    return _teapot(*size, Material((0.05,) * 3, (0.4,) * 3, (0.55,) * 3, 50))
+
+
+def _half_lit(*size: int) -> Scene:
+    return _teapot(*size, lights=(_KEY, Light((1, 0, 0), (0, 0, 0))))
+
+
+def _alike(*size: int) -> Scene:
+    scene = _teapot(*size)
+    parts = replace(scene.mesh, material=np.arange(len(scene.mesh.faces)) % 3)
+    return replace(scene, mesh=parts, material=(_COPPER,) * 3)
+
+
+def _floor(width: int, height: int, _: int) -> Scene:
+    corners = np.array([[0.0, 0, 0], [4, 0, 0], [4, 0, -4], [0, 0, -4]])
+    mesh = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.tile([0.0, 1, 0], (4, 1)))
+    camera = Camera.framing(corners, (0.4, 0.5, 1.0), "perspective", width / height)
+    return Scene(mesh, camera, width, height, replace(_COPPER, exponent=500), [Light((0.3, 0.3, -1))])
+
+
+def _ring(width: int, height: int, _: int) -> Scene:
+    camera = Camera((2.2, 3.2, 4.6), (0, 0, 0), projection="perspective", field_of_view=32)
+    steel = Material((0.06,) * 3, (0.42, 0.44, 0.48), (0.7,) * 3, 120)
+    blue = tuple(code / 255 for code in (0x30, 0x4A, 0x70))
+    lights = [Light((-0.6, 0.9, 0.5), (0.9, 0.88, 0.84)), Light((0.9, 0.1, 0.6), blue)]
+    return Scene(ring(), camera, width, height, steel, lights)
+
+
+def _lamp(width: int, height: int, triangles: int) -> Scene:
+    camera = Camera((3.5, 5.0, 7.5), (0.2, 1.4, 0), projection="perspective", field_of_view=34)
+    clay = Material((0.04,) * 3, (0.5, 0.52, 0.55), (0.6,) * 3, 80)
+    night = tuple(code / 255 for code in (0x20, 0x34, 0x60))
+    lamp = Light(color=(1.0, 0.9, 0.75), position=(-2.6, 3.4, 3.0))
+    lights = [lamp, Light((0.8, 0.2, -0.3), night)]
+    return Scene(teapot(triangles), camera, width, height, clay, lights, viewer="near")
+
+
+SCENES: dict[str, tuple[Callable[[int, int, int], Scene], dict[str, Any] | None]] = {
+    "copper teapot": (_teapot, None),
+    "matt teapot, k_s = 0": (lambda *size: _teapot(*size, replace(_COPPER, specular=(0, 0, 0))), None),
+    "teapot in ambient light": (lambda *size: _teapot(*size, lights=()), None),
+    "grey teapot": (_grey, None),
+    "three materials alike": (_alike, None),
+    "one of two lights is off": (_half_lit, None),
+    "floor lit from behind, exponent 500": (_floor, None),
+    "steel ring, two lights": (
+        _ring,
+        {"method": "quadratic", "model": "cosquad_lin", "operand": "one_minus_cosine", "gate": True},
+    ),
+    "teapot beside a lamp": (_lamp, {"method": "chord-local", "model": "cosquad_lin"}),
+}
+"""Scenes of a width, a height and about so many triangles; and the full pipeline, where it is not the chord
+method with the model cosquad and a highlight gate.
+"""
+
+QUICK_SCENES = ("copper teapot", "matt teapot, k_s = 0")
+"""Scenes of the quick report."""
+
+
+def _fit(name: str, size: Sequence[int]) -> tuple[Scene, Fit]:
+    build, options = SCENES[name]
+    scene = build(*size)
+    return scene, for_scene(scene, options and ShadingPipeline(lights=len(scene.lights), **options))
+
+
+def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
+    """What a scene's pipeline goes without, and its frame beside that of the full one, by bit-true twins.
+
+    Parameters
+    ----------
+    name : str
+        One of `SCENES`.
+    size : sequence of int
+        Width, height and triangles.
+    steps : bool
+        Whether each thing that is left out is counted on top of those before it; else all together.
+
+    Returns
+    -------
+    dict
+        That of `fit_figures` but for the clocks, and ``reasons``, what is left out and why,
+        ``method``, ``model`` and ``pixels``.
+    """
+    scene, fit = _fit(name, size)
+    full, fitted = twin_frame(scene, fit.full), twin_frame(fit.scenes[0], fit.design)
+    counted = fit
+    if not steps:
+        together = {key: value for omission in fit.omissions for key, value in omission.changes.items()}
+        counted = Fit(fit.full, (Omission("all of it", together),), fit.scenes)
+    figures = fit_figures(counted, _SETTINGS, fitted, full)
+    return {key: value for key, value in figures.items() if "clocks" not in key} | {
+        "reasons": [omission.reason for omission in fit.omissions],
+        "method": fit.full.method,
+        "model": fit.full.model,
+        "pixels": full.pixels,
+    }
+
+
+def simulate_both(name: str, size: Sequence[int]) -> dict[str, int]:
+    """``clocks`` and ``full_clocks`` of the simulated pipelines, and ``different_pixels`` of their frames.
+
+    Parameters
+    ----------
+    name, size
+        As for `measure`.
+    """
+    scene, fit = _fit(name, size)
+    full = FrameSimulator(fit.full).render(scene)
+    fitted = FrameSimulator(fit.design).render(fit.scenes[0])
+    different = (full.image != fitted.image).any(axis=-1)
+    return {
+        "clocks": fitted.clocks,
+        "full_clocks": full.clocks,
+        "different_pixels": int(np.count_nonzero(different)),
+    }
+
+
+def tasks(quick: bool) -> list[Task]:
+    """Each scene by twins and, if it need not be quick, by simulation."""
+    size = list(_QUICK if quick else _FULL)
+    settings = [{"name": name, "size": size} for name in (QUICK_SCENES if quick else SCENES)]
+    counted = [Task(measure, each | {"steps": not quick}) for each in settings]
+    return counted + [Task(simulate_both, each) for each in settings if not quick]
+
+
+def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
+    """What each scene goes without, what that saves, and whether its frame is the full pipeline's."""
+    found: dict[str, dict[str, Any]] = {}
+    for task, result in zip(tasks, results, strict=True):
+        # Pixels that differ in either are worth telling.
+        of = found.setdefault(task.settings["name"], {"clocks": None, "full_clocks": None})
+        different = of.get("different_pixels", 0)
+        of |= result
+        of["different_pixels"] = max(different, result["different_pixels"])
+    simulated = sum(of["clocks"] is not None for of in found.values())
+    same = sum(of["different_pixels"] == 0 for of in found.values())
+    least = min(found, key=lambda name: _left(found[name], "cells"))
+    most = max(found, key=lambda name: _left(found[name], "cells"))
+    text = [
+        "`--fit` builds only what a scene needs. It changes no word of the arithmetic, so the frame must be "
+        f"that of the full pipeline to the bit: {same} of {len(found)} are, by the bit-true twins of both "
+        f"pipelines, {simulated} of them by simulation, too.",
+        f"What stays is from {_left(found[least], 'cells'):.0%} of the cells ({least}) to "
+        f"{_left(found[most], 'cells'):.0%} ({most}). Cells are operators, multiplexers, registers and "
+        "memories of any width, before technology mapping.",
+    ]
+    return Section(
+        "needs", "What a scene does not need", text, [_totals(found), _drawing(found), _omissions(found)]
+    )
+
+
+def _left(figures: dict, resource: str) -> float:
+    """Share of a resource that stays; of one that the full pipeline does not have, all."""
+    full = figures["full"][resource]
+    return figures["fitted"][resource] / full if full else 1.0
+
+
+def _totals(found: dict[str, dict]) -> Table:
+    columns = ["scene", "method", "model", "pixels"]
+    for resource in _RESOURCES:
+        name = resource.replace("_", " ")
+        columns += [f"{name}, full", f"{name}, fitted"]
+    columns += ["clocks, full", "clocks, fitted", "pixels of another colour"]
+    rows: list[list[Cell]] = []
+    grades: list[list[Grade]] = []
+    for name, of in found.items():
+        row: list[Cell] = [name, of["method"], of["model"], of["pixels"]]
+        for resource in _RESOURCES:
+            row += [of[which][resource] for which in ("full", "fitted")]
+        rows.append([*row, of["full_clocks"], of["clocks"], of["different_pixels"]])
+        grades.append([""] * (len(columns) - 1) + ["bad" if of["different_pixels"] else "good"])
+    note = (
+        "The full pipeline has as many lights and materials as the scene, 12-bit coordinates and lengths, a "
+        "PROM of exponents, three channels and, where the method can have one, a highlight gate."
+    )
+    return Table("needs", "The full pipeline and the fitted one", columns, rows, note, grades)
+
+
+def _omissions(found: dict[str, dict]) -> Table:
+    columns = ["scene", "left out, and why", *(f"saves {name.replace('_', ' ')}" for name in _RESOURCES)]
+    rows: list[list[Cell]] = []
+    for name, of in found.items():
+        if len(of["reasons"]) == len(of["omissions"]):
+            rows += [
+                [name, omission["reason"], *(omission["saves"][resource] for resource in _RESOURCES)]
+                for omission in of["omissions"]
+            ]
+        else:
+            rows += [[name, reason, *[None] * len(_RESOURCES)] for reason in of["reasons"]]
+            saves = [sum(each["saves"][resource] for each in of["omissions"]) for resource in _RESOURCES]
+            rows.append([name, "all of it", *saves])
+    note = "Each on top of those above it."
+    return Table("needs-omissions", "What is left out of each pipeline", columns, rows, note)
+
+
+def _drawing(found: dict[str, dict]) -> Drawing:
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import PercentFormatter
+
+    figure = Figure(figsize=(7.6, 0.62 * len(found) + 1.1), layout="constrained")
+    axes = figure.subplots()
+    place = np.arange(len(found))
+    colors = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd")
+    for index, (resource, color) in enumerate(zip(_RESOURCES, colors, strict=True)):
+        left = [_left(of, resource) for of in found.values()]
+        axes.barh(place + (index - 1.5) * 0.2, left, 0.2, color=color, label=resource.replace("_", " "))
+    axes.set(yticks=place, yticklabels=list(found), xlim=(0, 1.02), xlabel="share of the full pipeline")
+    axes.xaxis.set_major_formatter(PercentFormatter(1))
+    axes.invert_yaxis()
+    axes.grid(True, axis="x", color="#dddddd", linewidth=0.5)
+    axes.set_axisbelow(True)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False)
+    note = "What is left of each resource when a pipeline has only what its scene needs."
+    return Drawing("needs-shares", "What stays of the full pipeline", svg(figure), note)

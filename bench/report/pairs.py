@@ -1,0 +1,184 @@
+"""Every method with every reflection model: simulated pixels beside those of the twin.
+
+``python -m blysk.bench.report.pairs [MESH ...]`` renders each mesh (the teapot by default) at 96x72 and
+exponents 1, 30 and 1000 with each pair, without specular light too, in the compiled engine, and compares
+every pixel that comes out, hidden ones too, with `ShadingPipeline.compute`. It prints a line a pair. The exit
+status is 1 when a pixel differs or a pair cannot be built, 2 for a mesh that cannot be read.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from blysk.bench.accuracy import scene_for
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.pipeline import METHODS, MODELS, ShadingPipeline
+from blysk.golden.reference.geometry import Mesh
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.engines.engine import SimulationError
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.errors import InputError
+from blysk.sim.frames.frame import beats_of, prepare
+from blysk.sim.meshes.mesh import load_mesh
+
+__all__ = ["EXPONENTS", "Pair", "main", "measure", "mismatches"]
+
+EXPONENTS = (1, 30, 1000)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A method and a model, and how their frames compare.
+
+    Parameters
+    ----------
+    method : str
+        Method of interpolation.
+    model : str or None
+        Reflection model; ``None``: no specular light.
+    frames, pixels : int
+        What was compared.
+    mismatches : int
+        Pixels that differ from the twin's in place, colour or mark of a span's end.
+    failure : str
+        One line that says why frames are missing; empty where none are.
+    """
+
+    method: str
+    model: str | None
+    frames: int
+    pixels: int
+    mismatches: int
+    failure: str = ""
+
+
+def mismatches(
+    unit: ShadingPipelineUnit, mesh: Mesh, exponent: int, width: int, height: int
+) -> tuple[int, int]:
+    """Pixels of a frame, and how many of the simulated ones are not the twin's.
+
+    Parameters
+    ----------
+    unit : ShadingPipelineUnit
+        Pipeline of one light and one material.
+    mesh : Mesh
+        The surface.
+    exponent : int
+        Of the highlight.
+    width, height : int
+        Size of the picture.
+
+    Raises
+    ------
+    SimulationError
+        If the pipeline breaks the stream's rules, stops, or gives another number of pixels.
+    """
+    scene = scene_for(mesh, exponent, width, height)
+    spans = prepare(scene, unit.parameters).spans
+    constants = FrameConstants.of(scene, 1)
+    expected = unit.parameters.compute(spans, constants)
+    run = simulate(
+        unit,
+        beats_of(unit, spans),
+        count=len(expected.x),
+        write=constants.writes(),
+    )
+    wrong = (run.beats["x"] != expected.x) | (run.beats["y"] != expected.y)
+    wrong |= run.beats["last"] != expected.last
+    for channel, name in enumerate("rgb"):
+        wrong |= run.beats[name] != expected.color[:, channel]
+    # A flag that differs is one more: no pixel would show it.
+    flags = int(run.status["wide_spans"]) != expected.wide_spans
+    return len(wrong), int(np.count_nonzero(wrong)) + flags
+
+
+def measure(
+    meshes: Sequence[Mesh],
+    methods: Sequence[str] = tuple(METHODS),
+    models: Sequence[str | None] = (*MODELS, None),
+    exponents: Sequence[int] = EXPONENTS,
+    width: int = 96,
+    height: int = 72,
+) -> Iterator[Pair]:
+    """Compare the frames of every method with every model.
+
+    Parameters
+    ----------
+    meshes : sequence of Mesh
+        What is drawn.
+    methods, models : sequences
+        The pairs.
+    exponents : sequence of int
+        A frame of each mesh for each.
+    width, height : int
+        Size of a frame.
+    """
+    for method in methods:
+        for model in models:
+            frames = pixels = wrong = 0
+            failure = ""
+            try:
+                unit = ShadingPipelineUnit(ShadingPipeline(method, model))
+                for mesh in meshes:
+                    for exponent in exponents:
+                        of_frame = mismatches(unit, mesh, exponent, width, height)
+                        frames, pixels, wrong = frames + 1, pixels + of_frame[0], wrong + of_frame[1]
+            except (ValueError, SimulationError) as error:
+                failure = f"{type(error).__name__}: {error}".splitlines()[0]
+            yield Pair(method, model, frames, pixels, wrong, failure)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print a line a pair, and judge.
+
+    Returns
+    -------
+    int
+        0; 1 when a pixel differs or a frame is missing, 2 when a mesh cannot be read.
+    """
+    parser = argparse.ArgumentParser(
+        prog="blysk.bench.report.pairs", description="every method with every model"
+    )
+    parser.add_argument("meshes", nargs="*", default=["teapot"])
+    parser.add_argument("--width", type=int, default=96)
+    parser.add_argument("--height", type=int, default=72)
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=tuple(METHODS))
+    parser.add_argument("--models", nargs="+", choices=(*MODELS, "none"), default=(*MODELS, "none"))
+    parser.add_argument("--exponents", nargs="+", type=int, default=EXPONENTS)
+    parser.add_argument("--json", help="file for the same figures")
+    options = parser.parse_args(arguments)
+    try:
+        meshes = [load_mesh(source, materials=False).mesh for source in options.meshes]
+    except InputError as error:
+        print(f"blysk.bench.report.pairs: {error}", file=sys.stderr)
+        return 2
+    models = [None if model == "none" else model for model in options.models]
+    pairs = []
+    print("| method | model | frames | pixels | mismatches |")
+    print("|---|---|---:|---:|---:|")
+    for pair in measure(meshes, options.methods, models, options.exponents, options.width, options.height):
+        pairs.append(pair)
+        note = f" {pair.failure} |" if pair.failure else ""
+        print(
+            f"| {pair.method} | {pair.model or 'none'} | {pair.frames} | {pair.pixels:,} "
+            f"| {pair.mismatches:,} |{note}",
+            flush=True,
+        )
+    pixels, wrong = (sum(getattr(pair, name) for pair in pairs) for name in ("pixels", "mismatches"))
+    failed = sum(bool(pair.failure) for pair in pairs)
+    print(
+        f"\n{len(pairs)} pairs, {len(meshes)} meshes, {pixels:,} pixels: {wrong:,} mismatches, "
+        f"{failed} pairs with frames missing"
+    )
+    if options.json:
+        with open(options.json, "w", encoding="utf-8") as file:
+            json.dump([asdict(pair) for pair in pairs], file)
+    return 1 if wrong or failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

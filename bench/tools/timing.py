@@ -1,0 +1,240 @@
+"""Timing diagrams of a unit's streams, from a simulation."""
+
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from amaranth.hdl import Value
+from amaranth.lib.wiring import Component
+from amaranth.sim import Simulator
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from blysk.sim.engines.beats import dtype_of, pack
+from blysk.sim.engines.engine import Ports
+
+__all__ = ["Waves", "draw_timing", "waves_of"]
+
+PIXELS = 3
+"""Pixels of a span in a diagram, where a unit makes pixels of spans."""
+
+_HANDSHAKES = ("i.valid", "i.ready", "o.valid", "o.ready")
+
+_PERIOD = 1e-8
+_PATIENCE = 5000
+
+_CLOCK, _ROW = 22.0, 22.0
+_MARGIN = 58.0
+_INK, _FILLS = "#222222", ("#cfe0f3", "#f9dcc0", "#d5ecd5", "#eadcf2")
+QUIET = 7
+"""Clocks without a change above which a diagram leaves them out."""
+
+
+@dataclass(frozen=True)
+class Waves:
+    """The handshakes of a simulation, clock by clock, as they stand before the rising edge.
+
+    Parameters
+    ----------
+    levels : dict of str to bool array
+        ``i.valid``, ``i.ready``, ``o.valid`` and ``o.ready``.
+    inputs, outputs : list of (str or None)
+        Name of the beat that each stream offers on a clock.
+    """
+
+    levels: dict[str, np.ndarray]
+    inputs: list[str | None]
+    outputs: list[str | None]
+
+    @property
+    def clocks(self) -> int:
+        """Clocks shown."""
+        return len(self.inputs)
+
+
+def waves_of(unit: Component, beat: dict | None = None, beats: int = 3) -> Waves:
+    """Simulate a unit with a pause of the source and a stall of the sink.
+
+    The source pauses for two clocks before its last beat; the sink is not ready for two clocks when the first
+    result is there, or the second where a beat has several. Constants are 0, and where nothing is offered
+    every bit of the payload is 1.
+
+    Parameters
+    ----------
+    unit : Component
+        Unit.
+    beat : dict, optional
+        Fields of every input beat; others are 0. ``length`` is made `PIXELS`: a beat is then a span, with as
+        many results.
+    beats : int
+        Input beats.
+
+    Raises
+    ------
+    RuntimeError
+        If the results do not come.
+    """
+    beat = dict(beat or {})
+    results = 1
+    if "length" in beat:
+        beat["length"] = results = PIXELS
+    ports = Ports(unit)
+    operands = np.zeros(1, dtype_of(ports.i))
+    for name, value in beat.items():
+        operands[name] = value
+    code = int.from_bytes(pack(ports.i, operands).astype("<u4").tobytes(), "little")
+    input_payload = Value.cast(unit.i.payload).as_unsigned()
+    history: list[tuple[bool, ...]] = []
+
+    async def bench(ctx):
+        taken, given, pause, stall, after = 0, 0, 2, 2, 2
+        ctx.set(input_payload, -1)
+        while after:
+            offered = taken < beats and (taken < beats - 1 or not pause)
+            pause -= taken == beats - 1 and pause > 0
+            ctx.set(unit.i.valid, offered)
+            ctx.set(input_payload, code if offered else -1)
+            stalled = stall > 0 and given == (1 if results > 1 else 0) and ctx.get(unit.o.valid)
+            stall -= stalled
+            ctx.set(unit.o.ready, not stalled)
+            levels = tuple(bool(ctx.get(getattr(getattr(unit, n[0]), n[2:]))) for n in _HANDSHAKES)
+            history.append(levels)
+            taken += levels[0] and levels[1]
+            given += levels[2] and levels[3]
+            after -= given == beats * results
+            if len(history) > _PATIENCE:
+                raise RuntimeError(f"{type(unit).__name__} gave {given} of {beats * results} results")
+            await ctx.tick()
+
+    simulator = Simulator(unit)
+    simulator.add_clock(_PERIOD)
+    simulator.add_testbench(bench)
+    simulator.run()
+    levels = dict(zip(_HANDSHAKES, np.array(history).T, strict=True))
+    spans = [_letter(k) for k in range(beats)]
+    pixels = [letter + str(k) * (results > 1) for letter in spans for k in range(results)]
+    return Waves(
+        levels,
+        _offered(levels["i.valid"], levels["i.ready"], spans),
+        _offered(levels["o.valid"], levels["o.ready"], pixels),
+    )
+
+
+def _letter(k: int) -> str:
+    return "ABCDEFGH"[k]
+
+
+def _offered(valid: np.ndarray, ready: np.ndarray, names: list[str]) -> list[str | None]:
+    """Name of the beat on each clock: as many have moved before as it stands in the row."""
+    moved = np.cumsum(valid & ready) - (valid & ready)
+    return [names[k] if is_valid else None for k, is_valid in zip(moved, valid, strict=True)]
+
+
+def _shown(waves: Waves) -> list[int | None]:
+    """Clocks of the diagram; `None` for a stretch that is left out."""
+    states = [
+        (
+            waves.levels["i.valid"][k],
+            # Nobody asks while nothing is offered.
+            waves.levels["i.valid"][k] and waves.levels["i.ready"][k],
+            waves.levels["o.valid"][k],
+            waves.levels["o.ready"][k],
+            waves.inputs[k],
+            waves.outputs[k],
+        )
+        for k in range(waves.clocks)
+    ]
+    shown: list[int | None] = []
+    start = 0
+    for _, run in groupby(states):
+        length = len(list(run))
+        clocks = list(range(start, start + length))
+        shown += [*clocks[:2], None, *clocks[-2:]] if length > QUIET else clocks
+        start += length
+    return shown
+
+
+def draw_timing(waves: Waves) -> Figure:
+    """Draw the handshakes clock by clock.
+
+    A beat moves at the end of a clock, the rising edge of ``clk``, when valid and ready are both high.
+    """
+    shown = _shown(waves)
+    rows = ["clk", "i.valid", "i.ready", "i.payload", "o.valid", "o.ready", "o.payload"]
+    width, height = _MARGIN + _CLOCK * len(shown) + 8, _ROW * len(rows) + 20
+    figure = Figure(figsize=(width / 72, height / 72), facecolor="white")
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_axis_off()
+    axes.set_xlim(-_MARGIN, width - _MARGIN)
+    axes.set_ylim(height - 14, -6)
+    letters: dict[str, int] = {}
+    for row, name in enumerate(rows):
+        low, high = row * _ROW + 17, row * _ROW + 4
+        axes.text(-6, (low + high) / 2, name, ha="right", va="center", fontsize=8, color="black")
+        xs, ys = [], []
+        for place, clock in enumerate(shown):
+            x = place * _CLOCK
+            if clock is None:
+                continue
+            if name == "clk":
+                xs += [x, x + _CLOCK / 2, x + _CLOCK / 2, x + _CLOCK]
+                ys += [high, high, low, low]
+            elif name in waves.levels:
+                y = high if waves.levels[name][clock] else low
+                xs += [x, x + _CLOCK]
+                ys += [y, y]
+            if place + 1 < len(shown) and shown[place + 1] is None:
+                xs += [x + _CLOCK, x + 2 * _CLOCK]
+                ys += [ys[-1], ys[-1]] if ys else []
+        if ys:
+            axes.plot(xs, ys, color=_INK, linewidth=1.1, solid_joinstyle="miter")
+        else:
+            beats = waves.inputs if name[0] == "i" else waves.outputs
+            _draw_beats(axes, shown, beats, (low, high), letters)
+    bottom = len(rows) * _ROW
+    for place, clock in enumerate(shown):
+        x = place * _CLOCK
+        if clock is None:
+            axes.fill_between([x + 6, x + _CLOCK - 6], 0, bottom - 2, color="white", linewidth=0, zorder=4)
+            axes.text(x + _CLOCK / 2, bottom / 2, "⋯", ha="center", va="center", fontsize=11, zorder=5)
+        else:
+            axes.plot([x, x], [0, bottom], color="#bbbbbb", linewidth=0.5, linestyle=(0, (1, 2)), zorder=0)
+            axes.text(
+                x + _CLOCK / 2,
+                bottom + 2,
+                str(clock),
+                ha="center",
+                va="center",
+                fontsize=6.5,
+                color="#666666",
+            )
+    return figure
+
+
+def _draw_beats(axes, shown, beats, span, letters) -> None:
+    """Boxes with the names of the beats that a stream offers."""
+    low, high = span
+    names = [None if clock is None else beats[clock] for clock in shown]
+    # A stretch that is left out has what is on both its sides.
+    names = [
+        names[k - 1] if clock is None else name
+        for k, (name, clock) in enumerate(zip(names, shown, strict=True))
+    ]
+    start = 0
+    for name, run in groupby(names):
+        end = start + len(list(run))
+        if name is None:
+            axes.plot([start * _CLOCK, end * _CLOCK], [(low + high) / 2] * 2, color="#999999", linewidth=0.9)
+        else:
+            fill = _FILLS[letters.setdefault(name[0], len(letters)) % len(_FILLS)]
+            left, right, middle = start * _CLOCK, end * _CLOCK, (low + high) / 2
+            axes.fill(
+                [left, left + 3, right - 3, right, right - 3, left + 3],
+                [middle, high, high, middle, low, low],
+                facecolor=fill,
+                edgecolor=_INK,
+                linewidth=0.9,
+            )
+            axes.text((left + right) / 2, middle, name, ha="center", va="center", fontsize=7.5, zorder=6)
+        start = end

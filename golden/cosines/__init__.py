@@ -1,0 +1,1 @@
+"""Bit-accurate models of the units that make N·L and N·H, or 1 - N·H, along a span."""

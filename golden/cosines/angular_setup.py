@@ -1,0 +1,349 @@
+"""Angular setup ([T] 3.1): the great circle of a span as seen from a fixed vector."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from blysk.golden.cosines.arccos import SEGMENT_BOUNDS, Arccos, HalfChord
+from blysk.golden.cosines.highlight_cosine import HighlightCosine
+from blysk.golden.normals.difference_setup import DifferenceSetup, checked_lengths, reciprocal_place
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
+from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
+
+__all__ = ["SPAN_ANGLES", "AngularSetup"]
+
+SPAN_ANGLES = ("half_chord", "arccos")
+"""Units that psi may come from."""
+
+
+@dataclass(frozen=True)
+class AngularSetup:
+    """``psi``, ``lambda``, ``cos beta`` and ``psi/(m-1)`` from ``N_l``, ``N_r`` and a fixed vector H.
+
+    [T] 3.1 takes psi from arccos and ``tan lambda = (N_r.H - cos psi N_l.H)/(sin psi N_l.H)``, which is 0/0
+    where psi tends to 0, the usual case. Here, with ``a = N_l.H``, ``b = N_r.H`` and the angle counted from
+    the middle of the span,
+
+    - ``cos gamma(t) = x cos((t - 1/2) psi) + y sin((t - 1/2) psi)``,
+    - ``x = (a + b)/(2 cos(psi/2))`` and ``y = (b - a)/(2 sin(psi/2))``,
+    - ``cos beta = sqrt(x^2 + y^2)``, ``lambda = atan2(y, x) + psi/2``.
+
+    The curve goes through a and b whatever psi is, so an error of y counts times ``sin(psi/2)``: it fades
+    where y is hard to tell. All cancellations are exact, as dot products of code vectors are: ``w = |N_r -
+    N_l|^2 = N_l.N_l + N_r.N_r - 2 N_l.N_r`` and ``b - a``. Both half-angle functions come from ``z = w/4 =
+    sin^2(psi/2)``: ``1/(2 cos(psi/2)) = 1/2 + e(z)/2`` from a table, a small correction; ``1/(2 sin(psi/2))
+    = 2^j T(v)`` from a table on ``v = z 4^j`` in [1/4, 1), with ``b - a`` shifted by j. psi is that of
+    `HalfChord`; nothing needs an arccos. Beyond 90 degrees ``|N_r + N_l|^2`` takes the place of w and x and
+    y change places, so every angle from 0 to 180 degrees is served. Only for opposite normals is there no
+    plane: the setup then goes round by the pole ``x = 0``. The nearer they come to it, the more their
+    rounding turns the plane, by ``1/sin psi`` of it: spans over 150 degrees are flagged. One comparison does,
+    ``|N_r + N_l|^2 < 4 cos^2(75 degrees)``, less what rounding may take off: flagged for certain from 150.01.
+
+    Polar coordinates are found by 22 steps of CORDIC; its gain is taken back by shifts and additions. A
+    span of one pixel gets ``psi/(m-1) = psi``, which nothing reads.
+
+    ============ ============ ====================================================================
+    word         format       why
+    ============ ============ ====================================================================
+    w            UQ(2, 34)    exact; at most 2 for unit vectors
+    e            UQ(-1, 18)   multiplier operand; at most 0.4143. Table: UQ(-1, 22), rise UQ(-9, 22)
+    T            UQ(0, 17)    multiplier operand; table: UQ(0, 22), fall UQ(-8, 22)
+    (b - a) 2^j  SQ(2, 16)    multiplier operand
+    x, y         SQ(2, 26)    grow by 1.6468 in CORDIC, to SQ(4, 26)
+    atan2        SQ(0, 28)    turns
+    psi          UQ(0, 36)    turns
+    lambda       SQ(0, 40)    turns
+    psi/(m-1)    UQ(0, 40)    turns; psi by its leading 17 bits times `DifferenceSetup`'s reciprocal
+    cos beta     UQ(1, 25)    over 1 only where normals of unequal length are few steps apart
+    ============ ============ ====================================================================
+
+    Error of cos gamma(t) at any pixel, for the exact cosine of what the setup gives, against the formula
+    above in exact arithmetic on the same codes: `error`. Largest found: 5e-7 up to 0.1 degrees, 9e-7 at 1,
+    3e-6 at 10, 1.3e-5 at 45, 3.3e-5 from 90 on.
+
+    **By arccos**, as drawn: ``angle="arccos"`` takes psi from `Arccos` on ``N_l.N_r``, the square of the code
+    of length 1 divided out by ``r + r/2^16``, rounded to SQ(2, 16). psi is rounded to UQ(2, 15) radians and
+    brought to turns by a product with ``1/(2 pi)`` in UQ(-2, 19); ``psi/(m-1)`` reads the first 17 bits of
+    it. x and y stay as above (the printed ``tan lambda`` is 0/0 for equal normals), so that what is lost is
+    what arccos loses: `arccos_error`. Largest error of cos gamma found, by the span angle in degrees:
+
+    ================= ====== ====== ====== ======
+    psi from          1e-4   1      10     45
+    ================= ====== ====== ====== ======
+    half chord        5.0e-7 7.4e-7 3.8e-6 1.3e-5
+    arccos, refitted  0.0095 0.0012 0.0049 2.6e-4
+    arccos, corrected 0.042  0.034  3.5e-4 5.0e-4
+    arccos, printed   0.088  0.078  0.045  5.0e-4
+    ================= ====== ====== ====== ======
+
+    The vectors must be of unit length to within their rounding; words of others saturate or wrap.
+
+    Parameters
+    ----------
+    angle : str
+        One of `SPAN_ANGLES`.
+    arccos : Arccos
+        Table of ``"arccos"``.
+
+    Raises
+    ------
+    ValueError
+        If the angle's unit is unknown.
+
+    Source: [T] 3.1; blocks.md, "Highlight-cosine unit".
+    """
+
+    angle: Literal["half_chord", "arccos"] = "half_chord"
+    arccos: Arccos = field(default_factory=Arccos)
+
+    MAX_ANGLE = 150.0
+    CHORD_FORMAT = HalfChord.OPERAND_FORMAT
+    # The rounding of two normals moves a squared sum of length 0.52 by under 3.6 steps.
+    SHORTEST_SUM = Fixed(
+        UQ(2, 17),
+        int((ONE_SQUARED.values * 4 * np.cos(np.radians(MAX_ANGLE / 2)) ** 2 - 4 * COMPONENT.step) * 2.0**17),
+    )
+    CORRECTION_FORMAT = UQ(-1, 18)
+    CORRECTION_VALUE_FORMAT = UQ(-1, 22)
+    CORRECTION_RISE_FORMAT = UQ(-9, 22)
+    RECIPROCAL_FORMAT = UQ(0, 17)
+    RECIPROCAL_VALUE_FORMAT = UQ(0, 22)
+    RECIPROCAL_FALL_FORMAT = UQ(-8, 22)
+    MINOR_FORMAT = SQ(2, 16)
+    AXIS_FORMAT = SQ(2, 26)
+    ROTATED_FORMAT = SQ(4, 26)
+    DIRECTION_FORMAT = SQ(0, 28)
+    MANTISSA_FORMAT = UQ(-1, 18)
+    ANGLE_FORMAT = HalfChord.RESULT_FORMAT
+    PHASE_FORMAT = HighlightCosine.PHASE_FORMAT
+    STEP_FORMAT = HighlightCosine.STEP_FORMAT
+    COS_BETA_FORMAT = HighlightCosine.COS_BETA_FORMAT
+    ADDRESS_BITS = 9
+    FRACTION_BITS = 14
+    CORDIC_STEPS = 22
+    GAIN_BITS = 30
+    RADIANS_FORMAT = UQ(2, 15)
+    TURNS_PER_RADIAN = Fixed.round(UQ(-2, 19), 1 / (2 * np.pi))
+
+    def __post_init__(self):
+        if self.angle not in SPAN_ANGLES:
+            raise ValueError(f"angle must be {' or '.join(SPAN_ANGLES)}, not {self.angle!r}")
+
+    @staticmethod
+    def error(angle: np.ndarray) -> np.ndarray:
+        """Bound of the error of cos gamma with the half chord, by the span angle in degrees.
+
+        x has the correction's errors (fit 2.5e-7, table 2^-22, rounding 2^-19), times at most 1, and the
+        cut of its factor, 2^-18 times 0.42; y has the rounding of its factor, 2^-17, and twice T's errors
+        (fit 2.9e-6, table 2^-22, rounding 2^-18); CORDIC has the last step's angle, 2^-21, a cut of 2^-26 a
+        step, and the rounding of its 22 angles. Half the error of psi counts at either end, and that of
+        ``psi/(m-1)`` (17 leading bits of psi, 2^-19 over 0.159, and the reciprocal, 2^-17) at the far one;
+        both times cos beta, at most 1.
+        """
+        half = np.radians(angle) / 2
+        x = 2.5e-7 + 2.0**-22 + 2.0**-19 + 0.42 * 2.0**-18 + 2.0**-26
+        y = 2.0**-17 + 2 * (2.9e-6 + 2.0**-22 + 2.0**-18) + 2.0**-26
+        cordic = 2.0**-21 + 22 * 2.0**-26 * np.sqrt(2) + 22 * 2 * np.pi * 2.0**-29 + 2.0**-24
+        ends = np.minimum(half, np.pi / 2 - half) * HalfChord.RELATIVE_ERROR
+        ends = ends + 2 * half * (2.0**-19 / 0.159 + 2.0**-17)
+        acute = half <= np.pi / 4 * (1 + 1e-6)
+        return x + np.where(acute, np.sin(half), 1) * y + cordic + ends + 2 * np.pi * 4095 * 2.0**-40
+
+    def arccos_error(self, angle: float) -> float:
+        """Bound of the error of cos gamma with ``angle="arccos"``, for one span angle in degrees.
+
+        To `error` come the error of psi, half of which counts at either end, times cos beta, and the rounding
+        of psi for its step, 2^-19 turns. cos beta is at most 1, and a length that differs by 2^-17 adds its
+        quotient by the chord, up to sqrt 2. The cosine is off by 2^-17, its rounding, and by 2^-18 for either
+        length; psi has that, by arccos itself; the largest model error of the segments that such a cosine
+        may fall into, and their arithmetic error; 2^-16 for its last rounding and a relative ``2^-20 2 pi``
+        for that of ``1/(2 pi)``.
+        """
+        psi = np.radians(angle)
+        around = np.clip(np.cos(psi) + np.array([-1, 0, 1]) * (2.0**-16 + 2.0**-30), -1, 1)
+        segments = self.arccos._segment(np.abs(around), SEGMENT_BOUNDS[1:-1])
+        x = np.linspace(SEGMENT_BOUNDS[:-1], SEGMENT_BOUNDS[1:], 20001, axis=1)
+        x[:, -1] -= 2.0**-40
+        model = np.abs(self.arccos.polynomial(x) - np.arccos(x)).max(axis=1)
+        table = (model + self.arccos.arithmetic_error)[segments.min() : segments.max() + 1].max()
+        off = np.abs(np.arccos(around) - psi).max() + table + 2.0**-16
+        off += (psi + off) * 2.0**-20 * 2 * np.pi
+        chord = 2 * min(np.sin(psi / 2), np.cos(psi / 2))
+        cos_beta = min(1 + 2.0**-17 / max(chord, 2.0**-18), np.sqrt(2))
+        return self.error(angle) + cos_beta * (off / 2 + 2 * np.pi * 2.0**-19 + off * 2.0**-17)
+
+    @cached_property
+    def corrections(self) -> tuple[Fixed, Fixed]:
+        """Table of e over z from 0 to 1/2, ``1/(one sqrt(1 - z/one)) - 1``, and its rise to the next word."""
+        one = float(ONE_SQUARED.values)
+        start = np.arange(1 << self.ADDRESS_BITS) / (2 << self.ADDRESS_BITS)
+        width = start[1]
+
+        def function(z):
+            return 1 / (one * np.sqrt(1 - z / one)) - 1
+
+        return self._chords(function, start, width, self.CORRECTION_VALUE_FORMAT, self.CORRECTION_RISE_FORMAT)
+
+    @cached_property
+    def reciprocals(self) -> tuple[Fixed, Fixed]:
+        """Table of T over v from 0 to 1, ``1/(2 sqrt(v one))``, and its fall.
+
+        The words below 1/4 are met by ``w = 0`` alone and hold 0.
+        """
+        one = float(ONE_SQUARED.values)
+        start = np.arange(1 << self.ADDRESS_BITS) / (1 << self.ADDRESS_BITS)
+        width = start[1]
+        used = start >= 1 / 4
+
+        def function(v):
+            return 1 / (2 * np.sqrt(np.maximum(v, 1 / 4) * one))
+
+        value, fall = self._chords(
+            function, start, width, self.RECIPROCAL_VALUE_FORMAT, self.RECIPROCAL_FALL_FORMAT
+        )
+        return Fixed(value.format, value.codes * used), Fixed(fall.format, fall.codes * used)
+
+    @staticmethod
+    def _chords(
+        function: Callable[[np.ndarray], np.ndarray],
+        start: np.ndarray,
+        width: float,
+        value_format: Format,
+        change_format: Format,
+    ) -> tuple[Fixed, Fixed]:
+        """Lines of nearly least maximum error of a convex function: chords lowered by half their sag."""
+        low, middle, high = (function(start + width * part) for part in (0, 0.5, 1))
+        value = np.clip(low - ((low + high) / 2 - middle) / 2, 0, value_format.max_code * value_format.step)
+        return Fixed.round(value_format, value), Fixed.round(change_format, np.abs(high - low))
+
+    @cached_property
+    def directions(self) -> Fixed:
+        """``arctan 2^-i`` in turns, for each step of CORDIC."""
+        turns = np.arctan(2.0 ** -np.arange(self.CORDIC_STEPS)) / (2 * np.pi)
+        return Fixed.round(self.DIRECTION_FORMAT, turns)
+
+    @cached_property
+    def gain_terms(self) -> tuple[tuple[int, int], ...]:
+        """Signs and right shifts whose sum is the reciprocal of CORDIC's gain to 2^-28."""
+        rest = np.prod(1 / np.sqrt(1 + 4.0 ** -np.arange(self.CORDIC_STEPS)))
+        terms = []
+        while abs(rest) > 2.0**-28:
+            shift = int(-np.round(np.log2(abs(rest) / 1.06066)))
+            terms.append((int(np.sign(rest)), shift))
+            rest -= np.sign(rest) * 2.0**-shift
+        return tuple(terms)
+
+    def compute(
+        self, normal_left: Fixed, normal_right: Fixed, vector: Fixed, length: np.ndarray
+    ) -> tuple[Fixed, Fixed, Fixed, Fixed, np.ndarray]:
+        """Bit-true setup.
+
+        Parameters
+        ----------
+        normal_left, normal_right, vector : Fixed, shape (spans, 3), SQ(1, 17)
+            Unit vectors.
+        length : int array, shape (spans,)
+            Pixels, 1 to 4095.
+
+        Returns
+        -------
+        angle : Fixed, shape (spans,), UQ(0, 36)
+            psi in turns.
+        phase : Fixed, shape (spans,), SQ(0, 40)
+            lambda in turns.
+        step : Fixed, shape (spans,), UQ(0, 40)
+            ``psi/(m-1)`` in turns.
+        cos_beta : Fixed, shape (spans,), UQ(1, 25)
+        wide : bool array, shape (spans,)
+            Whether the normals are over `MAX_ANGLE` apart, and their plane is not to be trusted.
+
+        Raises
+        ------
+        ValueError
+            If an operand has another format or a length is out of range.
+        """
+        length = checked_lengths(length)
+        if {normal_left.format, normal_right.format, vector.format} != {COMPONENT}:
+            raise ValueError(f"operands must be {COMPONENT}")
+        dot = DotProduct().compute
+        own = dot(normal_left, normal_left) + dot(normal_right, normal_right)
+        cross = dot(normal_left, normal_right)
+        obtuse = cross.codes < 0
+        chord = own - Fixed(SQ(5, 34), np.abs(cross.codes)).scale(1).extend(SQ(6, 34))
+        chord = chord.saturate(self.CHORD_FORMAT)
+        left, right = dot(normal_left, vector), dot(normal_right, vector)
+        total, difference = (left + right).extend(SQ(6, 34)), (right - left).extend(SQ(6, 34))
+        major = Fixed(SQ(6, 34), np.where(obtuse, difference.codes, total.codes))
+        minor = Fixed(SQ(6, 34), np.where(obtuse, total.codes, difference.codes))
+        shift = HalfChord.shift(chord)
+        x, y = self._major(chord, major), self._minor(chord, minor, shift)
+        x, y = np.where(obtuse, y, x), np.where(obtuse, x, y)
+        radius, direction = self._polar(x, y)
+
+        if self.angle == "half_chord":
+            angle, angle_shift = HalfChord().compute(chord, obtuse), np.where(obtuse, 0, shift)
+        else:
+            angle, angle_shift = self._by_arccos(cross), np.zeros_like(shift)
+        cos_beta = sum(sign * (radius << 4 >> places) for sign, places in self.gain_terms)
+        cos_beta = Fixed(SQ(4, self.GAIN_BITS), cos_beta).round_half_up(25).saturate(self.COS_BETA_FORMAT)
+        half = angle.scale(-1).extend(UQ(0, 40))
+        phase = (direction.extend(self.PHASE_FORMAT) + half).wrap(self.PHASE_FORMAT)
+        step = self._step(angle, angle_shift, length)
+        wide = obtuse & (chord.truncate(self.SHORTEST_SUM.format.fraction_bits) < self.SHORTEST_SUM)
+        return angle, phase, step, cos_beta, wide
+
+    def _by_arccos(self, cross: Fixed) -> Fixed:
+        """Psi in turns, from the exact dot product of the normals."""
+        cosine = Fixed(cross.format, cross.codes + (cross.codes >> 16)).round_half_up(16)
+        radians, _ = self.arccos.compute(cosine.saturate(Arccos.OPERAND_FORMAT))
+        radians = radians.round_half_up(15).saturate(self.RADIANS_FORMAT)
+        return (radians * self.TURNS_PER_RADIAN).extend(self.ANGLE_FORMAT)
+
+    def _looked_up(self, table, bits: np.ndarray, width: int) -> tuple[Fixed, Fixed]:
+        """Word at the top bits, and its change times the bits below them."""
+        values, changes = table
+        address = bits >> (width - self.ADDRESS_BITS)
+        fraction = bits >> (width - self.ADDRESS_BITS - self.FRACTION_BITS) & ((1 << self.FRACTION_BITS) - 1)
+        change = Fixed(UQ(0, self.FRACTION_BITS), fraction) * changes[address]
+        return values[address], change.round_half_up(22)
+
+    def _major(self, chord: Fixed, major: Fixed) -> np.ndarray:
+        """``major/2 (1 + e)`` at 26 fraction bits."""
+        bits = np.minimum(chord.codes, (1 << 35) - 1)
+        value, change = self._looked_up(self.corrections, bits, 35)
+        correction = (value + change).round_half_up(18).saturate(self.CORRECTION_FORMAT)
+        half = major.scale(-1)
+        factor = half.truncate(17).saturate(COMPONENT)
+        product = (correction * factor).round_half_up(26)
+        return (half.truncate(26) + product).wrap(self.AXIS_FORMAT).codes
+
+    def _minor(self, chord: Fixed, minor: Fixed, shift: np.ndarray) -> np.ndarray:
+        """``minor 2^j T`` at 26 fraction bits."""
+        value, change = self._looked_up(self.reciprocals, chord.codes << 2 * shift, 36)
+        reciprocal = (value - change).round_half_up(17).saturate(self.RECIPROCAL_FORMAT)
+        shifted = Fixed(SQ(23, 34), minor.codes << shift).wrap(SQ(3, 34))
+        factor = shifted.round_half_up(16).saturate(self.MINOR_FORMAT)
+        return (reciprocal * factor).round_half_up(26).wrap(self.AXIS_FORMAT).codes
+
+    def _polar(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, Fixed]:
+        """Radius times CORDIC's gain at 26 fraction bits, and direction."""
+        behind = x < 0
+        x, y = np.where(behind, -x, x), np.where(behind, -y, y)
+        direction = np.where(behind, self.DIRECTION_FORMAT.min_code, 0)
+        for i, turn in enumerate(self.directions.codes.tolist()):
+            below = y < 0
+            x, y = np.where(below, x - (y >> i), x + (y >> i)), np.where(below, y + (x >> i), y - (x >> i))
+            direction = np.where(below, direction - turn, direction + turn)
+        return x, Fixed(SQ(3, 28), direction).wrap(self.DIRECTION_FORMAT)
+
+    def _step(self, angle: Fixed, shift: np.ndarray, length: np.ndarray) -> Fixed:
+        """``psi/(m-1)``, cut to 40 fraction bits; the reciprocal is that of `DifferenceSetup`."""
+        address, halvings = reciprocal_place(length - 1)
+        leading = Fixed(UQ(18, 36), angle.codes << shift).round_half_up(18).saturate(self.MANTISSA_FORMAT)
+        product = leading * DifferenceSetup().reciprocals[address]
+        # The table holds half of 1/f, and the product has 35 fraction bits.
+        return Fixed(self.STEP_FORMAT, product.codes << 6 >> (shift + halvings))

@@ -1,0 +1,52 @@
+"""Diffuse unit: the Lambert term, and whether the light is behind the surface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.number.fixed import UQ, Fixed, Format
+
+__all__ = ["Diffuse"]
+
+
+@dataclass(frozen=True)
+class Diffuse:
+    """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated to ``1 - 2^-17``.
+
+    17 bits, an operand of the colour multipliers. Unit vectors have the length ``ONE / 2^17``, so the term is
+    short by a relative 2^-16 (0.004 LSB of a full channel); the rounding adds 2^-18.
+
+    Parameters
+    ----------
+    operand_format : Format
+        Of ``N . L``, signed.
+
+    Source: [B] 4, [T] 6.
+    """
+
+    operand_format: Format = DotProduct().result_format
+
+    RESULT_FORMAT = UQ(0, 17)
+
+    def compute(self, cosine: Fixed) -> Fixed:
+        """Bit-true diffuse terms.
+
+        Parameters
+        ----------
+        cosine : Fixed, any shape, `operand_format`
+            ``N . L`` of two unit vectors.
+
+        Raises
+        ------
+        ValueError
+            If the operand has another format.
+        """
+        if cosine.format != self.operand_format:
+            raise ValueError(f"operand must be {self.operand_format}, not {cosine.format}")
+        return cosine.round_half_up(17).saturate(self.RESULT_FORMAT)
+
+    @staticmethod
+    def dark(cosine: Fixed) -> np.ndarray:
+        """Whether ``N . L <= 0``: no light at all, diffuse or specular, comes from behind the surface."""
+        return cosine.codes <= 0

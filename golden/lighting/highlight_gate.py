@@ -1,0 +1,222 @@
+"""Highlight gate: which spans can hold a visible highlight ([T] 4.2, figure 4.10)."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from blysk.golden.lighting.specular import MAX_EXPONENT, HighlightOperand, Specular
+from blysk.golden.methods.interpolator import Interpolator
+from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
+from blysk.golden.number.unit_vector import ONE_SQUARED
+
+__all__ = ["HighlightGate"]
+
+
+@dataclass(frozen=True)
+class HighlightGate:
+    """Whether a span may be lit: from ``a = N_l . H``, ``b = N_r . H`` and ``u = 1 - N_l . N_r``.
+
+    Along the great circle from ``N_l`` to ``N_r``, psi apart, the largest ``N . H`` is at an end, or inside
+    where ``b > a cos psi`` and ``a > b cos psi``, and then ``M = sqrt(a^2 + b^2 - 2 a b cos psi) / sin psi``.
+    With ``cos psi = 1 - u`` and d = a - b that is ``M^2 = (d^2 + 2 a b u) / (u (2 - u))``, in which nothing
+    cancels for psi tending to 0, and inside is ``max(a, b) u > |d|``. A span is lit where
+
+    - it is over 45 degrees, or wider than the method is meant for, or
+    - ``max(a, b)^2 >= T``, or
+    - ``max(a, b) u > |d|`` and ``d^2 >= u w``, with ``w = 2 T - 2 a b - T u``: that is ``M^2 >= T``.
+
+    T is the square of a threshold on N·H, from a PROM addressed by the exponent. No root, no division.
+
+    ======== ============= ===============================================================================
+    word     format        why
+    ======== ============= ===============================================================================
+    a, b     UQ(0, F)      cut, one step added; 0 where negative, saturated at the top
+    u        UQ(-1, F+1)   cut, three steps added
+    T        UQ(0, F)      cut; 0: every span is lit
+    w        UQ(1, F-1)    cut; where it is not positive, ``d^2 >= u w`` holds
+    products F + F bits    exact, as are the comparisons
+    ======== ============= ===============================================================================
+
+    F is 17; smaller words serve to check the decision exhaustively.
+
+    **No pixel of a span that is not lit has a specular term other than 0**, for unit normals and H from
+    `quantise`. Such a term changes no channel: the picture is the same to the bit.
+
+    1. *The curve.* Let omega be the square of the code of length 1, and ``cos psi = N_l.N_r / omega``, of the
+       codes. The exact curve is ``N(t) = alpha N_l + beta N_r`` with ``alpha = (1-t)(1 + k t)``,
+       ``beta = t (1 + k (1-t))``, ``k = 4h - 2``, ``h = 1/sqrt(2 (1 + cos psi)) >= 1/2``; both are at least 0
+       for t in [0, 1]. Hence ``N(t).H <= alpha a' + beta b'`` for all ``a' >= a``, ``b' >= b``. (Where
+       rounding makes ``cos psi > 1``, the unit takes k = 0, and the sum is at most max(a', b').) A straight
+       line has k = 0; points of the great circle, and straight lines between them, have factors like these.
+    2. *It stays inside the unit circle.* For unit vectors e_l, e_r psi apart, ``alpha e_l + beta e_r`` is the
+       same curve; along and across the bisector it is ``1 - s^2 (1 - c)`` and ``s sin(psi/2)``, s = 2t - 1,
+       ``c = cos(psi/2)``. Its squared length is ``1 - (1-c)^2 s^2 (1 - s^2) <= 1`` and its direction turns
+       from e_l to e_r. With the vector p of their plane for which ``p.e_l = a'``, ``p.e_r = b'``:
+       ``alpha a' + beta b' = p.(alpha e_l + beta e_r) <= max(0, m)``, m the maximum of p·e over the arc.
+       This holds whatever the lengths of the codes.
+    3. *The arc.* At a share x of it, ``p.e = (a' sin((1-x) psi) + b' sin(x psi)) / sin psi``. For a' and b'
+       not negative that is at least 0 and grows with a', with b', and with psi, as ``sin(x psi)/sin psi``
+       does on (0, pi). So m of the words is at least that of the exact values if every word is at least its
+       value.
+       a and b: a cut takes off less than the step that is added; where the top saturates, the word's square
+       is over every T. u: the cut takes off less than one step, and ``u/omega`` exceeds u by under 1.2 steps;
+       three are added. The maximum of p·e over the whole circle is ``|p| = M``; it is on the arc where
+       ``max(a', b') u > |d|``.
+    4. *The comparison.* T and w are cut, everything else is exact, so not lit gives ``m^2 < T``, also where m
+       is at an end. T is at most ``tau^2``, so ``m < tau`` and ``N(t).H < tau`` on the exact curve.
+    5. *The pipeline.* Each method states how far its pixels may be brighter than m
+       (`Interpolator.highlight_excess`, from the errors of its devices; 4.4 steps of
+       2^-17 for quadratic normals): it has no N·H over ``m + excess``, no 1 - N·H under
+       ``shortest (1 - m) - excess``. x, the largest argument to which the specular unit may give a term, in
+       steps of 2^-25, follows from its PROM in integers (`HighlightOperand.last_lit_arguments`). So tau is
+       such that ``shortest (1 - tau) - excess`` is x and a step more, the excess rounded up to whole steps
+       (`margin`). The argument falls with N·H, and beyond x the term is 0. ∎
+
+    The margins cost little: for quadratic normals, a span is let through only if
+    ``M^2 >= tau^2 - 10 * 2^-17``.
+
+    Ends must be unit vectors as `quantise` makes them. With N·H of straight or quadratic normals a search
+    over all models lost no highlight for ends up to 1/128 longer, or shorter; other methods lose some where
+    ends are 8 to 128 steps of 2^-17 too short or too long.
+
+    An exponent under which the unit shades nothing 0 up to N·H = tau <= 0 (1; 2 and 3 for wide models) has
+    T = 0.
+
+    Parameters
+    ----------
+    specular : Specular or Power
+        The unit that is gated.
+    fraction_bits : int
+        F, 5 to 17.
+    interpolator : Interpolator
+        The method that finds the pixels' operands.
+
+    Raises
+    ------
+    ValueError
+        If the number of bits is out of range.
+
+    Source: [T] 4.2, figure 4.10.
+    """
+
+    specular: HighlightOperand = field(default_factory=Specular)
+    fraction_bits: int = 17
+    interpolator: Interpolator = field(default_factory=QuadraticInterpolator)
+
+    def __post_init__(self):
+        if not 5 <= self.fraction_bits <= 17:
+            raise ValueError(f"fraction_bits must be 5 to 17, not {self.fraction_bits}")
+
+    @property
+    def margin(self) -> float:
+        """The method's excess in whole steps of 2^-17."""
+        return float(np.ceil(self.interpolator.highlight_excess * 2.0**17) * 2.0**-17)
+
+    @property
+    def component_format(self) -> Format:
+        """Format of a component of the normals and of H."""
+        return SQ(1, self.fraction_bits)
+
+    @property
+    def dot_product(self) -> DotProduct:
+        """Parameters of the dot products."""
+        return DotProduct(self.component_format, self.component_format)
+
+    @property
+    def one_squared(self) -> Fixed:
+        """Dot product of a unit vector with itself."""
+        one = Fixed(self.component_format, self.component_format.max_code)
+        return one * one
+
+    @property
+    def level_format(self) -> Format:
+        """Format of a, b and T."""
+        return UQ(0, self.fraction_bits)
+
+    @property
+    def angle_format(self) -> Format:
+        """Format of u."""
+        return UQ(-1, self.fraction_bits + 1)
+
+    @property
+    def widest(self) -> Fixed:
+        """Largest cut ``u`` of which the exact one is under that of the method's `gate_angle` for certain."""
+        limit = self.one_squared.values * (1 - np.cos(np.radians(self.interpolator.gate_angle)))
+        return Fixed(self.angle_format, int(limit / self.angle_format.step) - 1)
+
+    @cached_property
+    def thresholds(self) -> Fixed:
+        """The PROM: T for exponents 0 to 1023."""
+        nearest = (self.specular.last_lit_arguments + 1) * 2.0**-25
+        level = float(ONE_SQUARED.values) - (nearest + self.margin) / self.interpolator.shortest_normal
+        # In steps of 2^-34; one less, as the quotient is not exact.
+        level = np.floor(level * 2.0**34).astype(np.int64) - 1
+        # Squares of 34 bits outgrow an int64.
+        codes = [max(code, 0) ** 2 >> (68 - self.fraction_bits) for code in level.tolist()]
+        return Fixed(self.level_format, codes)
+
+    def decide(self, a: Fixed, b: Fixed, u: Fixed, threshold: Fixed) -> np.ndarray:
+        """Whether the maximum over the arc may reach the threshold: the comparisons alone.
+
+        Parameters
+        ----------
+        a, b : Fixed, any shape, UQ(0, F)
+            N·H at the ends, rounded up.
+        u : Fixed, same shape, UQ(-1, F+1)
+            One minus the cosine of the angle between them, rounded up.
+        threshold : Fixed, same shape, UQ(0, F)
+            T.
+
+        Returns
+        -------
+        bool array, same shape
+        """
+        f = self.fraction_bits
+        large = np.maximum(a.codes, b.codes)
+        difference = np.abs(a.codes - b.codes)
+        inside = large * u.codes > difference << (f + 1)
+        slack = (threshold.codes << (f + 2)) - threshold.codes * u.codes - (a.codes * b.codes << 2)
+        slack = slack >> (f + 2)
+        reached = (slack <= 0) | (difference * difference >= u.codes * slack)
+        return (large * large >= threshold.codes << f) | (inside & reached)
+
+    def compute(
+        self, normal_left: Fixed, normal_right: Fixed, halfway: Fixed, exponent: int | np.ndarray
+    ) -> np.ndarray:
+        """Bit-true decisions.
+
+        Parameters
+        ----------
+        normal_left, normal_right : Fixed, shape (spans, 3), SQ(1, F)
+            Unit normals of the ends.
+        halfway : Fixed, shape (3,) or (spans, 3), SQ(1, F)
+            Unit half-way vector.
+        exponent : int or int array, shape (spans,)
+            1 to 1000.
+
+        Returns
+        -------
+        bool array, shape (spans,)
+            False: every pixel of the span has a specular term of 0.
+
+        Raises
+        ------
+        ValueError
+            If an operand has another format or an exponent is out of range.
+        """
+        exponent = np.asarray(exponent, dtype=np.int64)
+        if exponent.size and not 1 <= exponent.min() <= exponent.max() <= MAX_EXPONENT:
+            raise ValueError(f"exponents must be 1 to {MAX_EXPONENT}")
+        dot, angle = self.dot_product, self.angle_format
+        difference = self.one_squared - dot.compute(normal_left, normal_right)
+        cut = difference.truncate(angle.fraction_bits).saturate(angle)
+        u = Fixed(angle, np.minimum(cut.codes + 3, angle.max_code))
+        a, b = (self._level(dot.compute(normal, halfway)) for normal in (normal_left, normal_right))
+        return (cut > self.widest) | self.decide(a, b, u, self.thresholds[exponent])
+
+    def _level(self, cosine: Fixed) -> Fixed:
+        step = Fixed(self.level_format, 1)
+        return (cosine.truncate(self.fraction_bits) + step).saturate(self.level_format)

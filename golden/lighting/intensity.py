@@ -1,0 +1,121 @@
+"""Intensity unit: ambient, diffuse and specular light of a pixel, in three channels ([T] figure 4.10)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.number.fixed import UQ, Fixed
+
+__all__ = ["MAX_INTENSITY", "MAX_LIGHTS", "Intensity"]
+
+MAX_INTENSITY = 8
+"""Largest intensity of a term; 1 is the full channel."""
+
+MAX_LIGHTS = 16
+"""Largest number of lights."""
+
+
+@dataclass(frozen=True)
+class Intensity:
+    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` a channel, saturated to 255 and rounded half up.
+
+    The products ``k I`` come as *colour operands* in LSB of the 8-bit channel: ``UQ(11, 6)``, 17 bits for
+    the multipliers, so a term may reach 2047.98 LSB, eight times the full channel. The sum is exact; the
+    only roundings are those of the operands, 2^-7 LSB each times a term of at most 1, and the last, 1/2 LSB.
+
+    Parameters
+    ----------
+    lights : int
+        Number of lights, 0 to 16.
+    has_specular : bool
+        Whether there are specular terms; else they must be 0.
+    channels : int
+        3, or 1: red's colour operands count for every channel.
+
+    Raises
+    ------
+    ValueError
+        If the number of lights or channels is out of range.
+
+    Source: [B] 4 and 5, [T] figure 4.10.
+    """
+
+    lights: int = 1
+    has_specular: bool = True
+    channels: int = 3
+
+    COLOR_FORMAT = UQ(11, 6)
+    TERM_FORMAT = UQ(0, 17)
+    RESULT_FORMAT = UQ(8, 0)
+
+    def __post_init__(self):
+        if not 0 <= self.lights <= MAX_LIGHTS:
+            raise ValueError(f"lights must be 0 to {MAX_LIGHTS}, not {self.lights}")
+        if self.channels not in (1, 3):
+            raise ValueError(f"channels must be 1 or 3, not {self.channels}")
+
+    @classmethod
+    def color(cls, intensity: np.ndarray) -> np.ndarray:
+        """Codes of colour operands for intensities (1 is the full channel).
+
+        Raises
+        ------
+        ValueError
+            If an intensity is negative, not finite, or over 8.
+        """
+        intensity = np.asarray(intensity, dtype=np.float64)
+        if not np.all((intensity >= 0) & (intensity <= MAX_INTENSITY)):
+            raise ValueError(f"the intensity of a term must be 0 to {MAX_INTENSITY}")
+        return Fixed.round(cls.COLOR_FORMAT, intensity * 255).codes
+
+    def compute(
+        self, ambient: Fixed, diffuse_color: Fixed, specular_color: Fixed, diffuse: Fixed, specular: Fixed
+    ) -> np.ndarray:
+        """Bit-true channels.
+
+        Parameters
+        ----------
+        ambient : Fixed, shape (3,), UQ(11, 6)
+            Ambient colour operand.
+        diffuse_color, specular_color : Fixed, shape (lights, 3), UQ(11, 6)
+            Colour operands of each light.
+        diffuse, specular : Fixed, shape (pixels, lights), UQ(0, 17)
+            Terms of each light.
+
+        Returns
+        -------
+        uint8 array, shape (pixels, 3)
+
+        Raises
+        ------
+        ValueError
+            If an operand has another format.
+        """
+        for color in (ambient, diffuse_color, specular_color):
+            if color.format != self.COLOR_FORMAT:
+                raise ValueError(f"colour operands must be {self.COLOR_FORMAT}, not {color.format}")
+        for term in (diffuse, specular):
+            if term.format != self.TERM_FORMAT:
+                raise ValueError(f"terms must be {self.TERM_FORMAT}, not {term.format}")
+        # At most 32 products and an ambient term of 34 bits each: 40 bits, far from an int64's end.
+        fraction_bits = self.COLOR_FORMAT.fraction_bits + self.TERM_FORMAT.fraction_bits
+        total = diffuse.codes @ diffuse_color.codes + specular.codes @ specular_color.codes
+        total = total + (ambient.codes << self.TERM_FORMAT.fraction_bits)
+        total = Fixed(UQ(17, fraction_bits), total).round_half_up(0).saturate(self.RESULT_FORMAT)
+        color = total.codes.astype(np.uint8)
+        return color if self.channels == 3 else np.repeat(color[:, :1], 3, axis=-1)
+
+    def clocks(self, diffuse: Fixed, specular: Fixed) -> np.ndarray:
+        """Clocks that each pixel takes in the unit's compact style: ``channels max(1, terms not 0)``.
+
+        Parameters
+        ----------
+        diffuse, specular : Fixed, shape (pixels, lights), UQ(0, 17)
+            Terms of each light.
+
+        Returns
+        -------
+        int64 array, shape (pixels,)
+        """
+        terms = np.concatenate([diffuse.codes, specular.codes], axis=-1)
+        return self.channels * np.maximum(np.count_nonzero(terms, axis=-1), 1)

@@ -1,0 +1,404 @@
+"""Specular unit: the cosine-quadratic model with its cutoff ([T] figures 3.6 and 3.7), and its kin."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.number.fixed import UQ, Fixed, Format
+from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.reference.reflection import COSCOS_MODELS, coscos_scale, slope
+
+__all__ = ["FURTHER_MODELS", "MAX_EXPONENT", "SPECULAR_MODELS", "Chords", "HighlightOperand", "Specular"]
+
+MAX_EXPONENT = 1000
+"""Largest specular exponent."""
+
+SPECULAR_MODELS = ("cosquad", "cosquad7", "cosquad_lin")
+"""Reflection models of the documents that the unit serves, all of one latency."""
+
+# a and b of the slope k = a n + b, None where a table holds k; and how often the base is squared.
+_MODELS = {
+    "cosquad": ((1 / 2, 0.0), 1),
+    "cosquad7": ((7 / 16, 0.0), 1),
+    "cosquad_lin": ((0.448, 0.099), 1),
+    "cosquad_q": (None, 1),
+    "cosquad_lin_refitted": ((0.44813, 0.10235), 1),
+    "lyon1_refitted": ((0.3557, 0.2457), 1),
+    "lyon2": ((1 / 4, 0.0), 2),
+    "lyon2_refitted": ((0.2113, 0.1468), 2),
+    "lyon3": ((1 / 8, 0.0), 3),
+    "lyon3_refitted": ((0.1150, 0.0799), 3),
+    "exp": ((math.log2(math.e) / 16, 0.0), 0),
+    "coscos2": ((4 / math.pi**2, 0.0), 1),
+    "coscos4": ((2 / math.pi**2, 0.0), 2),
+    "coscos2_integral": (None, 1),
+    "coscos4_integral": (None, 2),
+}
+
+FURTHER_MODELS = tuple(model for model in _MODELS if model not in SPECULAR_MODELS)
+"""Reflection models that the unit serves beside those: more squarers, tables of a slope or a curve."""
+
+
+class HighlightOperand:
+    """What the units of a highlight share: their operand, and what they refuse.
+
+    A subclass has a field ``operand``. ``"cosine"``: the unit takes ``N . H`` of two unit vectors in
+    ``SQ(4, 34)`` and subtracts it from `ONE_SQUARED`. ``"one_minus_cosine"``: it takes ``1 - cos gamma`` in
+    ``UQ(1, 25)``.
+    """
+
+    operand: str
+
+    ARGUMENT_FORMAT = UQ(1, 25)
+    RESULT_FORMAT = UQ(0, 17)
+    EXPONENT_BITS = 10
+
+    def __post_init__(self):
+        if self.operand not in ("cosine", "one_minus_cosine"):
+            raise ValueError(f"operand must be 'cosine' or 'one_minus_cosine', not {self.operand!r}")
+
+    @property
+    def operand_format(self) -> Format:
+        """Format of the input."""
+        return DotProduct().result_format if self.operand == "cosine" else self.ARGUMENT_FORMAT
+
+    def one_minus(self, operand: Fixed, exponent: int) -> Fixed:
+        """One minus the cosine, exact, of an operand and an exponent that are in range.
+
+        Raises
+        ------
+        ValueError
+            If the operand has another format or the exponent is out of range.
+        """
+        if operand.format != self.operand_format:
+            raise ValueError(f"operand must be {self.operand_format}, not {operand.format}")
+        if not 1 <= exponent <= MAX_EXPONENT:
+            raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {exponent}")
+        return ONE_SQUARED - operand if self.operand == "cosine" else operand
+
+    @property
+    def last_lit_arguments(self) -> np.ndarray:
+        """Largest ``1 - cos gamma``, in steps of 2^-25, that may give a term over 0, for each exponent.
+
+        int64 array, shape (1024,); 2^27 where every argument may.
+        """
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Chords:
+    """A monotone function by chords: a table of starts and steps, between which 11 bits interpolate.
+
+    Parameters
+    ----------
+    start, step : Fixed, shape (entries,)
+        Value at the start of each interval, and how far it is to the next; as many fraction bits.
+    rising : bool
+        Whether the steps are added, else subtracted.
+    """
+
+    start: Fixed
+    step: Fixed
+    rising: bool
+
+    INTERPOLATION_FORMAT = UQ(0, 11)
+
+    @classmethod
+    def of(cls, ends: np.ndarray, start_format: Format, step_format: Format) -> "Chords":
+        """Chords between the values at the ends of equal intervals."""
+        codes = Fixed.round(start_format, ends).codes
+        rising = bool(codes[-1] > codes[0])
+        return cls(
+            Fixed(start_format, codes[:-1]),
+            Fixed(step_format, np.diff(codes) if rising else -np.diff(codes)),
+            rising,
+        )
+
+    def compute(self, code: np.ndarray) -> Fixed:
+        """Bit-true values: the code's low 11 bits interpolate, those above are the address."""
+        format = self.INTERPOLATION_FORMAT
+        address = code >> format.width
+        way = self.step[address] * Fixed(format, code & format.max_code)
+        way = way.truncate(self.start.format.fraction_bits).codes
+        start = self.start.codes[address]
+        return Fixed(self.start.format, start + way if self.rising else start - way)
+
+
+def _lowered(function, entries: int) -> np.ndarray:
+    """Ends of chords of a convex function on [0, 1], lowered by half of what the chords are too high."""
+    ends = function(np.arange(entries + 1) / entries)
+    high = (ends[1:] + ends[:-1]) / 2 - function((np.arange(entries) + 0.5) / entries)
+    return np.maximum(ends - (np.r_[high[0], high] + np.r_[high, high[-1]]) / 4, 0)
+
+
+@dataclass(frozen=True)
+class Specular(HighlightOperand):
+    """``max(1 - k (1 - cos gamma), 0)^p`` with ``k = a n + b`` and p = 2, 4 or 8, by model and exponent n.
+
+    ``cosquad_q`` reads k from a table of 1024 words; the models of Lyon square once, twice or three times.
+    ``exp`` is ``exp(-n (1 - cos gamma)) = 2^(-16 p)`` with ``p = k (1 - cos gamma)``, ``k = n log2(e)/16``:
+    the whole part of 16 p is a shift, its fraction addresses a table of 64 values of ``2^-f`` between
+    which 11 bits interpolate.
+
+    ``coscos2`` and ``coscos4`` are ``cos^k(a gamma)``, of a base ``cos(a gamma) = cos(pi/2 sqrt w)`` with
+    ``w = (2 a gamma / pi)^2``: no root and no arccos, because both the square of gamma and the cosine of a
+    root are smooth. ``gamma^2 = 2 x (1 + e)`` with ``x = 1 - cos gamma``, and e, 0 at the peak, comes from a
+    table of 128 chords over x in [0, 2). So ``w = p + p e`` with ``p = k x``, ``k = 8 a^2 / pi^2``: by
+    Taylor's rule ``4 n / pi^2`` and ``2 n / pi^2``, by equal integrals from a table of 1024 words. The base
+    is 64 chords over w in [0, 1); from w = 1 on the term is 0.
+
+    The slope is normalised to ``k = K 2^s`` with K in [1/2, 1), and ``1 - cos gamma`` shifted by s before
+    the multiplier, so that both its operands keep their 17 bits at every exponent.
+
+    ============= ========== ===================================================================
+    word          format     why
+    ============= ========== ===================================================================
+    1 - cos gamma UQ(1, 25)  at n = 1000 the shift takes up 9 of the fraction bits; saturates
+    k             UQ(9, 18)  at most 511.5; ``n/2`` and ``7n/16`` are exact
+    K             UQ(0, 17)  multiplier operand; cut
+    shifted       UQ(1, 16)  multiplier operand; cut, saturates (anything from 1/K on is dark)
+    base          UQ(0, 17)  ``1 - 2^-17 - p`` is the product p, cut, with its bits inverted
+    squares       UQ(0, 17)  cut
+    16 p          UQ(5, 17)  of ``exp``
+    table         UQ(0, 19)  chords of ``2^-f`` or the cosine, lowered by half of what they are too high
+    e             UQ(1, 18)  chords; multiplier operand, cut to UQ(1, 16)
+    p, w          UQ(0, 17)  of ``coscos``; cut
+    result        UQ(0, 17)  operand of the colour multipliers; cut
+    ============= ========== ===================================================================
+
+    The PROM holds for each exponent the largest shifted argument whose base reaches the cutoff: `CUTOFF`
+    where the base is squared once, for the others what gives a term of 2^-14 too. A lit base has ``p < 1``
+    and ``w < 1``, so that nothing wraps. The comparison is made before the square, never on it, so the
+    parabola's second lobe cannot come through. What it drops is under ``CUTOFF^2 = 2^-14``: 1/64 LSB at
+    intensity 1, 1/8 LSB at the largest, 8.
+
+    Arithmetic error of the result for an exact argument, at most `ERROR`: base is off by 2^-16 each from
+    the argument, its shift and K, and by 2^-17 from the product; the square doubles it; the result adds
+    2^-17. Each further square doubles what it gets and adds 2^-17: at most `error`, 2^-12 and 2^-11.
+
+    Error of ``exp``: what is off by a share of p (K, the slope) is multiplied by ``p 2^(-16 p) <= 0.034``;
+    the cuts of the argument and its shift, under ``2^-16 + 2^-18``, times ``16 ln 2``, are 2.2e-4; the chords
+    add 7.3e-6, roundings and the rest under 2e-5: at most ``2^-12 + 2^-15``.
+
+    Error of ``coscos``: every cut makes w smaller, together by less than ``2^-16 K (1 + e) + 2^-17 (1 + e) +
+    2^-17 w / K + 2^-16 p + 2^-17`` and what the slope is off by, which is 2^-15 at the peak. There the term
+    falls fastest with w, by 2.47 (k = 2) or 4.93 (k = 4); the chords of the base are too high by at most
+    1.11e-5, which counts two or four times. The sum is largest next to the peak, 9.8e-5 and 2.0e-4: at most
+    2^-13 and 2^-12. The chords of e make w larger, by less than 1.1e-5 up to a right angle and 8e-5 up to
+    x = 1.7, where the term falls slowly. Towards x = 2 they fail, as e has a root's end there; only n = 1
+    with k = 4 has light beyond 1.7, under 0.03, and the fourth power makes the error small again: measured,
+    8e-6.
+
+    Parameters
+    ----------
+    model : str
+        One of `SPECULAR_MODELS` or `FURTHER_MODELS`.
+    operand : str
+        ``"cosine"`` or ``"one_minus_cosine"``; see `HighlightOperand`.
+    as_documented : bool
+        The comparator of figure 3.6 as drawn, for `SPECULAR_MODELS`: it compares the *square*, with 2^-14 at
+        every exponent. Up to the base's zero the terms are those of the default to the bit. Past it the
+        parabola rises again and its second lobe comes through; squares over 1 saturate, so that from
+        ``k (1 - cos gamma) = 2`` on the surface is as bright as at the peak: at n = 20 from 37 degrees on.
+        A highlight gate for such a unit lets every span through.
+
+    Raises
+    ------
+    ValueError
+        If the model is not one of those or not one that is documented so, or the operand is unknown.
+
+    Source: [T] 3.1 and 3.4, figures 3.6 and 3.7; [C] for ``cosquad_lin`` and ``cosquad_q``; Lyon 1993;
+    numbers.md, "Traps in the documents".
+    """
+
+    model: str = "cosquad"
+    operand: Literal["cosine", "one_minus_cosine"] = "cosine"
+    as_documented: bool = False
+
+    SLOPE_FORMAT = UQ(9, 18)
+    SCALE_FORMAT = UQ(0, 17)
+    SHIFTED_FORMAT = UQ(1, 16)
+    WIDE_FORMAT = UQ(2, 16)
+    BASE_FORMAT = UQ(0, 17)
+    CUTOFF = 1 / 128
+    ERROR = 2.0**-13
+
+    def __post_init__(self):
+        if self.model not in _MODELS:
+            raise ValueError(f"the specular unit serves {', '.join(_MODELS)}, not {self.model!r}")
+        if self.as_documented and self.model not in SPECULAR_MODELS:
+            raise ValueError(f"as_documented is of {', '.join(SPECULAR_MODELS)}, not of {self.model}")
+        super().__post_init__()
+
+    @property
+    def is_coscos(self) -> bool:
+        """Whether the model is a power of ``cos(a gamma)``."""
+        return self.model in COSCOS_MODELS
+
+    @property
+    def squarings(self) -> int:
+        """How often the base is squared: 1 to 3, 0 for ``exp``."""
+        return _MODELS[self.model][1]
+
+    @property
+    def error(self) -> float:
+        """Largest arithmetic error of the model."""
+        return (2.0**-12 + 2.0**-15, self.ERROR, 2.0**-12, 2.0**-11)[self.squarings]
+
+    @property
+    def cutoff(self) -> Fixed:
+        """Smallest base that is not cut off: what it leads to is 2^-14 at most."""
+        if self.model == "exp":
+            return Fixed(self.BASE_FORMAT, self.BASE_FORMAT.code(1 / 8))
+        return Fixed(self.BASE_FORMAT, math.floor(2.0 ** (17 - 14 / 2**self.squarings)))
+
+    @property
+    def slope_terms(self) -> tuple[Fixed, Fixed] | None:
+        """``a`` and ``b`` of the slope ``k = a n + b``, in words of the hardware; None: a table holds k."""
+        line, _ = _MODELS[self.model]
+        if line is None:
+            return None
+        a, b = line
+        return Fixed.round(UQ(0, 19), a), Fixed.round(UQ(0, 18), b)
+
+    @cached_property
+    def slopes(self) -> Fixed:
+        """Slope k for exponents 0 to 1023; 0 at 0 where a table holds it."""
+        exponents = np.arange(1 << self.EXPONENT_BITS)
+        if self.slope_terms is None:
+            return Fixed.round(self.SLOPE_FORMAT, [0.0, *map(self._slope, exponents[1:].tolist())])
+        a, b = self.slope_terms
+        total = (a * Fixed(UQ(self.EXPONENT_BITS, 0), exponents)).truncate(18) + b
+        return total.wrap(self.SLOPE_FORMAT)
+
+    def _slope(self, exponent: int) -> float:
+        if self.is_coscos:
+            return 8 * (coscos_scale(exponent, *COSCOS_MODELS[self.model]) / math.pi) ** 2
+        return slope(self.model, exponent)
+
+    def scale(self, exponent: np.ndarray) -> tuple[Fixed, np.ndarray]:
+        """``K`` and ``s`` of the slope ``k = K 2^s``, for exponents 0 to 1023.
+
+        Returns
+        -------
+        scale : Fixed, UQ(0, 17)
+            ``K``, at least 1/2 where k is at least 1/4.
+        shift : int array
+            ``s``, -1 to 9.
+        """
+        code = self.slopes.codes[exponent]
+        shift = np.full_like(code, -1)
+        for s in range(10):
+            shift[code >> (s + 17) > 0] = s
+        return Fixed(self.SCALE_FORMAT, (code << (9 - shift) >> 10) & self.SCALE_FORMAT.max_code), shift
+
+    @cached_property
+    def chords(self) -> Chords:
+        """Table of ``exp``, ``2^-f``, or of ``coscos``, ``cos(pi/2 sqrt w)``: 64 chords."""
+        if self.model == "exp":
+            return Chords.of(_lowered(lambda f: 2.0**-f, 64), UQ(0, 19), UQ(-6, 19))
+        return Chords.of(_lowered(lambda w: np.cos(math.pi / 2 * np.sqrt(w)), 64), UQ(0, 19), UQ(-5, 19))
+
+    @cached_property
+    def excess(self) -> Chords:
+        """Table of ``coscos``: ``e = gamma^2 / (2 x) - 1``, 128 chords over x in [0, 2)."""
+        x = np.arange(1, 129) / 64
+        return Chords.of(np.r_[0, np.arccos(1 - x) ** 2 / (2 * x) - 1], UQ(1, 18), UQ(-1, 18))
+
+    @cached_property
+    def boundaries(self) -> Fixed:
+        """The PROM: largest shifted argument that is not cut off, for exponents 0 to 1023.
+
+        As documented no argument is cut off for certain, and the unit has no PROM.
+        """
+        format = self.SHIFTED_FORMAT
+        exponent = np.arange(1 << self.EXPONENT_BITS)
+        scale, shift = self.scale(exponent)
+        if self.as_documented:
+            return Fixed(format, np.full(exponent.shape, format.max_code))
+        if not self.is_coscos:
+            largest = self.BASE_FORMAT.max_code - self.cutoff.codes
+            codes = (((largest + 1) << 16) - 1) // np.maximum(scale.codes, 1)
+            return Fixed(format, np.minimum(codes, format.max_code))
+        # By halving: the base falls with the argument, of which the last that gives a shifted one counts.
+        boundary = np.zeros_like(exponent)
+        for bit in reversed(range(format.width)):
+            shifted = boundary | 1 << bit
+            last = np.minimum(((shifted + 1 << 10) - 1) >> (shift + 1), self.ARGUMENT_FORMAT.max_code)
+            base = self._cosine(Fixed(self.ARGUMENT_FORMAT, last), Fixed(format, shifted) * scale)
+            boundary = np.where(base >= self.cutoff.codes, shifted, boundary)
+        return Fixed(format, boundary)
+
+    @property
+    def last_lit_arguments(self):
+        """From the PROM, in integers."""
+        _, shift = self.scale(np.arange(1 << self.EXPONENT_BITS))
+        boundary = self.boundaries.codes
+        arguments = (((boundary + 1) << 10) - 1) >> (shift + 1)
+        arguments[boundary == self.SHIFTED_FORMAT.max_code] = 1 << 27
+        return arguments
+
+    def compute(self, operand: Fixed, dark: np.ndarray, exponent: int) -> Fixed:
+        """Bit-true specular terms.
+
+        Parameters
+        ----------
+        operand : Fixed, any shape
+            ``cos gamma`` or ``1 - cos gamma`` in `operand_format`; a cosine in units of `ONE_SQUARED`.
+        dark : bool array, same shape
+            Whether the light is behind the surface: the result is 0.
+        exponent : int
+            1 to 1000.
+
+        Returns
+        -------
+        Fixed, same shape, UQ(0, 17)
+
+        Raises
+        ------
+        ValueError
+            If the operand has another format or the exponent is out of range.
+        """
+        argument = self.one_minus(operand, exponent).truncate(25).saturate(self.ARGUMENT_FORMAT)
+        scale, shift = self.scale(np.int64(exponent))
+        shifted = Fixed(UQ(10, 26), argument.codes << (shift + 1)).truncate(16)
+        lit = ~np.asarray(dark, dtype=bool)
+        if self.as_documented:
+            return self._drawn(shifted.saturate(self.WIDE_FORMAT) * scale, lit)
+        shifted = shifted.saturate(self.SHIFTED_FORMAT)
+        lit &= shifted <= self.boundaries[exponent]
+        product = shifted * scale
+        if self.model == "exp":
+            return self._exponential(product.truncate(21).scale(4), lit)
+        if self.is_coscos:
+            base = self._cosine(argument, product)
+        else:
+            base = self.BASE_FORMAT.max_code - product.truncate(17).codes
+        base = Fixed(self.BASE_FORMAT, np.where(lit, base, 0))
+        for _ in range(self.squarings):
+            base = (base * base).truncate(17)
+        return base
+
+    def _drawn(self, product: Fixed, lit: np.ndarray) -> Fixed:
+        """Square of a base of either sign, where the square reaches the cutoff's."""
+        p, largest = product.truncate(17).codes, self.BASE_FORMAT.max_code
+        base = np.where(p <= largest, largest - p, np.minimum(p - largest - 1, largest))
+        base = Fixed(self.BASE_FORMAT, np.where(lit, base, 0))
+        square = (base * base).truncate(17)
+        return Fixed(self.RESULT_FORMAT, np.where(square.values >= self.CUTOFF**2, square.codes, 0))
+
+    def _cosine(self, argument: Fixed, product: Fixed) -> np.ndarray:
+        """Codes of ``cos(a gamma)``, from ``w = p + p e``; that of the largest w beyond it."""
+        p = product.truncate(17).saturate(self.BASE_FORMAT)
+        e = self.excess.compute(argument.codes >> 8).truncate(16)
+        w = (p + p * e).truncate(17).saturate(self.BASE_FORMAT)
+        return self.chords.compute(w.codes).truncate(17).codes
+
+    def _exponential(self, power: Fixed, lit: np.ndarray) -> Fixed:
+        """``2^-power`` where lit, else 0."""
+        whole, value = power.codes >> 17, self.chords.compute(power.codes & 0x1FFFF)
+        return Fixed(self.RESULT_FORMAT, np.where(lit, value.codes >> (whole + 2), 0))

@@ -1,0 +1,1 @@
+"""Interpolation methods: from a span to the operands of its pixels."""

@@ -1,0 +1,62 @@
+"""The angular method ([T] 3.1, 3.2): cosines of angles that grow evenly along the great circle."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from blysk.golden.cosines.angular_setup import AngularSetup
+from blysk.golden.cosines.highlight_cosine import HighlightCosine
+from blysk.golden.methods.interpolator import Interpolator, Operands, pixels_of
+from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.unit_vector import COMPONENT
+
+__all__ = ["AngularInterpolator"]
+
+
+@dataclass(frozen=True)
+class AngularInterpolator(Interpolator):
+    """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, for L and H of each light.
+
+    Formats and error bounds are those of `AngularSetup` and
+    `HighlightCosine`. N·L is 1 less the result, ``SQ(2, 25)``. Spans over 150
+    degrees are flagged.
+
+    Parameters
+    ----------
+    setup : AngularSetup
+        The unit that finds the angles.
+
+    Source: [T] 3.1, 3.2.
+    """
+
+    setup: AngularSetup = field(default_factory=AngularSetup)
+
+    operand: ClassVar = "one_minus_cosine"
+    COSINE_FORMAT = SQ(2, 25)
+    MAX_ANGLE = AngularSetup.MAX_ANGLE
+    CURVE = "slerp"
+
+    @property
+    def highlight_excess(self):
+        """Errors of the setup, of the cosine and of its cut: ``cos gamma(t)`` is the great circle's."""
+        angles = np.linspace(1e-4, self.gate_angle, 1000)
+        setup = AngularSetup.error(angles).max()
+        return float(setup) + HighlightCosine.ERROR + HighlightCosine.RESULT_FORMAT.step
+
+    def compute(self, normal_left, normal_right, length, direction, halfway):
+        """Bit-true operands."""
+        place = pixels_of(length)
+
+        def along(vector):
+            vector = Fixed(COMPONENT, np.broadcast_to(vector, normal_left.codes.shape))
+            _, phase, step, cos_beta, wide = self.setup.compute(normal_left, normal_right, vector, length)
+            return HighlightCosine().compute(phase, step, cos_beta, *place).codes, wide
+
+        one = Fixed(UQ(1, 25), 1 << 25)
+        results = [[along(vector) for vector in vectors.codes] for vectors in (direction, halfway)]
+        cosine, highlight = (
+            Fixed(HighlightCosine.RESULT_FORMAT, np.stack([codes for codes, _ in light], axis=-1))
+            for light in results
+        )
+        return Operands(one - cosine, highlight, results[0][0][1])

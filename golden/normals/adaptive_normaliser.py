@@ -1,0 +1,264 @@
+"""Adaptive normaliser: a span bisected until straight lines will do ([T] figure 2.7)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from blysk.golden.methods.interpolator import pixels_of
+from blysk.golden.normals.bisection import Bisection
+from blysk.golden.normals.difference_setup import DifferenceSetup, checked_lengths, reciprocal_place
+from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.number.unit_vector import COMPONENT
+
+__all__ = ["AdaptiveNormaliser"]
+
+
+@dataclass(frozen=True)
+class AdaptiveNormaliser:
+    """Normals of a span of m pixels by linear interpolation over ``2^k`` equal arcs of its great circle.
+
+    **Error block.** Over an arc a chord is too short by its sagitta at most:
+    ``d_k = 1 - cos(psi/2^(k+1))`` for ``2^k`` segments, and ``d_(k+1) = d_k/4`` nearly. With
+    ``q = (1 - cos psi)/4``, as the bisection unit gives it, ``d_k <= (q + q^2) / 4^k``: one square, then
+    wired shifts. The right side is over by at most 6.7 % (k = 0 at 90 degrees), never under, so that the
+    first k with ``(q + q^2) / 4^k <= threshold`` keeps its word. `depth` is the k of 90 degrees.
+
+    **Segment ends** ``E_j`` at ``psi j / 2^k``, from the bisection unit, level by level.
+
+    **Linear interpolators.** Pixel i lies at ``i 2^k / (m - 1)`` of a segment's length. The integer part is
+    its segment j, exact by integer arithmetic, whatever m; the first pixel of a segment starts at
+    ``E_j + phi (E_(j+1) - E_j)``, phi its fractional part, and every further one adds
+    ``(E_(j+1) - E_j) 2^k/(m - 1)``. The last pixel is a segment of its own, so that both ends come out as
+    they went in.
+
+    The documents extrapolate instead: ``N_l + g (N_r - N_l)`` stands for the pixel at the next power of two,
+    g = 2^p/(m - 1), so that segments are whole pixels and divisions shifts. That is no variant here, because
+    it does not fit the bisection unit. The new end is not of unit length (up to 1.03 for 10 degrees, 1.47
+    for 45) and does not fit the word; `Renormaliser` has eight multipliers, this whole unit three; and 90
+    degrees become up to 116, too wide to bisect. Even normalised it stands on the chord's continuation, not
+    where the great circle has its pixel, so that the last pixel misses N_r, by up to 0.00015 degrees for 1,
+    0.15 for 10 and 8.2 for 45. Here it misses by nothing.
+
+    A span wider than the bisection's `max_angle` is flagged and not divided: its normals lie on the straight
+    line between its ends (for ends further apart than 1 in a component, near the left one), and mean nothing
+    but at its first and last pixel. Ends must be of unit length, to 1/256 or so: a middle normal is made
+    as long as one, so that the normals between ends that are not are off by as much. An end of length 0
+    counts as 90 degrees away, and is not flagged.
+
+    ================ ========== ==================================================================
+    word             format     why
+    ================ ========== ==================================================================
+    q + q^2          SQ(2, 20)  a threshold of 2^-14 has 6 bits
+    E_j              SQ(1, 17)  the bisection's results
+    E_(j+1) - E_j    SQ(1, 17)  operand; saturates, which a threshold up to 1/8 keeps from happening
+    1/(m - 1)        UQ(0, 17)  table, with the shift of `DifferenceSetup`
+    phi              UQ(0, 17)  operand; cut
+    N                SQ(2, 32)  cut; half a step of the result is added at the start; never wraps
+    step             SQ(1, 32)  cut: 2^-32 a pixel, 9.5e-7 after 4095
+    normal           SQ(1, 17)  rounded half up, saturates
+    ================ ========== ==================================================================
+
+    Arithmetic error of a component against straight lines between the exact ends, at most `error`: that of
+    the ends (`end_error`); a difference of ends, at most ``sqrt(8.1 threshold)`` and 0.77, times the 2^-17 of
+    phi and of the reciprocal; drift; the last rounding. Of the ends, the bisection's model error makes them
+    too long or too short, and the next level, which reads their dot product, hands on ``1/(1 + cos)`` of
+    that, 0.586 at most; its arithmetic errors add up, in all levels by a factor of 1.12 at most. The first
+    and the last normal of a span are exact.
+
+    Model error against the great circle: the length is short by at most ``threshold`` (and the 2^-19 of the
+    rounding of q), never long; the direction is off by at most ``0.017 theta^3`` for a segment of angle
+    theta, ``theta^2 <= 8.1 threshold``.
+
+    Parameters
+    ----------
+    threshold : float
+        Largest length error, 2^-14 to 1/8; cut to 20 fraction bits.
+    bisection : Bisection
+        Factor of the bisection unit.
+
+    Raises
+    ------
+    ValueError
+        If the threshold is out of range.
+
+    Source: [T] 2.1, figure 2.7, appendix Г; blocks.md, "Adaptive normaliser".
+    """
+
+    threshold: float = 2.0**-10
+    bisection: Bisection = field(default_factory=Bisection)
+
+    SAGITTA_FORMAT = SQ(2, 20)
+    ACCUMULATOR_FORMAT = SQ(2, 32)
+    STEP_FORMAT = SQ(1, 32)
+    RESULT_FORMAT = COMPONENT
+    LENGTH_BITS = DifferenceSetup.LENGTH_BITS
+
+    def __post_init__(self):
+        if not 2.0**-14 <= self.threshold <= 1 / 8:
+            raise ValueError(f"threshold must be 2^-14 to 1/8, not {self.threshold!r}")
+
+    @property
+    def limits(self) -> Fixed:
+        """``threshold 4^k`` for k under `depth`: each that ``q + q^2`` exceeds asks for one more level."""
+        code = int(np.floor(np.ldexp(self.threshold, self.SAGITTA_FORMAT.fraction_bits)))
+        q = (1 - np.cos(np.radians(self.bisection.max_angle))) / 4
+        largest = (q + q * q) / self.SAGITTA_FORMAT.step
+        count = 0
+        while code << (2 * count) < largest:
+            count += 1
+        return Fixed(self.SAGITTA_FORMAT, code << (2 * np.arange(count, dtype=np.int64)))
+
+    @property
+    def depth(self) -> int:
+        """Largest number of levels k."""
+        return len(self.limits.codes)
+
+    def end_error(self, levels: int, first_step: bool) -> float:
+        """Bound on the error of a component of a segment end, in a span that asks for so many levels."""
+        p = self.bisection
+        length = 0.0
+        for level in range(1, levels + 1):
+            # Widest span of this level: a segment's angle, doubled back to it.
+            widest = np.degrees(np.sqrt(8.1 * self.threshold)) * 2.0 ** (levels - level + 1)
+            first = first_step and level == 1
+            length = max(length, 2 * p.model_error(first, widest) + 0.586 * length)
+        return (
+            length
+            + 1.12 * (levels and p.arithmetic_error(first_step))
+            + 1.12 * max(levels - 1, 0) * p.arithmetic_error(False)
+        )
+
+    def error(self, levels: int, first_step: bool) -> float:
+        """Bound on the error of a component of a normal against straight lines between the exact ends."""
+        difference = min(0.77, np.sqrt(8.1 * self.threshold))
+        return self.end_error(levels, first_step) + difference * 2.0**-16 + 4096 * 2.0**-32 + 2.0**-18
+
+    def levels(self, one_minus_cosine: Fixed, wide: np.ndarray) -> np.ndarray:
+        """Number of levels k of spans, from what the bisection unit says of their ends.
+
+        Parameters
+        ----------
+        one_minus_cosine : Fixed, any shape, SQ(2, 17)
+            ``1 - cos psi``.
+        wide : bool array, same shape
+            Whether the span is too wide to be divided.
+        """
+        operand = one_minus_cosine.saturate(COMPONENT)
+        square = (operand * operand).scale(-4).truncate(20)
+        sagitta = one_minus_cosine.scale(-2).extend(SQ(1, 20)) + square
+        sagitta = sagitta.saturate(self.SAGITTA_FORMAT).codes[..., np.newaxis]
+        return np.where(wide, 0, (sagitta > self.limits.codes).sum(axis=-1))
+
+    def compute(
+        self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
+    ) -> tuple[Fixed, np.ndarray, np.ndarray]:
+        """Bit-true normals, in raster order.
+
+        Parameters
+        ----------
+        normal_left, normal_right : Fixed, shape (spans, 3), SQ(1, 17)
+            Unit normals of the spans' ends.
+        length : int array, shape (spans,)
+            Pixels, 0 to 4095.
+
+        Returns
+        -------
+        normal : Fixed, shape (pixels, 3), SQ(1, 17)
+            Normals of all spans, one after the other.
+        wide : bool array, shape (spans,)
+            Whether the span is wider than the bisection's `max_angle`.
+        levels : int array, shape (spans,)
+            k.
+
+        Raises
+        ------
+        ValueError
+            If an operand has another format or a length is out of range.
+        """
+        length = checked_lengths(length, 0)
+        whole = 1 << self.depth
+        ends = np.zeros((len(length), whole + 1, 3), dtype=np.int64)
+        ends[:, 0], ends[:, -1] = normal_left.codes, normal_right.codes
+        _, u, wide = self.bisection.compute(normal_left, normal_right)
+        levels = self.levels(u, wide)
+        for level in range(1, self.depth + 1):
+            active = np.flatnonzero(levels >= level)
+            half = whole >> level
+            before, after = ends[active, : -1 : 2 * half], ends[active, 2 * half :: 2 * half]
+            middle, _, _ = self.bisection.compute(Fixed(COMPONENT, before), Fixed(COMPONENT, after))
+            ends[active, half :: 2 * half] = middle.codes
+
+        span, segment, place, index = self.places(length, levels)
+        spacing = whole >> levels[span]
+        left = Fixed(COMPONENT, ends[span, segment * spacing])
+        right = Fixed(COMPONENT, ends[span, np.minimum((segment + 1) * spacing, whole)])
+        difference = (right - left).saturate(COMPONENT)
+        normal = self.walk(left, difference, length, levels, span, place, index)
+        return normal.truncate(COMPONENT.fraction_bits).saturate(COMPONENT), wide, levels
+
+    def places(
+        self, length: np.ndarray, levels: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Where the pixels of spans lie on their segments, in raster order.
+
+        Parameters
+        ----------
+        length, levels : int array, shape (spans,)
+            m and k.
+
+        Returns
+        -------
+        span, segment : int array, shape (pixels,)
+            Span of each pixel, and j, 0 to ``2^k``.
+        place : int array, shape (pixels,)
+            Of the first pixel of the segment: ``phi (m - 1)``.
+        index : int array, shape (pixels,)
+            Pixels since that one.
+        """
+        span, pixel = pixels_of(length)
+        steps, level = np.maximum(length - 1, 1)[span], levels[span]
+        segment = (pixel << level) // steps
+        first_pixel = -((-segment * steps) >> level)
+        return span, segment, (first_pixel << level) - segment * steps, pixel - first_pixel
+
+    def walk(
+        self,
+        left: Fixed,
+        difference: Fixed,
+        length: np.ndarray,
+        levels: np.ndarray,
+        span: np.ndarray,
+        place: np.ndarray,
+        index: np.ndarray,
+    ) -> Fixed:
+        """Bit-true sums of pixels along their segments.
+
+        Parameters
+        ----------
+        left, difference : Fixed, shape (pixels, components), SQ(1, 17)
+            ``E_j``, and ``E_(j+1) - E_j``.
+        length, levels, span, place, index
+            Of `places`.
+
+        Returns
+        -------
+        Fixed, shape (pixels, components), SQ(2, 32)
+            With half a step of the result added.
+        """
+        reciprocal, shift = (x[span] for x in self.reciprocal(np.maximum(length - 1, 1)))
+        phi = Fixed(COMPONENT, ((place * reciprocal) << 1 >> shift)[:, np.newaxis])
+        start = left + (difference * phi).truncate(32) + self.half_step
+        slope = (difference * Fixed(COMPONENT, reciprocal[:, np.newaxis])).codes
+        slope = Fixed(SQ(2, 34), slope >> np.maximum(shift - 1 - levels[span], 0)[:, np.newaxis]).truncate(32)
+        walked = start.codes + index[:, np.newaxis] * slope.wrap(self.STEP_FORMAT).codes
+        return Fixed(self.ACCUMULATOR_FORMAT, self.ACCUMULATOR_FORMAT.wrap(walked))
+
+    @property
+    def half_step(self) -> Fixed:
+        """Half a step of the result: rounding half up is then a cut."""
+        return Fixed.round(self.ACCUMULATOR_FORMAT, COMPONENT.step / 2)
+
+    def reciprocal(self, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Code of the table and shift s of ``1/steps = 2 reciprocal 2^-s``, for 1 to 4094 steps."""
+        address, shift = reciprocal_place(steps)
+        return DifferenceSetup().reciprocals.codes[address], shift

@@ -1,0 +1,279 @@
+"""Bisection unit: the normal half-way between two others ([T] figure 2.6)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax_quantised
+from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
+
+__all__ = ["Bisection"]
+
+_PRINTED = {1: (0.64, -0.07), 2: (0.681, -0.119, 0.014)}
+"""[T]: ``1/sqrt(2 + z)`` in ascending powers of z, by degree."""
+
+_PRINTED_FIRST_STEP = (0.707, -0.341, 0.193, -0.059)
+"""[T]: ``h(r)`` in ascending powers of r."""
+
+
+@dataclass(frozen=True)
+class Bisection:
+    """``N = (N_a + N_b) / sqrt(2 + z)`` with ``z = 2 r``, ``r = N_a . N_b``.
+
+    Computed as ``N = (N_a + N_b)/2 + e (N_a + N_b)``, ``e = 1/sqrt(2 + z) - 1/2``, so that a word of e holds
+    its small part alone. e is one of two polynomials in Horner's form, chosen by ``u = 1 - r``:
+
+    - to 45 degrees (z in [sqrt 2, 2]): degree 1 or 2 in u, without a constant: exact at angle 0. In
+      numbers.md the variable is ``v = 2 - z = 2 u``, a wired shift;
+    - from 45 to 90 degrees, the first step of a wide span: ``h(r) = 1/sqrt(2 (1 + r))``, the same function,
+      as a cubic in r, fitted where it is used.
+
+    With ``as_documented`` both are polynomials in r with the printed coefficients (those of z doubled once
+    for every power of it).
+
+    A span wider than `max_angle` by more than the rounding of its normals is flagged; its result means
+    nothing.
+
+    Ends that are no unit vectors: of length ``1 + x`` they give a middle of length ``1 + x/(1 + r)``, so up
+    to 45 degrees a half to 0.59 of the error is left. An end of length 0 is taken for one at 90 degrees:
+    flagged where `max_angle` is 45, else the result is 0.7071 times the other end.
+
+    ============= ========== ================================================================
+    word          format     why
+    ============= ========== ================================================================
+    u             SQ(2, 17)  up to 2, for opposite normals
+    u or r        SQ(1, 17)  operand of the multiplier, 18 bits
+    c, sums       SQ(0, 18)  18 bits; under 0.35 where nothing is flagged; wrap
+    e             SQ(-1, 19) 18 bits; at most 0.0412 at 45 degrees, 0.2072 at 90; wraps
+    N             SQ(1, 17)  so that a unit can bisect its own results; saturates
+    ============= ========== ================================================================
+
+    Both ends are scaled by one factor, so its error changes the length of N, never its direction
+    (but where a component saturates at 1).
+
+    Model error of the factor, with the coefficients of the words above (`model_error`), and what it is as a
+    relative error of the length:
+
+    =================== ================ ==================== ================ ====================
+    variant             to 45 degrees    relative             45 to 90 degrees relative
+    =================== ================ ==================== ================ ====================
+    degree 1            8.3e-4           0.16 %, 0 at 0       1.1e-4           0.02 %
+    degree 2            2.5e-5           0.005 %, 0 at 0      1.1e-4           0.02 %
+    documented degree 1 1.1e-3           0.22 %, 0 at 0       6.2e-4           0.09 %
+    documented degree 2 1.0e-3           0.20 %, 0.20 % at 0  6.2e-4           0.09 %
+    =================== ================ ==================== ================ ====================
+
+    Arithmetic error of a component against the same polynomial (`arithmetic_error`): a component of
+    ``N_a + N_b``, at most 2, times the error of e; that is u rounded to 17 bits (2^-18, and as much again for
+    r, which is taken from it) times the slope of e (0.1585 at 45 degrees, 0.3536 at 90), the roundings of
+    the sums (2^-19 times u, or times r + r^2) and of e (2^-20); the half sum cut by up to 2^-18 times 2 e;
+    the product cut (2^-21); the result rounded (2^-18).
+
+    Parameters
+    ----------
+    degree : int
+        1 or 2: degree of the polynomial for spans up to 45 degrees.
+    max_angle : int
+        90, or 45 for a unit without the first step, which saves its multiplications.
+    as_documented : bool
+        Take the coefficients printed in [T].
+
+    Raises
+    ------
+    ValueError
+        If a parameter is none of those.
+
+    Source: [T] 2.1, figure 2.6; blocks.md; numbers.md, "Polynomials".
+    """
+
+    degree: int = 2
+    max_angle: int = 90
+    as_documented: bool = False
+
+    ANGLE_FORMAT = SQ(2, 17)
+    OPERAND_FORMAT = SQ(1, 17)
+    SUM_FORMAT = SQ(0, 18)
+    FACTOR_FORMAT = SQ(-1, 19)
+    FORMAT = COMPONENT
+    ONE = ONE_SQUARED.round_half_up(17).wrap(OPERAND_FORMAT)
+    """Dot product of a unit vector with itself, in the word of r."""
+
+    def __post_init__(self):
+        if self.degree not in (1, 2):
+            raise ValueError(f"degree must be 1 or 2, not {self.degree!r}")
+        if self.max_angle not in (45, 90):
+            raise ValueError(f"max_angle must be 45 or 90, not {self.max_angle!r}")
+
+    @property
+    def steps(self) -> int:
+        """Multiplications of Horner's form: the larger degree of the two polynomials."""
+        return self.degree if self.max_angle == 45 else 3
+
+    @staticmethod
+    def _limit(angle: float) -> Fixed:
+        """``u`` at an angle, with room for the rounding of two normals."""
+        return Fixed.round(Bisection.ANGLE_FORMAT, 1 - np.cos(np.radians(angle)) + 4 * COMPONENT.step)
+
+    @cached_property
+    def widest_narrow(self) -> Fixed:
+        """Largest ``u`` for the polynomial of spans up to 45 degrees."""
+        return self._limit(45)
+
+    @cached_property
+    def widest(self) -> Fixed:
+        """Largest ``u`` that is not flagged."""
+        return self._limit(self.max_angle)
+
+    def reads_cosine(self, first_step: bool) -> bool:
+        """Whether a polynomial is one in r (else in u)."""
+        return first_step or self.as_documented
+
+    @cached_property
+    def _polynomials(self) -> tuple[tuple[Fixed, Fixed], tuple[Fixed, Fixed]]:
+        # The hardware reads u and r in units of `ONE_SQUARED`.
+        one = ONE_SQUARED.values
+        narrow, wide = self.widest_narrow.values, self._limit(90).values
+        if self.as_documented:
+            printed = [
+                [c * 2.0**power for power, c in enumerate(_PRINTED[self.degree])],
+                _PRINTED_FIRST_STEP,
+            ]
+            fits = [
+                (c[0] - 0.5, [c[power] / one**power for power in range(1, len(c))])
+                for c in map(list, printed)
+            ]
+        else:
+            codes = minimax_quantised(
+                lambda u: half_angle_factor(u / one),
+                0.0,
+                narrow,
+                dict.fromkeys(range(1, self.degree + 1), self.SUM_FORMAT),
+                held={0: 0.5},
+            )
+            first = minimax_quantised(
+                lambda r: half_angle_factor(1 - r / one),
+                one - wide,
+                one - narrow,
+                {0: UQ(0, 19), 1: self.SUM_FORMAT, 2: self.SUM_FORMAT, 3: self.SUM_FORMAT},
+            )
+            step = self.SUM_FORMAT.step
+            fits = [(0.0, codes * step), (first[0] * self.FACTOR_FORMAT.step - 0.5, first[1:] * step)]
+        return tuple(
+            (
+                Fixed.round(self.FACTOR_FORMAT, constant),
+                Fixed.round(self.SUM_FORMAT, [*rest, *[0.0] * (3 - len(rest))]),
+            )
+            for constant, rest in fits
+        )
+
+    def polynomial(self, first_step: bool) -> tuple[Fixed, Fixed]:
+        """Coefficients of e.
+
+        Parameters
+        ----------
+        first_step : bool
+            Of the polynomial for 45 to 90 degrees, else of that for spans up to 45 degrees.
+
+        Returns
+        -------
+        constant : Fixed, shape (), SQ(-1, 19)
+            Coefficient of power 0.
+        rest : Fixed, shape (steps,), SQ(0, 18)
+            Coefficients of the powers 1, 2, ... of u or r (`reads_cosine`), filled up with 0.
+        """
+        constant, rest = self._polynomials[first_step]
+        return constant, rest[: self.steps]
+
+    def model_error(self, first_step: bool, widest: float = 90.0) -> float:
+        """Largest error of the factor ``1/2 + e`` as a polynomial in exact arithmetic.
+
+        Over the polynomial's domain, or its part up to ``widest`` degrees.
+        """
+        one = ONE_SQUARED.values.item()
+        low, high = (45, float(np.clip(widest, 45, 90))) if first_step else (0, min(widest, 45.0))
+        low, high = (1 - np.cos(np.radians(angle)) for angle in (low, high))
+        constant, rest = self._polynomials[first_step]
+        coefficients = np.r_[constant.values + 0.5, rest.values]
+        coefficients = coefficients * one ** np.arange(len(coefficients))
+        if self.reads_cosine(first_step):
+            return largest_error(lambda r: half_angle_factor(1 - r), coefficients, 1 - high, 1 - low)[0]
+        return largest_error(half_angle_factor, coefficients, low, high)[0]
+
+    def arithmetic_error(self, first_step: bool) -> float:
+        """Bound on the error of a component of N against the same polynomial in exact arithmetic."""
+        cosine = self.reads_cosine(first_step)
+        slope, e = (0.3536, 0.2072) if first_step else (0.1585, 0.0412)
+        x = (0.7072 if first_step else 1.0) if cosine else 0.2930
+        # The slopes of the printed polynomials differ from the function's by less than a fifth.
+        slope *= 1.2 if self.as_documented else 1.0
+        factor = 2.0**-18 * (1 + cosine) * slope + 2.0**-19 * (x + x * x) + 2.0**-20
+        return 2 * factor + 2.0**-18 * 2 * e + 2.0**-21 + 2.0**-18
+
+    def error(self, first_step: bool) -> float:
+        """Bound on the error of a component of N against the exact function of the same two code vectors."""
+        return 2 * self.model_error(first_step) + self.arithmetic_error(first_step)
+
+    def factor(self, u: Fixed) -> tuple[Fixed, np.ndarray]:
+        """Bit-true ``e`` and flag.
+
+        Parameters
+        ----------
+        u : Fixed, any shape, SQ(2, 17)
+            One minus the cosine of the span angle.
+
+        Returns
+        -------
+        e : Fixed, same shape, SQ(-1, 19)
+            ``1/sqrt(2 + z) - 1/2``.
+        wide : bool array, same shape
+            Whether the span is wider than `max_angle`.
+        """
+        first_step = (u > self.widest_narrow) & (self.max_angle == 90)
+        cosine = (self.ONE - u).saturate(self.OPERAND_FORMAT)
+        (narrow_constant, narrow), (wide_constant, wide) = map(self.polynomial, (False, True))
+        x = np.where(first_step | self.as_documented, cosine.codes, u.saturate(self.OPERAND_FORMAT).codes)
+        x = Fixed(self.OPERAND_FORMAT, x)
+
+        def coefficient(power: int) -> Fixed:
+            codes = np.where(first_step, wide.codes[power - 1], narrow.codes[power - 1])
+            return Fixed(self.SUM_FORMAT, codes)
+
+        total = coefficient(self.steps)
+        for power in range(self.steps - 1, 0, -1):
+            total = ((x * total).round_half_up(18) + coefficient(power)).wrap(self.SUM_FORMAT)
+        constant = Fixed(self.FACTOR_FORMAT, np.where(first_step, wide_constant.codes, narrow_constant.codes))
+        e = ((x * total).round_half_up(19) + constant).wrap(self.FACTOR_FORMAT)
+        return e, u > self.widest
+
+    def compute(self, normal_a: Fixed, normal_b: Fixed) -> tuple[Fixed, Fixed, np.ndarray]:
+        """Bit-true middle normals.
+
+        Parameters
+        ----------
+        normal_a, normal_b : Fixed, shape (..., 3), SQ(1, 17)
+            Unit normals.
+
+        Returns
+        -------
+        normal_middle : Fixed, shape (..., 3), SQ(1, 17)
+            Normals half-way between them.
+        one_minus_cosine : Fixed, shape (...), SQ(2, 17)
+            ``u``.
+        wide : bool array, shape (...)
+            Whether the two are further apart than `max_angle`: the normal then means nothing.
+
+        Raises
+        ------
+        ValueError
+            If an operand has another format.
+        """
+        dot = DotProduct().compute(normal_a, normal_b)
+        u = (ONE_SQUARED - dot).round_half_up(17).saturate(self.ANGLE_FORMAT)
+        e, wide = self.factor(u)
+        half_sum = (normal_a + normal_b).scale(-1)
+        e = Fixed(e.format, e.codes[..., np.newaxis])
+        correction = (e * half_sum.truncate(17)).scale(1).truncate(21)
+        return (half_sum + correction).round_half_up(17).saturate(self.FORMAT), u, wide

@@ -1,0 +1,185 @@
+"""Middle normal of a span through the h polynomial ([T] 2.2)."""
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
+from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax, minimax_quantised
+from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
+
+__all__ = ["MAX_SPAN_ANGLE", "MIDDLE_NORMAL_FITS", "MiddleNormal"]
+
+MIDDLE_NORMAL_FITS = ("exact", "as_documented", "minimax_2", "minimax_3")
+"""Names of the polynomials for h."""
+
+_PRINTED = (0.707, -0.341, 0.193, -0.059)
+"""[T]: ``h(r)`` in ascending powers of r."""
+
+MAX_SPAN_ANGLE = 45.0
+"""Largest angle between the end normals of a span, in degrees, for which the formats are made."""
+
+
+@dataclass(frozen=True)
+class MiddleNormal:
+    """``N_c = h(r) (N_l + N_r)`` with ``h = 1/sqrt(2 (1 + r))`` and ``r = N_l . N_r``.
+
+    Computed as ``N_c = (N_l + N_r)/2 + e(u) (N_l + N_r)`` with ``u = 1 - r``. The polynomial
+    ``e = h - 1/2 = u (c1 + u (c2 + u c3))`` is exact at angle 0, where neighbouring normals of a mesh live,
+    and fitted up to `MAX_SPAN_ANGLE`.
+
+    ======== ============= ==========================================================
+    word     format        why
+    ======== ============= ==========================================================
+    u        UQ(-1, 18)    17 bits for the multiplier; holds angles to 60 degrees
+    c, sums  UQ(-2, 19)    17 bits; the sums stay under 0.15
+    e        UQ(-4, 21)    17 bits; at most 0.0412 at 45 degrees
+    E        F = 19        ``-4 E`` and ``4 E`` then have 17 fraction bits, exactly
+    N_c      SQ(1, 19)
+    ======== ============= ==========================================================
+
+    Arithmetic error of a component of ``N_c`` against the exact function of the same two code vectors, for
+    angles to 45 degrees, under `ERROR`: e is off by the fit (8.3e-7), by u cut to 18 fraction bits (times
+    the slope 0.18), by two roundings of sums (2^-20 u and 2^-20 u^2) and by its own (2^-22), and is
+    multiplied by a component of ``N_l + N_r``, at most 2; ``(N_l + N_r)/2`` is cut by up to 2^-18 and
+    multiplied by 2 e <= 0.0824; the last rounding adds 2^-20.
+
+    A wider span is flagged; u and N_c then saturate.
+
+    Ends that are no unit vectors: of length ``1 + x`` they give a middle of length ``1 + x/(1 + r)``, or,
+    where u would be negative, half their sum, no longer than they are. A span with an end of length 0 is
+    flagged.
+
+    Other fits are there for comparison, with the same hardware: their polynomials in r, rewritten in u, have
+    the same form. That of [T] has the constant 1/2 exactly: ``e = u (0.132 + u (0.016 + 0.059 u))``. A plain
+    minimax fit over r in [0, 1] has another constant, and makes every normal of a flat face too short or too
+    long by twice its error; e is then ``SQ(-3, 21)``, 18 bits. `model_error` of h, with coefficients in words
+    of the hardware, what it is as a relative error of the length, and both over all r in [0, 1]:
+
+    ================= ============= ======== ============= ===============
+    fit               to 45 degrees relative at angle 0    over [0, 1]
+    ================= ============= ======== ============= ===============
+    ``exact``         8.2e-7        0.0002 % 0
+    ``as_documented`` 4.9e-4        0.093 %  0             6.1e-4, 0.093 %
+    ``minimax_2``     1.9e-3        0.38 %   0.38 % long   1.9e-3, 0.38 %
+    ``minimax_3``     2.9e-4        0.058 %  0.058 % short 2.9e-4, 0.058 %
+    ================= ============= ======== ============= ===============
+
+    Parameters
+    ----------
+    fit : str
+        One of `MIDDLE_NORMAL_FITS`: exact at angle 0; the coefficients printed in [T]; a plain minimax fit of
+        degree 2 or 3.
+
+    Raises
+    ------
+    ValueError
+        If `fit` is none of those.
+
+    Source: [T] 2.2; numbers.md, "exact at zero angle" and "Polynomials".
+    """
+
+    fit: str = "exact"
+
+    ANGLE_FORMAT = UQ(-1, 18)
+    SUM_FORMAT = UQ(-2, 19)
+    FACTOR_FORMAT = UQ(-4, 21)
+    FORMAT = SQ(1, 19)
+    ARITHMETIC_ERROR = (
+        2 * (2.0**-18 * 0.18 + 2.0**-20 * (0.293 + 0.293**2) + 2.0**-22) + 2.0**-18 * 0.0824 + 2.0**-20
+    )
+    """Bound on the error of a component against the same polynomial in exact arithmetic."""
+    ERROR = 2 * 8.3e-7 + ARITHMETIC_ERROR
+    """Bound on the error of a component with the fit that is exact at angle 0."""
+
+    def __post_init__(self):
+        if self.fit not in MIDDLE_NORMAL_FITS:
+            raise ValueError(f"fit must be one of {', '.join(MIDDLE_NORMAL_FITS)}, not {self.fit!r}")
+
+    @property
+    def coefficients(self) -> Fixed:
+        """``c1, c2, c3``, in words of the hardware."""
+        return Fixed(self.SUM_FORMAT, _coefficients(self.fit)[1])
+
+    @property
+    def constant(self) -> Fixed:
+        """``e`` at angle 0: 0 but for the plain minimax fits."""
+        return Fixed(self.factor_format, _coefficients(self.fit)[0])
+
+    @property
+    def factor_format(self) -> Format:
+        """Format of ``e``: `FACTOR_FORMAT`, or ``SQ(-3, 21)`` where a fit can make e negative."""
+        return SQ(-3, 21) if self.fit.startswith("minimax") else self.FACTOR_FORMAT
+
+    @property
+    def model_error(self) -> float:
+        """Largest error of ``1/2 + e`` as a polynomial in exact arithmetic, to `MAX_SPAN_ANGLE`."""
+        one = ONE_SQUARED.values.item()
+        coefficients = np.r_[0.5 + self.constant.values, self.coefficients.values] * one ** np.arange(4)
+        widest = 1 - np.cos(np.radians(MAX_SPAN_ANGLE))
+        return largest_error(half_angle_factor, coefficients, 0.0, widest)[0]
+
+    @property
+    def error(self) -> float:
+        """Bound on the error of a component against the exact function of the same two code vectors."""
+        # The half sum's cut counts times e, which may be too large by the fit's error.
+        return 2 * (1 + 2.0**-18) * self.model_error + self.ARITHMETIC_ERROR
+
+    @cached_property
+    def widest(self) -> Fixed:
+        """Largest ``u`` that is not flagged: that of `MAX_SPAN_ANGLE` and the rounding of two normals."""
+        limit = 1 - np.cos(np.radians(MAX_SPAN_ANGLE)) + 4 * COMPONENT.step
+        return Fixed.round(self.ANGLE_FORMAT, limit)
+
+    def compute(self, normal_left: Fixed, normal_right: Fixed) -> tuple[Fixed, np.ndarray]:
+        """Bit-true middle normals.
+
+        Parameters
+        ----------
+        normal_left, normal_right : Fixed, shape (..., 3), SQ(1, 17)
+            Unit normals of the span's ends.
+
+        Returns
+        -------
+        normal_middle : Fixed, shape (..., 3), SQ(1, 19)
+            Middle normals.
+        wide : bool array, shape (...)
+            Whether the span is wider than `MAX_SPAN_ANGLE`: the normal is then saturated.
+        """
+        dot = DotProduct().compute(normal_left, normal_right)
+        difference = (ONE_SQUARED - dot).truncate(self.ANGLE_FORMAT.fraction_bits)
+        u = difference.saturate(self.ANGLE_FORMAT)
+        c1, c2, c3 = (self.coefficients[i] for i in range(3))
+        total = (u * c3).round_half_up(19) + c2
+        total = (u * total.wrap(self.SUM_FORMAT)).round_half_up(19) + c1
+        e = (u * total.wrap(self.SUM_FORMAT)).round_half_up(21) + self.constant
+        e = e.saturate(self.factor_format)
+        half_sum = (normal_left + normal_right).scale(-1)
+        e = Fixed(e.format, e.codes[..., np.newaxis])
+        correction = (e * half_sum.truncate(17).saturate(COMPONENT)).scale(1).round_half_up(19)
+        return (half_sum + correction).saturate(self.FORMAT), u > self.widest
+
+
+@cache
+def _coefficients(fit: str) -> tuple[int, np.ndarray]:
+    """Code of the constant of e, and codes of c1, c2, c3."""
+    # The unit reads u in units of `ONE_SQUARED`.
+    one = ONE_SQUARED.values.item()
+    if fit == "exact":
+        codes = minimax_quantised(
+            lambda u: half_angle_factor(u / one),
+            0.0,
+            one * (1 - np.cos(np.radians(MAX_SPAN_ANGLE))),
+            dict.fromkeys((1, 2, 3), MiddleNormal.SUM_FORMAT),
+            held={0: 0.5},
+        )
+        return 0, codes
+    if fit == "as_documented":
+        in_u = np.polynomial.Polynomial(_PRINTED)(np.polynomial.Polynomial([1, -1])).coef
+    else:
+        in_u = minimax(half_angle_factor, 0.0, 1.0, int(fit[-1]))
+    in_u = np.pad(in_u, (0, 4 - len(in_u))) / one ** np.arange(4)
+    constant = Fixed.round(SQ(-3, 21), in_u[0] - 0.5)
+    return constant.codes.item(), Fixed.round(MiddleNormal.SUM_FORMAT, in_u[1:]).codes

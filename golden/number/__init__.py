@@ -1,0 +1,1 @@
+"""Numbers: fixed-point formats and arrays, unit vectors as codes, polynomial fits."""

@@ -1,0 +1,1 @@
+"""The float64 truth: camera, scene, reflection models, rasteriser, renderer, metrics."""

@@ -1,0 +1,315 @@
+"""Lights, a material, and the intensity that a normal gives, in float64."""
+
+import math
+import operator
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.reflection import REFLECTION_MODELS, reflect
+
+__all__ = [
+    "Light",
+    "Material",
+    "gram_determinant",
+    "halfway_vector",
+    "intensity",
+    "intensity_of_cosines",
+    "saturate",
+]
+
+Triple = tuple[float, float, float]
+
+
+def triple(name: str, value: Sequence[float], least: float = -math.inf, most: float = math.inf) -> Triple:
+    """Three finite floats in [least, most], or a ValueError that names the thing.
+
+    Parameters
+    ----------
+    name : str
+        What the numbers are, for the error's text.
+    value : sequence of three numbers
+        The numbers.
+    least, most : float
+        The range.
+
+    Raises
+    ------
+    ValueError
+        If there are not three numbers, or one is not finite or out of range.
+    """
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be three finite numbers, not {value!r}")
+    if (array < least).any() or (array > most).any():
+        limits = f"at least {least:g}" if math.isinf(most) else f"in {least:g} to {most:g}"
+        raise ValueError(f"{name} must be {limits}, not {value!r}")
+    return tuple(array.tolist())
+
+
+@dataclass(frozen=True)
+class Light:
+    """A directional light, or a point light: as bright at every distance.
+
+    Parameters
+    ----------
+    direction : three floats, optional
+        Vector *to* the light, any length but 0; stored as a unit vector.
+    color : three floats
+        Intensity I_i a channel, at least 0.
+    position : three floats, optional
+        In place of the direction: where a point light is, in the mesh's units.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, the direction is 0, a channel is negative, or there is not exactly one of
+        direction and position.
+    """
+
+    direction: Triple | None = None
+    color: Triple = (1.0, 1.0, 1.0)
+    position: Triple | None = None
+
+    def __post_init__(self):
+        if (self.direction is None) == (self.position is None):
+            raise ValueError("a light must have either a direction or a position")
+        if self.position is not None:
+            object.__setattr__(self, "position", triple("a light's position", self.position))
+        else:
+            direction = triple("a light's direction", self.direction)
+            if not any(direction):
+                raise ValueError("a light's direction must not be 0")
+            object.__setattr__(self, "direction", tuple(normalise(direction).tolist()))
+        object.__setattr__(self, "color", triple("a light's color", self.color, least=0))
+
+    def towards(self, points: np.ndarray | None = None) -> np.ndarray:
+        """Unit vectors L from points of the surface to the light; 0 where a point light is at the point.
+
+        Parameters
+        ----------
+        points : array, shape (..., 3), optional
+            Points; a directional light does not read them.
+
+        Returns
+        -------
+        float64 array
+            Shape (3,) of a directional light, else that of the points.
+
+        Raises
+        ------
+        ValueError
+            If a point light is given no points.
+        """
+        if self.position is None:
+            return np.array(self.direction)
+        if points is None:
+            raise ValueError("a point light needs the points that it lights")
+        return normalise(np.asarray(self.position) - points)
+
+
+@dataclass(frozen=True)
+class Material:
+    """Reflection coefficients of a surface.
+
+    Parameters
+    ----------
+    ambient, diffuse, specular : three floats each
+        k_a, k_d, k_s a channel, at least 0. Their sum may exceed 1: the intensity saturates.
+    exponent : int
+        Exponent n of the highlight, 1 to 1000.
+
+    Raises
+    ------
+    ValueError
+        If a coefficient is negative or not finite, or the exponent is out of range.
+    TypeError
+        If the exponent is not an integer.
+    """
+
+    ambient: Triple
+    diffuse: Triple
+    specular: Triple
+    exponent: int
+
+    def __post_init__(self):
+        for name in ("ambient", "diffuse", "specular"):
+            object.__setattr__(self, name, triple(f"a material's {name}", getattr(self, name), least=0))
+        object.__setattr__(self, "exponent", operator.index(self.exponent))
+        if not 1 <= self.exponent <= 1000:
+            raise ValueError(f"a material's exponent must be in 1 to 1000, not {self.exponent}")
+
+
+def halfway_vector(light_direction: Sequence[float], viewer: Sequence[float]) -> np.ndarray:
+    """Unit half-way vectors ``H = (L + V) / |L + V|``, or zeros when ``L = -V`` ([B] 3).
+
+    Parameters
+    ----------
+    light_direction, viewer : arrays, shape (..., 3)
+        Unit vectors L and V, broadcast.
+
+    Returns
+    -------
+    float64 array, shape (..., 3)
+        H. Where ``|L + V|`` is at most 1e-9 the sum is rounding noise and H is zeros.
+    """
+    total = np.asarray(light_direction, dtype=np.float64) + np.asarray(viewer, dtype=np.float64)
+    return np.where(np.linalg.norm(total, axis=-1, keepdims=True) > 1e-9, normalise(total), 0.0)
+
+
+def gram_determinant(normal: np.ndarray, light_direction: np.ndarray, viewer: np.ndarray) -> np.ndarray:
+    """Gram determinant of three unit vectors from their cosines alone ([P]).
+
+    ``1 - (N·V)^2 - (L·N)^2 - (L·V)^2 + 2 (L·N)(N·V)(L·V)``, which equals ``((L x N)·V)^2``: 0 exactly
+    when the vectors are coplanar.
+
+    Parameters
+    ----------
+    normal, light_direction, viewer : arrays, shape (..., 3)
+        Unit vectors.
+
+    Returns
+    -------
+    float64 array, shape (...)
+    """
+    nv = (np.asarray(normal) * viewer).sum(axis=-1)
+    ln = (np.asarray(light_direction) * normal).sum(axis=-1)
+    lv = (np.asarray(light_direction) * viewer).sum(axis=-1)
+    return 1 - nv**2 - ln**2 - lv**2 + 2 * ln * nv * lv
+
+
+def intensity(
+    normals: np.ndarray,
+    material: Material,
+    lights: Sequence[Light],
+    ambient_light: Sequence[float],
+    viewer: Sequence[float],
+    model: str,
+    chord: bool = False,
+    points: np.ndarray | None = None,
+) -> np.ndarray:
+    """Intensity of every normal, not saturated.
+
+    ``I = k_a I_a + sum_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6). The cosine of
+    ``phong`` is R·V with ``R = 2 (N·L) N - L``, that of the other models N·H. A light with ``N·L <= 0``
+    gives neither diffuse nor specular; one with ``L = -V`` has no half-way vector and gives no specular. A
+    point light gives nothing to the point where it is.
+
+    Parameters
+    ----------
+    normals : array, shape (..., 3)
+        Normals, used as given: a method's nearly-unit vectors keep their length.
+    material : Material
+        The coefficients.
+    lights : sequence of Light
+        Any number.
+    ambient_light : three floats
+        I_a a channel.
+    viewer : array, shape (3,) or (..., 3)
+        Unit vector V to the viewer, constant over the frame or for each normal.
+    model : str
+        One of `REFLECTION_MODELS`.
+    chord : bool
+        Whether ``1 - |N - H|^2 / 2`` takes the place of N·H, which it equals for unit normals (chord.md).
+    points : array, shape (..., 3), optional
+        Where each normal stands; only point lights read it.
+
+    Returns
+    -------
+    float64 array, shape (..., 3)
+
+    Raises
+    ------
+    ValueError
+        If the model is unknown, or a point light has no points.
+    """
+    _check_model(model)
+    normals = np.asarray(normals, dtype=np.float64)
+    viewer = np.asarray(viewer, dtype=np.float64)
+    total = np.empty(normals.shape)
+    total[...] = np.multiply(material.ambient, ambient_light)
+    for light in lights:
+        direction = light.towards(points)
+        cosine = _dot(normals, direction)
+        halfway = halfway_vector(direction, viewer)
+        if not (halfway.any() and any(material.specular)):
+            highlight_cosine = None
+        elif model == "phong":
+            highlight_cosine = 2 * cosine * _dot(normals, viewer) - _dot(direction, viewer)
+        elif chord:
+            highlight_cosine = 1 - np.square(normals - halfway).sum(axis=-1) / 2
+        else:
+            highlight_cosine = _dot(normals, halfway)
+        _add_light(total, material, light, cosine, highlight_cosine, halfway.any(axis=-1), model)
+    return total
+
+
+def intensity_of_cosines(
+    material: Material,
+    lights: Sequence[Light],
+    ambient_light: Sequence[float],
+    cosine: np.ndarray,
+    highlight_cosine: np.ndarray,
+    model: str,
+) -> np.ndarray:
+    """The same, from what a method gives instead of a normal.
+
+    Parameters
+    ----------
+    material, lights, ambient_light, model
+        As for `intensity`; of the lights only the colours are read.
+    cosine, highlight_cosine : arrays, shape (..., lights)
+        N·L and N·H.
+
+    Returns
+    -------
+    float64 array, shape (..., 3)
+
+    Raises
+    ------
+    ValueError
+        If the model is unknown.
+    """
+    _check_model(model)
+    total = np.empty((*np.shape(cosine)[:-1], 3))
+    total[...] = np.multiply(material.ambient, ambient_light)
+    for index, light in enumerate(lights):
+        given = cosine[..., index], highlight_cosine[..., index]
+        _add_light(total, material, light, *given, np.True_, model)
+    return total
+
+
+def _check_model(model: str) -> None:
+    if model not in REFLECTION_MODELS:
+        raise ValueError(f"model must be one of {', '.join(REFLECTION_MODELS)}, not {model!r}")
+
+
+def _dot(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
+    return vectors @ others if others.ndim == 1 else np.einsum("...i,...i->...", vectors, others)
+
+
+def _add_light(total, material, light, cosine, highlight_cosine, has_halfway, model) -> None:
+    """Both terms of a light, added in place; without a cosine of the highlight, the diffuse one alone."""
+    color = np.asarray(light.color)
+    total += np.maximum(cosine, 0.0)[..., np.newaxis] * (color * material.diffuse)
+    if highlight_cosine is not None:
+        highlight = reflect(model, highlight_cosine, material.exponent)
+        highlight = np.where((cosine > 0) & has_halfway, highlight, 0.0)
+        total += highlight[..., np.newaxis] * (color * material.specular)
+
+
+def saturate(values: np.ndarray) -> np.ndarray:
+    """Intensities limited to [0, 1], as a screen limits them.
+
+    Parameters
+    ----------
+    values : array
+        Intensities.
+
+    Returns
+    -------
+    float64 array, same shape
+    """
+    return np.clip(np.asarray(values, dtype=np.float64), 0.0, 1.0)

@@ -1,0 +1,462 @@
+"""Triangles to spans and fragments: exact coverage, clipping, depth, perspective-correct normals."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.methods.interpolator import runs_of
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.scene import Scene
+
+__all__ = ["SUBPIXELS", "Raster", "face_normals", "fragment_barycentrics", "fragment_normals", "rasterise"]
+
+SUBPIXELS = 256
+"""Steps of a pixel to which projected vertices are rounded."""
+
+# Pixels beyond which a triangle is cut, so that edge functions stay within int64: coordinates within
+# 2^28 steps give products within 2^59.
+_GUARD = float(2**20)
+# Scanlines or fragments handled at once; bounds the memory, changes no result.
+_CHUNK = 1 << 20
+
+
+@dataclass(frozen=True)
+class Raster:
+    """The spans and fragments of a scene.
+
+    Spans that no pixel of the picture shows are left out. Spans stand in the order of their triangles, and
+    within a triangle in that of y; fragments in the order of their spans, and within a span in that of x.
+    Every pixel of a span is a fragment, also where something nearer hides it, because hardware shades whole
+    spans.
+
+    Parameters
+    ----------
+    x, y : int32 arrays, shape (S,)
+        First pixel of each span.
+    length : int32 array, shape (S,)
+        Pixels of each span, 1 to 4095.
+    triangle : int32 array, shape (S,)
+        Index into the mesh's faces.
+    normal_left, normal_right : float64 arrays, shape (S, 3)
+        Unit normals at the first and the last pixel centre: vertex normals interpolated
+        perspective-correctly and normalised.
+    magnitude_left, magnitude_right : float64 arrays, shape (S,)
+        Lengths of those normals before they were normalised, divided by W of `Camera.homogeneous`. With them
+        the normal between the ends is exactly ``normalise((1-t) m_l N_l + t m_r N_r)``.
+    weights_left, weights_right : float64 arrays, shape (S, 3)
+        Barycentric coordinates of the two ends in the triangle, divided by W; linear along the span.
+    back : bool array, shape (S,)
+        Where the triangle is seen from behind.
+    span : int32 array, shape (F,)
+        Span of each fragment.
+    offset : int16 array, shape (F,)
+        Its position in the span, 0 to length - 1.
+    pixel : int32 array, shape (F,)
+        ``y * width + x``.
+    visible : bool array, shape (F,)
+        The fragment is the nearest of its pixel; of several at one depth, that of the lowest triangle index.
+    triangles : int
+        Triangles of the mesh. Each is either drawn (it gave spans before the depth test) or counted once in
+        one of the next four.
+    degenerate : int
+        Triangles without area, in the world or after rounding to 1/256 pixel.
+    culled : int
+        Triangles seen from behind and left out because the scene asks for that.
+    outside : int
+        Triangles wholly outside the picture or nearer than the near plane.
+    uncovered : int
+        Triangles that hold no pixel centre of the picture.
+    hidden_spans : int
+        Spans left out because nothing of them is visible.
+    repaired_normals : int
+        Ends of spans whose interpolated normal was 0 and that got the normal of the face instead.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    length: np.ndarray
+    triangle: np.ndarray
+    normal_left: np.ndarray
+    normal_right: np.ndarray
+    magnitude_left: np.ndarray
+    magnitude_right: np.ndarray
+    weights_left: np.ndarray
+    weights_right: np.ndarray
+    back: np.ndarray
+    span: np.ndarray
+    offset: np.ndarray
+    pixel: np.ndarray
+    visible: np.ndarray
+    triangles: int
+    degenerate: int
+    culled: int
+    outside: int
+    uncovered: int
+    hidden_spans: int
+    repaired_normals: int
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Triangles ready to be filled: what is left of the mesh's after clipping, all of one winding.
+
+    ``points`` (P, 3, 2) int64 in 1/256 pixel, with positive ``area``, twice the triangle's, (P,); ``weight``
+    (P, 3) is 1 / W, ``nearness`` (P, 3) is linear on the screen and larger when nearer; ``corner`` (P, 3, 3)
+    holds each corner's barycentric coordinates in the mesh's triangle ``triangle`` (P,).
+    """
+
+    points: np.ndarray
+    area: np.ndarray
+    weight: np.ndarray
+    nearness: np.ndarray
+    corner: np.ndarray
+    triangle: np.ndarray
+
+    def edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A, B and C of each edge function ``A x + B y + C`` (P, 3), x and y in pixels, counted from 0.
+
+        Edge i lies opposite corner i; inside, the function is positive and the three add up to the area.
+        """
+        start = self.points[:, [1, 2, 0]]
+        end = self.points[:, [2, 0, 1]]
+        a = start[..., 1] - end[..., 1]
+        b = end[..., 0] - start[..., 0]
+        half = SUBPIXELS // 2
+        c = a * (half - start[..., 0]) + b * (half - start[..., 1])
+        return a * SUBPIXELS, b * SUBPIXELS, c
+
+
+def face_normals(mesh: Mesh) -> np.ndarray:
+    """Unit normals of the triangles, by the right-hand rule.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The surface.
+
+    Returns
+    -------
+    float64 array, shape (F, 3)
+        0 where a triangle has no area.
+    """
+    first, second, third = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
+    return normalise(np.cross(second - first, third - first))
+
+
+def _clip(records: np.ndarray, source: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cut triangles by one plane: corners with a negative distance are outside."""
+    inside = distance >= 0
+    count = inside.sum(axis=1)
+    kept = [records[count == 3]]
+    kept_source = [source[count == 3]]
+    for corners_inside in (1, 2):
+        chosen = np.flatnonzero(count == corners_inside)
+        # The odd one out becomes corner 0, the winding stays.
+        odd = (inside[chosen] == (corners_inside == 1)).argmax(axis=1)
+        order = (odd[:, np.newaxis] + np.arange(3)) % 3
+        first, second, third = np.moveaxis(records[chosen[:, np.newaxis], order], 1, 0)
+        d_first, d_second, d_third = distance[chosen[:, np.newaxis], order].T
+
+        # Always from the inside to the outside, so that two triangles cut their shared edge in the same bits.
+        def cut(near, far, d_near, d_far):
+            return near + (d_near / (d_near - d_far))[:, np.newaxis] * (far - near)
+
+        if corners_inside == 1:
+            pieces = [(first, cut(first, second, d_first, d_second), cut(first, third, d_first, d_third))]
+        else:
+            towards_second = cut(second, first, d_second, d_first)
+            towards_third = cut(third, first, d_third, d_first)
+            pieces = [(second, third, towards_third), (second, towards_third, towards_second)]
+        for piece in pieces:
+            kept.append(np.stack(piece, axis=1))
+            kept_source.append(source[chosen])
+    return np.concatenate(kept), np.concatenate(kept_source)
+
+
+def _assemble(scene: Scene, candidates: np.ndarray, corners: np.ndarray) -> tuple[_Pieces, np.ndarray]:
+    """Clip, divide, round. Also returns the mesh triangles of which anything is left after clipping."""
+    near = scene.camera.near
+    x, y, w, depth = np.moveaxis(corners, -1, 0)
+    beyond = (np.maximum(np.abs(x), np.abs(y)) > _GUARD * w) | (depth < near)
+    crossing = beyond.any(axis=1)
+    whole = ~crossing
+    corner = np.broadcast_to(np.eye(3), (len(corners), 3, 3))
+    triangle = candidates
+    if crossing.any():
+        records = np.concatenate((corners[crossing], corner[crossing]), axis=-1)
+        source = candidates[crossing]
+        records, source = _clip(records, source, records[..., 3] - near)
+        for axis in (0, 1):
+            for sign in (1, -1):
+                records, source = _clip(records, source, _GUARD * records[..., 2] - sign * records[..., axis])
+        corners = np.concatenate((corners[whole], records[..., :4]))
+        corner = np.concatenate((corner[whole], records[..., 4:]))
+        triangle = np.concatenate((candidates[whole], source))
+        order = np.argsort(triangle, kind="stable")
+        corners, corner, triangle = corners[order], corner[order], triangle[order]
+    left_over = triangle
+
+    points = np.rint(corners[..., :2] / corners[..., 2:3] * SUBPIXELS).astype(np.int64)
+    first, second = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
+    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    weight = 1 / corners[..., 2]
+    nearness = weight if scene.camera.projection == "perspective" else -corners[..., 3]
+    clockwise = area < 0
+    turn = np.where(clockwise[:, np.newaxis], [0, 2, 1], [0, 1, 2])
+    rows = np.arange(len(area))[:, np.newaxis]
+    solid = area != 0
+    pieces = _Pieces(
+        points=points[rows, turn][solid],
+        area=np.abs(area[solid]),
+        weight=weight[rows, turn][solid],
+        nearness=nearness[rows, turn][solid],
+        corner=corner[rows, turn][solid],
+        triangle=triangle[solid],
+    )
+    return pieces, left_over
+
+
+def _counting(counts: np.ndarray) -> np.ndarray:
+    """0, 1, ... counts[0] - 1, 0, 1, ... counts[1] - 1, ..."""
+    ends = np.cumsum(counts)
+    return np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - counts, counts)
+
+
+def _spans(
+    pieces: _Pieces, width: int, height: int
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+    """Spans in chunks: piece, x, y, length, nearness at the first pixel, and its step a pixel."""
+    a, b, c = pieces.edges()
+    # A pixel centre exactly on an edge belongs to the triangle on whose left or top that edge is.
+    top_left = (a > 0) | ((a == 0) & (b > 0))
+    # E >= 0 on those edges, E >= 1 on the others.
+    biased = c - ~top_left
+    scaled = pieces.nearness / pieces.area[:, np.newaxis]
+    step = (a * scaled).sum(axis=1)
+    half = SUBPIXELS // 2
+    low = np.maximum(-((half - pieces.points[..., 1].min(axis=1)) // SUBPIXELS), 0)
+    high = np.minimum((pieces.points[..., 1].max(axis=1) - half) // SUBPIXELS, height - 1)
+    lines = np.maximum(high - low + 1, 0)
+    for run in runs_of(lines, _CHUNK):
+        count = lines[run]
+        piece = np.repeat(np.arange(run.start, run.stop), count)
+        y = np.repeat(low[run], count) + _counting(count)
+        left = np.zeros(len(piece), dtype=np.int64)
+        right = np.full(len(piece), width - 1, dtype=np.int64)
+        for edge in range(3):
+            slope = a[piece, edge]
+            value = biased[piece, edge] + b[piece, edge] * y
+            bound = value // np.where(slope == 0, 1, np.abs(slope))
+            np.maximum(left, -bound, out=left, where=slope > 0)
+            np.minimum(right, bound, out=right, where=slope < 0)
+            np.copyto(right, -1, where=(slope == 0) & (value < 0))
+        covered = np.flatnonzero(right >= left)
+        piece, left, y = piece[covered], left[covered], y[covered]
+        nearness = np.zeros(len(piece))
+        for edge in range(3):
+            value = c[piece, edge] + b[piece, edge] * y + a[piece, edge] * left
+            nearness += value * scaled[piece, edge]
+        yield piece, left, y, right[covered] - left + 1, nearness, step[piece]
+
+
+def rasterise(scene: Scene) -> Raster:
+    """Spans and fragments of a scene.
+
+    Triangles are clipped against the near plane, projected, and rounded to 1/256 pixel. A pixel belongs to a
+    triangle when its centre lies inside, or exactly on a left or a top edge: with integer edge functions
+    this is exact, and no pixel of a shared edge is drawn twice or missed. Each scanline's interval comes from
+    an exact floor division. Depth is interpolated in float64, linearly on the screen (1/W, or the depth
+    itself in the orthographic projection).
+
+    Parameters
+    ----------
+    scene : Scene
+        What to draw.
+
+    Returns
+    -------
+    Raster
+    """
+    mesh, width, height = scene.mesh, scene.width, scene.height
+    faces = mesh.faces
+    plane = face_normals(mesh)
+    degenerate = ~plane.any(axis=1)
+    homogeneous = scene.camera.homogeneous(mesh.vertices, width, height)
+    if scene.camera.projection == "perspective":
+        towards = scene.camera.position - mesh.vertices[faces[:, 0]]
+        back = (plane * towards).sum(axis=1) < 0
+    else:
+        back = plane @ scene.camera.viewer < 0
+    culled = back & ~degenerate if scene.back_faces == "cull" else np.zeros(len(faces), dtype=bool)
+
+    x, y, w, depth = homogeneous.T
+    outside = np.zeros(len(faces), dtype=bool)
+    for beyond in (x < 0, x > width * w, y < 0, y > height * w, depth < scene.camera.near):
+        outside |= beyond[faces].all(axis=1)
+    candidates = np.flatnonzero(~(degenerate | culled | outside))
+    outside &= ~(degenerate | culled)
+    pieces, left_over = _assemble(scene, candidates, homogeneous[faces[candidates]])
+    present = np.zeros((3, len(faces)), dtype=bool)
+    present[0, left_over] = True
+    present[1, pieces.triangle] = True
+
+    owner = np.full(width * height, -1, dtype=np.int32)
+    buffer = np.full(width * height, -np.inf)
+    columns = []
+    count = 0
+    for piece, left, line, length, nearness, step in _spans(pieces, width, height):
+        present[2, pieces.triangle[piece]] = True
+        columns.append([part.astype(np.int32) for part in (piece, left, line, length)])
+        first_pixel = line * width + left
+        for run in runs_of(length, _CHUNK):
+            lengths = length[run]
+            offset = _counting(lengths)
+            pixel = np.repeat(first_pixel[run], lengths) + offset
+            value = np.repeat(nearness[run], lengths) + np.repeat(step[run], lengths) * offset
+            before = buffer[pixel]
+            np.maximum.at(buffer, pixel, value)
+            # Strictly nearer than what was there: at one depth the lower triangle, drawn before, stays.
+            winner = np.flatnonzero((value > before) & (value == buffer[pixel]))[::-1]
+            # Of equals in this chunk the last assignment counts, which the reversal makes the first span.
+            index = np.repeat(np.arange(count + run.start, count + run.stop, dtype=np.int32), lengths)
+            owner[pixel[winner]] = index[winner]
+        count += len(piece)
+    del buffer
+
+    if columns:
+        piece, left, line, length = (np.concatenate(column) for column in zip(*columns, strict=True))
+    else:
+        piece, left, line, length = np.zeros((4, 0), dtype=np.int32)
+    seen = np.zeros(count, dtype=bool)
+    seen[owner[owner >= 0]] = True
+    kept = np.flatnonzero(seen)
+    if (left_over[1:] == left_over[:-1]).any():
+        # The pieces of a clipped triangle follow each other; its spans follow y.
+        kept = kept[np.lexsort((left[kept], line[kept], pieces.triangle[piece[kept]]))]
+    renumbered = np.full(count + 1, -1, dtype=np.int32)
+    renumbered[kept] = np.arange(len(kept), dtype=np.int32)
+    owner = renumbered[owner]
+    piece, left, line, length = piece[kept], left[kept], line[kept], length[kept]
+
+    triangle = pieces.triangle[piece].astype(np.int32)
+    span_back = back[triangle]
+    turn = np.where(span_back, -1.0, 1.0) if scene.back_faces == "flip" else np.ones(len(triangle))
+    fallback = plane[triangle] * turn[:, np.newaxis]
+    ends = []
+    repaired = 0
+    for column in (left, left + length - 1):
+        weights = _weights(pieces, piece, column, line)
+        normal = np.zeros((len(piece), 3))
+        for corner in range(3):
+            normal += weights[:, corner, np.newaxis] * mesh.normals[faces[triangle, corner]]
+        normal *= turn[:, np.newaxis]
+        magnitude = np.sqrt((normal * normal).sum(axis=1))
+        # Opposite unit normals leave a remainder of about 1e-16 where they should cancel.
+        lost = magnitude <= 1e-12 * weights.sum(axis=1)
+        magnitude[lost] = 0.0
+        normal[lost] = fallback[lost]
+        repaired += int(lost.sum())
+        ends.append((weights, normalise(normal), magnitude))
+
+    offset = _counting(length).astype(np.int16)
+    span = np.repeat(np.arange(len(length), dtype=np.int32), length)
+    pixel = np.repeat(line * width + left, length)
+    pixel += offset
+    return Raster(
+        x=left,
+        y=line,
+        length=length,
+        triangle=triangle,
+        normal_left=ends[0][1],
+        normal_right=ends[1][1],
+        magnitude_left=ends[0][2],
+        magnitude_right=ends[1][2],
+        weights_left=ends[0][0],
+        weights_right=ends[1][0],
+        back=span_back,
+        span=span,
+        offset=offset,
+        pixel=pixel,
+        visible=owner[pixel] == span,
+        triangles=len(faces),
+        degenerate=int(degenerate.sum() + (present[0] & ~present[1]).sum()),
+        culled=int(culled.sum()),
+        outside=int(outside.sum() + len(candidates) - present[0].sum()),
+        uncovered=int((present[1] & ~present[2]).sum()),
+        hidden_spans=count - len(kept),
+        repaired_normals=repaired,
+    )
+
+
+def _weights(pieces: _Pieces, piece: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates in the mesh's triangle over W at pixel centres, shape (count, 3)."""
+    a, b, c = pieces.edges()
+    result = np.zeros((len(piece), 3))
+    for edge in range(3):
+        value = c[piece, edge] + b[piece, edge] * y + a[piece, edge] * x
+        share = value / pieces.area[piece] * pieces.weight[piece, edge]
+        result += share[:, np.newaxis] * pieces.corner[piece, edge]
+    return result
+
+
+def _position(raster: Raster, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Span of the chosen fragments and their t in it, shape (count, 1)."""
+    span = raster.span[which]
+    t = raster.offset[which] / np.maximum(raster.length[span] - 1, 1)
+    return span, t[:, np.newaxis]
+
+
+def fragment_barycentrics(raster: Raster, which: np.ndarray) -> np.ndarray:
+    """Perspective-correct barycentric coordinates of fragments in their triangles.
+
+    Parameters
+    ----------
+    raster : Raster
+        From `rasterise`.
+    which : int or bool array
+        The fragments, as an index into the fragment arrays.
+
+    Returns
+    -------
+    float64 array, shape (count, 3)
+        Shares of the triangle's three vertices; they add up to 1.
+    """
+    span, t = _position(raster, which)
+    weights = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
+    return weights / weights.sum(axis=1, keepdims=True)
+
+
+def fragment_normals(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray:
+    """Perspective-correct unit normals of fragments: what a GPU interpolates for Phong shading.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene that was rasterised.
+    raster : Raster
+        From `rasterise`.
+    which : int or bool array
+        The fragments, as an index into the fragment arrays.
+
+    Returns
+    -------
+    float64 array, shape (count, 3)
+        ``normalise((1-t) m_l N_l + t m_r N_r)``; where this is 0, the normal of the face, negated where the
+        scene asks for that.
+    """
+    span, t = _position(raster, which)
+    left = (1 - t) * raster.magnitude_left[span][:, np.newaxis]
+    right = t * raster.magnitude_right[span][:, np.newaxis]
+    normal = left * raster.normal_left[span]
+    normal += right * raster.normal_right[span]
+    length = np.sqrt((normal * normal).sum(axis=1, keepdims=True))
+    weight = (1 - t) * raster.weights_left[span].sum(axis=1, keepdims=True)
+    weight += t * raster.weights_right[span].sum(axis=1, keepdims=True)
+    lost = np.flatnonzero((length <= 1e-12 * weight)[:, 0])
+    if len(lost):
+        face = face_normals(scene.mesh)[raster.triangle[span[lost]]]
+        flip = raster.back[span[lost]] & (scene.back_faces == "flip")
+        normal[lost] = np.where(flip[:, np.newaxis], -face, face)
+        length[lost] = 1.0
+    return normal / length

@@ -1,0 +1,425 @@
+"""The golden float64 renderer: a scene to a picture."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.reference.curves import interpolate
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.lighting import halfway_vector, intensity, intensity_of_cosines, saturate
+from blysk.golden.reference.raster import (
+    Raster,
+    face_normals,
+    fragment_barycentrics,
+    fragment_normals,
+    rasterise,
+)
+from blysk.golden.reference.scene import Scene
+
+__all__ = [
+    "DIFFUSE_THRESHOLD",
+    "HIGHLIGHT_THRESHOLD",
+    "NORMAL_THRESHOLD",
+    "SHADINGS",
+    "Curve",
+    "Frame",
+    "Thresholds",
+    "fragment_positions",
+    "gouraud_triangles",
+    "render",
+    "shade_operands",
+    "shade_spans",
+]
+
+SHADINGS = ("flat", "gouraud", "quadratic_gouraud", "adaptive", "phong", "slerp")
+"""Names of the shading methods."""
+
+NORMAL_THRESHOLD = 0.9
+"""Threshold of ``adaptive`` for the normals of a triangle's vertices ([T] appendix В)."""
+
+HIGHLIGHT_THRESHOLD = 0.004
+"""The same for N·H."""
+
+DIFFUSE_THRESHOLD = 0.008
+"""The same for N·L."""
+
+Curve = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""A function of the normals at a span's ends and the place t between them."""
+
+# Fragments shaded at once; bounds the memory, changes no result.
+_CHUNK = 1 << 18
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A picture.
+
+    Parameters
+    ----------
+    image : float64 array, shape (height, width, 3)
+        Intensities in [0, 1], not rounded.
+    mask : bool array, shape (height, width)
+        Pixels that show the surface.
+    """
+
+    image: np.ndarray
+    mask: np.ndarray
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """When ``adaptive`` shades a triangle by its vertices alone: where all three differences are smaller.
+
+    Parameters
+    ----------
+    normal : float
+        Length of the difference of two vertex normals; 0.9 is an angle of 53.5 degrees. (Were the 0.9 of the
+        document meant as a least cosine, 25.8 degrees, the length would be 0.447.)
+    highlight : float
+        Difference of N·H of two vertices, for every light.
+    diffuse : float
+        Difference of N·L of two vertices, for every light; 0.008 is two steps of an 8-bit channel for a
+        white surface and one light.
+
+    Raises
+    ------
+    ValueError
+        If a threshold is negative or NaN. Infinite ones are allowed: they make every triangle pass.
+    """
+
+    normal: float = NORMAL_THRESHOLD
+    highlight: float = HIGHLIGHT_THRESHOLD
+    diffuse: float = DIFFUSE_THRESHOLD
+
+    def __post_init__(self):
+        for name in ("normal", "highlight", "diffuse"):
+            value = float(getattr(self, name))
+            if math.isnan(value) or value < 0:
+                raise ValueError(f"the {name} threshold must be at least 0, not {value}")
+            object.__setattr__(self, name, value)
+
+
+def gouraud_triangles(scene: Scene, thresholds: Thresholds | None = None) -> np.ndarray:
+    """Triangles that ``adaptive`` shades by Gouraud's method; the mean is their share ([T] appendix В).
+
+    Those whose vertices, two by two, differ by less than each of the thresholds in N, N·H and N·L. A light
+    with ``L = -V`` has no H and no highlight, and only its N·L counts. A change of N·H by e changes
+    ``(N·H)^n`` by up to ``n e``: with large exponents the default lets visible errors through.
+
+    The listing of [T] appendix В returns Phong where the normals are close; that test is inverted, and
+    mended here.
+
+    Parameters
+    ----------
+    scene : Scene
+        Mesh, lights and viewer.
+    thresholds : Thresholds, optional
+        Those of the document by default.
+
+    Returns
+    -------
+    bool array, shape (F,)
+        By face of the mesh, drawn or not.
+    """
+    thresholds = thresholds or Thresholds()
+    normals = scene.mesh.normals
+    faces = scene.mesh.faces
+    result = np.ones(len(faces), dtype=bool)
+    cosines = []
+    viewer = scene.view_vectors(scene.mesh.vertices)
+    for light in scene.lights:
+        direction = light.towards(scene.mesh.vertices)
+        halfway = halfway_vector(direction, viewer)
+        cosines += [
+            ((normals * halfway).sum(axis=1), thresholds.highlight),
+            ((normals * direction).sum(axis=1), thresholds.diffuse),
+        ]
+    for first, second in ((0, 1), (1, 2), (2, 0)):
+        first, second = faces[:, first], faces[:, second]
+        result &= np.linalg.norm(normals[first] - normals[second], axis=1) < thresholds.normal
+        for cosine, threshold in cosines:
+            result &= np.abs(cosine[first] - cosine[second]) < threshold
+    return result
+
+
+def render(
+    scene: Scene,
+    shading: str = "phong",
+    model: str = "blinn",
+    raster: Raster | None = None,
+    thresholds: Thresholds | None = None,
+) -> Frame:
+    """Picture of a scene in float64.
+
+    - ``flat``: the intensity of each triangle's own normal, in its middle;
+    - ``gouraud``: the intensity at the three vertices, saturated there, interpolated perspective-correctly;
+    - ``quadratic_gouraud``: the second-degree polynomial through the intensities, saturated, at the three
+      vertices and at the middles of the three edges ([T] appendix Д), where the normal is that of
+      ``phong``, ``(N_a + N_b)/|N_a + N_b|``. In the perspective-correct barycentric coordinates l it is
+      ``sum_i l_i (2 l_i - 1) I_i + sum_{i<j} 4 l_i l_j I_ij``. Two triangles that share an edge and its
+      normals agree along it. Between the six points it may leave their range by up to a third of it
+      (in the middle of the triangle), and is saturated again;
+    - ``adaptive``: ``gouraud`` in the triangles of `gouraud_triangles`, ``phong`` in the others ([T]
+      appendix В);
+    - ``phong``: the vertex normals interpolated perspective-correctly and normalised at every pixel, as a
+      GPU does: the reference image;
+    - ``slerp``: normals on the great circle between the ends of each span, linear in screen space ([T] 2.1).
+
+    Point lights and a near viewer have an L and V of their own at every point that is lit: a fragment's place
+    on the surface, a vertex, the middle of an edge.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to draw.
+    shading : str
+        One of `SHADINGS`.
+    model : str
+        One of `REFLECTION_MODELS`.
+    raster : Raster, optional
+        The scene's own raster, when it is at hand already.
+    thresholds : Thresholds, optional
+        Of ``adaptive``; the other methods do not read them.
+
+    Raises
+    ------
+    ValueError
+        If the shading or the model is unknown.
+    """
+    if shading not in SHADINGS:
+        raise ValueError(f"shading must be one of {', '.join(SHADINGS)}, not {shading!r}")
+    if raster is None:
+        raster = rasterise(scene)
+    if shading == "slerp":
+        image = shade_spans(scene, raster, "slerp", model)
+    else:
+        image = _background(scene)
+        colors = image.reshape(-1, 3)
+        nodes = None if shading == "phong" else _NodeColors(scene, raster, shading, model)
+        linear = gouraud_triangles(scene, thresholds) if shading == "adaptive" else None
+        for which in _visible(raster):
+            by_nodes = by_normals = which
+            if linear is not None:
+                chosen = linear[raster.triangle[raster.span[which]]]
+                by_nodes, by_normals = which[chosen], which[~chosen]
+            if nodes is not None:
+                colors[raster.pixel[by_nodes]] = nodes.interpolate(by_nodes)
+            if shading in ("phong", "adaptive"):
+                normals = fragment_normals(scene, raster, by_normals)
+                span = raster.span[by_normals]
+                colors[raster.pixel[by_normals]] = saturate(
+                    _shade(
+                        scene,
+                        normals,
+                        model,
+                        raster.triangle,
+                        span,
+                        points=_points(scene, raster, by_normals),
+                    )
+                )
+    mask = np.zeros((scene.height, scene.width), dtype=bool)
+    mask.reshape(-1)[raster.pixel[raster.visible]] = True
+    return Frame(image=image, mask=mask)
+
+
+class _NodeColors:
+    """Colors at a few points of every triangle that shows, and their interpolation."""
+
+    def __init__(self, scene: Scene, raster: Raster, shading: str, model: str):
+        self.raster, self.shading = raster, shading
+        shown, self.place = np.unique(raster.triangle, return_inverse=True)
+        face = face_normals(scene.mesh)[shown][:, np.newaxis]
+        points = scene.mesh.vertices[scene.mesh.faces[shown]]
+        if shading == "flat":
+            normals = face
+            points = points.mean(axis=1, keepdims=True)
+        else:
+            normals = scene.mesh.normals[scene.mesh.faces[shown]]
+            if shading == "quadratic_gouraud":
+                # The middle of the edge that lies opposite each corner.
+                total = normals[:, [1, 2, 0]] + normals[:, [2, 0, 1]]
+                # As in `rasterise`: opposite normals leave a remainder where they should cancel.
+                lost = np.linalg.norm(total, axis=-1, keepdims=True) <= 1e-12
+                middles = np.where(lost, face, normalise(total))
+                normals = np.concatenate((normals, middles), axis=1)
+                points = np.concatenate((points, (points[:, [1, 2, 0]] + points[:, [2, 0, 1]]) / 2), axis=1)
+        if scene.back_faces == "flip":
+            back = np.zeros(len(shown), dtype=bool)
+            back[self.place] = raster.back
+            normals = np.where(back[:, np.newaxis, np.newaxis], -normals, normals)
+        self.colors = saturate(_shade(scene, normals, model, shown, slice(None), points=points))
+
+    def interpolate(self, which: np.ndarray) -> np.ndarray:
+        """Colors of fragments, shape (count, 3)."""
+        colors = self.colors[self.place[self.raster.span[which]]]
+        if self.shading == "flat":
+            return colors[:, 0]
+        share = fragment_barycentrics(self.raster, which)
+        if self.shading == "quadratic_gouraud":
+            across = 4 * share[:, [1, 2, 0]] * share[:, [2, 0, 1]]
+            share = np.concatenate((share * (2 * share - 1), across), axis=1)
+        return saturate(np.einsum("fn,fnk->fk", share, colors))
+
+
+def shade_spans(
+    scene: Scene, raster: Raster, curve: str | Curve, model: str, chord: bool = False
+) -> np.ndarray:
+    """Picture from spans alone, as the hardware sees them.
+
+    The normal of a fragment is the curve between its span's ends at ``t = offset / (length - 1)`` (0 for a
+    span of one pixel), with the length that the curve gives it. With ``normalised`` this is the reference
+    of the method error.
+
+    Parameters
+    ----------
+    scene : Scene
+        Size, background, materials, lights and viewer; of the mesh the materials of its faces.
+    raster : Raster
+        The spans. Only normal_left, normal_right, length, span, offset, pixel and visible are used (and
+        triangle, where there are several materials; and triangle, weights_left and weights_right, where there
+        are point lights or a near viewer), so that they may be replaced, with `dataclasses.replace`, by
+        quantised ones.
+    curve : str or callable
+        One of `CURVES`, or a function of the normals at both ends and t.
+    model : str
+        One of `REFLECTION_MODELS`.
+    chord : bool
+        See `intensity`.
+
+    Returns
+    -------
+    float64 array, shape (height, width, 3)
+        Intensities in [0, 1], not rounded.
+
+    Raises
+    ------
+    ValueError
+        If the curve or the model is unknown, or spans without weights have point lights or a near viewer.
+    """
+    image = _background(scene)
+    colors = image.reshape(-1, 3)
+    for which in _visible(raster):
+        span = raster.span[which]
+        t = raster.offset[which] / np.maximum(raster.length[span] - 1, 1)
+        ends = raster.normal_left[span], raster.normal_right[span]
+        normals = interpolate(curve, *ends, t) if isinstance(curve, str) else curve(*ends, t)
+        points = _points(scene, raster, which)
+        shaded = _shade(scene, normals, model, raster.triangle, span, chord, points)
+        colors[raster.pixel[which]] = saturate(shaded)
+    return image
+
+
+def shade_operands(
+    scene: Scene, raster: Raster, cosine: np.ndarray, highlight_cosine: np.ndarray, model: str
+) -> np.ndarray:
+    """Picture from what a method without normals gives for every fragment.
+
+    Parameters
+    ----------
+    scene : Scene
+        Size, background, materials and the lights' colours; of the mesh the materials of its faces.
+    raster : Raster
+        The fragments; span, pixel, visible and triangle are used.
+    cosine, highlight_cosine : arrays, shape (fragments, lights)
+        N·L and N·H.
+    model : str
+        One of `REFLECTION_MODELS`.
+
+    Returns
+    -------
+    float64 array, shape (height, width, 3)
+        Intensities in [0, 1], not rounded.
+
+    Raises
+    ------
+    ValueError
+        If the model is unknown.
+    """
+    image = _background(scene)
+    colors = image.reshape(-1, 3)
+    for which in _visible(raster):
+        material = scene.mesh.material[raster.triangle[raster.span[which]]]
+        for index, coefficients in enumerate(scene.materials):
+            chosen = which[material == index]
+            shaded = intensity_of_cosines(
+                coefficients,
+                scene.lights,
+                scene.ambient_light,
+                cosine[chosen],
+                highlight_cosine[chosen],
+                model,
+            )
+            colors[raster.pixel[chosen]] = saturate(shaded)
+    return image
+
+
+def fragment_positions(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray:
+    """Where fragments lie on the surface, in the mesh's units: perspective-correct.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene that was rasterised.
+    raster : Raster
+        From `rasterise`.
+    which : int or bool array
+        The fragments, as an index into the fragment arrays.
+
+    Returns
+    -------
+    float64 array, shape (count, 3)
+
+    Raises
+    ------
+    ValueError
+        If the raster's weights were left out.
+    """
+    if len(raster.weights_left) != len(raster.length):
+        raise ValueError("point lights and a near viewer need the weights of the spans")
+    corners = scene.mesh.vertices[scene.mesh.faces[raster.triangle[raster.span[which]]]]
+    return np.einsum("fn,fnk->fk", fragment_barycentrics(raster, which), corners)
+
+
+def _points(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray | None:
+    return fragment_positions(scene, raster, which) if scene.local else None
+
+
+def _background(scene: Scene) -> np.ndarray:
+    image = np.empty((scene.height, scene.width, 3))
+    image[...] = scene.background
+    return image
+
+
+def _visible(raster: Raster) -> Iterator[np.ndarray]:
+    visible = np.flatnonzero(raster.visible)
+    # At least one part, so that a wrong name is an error in an empty picture too.
+    for start in range(0, max(len(visible), 1), _CHUNK):
+        yield visible[start : start + _CHUNK]
+
+
+def _shade(
+    scene: Scene,
+    normals: np.ndarray,
+    model: str,
+    triangles: np.ndarray,
+    which: np.ndarray | slice,
+    chord: bool = False,
+    points: np.ndarray | None = None,
+) -> np.ndarray:
+    """Intensities of normals, whose first axis is that of ``triangles[which]``, the triangles they lie on."""
+
+    def shade(normals, material, points):
+        viewer = scene.view_vectors(points)
+        return intensity(normals, material, scene.lights, scene.ambient_light, viewer, model, chord, points)
+
+    if len(scene.materials) == 1:
+        return shade(normals, scene.materials[0], points)
+    result = np.empty(normals.shape)
+    material = scene.mesh.material[triangles[which]]
+    for index in np.unique(material):
+        chosen = material == index
+        own = None if points is None else points[chosen]
+        result[chosen] = shade(normals[chosen], scene.materials[index], own)
+    return result

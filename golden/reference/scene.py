@@ -1,0 +1,130 @@
+"""Everything that a picture depends on: mesh, camera, size, material and lights."""
+
+import operator
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.lighting import Light, Material, Triple, triple
+
+__all__ = ["BACK_FACES", "LARGEST_SIDE", "VIEWERS", "Scene"]
+
+BACK_FACES = ("flip", "show", "cull")
+"""What happens to a triangle seen from behind."""
+
+VIEWERS = ("distant", "near")
+"""Where light is reflected to: one direction for the whole frame, or the camera."""
+
+LARGEST_SIDE = 4095
+"""Largest width and height: x, y and a span's length are 12 bits each."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A picture to be made.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The surface.
+    camera : Camera
+        The viewer.
+    width, height : int
+        Pixels, 1 to 4095 each.
+    material : Material or sequence of Material
+        The surface's coefficients; several by the mesh's index of each face, stored as a tuple.
+    lights : sequence of Light
+        Any number, directional or point lights; stored as a tuple.
+    ambient_light : three floats
+        I_a a channel, at least 0.
+    background : three floats
+        Color of the pixels that show no surface, in [0, 1].
+    back_faces : {"flip", "show", "cull"}
+        A triangle seen from behind (its corners clockwise) is drawn with its normals negated, so that those
+        of an outer surface turn to the viewer's side, or with its normals as they are, or is left out.
+    viewer : {"distant", "near"}
+        The V of the lighting: `Camera.viewer` everywhere, or from each point of the surface to a perspective
+        camera.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range, the mesh has faces of a material that there is not, or a near viewer has
+        an orthographic camera.
+    TypeError
+        If a size is not an integer, a light is not a `Light` or a material is not a `Material`.
+    """
+
+    mesh: Mesh
+    camera: Camera
+    width: int
+    height: int
+    material: Material | tuple[Material, ...]
+    lights: tuple[Light, ...]
+    ambient_light: Triple = (1.0, 1.0, 1.0)
+    background: Triple = (0.0, 0.0, 0.0)
+    back_faces: str = "flip"
+    viewer: str = "distant"
+
+    def __post_init__(self):
+        for name in ("width", "height"):
+            size = operator.index(getattr(self, name))
+            if not 1 <= size <= LARGEST_SIDE:
+                raise ValueError(f"a scene's {name} must be in 1 to {LARGEST_SIDE}, not {size}")
+            object.__setattr__(self, name, size)
+        object.__setattr__(self, "lights", tuple(self.lights))
+        for light in self.lights:
+            if not isinstance(light, Light):
+                raise TypeError(f"a scene's lights must be Light, not {type(light).__name__}")
+        if not isinstance(self.material, Material):
+            object.__setattr__(self, "material", tuple(self.material))
+        for material in self.materials:
+            if not isinstance(material, Material):
+                raise TypeError(f"a scene's materials must be Material, not {type(material).__name__}")
+        used = 1 + self.mesh.material.max(initial=0)
+        if len(self.materials) < used:
+            raise ValueError(f"the mesh has faces of {used} materials, the scene {len(self.materials)}")
+        object.__setattr__(self, "ambient_light", triple("a scene's ambient_light", self.ambient_light, 0))
+        object.__setattr__(self, "background", triple("a scene's background", self.background, 0, 1))
+        if self.back_faces not in BACK_FACES:
+            raise ValueError(f"back_faces must be one of {', '.join(BACK_FACES)}, not {self.back_faces!r}")
+        if self.viewer not in VIEWERS:
+            raise ValueError(f"viewer must be one of {', '.join(VIEWERS)}, not {self.viewer!r}")
+        if self.viewer == "near" and self.camera.projection != "perspective":
+            raise ValueError("a near viewer needs a perspective camera; an orthographic one is distant")
+
+    @property
+    def local(self) -> bool:
+        """Whether L or H differ from point to point: there is a point light, or a near viewer."""
+        return self.viewer == "near" or any(light.position is not None for light in self.lights)
+
+    def view_vectors(self, points: np.ndarray | None = None) -> np.ndarray:
+        """Unit vectors V from points of the surface to the viewer.
+
+        Parameters
+        ----------
+        points : array, shape (..., 3), optional
+            Points; a distant viewer does not read them.
+
+        Returns
+        -------
+        float64 array
+            Shape (3,) of a distant viewer, else that of the points; 0 at the camera itself.
+
+        Raises
+        ------
+        ValueError
+            If a near viewer is given no points.
+        """
+        if self.viewer == "distant":
+            return self.camera.viewer
+        if points is None:
+            raise ValueError("a near viewer needs the points that it sees")
+        return normalise(np.asarray(self.camera.position) - points)
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """The material, or all of them."""
+        return (self.material,) if isinstance(self.material, Material) else self.material

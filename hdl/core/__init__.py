@@ -1,0 +1,1 @@
+"""What every unit is built of: fixed-point shapes, streams, scheduled datapaths."""

@@ -1,0 +1,423 @@
+"""Data-flow graphs: words of a unit, placed in time and on shared operators, then built as registers."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from amaranth.hdl import Module, ShapeLike, Signal, Value, signed
+from amaranth.lib.memory import Memory
+
+from blysk.golden.number.fixed import Format
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+
+__all__ = [
+    "MULTIPLIER_BITS",
+    "MULTIPLIER_LATENCY",
+    "Dataflow",
+    "Operator",
+    "Word",
+    "checked_interval",
+    "dot",
+    "registered_product",
+    "shared_sums",
+]
+
+MULTIPLIER_BITS = 18
+"""Bits of a multiplier's signed operands."""
+
+MULTIPLIER_LATENCY = 4
+"""Clocks of `registered_product`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Word:
+    """A word of a data flow.
+
+    Parameters
+    ----------
+    name : str
+        Of its register.
+    age : int
+        Enabled clocks from when a beat is taken in until its word stands.
+    stands : int
+        Clocks for which it stands before the next beat's may take its place.
+    """
+
+    name: str
+    age: int
+    stands: int
+
+
+@dataclass(frozen=True, eq=False)
+class Operator:
+    """Equal pieces of hardware that take turns at the uses of a graph.
+
+    Parameters
+    ----------
+    name : str
+        Of its operand registers.
+    shapes : sequence of ShapeLike
+        Operands; each piece has a register for every one.
+    latency : int
+        Registers from those of the operands to the result.
+    make : callable
+        Makes a piece: from a function that makes a register (value, name) and the operands, the result.
+    left : list of int
+        Uses that may still come.
+    free : list of list of bool
+        For each piece the turns that nothing has yet, one for every clock of the interval.
+    """
+
+    name: str
+    shapes: Sequence[ShapeLike]
+    latency: int
+    make: Callable[..., Any]
+    left: list[int]
+    free: list[list[bool]] = field(default_factory=list)
+
+    @property
+    def count(self) -> int:
+        """How many pieces there are."""
+        return len(self.free)
+
+
+class Dataflow:
+    """The words of a `PipelinedUnit` and what makes each from others, before there is any hardware.
+
+    Every word gets the earliest age at which its operands are there. What is shared, such as a multiplier,
+    is used when a piece of it is free: beats come a whole multiple of the initiation interval apart, so a
+    piece has as many turns as the interval has clocks, and ``ceil(uses / interval)`` pieces serve all. Uses
+    are placed in the order in which they are added. Words that are read later than they stand are copied on
+    the way by `build`.
+
+    Parameters
+    ----------
+    interval : int
+        Initiation interval of the unit, at least 1.
+    multiplications : int
+        How many there will be.
+    hurries : bool
+        Whether a product takes a single register, two clocks in all: for a unit whose results are waited for.
+
+    Raises
+    ------
+    ValueError
+        If the interval is less than 1.
+    """
+
+    def __init__(self, interval: int, multiplications: int = 0, *, hurries: bool = False):
+        if interval < 1:
+            raise ValueError(f"interval must be at least 1, not {interval}")
+        self.interval = interval
+        self._makers: list[tuple[Word, Callable[[_Build], Any]]] = []
+        latency, product = MULTIPLIER_LATENCY, registered_product
+        if hurries:
+            latency, product = 1, lambda register, a, b: register(a * b, "product")
+        operand = signed(MULTIPLIER_BITS)
+        self.multiplier = self.share("multiplier", multiplications, (operand, operand), latency, product)
+
+    def _add(self, name: str, age: int, stands: int, make: Callable[["_Build"], Any]) -> Word:
+        word = Word(name, age, stands)
+        self._makers.append((word, make))
+        return word
+
+    def input(self, name: str, read: Callable[[Any], Any]) -> Word:
+        """A word of the beat: ``read(operands)``."""
+        first = 0 if self.interval == 1 else 1
+        return self._add(name, first, self.interval, lambda build: read(build.operands))
+
+    def wire(self, name: str, function: Callable[[Any], Any], word: Word) -> Word:
+        """Wiring from a word's value; where it is read later than it stands, it is copied in its place."""
+        return self._add(name, word.age, word.stands, lambda build: function(build.at(word, word.age)))
+
+    def register(self, name: str, function: Callable[..., Any], *words: Word, since: int = 0) -> Word:
+        """A register that takes ``function`` of the words' values, one clock.
+
+        Parameters
+        ----------
+        name : str
+            Of the word.
+        function : callable
+            Of the values of `words`.
+        *words : Word
+            What it is made from.
+        since : int
+            Age at which it stands at the earliest: a word that is read late need not be copied till then.
+        """
+        age = max(since - 1, *(word.age for word in words))
+
+        def make(build):
+            value = function(*(build.at(word, age) for word in words))
+            return build.unit.register(build.m, value, name, when=build.when(age))
+
+        return self._add(name, age + 1, self.interval, make)
+
+    def share(
+        self, name: str, uses: int, shapes: Sequence[ShapeLike], latency: int, make: Callable[..., Any]
+    ) -> Operator:
+        """An operator for so many uses; the parameters are those of `Operator`."""
+        pieces = -(-uses // self.interval)
+        return Operator(name, shapes, latency, make, [uses], [[True] * self.interval for _ in range(pieces)])
+
+    def use(
+        self,
+        operator: Operator,
+        name: str,
+        words: Sequence[Word],
+        operands: Callable[..., Sequence[Any]],
+        result: Callable[[Any], Any] = lambda value: value,
+        latency: int | None = None,
+        since: int = 0,
+    ) -> Word:
+        """Result of an operator; it stands for one clock.
+
+        Parameters
+        ----------
+        operator : Operator
+            From `share`.
+        name : str
+            Of the word.
+        words : sequence of Word
+            What the operands are made from.
+        operands : callable
+            Wiring from the words' values to the operands.
+        result : callable
+            Wiring from the operator's result to the word's value.
+        latency : int or None
+            Registers from the operands to that value, where ``result`` takes one on the way; ``None``: all.
+        since : int
+            Age at which the word stands at the earliest: one that is read late need not be copied till then.
+
+        Raises
+        ------
+        ValueError
+            If that is one use more than announced.
+        """
+        if not operator.left[0]:
+            raise ValueError(f"{name} is one use of the {operator.name} more than announced")
+        operator.left[0] -= 1
+        latency = operator.latency if latency is None else latency
+        age = max(since - 1 - latency, *(word.age for word in words))
+        while not any(turns[age % self.interval] for turns in operator.free):
+            age += 1
+        piece = next(k for k, turns in enumerate(operator.free) if turns[age % self.interval])
+        operator.free[piece][age % self.interval] = False
+
+        def make(build):
+            given = operands(*(build.at(word, age) for word in words))
+            return result(build.issue(operator, piece, age, given))
+
+        return self._add(name, age + 1 + latency, 1, make)
+
+    def multiply(
+        self,
+        name: str,
+        a: Word,
+        b: Word,
+        left: Callable[[Any], FixedValue] = lambda value: value,
+        right: Callable[[Any], FixedValue] = lambda value: value,
+        since: int = 0,
+    ) -> Word:
+        """Exact product of two words on a shared multiplier.
+
+        It is there `MULTIPLIER_LATENCY` clocks after its operands; one, in a graph that ``hurries``.
+
+        Parameters
+        ----------
+        name : str
+            Of the word.
+        a, b : Word
+            Operands.
+        left, right : callable
+            Wiring from the value of a word to the operand: `MULTIPLIER_BITS` bits if signed, one less if not.
+        since : int
+            As for `use`.
+
+        Raises
+        ------
+        ValueError
+            If an operand is too wide, or there are more multiplications than announced.
+        """
+        format: list[Format] = []
+
+        def operands(x, y):
+            x, y = left(x), right(y)
+            for value in (x, y):
+                if value.format.width + (not value.format.signed) > MULTIPLIER_BITS:
+                    raise ValueError(f"{value.format} is too wide for a multiplier")
+            format.append(x.format * y.format)
+            return x, y
+
+        def product(code):
+            return FixedValue(format[-1], code[: format[-1].width])
+
+        return self.use(self.multiplier, name, (a, b), operands, product, since=since)
+
+    def look_up(self, name: str, words: Sequence[int], width: int, address: Word) -> Word:
+        """Word of a table at an address, one clock.
+
+        Parameters
+        ----------
+        name : str
+            Of the table.
+        words : sequence of int
+            Of the table, a power of two of them.
+        width : int
+            Bits of each.
+        address : Word
+            As many bits as needed, unsigned.
+        """
+        age = address.age
+
+        def make(build):
+            memory = Memory(shape=width, depth=len(words), init=words)
+            build.m.submodules[name] = memory
+            port = memory.read_port()
+            build.m.d.comb += port.addr.eq(build.at(address, age))
+            return port.data
+
+        # The address stands for an interval, and so does what is read.
+        return self._add(name, age + 1, address.stands, make)
+
+    def build(self, m: Module, unit: PipelinedUnit, operands: Any) -> Callable[[Word, int], Any]:
+        """Make the hardware; the result gives a word's value at an age.
+
+        Parameters
+        ----------
+        m : Module
+            Module that gets the registers.
+        unit : PipelinedUnit
+            Unit whose beats they belong to; its initiation interval is that of the graph.
+        operands
+            What the unit's `PipelinedUnit.datapath` is given.
+        """
+        build = _Build(m, unit, operands)
+        for word, make in self._makers:
+            build.values[word] = {word.age: make(build)}
+        return build.at
+
+
+def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> Any:
+    """Exact product, `MULTIPLIER_LATENCY` clocks: two registers for each operand, two for the product.
+
+    An FPGA's multipliers lie in few places, far from the multiplexers that operands come from and the adders
+    that products go to. Of registers in a row each wire is short wherever those are; and some go into the
+    multiplier block.
+
+    Parameters
+    ----------
+    register : callable
+        Makes a register: from a value and its name, the register.
+    a, b
+        Operands.
+    """
+    for step in range(2):
+        a, b = register(a, f"a_{step}"), register(b, f"b_{step}")
+    return register(register(a * b, "product_0"), "product")
+
+
+def shared_sums(graph: Dataflow, uses: int, product: Format) -> Operator:
+    """What sums so many dot products, whose products have a format: two clocks; see `dot`."""
+    shapes = FixedShape(product + product), FixedShape(product)
+    return graph.share("sum", uses, shapes, 1, lambda register, x, y: register(x + y, "total"))
+
+
+def dot(
+    graph: Dataflow, name: str, a: Word, b: Word | Callable[[Any], Any], sums: Operator | None = None
+) -> Word:
+    """Exact dot product of two vectors: three multiplications of the graph, and two sums.
+
+    Parameters
+    ----------
+    graph : Dataflow
+        Graph that gets the words.
+    name : str
+        Of the result.
+    a : Word
+        A vector.
+    b : Word or callable
+        The other; or what makes it from the value of ``a``.
+    sums : Operator or None
+        From `shared_sums`; ``None``: the sums have registers of their own.
+    """
+
+    def factors(c):
+        if isinstance(b, Word):
+            return a, b, lambda v: v[c], lambda v: v[c]
+        return a, a, lambda v: v[c], lambda v: b(v)[c]
+
+    products = [graph.multiply(f"{name}_{c}", *factors(c)) for c in range(3)]
+    if sums is not None:
+        return graph.use(sums, f"{name}_total", products, lambda x, y, z: (x + y, z))
+    partial = graph.register(f"{name}_partial", lambda x, y: x + y, *products[:2])
+    return graph.register(f"{name}_total", lambda x, y: x + y, partial, products[2])
+
+
+def checked_interval(interval: int | None, longest: int, default: int | None = None) -> int:
+    """An initiation interval from 1 to that of one multiplier for all; ``None`` stands for the default.
+
+    Raises
+    ------
+    ValueError
+        If it is none of those.
+    """
+    if interval is None:
+        return default or longest
+    if interval not in range(1, longest + 1):
+        raise ValueError(f"initiation_interval must be 1 to {longest}, not {interval!r}")
+    return interval
+
+
+class _Build:
+    """Hardware of a graph while it is being made."""
+
+    def __init__(self, m: Module, unit: PipelinedUnit, operands: Any):
+        self.m, self.unit, self.operands = m, unit, operands
+        self.values: dict[Word, dict[int, Any]] = {}
+        self._pieces: dict[tuple[Operator, int], tuple[list[Signal], Any]] = {}
+
+    def when(self, age: int) -> Value | None:
+        """When a register of that age is written; always where every clock brings a beat."""
+        return self.unit.at(age) if self.unit.initiation_interval > 1 else None
+
+    def at(self, word: Word, age: int) -> Any:
+        """Value of a word at an age, through copies where it no longer stands by itself."""
+        copies = self.values[word]
+        first = max(copies)
+        stands = word.stands if first == word.age else self.unit.initiation_interval
+        while age >= first + stands:
+            value = copies[first]
+            first += stands
+            copies[first] = self.unit.register(
+                self.m, value, f"{word.name}_{first}", when=self.when(first - 1)
+            )
+            stands = self.unit.initiation_interval
+        return copies[max(start for start in copies if start <= age)]
+
+    def issue(self, operator: Operator, piece: int, age: int, operands: Sequence[Any]) -> Any:
+        """Give a piece of an operator its operands at an age; its result, for all uses.
+
+        Those of the first use are given whenever it is no other's turn, so that no register needs an enable.
+        """
+        key, when = (operator, piece), self.when(age)
+        if key not in self._pieces:
+            when = None
+            given = [
+                Signal(shape, name=f"{operator.name}_{piece}_{k}") for k, shape in enumerate(operator.shapes)
+            ]
+
+            def register(value, name):
+                return self.unit.register(self.m, value, f"{operator.name}_{piece}_{name}")
+
+            self._pieces[key] = given, operator.make(register, *given)
+        given, result = self._pieces[key]
+        assignments = [
+            Value.cast(to).eq(Value.cast(value)) for to, value in zip(given, operands, strict=True)
+        ]
+        if when is None:
+            self.m.d.sync += assignments
+        else:
+            with self.m.If(when):
+                self.m.d.sync += assignments
+        return result

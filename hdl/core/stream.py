@@ -1,0 +1,321 @@
+"""What every streaming unit shares: connections, outputs that wait, and the pipeline with one enable."""
+
+from amaranth.hdl import Cat, EnableInserter, Module, Mux, Shape, ShapeLike, Signal, Value, ValueLike
+from amaranth.lib import data, fifo, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.hdl.core.fixed import FixedShape
+
+__all__ = [
+    "BUFFER_LATENCY",
+    "REGISTER_LATENCY",
+    "PipelinedUnit",
+    "connect",
+    "connect_buffered",
+    "connect_registered",
+    "count_down",
+    "offer",
+    "require_same_shape",
+]
+
+BUFFER_LATENCY = 2
+"""Clocks that a payload takes through an empty buffer."""
+
+REGISTER_LATENCY = 1
+"""Clocks that a payload takes through the register of `connect_registered`."""
+
+
+def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> None:
+    """Refuse two payload shapes that differ in a field, a width, a sign or a fixed-point format.
+
+    Amaranth compares payloads by width alone, so that a moved binary point would pass.
+
+    Raises
+    ------
+    TypeError
+        If the shapes differ, naming the field.
+    """
+    if isinstance(a, data.StructLayout) and isinstance(b, data.StructLayout):
+        if list(a.members) != list(b.members):
+            raise TypeError(
+                f"{path} has fields {list(a.members)} on one side, {list(b.members)} on the other"
+            )
+        for name, shape in a.members.items():
+            require_same_shape(shape, b.members[name], f"{path}.{name}")
+    elif isinstance(a, data.ArrayLayout) and isinstance(b, data.ArrayLayout):
+        if a.length != b.length:
+            raise TypeError(f"{path} has {a.length} elements on one side, {b.length} on the other")
+        require_same_shape(a.elem_shape, b.elem_shape, f"{path}[]")
+    else:
+        custom = (FixedShape, data.Layout)
+        same = a == b if isinstance(a, custom) or isinstance(b, custom) else Shape.cast(a) == Shape.cast(b)
+        if not same:
+            raise TypeError(f"{path} is {a!r} on one side, {b!r} on the other")
+
+
+def connect(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
+    """Connect two streams whose payloads have the same fields and formats.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the connection.
+    source : stream.Interface
+        Stream that offers payloads (the output of a submodule, or the input of the enclosing component).
+    sink : stream.Interface
+        Stream that accepts them.
+
+    Raises
+    ------
+    TypeError
+        If the payloads differ in a field or in a fixed-point format.
+    """
+    require_same_shape(source.payload.shape(), sink.payload.shape())
+    m.d.comb += [
+        Value.cast(sink.payload).eq(Value.cast(source.payload)),
+        sink.valid.eq(source.valid),
+        source.ready.eq(sink.ready),
+    ]
+
+
+def connect_buffered(
+    m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int
+) -> None:
+    """Connect two streams through a FIFO, which takes payloads in while the sink waits.
+
+    A payload takes `BUFFER_LATENCY` clocks through the empty FIFO.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the FIFO as a submodule ``name``.
+    source, sink : stream.Interface
+        As for `connect`.
+    depth : int
+        Payloads that the FIFO holds, at least 3.
+
+    Raises
+    ------
+    TypeError
+        If the payloads differ in a field or in a fixed-point format.
+    """
+    require_same_shape(source.payload.shape(), sink.payload.shape())
+    width = Shape.cast(source.payload.shape()).width
+    m.submodules[name] = buffer = fifo.SyncFIFOBuffered(width=width, depth=depth)
+    m.d.comb += [
+        buffer.w_data.eq(source.payload),
+        buffer.w_en.eq(source.valid),
+        source.ready.eq(buffer.w_rdy),
+        Value.cast(sink.payload).eq(buffer.r_data),
+        sink.valid.eq(buffer.r_rdy),
+        buffer.r_en.eq(sink.ready),
+    ]
+
+
+def offer(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
+    """Offer on a stream what stands in registers; one more register holds what is not taken.
+
+    The result, *advance*, tells whether the registers behind ``valid`` and ``payload`` take their next values
+    on this clock. It is itself a register, so that no path leads from the ready of one unit to that of the
+    one before it, however many there are in a row: a beat that is not taken on the clock on which it is first
+    offered moves into the register, and what stands behind it follows into its place and waits there.
+
+    This costs a register and a multiplexer for each bit of the payload. It takes no clock, neither of the
+    latency nor of the throughput: a beat is offered on the clock on which ``valid`` rises, and while the
+    output is ready beats follow each other as they come. One that waits stays as it is. Reset empties the
+    register.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the register.
+    output : stream.Interface
+        Stream on which to offer.
+    valid : ValueLike
+        Whether there is a payload; a register that changes only while ``advance``.
+    payload : ValueLike
+        The payload, likewise.
+
+    Returns
+    -------
+    Value
+        ``advance``, one bit.
+    """
+    held = Signal(name="held")
+    spare = Signal(len(Value.cast(payload)), name="spare", reset_less=True)
+    m.d.comb += [
+        output.valid.eq(held | valid),
+        Value.cast(output.payload).eq(Mux(held, spare, Value.cast(payload))),
+    ]
+    m.d.sync += held.eq(output.valid & ~output.ready)
+    with m.If(~held):
+        m.d.sync += spare.eq(Value.cast(payload))
+    return ~held
+
+
+def connect_registered(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
+    """Connect two streams through a register, which takes `REGISTER_LATENCY`; the source's ready is one, too.
+
+    Parameters
+    ----------
+    m, source, sink
+        As for `connect`.
+
+    Raises
+    ------
+    TypeError
+        If the payloads differ in a field or in a fixed-point format.
+    """
+    require_same_shape(source.payload.shape(), sink.payload.shape())
+    valid = Signal(name="valid")
+    payload = Signal(Shape.cast(source.payload.shape()).width, name="payload", reset_less=True)
+    advance = offer(m, sink, valid, payload)
+    m.d.comb += source.ready.eq(advance)
+    with m.If(advance):
+        m.d.sync += [valid.eq(source.valid), payload.eq(source.payload)]
+
+
+def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[Signal, Signal]:
+    """Count the pixels of spans, one on each clock on which ``advance`` is high.
+
+    A span is taken in while ``valid & advance & ends``.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the counter.
+    valid : Value
+        Whether there is a next span.
+    length : Value
+        Its pixels, 0 or more.
+    advance : Value
+        Whether the counter moves.
+
+    Returns
+    -------
+    active, ends : Signal
+        Whether there is a pixel; whether the next span may begin: there is none, or it is the last. Both are
+        registers.
+    """
+    active, ends = Signal(name="active"), Signal(name="ends", init=1)
+    remaining = Signal(len(length), name="remaining")
+    with m.If(advance):
+        with m.If(ends):
+            m.d.sync += [active.eq(valid & (length != 0)), ends.eq(~valid | (length <= 1))]
+            m.d.sync += remaining.eq(length)
+        with m.Else():
+            m.d.sync += [ends.eq(remaining == 2), remaining.eq(remaining - 1)]
+    return active, ends
+
+
+class PipelinedUnit(wiring.Component):
+    """A unit with a fixed latency and initiation interval, moved on by one common enable.
+
+    A beat taken in on one clock is offered on the output ``latency`` clocks later, unless the output waits:
+    then the whole unit stands still, from the clock after the first on which a beat was not taken, and holds
+    its payloads (`offer`). As long as a beat is inside, the next is taken in a whole multiple of
+    ``initiation_interval`` clocks after it, not counting those of standing still. ``i.ready`` and ``o.valid``
+    follow from the unit's registers alone. Reset empties the unit.
+
+    A subclass describes its registers in `datapath`, as if they moved on every clock. Control comes from the
+    *age* of a beat: `at` tells whether a beat was taken in so many enabled clocks ago.
+
+    Parameters
+    ----------
+    input_shape, output_shape : ShapeLike
+        Payloads.
+    latency : int
+        Clocks from input to output, at least 1.
+    initiation_interval : int
+        Distance in clocks of two inputs. With 1, `datapath` gets the input itself, and registers it;
+        with more, it gets a register that holds the input for ages 1 to ``initiation_interval``.
+    constants : ShapeLike or None
+        Shape of the port ``constants``: values that stay while beats are inside. ``None``: no such port.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(input_shape))`
+        Operands.
+    o : :py:`Out(stream.Signature(output_shape))`
+        Results.
+    constants : :py:`In(constants)`
+        Only where asked for.
+    """
+
+    def __init__(
+        self,
+        input_shape: ShapeLike,
+        output_shape: ShapeLike,
+        *,
+        latency: int,
+        initiation_interval: int = 1,
+        constants: ShapeLike | None = None,
+    ):
+        if latency < 1 or initiation_interval < 1:
+            raise ValueError("latency and initiation_interval must be at least 1")
+        self.latency = latency
+        self.initiation_interval = initiation_interval
+        members = {"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))}
+        if constants is not None:
+            members["constants"] = In(constants)
+        super().__init__(members)
+
+    def datapath(self, m: Module, operands):
+        """Describe the registers in ``m`` and return the payload of the output, ``latency`` registers on."""
+        raise NotImplementedError
+
+    def at(self, age: int) -> Value:
+        """Whether a beat was taken in ``age`` enabled clocks ago, 1 to ``latency``."""
+        return self._ages[age - 1]
+
+    @staticmethod
+    def register(m: Module, value, name: str, *, when: Value | None = None):
+        """A register that takes ``value`` on every enabled clock, or only ``when`` told."""
+        register = Signal(value.shape(), name=name)
+        if when is None:
+            m.d.sync += register.eq(value)
+        else:
+            with m.If(when):
+                m.d.sync += register.eq(value)
+        return register
+
+    def elaborate(self, platform):
+        """Build the control and put the data path under the common enable."""
+        m = Module()
+        self._ages = Signal(self.latency, name="ages")
+        advance, accept = Signal(), Signal()
+        if self.initiation_interval == 1:
+            m.d.comb += self.i.ready.eq(advance)
+        else:
+            m.d.comb += self.i.ready.eq(self._turn(m, advance, accept))
+        m.d.comb += accept.eq(self.i.valid & self.i.ready)
+        with m.If(advance):
+            m.d.sync += self._ages.eq(Cat(accept, self._ages[:-1]))
+
+        inner = Module()
+        operands = self.i.payload
+        if self.initiation_interval > 1:
+            # What comes without being valid has no age.
+            operands = self.register(inner, operands, "operands", when=self.i.ready)
+        result = self.datapath(inner, operands)
+        m.submodules.datapath = EnableInserter(advance)(inner)
+        m.d.comb += advance.eq(offer(m, self.o, self._ages[-1], result))
+        return m
+
+    def _turn(self, m: Module, advance: Value, accept: Value) -> Value:
+        """Whether a beat may come: a shared part serves those of several ages, at turns fixed by distance.
+
+        A register, worked out a clock ahead.
+        """
+        ready, turn = Signal(name="ready", init=1), Signal(range(self.initiation_interval))
+        # Whether a beat will be inside on the next clock even if none comes on this one.
+        stays, opens = Signal(name="stays"), Signal(name="opens")
+        m.d.comb += opens.eq((turn == self.initiation_interval - 1) | ~(accept | stays))
+        with m.If(advance):
+            m.d.sync += [
+                stays.eq(Cat(accept, self._ages)[:-2].any()),
+                turn.eq(Mux(opens, 0, turn + 1)),
+            ]
+        waits = self.o.valid & ~self.o.ready
+        m.d.sync += ready.eq(~waits & Mux(advance, opens, turn == 0))
+        return ready

@@ -1,0 +1,381 @@
+"""Angular setup ([T] 3.1): dot products, the angle of a span, and CORDIC, on shared multipliers."""
+
+from collections.abc import Sequence
+
+from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
+from amaranth.lib import data
+
+from blysk.golden.cosines.angular_setup import AngularSetup
+from blysk.golden.cosines.arccos import Arccos, HalfChord
+from blysk.golden.normals.difference_setup import DifferenceSetup
+from blysk.golden.number.fixed import SQ, UQ
+from blysk.golden.number.unit_vector import COMPONENT
+from blysk.hdl.core.dataflow import Dataflow, Word, checked_interval, dot, shared_sums
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.cosines.arccos import ArccosUnit, half_chord_words, normalised_words
+from blysk.hdl.normals.difference_setup import reciprocal_words
+from blysk.hdl.normals.middle_normal import normal_shape
+
+__all__ = ["AngularSetupUnit"]
+
+
+class AngularSetupUnit(PipelinedUnit):
+    """``psi``, ``lambda``, ``psi/(m-1)`` and ``cos beta`` of a span and a fixed vector.
+
+    Equations, tables, formats and error bound are those of `AngularSetup`, the bit-true
+    twin.
+
+    Twenty-six multiplications: five dot products of three, six of the half chord, two more interpolations, x,
+    y and the step. With an initiation interval I, ``ceil(26/I)`` multipliers take turns at them
+    (`dataflow`). With ``angle="arccos"`` the pipelined arccos unit, which has two multipliers, takes the
+    place of the half chord, and one multiplication that of its six, to bring psi to turns: ``2 + ceil(21/I)``
+    multipliers. The results are the same to the bit.
+
+    =================== == == == == == ==
+    initiation interval 1  2  3  4  5  6
+    =================== == == == == == ==
+    latency             59 60 62 67 71 64
+    multipliers         26 13 9  7  6  5
+    by arccos: latency  59 60 63 63 66 66
+    multipliers         23 13 9  8  7  6
+    =================== == == == == == ==
+
+    Four tables: 512 words of 36 bits twice (once by arccos) and of 34 once, and 2048 of 17. CORDIC is
+    unrolled, 22 steps of three adders, as is the sum that takes back its gain.
+
+    Parameters
+    ----------
+    parameters : AngularSetup
+        Where psi comes from, tables and formats.
+    initiation_interval : int or None
+        1 to 26, or to 21 by arccos: distance in clocks of two inputs. ``None``: 6.
+
+    Raises
+    ------
+    ValueError
+        If `initiation_interval` is none of those.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"normal_left", "normal_right", "vector", "length"})))`
+        Unit vectors, three components ``SQ(1, 17)`` each; length 1 to 4095.
+    o : :py:`Out(stream.Signature(StructLayout({...})))`
+        ``angle`` UQ(0, 36), ``phase`` SQ(0, 40), ``step`` UQ(0, 40), all in turns; ``cos_beta`` UQ(1, 25);
+        ``length``; ``wide``: the span is over 150 degrees, and its plane not to be trusted.
+
+    Source: [T] 3.1.
+    """
+
+    def __init__(self, parameters: AngularSetup | None = None, initiation_interval: int | None = None):
+        self.parameters = p = parameters or AngularSetup()
+        uses = 26 if p.angle == "half_chord" else 21
+        interval = checked_interval(initiation_interval, uses, 6)
+        self._graph = Dataflow(interval, uses)
+        self._words = self._describe()
+        super().__init__(
+            data.StructLayout(
+                {
+                    "normal_left": normal_shape(),
+                    "normal_right": normal_shape(),
+                    "vector": normal_shape(),
+                    "length": unsigned(DifferenceSetup.LENGTH_BITS),
+                }
+            ),
+            data.StructLayout(
+                {
+                    "angle": FixedShape(AngularSetup.ANGLE_FORMAT),
+                    "phase": FixedShape(AngularSetup.PHASE_FORMAT),
+                    "step": FixedShape(AngularSetup.STEP_FORMAT),
+                    "cos_beta": FixedShape(AngularSetup.COS_BETA_FORMAT),
+                    "length": unsigned(DifferenceSetup.LENGTH_BITS),
+                    "wide": unsigned(1),
+                }
+            ),
+            latency=max(word.age for word in self._words.values()),
+            initiation_interval=interval,
+        )
+
+    def datapath(self, m, operands):
+        """The graph, read at the age of its last word."""
+        self._m = m
+        value = self._graph.build(m, self, operands)
+        result = Signal(self.o.payload.shape())
+        for name, word in self._words.items():
+            read = value(word, self.latency)
+            format = getattr(AngularSetup, f"{name.upper()}_FORMAT", None)
+            m.d.comb += result[name].eq(FixedValue(format, read) if format else read)
+        return result
+
+    def _describe(self) -> dict:
+        """Words of the results."""
+        g, p = self._graph, self.parameters
+        left, right, vector, length = (
+            g.input(name, lambda operands, name=name: operands[name])
+            for name in ("normal_left", "normal_right", "vector", "length")
+        )
+        sums = shared_sums(g, 5, COMPONENT * COMPONENT)
+        pairs = ((left, left), (right, right), (left, right), (left, vector), (right, vector))
+        own_left, own_right, cross, dot_left, dot_right = (
+            dot(g, f"dot_{k}", a, b, sums) for k, (a, b) in enumerate(pairs)
+        )
+
+        own = g.register("own", lambda a, b: a + b, own_left, own_right)
+        obtuse = g.register("obtuse", lambda cross: Value.cast(cross)[-1], cross)
+        size = g.register("cross", _magnitude, cross)
+        chord = g.register("chord_wide", lambda own, size: own - size.scale(1).extend(SQ(6, 34)), own, size)
+        chord = g.register("chord", lambda chord: chord.saturate(p.CHORD_FORMAT), chord)
+        total = g.register("dot_sum", lambda a, b: a + b, dot_left, dot_right)
+        difference = g.register("dot_difference", lambda a, b: b - a, dot_left, dot_right)
+        major, minor = (
+            g.register(name, lambda *words: _choice(*words), obtuse, *words)
+            for name, words in (("major", (difference, total)), ("minor", (total, difference)))
+        )
+        shortest = p.SHORTEST_SUM
+        limit = FixedValue.constant(shortest.format, shortest.values.item())
+        wide = g.register(
+            "wide",
+            lambda obtuse, chord: obtuse & (chord.truncate(shortest.format.fraction_bits) < limit),
+            obtuse,
+            chord,
+        )
+        shift, v = normalised_words(g, chord)
+
+        y = self._minor(minor, shift, v)
+        x = self._major(major, chord)
+        cos_beta, direction = self._polar(x, y, obtuse)
+        if p.angle == "half_chord":
+            angle = half_chord_words(g, HalfChord(), chord, obtuse, shift, v)
+        else:
+            angle = self._by_arccos(cross)
+        phase = g.register(
+            "phase",
+            lambda direction, angle: (
+                direction.extend(p.PHASE_FORMAT)
+                + FixedValue(p.ANGLE_FORMAT, angle).scale(-1).extend(UQ(0, 40))
+            ).wrap(p.PHASE_FORMAT),
+            direction,
+            angle,
+        )
+        return {
+            "angle": angle,
+            "phase": phase,
+            "step": self._step(angle, obtuse, shift, length),
+            "cos_beta": cos_beta,
+            "length": length,
+            "wide": wide,
+        }
+
+    def _by_arccos(self, cross: Word) -> Word:
+        """Psi by arccos, and the product that brings it to turns."""
+        g, p = self._graph, self.parameters
+
+        def exact(cross):
+            # The square of the code of length 1 is 2^-16 under 1.
+            code = Value.cast(cross)
+            return FixedValue(cross.format, (code + (code >> 16))[: len(code)].as_signed())
+
+        unit = ArccosUnit(p.arccos)
+
+        def arccos(register, cosine):
+            self._m.submodules.arccos = unit
+            self._m.d.comb += [unit.i.valid.eq(1), unit.i.payload.eq(cosine), unit.o.ready.eq(1)]
+            return unit.o.payload.angle
+
+        cosine = g.register("cosine_exact", exact, cross)
+        cosine = g.register("cosine_rounded", lambda cosine: cosine.round_half_up(16), cosine)
+        operator = g.share("arccos", 1, [FixedShape(Arccos.OPERAND_FORMAT)], unit.latency, arccos)
+        radians = g.use(
+            operator, "radians_exact", [cosine], lambda cosine: [cosine.saturate(Arccos.OPERAND_FORMAT)]
+        )
+        radians = g.register(
+            "radians", lambda radians: radians.round_half_up(15).saturate(p.RADIANS_FORMAT), radians
+        )
+        factor = FixedValue.constant(p.TURNS_PER_RADIAN.format, p.TURNS_PER_RADIAN.values.item())
+        turns = g.multiply("turns_exact", radians, radians, right=lambda _: factor)
+        return g.register("turns", lambda turns: Value.cast(turns.extend(p.ANGLE_FORMAT)), turns)
+
+    def _looked_up(self, name: str, table, address: Word, fraction: Word, sign: int, format) -> Word:
+        """Interpolated word of a table, rounded to a format of a binary place less: seven clocks at least."""
+        g = self._graph
+        values, changes = table
+        width = changes.format.width
+        words = (values.codes << width | changes.codes).tolist()
+        entry = g.look_up(name, words, values.format.width + width, address)
+        entry = g.register(f"{name}_entry", lambda entry: entry, entry)
+        value = g.wire(f"{name}_value", lambda entry: FixedValue(values.format, entry[width:]), entry)
+        change = g.wire(f"{name}_change", lambda entry: FixedValue(changes.format, entry[:width]), entry)
+        fraction_format = UQ(0, self.parameters.FRACTION_BITS)
+        product = g.multiply(
+            f"{name}_product", fraction, change, lambda fraction: FixedValue(fraction_format, fraction)
+        )
+
+        def moved(value, product):
+            product = product.round_half_up(22)
+            return value + product if sign > 0 else value - product
+
+        total = g.register(f"{name}_sum", moved, value, product)
+        rounded = g.register(
+            f"{name}_rounded", lambda total: total.round_half_up(format.fraction_bits), total
+        )
+        return g.register(f"{name}_result", lambda rounded: rounded.saturate(format), rounded)
+
+    def _places(self, name: str, bits: Word, width: int) -> tuple[Word, Word]:
+        """Address of a table, from the top bits, and the bits below it."""
+        g, p = self._graph, self.parameters
+        below = width - p.ADDRESS_BITS
+        return (
+            g.wire(f"{name}_address", lambda bits: bits[below:], bits),
+            g.wire(f"{name}_fraction", lambda bits: bits[below - p.FRACTION_BITS : below], bits),
+        )
+
+    def _major(self, major: Word, chord: Word) -> Word:
+        """The x before the exchange, ``major/2 (1 + e)``."""
+        g, p = self._graph, self.parameters
+
+        def clamped(chord):
+            bits = Value.cast(chord)
+            return Mux(bits[35], (1 << 35) - 1, bits[:35])[35 - p.ADDRESS_BITS - p.FRACTION_BITS :]
+
+        bits = g.register("correction_bits", clamped, chord)
+        places = self._places("correction", bits, p.ADDRESS_BITS + p.FRACTION_BITS)
+        correction = self._looked_up("corrections", p.corrections, *places, 1, p.CORRECTION_FORMAT)
+        half = g.wire("major_half", lambda major: major.scale(-1).truncate(26), major)
+        operand = g.register(
+            "half_operand", lambda major: major.scale(-1).truncate(17).saturate(COMPONENT), major
+        )
+        product = g.multiply("x_exact", correction, operand)
+        product = g.register("x_product", lambda product: product.round_half_up(26), product)
+        return g.register("x", lambda half, x: (half + x).wrap(p.AXIS_FORMAT), half, product)
+
+    def _minor(self, minor: Word, shift: Word, v: Word) -> Word:
+        """The y before the exchange, ``minor 2^j T``."""
+        g, p = self._graph, self.parameters
+        places = self._places("reciprocal", v, 36)
+        reciprocal = self._looked_up("inverse_roots", p.reciprocals, *places, -1, p.RECIPROCAL_FORMAT)
+        code = g.register(
+            "minor_coarse",
+            lambda minor, shift: (Value.cast(minor) << Cat(Const(0, 2), shift[2:]))[:37],
+            minor,
+            shift,
+        )
+        code = g.register("minor_shifted", lambda minor, shift: (minor << shift[:2])[:37], code, shift)
+        operand = g.register(
+            "minor_rounded", lambda code: FixedValue(SQ(3, 34), code).round_half_up(16), code
+        )
+        operand = g.register("minor_operand", lambda operand: operand.saturate(p.MINOR_FORMAT), operand)
+        product = g.multiply("y_exact", reciprocal, operand)
+        return g.register("y", lambda y: y.round_half_up(26).wrap(p.AXIS_FORMAT), product)
+
+    def _step(self, angle: Word, obtuse: Word, shift: Word, length: Word) -> Word:
+        """Bits of ``psi/(m-1)``."""
+        g, p = self._graph, self.parameters
+        leading = angle
+        if p.angle == "half_chord":
+            shift = g.register("angle_shift", lambda obtuse, shift: Mux(obtuse, 0, shift)[:5], obtuse, shift)
+            leading = g.register(
+                "psi_coarse", lambda psi, shift: (psi << Cat(Const(0, 2), shift[2:]))[:36], leading, shift
+            )
+            leading = g.register("psi_shifted", lambda psi, shift: (psi << shift[:2])[:36], leading, shift)
+        leading = g.register(
+            "psi_rounded", lambda psi: FixedValue(p.ANGLE_FORMAT, psi).round_half_up(18), leading
+        )
+        leading = g.register("psi_leading", lambda psi: psi.saturate(p.MANTISSA_FORMAT), leading)
+        reciprocal, places = reciprocal_words(g, length, since=leading.age - 4)
+        if p.angle == "half_chord":
+            places = g.register("places_sum", lambda a, b: (a + b)[:5], places, shift)
+        else:
+            places = g.wire("places_sum", lambda places: Cat(places, Const(0, 1))[:5], places)
+        product = g.multiply("step_exact", leading, reciprocal)
+        step = g.register(
+            "step_coarse",
+            lambda product, places: (Cat(Const(0, 6), product) >> Cat(Const(0, 3), places[3:]))[:40],
+            product,
+            places,
+        )
+        return g.register("step", lambda step, places: (step >> places[:3])[:40], step, places)
+
+    def _polar(self, x: Word, y: Word, obtuse: Word) -> tuple[Word, Word]:
+        """Cos beta and the direction, by CORDIC, one step a clock."""
+        g, p = self._graph, self.parameters
+        width, turns = p.ROTATED_FORMAT.width, p.DIRECTION_FORMAT.width
+        first, second = (
+            g.register(
+                name, lambda *words: Value.cast(_choice(*words).extend(p.ROTATED_FORMAT)), obtuse, *words
+            )
+            for name, words in (("x_turned", (y, x)), ("y_turned", (x, y)))
+        )
+
+        def turned(value, behind):
+            return Mux(behind[-1], -value, value)[:width].as_signed()
+
+        across = g.register("across", turned, second, first)
+        along = g.register("along", turned, first, first)
+        direction = g.register(
+            "direction",
+            lambda x: Mux(x[-1], p.DIRECTION_FORMAT.min_code, 0)[:turns].as_signed(),
+            first,
+        )
+        for i, turn in enumerate(p.directions.codes.tolist()):
+
+            def rotate(a, b, across, opposed, i=i):
+                below = across[-1]
+                return _added(a, _halved(b, i), ~below if opposed else below).as_signed()
+
+            direction = g.register(
+                f"direction_{i}",
+                lambda direction, across, turn=turn: (direction + Mux(across[-1], -turn, turn))[
+                    :turns
+                ].as_signed(),
+                direction,
+                across,
+            )
+            along, across = (
+                g.register(f"along_{i}", lambda a, b, r=rotate: r(a, b, b, False), along, across),
+                g.register(f"across_{i}", lambda a, b, r=rotate: r(a, b, a, True), across, along),
+            )
+        # The gain is taken back by a tree of additions.
+        zeros = p.GAIN_BITS - p.ROTATED_FORMAT.fraction_bits
+
+        def term(along, sign, places):
+            wide = Cat(Const(0, zeros), along).as_signed()
+            return wide >> places if sign > 0 else -(wide >> places)
+
+        terms = [
+            g.wire(f"gain_{places}", lambda along, t=(sign, places): term(along, *t), along)
+            for sign, places in p.gain_terms
+        ]
+        while len(terms) > 1:
+            terms = [
+                g.register(f"{terms[k].name}_sum", lambda *pair: _sum(pair, zeros + width), *terms[k : k + 2])
+                for k in range(0, len(terms), 2)
+            ]
+        cos_beta = g.register(
+            "cos_beta_rounded", lambda x: FixedValue(SQ(4, p.GAIN_BITS), x).round_half_up(25), terms[0]
+        )
+        cos_beta = g.register("cos_beta", lambda x: x.saturate(p.COS_BETA_FORMAT), cos_beta)
+        return cos_beta, g.wire("direction", lambda x: FixedValue(p.DIRECTION_FORMAT, x), direction)
+
+
+def _magnitude(cross: FixedValue) -> FixedValue:
+    code = Value.cast(cross)
+    return FixedValue(SQ(5, 34), Mux(code[-1], -code, code)[:39].as_signed())
+
+
+def _sum(terms: Sequence[Value], width: int) -> Value:
+    return sum(terms)[:width].as_signed()
+
+
+def _choice(condition, a, b):
+    """One of two fixed-point values of a format."""
+    return FixedValue(a.format, Mux(condition, Value.cast(a), Value.cast(b)))
+
+
+def _halved(a, times):
+    """``a / 2**times``, cut, in as many bits."""
+    return Cat(a[times:], a[-1].replicate(times))
+
+
+def _added(a, b, negate):
+    """``a + b``, or ``a - b`` where told, with one adder: the negative is the inverse and a carry."""
+    return (Cat(Const(1, 1), a) + Cat(negate, b ^ negate.replicate(len(b))))[1 : len(a) + 1]

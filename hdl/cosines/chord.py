@@ -1,0 +1,92 @@
+"""Chord unit: half the squared distance of two unit vectors, with three multipliers."""
+
+from collections.abc import Callable
+
+from amaranth.hdl import Cat, Const, Mux, Value
+from amaranth.lib import data
+
+from blysk.golden.cosines.chord import Chord
+from blysk.golden.number.fixed import SQ
+from blysk.golden.number.unit_vector import COMPONENT
+from blysk.hdl.core.dataflow import Dataflow, Word, dot
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.normals.middle_normal import normal_shape
+
+__all__ = ["ChordUnit", "chord"]
+
+
+def chord(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]) -> Word:
+    """``|a - b|^2 / 2`` in ``UQ(2, 35)``: three multiplications of the graph.
+
+    Parameters
+    ----------
+    graph : Dataflow
+        Graph that gets the words.
+    name : str
+        Of the result.
+    a : Word
+        A unit vector.
+    b : Word or callable
+        The other; or what gives one that stays while beats are inside.
+    """
+    differences = data.ArrayLayout(FixedShape(COMPONENT - COMPONENT), 3)
+
+    def subtract(a, b):
+        return differences(Cat(a[c] - b[c] for c in range(3)))
+
+    def is_far(difference):
+        tops = (Value.cast(difference[c])[-2:] for c in range(3))
+        return Cat(top[0] ^ top[1] for top in tops).any()
+
+    def halved(difference):
+        far = is_far(difference)
+        codes = (Value.cast(difference[c]) for c in range(3))
+        return normal_shape()(Cat(Mux(far, code[1:], code[:-1]) for code in codes))
+
+    def aligned(total, far):
+        code = Value.cast(total)
+        return FixedValue(SQ(6, 34), Mux(far, Cat(Const(0, 2), code), Cat(code, code[-1], code[-1])))
+
+    if isinstance(b, Word):
+        difference = graph.register(f"{name}_difference", subtract, a, b)
+    else:
+        difference = graph.register(f"{name}_difference", lambda a: subtract(a, b()), a)
+    far = graph.register(f"{name}_far", is_far, difference)
+    operand = graph.register(f"{name}_operand", halved, difference)
+    square = dot(graph, f"{name}_square", operand, lambda v: v)
+    square = graph.register(f"{name}_aligned", aligned, square, far)
+    return graph.register(name, lambda square: square.scale(-1).saturate(Chord.FORMAT), square)
+
+
+class ChordUnit(PipelinedUnit):
+    """``u = |a - b|^2 / 2``; `Chord` is the bit-true twin.
+
+    The latency is 11 clocks (difference, halving, operand, four for the product, two sums, alignment,
+    saturation) and the initiation interval 1. Three multipliers of 18x18 bits.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"a": ..., "b": ...})))`
+        Two unit vectors, three components ``SQ(1, 17)`` each.
+    o : :py:`Out(stream.Signature(UQ(1, 25)))`
+        u, as the specular unit takes it.
+
+    Source: chord.md.
+    """
+
+    def __init__(self):
+        self._graph = graph = Dataflow(1, 3)
+        a, b = (graph.input(name, lambda operands, name=name: operands[name]) for name in "ab")
+        u = chord(graph, "u", a, b)
+        self._result = u
+        super().__init__(
+            data.StructLayout({"a": normal_shape(), "b": normal_shape()}),
+            FixedShape(Chord.ARGUMENT_FORMAT),
+            latency=u.age,
+        )
+
+    def datapath(self, m, operands):
+        """The graph."""
+        u = self._graph.build(m, self, operands)(self._result, self.latency)
+        return u.truncate(Chord.ARGUMENT_FORMAT.fraction_bits).saturate(Chord.ARGUMENT_FORMAT)

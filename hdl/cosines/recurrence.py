@@ -1,0 +1,216 @@
+"""Recurrence unit ([T] figure 3.5): two cosines of equal steps, one product a pixel each."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.cosines.recurrence import Recurrence
+from blysk.golden.number.fixed import SQ, UQ
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit, offer
+
+__all__ = ["RecurrenceUnit"]
+
+_COPIES = ("diffuse", "highlight")
+
+
+class RecurrenceUnit(wiring.Component):
+    """``x(k) = A cos(phase - k d)``, once for the diffuse and once for the highlight term of a span.
+
+    The two copies share the coefficient register and the counter, which marks the last pixel of a span.
+    Forms, formats and error bound are those of `Recurrence`, the bit-true twin.
+
+    With ``interleave`` 1, every pixel needs the one before, so that the registers of the loop cannot be
+    filled with other pixels: ``reinsch`` gives a pixel every 4 clocks (product, two stages of shift, sums),
+    ``direct`` every 3 (product, sum, saturation). The next span is taken in ``4 (m - 1) + 1``
+    (``3 (m - 1) + 1``) clocks after one of m pixels.
+
+    With ``interleave`` 4, every pixel needs the one four before. The four phases follow each other through
+    the loop's four registers, so there is a pixel on every clock; a span takes m clocks, and the next follows
+    without a gap.
+
+    Either way the first pixel comes 3 clocks after its span was taken in, and a span of length 0 takes one
+    clock and gives nothing. Two multipliers, one a copy: 18 x 18 bits with the defaults.
+
+    Parameters
+    ----------
+    parameters : Recurrence
+        Form and formats.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"diffuse", "highlight", "coefficient", "shift", "length"})))`
+        Of each copy ``first`` and ``second`` in `Recurrence.state_format`: x(0), and x(1) - x(0) in
+        ``reinsch``, x(1) in ``direct``; interleaved, arrays of four, see `Recurrence.start`. Coefficient;
+        shift, in ``reinsch`` alone; length 0 to 4095.
+    o : :py:`Out(stream.Signature(StructLayout({"diffuse", "highlight", "last"})))`
+        Both cosines in `Recurrence.result_format`; whether this is the last pixel of its span.
+
+    Source: [T] 3.3, figure 3.5.
+    """
+
+    latency = 3
+
+    def __init__(self, parameters: Recurrence | None = None):
+        self.parameters = p = parameters or Recurrence()
+        self.clocks_per_pixel = 1 if p.interleave > 1 else {"reinsch": 4, "direct": 3}[p.form]
+        word = FixedShape(p.state_format)
+        if p.interleave > 1:
+            word = data.ArrayLayout(word, p.interleave)
+        start = data.StructLayout(dict.fromkeys(("first", "second"), word))
+        span = {**dict.fromkeys(_COPIES, start), "coefficient": FixedShape(p.coefficient_format)}
+        if p.form == "reinsch":
+            span["shift"] = unsigned(p.SHIFT_BITS)
+        span["length"] = unsigned(p.LENGTH_BITS)
+        pixel = {**dict.fromkeys(_COPIES, FixedShape(p.result_format)), "last": unsigned(1)}
+        super().__init__(
+            {
+                "i": In(stream.Signature(data.StructLayout(span))),
+                "o": Out(stream.Signature(data.StructLayout(pixel))),
+            }
+        )
+
+    def elaborate(self, platform):
+        """Counters, coefficient, the loop of each copy, and two registers for rounding and saturation."""
+        m = Module()
+        p, span = self.parameters, self.i.payload
+        active, after, phase = Signal(), Signal(p.LENGTH_BITS), Signal(range(self.clocks_per_pixel))
+        is_first = Signal()
+        rounded_valid, rounded_last, valid = Signal(), Signal(), Signal()
+        result = Signal(self.o.payload.shape())
+        advance, load = Signal(), Signal()
+        m.d.comb += [
+            advance.eq(offer(m, self.o, valid, result)),
+            self.i.ready.eq(advance & (after == 0)),
+            load.eq(self.i.valid & self.i.ready),
+        ]
+        ends = phase == self.clocks_per_pixel - 1
+        # Interleaved: which of the next pixels are the first of their phases.
+        first_to_come = Signal(p.interleave - 1)
+        starts = load | first_to_come[0] if p.interleave > 1 else load
+        coefficient = Signal(FixedShape(p.coefficient_format))
+        shift = Signal(p.SHIFT_BITS)
+        with m.If(advance):
+            m.d.sync += [
+                rounded_valid.eq(active & (phase == 0)),
+                rounded_last.eq(after == 0),
+                valid.eq(rounded_valid),
+                result.last.eq(rounded_last),
+            ]
+            with m.If(load):
+                m.d.sync += [
+                    active.eq(span.length != 0),
+                    after.eq(Mux(span.length == 0, 0, span.length - 1)),
+                    coefficient.eq(span.coefficient),
+                ]
+                if p.form == "reinsch":
+                    m.d.sync += shift.eq(span.shift)
+            with m.Elif(after == 0):
+                m.d.sync += active.eq(0)
+            with m.Else():
+                m.d.sync += phase.eq(Mux(ends, 0, phase + 1))
+                with m.If(ends):
+                    m.d.sync += after.eq(after - 1)
+            with m.If(starts | ends):
+                m.d.sync += is_first.eq(starts)
+            if p.interleave > 1:
+                m.d.sync += first_to_come.eq(Mux(load, (1 << (p.interleave - 1)) - 1, first_to_come >> 1))
+            is_first = self._late(m, is_first, 2 if p.form == "reinsch" else 3, "is_first")
+            for name in _COPIES:
+                start = self._start(m, name, load)
+                if p.form == "reinsch":
+                    rounded = self._reinsch(m, name, start, starts, ends, is_first, coefficient, shift)
+                else:
+                    rounded = self._direct(m, name, start, starts, ends, is_first, coefficient)
+                register = Signal(rounded.shape(), name=f"{name}_rounded")
+                m.d.sync += [
+                    register.eq(rounded),
+                    result[name].eq(register.saturate(p.result_format)),
+                ]
+        return m
+
+    def _start(self, m, name, load):
+        """First and second value of the pixel that comes next: the input's, then those held of it."""
+        p, payload = self.parameters, self.i.payload[name]
+        if p.interleave == 1:
+            return payload.first, payload.second
+        words = []
+        for which in ("first", "second"):
+            held = [
+                Signal(FixedShape(p.state_format), name=f"{name}_{which}_{phase}")
+                for phase in range(1, p.interleave)
+            ]
+            for place, word in enumerate(held):
+                following = held[min(place + 1, len(held) - 1)]
+                given = payload[which][place + 1]
+                m.d.sync += Value.cast(word).eq(Mux(load, Value.cast(given), Value.cast(following)))
+            chosen = Mux(load, Value.cast(payload[which][0]), Value.cast(held[0]))
+            words.append(FixedValue(p.state_format, chosen))
+        return words
+
+    def _late(self, m, value, clocks, name):
+        """Interleaved, ``value`` so many clocks on; else it has stayed for the whole of its pixel."""
+        if self.parameters.interleave > 1:
+            for clock in range(clocks):
+                value = PipelinedUnit.register(m, value, f"{name}_late_{clock}")
+        return value
+
+    def _reinsch(self, m, name, start, starts, ends, is_first, coefficient, shift):
+        """``D -= K 2^(2-s) x; x += D``, with x + D, for the old D, summed up beforehand."""
+        p = self.parameters
+        first, second = start
+        state = p.state_format
+        x, difference, total = (
+            Signal(FixedShape(state), name=f"{name}_{word}") for word in ("x", "difference", "sum")
+        )
+        operand = x.truncate(p.fraction_bits)
+        product = Signal(FixedShape(operand.format * p.coefficient_format), name=f"{name}_product")
+        bend = product.scale(2).extend(p.bend_format)
+        coarse, fine = (
+            Signal(FixedShape(p.bend_format), name=f"{name}_{word}") for word in ("coarse", "fine")
+        )
+        fine_shift = FixedValue(p.bend_format, Value.cast(coarse) >> shift[:3])
+        step = fine.truncate(state.fraction_bits)
+        m.d.sync += [
+            product.eq(operand * coefficient),
+            coarse.eq(FixedValue(p.bend_format, Value.cast(bend) >> Cat(Const(0, 3), shift[3:]))),
+            # The difference from the first value to the second is given.
+            Value.cast(fine).eq(Mux(is_first, 0, Value.cast(fine_shift))),
+            total.eq((x + difference).wrap(state)),
+        ]
+        total = self._late(m, total, 2, f"{name}_sum")
+        kept = self._late(m, difference, 3, f"{name}_difference")
+        half_step = FixedValue.constant(state, 2.0 ** -(p.fraction_bits + 1))
+        with m.If(starts):
+            m.d.sync += [x.eq((first + half_step).wrap(state)), difference.eq(second)]
+        with m.Elif(ends):
+            m.d.sync += [x.eq((total - step).wrap(state)), difference.eq((kept - step).wrap(state))]
+        exchange = FixedValue.constant(p.exchange.format, p.exchange.values.item())
+        return (x + exchange).truncate(p.result_format.fraction_bits)
+
+    def _direct(self, m, name, start, starts, ends, is_first, coefficient):
+        """``x(k+1) = -(-2 cos d) x(k) - x(k-1)``; for the first pixel the other register holds x(1)."""
+        p = self.parameters
+        first, second = start
+        state = p.state_format
+        x, other = (Signal(FixedShape(state), name=f"{name}_{word}") for word in ("x", "other"))
+        product = Signal(FixedShape(state * p.coefficient_format), name=f"{name}_product")
+        half_step = FixedValue.constant(UQ(-state.fraction_bits, state.fraction_bits + 1), state.step / 2)
+        base = Signal((half_step - other).shape(), name=f"{name}_base")
+        total = Signal((base - product).shape(), name=f"{name}_sum")
+        m.d.sync += [product.eq(x * coefficient), base.eq(half_step - other), total.eq(base - product)]
+        following = total.truncate(state.fraction_bits).saturate(state)
+        # Four phases fill four registers; the loop has three of its own.
+        following = self._late(m, following, 1, f"{name}_following")
+        given = self._late(m, other, 3, f"{name}_other")
+        before = self._late(m, x, 3, f"{name}_x")
+        with m.If(starts):
+            m.d.sync += [x.eq(first), other.eq(second)]
+        with m.Elif(ends):
+            m.d.sync += [
+                Value.cast(x).eq(Mux(is_first, Value.cast(given), Value.cast(following))),
+                other.eq(before),
+            ]
+        bits = p.result_format.fraction_bits
+        value = x.extend(SQ(2, bits)) if state.fraction_bits < bits else x
+        return value.round_half_up(bits)

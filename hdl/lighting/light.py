@@ -1,0 +1,153 @@
+"""Light unit: diffuse and specular term of one light ([T] figure 4.10)."""
+
+from amaranth.hdl import Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, fifo, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.power import Power
+from blysk.golden.lighting.specular import Specular
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import PipelinedUnit, connect_buffered
+from blysk.hdl.lighting.diffuse import DiffuseUnit
+from blysk.hdl.lighting.power import PowerUnit
+from blysk.hdl.lighting.specular import SpecularUnit
+
+__all__ = ["LightUnit"]
+
+
+class LightUnit(wiring.Component):
+    """``max(N . L, 0)`` and the reflection model of ``N . H``, for one light.
+
+    The specular unit is told when the light is behind the surface, or a highlight gate says that the span has
+    no highlight.
+
+    With an initiation interval of 1 the diffuse and the specular unit run in lockstep: their latencies are
+    equal, they are offered the same beats and taken from on the same clocks, so what holds of one handshake
+    holds of the other. With a longer one, dark beats are not given to the specular unit at all: they wait
+    beside it in order, and take a clock each.
+
+    The latency, the initiation interval and the multipliers are those of the specular unit, for beats that
+    are not dark.
+
+    Parameters
+    ----------
+    parameters : Specular or Power
+        Reflection model, and whether ``highlight`` is ``N . H`` or one minus it.
+    diffuse : Diffuse
+        Format of ``N . L``.
+    initiation_interval : int
+        Distance in clocks of two inputs, at least 1. That of `Power` is 42 from 42 on, else 1.
+    exponent : int or None
+        An exponent for good; see `SpecularUnit`.
+    shares_slope : bool
+        Whether a `SlopeUnit` outside works out what follows from the exponent. `Power` needs nothing.
+    gated : bool
+        Whether there is a highlight gate.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"cosine", "highlight", "gated"})))`
+        ``N . L`` and the specular operand; the last, only where there is a gate, tells that the beat's span
+        has no highlight.
+    o : :py:`Out(stream.Signature(StructLayout({"diffuse", "specular"})))`
+        Terms, ``UQ(0, 17)``.
+    constants
+        That of the specular unit: exponent, slope, or none.
+
+    Source: [T] figure 4.10; [B] 4.
+    """
+
+    def __init__(
+        self,
+        parameters: Specular | Power | None = None,
+        diffuse: Diffuse | None = None,
+        initiation_interval: int = 1,
+        *,
+        exponent: int | None = None,
+        shares_slope: bool = False,
+        gated: bool = False,
+    ):
+        self.parameters = p = parameters or Specular()
+        self._exponent = None
+        if isinstance(p, Power):
+            self._specular = PowerUnit(p, "sequential" if initiation_interval >= 42 else "pipelined")
+            self._exponent = exponent
+        else:
+            self._specular = SpecularUnit(
+                p, initiation_interval, exponent=exponent, shares_slope=shares_slope
+            )
+        self.latency = self._specular.latency
+        self.initiation_interval = self._specular.initiation_interval
+        self.skips_dark = self.initiation_interval > 1
+        self._diffuse = DiffuseUnit(2 if self.skips_dark else self.latency, diffuse)
+        operands = {
+            "cosine": FixedShape(self._diffuse.parameters.operand_format),
+            "highlight": FixedShape(self.parameters.operand_format),
+        }
+        if gated:
+            operands["gated"] = unsigned(1)
+        terms = dict.fromkeys(("diffuse", "specular"), FixedShape(Diffuse.RESULT_FORMAT))
+        members = {
+            "i": In(stream.Signature(data.StructLayout(operands))),
+            "o": Out(stream.Signature(data.StructLayout(terms))),
+        }
+        if "constants" in self._specular.signature.members and self._exponent is None:
+            members["constants"] = self._specular.signature.members["constants"]
+        super().__init__(members)
+
+    def elaborate(self, platform):
+        """Two units side by side."""
+        m = Module()
+        m.submodules.diffuse = diffuse = self._diffuse
+        m.submodules.specular = specular = self._specular
+        cosine = Value.cast(self.i.payload.cosine)
+        dark = Signal()
+        is_gated = self.i.payload.gated if "gated" in self.i.payload.shape().members else 0
+        m.d.comb += [
+            dark.eq(is_gated | cosine[-1] | ~cosine.any()),
+            diffuse.i.payload.eq(self.i.payload.cosine),
+            specular.i.payload.operand.eq(self.i.payload.highlight),
+            specular.i.payload.dark.eq(dark),
+        ]
+        if self._exponent is not None:
+            m.d.comb += specular.constants.exponent.eq(self._exponent)
+        elif "constants" in self.signature.members:
+            m.d.comb += Value.cast(specular.constants).eq(Value.cast(self.constants))
+        if self.skips_dark:
+            self._skip(m, diffuse, specular, dark)
+            return m
+        m.d.comb += [
+            self.i.ready.eq(diffuse.i.ready),
+            self.o.payload.diffuse.eq(diffuse.o.payload),
+            self.o.payload.specular.eq(specular.o.payload),
+            self.o.valid.eq(diffuse.o.valid),
+        ]
+        for unit in (diffuse, specular):
+            m.d.comb += [unit.i.valid.eq(self.i.valid), unit.o.ready.eq(self.o.ready)]
+        return m
+
+    def _skip(self, m: Module, diffuse: DiffuseUnit, specular: PipelinedUnit, dark: Value) -> None:
+        """Diffuse terms wait for the specular ones, which not all have."""
+        # As many as the specular unit has inside, one that it is about to take, and one for the output.
+        depth = max(specular.latency // specular.initiation_interval + 2, 3)
+        # A term is under way while its mark waits.
+        m.submodules.skips = skips = fifo.SyncFIFOBuffered(width=1, depth=depth + diffuse.latency)
+        terms = diffuse.o.signature.create(path=("terms",))
+        connect_buffered(m, "waiting", diffuse.o, terms, depth)
+        takes, gives, skip = Signal(), Signal(), skips.r_data
+        m.d.comb += [
+            takes.eq(diffuse.i.ready & skips.w_rdy),
+            self.i.ready.eq(takes & (dark | specular.i.ready)),
+            specular.i.valid.eq(self.i.valid & takes & ~dark),
+            diffuse.i.valid.eq(self.i.valid & skips.w_rdy & (dark | specular.i.ready)),
+            skips.w_en.eq(self.i.valid & self.i.ready),
+            skips.w_data.eq(dark),
+            self.o.valid.eq(terms.valid & skips.r_rdy & (skip | specular.o.valid)),
+            gives.eq(self.o.valid & self.o.ready),
+            terms.ready.eq(gives),
+            skips.r_en.eq(gives),
+            specular.o.ready.eq(gives & ~skip),
+            self.o.payload.diffuse.eq(terms.payload),
+            Value.cast(self.o.payload.specular).eq(Mux(skip, 0, Value.cast(specular.o.payload))),
+        ]

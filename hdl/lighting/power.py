@@ -1,0 +1,136 @@
+"""Exact power unit: Blinn's highlight by square and multiply."""
+
+from functools import reduce
+from operator import or_
+from typing import Literal
+
+from amaranth.hdl import Mux, Signal, Value, unsigned
+from amaranth.lib import data
+
+from blysk.golden.lighting.power import Power
+from blysk.golden.number.fixed import SQ
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.lighting.specular import highlight_shape, one_minus
+
+__all__ = ["PowerUnit"]
+
+
+class PowerUnit(PipelinedUnit):
+    """``max(cos gamma, 0)^n``, 0 for a light behind the surface; ports and timing rules of `SpecularUnit`.
+
+    Method, formats and the error bound are those of `Power`, the bit-true twin.
+
+    The pipelined form has a latency of 32 clocks (one minus, saturation, three for each bit of the exponent)
+    and an initiation interval of 1, with 18 multipliers. The sequential form has one, which makes nine
+    squares and ten products in turn: latency 44 clocks, initiation interval 42. All are 17 by 17 bits.
+
+    Parameters
+    ----------
+    parameters : Power
+        Kind of operand.
+    form : str
+        ``"pipelined"`` or ``"sequential"``.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"operand": ..., "dark": 1})))`
+        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``; whether the light is behind.
+    o : :py:`Out(stream.Signature(UQ(0, 17)))`
+        Specular term.
+    constants : :py:`In(StructLayout({"exponent": 10}))`
+        Exponent, 1 to 1000; stays while beats are inside.
+
+    Raises
+    ------
+    ValueError
+        If the form is unknown.
+
+    Source: [B] 3.
+    """
+
+    def __init__(
+        self, parameters: Power | None = None, form: Literal["pipelined", "sequential"] = "pipelined"
+    ):
+        if form not in ("pipelined", "sequential"):
+            raise ValueError(f"form must be 'pipelined' or 'sequential', not {form!r}")
+        self.parameters = p = parameters or Power()
+        self.form = form
+        super().__init__(
+            highlight_shape(p),
+            FixedShape(p.RESULT_FORMAT),
+            latency=32 if form == "pipelined" else 44,
+            initiation_interval=1 if form == "pipelined" else 42,
+            constants=data.StructLayout({"exponent": unsigned(p.EXPONENT_BITS)}),
+        )
+
+    def datapath(self, m, operands):
+        """The complement of the cosine takes two clocks; then the bits of the exponent, lowest first."""
+        p, register = self.parameters, self.register
+        complement = one_minus(p, operands.operand).extend(SQ(5, 34))
+        complement = register(m, complement, "one_minus_cosine")
+        dark = register(m, operands.dark, "dark")
+        start = Mux(dark, p.COMPLEMENT_FORMAT.max_code, Value.cast(complement.saturate(p.COMPLEMENT_FORMAT)))
+        start = FixedValue(p.COMPLEMENT_FORMAT, start[: p.COMPLEMENT_FORMAT.width])
+        s = self._pipelined(m, start) if self.form == "pipelined" else self._sequential(m, start)
+        return FixedValue(p.RESULT_FORMAT, ~Value.cast(s)[17:])
+
+    def _pipelined(self, m, start):
+        """Three clocks a bit: product, difference, saturation; for squares and products side by side."""
+        p, register = self.parameters, self.register
+        format = p.COMPLEMENT_FORMAT
+        x = register(m, start, "x_0")
+        s = None
+        for bit in range(p.EXPONENT_BITS):
+            is_set = self.constants.exponent[bit]
+            if s is None:
+                # The first product is with 1.
+                kept = register(m, x, "s_kept_0")
+                kept = register(m, kept, "s_late_0")
+                next_s = register(m, FixedValue(format, Mux(is_set, Value.cast(kept), 0)[:34]), "s_1")
+            else:
+                both, kept = self._products(m, s, x, f"s_{bit}")
+                taken = Mux(is_set, Value.cast(both.saturate(format)), Value.cast(kept))
+                next_s = register(m, FixedValue(format, taken[:34]), f"s_{bit + 1}")
+            if bit < p.EXPONENT_BITS - 1:
+                square, _ = self._products(m, x, x, f"x_{bit}")
+                x = register(m, square.saturate(format), f"x_{bit + 1}")
+            s = next_s
+        return s
+
+    def _products(self, m, p, q, name):
+        """Registered ``p + q - p q``, two clocks on, and ``p`` at that time."""
+        register = self.register
+        product = register(m, p.truncate(17) * q.truncate(17), f"{name}_product")
+        total = register(m, p + q, f"{name}_sum")
+        kept = register(m, p, f"{name}_kept")
+        return register(m, total - product, f"{name}_difference"), register(m, kept, f"{name}_late")
+
+    def _sequential(self, m, start):
+        """Ages: bit j's square at 3 + 4j, its product at 4 + 4j, each in x or s four clocks later."""
+        p, at, register = self.parameters, self.at, self.register
+        format = p.COMPLEMENT_FORMAT
+        bits = range(p.EXPONENT_BITS)
+        x, s = (Signal(FixedShape(format), name=name) for name in "xs")
+
+        def any_at(ages):
+            return reduce(or_, (at(age) for age in ages))
+
+        factors = [Signal(FixedShape(p.FACTOR_FORMAT), name=f"factor_{k}") for k in range(2)]
+        with m.If(any_at(4 + 4 * bit for bit in bits)):
+            m.d.sync += factors[0].eq(s.truncate(17))
+        with m.Else():
+            m.d.sync += factors[0].eq(x.truncate(17))
+        m.d.sync += factors[1].eq(x.truncate(17))
+        product = register(m, factors[0] * factors[1], "product")
+        is_product = any_at(6 + 4 * bit for bit in bits)
+        other = FixedValue(format, Mux(is_product, Value.cast(s), Value.cast(x))[:34])
+        total = register(m, x + other - product, "total").saturate(format)
+        with m.If(at(2)):
+            m.d.sync += [x.eq(start), s.eq(FixedValue.constant(format, 0))]
+        for bit in bits:
+            with m.If(at(6 + 4 * bit)):
+                m.d.sync += x.eq(total)
+            with m.If(at(7 + 4 * bit) & self.constants.exponent[bit]):
+                m.d.sync += s.eq(total)
+        return s

@@ -1,0 +1,376 @@
+"""Specular unit ([T] figures 3.6 and 3.7): the cosine-quadratic model with its PROM cutoff, and its kin."""
+
+from collections.abc import Callable
+from typing import Any
+
+from amaranth.hdl import Const, Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.lighting.specular import MAX_EXPONENT, Chords, HighlightOperand, Specular
+from blysk.golden.number.fixed import UQ, Format
+from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.hdl.core.dataflow import Dataflow, Word
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+
+__all__ = ["SlopeUnit", "SpecularUnit", "highlight_shape", "one_minus", "slope_shape"]
+
+_SHIFT_BITS = 4
+
+
+def highlight_shape(parameters: HighlightOperand) -> data.StructLayout:
+    """Shape of a unit's input: the operand, and whether the beat is dark, of which the term is 0."""
+    return data.StructLayout({"operand": FixedShape(parameters.operand_format), "dark": unsigned(1)})
+
+
+def slope_shape() -> data.StructLayout:
+    """Shape of what follows from the exponent: K, the shift s + 1, and the largest lit shifted argument."""
+    return data.StructLayout(
+        {
+            "scale": FixedShape(Specular.SCALE_FORMAT),
+            "shift": unsigned(_SHIFT_BITS),
+            "boundary": FixedShape(Specular.SHIFTED_FORMAT),
+        }
+    )
+
+
+def one_minus(parameters: HighlightOperand, operand: FixedValue) -> FixedValue:
+    """One minus the cosine, exact, of either kind of operand."""
+    if parameters.operand == "cosine":
+        return FixedValue.constant(ONE_SQUARED.format, ONE_SQUARED.values.item()) - operand
+    return operand
+
+
+class SlopeUnit(wiring.Component):
+    """What a `SpecularUnit` needs of the exponent: slope ``k = K 2^s``, and the PROM of the cutoff.
+
+    Twins are `Specular.scale` and `Specular.boundaries`. ``slope`` follows
+    the exponent two clocks behind.
+
+    One serves the units of all lights. It has a constant multiplier, a table of 1024 slopes of 27 bits in
+    its place for ``cosquad_q`` and the models by equal integrals, none for ``k = n / 2^j``; and a PROM of
+    1024 words of 17 bits, none as documented.
+
+    Parameters
+    ----------
+    parameters : Specular
+        Model, and whether the structure is the documented one.
+
+    Members
+    -------
+    exponent : :py:`In(10)`
+        1 to 1000.
+    slope : :py:`Out(slope_shape())`
+        K in ``UQ(0, 17)``, s + 1 from 0 to 10, boundary in ``UQ(1, 16)``.
+
+    Source: [T] figure 3.6; [C].
+    """
+
+    def __init__(self, parameters: Specular | None = None):
+        self.parameters = parameters or Specular()
+        super().__init__({"exponent": In(Specular.EXPONENT_BITS), "slope": Out(slope_shape())})
+
+    def elaborate(self, platform):
+        """Slope and PROM, then normalisation, a clock each."""
+        p = self.parameters
+        m = Module()
+        if p.slope_terms is None:
+            code = self._look_up(m, "slopes", p.slopes.codes, p.SLOPE_FORMAT)
+        else:
+            exponent = FixedValue(UQ(p.EXPONENT_BITS, 0), self.exponent)
+            a, b = (FixedValue.constant(term.format, term.values.item()) for term in p.slope_terms)
+            code = Signal(p.SLOPE_FORMAT.width, name="slope_word")
+            m.d.sync += code.eq(((a * exponent).truncate(18) + b).wrap(p.SLOPE_FORMAT).as_value())
+        scale, shift = Signal(FixedShape(p.SCALE_FORMAT)), Signal(_SHIFT_BITS)
+        for s in range(-1, 10):
+            with m.If(code[s + 17] if s >= 0 else 1):
+                m.d.sync += [Value.cast(scale).eq((code << (9 - s))[10:27]), shift.eq(s + 1)]
+        boundary = Const(p.SHIFTED_FORMAT.max_code, p.SHIFTED_FORMAT.width)
+        if not p.as_documented:
+            word = self._look_up(m, "boundaries", p.boundaries.codes, p.SHIFTED_FORMAT)
+            boundary = Signal(p.SHIFTED_FORMAT.width)
+            m.d.sync += boundary.eq(word)
+        m.d.comb += [
+            self.slope.scale.eq(scale),
+            self.slope.shift.eq(shift),
+            Value.cast(self.slope.boundary).eq(boundary),
+        ]
+        return m
+
+    def _look_up(self, m: Module, name: str, codes, format: Format) -> Value:
+        m.submodules[name] = table = Memory(shape=format.width, depth=len(codes), init=codes.tolist())
+        port = table.read_port()
+        m.d.comb += port.addr.eq(self.exponent)
+        return port.data
+
+
+class SpecularUnit(PipelinedUnit):
+    """``max(1 - k (1 - cos gamma), 0)^2`` or a higher power, 0 for a dark beat.
+
+    Models, formats, the PROM and the error bound are those of `Specular`, the bit-true twin.
+    A beat is dark where the light is behind the surface, or a highlight gate says that its span is. It works
+    as if its argument were 0, so nothing toggles from one dark beat to the next but its input and the first
+    register.
+
+    With an initiation interval I of 1 the latency is 7 clocks (one minus, saturation, shift, saturation,
+    product, base, square), and each of M products has a multiplier: 17 by 17 bits, 17 by 11 and 14 by 11 in
+    the chords of ``coscos``, 13 by 11 in those of ``exp``. With a longer interval they take turns at
+    ``ceil(M / I)`` multipliers of 18 by 18 bits; a product then takes four clocks more, for its operands
+    and the registers beside the multiplier (`registered_product`), and waits for its turn.
+
+    ============= = ===== == == == == =====================================================
+    model         M I = 1 2  3  4  6  beside slope and square
+    ============= = ===== == == == == =====================================================
+    cosquad, kin  2 7     17 17 16 17
+    lyon2         3 8     21 24 21 24 a square
+    lyon3         4 9     27 26 27 31 two squares
+    exp           2 9     19 19 18 19 64 words of 32 bits and a shift, no square
+    coscos2       5 11    28 29 28 31 a product, 128 words of 36 bits, 64 of 33, and chords
+    coscos4       6 12    33 35 33 38 those and a square
+    as documented 1 8     13 13 13 13 the slope's multiplier is of 18 by 17 bits, never shared
+    ============= = ===== == == == == =====================================================
+
+    What follows from the exponent costs what it does in a `SlopeUnit`.
+
+    Parameters
+    ----------
+    parameters : Specular
+        Model, kind of operand, and whether the structure is the documented one.
+    initiation_interval : int
+        Distance in clocks of two inputs, at least 1.
+    exponent : int or None
+        An exponent for good, 1 to 1000: no PROM, a constant shift, and the slope multiplier one by a
+        constant, so that M is one less. ``None``: the exponent is a port.
+    shares_slope : bool
+        Whether a `SlopeUnit` outside works out what follows from the exponent. Else the unit has its own,
+        where ``exponent`` is ``None``.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"operand": ..., "dark": 1})))`
+        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``; whether the beat is dark.
+    o : :py:`Out(stream.Signature(UQ(0, 17)))`
+        Specular term.
+    constants : :py:`In(StructLayout({"exponent": 10}))` or :py:`In(slope_shape())`
+        Exponent, 1 to 1000, or what a `SlopeUnit` gives; stays while beats are inside, and the slope from
+        two clocks after the first is taken. None with an exponent for good.
+
+    Raises
+    ------
+    ValueError
+        If the interval or the exponent is out of range, or both an exponent and a shared slope are asked for.
+
+    Source: [T] figures 3.6 and 3.7; [C].
+    """
+
+    def __init__(
+        self,
+        parameters: Specular | None = None,
+        initiation_interval: int = 1,
+        *,
+        exponent: int | None = None,
+        shares_slope: bool = False,
+    ):
+        self.parameters = p = parameters or Specular()
+        if exponent is not None and not 1 <= exponent <= MAX_EXPONENT:
+            raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {exponent}")
+        if exponent is not None and shares_slope:
+            raise ValueError("a unit with an exponent of its own shares no slope")
+        self.exponent, self.shares_slope = exponent, shares_slope
+        self._has_slope_turn = exponent is None and not p.as_documented
+        count = self.multiplications(p, exponent)
+        self._graph = Dataflow(initiation_interval, count if initiation_interval > 1 else 0)
+        self._result = self._describe()
+        constants = None
+        if shares_slope:
+            constants = slope_shape()
+        elif exponent is None:
+            constants = data.StructLayout({"exponent": unsigned(p.EXPONENT_BITS)})
+        super().__init__(
+            highlight_shape(p),
+            FixedShape(p.RESULT_FORMAT),
+            latency=self._result.age,
+            initiation_interval=initiation_interval,
+            constants=constants,
+        )
+
+    @staticmethod
+    def multiplications(parameters: Specular, exponent: int | None = None) -> int:
+        """M, of the table above: an initiation interval of as many clocks needs one multiplier."""
+        chords = 3 if parameters.is_coscos else int(parameters.model == "exp")
+        by_slope = exponent is None and not parameters.as_documented
+        return by_slope + parameters.squarings + chords
+
+    def datapath(self, m, operands):
+        """The graph, read at the age of its last word."""
+        self._slope = self._frame_values(m)
+        return self._graph.build(m, self, operands)(self._result, self.latency)
+
+    def _frame_values(self, m: Module) -> tuple[FixedValue, Value, FixedValue]:
+        """K, s + 1 and the boundary: a constant, from outside, or two clocks behind the exponent."""
+        p = self.parameters
+        if self.exponent is not None:
+            (scale, shift), boundary = p.scale(self.exponent), p.boundaries[self.exponent]
+            return (
+                FixedValue.constant(scale.format, scale.values.item()),
+                Const(int(shift) + 1, _SHIFT_BITS),
+                FixedValue.constant(boundary.format, boundary.values.item()),
+            )
+        if self.shares_slope:
+            slope = self.constants
+        else:
+            m.submodules.slope = unit = SlopeUnit(p)
+            m.d.comb += unit.exponent.eq(self.constants.exponent)
+            slope = unit.slope
+        return slope.scale, slope.shift, slope.boundary
+
+    def _describe(self) -> Word:
+        """Words from the operand to the result."""
+        p, g = self.parameters, self._graph
+        operand = g.input("operand", lambda operands: operands.operand)
+        self._dark = dark = g.input("dark", lambda operands: operands.dark)
+
+        def saturated(argument, dark):
+            argument = Value.cast(argument.saturate(p.ARGUMENT_FORMAT))
+            return FixedValue(p.ARGUMENT_FORMAT, Mux(dark, 0, argument)[: p.ARGUMENT_FORMAT.width])
+
+        def shifted(argument):
+            return FixedValue(UQ(10, 26), (Value.cast(argument) << self._slope[1])[:36]).truncate(16)
+
+        def is_lit(wide, dark):
+            # The saturated argument is at most the boundary; it always is where that is the largest code.
+            boundary = self._slope[2]
+            return ((wide <= boundary) | Value.cast(boundary).all()) & ~dark
+
+        argument = g.register("one_minus_cosine", lambda x: one_minus(p, x).truncate(25), operand)
+        argument = g.register("argument", saturated, argument, dark)
+        wide = g.register("shifted_wide", shifted, argument)
+        format = p.WIDE_FORMAT if p.as_documented else p.SHIFTED_FORMAT
+        operand = g.register("shifted", lambda wide: wide.saturate(format), wide)
+        if self._has_slope_turn:
+            product = self._multiply("product", operand, operand, right=lambda _: self._slope[0])
+        else:
+            product = g.register("product", lambda x: x * self._slope[0], operand)
+        if p.as_documented:
+            return self._drawn(product)
+        lit = g.register("lit", is_lit, wide, dark)
+        if p.model == "exp":
+            return self._exponential(product, lit)
+
+        def below_one(product):
+            # Below the boundary the product is under 1.
+            return Value.cast(product.truncate(17))[:17]
+
+        if p.is_coscos:
+            base = self._cosine(argument, product, below_one, lit)
+        else:
+            # 1 - 2^-17 - product is its inverse.
+            base = g.register(
+                "base",
+                lambda product, lit: FixedValue(p.BASE_FORMAT, Mux(lit, ~below_one(product), 0)[:17]),
+                product,
+                lit,
+            )
+        for name in ("square", "square_2", "square_3")[: p.squarings]:
+            base = self._multiply(name, base, base, _cut, _cut)
+        return g.wire("result", _cut, base)
+
+    def _multiply(
+        self,
+        name: str,
+        a: Word,
+        b: Word,
+        left: Callable[[Any], FixedValue] = lambda value: value,
+        right: Callable[[Any], FixedValue] = lambda value: value,
+    ) -> Word:
+        """Exact product: a clock with a multiplier of its own, two at a turn of a shared one."""
+        g = self._graph
+        if g.interval == 1:
+            return g.register(name, lambda x, y: left(x) * right(y), a, b)
+        format: list[Format] = []
+
+        def operands(x, y, dark):
+            x, y = left(x), right(y)
+            format.append(x.format * y.format)
+            return tuple(Mux(dark, 0, Value.cast(value)) for value in (x, y))
+
+        def product(code):
+            return FixedValue(format[-1], code[: format[-1].width])
+
+        return g.use(g.multiplier, name, (a, b, self._dark), operands, product)
+
+    def _drawn(self, product: Word) -> Word:
+        """Base of either sign, square, and the comparator on the square."""
+        p, g = self.parameters, self._graph
+
+        def base(product, dark):
+            code = Value.cast(product.truncate(17))
+            base = Mux(code[18], p.BASE_FORMAT.max_code, Mux(code[17], code[:17], ~code[:17]))
+            return FixedValue(p.BASE_FORMAT, Mux(dark, 0, base)[:17])
+
+        def result(square):
+            square = square.truncate(17)
+            bright = square >= FixedValue.constant(p.RESULT_FORMAT, p.CUTOFF**2)
+            return FixedValue(p.RESULT_FORMAT, Mux(bright, Value.cast(square), 0))
+
+        base = g.register("base", base, product, self._dark)
+        return g.register("result", result, self._multiply("square", base, base))
+
+    def _cosine(self, argument: Word, product: Word, below_one: Callable, lit: Word) -> Word:
+        """Base of ``coscos``: e while the product p is made; ``p + p e``; the cosine."""
+        p, g = self.parameters, self._graph
+        code = g.wire("excess_code", lambda x: Value.cast(x)[8:], argument)
+        e = self._interpolate("excess", p.excess, code)
+        product = g.wire("p", lambda product: FixedValue(p.BASE_FORMAT, below_one(product)), product)
+        more = self._multiply("more", product, e, right=lambda e: e.truncate(16))
+        w = g.register("w", lambda product, more: (product + more).truncate(17), product, more)
+        # Where lit, w is under 1.
+        code = g.wire("chords_code", lambda w: Value.cast(w)[:17], w)
+        return self._interpolate("chords", p.chords, code, lit)
+
+    def _exponential(self, product: Word, lit: Word) -> Word:
+        """``2^-power``: three clocks of chords, shift."""
+        p, g = self.parameters, self._graph
+
+        def power(product):
+            return Value.cast(product.truncate(21).scale(4))
+
+        def result(value, whole, lit):
+            shifted = Mux(lit, Value.cast(value)[2:] >> whole, 0)
+            return FixedValue(p.RESULT_FORMAT, shifted[: p.RESULT_FORMAT.width])
+
+        whole = g.wire("whole", lambda product: power(product)[17:21], product)
+        value = self._interpolate(
+            "chords", p.chords, g.wire("f", lambda product: power(product)[:17], product)
+        )
+        return g.register("result", result, value, whole, lit)
+
+    def _interpolate(self, name: str, chords: Chords, code: Word, lit: Word | None = None) -> Word:
+        """Twin of `Chords.compute`: table, product, sum; 0 where not ``lit``."""
+        g = self._graph
+        format, step_format = chords.start.format, chords.step.format
+        words = (chords.start.codes | chords.step.codes << format.width).tolist()
+        bits = chords.INTERPOLATION_FORMAT.width
+        address = g.wire(f"{name}_address", lambda code: code[bits:], code)
+        word = g.look_up(name, words, format.width + step_format.width, address)
+        within = g.register(
+            f"{name}_within", lambda code: FixedValue(chords.INTERPOLATION_FORMAT, code[:bits]), code
+        )
+        way = self._multiply(
+            f"{name}_way", word, within, lambda word: FixedValue(step_format, word[format.width :])
+        )
+        start = g.wire(f"{name}_start", lambda word: FixedValue(format, word[: format.width]), word)
+
+        def value(start, way, lit=None):
+            way = way.truncate(format.fraction_bits)
+            value = (start + way if chords.rising else start - way).wrap(format)
+            return value if lit is None else FixedValue(format, Mux(lit, Value.cast(value), 0))
+
+        return g.register(f"{name}_value", value, start, way, *([] if lit is None else [lit]))
+
+
+def _cut(value: FixedValue) -> FixedValue:
+    """To the 17 fraction bits of a base and of the result."""
+    return value.truncate(17)

@@ -1,0 +1,53 @@
+"""Bisection of spans until straight lines will do ([T] figure 2.7): method ``bisection``."""
+
+from amaranth.lib import stream
+
+from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
+from blysk.hdl.methods.interpolator import NormalInterpolatorUnit, span_words
+from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
+from blysk.hdl.normals.middle_normal import normal_shape
+
+__all__ = ["BisectionInterpolatorUnit"]
+
+
+class BisectionInterpolatorUnit(NormalInterpolatorUnit):
+    """The adaptive normaliser; `BisectionInterpolator` is the twin.
+
+    `latency` and `setup_interval` are those of a span that is not divided; a divided one takes longer (see
+    `AdaptiveNormaliserUnit`).
+
+    Parameters
+    ----------
+    parameters : BisectionInterpolator
+        Threshold, factor of the bisection unit, specular operand.
+    lights : int
+        Number of lights, at least 1.
+    options
+        As for `InterpolatorUnit`.
+
+    Source: [T] 2.1, figure 2.7.
+    """
+
+    def __init__(self, parameters: BisectionInterpolator, lights: int, **options):
+        super().__init__(parameters, lights, **options)
+        self._normaliser = AdaptiveNormaliserUnit(parameters.normaliser)
+        preparation = self._normaliser.preparation(0)
+        self.latency = preparation + self.product_latency
+        self.setup_interval = preparation - 2
+
+    def source(self, m):
+        """The normaliser, and one flag a span."""
+        m.submodules.adaptive_normaliser = normaliser = self._normaliser
+        m.d.comb += [
+            *(normaliser.i.payload[name].eq(word) for name, word in span_words(self.i.payload)),
+            normaliser.i.valid.eq(self.i.valid),
+            self.i.ready.eq(normaliser.i.ready),
+        ]
+        normals = stream.Signature(normal_shape()).create(path=("normals",))
+        pixel = normaliser.o.payload
+        m.d.comb += [
+            normals.payload.eq(pixel.normal),
+            normals.valid.eq(normaliser.o.valid),
+            normaliser.o.ready.eq(normals.ready),
+        ]
+        return normals, normals.valid & normals.ready & pixel.last & pixel.wide

@@ -1,0 +1,120 @@
+"""Linear interpolation of normals, as it comes (``linear``) or brought to unit length (``renormalise``)."""
+
+from amaranth.hdl import Cat, Signal, Value
+from amaranth.lib import fifo, stream
+
+from blysk.golden.methods.linear_interpolator import LinearInterpolator
+from blysk.golden.normals.gpq import GPQ
+from blysk.hdl.core.stream import REGISTER_LATENCY, connect, connect_registered, offer
+from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
+from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
+from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
+from blysk.hdl.normals.middle_normal import normal_shape
+from blysk.hdl.normals.renormaliser import RenormaliserUnit
+
+__all__ = ["LinearInterpolatorUnit"]
+
+
+class LinearInterpolatorUnit(NormalInterpolatorUnit):
+    """Normals on a straight line; `LinearInterpolator` is the twin.
+
+    The difference setup of a straight line, ``P = N_r - N_l``, the accumulator, and with ``renormalised`` the
+    direct renormaliser, of eight multipliers. A span that is too wide is flagged when it comes in; with
+    ``renormalised`` at the first pixel that shows it, as only the renormaliser knows which it does not serve.
+
+    Parameters
+    ----------
+    parameters : LinearInterpolator
+        Renormalised or not, and the specular operand.
+    lights : int
+        Number of lights, at least 1.
+    setup_interval : int
+        Clocks from a span to the next at the closest, 1 to 7.
+    options
+        As for `InterpolatorUnit`.
+
+    Source: [T] 2.1; numbers.md, "Rivals to measure against".
+    """
+
+    # Spans that wait ready for the accumulator: one at the output of the setup, two in the registers between.
+    PREPARED = 3
+
+    @classmethod
+    def setup_intervals(cls, parameters):
+        """What the setup can be built for."""
+        return range(1, 8)
+
+    def __init__(self, parameters: LinearInterpolator, lights: int, setup_interval: int = 4, **options):
+        super().__init__(parameters, lights, **options)
+        self.setup_interval = setup_interval
+        self._setup = DifferenceSetupUnit(
+            initiation_interval=setup_interval, length_bits=self.length_bits, order=1
+        )
+        self._accumulator = DifferenceAccumulatorUnit()
+        units = [self._setup, self._accumulator]
+        if parameters.renormalised:
+            self._renormaliser = RenormaliserUnit()
+            units.append(self._renormaliser)
+        self.latency = sum(unit.latency for unit in units) + REGISTER_LATENCY + self.product_latency
+
+    def source(self, m):
+        """Difference, its share a pixel, the sums."""
+        m.submodules.difference_setup = setup = self._setup
+        m.submodules.difference_accumulator = accumulator = self._accumulator
+        span, operands = self.i.payload, setup.i.payload
+        differences = [span.normal_right[c] - span.normal_left[c] for c in range(3)]
+        m.d.comb += [
+            *(operands.p[c].eq(differences[c].saturate(GPQ.P_FORMAT)) for c in range(3)),
+            operands.q.eq(span.normal_left),
+            operands.length.eq(span.length),
+            setup.i.valid.eq(self.i.valid),
+            self.i.ready.eq(setup.i.ready),
+        ]
+        tops = (Value.cast(difference)[-2:] for difference in differences)
+        far = Cat(top[0] ^ top[1] for top in tops).any()
+        connect_registered(m, setup.o, accumulator.i)
+        wide = Signal()
+        if not self.parameters.renormalised:
+            m.d.sync += wide.eq(self.i.valid & self.i.ready & far)
+            return accumulator.o, wide
+        m.submodules.renormaliser = renormaliser = self._renormaliser
+        connect(m, accumulator.o, renormaliser.i)
+        normals = stream.Signature(normal_shape()).create(path=("normals",))
+        m.d.comb += [
+            normals.payload.eq(renormaliser.o.payload.normal),
+            normals.valid.eq(renormaliser.o.valid),
+            renormaliser.o.ready.eq(normals.ready),
+        ]
+        first, far = self._marks(m, far)
+        # Of this span: a pixel before this one has shown it.
+        shown, shows = Signal(), Signal()
+        before = shown & ~first
+        m.d.comb += shows.eq((first & far) | renormaliser.o.payload.outside)
+        m.d.sync += wide.eq(0)
+        with m.If(normals.valid & normals.ready):
+            m.d.sync += [wide.eq(shows & ~before), shown.eq(shows | before)]
+        return normals, wide
+
+    def _marks(self, m, far):
+        """Of a normal that the renormaliser offers: whether it is a span's first, and then ``far`` of it."""
+        setup, accumulator, renormaliser = self._setup, self._accumulator, self._renormaliser
+        # Holds every span between the input and the accumulator, and so is never full.
+        depth = -(-setup.latency // self.setup_interval) + 1 + self.PREPARED
+        m.submodules.far = spans = fifo.SyncFIFOBuffered(width=1, depth=depth)
+        load = accumulator.i.valid & accumulator.i.ready
+        m.d.comb += [
+            spans.w_data.eq(far),
+            spans.w_en.eq(self.i.valid & self.i.ready),
+            spans.r_en.eq(load),
+        ]
+        mark = Cat(load, spans.r_data)
+        for name, unit in (("young", accumulator), ("old", renormaliser)):
+            # As many registers as the values go through in the unit, and one to wait in beside theirs.
+            marks = Signal(2 * unit.latency, name=name)
+            beside = stream.Signature(2).create(path=(name,))
+            advance = offer(m, beside, unit.o.valid, marks[-2:])
+            m.d.comb += beside.ready.eq(unit.o.ready)
+            with m.If(advance):
+                m.d.sync += marks.eq(Cat(mark, marks))
+            mark = beside.payload
+        return mark[0], mark[1]

@@ -1,0 +1,89 @@
+"""The recurrence method ([T] 3.3): cosines of equal steps along the great circle, one product each."""
+
+from amaranth.hdl import Module, Value
+
+from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
+from blysk.golden.number.fixed import UQ
+from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.core.stream import REGISTER_LATENCY, connect_registered
+from blysk.hdl.cosines.recurrence import RecurrenceUnit
+from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
+from blysk.hdl.methods.interpolator import InterpolatorUnit, span_words
+
+__all__ = ["RecurrenceInterpolatorUnit"]
+
+
+class RecurrenceInterpolatorUnit(InterpolatorUnit):
+    """Recurrence setup, then a recurrence unit for each light, which has a copy for L and one for H.
+
+    `RecurrenceInterpolator` is the twin. All recurrence units are equal, are
+    offered the same spans and taken from on the same clocks. Two multipliers a light, and those of the
+    setup, ``ceil((14 + 32 lights) / setup_interval)``. Without highlights the setup and the units are the
+    same, and what follows from H goes nowhere.
+
+    Parameters
+    ----------
+    parameters : RecurrenceInterpolator
+        Twin.
+    lights : int
+        Number of lights, at least 1.
+    setup_interval : int
+        Clocks from a span to the next at the closest, at least 1.
+    options
+        As for `InterpolatorUnit`.
+
+    Source: [T] 3.1, 3.3, figure 3.5.
+    """
+
+    @classmethod
+    def setup_intervals(cls, parameters):
+        """What the setup can be built for."""
+        return range(1, 47)
+
+    def __init__(self, parameters: RecurrenceInterpolator, lights: int, setup_interval: int = 4, **options):
+        super().__init__(parameters, lights, **options)
+        self.setup_interval = setup_interval
+        self._setup = RecurrenceSetupUnit(parameters.setup, lights, setup_interval)
+        self._recurrences = [RecurrenceUnit(parameters.setup.recurrence) for _ in range(lights)]
+        unit = self._recurrences[0]
+        self.latency = self._setup.latency + REGISTER_LATENCY + unit.latency
+
+    def elaborate(self, platform):
+        """Registers between the two hold spans ready, so that a long one pays for short ones after it."""
+        m = Module()
+        m.submodules.recurrence_setup = setup = self._setup
+        m.d.comb += [
+            *(setup.i.payload[name].eq(word) for name, word in span_words(self.i.payload)),
+            setup.i.valid.eq(self.i.valid),
+            self.i.ready.eq(setup.i.ready),
+        ]
+        prepared = setup.o.signature.create(path=("prepared",))
+        connect_registered(m, setup.o, prepared)
+        one = FixedValue.constant(UQ(1, 25), 1)
+        for light, unit in enumerate(self._recurrences):
+            m.submodules[f"recurrence_{light}"] = unit
+            starts, result = prepared.payload.lights[light], self.o.payload[light]
+            m.d.comb += [
+                *(
+                    Value.cast(unit.i.payload[name]).eq(Value.cast(starts[name]))
+                    for name in ("diffuse", "highlight")
+                ),
+                *(
+                    unit.i.payload[name].eq(prepared.payload[name])
+                    for name in ("coefficient", "shift", "length")
+                    if name in unit.i.payload.shape().members
+                ),
+                unit.i.valid.eq(prepared.valid),
+                unit.o.ready.eq(self.o.ready),
+                result.cosine.eq(unit.o.payload.diffuse),
+            ]
+            if self.highlights:
+                highlight = one - unit.o.payload.highlight
+                m.d.comb += result.highlight.eq(highlight.saturate(result.highlight.format))
+        m.d.comb += [
+            prepared.ready.eq(self._recurrences[0].i.ready),
+            self.o.valid.eq(self._recurrences[0].o.valid),
+            setup.constants.eq(self.constants),
+            self.wide.eq(setup.o.valid & setup.o.ready & setup.o.payload.wide),
+        ]
+        return m

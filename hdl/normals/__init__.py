@@ -1,0 +1,1 @@
+"""Units that make and interpolate normals."""

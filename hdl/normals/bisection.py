@@ -1,0 +1,156 @@
+"""Bisection unit ([T] figure 2.6) on shared multipliers."""
+
+from amaranth.hdl import Const, Mux, Signal, Value, signed, unsigned
+from amaranth.lib import data
+
+from blysk.golden.normals.bisection import Bisection
+from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.hdl.core.dataflow import Dataflow, checked_interval, dot
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.normals.middle_normal import normal_shape
+
+__all__ = ["BisectionUnit", "coefficient"]
+
+
+def coefficient(parameters: Bisection, power: int, first_step: Value) -> FixedValue:
+    """Coefficient of a power of the factor's polynomial, or of that of the first step."""
+    codes = []
+    for which in (False, True):
+        constant, rest = parameters.polynomial(which)
+        number = rest[power - 1] if power else constant
+        codes.append(Const(number.codes.item(), signed(number.format.width)))
+    narrow, wide = codes
+    return FixedValue(number.format, narrow if parameters.max_angle == 45 else Mux(first_step, wide, narrow))
+
+
+class BisectionUnit(PipelinedUnit):
+    """``N = (N_a + N_b) / sqrt(2 + z)`` with ``z = 2 N_a . N_b``, and a flag for spans too wide for it.
+
+    Formats, variants, error bounds and the flag are those of `Bisection`, the bit-true twin.
+
+    ``s + 6`` multiplications: three of the dot product, s Horner steps, three scalings. With an initiation
+    interval I, ``ceil((s + 6) / I)`` multipliers take turns at them (`dataflow`); with an interval of 1
+    each has one task. The results are the same to the bit.
+
+    Latency and multipliers by interval:
+
+    ======================== == ===== ===== ===== ===== ===== ===== ===== ===== =====
+    variant                  s  1     2     3     4     5     6     7     8     9
+    ======================== == ===== ===== ===== ===== ===== ===== ===== ===== =====
+    90 degrees               3  23, 9 25, 5 26, 3 28, 3 29, 2 27, 2 25, 2 25, 2 38, 1
+    45 degrees, degree 2     2  20, 8 21, 4 23, 3 25, 2 24, 2 23, 2 23, 2 29, 1
+    45 degrees, degree 1     1  17, 7 19, 4 20, 3 21, 2 19, 2 20, 2 25, 1
+    ======================== == ===== ===== ===== ===== ===== ===== ===== ===== =====
+
+    Parameters
+    ----------
+    parameters : Bisection
+        Degree, widest span, coefficients and formats.
+    initiation_interval : int or None
+        1 to ``s + 6``: distance in clocks of two inputs. ``None``: ``s + 3``.
+
+    Raises
+    ------
+    ValueError
+        If `initiation_interval` is none of those.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"normal_a": ..., "normal_b": ...})))`
+        Unit normals, three components ``SQ(1, 17)`` each.
+    o : :py:`Out(stream.Signature(StructLayout({...})))`
+        ``normal_middle``, three components ``SQ(1, 17)``; ``one_minus_cosine`` of the two normals in
+        ``SQ(2, 17)``; ``wide``: they are further apart than ``max_angle`` and the result means nothing.
+
+    Source: [T] 2.1, figure 2.6.
+    """
+
+    def __init__(self, parameters: Bisection | None = None, initiation_interval: int | None = None):
+        self.parameters = parameters or Bisection()
+        steps = self.parameters.steps
+        interval = checked_interval(initiation_interval, steps + 6, steps + 3)
+        self._graph = Dataflow(interval, steps + 6, hurries=True)
+        self._words = self._describe()
+        super().__init__(
+            data.StructLayout({"normal_a": normal_shape(), "normal_b": normal_shape()}),
+            data.StructLayout(
+                {
+                    "normal_middle": normal_shape(),
+                    "one_minus_cosine": FixedShape(Bisection.ANGLE_FORMAT),
+                    "wide": unsigned(1),
+                }
+            ),
+            latency=max(word.age for word in self._words.values()),
+            initiation_interval=interval,
+        )
+
+    def datapath(self, m, operands):
+        """The graph, read at the age of its last word."""
+        value = self._graph.build(m, self, operands)
+        read = {name: value(word, self.latency) for name, word in self._words.items()}
+        result = Signal(self.o.payload.shape())
+        m.d.comb += [
+            *(result.normal_middle[c].eq(read[c]) for c in range(3)),
+            *(result[name].eq(read[name]) for name in ("one_minus_cosine", "wide")),
+        ]
+        return result
+
+    def _describe(self) -> dict:
+        """Words of the results."""
+        g, p = self._graph, self.parameters
+        a, b = (
+            g.input(name, lambda operands, name=name: operands[name]) for name in ("normal_a", "normal_b")
+        )
+        squared = FixedValue.constant(ONE_SQUARED.format, ONE_SQUARED.values.item())
+        difference = g.register("difference", lambda cosine: squared - cosine, dot(g, "dot", a, b))
+        rounded = g.register("difference_rounded", lambda x: x.round_half_up(17), difference)
+        u = g.register("u", lambda x: x.saturate(p.ANGLE_FORMAT), rounded)
+        limits = [FixedValue.constant(p.ANGLE_FORMAT, w.values.item()) for w in (p.widest_narrow, p.widest)]
+        first_step = g.register("first_step", lambda u: u > limits[0], u)
+        words = {"one_minus_cosine": u, "wide": g.register("wide", lambda u: u > limits[1], u)}
+        one = FixedValue.constant(p.OPERAND_FORMAT, p.ONE.values.item())
+        cosine = g.register("cosine", lambda u: one - u, u)
+        angle = g.register("angle", lambda u: u.saturate(p.OPERAND_FORMAT), u)
+
+        def operand(first_step, cosine, angle):
+            cosine = cosine.saturate(p.OPERAND_FORMAT)
+            if p.reads_cosine(False):
+                return cosine
+            if p.max_angle == 45:
+                return angle
+            return FixedValue(p.OPERAND_FORMAT, Mux(first_step, cosine.as_value(), angle.as_value()))
+
+        x = g.register("x", operand, first_step, cosine, angle)
+        # A multiplier takes 18 signed bits twice; wired shifts align what it is given.
+        product = g.multiply(
+            "product_top", x, first_step, right=lambda first: coefficient(p, p.steps, first).scale(1)
+        )
+        for power in range(p.steps - 1, 0, -1):
+
+            def total(product, first, power=power):
+                added = coefficient(p, power, first)
+                return (product.scale(-1).round_half_up(18) + added).wrap(p.SUM_FORMAT)
+
+            word = g.register(f"total_{power}", total, product, first_step)
+            product = g.multiply(f"product_{power}", x, word, right=lambda total: total.scale(1))
+
+        def factor(product, first):
+            added = coefficient(p, 0, first)
+            return (product.scale(-1).round_half_up(19) + added).wrap(p.FACTOR_FORMAT)
+
+        e = g.register("e", factor, product, first_step)
+        for c in range(3):
+            half_sum = g.register(f"half_sum_{c}", lambda a, b, c=c: (a[c] + b[c]).scale(-1), a, b)
+            product = g.multiply(
+                f"scaled_{c}", e, half_sum, lambda e: e.scale(2), lambda half: half.truncate(17)
+            )
+            middle = g.register(
+                f"middle_sum_{c}",
+                lambda half, product: half + product.scale(-1).truncate(21),
+                half_sum,
+                product,
+            )
+            middle = g.register(f"middle_rounded_{c}", lambda middle: middle.round_half_up(17), middle)
+            words[c] = g.register(f"middle_{c}", lambda middle: middle.saturate(p.FORMAT), middle)
+        return words

@@ -1,0 +1,111 @@
+"""Forward-difference accumulator ([T] figure 2.10): two accumulating adders a component."""
+
+from collections.abc import Iterator
+
+from amaranth.hdl import Module, ShapeLike, Signal, ValueCastable
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import count_down, offer
+from blysk.hdl.normals.difference_setup import difference_shape
+from blysk.hdl.normals.middle_normal import normal_shape
+
+__all__ = ["AccumulatorUnit", "DifferenceAccumulatorUnit"]
+
+
+class AccumulatorUnit(wiring.Component):
+    """Quadratics of a span by forward differences, one value of each a clock, first pixel first.
+
+    Formats, rounding and bounds are those of `DifferenceAccumulator`, the
+    bit-true twin of each.
+
+    A span of m pixels taken in on one clock gives its first values 2 clocks later and more on each of the
+    m - 1 clocks after, unless the output waits; the next span is taken in on the clock that leaves no gap. A
+    span of length 0 takes one clock and gives nothing. No multipliers.
+
+    Parameters
+    ----------
+    input_shape : StructLayout
+        Of a prepared span; has a field ``length``.
+    output_shape : ShapeLike
+        Of the values.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(input_shape))`
+        Start, differences and length of a span.
+    o : :py:`Out(stream.Signature(output_shape))`
+        Values.
+
+    Source: [T] figure 2.10.
+    """
+
+    latency = 2
+
+    def __init__(self, input_shape: data.StructLayout, output_shape: ShapeLike):
+        super().__init__({"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))})
+
+    def quadratics(
+        self, values: ValueCastable
+    ) -> Iterator[tuple[str, DifferenceAccumulator, tuple, FixedValue]]:
+        """Name, formats, (start, first, second) and place among the ``values`` of each quadratic."""
+        raise NotImplementedError
+
+    def elaborate(self, platform):
+        """Accumulators, a pixel counter, and a register for the saturated values."""
+        m = Module()
+        advance, load, valid = Signal(), Signal(), Signal()
+        active, ends = count_down(m, self.i.valid, self.i.payload.length, advance)
+        values = Signal(self.o.payload.shape())
+        m.d.comb += [
+            advance.eq(offer(m, self.o, valid, values)),
+            self.i.ready.eq(advance & ends),
+            load.eq(self.i.valid & self.i.ready),
+        ]
+        with m.If(advance):
+            m.d.sync += valid.eq(active)
+        for name, p, (start, first, second), result in self.quadratics(values):
+            value = Signal(FixedShape(p.format), name=name)
+            difference = Signal(FixedShape(p.difference_format), name=f"{name}_difference")
+            bend = Signal(FixedShape(p.difference_format), name=f"{name}_second_difference")
+            half_step = FixedValue.constant(p.format, p.result_format.step / 2)
+            with m.If(load):
+                m.d.sync += [
+                    value.eq((start + half_step).wrap(p.format)),
+                    difference.eq(first),
+                    bend.eq(second),
+                ]
+            with m.Elif(advance):
+                m.d.sync += [
+                    value.eq((value + difference).wrap(p.format)),
+                    difference.eq((difference + bend).wrap(p.difference_format)),
+                ]
+            with m.If(advance):
+                m.d.sync += result.eq(value.truncate(p.result_format.fraction_bits).saturate(p.result_format))
+        return m
+
+
+class DifferenceAccumulatorUnit(AccumulatorUnit):
+    """``N += W; W += 2 G dt^2``: the normals of a span, three quadratics; see `AccumulatorUnit`.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(difference_shape()))`
+        Start, differences and length of a span.
+    o : :py:`Out(stream.Signature(ArrayLayout(SQ(1, 17), 3)))`
+        Normals.
+
+    Source: [T] figure 2.10.
+    """
+
+    def __init__(self):
+        super().__init__(difference_shape(), normal_shape())
+
+    def quadratics(self, values):
+        """The components of the normal."""
+        span = self.i.payload
+        for c in range(3):
+            operands = span.start[c], span.first[c], span.second[c]
+            yield f"normal_{c}", DifferenceAccumulator(), operands, values[c]

@@ -1,0 +1,363 @@
+"""Difference setup ([T] figure 2.11): first and second difference of a quadratic normal curve."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
+from amaranth.lib import data
+
+from blysk.golden.normals.difference_setup import LENGTH_BITS, DifferenceSetup
+from blysk.golden.normals.gpq import GPQ
+from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.unit_vector import COMPONENT
+from blysk.hdl.core.dataflow import MULTIPLIER_LATENCY, Dataflow, Word, checked_interval, registered_product
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.normals.middle_normal import normal_shape
+
+__all__ = [
+    "DifferenceSetupUnit",
+    "checked_length_bits",
+    "difference_shape",
+    "reciprocal_words",
+    "square_words",
+]
+
+
+def checked_length_bits(length_bits: int) -> int:
+    """Bits of the lengths that a unit takes.
+
+    Raises
+    ------
+    ValueError
+        If they are not 2 to 12.
+    """
+    if length_bits not in range(2, LENGTH_BITS + 1):
+        raise ValueError(f"length_bits must be 2 to {LENGTH_BITS}, not {length_bits!r}")
+    return length_bits
+
+
+def reciprocal_words(
+    graph: Dataflow,
+    length: Word,
+    table: Fixed | None = None,
+    length_bits: int = LENGTH_BITS,
+    since: int = 0,
+) -> tuple[Word, Word]:
+    """``dt = 1/(m - 1) = 2 reciprocal 2^-shift``, as `reciprocal_place` finds it.
+
+    Five clocks: m - 1, its leading one, the address, the table, a register. With fewer bits of the length the
+    table has ``2^(length_bits - 1)`` words, those that shorter spans read of the whole.
+
+    Parameters
+    ----------
+    graph : Dataflow
+        Graph that gets the words.
+    length : Word
+        m, 1 to ``2^length_bits - 1``; 1 counts as 2.
+    table : Fixed or None
+        Table of `reciprocal_table`; ``None``: that of `DifferenceSetup`.
+    length_bits : int
+        Bits of the length, 2 to 12.
+    since : int
+        Age at which m - 1 stands at the earliest.
+
+    Returns
+    -------
+    reciprocal, shift : Word
+        In the table's format; 0 to ``length_bits``.
+    """
+    table = DifferenceSetup().reciprocals if table is None else table
+    top = length_bits - 1
+
+    def leading(steps):
+        # Of a span of one pixel there is none.
+        place, below_top = Const(0, range(length_bits)), Const(top, range(length_bits))
+        for bit in range(length_bits):
+            place = Mux(steps[bit], Const(bit, range(length_bits)), place)
+            below_top = Mux(steps[bit], Const(top - bit, range(length_bits)), below_top)
+        return Cat(place, below_top)
+
+    half = len(Const(0, range(length_bits)))
+    steps = graph.register("steps", lambda length: (length - 1)[:length_bits], length, since=since)
+    places = graph.register("places", leading, steps)
+    address = graph.register("address", lambda steps, both: (steps << both[half:])[:top], steps, places)
+    codes = table.codes[:: len(table.codes) >> top].tolist()
+    word = graph.look_up("reciprocals", codes, table.format.width, address)
+    reciprocal = graph.register("reciprocal", lambda word: FixedValue(table.format, word), word)
+    shift = graph.register("shift", lambda both, address: both[:half] + address.any(), places, address)
+    return reciprocal, shift
+
+
+def square_words(graph: Dataflow, product: Word, shift: Word) -> tuple[Word, Word]:
+    """``dt^2 = 4 square 2^-square_shift``: two clocks.
+
+    Parameters
+    ----------
+    graph : Dataflow
+        Graph that gets the words.
+    product : Word
+        Exact square of the reciprocal of `DifferenceSetup`.
+    shift : Word
+        Its shift.
+
+    Returns
+    -------
+    square, square_shift : Word
+        ``UQ(0, 17)``; 0 to 25.
+    """
+    exact = UQ(0, 34)
+
+    def normalised(product):
+        code = Value.cast(product)[: exact.width]
+        code = Mux(code[-1], code, Cat(Const(0, 1), code[:-1]))
+        return FixedValue(exact, code).round_half_up(17)
+
+    small = graph.register("square_small", lambda product: ~Value.cast(product)[exact.width - 1], product)
+    rounded = graph.register("square_rounded", normalised, product)
+    square = graph.register("square", lambda x: x.saturate(DifferenceSetup.RECIPROCAL_FORMAT), rounded)
+    return square, graph.register("square_shift", lambda small, shift: Cat(small, shift), small, shift)
+
+
+def difference_shape() -> data.StructLayout:
+    """Shape of a prepared span: start, first and second difference, length in pixels."""
+    difference = data.ArrayLayout(FixedShape(DifferenceSetup.FORMAT), 3)
+    return data.StructLayout(
+        {"start": normal_shape(), "first": difference, "second": difference, "length": unsigned(12)}
+    )
+
+
+class DifferenceSetupUnit(PipelinedUnit):
+    """``W_0 = P dt + G dt^2`` and ``2 G dt^2`` with ``dt = 1/(m - 1)``.
+
+    Formats and error bound are those of `DifferenceSetup`, the bit-true twin.
+
+    Seven multiplications: the square of dt, three products with P and three with G. With an initiation
+    interval I, ``ceil(7 / I)`` multipliers take turns at them (`dataflow`), each with its own shifter. By
+    default one does all; with an interval of 1 each has one task. The results are the same to the bit. A
+    table of ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals.
+
+    =========== == == == == == == ==
+    interval    1  2  3  4  5  6  7
+    =========== == == == == == == ==
+    latency     21 22 23 25 23 24 28
+    multipliers 7  4  3  2  2  2  1
+    =========== == == == == == == ==
+
+    For a straight line, `order` 1, only three products with P are left:
+
+    =========== == == == == == == ==
+    interval    1  2  3  4  5  6  7
+    =========== == == == == == == ==
+    latency     13 15 16 16 16 16 16
+    multipliers 3  2  1  1  1  1  1
+    =========== == == == == == == ==
+
+    With the products in the order of [T] there are nine, three of ``G dt`` first:
+
+    =========== == == == == == == == == ==
+    interval    1  2  3  4  5  6  7  8  9
+    =========== == == == == == == == == ==
+    latency     24 25 25 25 28 29 26 26 28
+    multipliers 9  5  3  3  2  2  2  2  1
+    =========== == == == == == == == == ==
+
+    Parameters
+    ----------
+    parameters : DifferenceSetup
+        Table, formats and order of the products.
+    initiation_interval : int or None
+        1 to 7, or to 9 in the order of [T]: distance in clocks of two inputs. ``None``: that of one busy
+        multiplier.
+    order : int
+        2; or 1 for a straight line, G = 0 and no port for it: three multiplications and a second difference
+        of 0.
+    length_bits : int
+        Bits of the length, 2 to 12: spans have at most ``2^length_bits - 1`` pixels.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is none of those.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"g", "p", "q", "length"})))`
+        Coefficients in the formats of `GPQ`; length, `length_bits` bits, at least 1.
+    o : :py:`Out(stream.Signature(difference_shape()))`
+        The start ``q``, both differences in ``SQ(2, 42)``, the length.
+
+    Source: [T] figure 2.11.
+    """
+
+    def __init__(
+        self,
+        parameters: DifferenceSetup | None = None,
+        initiation_interval: int | None = None,
+        order: Literal[1, 2] = 2,
+        length_bits: int = LENGTH_BITS,
+    ):
+        if order not in (1, 2):
+            raise ValueError(f"order must be 1 or 2, not {order!r}")
+        self.parameters = parameters or DifferenceSetup()
+        self.order = order
+        self.length_bits = checked_length_bits(length_bits)
+        longest = 9 if self.parameters.as_documented else 7
+        uses = longest if order == 2 else 3
+        interval = checked_interval(initiation_interval, longest, uses)
+        self._graph = Dataflow(interval)
+        shapes = FixedShape(DifferenceSetup.RECIPROCAL_FORMAT), FixedShape(COMPONENT), unsigned(5)
+        self._multiplier = self._graph.share("multiplier", uses, shapes, MULTIPLIER_LATENCY + 3, _multiply)
+        self._words = self._describe()
+        coefficients = {
+            "g": data.ArrayLayout(FixedShape(GPQ.G_FORMAT), 3),
+            "p": data.ArrayLayout(FixedShape(GPQ.P_FORMAT), 3),
+            "q": normal_shape(),
+        }
+        if order == 1:
+            del coefficients["g"]
+        super().__init__(
+            data.StructLayout({**coefficients, "length": unsigned(length_bits)}),
+            difference_shape(),
+            latency=max(word.age for word in self._words.values()),
+            initiation_interval=interval,
+        )
+
+    def datapath(self, m, operands):
+        """The graph, read at the age of its last word."""
+        value = self._graph.build(m, self, operands)
+        result = Signal(self.o.payload.shape())
+        for index, word in self._words.items():
+            target = result[index] if isinstance(index, str) else result[index[0]][index[1]]
+            m.d.comb += target.eq(value(word, self.latency))
+        return result
+
+    def _describe(self) -> dict:
+        """Words of the results."""
+        g = self._graph
+        start, length = (g.input(name, lambda i, name=name: i[name]) for name in ("q", "length"))
+        words = {"start": start, "length": length}
+        reciprocal, shift = reciprocal_words(g, length, length_bits=self.length_bits)
+        p = g.input("p", lambda operands: operands.p)
+        if self.order == 1:
+            for c in range(3):
+                words["first", c] = self._shifted(
+                    f"first_{c}", reciprocal, p, shift, lambda p, c=c: p[c], _plus_one
+                )
+            return words
+        describe = self._documented if self.parameters.as_documented else self._products
+        describe(words, p, g.input("g", lambda operands: operands.g), reciprocal, shift)
+        return words
+
+    def _products(self, words, p, g, reciprocal, shift) -> None:
+        """``P dt + G dt^2`` and ``2 G dt^2``."""
+        graph = self._graph
+        product = self._product(
+            "square_exact", reciprocal, reciprocal, lambda reciprocal: reciprocal.extend(COMPONENT)
+        )
+        firsts = [
+            self._shifted(f"first_order_{c}", reciprocal, p, shift, lambda p, c=c: p[c], _plus_one)
+            for c in range(3)
+        ]
+        square, square_shift = square_words(graph, product, shift)
+        for c, first in enumerate(firsts):
+            second = self._shifted(
+                f"second_order_{c}", square, g, square_shift, lambda g, c=c: g[c].extend(COMPONENT)
+            )
+            words["first", c] = graph.register(
+                f"first_{c}", lambda a, b: (a + b).wrap(DifferenceSetup.FORMAT), first, second
+            )
+            words["second", c] = graph.register(f"second_{c}", _twice, second)
+
+    def _documented(self, words, p, g, reciprocal, shift) -> None:
+        """``(G dt + P) dt`` and ``2 (G dt) dt``."""
+        graph = self._graph
+        slope_format, step_format = DifferenceSetup.SLOPE_FORMAT, SQ(1, 29)
+        products = [
+            self._product(f"bend_exact_{c}", reciprocal, g, lambda g, c=c: g[c].extend(COMPONENT))
+            for c in range(3)
+        ]
+        bends = [
+            graph.register(f"bend_{c}", lambda x: x.round_half_up(18).wrap(slope_format), product)
+            for c, product in enumerate(products)
+        ]
+        for c, bend in enumerate(bends):
+            second = self._shifted(
+                f"second_order_{c}",
+                reciprocal,
+                bend,
+                shift,
+                lambda bend: bend.scale(1),
+                lambda shift: Cat(Const(1, 1), shift),
+            )
+            words["second", c] = graph.register(f"second_{c}", _twice, second)
+        for c, bend in enumerate(bends):
+            # The step of the first pixel, exact with 29 fraction bits, in two stages.
+            step = graph.register(
+                f"step_coarse_{c}",
+                lambda bend, shift: FixedValue(
+                    step_format,
+                    Value.cast(bend.scale(1).extend(step_format)) >> Cat(Const(0, 2), shift[2:]),
+                ),
+                bend,
+                shift,
+            )
+            step = graph.register(
+                f"step_{c}",
+                lambda step, shift: FixedValue(step_format, Value.cast(step) >> shift[:2]),
+                step,
+                shift,
+            )
+            slope = graph.register(f"slope_sum_{c}", lambda step, p, c=c: step + p[c], step, p)
+            slope = graph.register(f"slope_rounded_{c}", lambda slope: slope.round_half_up(17), slope)
+            slope = graph.register(f"slope_{c}", lambda slope: slope.saturate(COMPONENT), slope)
+            words["first", c] = self._shifted(
+                f"first_{c}", reciprocal, slope, shift, lambda slope: slope, _plus_one
+            )
+
+    def _product(self, name: str, factor: Word, operand: Word, wiring) -> Word:
+        """Exact product."""
+
+        def operands(factor, operand):
+            return factor, wiring(operand), Const(0, 5)
+
+        return self._graph.use(
+            self._multiplier,
+            name,
+            (factor, operand),
+            operands,
+            lambda results: results[0],
+            latency=MULTIPLIER_LATENCY,
+        )
+
+    def _shifted(
+        self, name: str, factor: Word, operand: Word, shift: Word, wiring, amount=lambda shift: shift
+    ) -> Word:
+        """``4 product 2^-amount``, rounded half up to 42 fraction bits."""
+
+        def operands(factor, operand, shift):
+            return factor, wiring(operand), amount(shift)
+
+        return self._graph.use(
+            self._multiplier, name, (factor, operand, shift), operands, lambda results: results[1]
+        )
+
+
+def _plus_one(shift: Value) -> Value:
+    return shift + 1
+
+
+def _twice(second: FixedValue) -> FixedValue:
+    return second.scale(1).extend(SQ(3, 42)).wrap(DifferenceSetup.FORMAT)
+
+
+def _multiply(register, a: FixedValue, b: FixedValue, amount: Value) -> Sequence[FixedValue]:
+    """Product; and ``4 product 2^-amount`` in two stages, rounded half up to 42 fraction bits."""
+    product = registered_product(register, a, b)
+    for clock in range(MULTIPLIER_LATENCY):
+        amount = register(amount, f"amount_{clock}")
+    scaled = product.scale(2).extend(SQ(3, 43))
+    coarse = FixedValue(scaled.format, Value.cast(scaled) >> Cat(Const(0, 3), amount[3:]))
+    coarse, fine = register(coarse, "coarse"), register(amount[:3], "fine_amount")
+    shifted = register(FixedValue(scaled.format, Value.cast(coarse) >> fine), "shifted")
+    return product, register(shifted.round_half_up(42).wrap(DifferenceSetup.FORMAT), "rounded")

@@ -1,0 +1,55 @@
+"""Dot-product unit ([T] figure 2.5): three multipliers and an adder tree."""
+
+from amaranth.lib import data
+
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import PipelinedUnit
+
+__all__ = ["DotProductUnit"]
+
+
+class DotProductUnit(PipelinedUnit):
+    """Exact dot product ``a0 b0 + a1 b1 + a2 b2``.
+
+    The sum keeps every bit (``SQ(4, 34)`` for unit vectors), so there is neither rounding nor overflow.
+
+    The latency is 3 clocks (products, first sum, second sum) and the initiation interval is 1. Three
+    multipliers.
+
+    Parameters
+    ----------
+    parameters : DotProduct
+        Number formats; `DotProduct.compute` is the bit-true twin.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"a": ..., "b": ...})))`
+        Two vectors of three components.
+    o : :py:`Out(stream.Signature(FixedShape))`
+        Their dot product.
+
+    Source: [T] figure 2.5.
+    """
+
+    def __init__(self, parameters: DotProduct | None = None):
+        self.parameters = parameters or DotProduct()
+        super().__init__(
+            data.StructLayout(
+                {
+                    "a": data.ArrayLayout(FixedShape(self.parameters.a_format), 3),
+                    "b": data.ArrayLayout(FixedShape(self.parameters.b_format), 3),
+                }
+            ),
+            FixedShape(self.parameters.result_format),
+            latency=3,
+        )
+
+    def datapath(self, m, operands):
+        """Products, then the sum of two, then of all."""
+        products = [
+            self.register(m, operands.a[axis] * operands.b[axis], f"product_{axis}") for axis in range(3)
+        ]
+        partial = self.register(m, products[0] + products[1], "partial_sum")
+        last = self.register(m, products[2], "last_product")
+        return self.register(m, partial + last, "sum")

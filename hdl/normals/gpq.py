@@ -1,0 +1,74 @@
+"""G/P/Q unit ([T] figure 2.8): adders and wired shifts."""
+
+from amaranth.hdl import Signal
+from amaranth.lib import data
+
+from blysk.golden.normals.gpq import GPQ
+from blysk.golden.normals.middle_normal import MiddleNormal
+from blysk.golden.number.fixed import SQ
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.normals.middle_normal import normal_shape
+
+__all__ = ["GPQUnit"]
+
+
+class GPQUnit(PipelinedUnit):
+    """``G = 2 N_r - 4 N_c + 2 N_l``, ``P = 4 N_c - N_r - 3 N_l``, ``Q = N_l``.
+
+    Exact for spans up to 45 degrees, saturated beyond; `GPQ` is the bit-true twin.
+
+    The latency is 3 clocks (first sums, second sums, saturation) and the initiation interval is 1. No
+    multipliers.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"normal_left", "normal_middle", "normal_right"})))`
+        Normals: ``SQ(1, 17)`` at the ends, ``SQ(1, 19)`` in the middle.
+    o : :py:`Out(stream.Signature(StructLayout({"g", "p", "q"})))`
+        Coefficients: ``SQ(0, 17)``, ``SQ(1, 17)``, ``SQ(1, 17)``.
+
+    Source: [T] figure 2.8.
+    """
+
+    def __init__(self):
+        super().__init__(
+            data.StructLayout(
+                {
+                    "normal_left": normal_shape(),
+                    "normal_middle": data.ArrayLayout(FixedShape(MiddleNormal.FORMAT), 3),
+                    "normal_right": normal_shape(),
+                }
+            ),
+            data.StructLayout(
+                {
+                    "g": data.ArrayLayout(FixedShape(GPQ.G_FORMAT), 3),
+                    "p": data.ArrayLayout(FixedShape(GPQ.P_FORMAT), 3),
+                    "q": normal_shape(),
+                }
+            ),
+            latency=3,
+        )
+
+    def datapath(self, m, operands):
+        """Three components side by side."""
+        register = self.register
+        result = Signal(self.o.payload.shape())
+        for c in range(3):
+            left, right = operands.normal_left[c], operands.normal_right[c]
+            middle = operands.normal_middle[c].scale(2)
+            ends = register(m, (left + right).scale(1), f"ends_{c}")
+            four_middle = register(m, middle, f"four_middle_{c}")
+            rise = register(m, middle - right, f"rise_{c}")
+            three_left = register(m, left.scale(1) + left, f"three_left_{c}")
+            g = register(m, ends.extend(SQ(3, 17)) - four_middle, f"g_sum_{c}")
+            p = register(m, rise - three_left, f"p_sum_{c}")
+            q = left
+            for stage in range(3):
+                q = register(m, q, f"q_{c}_{stage}")
+            m.d.comb += [
+                result.g[c].eq(register(m, g.saturate(GPQ.G_FORMAT), f"g_{c}")),
+                result.p[c].eq(register(m, p.saturate(GPQ.P_FORMAT), f"p_{c}")),
+                result.q[c].eq(q),
+            ]
+        return result

@@ -1,0 +1,140 @@
+"""Middle normal of a span through the h polynomial ([T] 2.2) on shared multipliers."""
+
+from amaranth.hdl import Signal, unsigned
+from amaranth.lib import data
+
+from blysk.golden.normals.middle_normal import MiddleNormal
+from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
+from blysk.hdl.core.dataflow import Dataflow, checked_interval, dot
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+
+__all__ = ["MiddleNormalUnit", "normal_shape"]
+
+
+def normal_shape() -> data.ArrayLayout:
+    """Shape of a unit normal: three components ``SQ(1, 17)``."""
+    return data.ArrayLayout(FixedShape(COMPONENT), 3)
+
+
+_MULTIPLICATIONS = 9
+"""Three of the dot product, three Horner steps, three scalings by e."""
+
+
+class MiddleNormalUnit(PipelinedUnit):
+    """``N_c = h(r) (N_l + N_r)`` with ``h = 1/sqrt(2 (1 + r))`` as a polynomial.
+
+    Formats, fits (that of the default is exact at angle 0), error bound and the flag are those of
+    `MiddleNormal`, the bit-true twin.
+
+    Nine multiplications: three of the dot product, three Horner steps, three scalings. With an initiation
+    interval I, ``ceil(9 / I)`` multipliers take turns at them (`dataflow`); with an interval of 1 each
+    has one task. The results are the same to the bit.
+
+    =========== == == == == == == == == ==
+    interval    1  2  3  4  5  6  7  8  9
+    =========== == == == == == == == == ==
+    latency     36 37 40 39 40 40 40 44 52
+    multipliers 9  5  3  3  2  2  2  2  1
+    =========== == == == == == == == == ==
+
+    Parameters
+    ----------
+    parameters : MiddleNormal
+        Fit of h and formats.
+    initiation_interval : int or None
+        1 to 9: distance in clocks of two inputs. ``None``: 6.
+
+    Raises
+    ------
+    ValueError
+        If `initiation_interval` is none of those.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"normal_left": ..., "normal_right": ...})))`
+        Unit normals of the span's ends, three components ``SQ(1, 17)`` each.
+    o : :py:`Out(stream.Signature(StructLayout({...})))`
+        The same two normals, ``normal_middle`` in ``SQ(1, 19)``, and ``wide``: the span is wider than 45
+        degrees and its middle normal not to be trusted.
+
+    Source: [T] 2.2; the fit of numbers.md.
+    """
+
+    def __init__(self, parameters: MiddleNormal | None = None, initiation_interval: int | None = None):
+        self.parameters = parameters or MiddleNormal()
+        interval = checked_interval(initiation_interval, _MULTIPLICATIONS, 6)
+        self._graph = Dataflow(interval, _MULTIPLICATIONS)
+        self._words = self._describe()
+        ends = {"normal_left": normal_shape(), "normal_right": normal_shape()}
+        super().__init__(
+            data.StructLayout(ends),
+            data.StructLayout(
+                {
+                    **ends,
+                    "normal_middle": data.ArrayLayout(FixedShape(MiddleNormal.FORMAT), 3),
+                    "wide": unsigned(1),
+                }
+            ),
+            latency=max(word.age for word in self._words.values()),
+            initiation_interval=interval,
+        )
+
+    def datapath(self, m, operands):
+        """The graph, read at the age of its last word."""
+        value = self._graph.build(m, self, operands)
+        read = {name: value(word, self.latency) for name, word in self._words.items()}
+        result = Signal(self.o.payload.shape())
+        m.d.comb += [
+            *(result[name].eq(read[name]) for name in ("normal_left", "normal_right", "wide")),
+            *(result.normal_middle[c].eq(read[c]) for c in range(3)),
+        ]
+        return result
+
+    def _describe(self) -> dict:
+        """Words of the results."""
+        g, p = self._graph, self.parameters
+        left, right = (
+            g.input(name, lambda operands, name=name: operands[name])
+            for name in ("normal_left", "normal_right")
+        )
+        cosine = dot(g, "cosine", left, right)
+        one = FixedValue.constant(ONE_SQUARED.format, ONE_SQUARED.values.item())
+        difference = g.register("difference", lambda cosine: one - cosine, cosine)
+        bits = p.ANGLE_FORMAT.fraction_bits
+        u = g.register("u", lambda x: x.truncate(bits).saturate(p.ANGLE_FORMAT), difference)
+        widest = FixedValue.constant(p.ANGLE_FORMAT, p.widest.values.item())
+        wide = g.register("wide", lambda u: u > widest, u)
+
+        # A multiplier takes at most 18 signed bits twice; wired shifts align what it is given.
+        c1, c2, c3 = (FixedValue.constant(p.SUM_FORMAT, value) for value in p.coefficients.values.tolist())
+        product = g.multiply("product_3", u, u, right=lambda _: c3)
+        for power, c in ((2, c2), (1, c1)):
+            rounded = g.register(f"rounded_{power}", lambda product: product.round_half_up(19), product)
+            total = g.register(f"total_{power}", lambda x, c=c: (x + c).wrap(p.SUM_FORMAT), rounded)
+            product = g.multiply(f"product_{power}", u, total)
+
+        def factor(product):
+            e = product.round_half_up(21)
+            if constant := p.constant.values.item():
+                e = e + FixedValue.constant(p.factor_format, constant)
+            return e.saturate(p.factor_format)
+
+        e = g.register("e", factor, product)
+        words = {"normal_left": left, "normal_right": right, "wide": wide}
+        for c in range(3):
+            half_sum = g.register(
+                f"half_sum_{c}", lambda a, b, c=c: (a[c] + b[c]).scale(-1), left, right, since=e.age
+            )
+            product = g.multiply(f"scaled_{c}", e, half_sum, right=_cut)
+            middle = g.register(f"middle_sum_{c}", _corrected, half_sum, product)
+            words[c] = g.register(f"middle_{c}", lambda middle: middle.saturate(p.FORMAT), middle)
+        return words
+
+
+def _cut(half_sum: FixedValue) -> FixedValue:
+    return half_sum.truncate(17).saturate(COMPONENT)
+
+
+def _corrected(half_sum: FixedValue, product: FixedValue) -> FixedValue:
+    return half_sum + product.scale(1).round_half_up(19)

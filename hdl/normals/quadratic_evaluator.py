@@ -1,0 +1,210 @@
+"""Quadratic evaluators ([T] figures 2.9 a and b): the normals of a span by multiplication."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.normals.gpq import GPQ
+from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
+from blysk.golden.number.fixed import SQ, UQ
+from blysk.golden.number.unit_vector import COMPONENT
+from blysk.hdl.core.dataflow import Dataflow
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit, connect
+from blysk.hdl.normals.difference_setup import reciprocal_words
+from blysk.hdl.normals.middle_normal import normal_shape
+
+__all__ = ["QuadraticEvaluatorUnit"]
+
+
+def _coefficients() -> dict:
+    return {
+        "g": data.ArrayLayout(FixedShape(GPQ.G_FORMAT), 3),
+        "p": data.ArrayLayout(FixedShape(GPQ.P_FORMAT), 3),
+        "q": normal_shape(),
+    }
+
+
+class QuadraticEvaluatorUnit(wiring.Component):
+    """``N(t) = G t^2 + P t + Q``: the normals of a span in raster order, first pixel at t = 0, last at t = 1.
+
+    Formats, rounding and error bound are those of `QuadraticEvaluator`, the
+    bit-true twin. The table of reciprocals holds 2048 words of 18 bits.
+
+    ``direct`` (figure 2.9 a): seven multipliers, t^2 once and two products a component (the figure draws one
+    component, with three). A span's first normal comes 14 clocks after it was taken in, then one a clock.
+
+    ``horner`` (figure 2.9 b): one multiplier, one adder and multiplexers a component, three multipliers in
+    all. The first normal comes 17 clocks after its span, then one every two clocks.
+
+    The step of the next span is prepared while this one runs: spans are taken in 7 clocks apart at the
+    closest, and there is no gap between their pixels when they have 7 pixels (``horner``: 4) or more. A
+    span of length 0 gives nothing.
+
+    Parameters
+    ----------
+    parameters : QuadraticEvaluator
+        Form, table and formats.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"g", "p", "q", "length"})))`
+        Coefficients in the formats of `GPQ`; length 0 to 4095.
+    o : :py:`Out(stream.Signature(ArrayLayout(SQ(1, 17), 3)))`
+        Normals.
+
+    Source: [T] figures 2.9 a and b.
+    """
+
+    def __init__(self, parameters: QuadraticEvaluator | None = None):
+        self.parameters = parameters or QuadraticEvaluator()
+        direct = self.parameters.form == "direct"
+        self.latency = 14 if direct else 17
+        self.clocks_per_pixel = 1 if direct else 2
+        super().__init__(
+            {
+                "i": In(stream.Signature(data.StructLayout({**_coefficients(), "length": unsigned(12)}))),
+                "o": Out(stream.Signature(normal_shape())),
+            }
+        )
+
+    def elaborate(self, platform):
+        """Step of the span, sum of the steps with a pixel counter, then the polynomial pixel by pixel."""
+        m = Module()
+        p = self.parameters
+        m.submodules.step = step = _StepUnit(p)
+        m.submodules.polynomial = polynomial = _DirectUnit() if p.form == "direct" else _HornerUnit()
+        connect(m, wiring.flipped(self.i), step.i)
+        connect(m, polynomial.o, wiring.flipped(self.o))
+
+        span, pixel = step.o, polynomial.i
+        total = Signal(FixedShape(p.SUM_FORMAT))
+        held = Signal(FixedShape(p.STEP_FORMAT))
+        coefficients = Signal(data.StructLayout(_coefficients()))
+        after = Signal(12)
+        valid = Signal()
+        advance = Signal()
+        m.d.comb += [
+            pixel.valid.eq(valid),
+            advance.eq(~valid | pixel.ready),
+            span.ready.eq(advance & (after == 0)),
+            pixel.payload.minus_t.eq(total.truncate(17)),
+            *(pixel.payload[name].eq(coefficients[name]) for name in ("g", "p", "q")),
+        ]
+        half_step = FixedValue.constant(p.SUM_FORMAT, COMPONENT.step / 2)
+        with m.If(span.valid & span.ready):
+            length = span.payload.length
+            m.d.sync += [
+                valid.eq(length != 0),
+                after.eq(Mux(length == 0, 0, length - 1)),
+                total.eq(half_step),
+                held.eq(span.payload.step),
+            ]
+            m.d.sync += [coefficients[name].eq(span.payload[name]) for name in ("g", "p", "q")]
+        with m.Elif(advance):
+            m.d.sync += [
+                valid.eq(after != 0),
+                after.eq(Mux(after == 0, 0, after - 1)),
+                total.eq((total - held).wrap(p.SUM_FORMAT)),
+            ]
+        return m
+
+
+class _StepUnit(PipelinedUnit):
+    """``dt = 1/(m - 1)`` beside the coefficients. Latency 8, initiation interval 7: one register for all."""
+
+    def __init__(self, parameters: QuadraticEvaluator):
+        self.parameters = parameters
+        span = {**_coefficients(), "length": unsigned(12)}
+        self._graph = Dataflow(7)
+        self._words = self._describe(span)
+        super().__init__(
+            data.StructLayout(span),
+            data.StructLayout({**span, "step": FixedShape(parameters.STEP_FORMAT)}),
+            latency=self._words["step"].age,
+            initiation_interval=7,
+        )
+
+    def datapath(self, m, operands):
+        """The graph, read at the age of the step."""
+        value = self._graph.build(m, self, operands)
+        result = Signal(self.o.payload.shape())
+        m.d.comb += [result[name].eq(value(word, self.latency)) for name, word in self._words.items()]
+        return result
+
+    def _describe(self, span) -> dict:
+        """Words of the results: the reciprocal, shifted in two stages, and the operands."""
+        g, p = self._graph, self.parameters
+        words = {name: g.input(name, lambda operands, name=name: operands[name]) for name in span}
+        reciprocal, shift = reciprocal_words(g, words["length"], p.reciprocals)
+        coarse = g.register(
+            "coarse",
+            lambda x, shift: Value.cast(x.scale(1).extend(p.STEP_FORMAT)) >> Cat(Const(0, 2), shift[2:]),
+            reciprocal,
+            shift,
+        )
+        words["step"] = g.register(
+            "step", lambda x, shift: FixedValue(p.STEP_FORMAT, x >> shift[:2]), coarse, shift
+        )
+        return words
+
+
+def _pixel_shape() -> data.StructLayout:
+    return data.StructLayout({**_coefficients(), "minus_t": FixedShape(COMPONENT)})
+
+
+def _with_half(value: FixedValue) -> FixedValue:
+    """A component plus half its step, by a wire: a cut after the sum then rounds half up."""
+    return FixedValue(SQ(1, 18), Cat(Const(1, 1), Value.cast(value)))
+
+
+class _DirectUnit(PipelinedUnit):
+    """Figure 2.9 a. Latency 5, initiation interval 1, seven multipliers."""
+
+    def __init__(self):
+        super().__init__(_pixel_shape(), normal_shape(), latency=5)
+
+    def datapath(self, m, operands):
+        """Square and linear products, -t^2 rounded, quadratic products, sum, saturation."""
+        register = self.register
+        minus_t = operands.minus_t
+        square = register(m, minus_t * minus_t, "square")
+        half = FixedValue.constant(UQ(-17, 18), COMPONENT.step / 2)
+        minus_square = register(m, (half - square).truncate(17).wrap(COMPONENT), "minus_square")
+        result = Signal(self.o.payload.shape())
+        for c in range(3):
+            g = register(m, register(m, operands.g[c], f"g_{c}"), f"g_late_{c}")
+            q = register(m, operands.q[c], f"q_{c}")
+            linear = register(m, operands.p[c] * minus_t, f"linear_{c}")
+            partial = register(m, _with_half(q) - linear, f"partial_{c}")
+            late = register(m, partial, f"partial_late_{c}")
+            quadratic = register(m, g * minus_square, f"quadratic_{c}")
+            total = register(m, late - quadratic, f"total_{c}").truncate(17)
+            m.d.comb += result[c].eq(register(m, total.saturate(COMPONENT), f"normal_{c}"))
+        return result
+
+
+class _HornerUnit(PipelinedUnit):
+    """Figure 2.9 b. Latency 8, initiation interval 2, one multiplier and one adder a component."""
+
+    def __init__(self):
+        super().__init__(_pixel_shape(), normal_shape(), latency=8, initiation_interval=2)
+
+    def datapath(self, m, operands):
+        """Ages: products issued at 1 and 4, sums at 3 and 6, so that two pixels share the parts at turns."""
+        at, register = self.at, self.register
+        held = register(m, operands, "operands_3", when=at(2))
+        q = register(m, held.q, "q_5", when=at(4))
+        minus_t = register(m, Mux(at(1), Value.cast(operands.minus_t), Value.cast(held.minus_t)), "minus_t")
+        minus_t = FixedValue(COMPONENT, minus_t)
+        result = Signal(self.o.payload.shape())
+        for c in range(3):
+            total = Signal(FixedShape(SQ(3, 34)), name=f"total_{c}")
+            rounded = total.truncate(17).saturate(COMPONENT)
+            first = Value.cast(operands.g[c].extend(COMPONENT))
+            factor = register(m, Mux(at(1), first, Value.cast(rounded)), f"factor_{c}")
+            product = register(m, FixedValue(COMPONENT, factor) * minus_t, f"product_{c}")
+            addend = FixedValue(COMPONENT, Mux(at(3), Value.cast(held.p[c]), Value.cast(q[c])))
+            m.d.sync += total.eq(_with_half(addend) - product)
+            m.d.comb += result[c].eq(register(m, rounded, f"normal_{c}"))
+        return result

@@ -1,0 +1,1 @@
+"""Simulation engines: an array of beats in, an array of beats and their cycles out."""

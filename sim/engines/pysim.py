@@ -1,0 +1,157 @@
+"""The interpreted engine: Amaranth's own simulator. Always there, slow, and writes waveforms."""
+
+from collections.abc import Callable
+from contextlib import nullcontext
+
+import numpy as np
+from amaranth.hdl import Value
+from amaranth.lib.wiring import Component
+from amaranth.sim import Simulator
+
+from blysk.sim.engines.beats import word_count
+from blysk.sim.engines.engine import End, Ports, Stimulus, Trace
+
+__all__ = ["Model"]
+
+_BATCH = 1000
+_PERIOD = 1e-8
+
+
+def _codes(words: np.ndarray) -> list[int]:
+    """One integer a beat; the engine's own integers have no width."""
+    return [int.from_bytes(row.tobytes(), "little") for row in words.astype("<u4")]
+
+
+def _words(codes: list[int], width: int) -> np.ndarray:
+    raw = b"".join(code.to_bytes(4 * width, "little") for code in codes)
+    return np.frombuffer(raw, dtype="<u4").astype(np.uint32).reshape(len(codes), width)
+
+
+class Model:
+    """A component for Amaranth's simulator.
+
+    Parameters
+    ----------
+    component : Component
+        Component to be simulated.
+    vcd : str, optional
+        File for the waveforms of each run.
+    """
+
+    def __init__(self, component: Component, vcd: str | None = None):
+        self.component = component
+        self.ports = Ports(component)
+        self.vcd = vcd
+
+    def run(self, stimulus: Stimulus, progress: Callable[[int], object] | None = None) -> Trace:
+        """Drive a stimulus from power-up; see `engine.Model`."""
+        result: list[Trace] = []
+
+        async def bench(ctx):
+            result.append(await self._drive(ctx, stimulus, progress))
+
+        simulator = Simulator(self.component)
+        try:
+            simulator.add_clock(_PERIOD)
+        except NameError:
+            raise ValueError(
+                f"{type(self.component).__name__} has nothing in the clock domain sync"
+            ) from None
+        simulator.add_testbench(bench)
+        with simulator.write_vcd(self.vcd) if self.vcd else nullcontext():
+            simulator.run()
+        return result[0]
+
+    async def _drive(self, ctx, stimulus: Stimulus, progress) -> Trace:
+        component, ports = self.component, self.ports
+        # Raw bits, whatever the payload's shape.
+        input_payload = Value.cast(component.i.payload).as_unsigned()
+        output_payload = Value.cast(component.o.payload).as_unsigned()
+        inputs, writes = _codes(stimulus.input), _codes(stimulus.write)
+        input_stalls, output_stalls = stimulus.input_stalls.tolist(), stimulus.output_stalls.tolist()
+        count = stimulus.count
+        if stimulus.constants.size:
+            ctx.set(Value.cast(component.constants).as_unsigned(), _codes(stimulus.constants)[0])
+        if ports.write is not None:
+            write_payload = Value.cast(component.write.payload).as_unsigned()
+            ctx.set(write_payload, -1)
+
+        output: list[int] = []
+        clocks: list[int] = []
+        input_clocks: list[int] = []
+        written, offered, held = 0, False, None
+        clock, last, end = 0, -1, End.LIMIT
+        ctx.set(input_payload, -1)
+        while clock != stimulus.limit:
+            complete = count is not None and len(input_clocks) == len(inputs) and len(output) == count
+            if complete and written == len(writes) and clock - last > stimulus.settle:
+                end = End.DONE
+                break
+            if clock - last > stimulus.patience:
+                end = End.DONE if count is None and len(input_clocks) == len(inputs) else End.STUCK
+                break
+
+            writing = written < len(writes)
+            if writing:
+                ctx.set(component.write.valid, 1)
+                ctx.set(write_payload, writes[written])
+            elif (
+                not offered
+                and len(input_clocks) < len(inputs)
+                and not input_stalls[clock % len(input_stalls)]
+            ):
+                offered = True
+                ctx.set(component.i.valid, 1)
+                ctx.set(input_payload, inputs[len(input_clocks)])
+            ready = not output_stalls[clock % len(output_stalls)]
+            ctx.set(component.o.ready, ready)
+
+            valid = ctx.get(component.o.valid)
+            payload = ctx.get(output_payload) if valid else None
+            if held is not None and payload != held:
+                end = End.CHANGED if valid else End.DROPPED
+                break
+            if valid and len(output) == count:
+                end = End.EXTRA
+                break
+            held = payload if valid and not ready else None
+            write_moves = writing and ctx.get(component.write.ready)
+            input_moves = offered and ctx.get(component.i.ready)
+            if valid and ready:
+                output.append(payload)
+                clocks.append(clock)
+                last = clock
+            if write_moves:
+                written += 1
+                last = clock
+            if input_moves:
+                input_clocks.append(clock)
+                offered = False
+                last = clock
+
+            await ctx.tick()
+            clock += 1
+            if write_moves and written == len(writes):
+                ctx.set(component.write.valid, 0)
+                ctx.set(write_payload, -1)
+            if input_moves:
+                ctx.set(component.i.valid, 0)
+                ctx.set(input_payload, -1)
+            if progress and clock % _BATCH == 0:
+                progress(len(output))
+
+        status = np.zeros((1, 0), dtype=np.uint32)
+        if ports.status is not None:
+            whole = end in (End.DONE, End.LIMIT)
+            code = ctx.get(Value.cast(component.status).as_unsigned()) if whole else 0
+            status = _words([code], word_count(ports.status))
+        return Trace(
+            end=end,
+            clock=clock,
+            total_clocks=last + 1,
+            write_count=written,
+            output=_words(output, word_count(ports.o)),
+            clocks=np.array(clocks, dtype=np.int64),
+            input_clocks=np.array(input_clocks, dtype=np.int64),
+            status=status,
+        )

@@ -1,0 +1,228 @@
+"""Send beats through a component, by either engine, and collect what comes out."""
+
+import operator
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from warnings import warn
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from amaranth.lib.wiring import Component
+
+from blysk.sim.engines import cxxrtl, pysim
+from blysk.sim.engines.beats import dtype_of, pack, unpack
+from blysk.sim.engines.engine import CompilerMissing, End, Model, Ports, SimulationError, Stimulus, Trace
+
+__all__ = ["Run", "simulate"]
+
+_PIECE = 1 << 15
+"""Beats unpacked at once."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came out of a simulation.
+
+    Parameters
+    ----------
+    beats : array, shape (count,)
+        Output beats, of type ``dtype_of(payload shape)``.
+    clocks : int64 array, shape (count,)
+        Clock at whose end each output beat was taken; clock 0 is the first after power-up.
+    input_clocks : int64 array, shape (input beats,)
+        The same of each input beat.
+    total_clocks : int
+        Clocks from clock 0 up to and with the last transfer (of an input, an output or a write).
+    status : scalar of the status layout's type, or None
+        The component's ``status`` at the end of the run.
+    engine : str
+        ``"cxxrtl"`` or ``"pysim"``.
+    """
+
+    beats: np.ndarray
+    clocks: np.ndarray
+    input_clocks: np.ndarray
+    total_clocks: int
+    status: np.generic | None
+    engine: str
+
+
+_models: WeakKeyDictionary[Component, Model] = WeakKeyDictionary()
+
+
+def _compiled(component: Component) -> Model:
+    if component not in _models:
+        _models[component] = cxxrtl.Model(component)
+    return _models[component]
+
+
+def _interpreted(component: Component, vcd: str | None) -> Model:
+    return pysim.Model(component, vcd)
+
+
+def _pattern(name: str, stalls) -> np.ndarray:
+    if stalls is None:
+        return np.zeros(1, dtype=bool)
+    stalls = np.ascontiguousarray(stalls)
+    if stalls.dtype != bool or stalls.ndim != 1:
+        raise ValueError(f"{name} must be a bool array of one dimension, not {stalls.dtype} {stalls.shape}")
+    if stalls.all():
+        raise ValueError(f"{name} must leave at least one clock free")
+    return stalls
+
+
+def _whole(name: str, value, least: int) -> int:
+    value = operator.index(value)
+    if value < least:
+        raise ValueError(f"{name} must be at least {least}, not {value}")
+    return value
+
+
+def _single(beat):
+    if isinstance(beat, Mapping):
+        return {name: _single(value) for name, value in beat.items()}
+    return np.asarray(beat)[np.newaxis]
+
+
+def _constants(shape, constants) -> np.ndarray:
+    if shape is None and constants is not None:
+        raise ValueError("the component has no constants")
+    if shape is not None and constants is None:
+        raise ValueError("the component has constants, and none are given")
+    return np.zeros((0, 0), dtype=np.uint32) if shape is None else pack(shape, _single(constants))
+
+
+def _writes(shape, write) -> np.ndarray:
+    if shape is None and write is not None:
+        raise ValueError("the component has no stream write")
+    return np.zeros((0, 0), dtype=np.uint32) if write is None else pack(shape, write)
+
+
+def simulate(
+    component: Component,
+    beats: np.ndarray | Mapping,
+    *,
+    count: int | None,
+    constants: np.ndarray | Mapping | None = None,
+    write: np.ndarray | Mapping | None = None,
+    engine: str = "cxxrtl",
+    input_stalls: np.ndarray | None = None,
+    output_stalls: np.ndarray | None = None,
+    patience: int = 10_000,
+    settle: int = 64,
+    progress: Callable[[int], object] | None = None,
+    vcd: str | None = None,
+) -> Run:
+    """Send beats through a component, and collect what comes out.
+
+    A compiled model is kept with its component (and, between processes, in the cache folder), so that the
+    second run of the same component starts at once.
+
+    Parameters
+    ----------
+    component : Component
+        Component with the members named in the text of `engine`.
+    beats : structured array or mapping
+        Input beats, as `beats.pack` takes them.
+    count : int or None
+        Output beats expected: the run ends when they and all input beats have moved and ``settle`` more
+        clocks have passed. ``None`` takes as many as come, until all input is taken and nothing has moved
+        for ``patience`` clocks.
+    constants : scalar of the constants' type, or mapping of names to codes
+        Driven for the whole run; needed when the component has ``constants``.
+    write : structured array or mapping, optional
+        Beats for the ``write`` stream, delivered before the first input beat.
+    engine : str
+        ``"cxxrtl"``, ``"pysim"``, or ``"auto"``: the compiled engine or, with a warning that says why, pysim
+        where no compiler works.
+    input_stalls, output_stalls : bool array, optional
+        Repeated for ever; ``True`` on a clock keeps the source from offering a new beat, or the sink from
+        being ready.
+    patience : int
+        Clocks without a transfer after which the component counts as stuck.
+    settle : int
+        Clocks to watch for a beat too many.
+    progress : callable, optional
+        Called with the number of output beats so far, between batches.
+    vcd : str, optional
+        File for the waveforms; ``pysim`` only.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    SimulationError
+        If the component withdraws or changes a beat that waits, gives a beat too many, or gets stuck; the
+        clock is named. If the engines disagree on the first clocks of a newly built model.
+    CompilerMissing
+        If there is no working C++ compiler for ``"cxxrtl"``.
+    ValueError, TypeError
+        If the component's members or an argument do not fit.
+    """
+    if engine not in ("cxxrtl", "pysim", "auto"):
+        raise ValueError(f"engine must be 'cxxrtl', 'pysim' or 'auto', not {engine!r}")
+    if vcd is not None and engine != "pysim":
+        raise ValueError(f"waveforms need engine 'pysim', not {engine!r}")
+    ports = Ports(component)
+    stimulus = Stimulus(
+        input=pack(ports.i, beats),
+        write=_writes(ports.write, write),
+        constants=_constants(ports.constants, constants),
+        input_stalls=_pattern("input_stalls", input_stalls),
+        output_stalls=_pattern("output_stalls", output_stalls),
+        count=None if count is None else _whole("count", count, 0),
+        patience=_whole("patience", patience, 1),
+        settle=_whole("settle", settle, 0),
+    )
+    model: Model
+    if engine == "pysim":
+        model = _interpreted(component, vcd)
+    else:
+        try:
+            model = _compiled(component)
+            engine = "cxxrtl"
+        except CompilerMissing as error:
+            if engine == "cxxrtl":
+                raise
+            warn(f"{error}; using pysim, some hundred times slower", RuntimeWarning, stacklevel=2)
+            model, engine = _interpreted(component, vcd), "pysim"
+    trace = model.run(stimulus, progress)
+    _judge(stimulus, trace)
+    return Run(
+        beats=_unpacked(ports.o, trace.output),
+        clocks=trace.clocks,
+        input_clocks=trace.input_clocks,
+        total_clocks=trace.total_clocks,
+        status=None if ports.status is None else unpack(ports.status, trace.status)[0],
+        engine=engine,
+    )
+
+
+def _unpacked(shape, words: np.ndarray) -> np.ndarray:
+    """`beats.unpack`, in pieces whose intermediate words stay in the processor's cache."""
+    beats = np.empty(len(words), dtype=dtype_of(shape))
+    for start in range(0, len(words), _PIECE):
+        piece = words[start : start + _PIECE]
+        beats[start : start + len(piece)] = unpack(shape, piece)
+    return beats
+
+
+def _judge(stimulus: Stimulus, trace: Trace) -> None:
+    """Raise `SimulationError` unless the run is complete."""
+    where = f"at clock {trace.clock}, output beat {len(trace.output)}"
+    if trace.end == End.DROPPED:
+        raise SimulationError(f"{where}: valid went low while the beat waited for ready")
+    if trace.end == End.CHANGED:
+        raise SimulationError(f"{where}: the payload changed while the beat waited for ready")
+    if trace.end == End.EXTRA:
+        raise SimulationError(f"{where}: a beat more than the {stimulus.count} expected")
+    if trace.end == End.STUCK:
+        expected = "" if stimulus.count is None else f" of {stimulus.count}"
+        raise SimulationError(
+            f"nothing moved for {stimulus.patience} clocks up to clock {trace.clock}: "
+            f"{len(trace.output)}{expected} output beats came, "
+            f"{len(trace.input_clocks)} of {len(stimulus.input)} input beats and "
+            f"{trace.write_count} of {len(stimulus.write)} writes were taken"
+        )

@@ -1,0 +1,178 @@
+"""Switching activity: how many register bits change, by submodule, while a component runs."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from amaranth.hdl import Cat, Const, Elaboratable, Fragment, Module, Signal, Value
+from amaranth.lib import data
+from amaranth.lib.wiring import Component, Out
+
+from blysk.sim.engines.simulate import Run, simulate
+
+__all__ = ["ToggleCounter", "count_toggles"]
+
+_BITS = 48
+_WORD = 32
+
+
+class ToggleCounter(Component):
+    """A component with a counter beside each of its submodules: register bits that have changed since reset.
+
+    Counted are registers and the words that memories give on a clock, each bit on each clock on which it
+    differs from the clock before; not the bits inside a memory, and no wires. A change is in the count two
+    clocks later. Counters have 48 bits: 2^48 toggles are more than 1000 registers of 18 bits make in
+    10^10 clocks.
+
+    Parameters
+    ----------
+    component : Component
+        Component to be watched.
+
+    Members
+    -------
+    i, o, constants, write
+        Those of the component.
+    status : :py:`Out(StructLayout({path: 48, ...}))`
+        Counts, by the submodules' names with dots between; ``top`` for the component's own registers.
+    """
+
+    def __init__(self, component: Component):
+        self._component = component
+        members = {name: member for name, member in component.signature.members.items() if name != "status"}
+        paths = _registers(Fragment.get(component, None))
+        counts = data.StructLayout(dict.fromkeys(paths, _BITS))
+        super().__init__(members | {"status": Out(counts)})
+
+    def elaborate(self, platform):
+        """The component, what its registers were, and sums."""
+        m = Module()
+        # Elaborated here, so that it is known which signals are registers.
+        m.submodules.component = fragment = Fragment.get(self._component, platform)
+        for name in self.signature.members:
+            inner, outer = getattr(self._component, name, None), getattr(self, name)
+            if name == "status":
+                continue
+            if hasattr(outer, "payload"):
+                source, sink = (inner, outer) if name == "o" else (outer, inner)
+                m.d.comb += [
+                    Value.cast(sink.payload).eq(Value.cast(source.payload)),
+                    sink.valid.eq(source.valid),
+                    source.ready.eq(sink.ready),
+                ]
+            else:
+                m.d.comb += Value.cast(inner).eq(Value.cast(outer))
+        # Registers that stay: with a constant, a conjunction is put together from single bits, and takes
+        # minutes to compile.
+        masks = [Signal(_WORD, init=mask, name=f"mask_{step}") for step, mask in enumerate(_Ones.MASKS)]
+        m.d.sync += [mask.eq(mask) for mask in masks]
+        for number, (path, registers) in enumerate(_registers(fragment).items()):
+            counts = [_Ones(*word, masks) for word in _words(registers)]
+            for index, count in enumerate(counts):
+                m.submodules[f"ones_{number}_{index}"] = count
+            total = Signal(_BITS, name="total")
+            m.d.sync += total.eq(total + _total(counts))
+            m.d.comb += self.status[path].eq(total)
+        return m
+
+
+def count_toggles(
+    component: Component, beats: np.ndarray | Mapping, *, engine: str = "pysim", **options: Any
+) -> tuple[Run, dict[str, int]]:
+    """Run a component, and count the toggled bits of its registers.
+
+    Parameters
+    ----------
+    component : Component
+        As for `simulate`.
+    beats, **options
+        Those of `simulate`.
+    engine : str
+        As for `simulate`. With the sums a component takes the compiled engine three times as long to build,
+        a pipeline half a minute; the interpreted one is done before with some hundred clocks.
+
+    Returns
+    -------
+    run : Run
+        What `simulate` gives, but for the status.
+    toggles : dict of str to int
+        Toggled bits of each submodule, without those inside it: "top", "datapath", "light_0.specular", ...
+    """
+    counter = ToggleCounter(component)
+    run = simulate(counter, beats, engine=engine, **options)
+    return run, {path: int(run.status[path]) for path in run.status.dtype.names}
+
+
+def _registers(fragment: Fragment, path: str = "top") -> dict[str, list[Value]]:
+    """What a fragment and those inside drive on a clock, by path."""
+    registers: list[Value] = []
+    for domain, statements in fragment.statements.items():
+        if domain != "comb":
+            registers += statements._lhs_signals()
+    for port in getattr(fragment, "_read_ports", ()):
+        if port._domain != "comb":
+            registers.append(port._data)
+    found = {path: registers} if registers else {}
+    for index, (inner, name, *_) in enumerate(fragment.subfragments):
+        name = name or f"unnamed_{index}"
+        found |= _registers(inner, name if path == "top" else f"{path}.{name}")
+    return found
+
+
+def _init(register: Value) -> int:
+    return Const(getattr(register, "init", 0), len(register)).value
+
+
+def _words(registers: Sequence[Value]) -> Iterator[tuple[Value, int]]:
+    """Bits of the registers, 32 together, and what they are after reset.
+
+    An engine computes with such words at once; a word of all bits would take minutes to compile.
+    """
+    parts, initial, width = [], 0, 0
+    for register in registers:
+        start, init = 0, _init(register)
+        while start < len(register):
+            part = register[start : start + _WORD - width]
+            parts.append(part)
+            initial |= (init >> start & (1 << len(part)) - 1) << width
+            start, width = start + len(part), width + len(part)
+            if width == _WORD:
+                yield Cat(parts), initial
+                parts, initial, width = [], 0, 0
+    if parts:
+        yield Cat(parts), initial
+
+
+class _Ones(Elaboratable):
+    """Bits of a word that are not what they were a clock before: how many of each byte, in that byte.
+
+    A module of its own, of which an engine that looks for changes has little to do again.
+    """
+
+    # Neighbours are added up in fields of 1, 2 and 4 bits.
+    MASKS = tuple(((1 << _WORD) - 1) // ((1 << 2 * field) - 1) * ((1 << field) - 1) for field in (1, 2, 4))
+
+    def __init__(self, now: Value, init: int, masks: Sequence[Value]):
+        self._now, self._init, self._masks = now, init, masks
+        self.bytes = Signal(_WORD)
+
+    def elaborate(self, platform):
+        m = Module()
+        before = Signal(len(self._now), init=self._init)
+        m.d.sync += before.eq(self._now)
+        ones = self._now ^ before
+        for step, mask in enumerate(self._masks):
+            fields = Signal(_WORD, name=f"fields_{step}")
+            m.d.comb += fields.eq((ones & mask) + ((ones >> (1 << step)) & mask))
+            ones = fields
+        m.d.comb += self.bytes.eq(ones)
+        return m
+
+
+def _total(counts: Sequence[_Ones]) -> Value:
+    """Sum of the bytes. One holds 8 at most: those of 31 words add up to less than 256."""
+    total = Const(0)
+    for start in range(0, len(counts), 31):
+        bytes_ = sum((count.bytes for count in counts[start : start + 31]), Const(0, _WORD))[:_WORD]
+        total = total + sum((bytes_.word_select(k, 8) for k in range(_WORD // 8)), Const(0))
+    return total

@@ -1,0 +1,1 @@
+"""Frames: a scene through the simulated pipeline."""

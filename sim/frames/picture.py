@@ -1,0 +1,171 @@
+"""Frames as picture files, and a simulated frame beside its golden one."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from blysk.sim.errors import InputError
+from blysk.sim.output import atomic_writer, check_writable
+
+__all__ = ["check_image_path", "write_comparison", "write_image"]
+
+_COMMON = ".png, .jpg, .bmp, .ppm, .tiff or .webp"
+
+
+def check_image_path(path: str | os.PathLike) -> None:
+    """Check, before long work, that a picture can be written to a file; writes nothing.
+
+    Raises
+    ------
+    InputError
+        If the suffix names no picture format, or the file cannot be written (see `check_writable`).
+    """
+    _picture_format(path)
+    check_writable(path)
+
+
+def _picture_format(path: str | os.PathLike) -> str:
+    suffix = Path(path).suffix.lower()
+    name = Image.registered_extensions().get(suffix)
+    if name not in Image.SAVE:
+        reason = f"the suffix {suffix} is no picture format" if suffix else "the name has no suffix"
+        raise InputError(str(path), reason, f"use {_COMMON}")
+    return name
+
+
+def write_image(path: str | os.PathLike, image: np.ndarray) -> None:
+    """Write a frame as a picture; the suffix chooses the format. The file is whole or not there at all.
+
+    PNG, BMP, PPM and TIFF keep every pixel to the bit.
+
+    Parameters
+    ----------
+    path : path
+        The output file, with a suffix that Pillow can write.
+    image : uint8 array, shape (height, width, 3)
+        Red, green, blue; row 0 is at the top.
+
+    Raises
+    ------
+    InputError
+        If the suffix names no picture format, or the file cannot be written.
+    ValueError
+        If the image has another shape or type.
+    """
+    _check_frame(image)
+    name = _picture_format(path)
+    with atomic_writer(path) as temporary:
+        Image.fromarray(image).save(temporary, format=name)
+
+
+def write_comparison(
+    path: str | os.PathLike, simulated: np.ndarray, golden: np.ndarray, *, title: str, subtitle: str = ""
+) -> None:
+    """Write one picture of three panels: simulated frame, golden frame, and error map with its scale.
+
+    The error of a pixel is the largest of its three channels' ``|simulated - 255 golden|``, in units of the
+    last place (LSB) of the 8-bit channel. The golden frame is not rounded for it, so half an LSB is what
+    rounding alone costs. The golden panel shows ``round(255 golden)``. The scale of the map goes from 0 to
+    the largest error, or to 1 LSB if that is less.
+
+    The panels show the frames pixel for pixel, from 1 x 1 to 4095 x 4095 and beyond. The text grows with
+    the frame's width, from 14 to 96 pixels; the margins widen where a small frame or a long title needs
+    it. The picture of a frame of 4095 x 4095 is 12,700 pixels wide.
+
+    Parameters
+    ----------
+    path : path
+        The output file, with a suffix that Pillow can write.
+    simulated : uint8 array, shape (height, width, 3)
+        Frame of the simulated hardware.
+    golden : float64 array, shape (height, width, 3)
+        Frame of the golden renderer, in [0, 1].
+    title, subtitle : str
+        One line each, above the panels.
+
+    Raises
+    ------
+    InputError
+        If the suffix names no picture format, or the file cannot be written.
+    ValueError
+        If a frame has another shape or type, or ``golden`` leaves [0, 1].
+    """
+    _check_frame(simulated)
+    if golden.shape != simulated.shape or golden.dtype != np.float64:
+        raise ValueError(
+            f"golden must be float64 of shape {simulated.shape}, not {golden.dtype} of shape {golden.shape}"
+        )
+    if not (golden.min() >= 0 and golden.max() <= 1):
+        raise ValueError("golden must be in [0, 1]")
+    check_image_path(path)
+
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+
+    height, width, _ = simulated.shape
+    error = np.zeros((height, width))
+    rounded = np.empty_like(simulated)
+    for channel in range(3):  # one channel at a time: a third of the memory
+        exact = 255 * golden[..., channel]
+        rounded[..., channel] = np.rint(exact)
+        np.maximum(error, np.abs(simulated[..., channel] - exact), out=error)
+    largest = max(1.0, error.max())
+    color_map = matplotlib.colormaps["inferno"]
+    colors = (color_map(np.arange(256))[:, :3] * 255).round().astype(np.uint8)
+    panels = {
+        "simulated": simulated,
+        "golden": rounded,
+        f"error: largest {error.max():.2f}, mean {error.mean():.3f} LSB": colors[
+            np.rint(error * (255 / largest)).astype(np.uint8)
+        ],
+    }
+
+    text = int(np.clip(width / 40, 14, 96))
+    column = max(width, 22 * text)
+    total_width = max(3 * column + 4 * text, int(0.65 * 1.3 * text * max(len(title), len(subtitle))))
+    left = [(total_width - 3 * column - 2 * text) // 2 + k * (column + text) for k in range(3)]
+    above, below = 7 * text, 5 * text
+    # The figure holds what stands above and below the panels, which are put in between untouched. At 72 dots
+    # an inch, a point is a pixel; the half pixel keeps the size from being rounded down.
+    figure = Figure(figsize=((total_width + 0.5) / 72, (above + below + 0.5) / 72), dpi=72)
+    canvas = FigureCanvasAgg(figure)
+
+    def place(x: float, y: float, content: str, **options):
+        figure.text(
+            x / total_width, 1 - y / (above + below), content, parse_math=False, ha="center", **options
+        )
+
+    place(total_width / 2, 2.2 * text, title, fontsize=1.3 * text, weight="bold")
+    place(total_width / 2, 4 * text, subtitle, fontsize=text)
+    for x, label in zip(left, panels, strict=True):
+        place(x + column / 2, above - 0.6 * text, label, fontsize=text)
+    bar = figure.add_axes(
+        [left[2] / total_width, 3.4 * text / (above + below), column / total_width, text / (above + below)]
+    )
+    scale = figure.colorbar(
+        ScalarMappable(Normalize(0, largest), color_map), cax=bar, orientation="horizontal"
+    )
+    scale.ax.tick_params(labelsize=text, length=text / 3, width=text / 14, pad=text / 5)
+    scale.set_label("largest channel error, LSB of 8 bits", fontsize=text)
+    canvas.draw()
+    around = np.asarray(canvas.buffer_rgba())[..., :3]
+
+    picture = np.full((above + height + below, total_width, 3), 255, dtype=np.uint8)
+    picture[:above] = around[:above]
+    picture[above + height :] = around[above:]
+    for x, panel in zip(left, panels.values(), strict=True):
+        x += (column - width) // 2
+        picture[above : above + height, x : x + width] = panel
+    write_image(path, picture)
+
+
+def _check_frame(image: np.ndarray) -> None:
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
+        raise ValueError(
+            f"a frame must be uint8 of shape (height, width, 3), not {image.dtype} of shape {image.shape}"
+        )

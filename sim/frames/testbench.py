@@ -1,0 +1,177 @@
+"""A folder that a user takes away with the Verilog: a cocotb bench, and the vectors of a frame."""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+from string import Template
+
+import numpy as np
+
+from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.pipeline import Pixels, ShadingPipeline, Spans
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.scene import Scene
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.errors import InputError
+from blysk.sim.frames.frame import beats_of, prepare
+from blysk.sim.meshes.mesh import load_mesh
+from blysk.sim.output import files_within, write_text
+
+__all__ = ["check_folder", "pixel_beats", "teapot_frame", "vectors", "write_testbench"]
+
+_TEMPLATES = ("run.py", "test_pipeline.py")
+
+_SIZE = 64, 48
+_TRIANGLES = 400
+
+
+def teapot_frame(
+    design: ShadingPipeline, size: tuple[int, int] = _SIZE, triangles: int = _TRIANGLES
+) -> tuple[Spans, list[FrameConstants], Pixels]:
+    """A teapot for a pipeline, with as many lights and materials as it has, and nothing too bright.
+
+    Parameters
+    ----------
+    design : ShadingPipeline
+        The pipeline.
+    size : two ints
+        Width and height of the picture.
+    triangles : int
+        Of the teapot, about.
+
+    Returns
+    -------
+    spans : Spans
+        What goes in. The first is of length 0, and gives no pixel.
+    constants : list of FrameConstants
+        Those of each material.
+    pixels : Pixels
+        What must come out, by the bit-true twin.
+    """
+    mesh = load_mesh("teapot", triangles=triangles).mesh
+    width, height = size
+    materials = [
+        Material((0.08, 0.05, 0.03), np.roll((0.75, 0.42, 0.2), k), (0.6,) * 3, exponent)
+        for k, exponent in enumerate(design.exponent or 20 + k % 100 for k in range(design.materials))
+    ]
+    lights = [
+        Light((np.cos(2 * k + 2), 0.8, np.sin(2 * k + 2)), np.roll((1.0, 0.8, 0.6), k) / design.lights)
+        for k in range(design.lights)
+    ]
+    scene = Scene(
+        mesh=replace(mesh, material=np.arange(len(mesh.faces)) % design.materials),
+        camera=Camera.framing(mesh.vertices, (0.4, 0.5, 1.0), "perspective", width / height),
+        width=width,
+        height=height,
+        material=materials,
+        lights=lights,
+    )
+    spans = prepare(scene, design).spans
+    spans = spans[np.r_[0, : len(spans)]]
+    spans.length[0] = 0
+    constants = [FrameConstants.of(scene, design.lights, index=index) for index in range(design.materials)]
+    return spans, constants, design.compute(spans, constants)
+
+
+def vectors(unit: ShadingPipelineUnit) -> dict[str, dict[str, np.ndarray]]:
+    """What goes into a pipeline for a small frame, and what must come out, by the ports of its Verilog.
+
+    Parameters
+    ----------
+    unit : ShadingPipelineUnit
+        The pipeline.
+
+    Returns
+    -------
+    dict of dict of int arrays
+        Of ``writes``, ``spans``, ``pixels`` and ``status``: a column of codes for each port, all equally
+        long. See `teapot_frame`.
+    """
+    spans, constants, pixels = teapot_frame(unit.parameters)
+    tables = {
+        "writes": ("write", writes_of(constants)),
+        "spans": ("i", beats_of(unit, spans)),
+        "pixels": ("o", pixel_beats(pixels)),
+        "status": ("status", {"wide_spans": [pixels.wide_spans], "empty_spans": [1], "overrun": [0]}),
+    }
+    return {name: dict(_columns(*table)) for name, table in tables.items()}
+
+
+def pixel_beats(pixels: Pixels) -> dict[str, np.ndarray]:
+    """Output beats of a pipeline, as `pack` takes them."""
+    beats = {"x": pixels.x, "y": pixels.y, "last": pixels.last}
+    return beats | dict(zip("rgb", pixels.color.T, strict=True))
+
+
+def _columns(name: str, beats) -> Iterator[tuple[str, np.ndarray]]:
+    """Port and codes of every field of beats; the ports are those of `emit`."""
+    if np.ndim(beats) > 1:
+        parts = ((index, beats[:, index]) for index in range(beats.shape[1]))
+    elif isinstance(beats, Mapping):
+        parts = beats.items()
+    elif names := np.asarray(beats).dtype.names:
+        parts = ((field, beats[field]) for field in names)
+    else:
+        yield name, np.asarray(beats, dtype=np.int64)
+        return
+    for key, part in parts:
+        yield from _columns(f"{name}_{key}", part)
+
+
+def check_folder(folder: str | os.PathLike) -> None:
+    """Check that a bench can be written into a folder; writes nothing.
+
+    Raises
+    ------
+    InputError
+        If there is such a folder and it is not empty, or it cannot be made or written.
+    """
+    if names := files_within(folder, _TEMPLATES[0]):
+        raise InputError(str(folder), f"holds {names[0]} already", "give a new or empty folder")
+
+
+def write_testbench(
+    folder: str | os.PathLike, unit: ShadingPipelineUnit, name: str, text: str, about: Sequence[str]
+) -> None:
+    """Write a bench, its vectors and the Verilog into a folder. Each file is whole or not there.
+
+    Parameters
+    ----------
+    folder : path
+        New or empty, see `check_folder`.
+    unit : ShadingPipelineUnit
+        The pipeline.
+    name, text : str
+        Its top module, and its Verilog.
+    about : sequence of str
+        Lines that say what it is.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
+    """
+    folder = Path(folder)
+    check_folder(folder)
+    tables = vectors(unit)
+    counts = {table: len(next(iter(columns.values()))) for table, columns in tables.items()}
+    templates = resources.files(__package__) / "templates"
+    readme = Template((templates / "README.md").read_text(encoding="utf-8"))
+    width, height = _SIZE
+    files = {f"{name}.v": text}
+    files |= {name: (templates / name).read_text(encoding="utf-8") for name in _TEMPLATES}
+    files |= {f"vectors/{table}.csv": _csv(columns) for table, columns in tables.items()}
+    files["README.md"] = readme.substitute(
+        counts, file=f"{name}.v", about="\n".join(f"- {line}" for line in about), width=width, height=height
+    )
+    (folder / "vectors").mkdir(parents=True, exist_ok=True)
+    for path, content in files.items():
+        write_text(folder / path, content)
+
+
+def _csv(columns: Mapping[str, np.ndarray]) -> str:
+    rows = np.column_stack(list(columns.values())).tolist()
+    return "\n".join(",".join(map(str, row)) for row in [list(columns), *rows]) + "\n"

@@ -1,0 +1,1 @@
+"""Meshes: the files of the world, and the teapot's patches."""

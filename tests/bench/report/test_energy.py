@@ -1,0 +1,104 @@
+# amaranth: UnusedElaboratable=no
+"""Toggled register bits by block: every register in one of them, and what the section makes of the counts."""
+
+import pytest
+
+from blysk.bench.report.energy import BLOCKS, EXPONENTS, by_block, measure, section, tasks
+from blysk.bench.report.gate import MODELS
+from blysk.bench.report.section import Drawing, Table
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.engines.toggles import ToggleCounter
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_register_is_in_a_block(model):
+    """Of the real pipeline, with a gate and without; the gate's are those that it has more."""
+    found = {}
+    for gate in (False, True):
+        unit = ToggleCounter(ShadingPipelineUnit(ShadingPipeline("chord", model, gate=gate)))
+        found[gate] = by_block(dict.fromkeys(unit.status.shape().members, 1))
+        assert set(found[gate]) == set(BLOCKS)
+        assert all(count or (block == "highlight gate" and not gate) for block, count in found[gate].items())
+        assert sum(found[gate].values()) == len(unit.status.shape().members)
+    assert found[False] | {"highlight gate": found[True]["highlight gate"]} == found[True]
+
+
+def test_inner_submodules_count():
+    toggles = {
+        "top": 1,
+        "light_0.specular": 2,
+        "light_0.specular.datapath": 4,
+        "light_0.diffuse": 8,
+        "interpolator.chord_setup.datapath.reciprocals": 16,
+        "interpolator.chord_accumulator": 32,
+        "something": 64,
+    }
+    found = by_block(toggles)
+    assert {block: count for block, count in found.items() if count} == {
+        "admission": 1,
+        "specular": 6,
+        "diffuse": 8,
+        "setup of spans": 16,
+        "sums of pixels": 32,
+        "others": 64,
+    }
+
+
+def test_counts_of_a_small_frame():
+    """The pixels are the twin's, and every block has something to do."""
+    [found] = measure("cosquad", True, [50], [20, 15, 64], "pysim")
+    assert found["same"]
+    assert 20 < found["spans"] <= found["pixels"] < found["clocks"]
+    assert all(by_block(found["toggles"]).values())
+
+
+@pytest.mark.long
+def test_the_gate_spares_the_specular_unit():
+    off, on = (measure("cosquad", gate, [2, 1000], [64, 48, 64], "auto") for gate in (False, True))
+    for without, gated in zip(off, on, strict=True):
+        assert without["same"]
+        assert gated["same"]
+        assert without["pixels"] == gated["pixels"]
+        assert by_block(without["toggles"])["highlight gate"] == 0
+    specular = [by_block(of["toggles"])["specular"] for of in (*off, *on)]
+    # Small highlights leave more spans without one.
+    assert specular[3] / specular[1] < specular[2] / specular[0] <= 1
+
+
+def frame(same=True, **toggles):
+    return {"spans": 10, "pixels": 20, "clocks": 40, "toggles": toggles, "same": same}
+
+
+def test_section():
+    quick = tasks(quick=True)
+    off, on = frame(intensity=300, slope=100), frame(intensity=280, slope=100, highlight_gate=40)
+    made = section(quick, [[off], [on]])
+    assert made.name == "energy"
+    [table] = (part for part in made.parts if isinstance(part, Table))
+    assert [part.name for part in made.parts if isinstance(part, Drawing)] == ["energy-blocks"]
+    first, second = table.records()
+    assert (first["gate"], second["gate"]) == ("off", "on")
+    assert (first["intensity, bits a pixel"], first["pipeline, bits a pixel"]) == (15, 20)
+    assert second["highlight gate, bits a pixel"] == 2
+    assert (first["saved, share"], second["saved, share"]) == (None, pytest.approx(-0.05))
+    assert [row[-1] for row in table.grades] == ["", "fair"]
+    text = " ".join(made.text)
+    assert "*intensity*: 75% of all with `cosquad` at exponent 50" in text
+    assert "changes by +5.0% (`cosquad`, exponent 50). " in text
+    assert "these have 2.0 pixels" in text
+    assert "Not counted" in text
+    assert "void" not in text
+    assert "void" in " ".join(section(quick, [[frame(False, top=1)], [on]]).text)
+
+
+def test_tasks():
+    full = tasks(quick=False)
+    assert [(task.settings["model"], task.settings["gate"]) for task in full] == [
+        (model, gate) for model in MODELS for gate in (False, True)
+    ]
+    assert all(task.settings["exponents"] == list(EXPONENTS) for task in full)
+    results = [[frame(top=10), frame(top=20), frame(top=40 - 20 * task.settings["gate"])] for task in full]
+    made = section(full, results)
+    assert len(made.parts[0].rows) == 2 * len(MODELS) * len(EXPONENTS)
+    assert "changes by -50.0% (`cosquad`, exponent 1000) to +0.0% (`cosquad`, exponent 2)" in made.text[1]

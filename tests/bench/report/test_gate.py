@@ -1,0 +1,241 @@
+# amaranth: UnusedElaboratable=no
+"""The gate table: shares against counts made pixel by pixel, frames and clocks of both pipelines, output."""
+
+import dataclasses
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from blysk.bench.accuracy import scene_for
+from blysk.bench.report import gate
+from blysk.bench.report.gate import (
+    Activity,
+    GateRow,
+    GateUnits,
+    Shares,
+    activity_of,
+    frames,
+    main,
+    same_pixels,
+    shares_of,
+)
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.engines.toggles import ToggleCounter
+from blysk.sim.frames.frame import prepare
+from blysk.sim.meshes.teapot import teapot
+
+
+def frame(design, triangles, exponent, width, height):
+    scene = scene_for(teapot(triangles), exponent, width, height)
+    return prepare(scene, design).spans, FrameConstants.of(scene, 1)
+
+
+def dark_pixels(design, spans, constants, term):
+    """Pixels that a term leaves black, in a picture that shows every step of it.
+
+    Ambient light is 1/64 below what is rounded up. A step of a term, 2^-17, times the largest colour operand,
+    2048 - 1/64, is just under that; so there are two equal lights.
+    """
+    full, black = np.full((2, 3), 2**17 - 1), np.zeros((2, 3), dtype=np.int64)
+    vectors = {name: np.repeat(getattr(constants, name), 2, axis=0) for name in ("direction", "halfway")}
+    colors = {"ambient": np.full(3, 31), "diffuse": black, "specular": black, term: full}
+    pixels = dataclasses.replace(design, lights=2).compute(
+        spans, dataclasses.replace(constants, **vectors, **colors)
+    )
+    return ~pixels.color.any(axis=1)
+
+
+@pytest.mark.parametrize(("model", "exponent"), [("cosquad", 20), ("coscos4", 200), ("blinn", 50)])
+def test_shares_are_those_of_the_pixels(model, exponent):
+    """Counted in pictures of the terms alone, span by span."""
+    design = ShadingPipeline("chord", model)
+    spans, constants = frame(design, 1000, exponent, 160, 120)
+    dark = dark_pixels(design, spans, constants, "specular")
+    behind = dark_pixels(design, spans, constants, "diffuse")
+    lit = design.lit_spans(spans, constants)[:, 0]
+    ends = np.cumsum(spans.length)
+    expected = dict.fromkeys(("gated_spans", "gated_pixels", "dark_spans", "dark_span_pixels"), 0)
+    for end, length, let_through in zip(ends, spans.length, lit, strict=True):
+        all_dark = dark[end - length : end].all()
+        assert all_dark or let_through
+        if not let_through:
+            expected["gated_spans"] += 1
+            expected["gated_pixels"] += length
+        if all_dark:
+            expected["dark_spans"] += 1
+            expected["dark_span_pixels"] += length
+    assert shares_of(design, spans, constants) == Shares(
+        spans=len(spans),
+        pixels=ends[-1],
+        dark_pixels=np.count_nonzero(dark),
+        behind_pixels=np.count_nonzero(behind),
+        **expected,
+    )
+    assert 0 < expected["gated_pixels"] < np.count_nonzero(dark) < ends[-1]
+
+
+def test_empty_spans_do_not_count():
+    design = ShadingPipeline("chord")
+    spans, constants = frame(design, 300, 50, 40, 30)
+    fields = {name: getattr(spans, name) for name in ("x", "y", "length", "normal_left", "normal_right")}
+    longer = Spans(**{name: np.repeat(codes, 2, axis=0) for name, codes in fields.items()})
+    longer.length[1::2] = 0
+    assert shares_of(design, longer, constants) == shares_of(design, spans, constants)
+    nothing = Spans(**{name: codes[:0] for name, codes in fields.items()})
+    assert shares_of(design, nothing, constants) == Shares(*[0] * 8)
+
+
+def test_gate_saves_clocks_of_the_compact_style_and_no_pixel_changes():
+    """Blinn's power takes 42 clocks a pixel: a gated pixel takes 3, one a channel of its diffuse term."""
+    off, on = (ShadingPipeline("chord", "blinn", gate=gate) for gate in (False, True))
+    spans, constants = frame(off, 300, 200, 10, 8)
+    expected = off.compute(spans, constants)
+    runs = frames(
+        [ShadingPipelineUnit(design, style="compact") for design in (off, on)], spans, constants, "pysim"
+    )
+    assert all(same_pixels(run, expected) for run in runs)
+    shares = shares_of(off, spans, constants)
+    assert runs[0].total_clocks > 42 * (shares.pixels - shares.behind_pixels)
+    assert runs[1].total_clocks < runs[0].total_clocks
+
+
+def test_a_pixel_that_differs_is_found():
+    design = ShadingPipeline("chord")
+    pixels = design.compute(*frame(design, 300, 50, 40, 30))
+    names = ("x", "y", "r", "g", "b", "last")
+    beats = np.zeros(len(pixels.x), [(name, np.int64) for name in names])
+    for name, codes in zip(names, (pixels.x, pixels.y, *pixels.color.T, pixels.last), strict=True):
+        beats[name] = codes
+    assert same_pixels(SimpleNamespace(beats=beats), pixels)
+    for name in names:
+        wrong = beats.copy()
+        wrong[name][-1] ^= 1
+        assert not same_pixels(SimpleNamespace(beats=wrong), pixels)
+    assert not same_pixels(SimpleNamespace(beats=beats[:-1]), pixels)
+
+
+def test_activity_counts_every_register_once():
+    """Powers of two for counts: the names of the real pipeline, each in the sum that it belongs to."""
+    unit = ToggleCounter(ShadingPipelineUnit(ShadingPipeline("chord", gate=True)))
+    paths = list(unit.status.shape().members)
+    status = np.zeros((), [(path, object) for path in paths])
+    for index, path in enumerate(paths):
+        status[path] = 1 << index
+    found = activity_of(SimpleNamespace(status=status))
+
+    def named(count):
+        return {path for index, path in enumerate(paths) if count >> index & 1}
+
+    assert named(found.pipeline) == set(paths)
+    assert named(found.specular) == {"light_0.specular", "light_0.specular.datapath"}
+    gate_paths = {"highlight_gate", "highlight_gate.datapath", "highlight_gate.datapath.thresholds"}
+    fifos = {"undecided", "lengths", "decisions"}
+    assert named(found.gate) == gate_paths | fifos | {f"{name}.storage" for name in fifos}
+
+
+SHARES = Shares(100, 1000, 40, 500, 45, 600, 700, 100)
+ROW = GateRow(
+    "teapot",
+    "blinn",
+    50,
+    SHARES,
+    clocks=(1100, 1100),
+    compact_clocks=(42000, 21000),
+    activity=(Activity(10000, 0, 100000), Activity(4000, 1000, 95000)),
+    identical=True,
+)
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """Rows without a simulation; what they were asked for."""
+    asked = {}
+
+    def measured(meshes, models, exponents, width, height):
+        asked.update(models=tuple(models), exponents=tuple(exponents), size=(width, height))
+        asked["meshes"] = [loaded.name for loaded in meshes]
+        for loaded in meshes:
+            yield dataclasses.replace(ROW, mesh=loaded.name, identical=asked.get("identical", True))
+
+    monkeypatch.setattr(gate, "measure", measured)
+    return asked
+
+
+def test_tables(counted, capsys):
+    assert main([]) == 0
+    assert counted["meshes"] == ["teapot"]
+    assert (counted["models"], counted["exponents"]) == (gate.MODELS, gate.EXPONENTS)
+    assert counted["size"] == (320, 240)
+    lines = capsys.readouterr().out.splitlines()
+    rows = [line.strip("| ").split(" | ") for line in lines if line.startswith("| teapot")]
+    head = ["teapot", "blinn", "50"]
+    assert rows == [
+        [*head, "100", "1,000", "40.0%", "50.0%", "60.0%", "70.0%", "10.0%"],
+        [*head, "42,000", "21,000", "50.0%", "1,100", "1,100", "0.0%"],
+        [*head, "10.0", "4.0", "1.0", "60.0%", "50.0%", "100.0", "95.0", "5.0%"],
+    ]
+    assert lines[-1] == "1 of 1 frames are the same to the bit with the gate off and on."
+
+
+def test_json(counted, capsys, tmp_path):
+    path = tmp_path / "gate.json"
+    arguments = ["teapot", "--size", "64x48", "--model", "blinn", "--exponent", "7", "--json", str(path)]
+    assert main(arguments) == 0
+    assert (counted["models"], counted["exponents"], counted["size"]) == (("blinn",), (7,), (64, 48))
+    figures = json.loads(path.read_text())
+    assert (figures["width"], figures["height"]) == (64, 48)
+    [row] = figures["frames"]
+    assert row["activity"] == [
+        {"specular": 10000, "gate": 0, "pipeline": 100000},
+        {"specular": 4000, "gate": 1000, "pipeline": 95000},
+    ]
+    assert row["shares"] == dataclasses.asdict(SHARES)
+    assert row["compact_clocks"] == [42000, 21000]
+
+
+def test_a_frame_that_differs_fails(counted, capsys):
+    counted["identical"] = False
+    assert main([]) == 1
+    assert capsys.readouterr().out.splitlines()[-1].startswith("0 of 1 frames are the same")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["missing.obj"], "missing.obj: "),
+        (["--size", "640"], "--size 640: not a size; give WIDTHxHEIGHT"),
+        (["--size", "0x9"], "--size 0x9: out of range"),
+        (["--exponent", "1001"], "Invalid value for '--exponent'"),
+        (["--model", "phong"], "Invalid value for '--model'"),
+        (["--json", "no/such/folder.json"], "no/such/folder.json: "),
+    ],
+)
+def test_bad_input_is_one_line(arguments, message, capsys):
+    assert main(arguments) == 2
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.startswith(f"blysk.bench.report.gate: {message}")
+    assert output.err.count("\n") == 1
+
+
+@pytest.mark.long
+def test_measures_what_the_gate_saves():
+    """Real frames: the gate takes no clocks, and the smaller the highlights, the more toggles it saves."""
+    units = GateUnits("cosquad")
+    saved = []
+    for exponent in (10, 200):
+        row = units.compare("teapot", scene_for(teapot(1000), exponent, 160, 120))
+        assert row.identical
+        assert row.exponent == exponent
+        (off, on), (small_off, small_on) = row.clocks, row.compact_clocks
+        assert off <= on <= off + 8
+        assert small_on <= small_off
+        quiet, gated = row.activity
+        assert quiet.gate == 0 < gated.gate
+        assert gated.specular < quiet.specular
+        saved.append(1 - gated.specular / quiet.specular)
+    assert saved[0] < saved[1]

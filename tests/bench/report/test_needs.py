@@ -1,0 +1,170 @@
+# amaranth: UnusedElaboratable=no
+"""What sample scenes do not need: the scenes, the figures, and the section made of them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blysk.bench.report import needs
+from blysk.bench.report.needs import QUICK_SCENES, SCENES, measure, ring, section, simulate_both, tasks
+from blysk.bench.report.section import Drawing, Table
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.reference.raster import face_normals
+from blysk.hdl.emit.cost import Cost
+from blysk.sim.cli.scene_file import read_scene_file
+from blysk.sim.frames.fit import Fit
+from blysk.sim.frames.frame import twin_frame
+from blysk.sim.meshes.mesh import load_mesh
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+SMALL = [100, 75, 1000]
+
+WHY = {
+    "copper teapot": "exponent fixed at 50",
+    "matt teapot, k_s = 0": "no specular path: every k_s is 0",
+    "teapot in ambient light": "no light path",
+    "grey teapot": "one channel of three",
+    "three materials alike": "no memory of materials: 1 of 3 differ",
+    "one of two lights is off": "1 of 2 lights",
+    "floor lit from behind, exponent 500": "the gate proves that no span holds a highlight",
+    "steel ring, two lights": "exponent fixed at 120",
+    "teapot beside a lamp": "exponent fixed at 80",
+}
+
+
+@pytest.fixture
+def costs(monkeypatch):
+    """Costs without a netlist: a cell less with each step."""
+
+    def counted(fit, setup_interval=None, style="throughput"):
+        full, *steps = (
+            Cost(cells, {(18, 18): cells // 10}, 0, 10 * cells, 5, cells)
+            for cells in range(100, 99 - len(fit.omissions), -1)
+        )
+        return full, tuple(steps)
+
+    monkeypatch.setattr(Fit, "costs", counted)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_scenes(name, costs):
+    """Each shows what it is there for, and its frame is the full pipeline's."""
+    found = measure(name, SMALL, steps=True)
+    assert any(WHY[name] in reason for reason in found["reasons"])
+    assert found["different_pixels"] == 0
+    assert found["pixels"] > 300
+    assert [omission["reason"] for omission in found["omissions"]] == found["reasons"]
+    saved = sum(omission["saves"]["cells"] for omission in found["omissions"])
+    assert found["full"]["cells"] - found["fitted"]["cells"] == saved == len(found["reasons"])
+    assert not {"clocks", "full_clocks"} & set(found)
+    assert measure(name, SMALL, steps=False)["fitted"]["cells"] == 99
+
+
+def test_a_frame_that_differs_is_told(monkeypatch, costs):
+    compute = ShadingPipeline.compute
+
+    def brighter(self, spans, constants):
+        pixels = compute(self, spans, constants)
+        if self.exponent is not None:
+            pixels.color[:, 0] ^= 1
+        return pixels
+
+    monkeypatch.setattr(ShadingPipeline, "compute", brighter)
+    found = measure("copper teapot", SMALL, steps=True)
+    assert found["different_pixels"] > 300
+    assert found["largest_difference"] == 1
+
+
+@pytest.mark.long
+def test_a_matt_scene_saves_half():
+    """By its netlists, and by simulation of both."""
+    found = measure("matt teapot, k_s = 0", SMALL, steps=False)
+    for resource in ("cells", "multipliers", "register_bits", "memory_bits"):
+        assert 0 < found["fitted"][resource] < 0.6 * found["full"][resource]
+    simulated = simulate_both("matt teapot, k_s = 0", SMALL)
+    assert simulated["different_pixels"] == 0
+    assert found["pixels"] < simulated["clocks"] <= simulated["full_clocks"]
+
+
+def test_both_are_simulated(monkeypatch):
+    """By two simulators, the fitted one with the scene that it is for."""
+    asked = []
+
+    class Simulator:
+        def __init__(self, design):
+            self.design = design
+
+        def render(self, scene):
+            asked.append((self.design, len(scene.lights)))
+            frame = twin_frame(scene, self.design)
+            frame.image[0, : len(asked) - 1] ^= 1
+            return frame
+
+    monkeypatch.setattr(needs, "FrameSimulator", Simulator)
+    found = simulate_both("one of two lights is off", SMALL)
+    assert found == {"clocks": 0, "full_clocks": 0, "different_pixels": 1}
+    assert [(design.lights, lights) for design, lights in asked] == [(2, 2), (1, 1)]
+
+
+def test_ring_is_that_of_the_examples():
+    mesh, example = ring(), load_mesh(str(EXAMPLES / "ring.obj")).mesh
+    assert len(mesh.faces) == len(example.faces) == 2 * 36 * 18
+    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1)
+    corners = mesh.normals[mesh.faces]
+    assert (np.einsum("fk,fnk->fn", face_normals(mesh), corners) > 0.9).all()
+    for vertex in mesh.vertices[::50]:
+        assert np.abs(example.vertices - vertex).max(axis=1).min() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("file", "name"), [("ring", "steel ring, two lights"), ("lamp", "teapot beside a lamp")]
+)
+def test_scenes_of_the_examples(file, name):
+    values = read_scene_file(str(EXAMPLES / f"{file}.toml")).values
+    build, options = SCENES[name]
+    scene = build(*values["size"], 1000)
+    assert scene.material.exponent == values["exponent"]
+    assert scene.camera.position == tuple(values["position"])
+    assert len(scene.lights) == len(values["lights"]) + len(values.get("point_lights", ()))
+    assert (options["method"], options["model"]) == (values["method"], values["model"])
+
+
+def test_section():
+    figures = {"cells": 100, "multipliers": 10, "register_bits": 1000, "memory_bits": 0}
+    half = {name: count // 2 for name, count in figures.items()}
+    counted = {
+        "full": figures,
+        "fitted": half,
+        "omissions": [{"reason": "this", "saves": half}],
+        "largest_difference": 0,
+        "different_pixels": 0,
+        "reasons": ["this"],
+        "method": "chord",
+        "model": "cosquad",
+        "pixels": 7,
+    }
+    full = [task for task in tasks(quick=False) if task.settings["name"] in QUICK_SCENES]
+    simulated = {"clocks": 9, "full_clocks": 12, "different_pixels": 0}
+    results = [counted, counted | {"fitted": figures}, simulated, simulated | {"different_pixels": 3}]
+    assert [task.function for task in full] == [measure, measure, simulate_both, simulate_both]
+    made = section(full, results)
+    assert made.name == "needs"
+    totals, omissions = (part for part in made.parts if isinstance(part, Table))
+    assert [part.name for part in made.parts if isinstance(part, Drawing)] == ["needs-shares"]
+    first, second = totals.records()
+    assert (first["cells, full"], first["cells, fitted"], first["clocks, fitted"]) == (100, 50, 9)
+    assert (first["pixels of another colour"], second["pixels of another colour"]) == (0, 3)
+    assert [row[-1] for row in totals.grades] == ["good", "bad"]
+    assert [row["saves cells"] for row in omissions.records()] == [50, 50]
+    text = " ".join(made.text)
+    assert "to the bit: 1 of 2 are" in text
+    assert "2 of them by simulation" in text
+    assert "from 50% of the cells" in text
+
+    quick = tasks(quick=True)
+    assert [task.settings["name"] for task in quick] == list(QUICK_SCENES)
+    several = counted | {"reasons": ["this", "that"]}
+    totals, _, omissions = section(quick, [several, several]).parts
+    assert totals.records()[0]["clocks, full"] is None
+    assert [row["saves cells"] for row in omissions.records()] == [None, None, 50] * 2

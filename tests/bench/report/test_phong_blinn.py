@@ -1,0 +1,173 @@
+"""Ways of Phong and Blinn against each other, counts by hand, and the section against its results."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from blysk.bench.accuracy import scene_for
+from blysk.bench.report import phong_blinn
+from blysk.bench.report.phong_blinn import (
+    FEWER_OPERATIONS,
+    PIXELS,
+    WAYS,
+    exponents,
+    frame_times,
+    hardware_clocks,
+    operations,
+    section,
+    shading_times,
+    tasks,
+)
+from blysk.bench.store import Task
+from blysk.golden.reference.lighting import Light, Material, intensity
+from blysk.golden.reference.renderer import render
+from blysk.sim.meshes.teapot import teapot
+
+
+@pytest.mark.parametrize("local", [False, True])
+def test_ways(local):
+    """All against `lighting`, which has tests of its own; both forms of Phong agree to rounding."""
+    vectors = normal, light, viewer = phong_blinn._vectors(local)
+    assert normal.shape == (3, PIXELS)
+    assert light.shape == viewer.shape == (3, PIXELS if local else 1)
+    found = {name: way(*vectors) for name, way in WAYS.items()}
+    vector, scalar, blinn = found.values()
+    np.testing.assert_allclose(vector, scalar, atol=1e-12)
+    # The ways have no test of N·L > 0 before the highlight.
+    lit = np.flatnonzero((normal * light).sum(axis=0) > 1e-6)[:40]
+    material = Material((0.1,) * 3, (0.4,) * 3, (0.5,) * 3, 50)
+    for pixel in lit:
+        column = pixel if local else 0
+        for model, values in (("phong", vector), ("blinn", blinn)):
+            exact = intensity(
+                normal[:, pixel], material, [Light(light[:, column])], (1, 1, 1), viewer[:, column], model
+            )
+            assert values[pixel] == pytest.approx(exact[0], abs=1e-12)
+
+
+def test_exponents():
+    found = exponents()
+    assert found["ratio"][0] == 4
+    degrees = np.array(found["degrees"])
+    c = np.cos(np.radians(degrees[4:]))
+    assert found["ratio"][4:] == pytest.approx(np.log(2 * c * c - 1) / np.log(c), rel=1e-6)
+    # Phong sees twice the angle.
+    n, p, gamma = found["ratio"][80] * 7, 7, math.radians(degrees[80])
+    assert math.cos(gamma) ** n == pytest.approx(math.cos(2 * gamma) ** p)
+
+
+def test_operations():
+    """Dot products 3 and 2, diffuse and ambient light 2 and 2 with the weights, a power, two gates."""
+    per_frame = {way: operations(way, False) for way in WAYS}
+    own = {way: operations(way, True) for way in WAYS}
+    rest = {"functions": 1, "comparisons": 2}
+    vector, scalar, blinn = WAYS
+    # N·L, R·V, twice a cosine, three times a normal, two weights; R = ... - L.
+    assert own[vector] == {"multiplications": 12, "additions": 9, **rest}
+    assert per_frame[vector] == own[vector]
+    # N·L, N·V, 2 (N·L)(N·V), weights; L·V besides where it is not the frame's.
+    assert own[scalar] == {"multiplications": 13, "additions": 9, **rest}
+    assert per_frame[scalar]["multiplications"] == pytest.approx(10, abs=0.001)
+    # N·L, N·H, weights; H besides: sum, length, three divisions.
+    assert own[blinn] == {"multiplications": 11, "additions": 11, "divisions": 3, "roots": 1, **rest}
+    assert per_frame[blinn]["multiplications"] == pytest.approx(8, abs=0.001)
+    assert per_frame[blinn]["roots"] == 1 / PIXELS
+
+
+def test_times():
+    found = shading_times(False, 1)
+    assert list(found) == list(WAYS)
+    assert next(iter(found.values())) == 1
+    assert min(found.values()) > 0
+    frame = frame_times(200, 64, 48, 1)
+    assert frame["pixels"] == render(scene_for(teapot(200), 50, 64, 48)).mask.sum()
+    assert min(frame["raster"], frame["phong"], frame["blinn"]) > 0
+
+
+@pytest.mark.long
+def test_hardware_clocks():
+    """A pixel a clock at most."""
+    found = hardware_clocks("cosquad", 200, 64, 48)
+    assert found["clocks"] > found["pixels"] >= render(scene_for(teapot(200), 50, 64, 48)).mask.sum()
+
+
+FRAMES = [
+    # Triangles, pixels, seconds of geometry, of Phong and of Blinn, clocks.
+    (992, 20_000, 0.010, 0.008, 0.006, 30_000),
+    (1_000_500, 25_000, 0.500, 0.010, 0.010, 100_000),
+]
+
+
+@pytest.fixture(scope="module")
+def made():
+    """The section from counts that are real and times that are not."""
+    chosen, found = [Task(exponents)], [exponents()]
+    for local in (False, True):
+        for way in WAYS:
+            chosen.append(Task(operations, {"way": way, "local": local}))
+            found.append(operations(way, local))
+        chosen.append(Task(shading_times, {"local": local, "repeats": 1}))
+        found.append(dict(zip(WAYS, (1.0, 0.9, 1.1 if local else 0.7), strict=True)))
+    for triangles, pixels, raster, phong, blinn, clocks in FRAMES:
+        settings = {"triangles": triangles, "width": 640, "height": 480}
+        chosen.append(Task(frame_times, {**settings, "repeats": 1}))
+        found.append(
+            {"triangles": triangles, "pixels": pixels, "raster": raster, "phong": phong, "blinn": blinn}
+        )
+        for model, more in (("cosquad", 0), ("blinn", 50)):
+            chosen.append(Task(hardware_clocks, {"model": model, **settings}))
+            found.append({"triangles": triangles, "pixels": pixels, "clocks": clocks + more})
+    return section(chosen, json.loads(json.dumps(found)))
+
+
+def test_operations_table(made):
+    rows = {(row["L and V are"], row["way"]): row for row in made.parts[1].records()}
+    assert len(rows) == 6
+    row = rows["the frame's", "Blinn"]
+    assert row["fewer operations than Phong, vector R"] == pytest.approx(1 - 17 / 24, abs=1e-3)
+    assert row["less time than Phong, vector R"] == pytest.approx(0.3)
+    near = rows["each pixel's", "Blinn"]
+    assert near["fewer operations than Phong, vector R"] == pytest.approx(1 - 29 / 24)
+    assert rows["each pixel's", "Phong, vector R"]["fewer operations than Phong, vector R"] is None
+    grades = [grade for line in made.parts[1].grades for grade in line if grade]
+    assert grades == ["good", "bad"]
+    assert FEWER_OPERATIONS[0] < 1 - 17 / 24 < FEWER_OPERATIONS[1]
+
+
+def test_frames_table(made):
+    first, last = made.parts[2].records()
+    assert first["less time with Blinn, frame"] == pytest.approx(1 - 16 / 18)
+    assert first["less time with Blinn, shading"] == pytest.approx(0.25)
+    assert first["share of geometry"] == pytest.approx(10 / 16)
+    assert first["Phong, ns a visible pixel"] == pytest.approx(0.018 / 20_000 * 1e9)
+    assert first["printed, at most"] is None
+    assert last["printed, at most"] == 0.45
+    assert last["clocks a pixel"] == 4
+    assert last["hardware clocks"] == 100_000
+
+
+def test_text(made):
+    text = " ".join(made.text)
+    assert "29% fewer where" in text
+    assert "21% more where" in text
+    assert "0.0% less time for the frame" in text
+    assert "62% of Blinn's frame at 992 triangles and 98% at 1,000,500" in text
+    assert "4.000 clocks with `cosquad` and 4.002 clocks with `blinn` at 1,000,500 triangles" in text
+    assert [part.name for part in made.parts] == [
+        "phong-blinn-5",
+        "phong-blinn-operations",
+        "phong-blinn-frames",
+        "phong-blinn-8",
+    ]
+
+
+def test_tasks():
+    for quick, largest, models in ((True, 10_000, 1), (False, 1_000_000, 2)):
+        chosen = tasks(quick)
+        assert len({(task.name, json.dumps(task.settings)) for task in chosen}) == len(chosen)
+        assert {task.function for task in chosen if task.timed} == {shading_times, frame_times}
+        frames = [task.settings for task in chosen if task.function is hardware_clocks]
+        assert max(settings["triangles"] for settings in frames) == largest
+        assert len({settings["model"] for settings in frames}) == models

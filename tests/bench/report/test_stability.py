@@ -1,0 +1,272 @@
+# amaranth: UnusedElaboratable=no
+"""Stiff and extreme cases: every method keeps in each what its documentation promises."""
+
+import dataclasses
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+from blysk.bench.report import stability
+from blysk.bench.report.section import Drawing, Table
+from blysk.bench.report.stability import (
+    ANGLES,
+    EXPONENTS,
+    GOOD,
+    GROUPS,
+    LENGTHS,
+    QUICK_METHODS,
+    RANGE_EXPONENTS,
+    STREAM_GROUP,
+    SWEEP,
+    Case,
+    arcs,
+    cases_of,
+    grade_of,
+    measure,
+    measure_case,
+    measure_ranges,
+    measure_stream,
+    section,
+    tasks,
+)
+from blysk.bench.store import Task
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.number.unit_vector import quantise
+from blysk.golden.pipeline import METHODS, ShadingPipeline, Spans
+from blysk.golden.reference.renderer import shade_spans
+
+# Their quadratic is that of another method.
+ALIKE = ("quadratic-eval", "quadratic-horner")
+NAMES = [pytest.param(name, marks=pytest.mark.long) if name in ALIKE else name for name in METHODS]
+FROM_SPANS = [group for group in GROUPS if group != STREAM_GROUP]
+
+
+@cache
+def cases(group: int) -> list[Case]:
+    return list(cases_of(group))
+
+
+@pytest.mark.parametrize("group", FROM_SPANS)
+@pytest.mark.parametrize("method", NAMES)
+def test_keeps_what_is_promised(group, method):
+    """Nothing silently wrong: not of spans that are cut, nor in the safe range of spans as they come."""
+    for case in cases(group):
+        found = measure_case(case, method)
+        assert found["given"]["safe_grade"] != "bad", case.name
+        if found["inside"]:
+            assert found["given"]["safe_grade"] in ("good", "fair")
+        if case.codes is not None:
+            assert found["prepared"] is None
+            continue
+        prepared = found["prepared"]
+        assert prepared["grade"] in ("good", "fair"), case.name
+        assert prepared["flagged"] == 0, case.name
+        # The chord methods count on cut spans alone, and state less than 1 LSB for every exponent, but of the
+        # terminator, where a wide highlight goes out at once; the local one cuts spans there, too.
+        if method == "chord-local" or (method == "chord" and not case.name.startswith("terminator")):
+            assert prepared["error"] <= GOOD, case.name
+
+
+@pytest.mark.parametrize(
+    "method", [name if name == "chord" else pytest.param(name, marks=pytest.mark.long) for name in METHODS]
+)
+def test_streams(method):
+    """Stalls, empty spans and a reset change no pixel."""
+    found = measure_stream(method, quick=True)
+    assert [case["case"] for case in found] == [
+        "back to back, empty spans between",
+        "random stalls on both sides",
+        "input mostly stalled",
+        "output mostly stalled",
+        "reset in mid span",
+    ]
+    assert all(case["pixels"] > 20 and case["wrong"] == 0 for case in found)
+
+
+@pytest.mark.long
+def test_a_stall_on_every_clock():
+    found = {case["case"]: case for case in measure_stream("chord", quick=False)}
+    for side in ("input", "output"):
+        assert found[f"a single stall of the {side}"]["runs"] > 150
+    assert all(case["wrong"] == 0 for case in found.values())
+
+
+def test_wrong_pixels_of_a_stream_are_counted(monkeypatch):
+    compute = ShadingPipeline.compute
+
+    def inverted(self, spans, constants):
+        pixels = compute(self, spans, constants)
+        color = pixels.color.copy()
+        color[:2] ^= 255
+        return dataclasses.replace(pixels, color=color)
+
+    monkeypatch.setattr(ShadingPipeline, "compute", inverted)
+    monkeypatch.setattr(stability, "stream_patterns", lambda unit: [("back to back", {})])
+    assert [case["wrong"] for case in measure_stream("linear", quick=True)] == [2, 2]
+
+
+@pytest.mark.parametrize("places", [slice(None), slice(0, 1)])
+def test_an_error_that_nothing_tells_of_is_bad(places, monkeypatch):
+    """One step more than the worst of a frame may be, in one pixel or in all."""
+    [case] = [case for case in cases(1) if case.name == "exponent 10"]
+    compute = ShadingPipeline.compute
+    right = measure_case(case, "renormalise")
+    assert right["prepared"]["grade"] == "good"
+
+    def brighter(self, spans, constants):
+        pixels = compute(self, spans, constants)
+        color = pixels.color.astype(int)
+        color[places] += np.where(color[places] < 128, 2, -2)
+        return dataclasses.replace(pixels, color=color)
+
+    monkeypatch.setattr(ShadingPipeline, "compute", brighter)
+    found = measure_case(case, "renormalise")
+    for way in ("given", "prepared"):
+        assert found[way]["grade"] == "bad"
+        assert 1.4 < found[way]["error"] <= right[way]["error"] + 2
+
+
+def test_error_is_that_of_the_pictures():
+    """Against the golden renderer's picture of the spans, where no pixel is at the terminator."""
+    [case] = [case for case in cases(1) if case.name == "exponent 100"]
+    raster, design = case.raster, ShadingPipeline("quadratic")
+    spans = Spans(
+        raster.x, raster.y, raster.length, quantise(raster.normal_left), quantise(raster.normal_right)
+    )
+    pixels = design.compute(spans, FrameConstants.of(case.scene))
+    picture = shade_spans(case.scene, raster, "normalised", "cosquad") * 255
+    error = np.abs(pixels.color - picture[pixels.y, pixels.x]).max()
+    assert measure_case(case, "quadratic")["given"]["error"] == pytest.approx(error, abs=1e-9)
+
+
+def test_wide_spans_are_told():
+    """Of spans over the widest, some flagged and some not: silently wrong, unless it is small."""
+    by_angle = {case.name: measure_case(case, "linear")["given"] for case in cases(2)}
+    wide = by_angle["90 degrees"]
+    assert wide["grade"] == "bad"
+    assert 0 < wide["flagged"] < 60
+    assert 100 < wide["silent"] <= wide["error"]
+    assert (by_angle["120 degrees"]["grade"], by_angle["120 degrees"]["flagged"]) == ("fair", 60)
+    assert by_angle["0 degrees"]["grade"] == "good"
+
+
+def test_every_case_of_the_specification_is_there():
+    names = [case.name for group in FROM_SPANS for case in cases(group)]
+    assert len(set(names)) == len(names)
+    for texts in (
+        [f"exponent {n}" for n in EXPONENTS],
+        [f"{angle:g} degrees" for angle in ANGLES],
+        [f"{m} pixels" for m in LENGTHS if m > 1],
+        ["between two pixels", "L = V", "light behind", "both normals 0", "through the near plane"],
+    ):
+        assert set(texts) <= set(names)
+    for group in FROM_SPANS:
+        # The same again, and every pixel once in the picture that they are held against.
+        for case, again in zip(cases(group), cases_of(group), strict=True):
+            np.testing.assert_array_equal(case.raster.normal_right, again.raster.normal_right)
+            shown = case.raster.pixel[case.raster.visible]
+            assert case.group == group
+            assert 0 < len(np.unique(shown)) == len(shown)
+    # Along the shared edge no pixel is drawn twice, and none is left out.
+    [shared] = [case for case in cases(9) if "share an edge" in case.name]
+    pixels = np.zeros(64 * 64, dtype=int)
+    np.add.at(pixels, shared.raster.pixel, 1)
+    rows = pixels.reshape(64, 64)
+    assert pixels.max() == 1
+    assert all(np.count_nonzero(np.diff(np.r_[0, row, 0])) in (0, 2) for row in rows)
+    with pytest.raises(ValueError, match="group 8 has no spans of its own"):
+        list(cases_of(STREAM_GROUP))
+
+
+def test_arcs():
+    rng = np.random.default_rng(1)
+    centre = np.array([0.0, 0.6, 0.8])
+    degrees, at, off = rng.uniform(0, 180, 50), rng.uniform(-1, 2, 50), rng.uniform(0, 40, 50)
+    left, right = arcs(rng, centre, degrees, at, off)
+    np.testing.assert_allclose(np.linalg.norm([left, right], axis=2), 1)
+    np.testing.assert_allclose(np.degrees(np.arccos((left * right).sum(axis=1))), degrees, atol=1e-5)
+    # The cosine to the centre is largest at the share, on the circle through both ends.
+    expected = np.cos(np.radians(off)) * np.cos(np.radians(at * degrees))
+    np.testing.assert_allclose(left @ centre, expected, atol=1e-12)
+    expected = np.cos(np.radians(off)) * np.cos(np.radians((1 - at) * degrees))
+    np.testing.assert_allclose(right @ centre, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("grades", "worst"),
+    [((), ""), (("good", ""), "good"), (("good", "fair"), "fair"), (("fair", "bad", "good"), "bad")],
+)
+def test_worst_grade(grades, worst):
+    assert grade_of(grades) == worst
+
+
+@pytest.mark.parametrize(
+    "method",
+    [name if name in QUICK_METHODS else pytest.param(name, marks=pytest.mark.long) for name in METHODS],
+)
+def test_ranges(method):
+    """Where the docstrings say that spans are flagged, and every range is good or fair to its end."""
+    found = measure_ranges(method)
+    interpolator = METHODS[method]
+    if method in ("linear", "renormalise"):
+        # A component of N_r - N_l over 1; and of renormalised ones a normal shorter than is served.
+        assert found["none_flagged"] >= 60
+        assert found["all_flagged"] > interpolator.MAX_ANGLE
+    elif method != "chord-local":
+        assert found["none_flagged"] == int(interpolator.MAX_ANGLE)
+        assert found["all_flagged"] == found["none_flagged"] + 1
+    assert list(found["widest"]) == [str(exponent) for exponent in RANGE_EXPONENTS]
+    assert all(0 < angle <= interpolator.MAX_ANGLE for angle in found["widest"].values())
+    inside, *outside = found["outside"]
+    assert inside["given"]["grade"] in ("good", "fair")
+    assert outside
+    for of in (inside, *outside):
+        assert of["prepared"]["grade"] in ("good", "fair")
+        assert of["prepared"]["flagged"] == 0
+    if method == "chord":
+        twice = outside[-1]["given"]
+        assert (twice["grade"], twice["flagged"]) == ("bad", 0)
+
+
+def test_section():
+    """Of a method's own measurements, through JSON as from the cache."""
+    chosen = [task for task in tasks(quick=True) if task.settings["method"] == "chord"]
+    assert [task.function for task in chosen] == [measure, measure_ranges, measure_stream]
+    stream = [{"case": "back to back", "runs": 3, "pixels": 20, "wrong": 0}]
+    stream.append({"case": "reset", "runs": 2, "pixels": 20, "wrong": None})
+    results = [json.loads(json.dumps(task.run())) for task in chosen[:2]] + [stream]
+    made = section(chosen, results)
+    assert made.name == "stability"
+    tables = {part.name: part for part in made.parts if isinstance(part, Table)}
+    assert [part.name for part in made.parts if isinstance(part, Drawing)] == ["stability-angles"]
+    for name in ("stability", "stability-as-given"):
+        assert [row["group"] for row in tables[name].records()] == list(GROUPS)
+        stalled = tables[name].records()[STREAM_GROUP - 1]
+        assert stalled["chord"] is None
+        assert tables[name].grades[STREAM_GROUP - 1][-1] == "bad"
+    cells = zip(tables["stability"].records(), tables["stability"].grades, strict=True)
+    for row, grades in cells:
+        if row["group"] not in (5, STREAM_GROUP):
+            assert row["chord"] <= GOOD
+            assert grades[-1] == "good"
+    assert len(tables["stability-cases"].rows) == sum(len(cases(group)) for group in FROM_SPANS)
+    [row] = tables["safe-ranges"].records()
+    assert row["method"] == "chord"
+    assert row["widest span at n = 1, degrees"] == 15
+    errors = dict(zip(SWEEP, (of["given"]["error"] for of in results[1]["sweep"]), strict=True))
+    up_to = row["error to 1 LSB up to, degrees"]
+    assert max(error for angle, error in errors.items() if angle <= up_to) <= 1
+    assert errors[min(angle for angle in SWEEP if angle > up_to)] > 1
+    text = " ".join(made.text)
+    assert f"Bad cells with spans cut: 1 of {len(GROUPS)}." in text
+    assert "5 runs" in text
+    assert "100 pixels, 0 of them wrong; 1 came to a halt." in text
+
+
+def test_tasks():
+    full = tasks(quick=False)
+    assert all(isinstance(task, Task) and not task.timed for task in full)
+    assert {task.settings["method"] for task in full} == set(METHODS)
+    assert {task.settings["method"] for task in tasks(quick=True)} == set(QUICK_METHODS)

@@ -1,0 +1,387 @@
+"""The site of ``blysk web``: its data, its files, its command; no browser."""
+
+import base64
+import importlib.util
+import json
+import re
+import zlib
+from html.parser import HTMLParser
+from importlib import resources
+
+import numpy as np
+import pytest
+from amaranth.hdl import Fragment
+from click.testing import CliRunner
+
+from blysk.bench.report.report import chosen_tasks
+from blysk.bench.tools import web
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.cli.main import main
+from blysk.sim.engines.probes import probes_of
+from blysk.sim.errors import InputError
+from blysk.sim.frames.frame import prepare
+
+pytest.importorskip("ziglang", reason="ziglang is not installed")
+
+DESIGNS = [("chord", "cosquad"), ("linear", "exp")]
+
+
+def unpacked(data):
+    """Codes by column, and which fragments show: what the page does, from what the page is told."""
+    raw = zlib.decompress(data)
+    count, fragments = np.frombuffer(raw[:8], "<u4").tolist()
+    at, codes = 8, {}
+    for column in json.loads(json.dumps(web.COLUMNS)):
+        values = np.zeros(count, dtype=np.int64)
+        for byte in range(column["bytes"]):
+            values += np.frombuffer(raw, np.uint8, count, at).astype(np.int64) << 8 * byte
+            at += count
+        values -= column["bias"]
+        if "from" in column:
+            values += codes[column["from"]]
+        elif column.get("running"):
+            values = np.cumsum(values)
+        codes[column["name"]] = values
+    visible = np.unpackbits(np.frombuffer(raw, np.uint8, offset=at), count=fragments, bitorder="little")
+    assert at + -(-fragments // 8) == len(raw)
+    return codes, visible.astype(bool)
+
+
+@pytest.mark.parametrize("mesh", web.MESHES)
+def test_spans_as_they_are_sent(mesh):
+    scene = web.scene_of(web.START | {"mesh": mesh, "view": web.MESHES[mesh].views - 1})
+    frame = prepare(scene, ShadingPipeline("chord"))
+    codes, visible = unpacked(web.encode(frame.spans, frame.cut_raster.visible))
+    for name in ("x", "y", "length"):
+        np.testing.assert_array_equal(codes[name], getattr(frame.spans, name))
+    for c in range(3):
+        np.testing.assert_array_equal(codes[f"normal_left.{c}"], frame.spans.normal_left[:, c])
+        np.testing.assert_array_equal(codes[f"normal_right.{c}"], frame.spans.normal_right[:, c])
+    np.testing.assert_array_equal(visible, frame.cut_raster.visible)
+    assert visible.sum() > 1000
+
+
+def test_extreme_codes_are_kept():
+    most = (1 << 17) - 1
+    ends = np.array([[most, -most, 0], [-most, most, -1], [0, 0, most]])
+    place = np.array([0, 4095, 0])
+    spans = web.Spans(place, place[::-1], np.array([4095, 0, 1]), ends, ends[::-1])
+    codes, visible = unpacked(web.encode(spans, np.array([True] * 4095 + [False])))
+    np.testing.assert_array_equal(codes["x"], spans.x)
+    np.testing.assert_array_equal(codes["length"], spans.length)
+    for c in range(3):
+        np.testing.assert_array_equal(codes[f"normal_right.{c}"], spans.normal_right[:, c])
+    assert len(visible) == 4096
+    assert not visible[-1]
+
+
+def test_streams_of_a_view():
+    methods = ["chord", "linear", "quadratic", "angular"]
+    found = web.streams_of("teapot", 0, methods)
+    assert json.loads(json.dumps(found)) == found
+    axes = np.array(found["axes"])
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    # Methods that take the same spans share them; narrower ones for high exponents are the chord's alone.
+    assert len(found["data"]) < len(methods) * len(web.BANDS)
+    assert found["streams"]["linear"] == found["streams"]["quadratic"]
+    counts = {
+        method: [len(unpacked(base64.b64decode(found["data"][k]))[0]["x"]) for k in numbers]
+        for method, numbers in found["streams"].items()
+    }
+    assert counts["chord"][0] < counts["chord"][1]
+    for k, exponent in enumerate(web.BANDS):
+        frame = prepare(web.scene_of(web.START | {"exponent": exponent}), ShadingPipeline("chord"))
+        assert counts["chord"][k] == len(frame.spans)
+
+
+def test_addresses_are_those_of_the_write_port():
+    tables = json.loads(json.dumps(web.tables()))
+    constants = FrameConstants.of(web.scene_of(web.START), 1)
+    beats = []
+    for fields, base in ((tables["frame"], 0), (tables["light"], tables["stride"])):
+        for name, (first, count) in fields.items():
+            codes = np.ravel(getattr(constants, name)).tolist()
+            assert len(codes) == count
+            beats += [(base + first + k, code & 0x3FFFF) for k, code in enumerate(codes)]
+    writes = constants.writes()
+    assert beats == list(zip(writes["address"].tolist(), writes["data"].tolist(), strict=True))
+
+
+# Names of words that the page's script lists by hand.
+
+
+@pytest.fixture(scope="module")
+def probes():
+    """Of all modules of the page."""
+    return [probe for pair in web.DESIGNS for probe in probes_of(ShadingPipelineUnit(web.design_of(*pair)))]
+
+
+@pytest.fixture(scope="module")
+def script():
+    return resources.files("blysk.bench.tools").joinpath("templates", "web", "app.js").read_text(encoding="utf-8")
+
+
+def names_in(braces):
+    """Names in an object that a script writes down, those of objects spread out in it too."""
+    values = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
+    entries = re.split(r"[,{}]", values.sub("", braces))
+    return [name for entry in entries if (name := entry.partition(":")[0].strip()) not in ("", "...")]
+
+
+def test_exact_values_are_those_of_the_probes(script, probes):
+    (braces,) = re.findall(r"found\.set\(n, \{(.*?)\n +\}\);", script, re.DOTALL)
+    names = names_in(braces)
+    assert len(names) == len(set(names))
+    assert set(names) == {probe.exact for probe in probes if probe.exact}
+
+
+def test_dark_words_are_probes(script, probes):
+    (names,) = re.findall(r"const isDark = (\[.*?\])", script)
+    dark = set(json.loads(names))
+    assert dark <= {probe.name for probe in probes}
+    # All words of the specular data path that are numbers: under the gate they are of another pixel.
+    assert dark == {probe.name for probe in probes if probe.block == "specular" and probe.name != "specular"}
+
+
+def test_every_block_has_a_stage(script, probes, monkeypatch):
+    def uncompiled(component):
+        Fragment.get(component, None)
+        return b""
+
+    monkeypatch.setattr(web, "build", uncompiled)
+    stages = {stage["name"] for stage in web.module_of("chord", "cosquad")["stages"]}
+    (braces,) = re.findall(r"const stageOf = (\{.*?\})", script)
+    stage_of = dict(re.findall(r'(\w+): "(\w+)"', braces))
+    assert list(stage_of) == names_in(braces)
+    blocks = {probe.block for probe in probes}
+    assert set(stage_of) <= blocks
+    assert {stage_of.get(block, block) for block in blocks} == stages
+
+
+# The site, of modules that are none.
+
+
+@pytest.fixture(scope="module")
+def work():
+    return web.tasks(DESIGNS, {"teapot": 1, "square": 2})
+
+
+@pytest.fixture(scope="module")
+def results(work):
+    module = {"wasm": "eJw=", "bytes": 65_432, "ports": {}, "probes": [{"exact": "</script>"}], "stages": []}
+    view = {"axes": np.eye(3).tolist(), "streams": {"chord": [0, 1], "linear": [0, 0]}, "data": ["a", "b"]}
+    return [module if task.function is web.module_of else view for task in work]
+
+
+@pytest.fixture
+def site(tmp_path, work, results):
+    folder = tmp_path / "site"
+    web.write_site(folder, work, results)
+    return folder
+
+
+class Addresses(HTMLParser):
+    """What a page asks for or leads to, its scripts, and its tags that stay open."""
+
+    VOID = frozenset({"meta", "img", "br", "input", "link", "hr"})
+
+    def __init__(self, text):
+        super().__init__()
+        self.found, self.open, self.ids, self.data = [], [], [], ""
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        attrs = dict(attrs)
+        self.found += [attrs[name] for name in ("src", "href") if name in attrs]
+        self.ids += [attrs["id"]] if "id" in attrs else []
+        if tag not in self.VOID:
+            self.open.append((tag, attrs))
+
+    def handle_endtag(self, tag):
+        if tag not in self.VOID:
+            assert self.open.pop()[0] == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1][1].get("id") == "site":
+            self.data += data
+
+
+def test_files_of_the_site(site):
+    mark = json.loads((site / "site.json").read_text())
+    there = sorted(path.relative_to(site).as_posix() for path in site.rglob("*") if path.is_file())
+    assert there == sorted([*mark["files"], "site.json"])
+    assert {"index.html", "modules/chord-cosquad.js", "models/blinn.js", "spans/square-1-1.js"} <= set(there)
+    page = Addresses((site / "index.html").read_text())
+    assert len(page.ids) == len(set(page.ids))
+    text = " ".join((site / "index.html").read_text().split())
+    *lower, highest = web.BANDS
+    assert f"cut for the exponent {', '.join(map(str, lower))} or {highest}, the smallest" in text
+    data = json.loads(page.data)
+    assert list(data["designs"]) == ["chord-cosquad", "linear-exp"]
+    assert data["start"] == {**web.START, "method": "chord", "model": "cosquad"}
+    assert [len(mesh["views"]) for mesh in data["meshes"].values()] == [1, 2]
+    for mesh in data["meshes"].values():
+        for view in mesh["views"]:
+            for names in view["streams"].values():
+                assert len(names) == len(web.BANDS)
+                assert all((site / "spans" / f"{name}.js").is_file() for name in names)
+    script = (site / "modules" / "chord-cosquad.js").read_text()
+    assert script.startswith('blysk.given("chord-cosquad",{')
+    assert "</script>" not in script
+
+
+def test_nothing_is_remote(site):
+    for path in site.rglob("*"):
+        if path.suffix in (".html", ".css") or path.name == "blysk.js":
+            assert "http://" not in path.read_text().replace("http://www.w3.org", "")
+            assert "https://" not in path.read_text()
+
+
+def test_an_earlier_site_is_replaced(site, work, results):
+    page = (site / "index.html").read_text()
+    web.write_site(site, work[:1] + work[2:3], results[:1] + results[2:3])
+    assert (site / "index.html").read_text() != page
+    assert not (site / "modules" / "linear-exp.js").exists()
+    assert not (site / "spans" / "square-0-0.js").exists()
+    mark = json.loads((site / "site.json").read_text())
+    assert "modules/linear-exp.js" not in mark["files"]
+    web.check_folder(site)
+
+
+def test_folder_of_something_else(tmp_path, site):
+    web.check_folder(tmp_path / "new")
+    (tmp_path / "empty").mkdir()
+    web.check_folder(tmp_path / "empty")
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputError, match="it is a file"):
+        web.check_folder(tmp_path / "file")
+    (site / "spans" / "mine.txt").write_text("mine")
+    with pytest.raises(InputError, match=r"holds spans/mine.txt, which is of no site"):
+        web.check_folder(site)
+    with pytest.raises(InputError, match="there is no folder"):
+        web.check_folder(tmp_path / "no" / "site")
+
+
+def test_names_of_an_earlier_site_that_lead_out_stay(site, work, results, tmp_path):
+    mine = tmp_path / "mine.txt"
+    mine.write_text("mine")
+    mark = json.loads((site / "site.json").read_text())
+    mark["files"] += ["../mine.txt", str(mine)]
+    (site / "site.json").write_text(json.dumps(mark))
+    web.write_site(site, work, results)
+    assert mine.read_text() == "mine"
+
+
+def test_report_in_the_site(tmp_path, work, results):
+    report = tmp_path / "report"
+    report.mkdir()
+    (report / "index.html").write_text("<p>report</p>")
+    (report / "report.json").write_text(
+        json.dumps({"program": "blysk", "files": ["index.html", "report.json", "a.csv"]})
+    )
+    with pytest.raises(InputError, match="is no report; make one with `blysk bench FOLDER`"):
+        web.write_site(tmp_path / "site", work, results, report)
+    (report / "a.csv").write_text("1,2\n")
+    web.write_site(tmp_path / "site", work, results, report)
+    assert (tmp_path / "site" / "report" / "a.csv").read_text() == "1,2\n"
+    assert 'href="report/index.html"' in (tmp_path / "site" / "index.html").read_text()
+    # Without it the link and the files go.
+    web.write_site(tmp_path / "site", work, results)
+    assert not (tmp_path / "site" / "report" / "a.csv").exists()
+    assert "report/index.html" not in (tmp_path / "site" / "index.html").read_text()
+
+
+# The command.
+
+
+def run(*arguments):
+    return CliRunner().invoke(web.command, list(map(str, arguments)))
+
+
+def test_command(tmp_path, monkeypatch, work, results):
+    asked = []
+
+    def made(tasks, jobs, progress):
+        asked.extend(tasks)
+        for _ in tasks:
+            progress()
+        return [results[0] if task.function is web.module_of else results[-1] for task in tasks]
+
+    # Of the report that is measured with it, one quick section.
+    monkeypatch.setattr(web, "chosen_tasks", lambda quick: chosen_tasks(quick, names=["errata"]))
+    monkeypatch.setattr(web, "measure_all", made)
+    found = run("-o", tmp_path / "site", "--design", "chord/cosquad", "--design", "linear/exp")
+    assert found.exit_code == 0, found.output
+    report = json.loads((tmp_path / "site" / "report" / "report.json").read_text())
+    assert report["quick"]
+    assert list(report["sections"]) == ["errata"]
+    assert found.output.split() == ["site", str(tmp_path / "site" / "index.html")]
+    modules = [task.settings for task in asked if task.function is web.module_of]
+    assert modules == [{"method": method, "model": model} for method, model in DESIGNS]
+    assert len(asked) - len(modules) == sum(body.views for body in web.MESHES.values())
+
+
+def test_command_is_registered(capsys):
+    assert not main(["web", "--help"])
+    assert "blysk web -o site" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["--design", "chord"], "--design chord: unknown model; use one of"),
+        (["--design", "chord-local/exp"], "--design chord-local/exp: unknown method; use one of linear"),
+        (["--design", "chord/phong"], "--design chord/phong: unknown model; use one of cosquad"),
+        (["--report", "nothing"], "--report nothing: is no report; make one with `blysk bench FOLDER`"),
+        (["-o", "no/site"], "no/site: cannot be written, there is no folder no; make the folder first"),
+    ],
+)
+def test_command_refuses(tmp_path, monkeypatch, arguments, line):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError) as error:
+        CliRunner().invoke(web.command, arguments, catch_exceptions=False)
+    assert str(error.value).startswith(line)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["ziglang", "jinja2", "markdown_it", "flip_evaluator", "skimage"])
+def test_command_without_the_extra(tmp_path, monkeypatch, name):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda n, *rest: None if n == name else find(n, *rest))
+    with pytest.raises(InputError, match=rf"^web: {name} is not installed; pip install 'blysk\[web\]'$"):
+        CliRunner().invoke(web.command, ["-o", str(tmp_path / "site")], catch_exceptions=False)
+    assert not list(tmp_path.iterdir())
+
+
+def test_command_interrupted(tmp_path, monkeypatch):
+    def stop(tasks, jobs, progress):
+        progress()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(web, "measure_all", stop)
+    found = run("-o", tmp_path / "site")
+    assert found.exit_code == 130
+    assert "stopped; 1 of" in found.output
+    assert not (tmp_path / "site").exists()
+
+
+@pytest.mark.long
+def test_interrupt_leaves_nothing_behind(interrupted):
+    """A worker in the midst of a program of its own, with files of its own."""
+    status, text = interrupted(
+        "import subprocess, sys, tempfile\n"
+        "from bench import web\n"
+        "from blysk.bench.store import Task\n"
+        "def sleep(seconds):\n"
+        "    with tempfile.TemporaryDirectory(prefix='blysk-'):\n"
+        "        subprocess.run(['sleep', str(seconds)])\n"
+        "if __name__ == '__main__':\n"
+        "    web.tasks = lambda designs, views: [Task(sleep, {'seconds': 300})]\n"
+        "    web.chosen_tasks = lambda quick: []\n"
+        "    sys.exit(web.command.main(['--jobs', '1'], standalone_mode=False))\n"
+    )
+    assert status == 130
+    assert text == "blysk: stopped; 0 of 1 parts are kept, run again to go on\n"

@@ -1,0 +1,217 @@
+"""Local chord setup: quadratics through three given values, against float64 and exact integers."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.cosines.local_chord_setup import LocalChordSetup
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+
+P = LocalChordSetup()
+
+
+def setup(diffuse, highlight, length):
+    """Of codes, shape (spans, 3) or (spans, lights, 3)."""
+    diffuse, highlight = (np.reshape(v, (len(v), -1, 3)) for v in (diffuse, highlight))
+    return P.compute(Fixed(P.DIFFUSE_FORMAT, diffuse), Fixed(P.HIGHLIGHT_FORMAT, highlight), length)
+
+
+def at(differences, step, light=0):
+    """Values of the quadratic at a pixel of each span, by exact integers."""
+    start, first, second = (d.codes[:, light].astype(object) for d in differences)
+    shift = ChordSetup().format.fraction_bits - differences.start.format.fraction_bits
+    step = step.astype(object)
+    total = (start << shift) + step * first + step * (step - 1) // 2 * second
+    return total.astype(float) * ChordSetup().format.step
+
+
+def curves(rng, count, size, low, high):
+    """Start, P and G of random quadratics that stay in a range."""
+    slope = rng.uniform(-0.49, 0.49, count) * size
+    bend = rng.uniform(-0.12, 0.12, count) * size
+    room = np.abs(slope) + np.abs(bend) + 1e-3
+    return rng.uniform(low + room, high - room), slope, bend
+
+
+def three(curve):
+    start, slope, bend = curve
+    return np.stack([start + t * (slope + t * bend) for t in (0, 0.5, 1)], axis=1)
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e-2, 0.1, 1.0])
+@pytest.mark.parametrize("length", [1, 2, 3, 16, 4095, None])
+def test_error(size, length):
+    """At random pixels and the last: within the bounds, and not far from them where lengths are random."""
+    rng = np.random.default_rng(int(1e4 * size))
+    count = 20_000
+    f, u = curves(rng, count, size, -1, 1), curves(rng, count, size, 0, 2)
+    codes = [
+        np.floor(three(curve) / format.step + 0.5).astype(np.int64)
+        for curve, format in ((f, P.DIFFUSE_FORMAT), (u, P.HIGHLIGHT_FORMAT))
+    ]
+    length = rng.integers(2, 4095, count, endpoint=True) if length is None else np.full(count, length)
+    diffuse, highlight, wide = setup(*codes, length)
+    assert not wide.any()
+    step = np.where(rng.random(count) < 0.5, length - 1, rng.integers(0, length))
+    t = step / np.maximum(length - 1, 1)
+    for differences, (start, slope, bend), bound in (
+        (diffuse, f, P.diffuse_error),
+        (highlight, u, P.highlight_error),
+    ):
+        error = np.abs(at(differences, step) - (start + t * (slope + t * bend)))
+        allowed = bound(np.abs(slope), np.abs(bend))
+        assert (error <= allowed).all()
+        if length.min() < length.max():
+            assert error.max() > bound(0.49 * size, 0.12 * size) / 8
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
+def test_stiff_equal_values_stay(length):
+    """No difference at all, at the ends of the ranges, too."""
+    rng = np.random.default_rng(length)
+    formats = P.DIFFUSE_FORMAT, P.HIGHLIGHT_FORMAT
+    codes = [rng.integers(f.min_code, f.max_code, (500, 1), endpoint=True) for f in formats]
+    for value, format in zip(codes, formats, strict=True):
+        value[:2, 0] = format.min_code, format.max_code
+    codes = [np.repeat(value, 3, axis=1) for value in codes]
+    diffuse, highlight, wide = setup(*codes, np.full(500, length))
+    assert not wide.any()
+    for differences, value, format in zip((diffuse, highlight), codes, formats, strict=True):
+        np.testing.assert_array_equal(differences.start.values[:, 0], value[:, 0] * format.step)
+        assert not differences.first.codes.any()
+        assert not differences.second.codes.any()
+
+
+@pytest.mark.parametrize("length", [2, 3, 5, 9, 17, 4097 // 2 + 1])
+def test_stiff_values_are_met(length):
+    """Where dt is a power of two nothing but G, for f also P, is rounded: 2^-23 in the middle, 2^-19."""
+    rng = np.random.default_rng(length)
+    count = 2000
+    f, u = curves(rng, count, 0.9, -1, 1), curves(rng, count, 0.9, 0, 2)
+    codes = [
+        np.rint(three(curve) / format.step).astype(np.int64)
+        for curve, format in ((f, P.DIFFUSE_FORMAT), (u, P.HIGHLIGHT_FORMAT))
+    ]
+    diffuse, highlight, _ = setup(*codes, np.full(count, length))
+    for place, step in ((0, 0), (1, (length - 1) // 2), (2, length - 1)):
+        if length == 2 and place == 1:
+            continue
+        step = np.full(count, step)
+        drift = 2.0**-46 * (length + length**2 / 2)
+        error = np.abs(at(highlight, step) - codes[1][:, place] * P.HIGHLIGHT_FORMAT.step)
+        assert error.max() <= (2.0**-23 if place == 1 else 0) + drift
+        error = np.abs(at(diffuse, step) - codes[0][:, place] * P.DIFFUSE_FORMAT.step)
+        assert error.max() <= (2.0**-23 if place == 1 else 0) + 2.0**-19 * place / 2 + drift
+
+
+def test_flag():
+    """Exactly where a rounded word leaves its format."""
+    count = 20_001
+    offset = np.arange(count) - count // 2
+    zero, length = np.zeros((count, 3), dtype=np.int64), np.full(count, 5)
+    half = 1 << 25
+
+    # u: P of 26 fraction bits with its end at about 1/2; v_m in the middle, so that G is 0 or half a step.
+    end = half + offset
+    highlight = np.stack([0 * end, end >> 1, end], axis=1)
+    bend = (2 * (end - 2 * (end >> 1)) / 2.0**26 * 2**20 + 0.5) // 1
+    assert not bend.any()
+    _, _, wide = setup(zero, highlight, length)
+    np.testing.assert_array_equal(wide, end >= half)
+    # The other way -1/2 itself fits.
+    _, _, wide = setup(zero, highlight[:, ::-1], length)
+    np.testing.assert_array_equal(wide, end > half)
+
+    # G = 4 (v_l - v_m) with equal ends: 1/8 at v_l - v_m = 2^-5, rounded half up to 2^-20.
+    bump = (1 << 21) + offset
+    for sign in (1, -1):
+        highlight = np.stack([half + 0 * bump, half - sign * bump, half + 0 * bump], axis=1)
+        _, _, wide = setup(zero, highlight, length)
+        bend = np.floor(sign * 4 * bump / 2.0**26 * 2**20 + 0.5)
+        np.testing.assert_array_equal(wide, (bend >= 2**17) | (bend < -(2**17)))
+        assert 0 < np.count_nonzero(wide) < count
+
+    # f: P rounded to 18 fraction bits.
+    end = (1 << 24) + offset
+    diffuse = np.stack([0 * end, end >> 1, end], axis=1)
+    _, _, wide = setup(diffuse, zero, length)
+    np.testing.assert_array_equal(wide, np.floor(end / 2.0**25 * 2**18 + 0.5) >= 2**17)
+    assert 0 < np.count_nonzero(wide) < count
+
+
+def test_sums_never_wrap():
+    """Any codes, flagged or not: the accumulators' sums stay within -4 to 4."""
+    rng = np.random.default_rng(7)
+    count = 20_000
+    codes = []
+    for format in (P.DIFFUSE_FORMAT, P.HIGHLIGHT_FORMAT):
+        ends = rng.choice([format.min_code, format.max_code, 0], (count, 3))
+        anywhere = rng.integers(format.min_code, format.max_code, (count, 3), endpoint=True)
+        codes.append(np.where(rng.random((count, 1)) < 0.5, ends, anywhere))
+    length = rng.integers(1, 4096, count)
+    length[::5] = 2
+    diffuse, highlight, wide = setup(*codes, length)
+    assert 0.5 < wide.mean() < 1
+    worst = 0.0
+    for differences in (diffuse, highlight):
+        for step in (length - 1, *(rng.integers(0, length) for _ in range(5))):
+            worst = max(worst, np.abs(at(differences, step)).max())
+    assert 2 < worst < 2.63
+    assert {unit.format for unit in ChordInterpolator().accumulators.values()} == {SQ(3, 46)}
+
+
+def test_a_distant_light_gives_what_chord_setup_gives(normal_pairs):
+    """The same quadratics from exact values as `ChordSetup` finds from normals, in the bounds of both."""
+    rng = np.random.default_rng(8)
+    left, right = (quantise(v) for v in normal_pairs(rng, 3000, rng.uniform(0, 20, 3000)))
+    direction, halfway = (quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2))
+    length = rng.integers(2, 4096, 3000)
+    vectors = (Fixed(COMPONENT, v) for v in (left, right, direction, halfway))
+    theirs = ChordSetup().compute(*vectors, length)
+    ends = [v / np.linalg.norm(v, axis=1, keepdims=True) for v in (left, right)]
+    middle = ends[0] + ends[1]
+    normals = ends[0], middle / np.linalg.norm(middle, axis=1, keepdims=True), ends[1]
+    d, h = (v[0] / np.linalg.norm(v[0]) for v in (direction, halfway))
+    one = (ONE / 2**17) ** 2
+    f = np.stack([one * (n @ d) for n in normals], axis=1)
+    u = np.stack([one * ((n - h) ** 2).sum(axis=1) / 2 for n in normals], axis=1)
+    fit = u[:, 0] + u[:, 2] <= 3.5
+    ours = setup(
+        np.rint(f / P.DIFFUSE_FORMAT.step).astype(np.int64),
+        np.rint(u / P.HIGHLIGHT_FORMAT.step).astype(np.int64),
+        length,
+    )
+    assert not ours[2].any()
+    step = rng.integers(0, length)
+    bound = ChordSetup().diffuse_error(20.01) + P.diffuse_error(0.5, 0.125)
+    assert np.abs(at(ours[0], step) - at(theirs[0], step)).max() <= bound
+    bound = ChordSetup().highlight_error(20.01) + P.highlight_error(0.5, 0.125)
+    assert np.abs(at(ours[1], step) - at(theirs[1], step))[fit].max() <= bound
+
+
+def test_lights_are_independent():
+    rng = np.random.default_rng(9)
+    shape = (300, 3, 3)
+    diffuse = rng.integers(-(1 << 20), 1 << 20, shape)
+    highlight = rng.integers(1 << 20, 1 << 22, shape)
+    length = rng.integers(1, 4096, 300)
+    *together, wide = setup(diffuse, highlight, length)
+    flags = np.zeros(300, dtype=bool)
+    for light in range(3):
+        *alone, flag = setup(diffuse[:, light], highlight[:, light], length)
+        flags |= flag
+        for both, one in zip(together, alone, strict=True):
+            for a, b in zip(both, one, strict=True):
+                np.testing.assert_array_equal(a.codes[:, light], b.codes[:, 0])
+    np.testing.assert_array_equal(wide, flags)
+
+
+def test_refuses():
+    f, u = (Fixed(format, np.zeros((1, 1, 3), int)) for format in (P.DIFFUSE_FORMAT, P.HIGHLIGHT_FORMAT))
+    with pytest.raises(ValueError, match=r"^operands must be SQ\(1, 25\) and UQ\(1, 26\), not UQ\(1, 26\), "):
+        P.compute(u, u, np.array([1]))
+    for length in (0, 4096):
+        with pytest.raises(ValueError, match=r"^lengths must be 1 to 4095$"):
+            P.compute(f, u, np.array([length]))

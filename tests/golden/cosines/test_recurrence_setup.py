@@ -1,0 +1,218 @@
+"""Recurrence setup against the curve in float64, for spans of every length and angle."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.cosines.recurrence import Recurrence
+from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
+from blysk.golden.normals.difference_setup import reciprocal_place
+from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise, values
+from blysk.golden.reference.curves import interpolate
+
+LENGTHS = [1, 2, 3, 4, 5, 8, 9, 16, 257, 4095]
+ANGLES = [0, 1e-4, 0.01, 0.1, 1, 5, 20, 45, 59, 61, 89.9, 90]
+
+
+def curve(left, right, vector, length):
+    """``(a sin(psi - k d) + b sin(k d))/sin psi`` of codes, shape (pixels, spans)."""
+    left, right, vector = (values(v) for v in (left, right, vector))
+    a, b = (left * vector).sum(axis=-1), (right * vector).sum(axis=-1)
+    q = np.minimum(np.square(right - left).sum(axis=-1) / 2, 1)
+    psi = 2 * np.arcsin(np.sqrt(q / 2))
+    t = np.arange(length)[:, np.newaxis] / max(length - 1, 1)
+
+    def weight(t):
+        return t * np.sinc(t * psi / np.pi) / np.sinc(psi / np.pi)
+
+    return a * weight(1 - t) + b * weight(t)
+
+
+def states_of(setup, left, right, vector, length):
+    left, right, vector = (Fixed(COMPONENT, codes) for codes in (left, right, vector))
+    *start, wide = setup.compute(left, right, vector, np.full(len(left.codes), length))
+    return setup.recurrence.states(*start, length), wide
+
+
+def make_spans(rng, normal_pairs, count, degrees):
+    """Spans, and vectors of which half lie near them, so that the peak is inside."""
+    left, right = normal_pairs(rng, count, degrees)
+    vector = normal_pairs(rng, count, 0.0)[0]
+    near = slice(0, count // 2)
+    t = rng.uniform(0, 1, count // 2)
+    vector[near] = interpolate("normalised", left[near], right[near], t)
+    return quantise(left), quantise(right), quantise(vector)
+
+
+@pytest.mark.parametrize("degrees", ANGLES)
+@pytest.mark.parametrize("length", LENGTHS)
+def test_stiff_spans_keep_the_bound(normal_pairs, length, degrees):
+    rng = np.random.default_rng(length)
+    setup = RecurrenceSetup()
+    spans = make_spans(rng, normal_pairs, 300, degrees)
+    states, wide = states_of(setup, *spans, length)
+    error = np.abs(setup.recurrence.result(states).values - curve(*spans, length)).max()
+    assert not wide.any()
+    assert error <= setup.error(length, np.radians(degrees))
+
+
+@pytest.mark.parametrize(("degrees", "stated"), [(0, 0.016), (1, 0.3), (10, 2.7), (45, 12), (90, 25)])
+def test_largest_errors_are_as_stated(normal_pairs, degrees, stated):
+    """In units of 1e-6; and the bound is no more than 7.5 times what many spans show."""
+    rng = np.random.default_rng(1)
+    setup = RecurrenceSetup()
+    found = []
+    for length in (2, 3, 4, 5, 9, 16, 17, 33, 100, 1000):
+        spans = make_spans(rng, normal_pairs, 2000, degrees)
+        states, _ = states_of(setup, *spans, length)
+        found.append(np.abs(setup.recurrence.result(states).values - curve(*spans, length)).max())
+    assert stated * 0.75e-6 <= max(found) <= stated * 1e-6
+    assert setup.error(4095, np.radians(degrees)) < 7.5 * max(found)
+
+
+def test_curve_is_slerp(normal_pairs):
+    """What the setup stands for is the great circle."""
+    rng = np.random.default_rng(2)
+    left, right, vector = make_spans(rng, normal_pairs, 200, rng.uniform(1, 90, 200))
+    t = np.linspace(0, 1, 50)[:, np.newaxis]
+    normals = interpolate("slerp", values(left), values(right), t)
+    exact = (normals * values(vector)).sum(axis=-1)
+    # The codes are not quite of unit length, and the curve follows that of either end.
+    assert np.abs(curve(left, right, vector, 50) - exact).max() < 2e-5
+
+
+@pytest.mark.parametrize("length", [1, 2, 5, 16, 4095])
+def test_stiff_equal_normals_stay_to_the_bit(normal_pairs, length):
+    rng = np.random.default_rng(3)
+    left, _, vector = make_spans(rng, normal_pairs, 300, 0)
+    states, _ = states_of(RecurrenceSetup(), left, left, vector, length)
+    np.testing.assert_array_equal(states.codes, np.broadcast_to(states.codes[0], states.shape))
+
+
+def test_stiff_normals_a_step_apart(normal_pairs):
+    """The chord is of a few codes, its direction arbitrary, and its length along H far from a sine."""
+    rng = np.random.default_rng(4)
+    left, _, vector = make_spans(rng, normal_pairs, 2000, 0)
+    right = np.clip(left + rng.integers(-1, 2, left.shape), -ONE, ONE)
+    for length in (2, 16, 4095):
+        setup = RecurrenceSetup()
+        states, _ = states_of(setup, left, right, vector, length)
+        error = np.abs(setup.recurrence.result(states).values - curve(left, right, vector, length)).max()
+        assert error <= setup.error(length, 2e-5)
+
+
+def test_stiff_peaks(normal_pairs):
+    """On a pixel, the first, the middle and the last one; and between two."""
+    rng = np.random.default_rng(5)
+    setup = RecurrenceSetup()
+    for degrees in (1, 20, 90):
+        left, right = normal_pairs(rng, 200, degrees)
+        for length, at in ((17, 0), (17, 0.5), (17, 1), (16, 0.5)):
+            codes = [quantise(v) for v in (left, right, interpolate("slerp", left, right, np.full(200, at)))]
+            states, _ = states_of(setup, *codes, length)
+            bound = setup.error(length, np.radians(degrees))
+            found = setup.recurrence.result(states).values
+            assert np.abs(found - curve(*codes, length)).max() <= bound
+            step = np.radians(degrees) / (length - 1)
+            peak = np.cos(step / 2) if length == 16 else 1
+            # The codes lie off the great circle by under 2^-17 each, which the cosine feels at second order,
+            # and are of unit length to within 2^-18 or so.
+            assert np.abs(found.max(axis=0) - peak).max() <= bound + 2.0**-17
+
+
+def test_wide_spans_are_flagged(normal_pairs):
+    rng = np.random.default_rng(6)
+    for degrees, flagged in ((89.99, False), (90, False), (90.02, True), (120, True), (180, True)):
+        spans = make_spans(rng, normal_pairs, 500, degrees)
+        _, wide = states_of(RecurrenceSetup(), *spans, 2)
+        assert np.all(wide == flagged)
+
+
+@pytest.mark.parametrize("length", [2, 3, 5, 16, 2049, 4095])
+def test_stiff_words_at_their_ends(length):
+    """Codes of any size, lengths 0 to sqrt 3: the flag and x(0) are exact, the angle follows the chord.
+
+    x(0) is N_l.H, saturated at -2 and 2. Whatever the lengths, K is that of an isosceles triangle with the
+    chord of the span, within the relative error that `RecurrenceSetup.error` counts.
+    """
+    rng = np.random.default_rng(7)
+    left, right, vector = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (3, 3000, 3))
+    setup, step = RecurrenceSetup(), 2.0**-34
+    first, _, coefficient, shift, wide = setup.compute(
+        *(Fixed(COMPONENT, codes) for codes in (left, right, vector)), np.full(3000, length)
+    )
+    unit = 1 + 2.0**-16
+    chord = np.square(right - left).sum(axis=1) / 2 * step * unit
+    np.testing.assert_array_equal(wide, chord >= 1 + 2.0**-13)
+    assert 900 < np.count_nonzero(wide) < 2100
+    cosine = (left * vector).sum(axis=1) * step * unit
+    assert np.count_nonzero(np.abs(cosine) >= 2) > 20
+    assert np.abs(first.values[:, 0] - np.clip(cosine, -2, 2 - step)).max() < step
+    angle = 4 * 2 * np.arcsin(np.sqrt(np.minimum(chord, 1) / 2)) / (length - 1)
+    used = ~wide & (angle <= np.pi / 2)
+    exact = 4 * np.square(np.sin(angle[used] / 2))
+    found = coefficient.values[used] * 2.0 ** (2 - shift[used])
+    word, table = 2.0**-18, setup.TABLE_ERROR
+    relative = 9 * word + table + (word + table) / 0.81 + word / 0.40
+    assert np.count_nonzero(used) > 200
+    assert np.all(np.abs(found - exact) <= relative * exact)
+
+
+def test_tables():
+    setup = RecurrenceSetup()
+    x = np.linspace(0, 1, 200_001)[1:-1]
+    psi = 2 * np.arcsin(np.sqrt(x / 2))
+    for (values_, changes), exact in zip(
+        setup.chord_tables, (psi**2 / (2 * x) - 1, psi / np.sin(psi) - 1), strict=True
+    ):
+        place = x * 512
+        line = values_.values[place.astype(int)] + changes.values[place.astype(int)] * (place % 1)
+        assert np.abs(line - exact).max() <= setup.TABLE_ERROR - 2.0**-22
+    x = np.linspace(0, np.square(np.pi / 2), 200_001)[1:]
+    d = np.sqrt(x)
+    for (values_, changes), exact in zip(
+        setup.step_tables, (1 - (2 * np.sin(d / 2) / d) ** 2, 1 - np.sin(d) / d), strict=True
+    ):
+        place = x * 128
+        line = values_.values[place.astype(int)] + changes.values[place.astype(int)] * (place % 1)
+        assert np.abs(line - exact).max() <= setup.TABLE_ERROR - 2.0**-22
+
+
+def test_reciprocals():
+    """Of every length: a relative 2^-17, and the square as exact."""
+    setup = RecurrenceSetup()
+    steps = np.arange(1, 4095)
+    address, shift = reciprocal_place(steps)
+    reciprocal, square, small = (word[address] for word in setup.reciprocals)
+    assert np.abs(reciprocal.values * 2.0 ** (1 - shift) * steps - 1).max() <= 2.0**-17
+    assert np.abs(square.values * 2.0 ** (2 - 2 * shift - small) * steps**2 - 1).max() <= 2.0**-17
+    assert min(reciprocal.values.min(), square.values.min()) >= 0.5
+
+
+@pytest.mark.parametrize("degrees", [1, 20, 90])
+@pytest.mark.parametrize("length", [1, 3, 5, 16, 64])
+def test_direct_form(normal_pairs, length, degrees):
+    """Start values and coefficient as from `Recurrence.start`, so its own error bound holds."""
+    rng = np.random.default_rng(8)
+    setup = RecurrenceSetup(Recurrence("direct", interleave=4))
+    spans = make_spans(rng, normal_pairs, 300, degrees)
+    states, _ = states_of(setup, *spans, length)
+    error = np.abs(setup.recurrence.result(states).values - curve(*spans, length)).max()
+    angle = np.radians(degrees)
+    own = RecurrenceSetup().error(length, angle)
+    # An error of a start value comes back as often as steps follow it; that of the coefficient is 2^-16.
+    steps = np.ceil(length / 4)
+    assert error <= setup.recurrence.error(length, angle) + own * (1 + 2 * steps)
+
+
+def test_refusals(normal_pairs):
+    for recurrence in (Recurrence(), Recurrence("direct"), Recurrence(interleave=4, fraction_bits=20)):
+        with pytest.raises(ValueError, match=r"^the recurrence must be "):
+            RecurrenceSetup(recurrence)
+    setup = RecurrenceSetup()
+    normals = Fixed(COMPONENT, np.array([[ONE, 0, 0]]))
+    for length in (0, 4096):
+        with pytest.raises(ValueError, match=r"^lengths must be 1 to 4095$"):
+            setup.compute(normals, normals, normals, np.array([length]))
+    with pytest.raises(ValueError, match=r"^operands must be SQ\(1, 17\)$"):
+        setup.compute(normals, normals, Fixed(SQ(2, 16), np.zeros((1, 3), int)), np.array([1]))

@@ -1,0 +1,167 @@
+"""Exact power twin against float64 and exact integers."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from blysk.golden.lighting.power import Power
+from blysk.golden.lighting.specular import SPECULAR_MODELS, Specular
+from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.reference.reflection import reflect
+
+EXPONENTS = (1, 2, 3, 10, 100, 500, 1000)
+
+
+def shade(unit, codes, exponent, dark=False):
+    codes = np.asarray(codes)
+    return unit.compute(Fixed(unit.operand_format, codes), np.full(codes.shape, dark), exponent)
+
+
+def exact(argument, exponent):
+    """``(1 - x)^n`` with the digits of x."""
+    return np.exp(exponent * np.log1p(-np.minimum(argument, 1 - 1e-15)))
+
+
+def test_error_at_every_exponent():
+    unit = Power("one_minus_cosine")
+    largest, smallest = 0.0, 0.0
+    for exponent in range(1, 1001):
+        rng = np.random.default_rng(exponent)
+        argument = np.r_[
+            rng.uniform(0, min(12 / exponent, 2), 500),
+            np.linspace(0, 1 / exponent, 200),
+            rng.uniform(0, 2, 50),
+        ]
+        codes = np.sort(np.floor(argument * 2**25).astype(np.int64))
+        result = shade(unit, np.minimum(codes, unit.operand_format.max_code), exponent)
+        error = result.values - exact(codes * 2.0**-25, exponent)
+        # The cuts of neighbours differ, by less than the bound; of any two, `tests/formal/test_power.py`.
+        assert (np.diff(result.codes) <= 5).all()
+        largest, smallest = max(largest, error.max()), min(smallest, error.min())
+    # Every cut makes the result smaller.
+    assert largest < 1e-12
+    assert Power.ERROR / 2 < -smallest <= Power.ERROR
+
+
+def test_error_of_a_cosine():
+    """In units of the codes' length, ``x / omega`` exceeds x by a share of 2^-16; n x c^(n-1) <= 1."""
+    unit = Power()
+    omega = ONE_SQUARED.codes.item()
+    for exponent in (1, 2, 3, 10, 100, 500, 1000):
+        codes = omega - (np.linspace(0, min(12 / exponent, 1), 20_000) * omega).astype(np.int64)
+        error = shade(unit, codes, exponent).values - exact(1 - codes / omega, exponent)
+        assert np.abs(error).max() <= Power.ERROR + 2.0**-16
+
+
+def test_first_order_bound():
+    """The sum that the docstring states: every cut product's error times its way to the result."""
+    worst, at = 0, None
+    for n in range(1, 1001):
+        bits = [j for j in range(10) if n >> j & 1]
+        x = [np.linspace(0, min(14 / n, 1), 800)]
+        for _ in range(9):
+            x.append(2 * x[-1] - x[-1] ** 2)
+        total = np.ones_like(x[0])
+        for k in range(9):
+            # A square's error of 2 x reaches all higher bits: c^m with m = n >> (k + 1).
+            m = n >> (k + 1)
+            if m:
+                lower = np.prod([1 - x[j] for j in bits if j <= k], axis=0)
+                total = total + lower * m * (1 - x[k + 1]) ** (m - 1) * 2 * x[k]
+        s = x[bits[0]]
+        for place, j in enumerate(bits[1:], start=1):
+            higher = np.prod([1 - x[i] for i in bits[place + 1 :]], axis=0)
+            total = total + (s + x[j]) * higher
+            s = s + x[j] - s * x[j]
+        if total.max() > worst:
+            worst, at = total.max(), n
+    assert at == 513
+    assert worst == pytest.approx(5.97, abs=0.01)
+    assert worst * 2.0**-17 < Power.ERROR
+
+
+def test_against_integers():
+    """Exact rational powers, nothing of floating point."""
+    unit = Power("one_minus_cosine")
+    rng = np.random.default_rng(3)
+    for exponent in (1, 2, 7, 63, 513, 1000):
+        codes = rng.integers(0, int(2**25 * min(6 / exponent, 1)), 40)
+        for code, result in zip(codes.tolist(), shade(unit, codes, exponent).codes.tolist(), strict=True):
+            power = Fraction(2**25 - code, 2**25) ** exponent
+            assert 0 <= power * 2**17 - result <= 6
+
+
+@pytest.mark.parametrize("exponent", EXPONENTS)
+def test_stiff_exponents(exponent):
+    """Over the half sphere, the bound of a cosine; at the peak, and past it by rounding, 1 to a step."""
+    unit, one = Power(), ONE_SQUARED.codes.item()
+    codes = np.unique(np.r_[np.linspace(0, one, 5000), one - np.geomspace(1, one, 5000)].astype(np.int64))
+    ideal = reflect("blinn", codes / one, exponent)
+    assert np.abs(shade(unit, codes, exponent).values - ideal).max() <= Power.ERROR + 2.0**-16
+    assert (shade(unit, [one, one + 1, one + 2**20], exponent).codes == 2**17 - 1).all()
+
+
+@pytest.mark.parametrize("exponent", EXPONENTS)
+def test_stiff_largest_and_smallest_codes(exponent):
+    """The ends of the word, c of 0 and below, a light behind the surface."""
+    unit = Power()
+    one = ONE_SQUARED.codes.item()
+    format = unit.operand_format
+    assert shade(unit, format.max_code, exponent).codes == 2**17 - 1
+    assert not shade(unit, [-(2**18), -one, format.min_code], exponent).codes.any()
+    # A square of the codes' length is 2^-16 short of 1, so that c = 0 is read as 2^-16.
+    assert (shade(unit, [0, -1], exponent).codes == (exponent == 1)).all()
+    codes = [format.min_code, 0, one // 2, one, format.max_code]
+    assert not shade(unit, codes, exponent, dark=True).codes.any()
+    unit = Power("one_minus_cosine")
+    assert shade(unit, [0], exponent).codes == 2**17 - 1
+    assert not shade(unit, [1 << 25, unit.operand_format.max_code], exponent).codes.any()
+
+
+def test_stiff_normals_of_wrong_length():
+    """A length of 1 + 1/256 counts as 1; one of 1 - 1/256 makes the peak c^n of that, 0.02 at n = 1000."""
+    unit, one = Power(), ONE_SQUARED.codes.item()
+    for length in (0, 1 - 1 / 256, 1 + 1 / 256):
+        codes = np.rint(length * one * np.cos(np.linspace(0, np.pi / 2, 2000))).astype(np.int64)
+        for exponent in EXPONENTS:
+            found = shade(unit, codes, exponent).values
+            ideal = reflect("blinn", codes / one, exponent)
+            assert np.abs(found - ideal).max() <= Power.ERROR + 2.0**-16
+    peak = shade(unit, np.rint(one * (1 - 1 / 256)).astype(np.int64), 1000).values
+    assert peak == pytest.approx(0.01996, abs=2e-4)
+
+
+def test_stiff_peak_on_and_between_pixels():
+    """Pixels 1 degree apart, and 20: symmetric, the largest in the middle; between two of the latter, 0."""
+    unit = Power()
+    for pitch in (1.0, 20.0):
+        for offset in (0.0, 0.5):
+            angle = np.radians(pitch * (np.arange(-9, 10 - 2 * offset) + offset))
+            codes = np.rint(ONE_SQUARED.codes * np.cos(angle)).astype(np.int64)
+            for exponent in EXPONENTS:
+                found = shade(unit, codes, exponent).codes
+                np.testing.assert_array_equal(found, found[::-1])
+                assert found.max() == found[len(codes) // 2]
+            assert found.any() == (pitch == 1 or not offset)
+
+
+def test_nearer_to_blinn_than_the_approximations():
+    codes = ONE_SQUARED.codes - (np.linspace(0, 0.12, 5000) * 2.0**34).astype(np.int64)
+    ideal = exact(1 - codes / ONE_SQUARED.codes, 100)
+    off = {
+        model: np.abs(shade(Specular(model), codes, 100).values - ideal).max()
+        for model in (*SPECULAR_MODELS, "lyon3_refitted", "exp")
+    }
+    assert 50 * np.abs(shade(Power(), codes, 100).values - ideal).max() < min(off.values())
+
+
+def test_bad_arguments_are_refused():
+    with pytest.raises(ValueError, match=r"^operand must be 'cosine' or 'one_minus_cosine', not 'sine'$"):
+        Power("sine")
+    with pytest.raises(ValueError, match=r"^operand must be SQ\(4, 34\), not SQ\(1, 17\)$"):
+        Power().compute(Fixed(SQ(1, 17), [0]), [False], 10)
+    for exponent in (0, 1001):
+        with pytest.raises(ValueError, match=rf"^exponent must be 1 to 1000, not {exponent}$"):
+            shade(Power(), [0], exponent)

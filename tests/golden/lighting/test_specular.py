@@ -1,0 +1,427 @@
+"""Specular twin against float64: every model at every exponent, every argument of some, the second lobe."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from blysk.golden.lighting.specular import FURTHER_MODELS, MAX_EXPONENT, SPECULAR_MODELS, Chords, Specular
+from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.unit_vector import ONE, ONE_SQUARED, quantise
+from blysk.golden.reference.reflection import (
+    COSCOS_MODELS,
+    LINE_MODELS,
+    REFLECTION_MODELS,
+    coscos_scale,
+    reflect,
+    slope,
+)
+
+ARGUMENT = Specular.ARGUMENT_FORMAT
+MODELS = SPECULAR_MODELS + FURTHER_MODELS
+EVERY_EXPONENT = np.arange(1, MAX_EXPONENT + 1)
+EXPONENTS = (1, 2, 3, 10, 100, 500, 1000)
+# One minus cosine has 26 bits; up to the base's zero at 1/k there are 2^18 of them or fewer from k = 128 on.
+EXHAUSTIVE = (300, 500, 511, 512, 513, 777, 1000)
+# Largest error measured over every exponent, by squarings; 6.1e-5 is the cutoff itself.
+MEASURED = {1: 6.2e-5, 2: 6.2e-5, 3: 1.3e-4, 0: 1.8e-4}
+MEASURED_OF_COSCOS = {1: 8.4e-5, 2: 1.7e-4}
+
+
+def shade(unit, codes, exponent, dark=False):
+    codes = np.asarray(codes)
+    return unit.compute(Fixed(unit.operand_format, codes), np.full(codes.shape, dark), exponent)
+
+
+def exact(model, exponent, argument):
+    """``max(1 - k (1 - c), 0)^2``, of one minus the cosine: nothing cancels near the peak."""
+    return np.maximum(1 - slope(model, exponent) * argument, 0) ** 2
+
+
+def zero(unit, exponent):
+    """Argument at which the unit's cutoff lies, nearly."""
+    if unit.model == "exp":
+        return 14 * np.log(2) / exponent
+    if unit.is_coscos:
+        half = np.pi / 2 / coscos_scale(exponent, *COSCOS_MODELS[unit.model])
+        return 1 - np.cos(min(half, np.pi))
+    return (1 - unit.cutoff.values.item()) / slope(unit.model, exponent)
+
+
+def cell_ends(unit, exponent):
+    """The first and last argument of every value of what the unit reads of it, up to past the base's zero.
+
+    The result depends on the shifted word alone, that of ``coscos`` also on the argument without its last 8
+    bits. The exact function falls with the argument, so that the errors of all arguments lie between those
+    at the ends.
+    """
+    _, shift = unit.scale(np.int64(exponent))
+    dropped = min(9 - int(shift), 8 if unit.is_coscos else 10)
+    last = min(int(2**25 * zero(unit, exponent) * 1.01) + 1000, ARGUMENT.max_code)
+    first = np.arange(0, last + 1, 1 << dropped)
+    return np.c_[first, np.minimum(first + (1 << dropped) - 1, ARGUMENT.max_code)].ravel()
+
+
+def check(unit, exponent, codes):
+    """Largest error, and largest error of what is not cut off."""
+    result = shade(unit, codes, exponent).values
+    ideal = exact(unit.model, exponent, codes * 2.0**-25)
+    error = np.abs(result - ideal)
+    assert error.max() <= Specular.ERROR
+    dropped = result == 0
+    assert ideal[dropped].max(initial=0) <= Specular.CUTOFF**2
+    # Nothing else is: past the base's reading error a brighter term shows.
+    assert ideal[~dropped].min() > (Specular.CUTOFF - 2.0**-14) ** 2
+    return error.max(), error[~dropped].max()
+
+
+@pytest.mark.parametrize("model", SPECULAR_MODELS)
+@pytest.mark.parametrize("exponent", EXHAUSTIVE)
+def test_error_of_every_argument(model, exponent):
+    """Measured: 6.1e-5, half of the bound, where it is cut off; 2.9e-5, a quarter of it, elsewhere."""
+    unit = Specular(model, "one_minus_cosine")
+    last = int(2**25 / slope(model, exponent)) + 100
+    assert last < 2**18 + 100
+    worst, lit = check(unit, exponent, np.arange(last))
+    assert worst > Specular.ERROR / 4
+    assert Specular.ERROR / 20 < lit < Specular.ERROR / 4
+
+
+@pytest.mark.parametrize("model", SPECULAR_MODELS)
+@pytest.mark.parametrize("exponent", [1, 2, 3, 10, 100, 255])
+def test_error_of_every_shifted_argument(model, exponent):
+    unit = Specular(model, "one_minus_cosine")
+    _, lit = check(unit, exponent, cell_ends(unit, exponent))
+    assert Specular.ERROR / 20 < lit < Specular.ERROR / 4
+
+
+@pytest.mark.parametrize("model", FURTHER_MODELS)
+def test_every_argument_of_a_narrow_highlight(model):
+    unit = Specular(model, "one_minus_cosine")
+    for exponent in (997, 1000):
+        codes = np.arange(int(1.1 * zero(unit, exponent) * 2**25))
+        error = np.abs(shade(unit, codes, exponent).values - reflect(model, 1 - codes * 2.0**-25, exponent))
+        assert unit.error / 10 < error.max() <= unit.error
+
+
+@pytest.mark.parametrize("model", COSCOS_MODELS)
+@pytest.mark.parametrize("exponent", [1, 2, 3, 10, 100])
+def test_error_of_every_argument_of_a_wide_highlight(model, exponent):
+    unit = Specular(model, "one_minus_cosine")
+    codes = cell_ends(unit, exponent)
+    result = shade(unit, codes, exponent)
+    ideal = reflect(model, 1 - codes * 2.0**-25, exponent)
+    assert np.abs(result.values - ideal).max() <= unit.error
+    assert (np.diff(result.codes) <= 0).all()
+    # The base is read too small by a chord's 8.5e-6 and a cut of 2^-17, and dropped there.
+    assert ideal[result.codes == 0].max() <= (unit.cutoff.values + 2.0**-15) ** COSCOS_MODELS[model][0]
+
+
+@pytest.mark.parametrize("operand", ["cosine", "one_minus_cosine"])
+@pytest.mark.parametrize("model", MODELS)
+def test_error_and_monotony_at_every_exponent(model, operand):
+    """Of a cosine of two unit vectors too: read in units of their length, it is off by no more."""
+    unit = Specular(model, operand)
+    worst = 0
+    for exponent in EVERY_EXPONENT[:: 1 if operand == "cosine" else 7]:
+        rng = np.random.default_rng(exponent)
+        end = zero(unit, exponent)
+        argument = np.r_[
+            np.linspace(0, end / 50, 100),
+            rng.uniform(0, 1.1 * end, 500),
+            end * (1 + rng.uniform(-1e-2, 1e-2, 100)),
+        ]
+        argument = np.sort(np.r_[argument, rng.uniform(0, 1.99, 50)])
+        argument = argument[argument < 1.99]
+        if operand == "cosine":
+            codes = np.floor(ONE_SQUARED.codes * (1 - argument)).astype(np.int64)
+            argument = 1 - codes / ONE_SQUARED.codes
+        else:
+            codes = np.floor(argument * 2**25).astype(np.int64)
+            argument = codes * 2.0**-25
+        result = shade(unit, codes, exponent)
+        ideal = reflect(model, 1 - argument, exponent)
+        worst = max(worst, np.abs(result.values - ideal).max())
+        assert (np.diff(result.codes) <= 0).all()
+        # What is dropped is under 2^-14, but for the error with which the argument is read.
+        assert ideal[result.codes == 0].max(initial=0) <= 2.0**-14 * 1.001
+    measured = (MEASURED_OF_COSCOS if unit.is_coscos else MEASURED)[unit.squarings]
+    assert unit.error / 10 < worst <= min(unit.error, measured)
+
+
+@pytest.mark.parametrize("model", COSCOS_MODELS)
+def test_first_order_bound_of_coscos(model):
+    """The sum that the docstring states, up to x = 1.7: every cut, times how fast the term falls with w."""
+    unit, (power, rule) = Specular(model), COSCOS_MODELS[model]
+    worst = 0
+    for exponent in (*range(1, 33), *range(33, 1001, 31), 1000):
+        a = coscos_scale(exponent, power, rule)
+        ideal = 8 * (a / math.pi) ** 2
+        code = unit.slopes.codes[exponent] * 2.0**-18
+        k = code / 2.0 ** int(unit.scale(np.int64(exponent))[1])
+        gamma = np.linspace(1e-6, min(math.pi / 2 / a, math.acos(-0.7)), 3000)
+        x = 1 - np.cos(gamma)
+        e = gamma**2 / (2 * x) - 1
+        p, w = ideal * x, (2 * a * gamma / math.pi) ** 2
+        cuts = (2.0**-16 * k + 2.0**-17) * (1 + e) + 2.0**-17 * w / k + 2.0**-16 * p + 2.0**-17
+        cuts += abs(code / ideal - 1) * w
+        base, falls = np.cos(a * gamma), np.sin(a * gamma) / np.sqrt(w) * math.pi / 4
+        found = power * base ** (power - 1) * (falls * cuts + 1.11e-5)
+        worst = max(worst, found.max())
+    assert worst == pytest.approx(9.8e-5 * power / 2, rel=0.03)
+    assert worst < unit.error
+
+
+@pytest.mark.parametrize("model", COSCOS_MODELS)
+def test_boundaries_of_coscos(model):
+    """The cosine at the last lit argument, and one step of the shifted word on, is the cutoff to 2^-14.
+
+    The base is read too high by at most 4.3e-5 there, the sum of the docstring with a slope of pi/4; a step
+    is up to 1.2e-5 of it. Not so for n = 1, whose lobe reaches where the chords of e fail.
+    """
+    unit, exponents = Specular(model), EVERY_EXPONENT[1:]
+    scale = np.array([coscos_scale(n, *COSCOS_MODELS[model]) for n in exponents.tolist()])
+    _, shift = unit.scale(exponents)
+    for step in (0, 1):
+        boundary = unit.boundaries.codes[exponents] + step
+        argument = (((boundary + 1) << 10) - 1 >> (shift + 1)) * 2.0**-25
+        base = np.cos(scale * np.arccos(1 - argument))
+        assert np.abs(base - unit.cutoff.values).max() <= 2.0**-14
+
+
+def test_curves_of_coscos():
+    """Both tables at every code, against their functions."""
+    unit = Specular("coscos2")
+    w = np.arange(2**17)
+    error = unit.chords.compute(w).values - np.cos(np.pi / 2 * np.sqrt(w * 2.0**-17))
+    assert 0.9e-5 < error.max() <= 1.11e-5
+    assert error.min() > -1e-5
+    x = np.arange(2**18) * 2.0**-17
+    e = np.r_[0, np.arccos(1 - x[1:]) ** 2 / (2 * x[1:]) - 1]
+    error = unit.excess.compute(np.arange(2**18)).values - e
+    assert error.min() > -6e-6
+    for end, bound in ((1, 1.1e-5), (1.7, 8e-5)):
+        assert bound / 2 < error[x <= end].max() <= bound
+
+
+def test_slopes_of_coscos():
+    """By Taylor's rule a line, by equal integrals a table."""
+    for model, (power, rule) in COSCOS_MODELS.items():
+        unit = Specular(model)
+        assert (unit.slope_terms is None) == (rule == "integral")
+        ideal = [8 * (coscos_scale(n, power, rule) / np.pi) ** 2 for n in EVERY_EXPONENT.tolist()]
+        # As in test_slope: a n + b off by n 2^-20 and 2^-18; a table by 2^-19.
+        bound = 2.0**-19 if rule == "integral" else EVERY_EXPONENT * 2.0**-20 + 2.0**-18
+        assert (np.abs(unit.slopes.values[1:1001] - ideal) <= bound).all()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("model", SPECULAR_MODELS)
+def test_error_of_every_shifted_argument_at_every_exponent(model):
+    unit = Specular(model, "one_minus_cosine")
+    for exponent in EVERY_EXPONENT:
+        codes = cell_ends(unit, exponent)
+        check(unit, exponent, codes)
+        assert (np.diff(shade(unit, np.sort(codes), exponent).codes) <= 0).all()
+
+
+@pytest.mark.parametrize("model", SPECULAR_MODELS)
+def test_slope(model):
+    """The hardware's ``K 2^s`` against the model's k: at most the cut of the sum and of K, 2^-17 each."""
+    unit = Specular(model)
+    scale, shift = unit.scale(EVERY_EXPONENT)
+    assert scale.codes.min() >= 2**16
+    assert (shift >= -1).all()
+    assert (shift <= 9).all()
+    ours = scale.values * 2.0**shift
+    ideal = np.array([slope(model, exponent) for exponent in EVERY_EXPONENT])
+    # a n: a rounded to 2^-20; cut to 2^-18; b rounded to 2^-19; K cut, a relative 2^-16 of at least 1/2.
+    bound = EVERY_EXPONENT * 2.0**-20 + 2.0**-18 + 2.0**-19 + ideal * 2.0**-16
+    assert (np.abs(ours - ideal) <= bound).all()
+    if model != "cosquad_lin":
+        np.testing.assert_array_equal(ours, ideal)
+
+
+@pytest.mark.parametrize("model", SPECULAR_MODELS)
+def test_boundaries_are_the_last_arguments_over_the_cutoff(model):
+    """Exact: the base at the boundary reaches 1/128, one step on it does not."""
+    unit = Specular(model)
+    scale, _ = unit.scale(EVERY_EXPONENT)
+    for exponent, k in zip(EVERY_EXPONENT, scale.codes.tolist(), strict=True):
+        boundary = int(unit.boundaries.codes[exponent])
+
+        def base(shifted, k=k):
+            return 1 - Fraction(1, 2**17) - Fraction(shifted * k >> 16, 2**17)
+
+        assert base(boundary) >= Fraction(1, 128)
+        assert base(boundary + 1) < Fraction(1, 128) or boundary == unit.SHIFTED_FORMAT.max_code
+
+
+def test_second_lobe_stays_dark():
+    """The parabola is 16 at n = 20, 60 degrees; nothing comes back up to the largest argument."""
+    assert (20 / 2 * (np.cos(np.radians(60)) - 1) + 1) ** 2 == pytest.approx(16)
+    cosine = Specular("cosquad", "cosine")
+    code = np.rint(ONE_SQUARED.codes * 0.5).astype(np.int64)
+    assert shade(cosine, code, 20).codes == 0
+    assert reflect("cosquad", 0.5, 20) == 0
+    everything = np.linspace(0, ARGUMENT.max_code, 20_001).astype(np.int64)
+    for model in SPECULAR_MODELS:
+        unit = Specular(model, "one_minus_cosine")
+        for exponent in (2, 3, 10, 20, 100, 500, 1000):
+            beyond = everything[everything * 2.0**-25 > 1 / slope(model, exponent)]
+            assert len(beyond) > 0 or slope(model, exponent) < 1
+            assert not shade(unit, beyond, exponent).codes.any()
+    # Every code that a cosine can have, to those of no unit vector.
+    ends = [cosine.operand_format.min_code, -ONE_SQUARED.codes.item(), -1, 0]
+    assert not shade(cosine, ends, 4).codes.any()
+
+
+def test_documented_comparator_lets_the_second_lobe_through():
+    """At n = 20, 60 degrees the square is 16: it saturates, and the surface is as bright as at the peak."""
+    drawn, gated = (Specular(as_documented=as_documented) for as_documented in (True, False))
+    code = np.rint(ONE_SQUARED.codes * 0.5).astype(np.int64)
+    assert shade(drawn, code, 20).codes == 2**17 - 2
+    assert (shade(drawn, np.arange(-ONE_SQUARED.codes, code, 2**20), 20).codes == 2**17 - 2).all()
+    assert shade(drawn, ONE_SQUARED.codes, 20).codes == 2**17 - 2
+    assert shade(gated, code, 20).codes == 0
+    # Where the base passes -1: 36.87 degrees, cos = 0.8.
+    for degrees, bright in ((36, False), (37, True)):
+        code = np.rint(ONE_SQUARED.codes * np.cos(np.radians(degrees))).astype(np.int64)
+        assert (shade(drawn, code, 20).codes == 2**17 - 2) == bright
+    # Dark is dark in either.
+    assert shade(drawn, code, 20, dark=True).codes == 0
+
+
+@pytest.mark.parametrize("model", SPECULAR_MODELS)
+def test_documented_comparator(model):
+    """Up to the base's zero to the bit the default; past it the printed parabola, limited to 1."""
+    drawn, gated = (Specular(model, "one_minus_cosine", documented) for documented in (True, False))
+    for exponent in EXPONENTS:
+        k = slope(model, exponent)
+        argument = np.r_[np.linspace(0, min(3 / k, 2), 20_000), np.linspace(0, 2, 20_000)]
+        codes = np.minimum((argument * 2**25).astype(np.int64), ARGUMENT.max_code)
+        base = 1 - k * codes * 2.0**-25
+        result = shade(drawn, codes, exponent)
+        assert np.abs(result.values - np.minimum(base * base, 1)).max() <= Specular.ERROR
+        first = base > 0
+        np.testing.assert_array_equal(result.codes[first], shade(gated, codes, exponent).codes[first])
+        assert (result.codes[base <= -1] >= 2**17 - 4).all()
+        assert (base <= -1).any() == (2 * k > 2)
+
+
+@pytest.mark.parametrize("exponent", EXPONENTS)
+@pytest.mark.parametrize("model", MODELS)
+def test_stiff_exponents(model, exponent):
+    """Over the whole half sphere, the bound; at the peak and past it by rounding, 1 to nine steps."""
+    unit = Specular(model, "cosine")
+    one = ONE_SQUARED.codes.item()
+    codes = np.unique(np.r_[np.linspace(0, one, 5000), one - np.geomspace(1, one, 5000)].astype(np.int64))
+    ideal = reflect(model, codes / one, exponent)
+    assert np.abs(shade(unit, codes, exponent).values - ideal).max() <= unit.error
+    peak = shade(unit, [one, one + 1, one + 2**20, unit.operand_format.max_code], exponent)
+    assert (peak.codes >= 2**17 - (2 if model in SPECULAR_MODELS else 9)).all()
+    assert len(set(peak.codes.tolist())) == 1
+    assert shade(Specular(model, "one_minus_cosine"), [0], exponent).codes == peak.codes[0]
+
+
+@pytest.mark.parametrize("exponent", EXPONENTS)
+@pytest.mark.parametrize("model", MODELS)
+def test_stiff_largest_and_smallest_codes(model, exponent):
+    """The far side of the sphere, and codes of no unit vector: the term of N·H = -1, and of 1."""
+    unit = Specular(model, "cosine")
+    one, format = ONE_SQUARED.codes.item(), unit.operand_format
+    ends = shade(unit, [-one, format.min_code], exponent)
+    assert ends.values == pytest.approx(reflect(model, [-1.0, -1.0], exponent), abs=unit.error)
+    assert shade(unit, format.max_code, exponent).codes == shade(unit, one, exponent).codes
+    argument = Specular(model, "one_minus_cosine")
+    last = shade(argument, ARGUMENT.max_code, exponent)
+    assert last.values == pytest.approx(reflect(model, -1.0, exponent), abs=unit.error)
+    # A light behind the surface, at the terminator, N·L = 0, too: nothing, whatever the cosine.
+    codes = [format.min_code, -one, 0, one, format.max_code]
+    assert not shade(unit, codes, exponent, dark=True).codes.any()
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_stiff_normals_of_wrong_length(model):
+    """N of length 1 +- 1/256 or 0, or no H: the term of that product, counted as 1 above 1; no more error.
+
+    At n = 1000 a normal too short by 1/256 has no highlight left: ``cosquad`` gives 0, Blinn's power 0.02.
+    """
+    unit = Specular(model, "cosine")
+    rng = np.random.default_rng(5)
+    normal = rng.normal(size=(400, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    halfway = quantise(normal)
+    for length in (0, 1 - 1 / 256, 1 + 1 / 256):
+        codes = np.clip(np.rint(normal * length * ONE), -ONE - 1, ONE).astype(np.int64)
+        product = np.einsum("ij,ij->i", codes, halfway)
+        for exponent in EXPONENTS:
+            found = shade(unit, product, exponent).values
+            assert found == pytest.approx(reflect(model, product / ONE**2, exponent), abs=unit.error)
+            if length > 1:
+                assert (found >= 1 - 9 * 2.0**-17).all()
+    short = shade(unit, np.rint(ONE_SQUARED.codes * (1 - 1 / 256)).astype(np.int64), 1000).values
+    assert short <= 0.06
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_stiff_peak_on_and_between_pixels(model):
+    """Pixels 1 degree apart, the peak on one or half-way: symmetric, the largest in the middle, and exact.
+
+    From n = 1000 on, the documents' highlights are 2.6 degrees across, three or four pixels. Narrower than a
+    pixel, at pixels 20 degrees apart, only a pixel at the peak is lit; between two nothing is seen.
+    """
+    unit = Specular(model, "cosine")
+    for pitch in (1.0, 20.0):
+        for offset in (0.0, 0.5):
+            angle = np.radians(pitch * (np.arange(-9, 10 - 2 * offset) + offset))
+            codes = np.rint(ONE_SQUARED.codes * np.cos(angle)).astype(np.int64)
+            for exponent in EXPONENTS:
+                found = shade(unit, codes, exponent)
+                np.testing.assert_array_equal(found.codes, found.codes[::-1])
+                middle = len(codes) // 2
+                assert found.codes.max() == found.codes[middle]
+                ideal = reflect(model, np.cos(angle), exponent)
+                assert np.abs(found.values - ideal).max() <= unit.error + 2.0**-17
+            # Of the last exponent, 1000.
+            assert found.codes.any() == (pitch == 1 or not offset)
+
+
+def test_chords_meet():
+    """No step from one chord to the next of more than half a code; the last ends where the curve does."""
+    unit = Specular("exp")
+    start, step = unit.chords.start, unit.chords.step
+    assert start.codes - step.codes == pytest.approx(np.r_[start.codes[1:], start.codes[0] / 2], abs=0.5)
+    for curve in (unit.chords, Specular("coscos4").chords, Specular("coscos4").excess):
+        found = curve.compute(np.arange(len(curve.start.codes) << 11)).codes
+        assert (np.diff(found) * (1 if curve.rising else -1) >= 0).all()
+    line = Chords.of(np.linspace(0, 1, 5) * 0.75, UQ(0, 12), UQ(0, 12))
+    assert line.rising
+    np.testing.assert_array_equal(line.compute(np.arange(8192)).codes, np.arange(8192) * 3072 >> 13)
+
+
+def test_models_are_reflection_models():
+    assert not set(FURTHER_MODELS) & set(SPECULAR_MODELS)
+    assert {*LINE_MODELS, *COSCOS_MODELS, "exp"} == set(MODELS)
+    assert set(FURTHER_MODELS) < set(REFLECTION_MODELS)
+
+
+def test_table_of_slopes():
+    ours = Specular("cosquad_q").slopes.values[1:1001]
+    ideal = [slope("cosquad_q", exponent) for exponent in EVERY_EXPONENT]
+    assert np.abs(ours - ideal).max() <= 2.0**-19
+
+
+def test_bad_arguments_are_refused():
+    with pytest.raises(ValueError, match=r"^the specular unit serves cosquad, .*, not 'phong'$"):
+        Specular("phong")
+    with pytest.raises(ValueError, match=r"^as_documented is of cosquad, cosquad7, cosquad_lin, not of exp$"):
+        Specular("exp", as_documented=True)
+    with pytest.raises(ValueError, match=r"^operand must be 'cosine' or 'one_minus_cosine', not 'sine'$"):
+        Specular(operand="sine")
+    with pytest.raises(ValueError, match=r"^operand must be SQ\(4, 34\), not SQ\(1, 17\)$"):
+        Specular().compute(Fixed(SQ(1, 17), [0]), [False], 10)
+    for exponent in (0, 1001, -1):
+        with pytest.raises(ValueError, match=rf"^exponent must be 1 to 1000, not {exponent}$"):
+            shade(Specular(), [0], exponent)

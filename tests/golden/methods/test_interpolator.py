@@ -1,0 +1,256 @@
+"""Interpolators: the operands of every pixel of each method, against float64 mathematics."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.cosines.angular_setup import AngularSetup
+from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
+from blysk.golden.cosines.highlight_cosine import HighlightCosine
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator, pixels_of
+from blysk.golden.methods.linear_interpolator import LinearInterpolator
+from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
+from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
+from blysk.golden.pipeline import METHODS
+from blysk.golden.reference.curves import CURVES, interpolate
+
+STEP = 2.0**-17
+ONE_VALUE = float(ONE_SQUARED.values)
+FROM_NORMALS = [name for name in METHODS if name != "chord-local"]
+NORMAL_METHODS = [name for name, method in METHODS.items() if isinstance(method, NormalInterpolator)]
+
+# `quantise` moves a vector by half a step along itself and by sqrt(3) steps across.
+MOVED = (0.5 + np.sqrt(3)) * STEP
+
+# Largest error of a component of a normal, in steps of 2^-17, that the devices promise over spans to 40
+# degrees and 64 pixels: the last rounding, 1/2; ends a step off at most, felt 1.25 times, and 1.06 in the
+# middle; the middle normal, half a step; dt, 2^-17 of |P| + 4 |G|; of `renormalise` its own step.
+NORMAL_STEPS = {
+    "linear": 0.5 + 1 + 0.7,
+    "renormalise": 0.5 + 1 + 0.7 + 1.1,
+    "quadratic": 0.5 + 2.4 + 1.5,
+    "quadratic-eval": 0.5 + 2.4 + 2.5,
+    "quadratic-horner": 0.5 + 2.4 + 2.5,
+}
+
+
+def spans(rng, normal_pairs, count=2000, angle=40.0, longest=64):
+    left, right = normal_pairs(rng, count, rng.uniform(0, angle, count))
+    return left, right, rng.integers(1, longest, count, endpoint=True)
+
+
+def vectors(rng, normal_pairs, lights):
+    return tuple(normal_pairs(rng, lights, 0.0)[0] for _ in range(2))
+
+
+def compute(interpolator, left, right, length, direction, halfway):
+    left, right, direction, halfway = (
+        Fixed(COMPONENT, quantise(v)) for v in (left, right, direction, halfway)
+    )
+    return interpolator.compute(left, right, length, direction, halfway)
+
+
+def places(length):
+    span, step = pixels_of(length)
+    return span, step / np.maximum(length - 1, 1)[span]
+
+
+def test_pixels_of():
+    span, step = pixels_of(np.array([2, 1, 3]))
+    assert span.tolist() == [0, 0, 1, 2, 2, 2]
+    assert step.tolist() == [0, 1, 0, 0, 1, 2]
+    assert [len(a) for a in pixels_of(np.array([], dtype=int))] == [0, 0]
+
+
+@pytest.mark.parametrize("method", FROM_NORMALS)
+def test_formats(method, normal_pairs):
+    rng = np.random.default_rng(1)
+    interpolator = METHODS[method]
+    assert interpolator.CURVE in CURVES
+    left, right, length = spans(rng, normal_pairs, 50, 10.0)
+    operands = compute(interpolator, left, right, length, *vectors(rng, normal_pairs, 3))
+    assert operands.cosine.format == interpolator.COSINE_FORMAT
+    assert operands.highlight.format == Specular(operand=interpolator.operand).operand_format
+    shape = (length.sum(), 3)
+    assert (operands.cosine.codes.shape, operands.highlight.codes.shape) == (shape, shape)
+    assert operands.wide.shape == (50,)
+    assert not operands.wide.any()
+
+
+@pytest.mark.parametrize("method", NORMAL_STEPS)
+def test_normals(method, normal_pairs):
+    """Each component against the method's curve in float64, `exact_normals`."""
+    rng = np.random.default_rng(2)
+    interpolator = METHODS[method]
+    left, right, length = spans(rng, normal_pairs)
+    normals, wide = interpolator.normals(
+        Fixed(COMPONENT, quantise(left)), Fixed(COMPONENT, quantise(right)), length
+    )
+    assert not wide.any()
+    span, t = places(length)
+    exact = interpolator.exact_normals(left[span], right[span], t)
+    error = np.abs(normals.codes / ONE - exact).max() / STEP
+    print(f"{method}: {error:.2f} steps")
+    assert error <= NORMAL_STEPS[method]
+    assert error > 0.8
+
+
+@pytest.mark.parametrize("operand", ["cosine", "one_minus_cosine"])
+@pytest.mark.parametrize("method", NORMAL_METHODS)
+def test_products_are_those_of_the_normals(method, operand, normal_pairs):
+    """Exact integers: N.L and N.H whole, the chord cut to 25 fraction bits."""
+    rng = np.random.default_rng(3)
+    interpolator = type(METHODS[method])(**{**METHODS[method].__dict__, "operand": operand})
+    assert interpolator.uses_chord == (operand == "one_minus_cosine")
+    left, right, length = spans(rng, normal_pairs, 300, 20.0)
+    direction, halfway = vectors(rng, normal_pairs, 2)
+    # A light near the spans: u is under 1/2, where the chord is exact.
+    halfway = left[:2]
+    operands = compute(interpolator, left, right, length, direction, halfway)
+    normals, _ = interpolator.normals(
+        Fixed(COMPONENT, quantise(left)), Fixed(COMPONENT, quantise(right)), length
+    )
+    lights, h = quantise(direction), quantise(halfway)
+    np.testing.assert_array_equal(operands.cosine.codes, normals.codes @ lights.T)
+    if operand == "cosine":
+        np.testing.assert_array_equal(operands.highlight.codes, normals.codes @ h.T)
+        return
+    square = ((normals.codes[:, np.newaxis] - h) ** 2).sum(axis=-1)
+    near = square < 1 << 34
+    assert np.count_nonzero(near) > 1000
+    np.testing.assert_array_equal(operands.highlight.codes[near], square[near] >> 10)
+
+
+def test_chord_operands(normal_pairs):
+    """N.L and u against the fit in float64, in the bounds of `ChordSetup` and of the last rounding."""
+    rng = np.random.default_rng(4)
+    left, right, length = spans(rng, normal_pairs, 4000, 22.4, 400)
+    direction, halfway = vectors(rng, normal_pairs, 2)
+    operands = compute(ChordInterpolator(), left, right, length, direction, halfway)
+    left, right, direction, halfway = (
+        quantise(v) / np.linalg.norm(quantise(v), axis=-1, keepdims=True)
+        for v in (left, right, direction, halfway)
+    )
+    span, t = places(length)
+    middle = left + right
+    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    t = t[:, np.newaxis]
+
+    def fit(function):
+        a, b, c = (function(n)[span] for n in (left, middle, right))
+        return (2 * c - 4 * b + 2 * a) * t**2 + (4 * b - c - 3 * a) * t + a
+
+    cosine = ONE_VALUE * fit(lambda n: n @ direction.T)
+    u = ONE_VALUE * fit(lambda n: ((n[:, np.newaxis] - halfway) ** 2).sum(axis=-1) / 2)
+    rounding = 2.0**-26
+    p = ChordSetup()
+    assert np.abs(operands.cosine.values - cosine).max() <= p.diffuse_error(22.402) + rounding
+    largest = np.maximum(u[np.cumsum(length) - length], u[np.cumsum(length) - 1])[span] / ONE_VALUE
+    assert np.all(np.abs(operands.highlight.values - u) <= p.highlight_error(22.402, largest) + rounding)
+
+
+def test_angular_operands(normal_pairs):
+    """``1 - cos`` along the great circle: the devices' bounds, and what rounding moves a vector, `MOVED`."""
+    rng = np.random.default_rng(5)
+    left, right, length = spans(rng, normal_pairs)
+    direction, halfway = vectors(rng, normal_pairs, 2)
+    operands = compute(METHODS["angular"], left, right, length, direction, halfway)
+    span, t = places(length)
+    normals = interpolate("slerp", left[span], right[span], t)
+    # The weights of the two ends add up to 1/cos(psi/2) at most.
+    bound = MOVED * (1 / np.cos(np.radians(20)) + 1)
+    bound += np.max(AngularSetup.error(np.linspace(0.01, 40, 4000))) + HighlightCosine.ERROR + 2.0**-16
+    assert np.abs(operands.cosine.values - normals @ direction.T).max() <= bound
+    assert np.abs(operands.highlight.values - (1 - normals @ halfway.T)).max() <= bound
+    assert np.abs(operands.cosine.values - normals @ direction.T).max() > bound / 8
+
+
+@pytest.mark.parametrize("method", FROM_NORMALS)
+@pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
+def test_stiff_equal_normals(method, length, normal_pairs):
+    """Angle 0: every pixel of a span is as its first."""
+    rng = np.random.default_rng(length)
+    left, _ = normal_pairs(rng, 3, 0.0)
+    lengths = np.full(3, length)
+    operands = compute(METHODS[method], left, left, lengths, *vectors(rng, normal_pairs, 1))
+    assert not operands.wide.any()
+    for values in (operands.cosine, operands.highlight):
+        values = values.codes.reshape(3, length)
+        np.testing.assert_array_equal(values, values[:, :1].repeat(length, axis=1))
+
+
+# The recurrence as drawn drifts away from its end; its own tests say how far.
+@pytest.mark.parametrize("method", FROM_NORMALS)
+@pytest.mark.parametrize("angle", [1e-4, 1.0, 14.0])
+def test_stiff_ends(method, angle, normal_pairs):
+    """The first and the last pixel have the normals of the ends, whatever the length."""
+    rng = np.random.default_rng(7)
+    left, right = normal_pairs(rng, 200, angle)
+    direction, halfway = vectors(rng, normal_pairs, 1)
+    ends = np.stack([left @ direction[0], right @ direction[0]], axis=1)
+    for length in (2, 3, 16, 1000):
+        operands = compute(METHODS[method], left, right, np.full(200, length), direction, halfway)
+        cosine = operands.cosine.values.reshape(200, length)[:, [0, -1]]
+        # Two vectors off, `ONE_SQUARED` in place of 1, and a step of the normal across.
+        assert np.abs(cosine - ends).max() <= 2 * MOVED + 2.0**-16 + np.sqrt(3) * STEP
+
+
+def test_widest_span():
+    for name, method in METHODS.items():
+        for exponent in (1, 10, 1000):
+            widest = method.widest_span(exponent)
+            assert widest == (largest_span_angle(exponent) if name == "chord" else method.MAX_ANGLE)
+    assert largest_span_angle(1) == largest_span_angle(5) == 15.0
+    assert abs(largest_span_angle(64) - 10.0) < 1e-12
+    assert abs(largest_span_angle(1000) - 20 / 1000 ** (1 / 6)) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("method", "narrow", "wide"),
+    [
+        ("bisection", 89.99, 90.1),
+        ("quadratic", 44.99, 45.1),
+        ("chord", 22.49, 22.52),
+        ("recurrence", 89.98, 90.1),
+    ],
+)
+def test_flag(method, narrow, wide, normal_pairs):
+    rng = np.random.default_rng(8)
+    for angle, flagged in ((narrow, False), (wide, True)):
+        left, right = normal_pairs(rng, 200, angle)
+        operands = compute(METHODS[method], left, right, np.full(200, 2), *vectors(rng, normal_pairs, 1))
+        assert (operands.wide == flagged).all()
+
+
+@pytest.mark.parametrize("method", ["linear", "renormalise"])
+def test_flag_of_linear_normals(method, normal_pairs):
+    """A component of the difference of 1 or more."""
+    rng = np.random.default_rng(9)
+    left, right = normal_pairs(rng, 2000, rng.uniform(0, 180, 2000))
+    operands = compute(METHODS[method], left, right, np.full(2000, 2), *vectors(rng, normal_pairs, 1))
+    difference = quantise(right) - quantise(left)
+    far = np.any((difference < COMPONENT.min_code) | (difference > COMPONENT.max_code), axis=1)
+    np.testing.assert_array_equal(operands.wide, far)
+    assert 300 < np.count_nonzero(far) < 1700
+
+
+def test_flag_of_opposite_normals():
+    x = np.array([[1.0, 0, 0]])
+    operands = compute(METHODS["angular"], x, -x, np.array([3]), x, x)
+    assert operands.wide.tolist() == [True]
+
+
+def test_refuses():
+    for make in (LinearInterpolator, QuadraticInterpolator):
+        with pytest.raises(ValueError, match=r"^operand must be 'cosine' or 'one_minus_cosine', not 'sine'$"):
+            make(operand="sine")
+    with pytest.raises(ValueError, match=r"'spline'"):
+        QuadraticInterpolator(form="spline")
+    with pytest.raises(NotImplementedError):
+        Interpolator().compute(None, None, None, None, None)
+    wrong = Fixed(SQ(2, 16), np.zeros((1, 3), int))
+    for method in ("chord", "quadratic"):
+        with pytest.raises(ValueError, match=r"^operands? must be "):
+            METHODS[method].compute(wrong, wrong, np.array([2]), wrong, wrong)

@@ -1,0 +1,229 @@
+"""The local chord method: operands of pixels with L and H of their own, against float64 mathematics."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.cosines.local_chord_setup import LocalChordSetup
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.methods.interpolator import pixels_of
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
+from blysk.golden.number.fixed import SQ
+from blysk.golden.number.unit_vector import ONE, ONE_SQUARED
+from blysk.golden.pipeline import MODELS
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.reflection import reflect
+
+ONE_VALUE = float(ONE_SQUARED.values)
+METHOD = LocalChordInterpolator()
+EXPONENTS = [1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000]
+
+
+class Surface:
+    """Straight lines of points with turning normals, lit by point lights, seen by a near viewer."""
+
+    def __init__(self, rng, count, lights, turn, reach, exponent, opposite=False):
+        self.start = rng.normal(size=(count, 3))
+        self.step = reach * normalise(rng.normal(size=(count, 3)))
+        # At about 3 units, on all sides.
+        self.lights = rng.uniform(2, 4, (count, lights, 1)) * normalise(rng.normal(size=(count, lights, 3)))
+        self.viewer = rng.uniform(2, 4, (count, 1)) * normalise(rng.normal(size=(count, 3)))
+        if opposite:
+            # Behind the point that the viewer sees, so that L is nearly -V, and H turns fast.
+            spread = 10.0 ** rng.uniform(-2, 0.3, (count, lights, 1)) * rng.normal(size=(count, lights, 3))
+            self.lights = spread - self.viewer[:, np.newaxis] * rng.uniform(0.5, 2, (count, lights, 1))
+        # Normals about the H of the first light, so that half of the spans see its highlight.
+        towards = normalise(normalise(self.lights[:, 0]) + normalise(self.viewer))
+        near = rng.normal(size=(count, 3)) * rng.choice([0.5, 2, 30], (count, 1)) / np.sqrt(exponent)
+        self.left = normalise(towards + near)
+        self.right = normalise(self.left + turn * normalise(rng.normal(size=(count, 3))))
+
+    def at(self, span, t):
+        """N·L and 1 - N·H at places of spans, each vector normalised there."""
+        t = t[:, np.newaxis]
+        normal = normalise((1 - t) * self.left[span] + t * self.right[span])[:, np.newaxis]
+        point = self.start[span] + t * self.step[span]
+        viewer = normalise(self.start[span] + self.viewer[span] - point)[:, np.newaxis]
+        direction = normalise((self.start[span])[:, np.newaxis] + self.lights[span] - point[:, np.newaxis])
+        halfway = normalise(direction + viewer)
+        return (normal * direction).sum(axis=2), ((normal - halfway) ** 2).sum(axis=2) / 2
+
+    def turns(self):
+        """Whether L and V move too far for their H; N, V and L are made not to turn too far."""
+        viewers, directions = [], []
+        for point in (self.start, self.start + self.step):
+            viewers.append(normalise(self.start + self.viewer - point)[:, np.newaxis])
+            directions.append(normalise(self.start[:, np.newaxis] + self.lights - point[:, np.newaxis]))
+        move = sum(np.linalg.norm(a - b, axis=2) for a, b in (viewers, directions))
+        total = [np.linalg.norm(v + d, axis=2) for v, d in zip(viewers, directions, strict=True)]
+        return (move > METHOD.LARGEST_MOVE * np.minimum(*total)).any(axis=1)
+
+    def values(self):
+        span = np.arange(len(self.start))
+        each = [self.at(span, np.full(len(span), t)) for t in (0.0, 0.5, 1.0)]
+        return SpanValues.quantise(*(np.stack(value, axis=2) for value in zip(*each, strict=True)))
+
+
+def test_operands():
+    """Against the quadratics through the exact values, in the bounds of the setup and the last rounding."""
+    rng = np.random.default_rng(1)
+    surface = Surface(rng, 4000, 2, 0.1, 0.1, 20)
+    length = rng.integers(1, 400, 4000)
+    values = surface.values()
+    operands = METHOD.compute_values(values, length)
+    # A light nearly opposite to the viewer turns H a great deal.
+    assert operands.wide.mean() < 0.01
+    kept = ~operands.wide[pixels_of(length)[0]]
+    assert operands.cosine.format == METHOD.COSINE_FORMAT == SQ(2, 25)
+    assert operands.highlight.format == Specular(operand=METHOD.operand).operand_format
+    assert operands.cosine.codes.shape == operands.highlight.codes.shape == (length.sum(), 2)
+    p, step = LocalChordSetup, 2.0**-26
+    cosine, u = METHOD.exact_operands(values, length)
+    # A quadratic may dip under 0, the operand not.
+    assert u.min() < 0
+    found = cosine, np.maximum(u, 0)
+    for operand, curve, bound in zip(
+        (operands.cosine, operands.highlight), found, (p.diffuse_error, p.highlight_error), strict=True
+    ):
+        error = np.abs(operand.values - ONE_VALUE * curve)[kept]
+        assert error.max() <= bound(0.5, 0.125) + step
+        assert error.max() > step / 2
+
+
+def test_exact_operands():
+    """The quadratics, written out, at every pixel; a span of one pixel has its first value."""
+    rng = np.random.default_rng(2)
+    surface = Surface(rng, 50, 3, 0.2, 0.2, 20)
+    length = rng.integers(1, 9, 50)
+    values = surface.values()
+    found = METHOD.exact_operands(values, length)
+    span, step = pixels_of(length)
+    nodes = np.array([0, 0.5, 1])
+    for codes, exact, unit in zip(values, found, (2.0**-25, 2.0**-26), strict=True):
+        for pixel in range(len(span)):
+            t = step[pixel] / max(length[span[pixel]] - 1, 1)
+            weights = [np.prod([(t - b) / (a - b) for b in nodes if b != a]) for a in nodes]
+            expected = codes[span[pixel]] @ weights * unit / (ONE / 2**17) ** 2
+            assert exact[pixel] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
+def test_stiff_equal_values(length):
+    """Every pixel of a span is as its first, to the last rounding."""
+    rng = np.random.default_rng(length)
+    diffuse, highlight = rng.uniform(-1, 1, (40, 2, 1)), rng.uniform(0, 2, (40, 2, 1))
+    diffuse[:2], highlight[:2] = [[[-1.0]], [[1.0]]], [[[0.0]], [[2.0]]]
+    values = SpanValues.quantise(diffuse.repeat(3, axis=2), highlight.repeat(3, axis=2))
+    operands = METHOD.compute_values(values, np.full(40, length))
+    assert not operands.wide.any()
+    for operand, codes in ((operands.cosine, values.diffuse), (operands.highlight, values.highlight / 2)):
+        found = operand.codes.reshape(40, length, 2)
+        np.testing.assert_array_equal(found, np.repeat(np.floor(codes[:, None, :, 0] + 0.5), length, axis=1))
+
+
+def test_peak_in_the_middle_and_at_the_ends():
+    """u = 0 at a pixel gives the operand 0, to what G is rounded by; it never turns below."""
+    values = SpanValues.quantise(
+        np.full((2, 1, 3), 0.7), np.array([[[1e-3, 0, 1e-3]], [[0, 1e-3, 4e-3]]], dtype=float)
+    )
+    for length in (3, 17, 4095):
+        operands = METHOD.compute_values(values, np.full(2, length))
+        u = operands.highlight.values.reshape(2, length)
+        assert u[0, length // 2] <= 2.0**-22
+        assert u[1, 0] == 0
+        assert u.min() >= 0
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_highlight_tolerance(model):
+    """What the tolerance costs, by the steepest chord of each model in float64, times 1.25."""
+    for n in EXPONENTS:
+        worst = 0.0
+        for end in (2.0, min(2.0, 12 / n)):
+            u = np.linspace(0, end, 20_001)
+            slope = np.abs(np.diff(reflect(model, 1 - u, n)) / np.diff(u))
+            worst = max(worst, (255 * slope * METHOD.highlight_tolerance(n, u[:-1])).max())
+        assert worst <= METHOD.HIGHLIGHT_BUDGET * (1.6 if n == 1 else 1.25)
+        assert worst >= METHOD.HIGHLIGHT_BUDGET * 0.75
+
+
+def exact(values):
+    """Values of codes."""
+    return values.diffuse * 2.0**-25 / ONE_VALUE, values.highlight * 2.0**-26 / ONE_VALUE
+
+
+def sizes(values):
+    """Of P and G."""
+    left, middle, right = values
+    bend = 2 * (left + right - 2 * middle)
+    return np.abs(right - left - bend), np.abs(bend)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_is_lit(model):
+    """Where it says no there is no term over a quarter of an LSB."""
+    for n in EXPONENTS:
+        u = np.linspace(0, 2, 20_001)
+        dark = ~METHOD.is_lit(n, u)
+        assert dark.any() == (n > 4)
+        assert (255 * reflect(model, 1 - u[dark], n)).max(initial=0) <= 0.25
+
+
+@pytest.mark.parametrize("opposite", [False, True])
+@pytest.mark.parametrize("exponent", [1, 10, 100, 1000])
+def test_total_error(exponent, opposite):
+    """Fit and arithmetic against vectors normalised at each pixel, over spans that pass the tolerances."""
+    rng = np.random.default_rng(exponent)
+    count = 8_000
+    turn, reach = rng.uniform(0, 0.3, (count, 1)), 10.0 ** rng.uniform(-2 - opposite, 0, (count, 1))
+    surface = Surface(rng, count, 2, turn, reach, exponent, opposite)
+    values = surface.values()
+    span = np.arange(count)
+    f, u = (np.moveaxis(v, 2, 0) for v in exact(values))
+    good = ~surface.turns()
+    miss_of_f, miss_of_u = (np.zeros((count, 2)) for _ in range(2))
+    for t in (0.25, 0.75):
+        weights = [(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)]
+        exact_f, exact_u = surface.at(span, np.full(count, t))
+        miss_of_f = np.maximum(miss_of_f, np.abs(np.tensordot(weights, f, 1) - exact_f))
+        miss_of_u = np.maximum(miss_of_u, np.abs(np.tensordot(weights, u, 1) - exact_u))
+    slope, bend = sizes(u)
+    # The vertex of a quadratic is at most a quarter from one of the three.
+    least = np.maximum(u.min(axis=0) - bend / 16 - miss_of_u, 0)
+    miss_of_u = METHOD.MARGIN * miss_of_u + LocalChordSetup.highlight_error(slope, bend)
+    good &= (miss_of_u <= METHOD.highlight_tolerance(exponent, least)).all(axis=1)
+    miss_of_f = METHOD.MARGIN * miss_of_f + LocalChordSetup.diffuse_error(*sizes(f))
+    good &= (miss_of_f <= METHOD.diffuse_tolerance).all(axis=1)
+    length = rng.integers(4, 100, count)
+    operands = METHOD.compute_values(values, length)
+    good &= ~operands.wide
+    assert np.count_nonzero(good) > count // 20
+    of_pixel, step = pixels_of(length)
+    exact_f, exact_u = surface.at(of_pixel, step / (length - 1)[of_pixel])
+    kept = good[of_pixel]
+    diffuse = 255 * np.abs(operands.cosine.values / ONE_VALUE - exact_f)[kept]
+    terms = [
+        reflect("cosquad", 1 - value, exponent)[kept]
+        for value in (operands.highlight.values / ONE_VALUE, exact_u)
+    ]
+    specular = 255 * np.abs(terms[0] - terms[1])
+    print(f"n = {exponent}: diffuse {diffuse.max():.3f}, specular {specular.max():.3f} LSB")
+    assert np.count_nonzero(terms[1] > 0.1) > 500
+    assert 0.02 < diffuse.max() <= METHOD.DIFFUSE_BUDGET
+    assert 0.02 < specular.max() <= METHOD.HIGHLIGHT_BUDGET
+
+
+def test_quantise():
+    """Nearest codes in units of ONE_SQUARED; the ends of the ranges fit."""
+    values = SpanValues.quantise(np.array([[[-1.0, 0.0, 1.0]]]), np.array([[[0.0, 1.0, 2.0]]]))
+    one = (2**17 - 1) ** 2 / 2**34
+    assert values.diffuse.tolist() == [[[-round(one * 2**25), 0, round(one * 2**25)]]]
+    assert values.highlight.tolist() == [[[0, round(one * 2**26), round(2 * one * 2**26)]]]
+    with pytest.raises(ValueError, match=r"outside|exceed"):
+        SpanValues.quantise(np.zeros((1, 1, 3)), np.full((1, 1, 3), -0.1))
+    with pytest.raises(ValueError, match=r"outside|exceed"):
+        SpanValues.quantise(np.full((1, 1, 3), 1.1), np.zeros((1, 1, 3)))
+
+
+def test_refuses_normals():
+    with pytest.raises(ValueError, match=r"^the local chord method takes values of its spans, not normals"):
+        METHOD.compute(None, None, np.array([2]), None, None)

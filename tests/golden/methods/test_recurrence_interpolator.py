@@ -1,0 +1,105 @@
+"""The recurrence method against cosines along the great circle."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.methods.angular_interpolator import AngularInterpolator
+from blysk.golden.methods.interpolator import pixels_of
+from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, quantise, values
+
+
+def operands_of(interpolator, left, right, length, direction, halfway):
+    left, right, direction, halfway = (Fixed(COMPONENT, v) for v in (left, right, direction, halfway))
+    return interpolator.compute(left, right, length, direction, halfway)
+
+
+def errors(interpolator, left, right, length, direction, halfway):
+    """Largest error of N·L and of the cosine of H, by span."""
+    found = operands_of(interpolator, left, right, length, direction, halfway)
+    span, index = pixels_of(length)
+    t = index / np.maximum(length[span] - 1, 1)
+    normals = interpolator.exact_normals(values(left)[span], values(right)[span], t)
+    cosines = normals @ values(direction).T, normals @ values(halfway).T
+    off = np.maximum(
+        np.abs(found.cosine.values - cosines[0]), np.abs(1 - found.highlight.values - cosines[1])
+    ).max(axis=1)
+    worst = np.zeros(len(length))
+    np.maximum.at(worst, span, off)
+    return worst, found
+
+
+@pytest.mark.parametrize("lights", [1, 2])
+def test_operands_keep_the_bound(normal_pairs, lights):
+    """Spans of all lengths and angles in one call, each against its own bound."""
+    rng = np.random.default_rng(1)
+    degrees = np.r_[np.zeros(20), 10.0 ** rng.uniform(-4, 0, 100), rng.uniform(0, 90, 280)]
+    left, right = (quantise(v) for v in normal_pairs(rng, 400, degrees))
+    length = rng.integers(1, 60, 400)
+    length[::40] = [1, 2, 3, 4, 5, 8, 9, 2049, 4094, 4095]
+    direction, halfway = (quantise(normal_pairs(rng, lights, 0.0)[0]) for _ in range(2))
+    interpolator = RecurrenceInterpolator()
+    worst, found = errors(interpolator, left, right, length, direction, halfway)
+    assert found.cosine.shape == found.highlight.shape == (length.sum(), lights)
+    assert not found.wide.any()
+    # The curve follows the codes' lengths, which are off by up to 2^-17 or so, and so does the angle.
+    assert np.all(worst <= interpolator.setup.error(length, np.radians(degrees)) + 2.0**-16)
+
+
+def test_spans_do_not_depend_on_each_other(normal_pairs):
+    rng = np.random.default_rng(2)
+    left, right = (quantise(v) for v in normal_pairs(rng, 40, rng.uniform(0, 100, 40)))
+    length = np.r_[rng.integers(1, 40, 38), 500, 1]
+    vectors = [quantise(normal_pairs(rng, 2, 0.0)[0]) for _ in range(2)]
+    whole = operands_of(RecurrenceInterpolator(), left, right, length, *vectors)
+    ends = np.cumsum(length)
+    for k in range(40):
+        one = slice(k, k + 1)
+        single = operands_of(RecurrenceInterpolator(), left[one], right[one], length[one], *vectors)
+        pixels = slice(ends[k] - length[k], ends[k])
+        np.testing.assert_array_equal(single.cosine.codes, whole.cosine.codes[pixels])
+        np.testing.assert_array_equal(single.highlight.codes, whole.highlight.codes[pixels])
+        assert single.wide == whole.wide[k]
+
+
+def test_agrees_with_the_angular_method(normal_pairs):
+    """The same curve, found in another way."""
+    rng = np.random.default_rng(3)
+    left, right = (quantise(v) for v in normal_pairs(rng, 300, rng.uniform(0, 45, 300)))
+    length = rng.integers(1, 100, 300)
+    vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+    found, other = (
+        operands_of(interpolator, left, right, length, *vectors)
+        for interpolator in (RecurrenceInterpolator(), AngularInterpolator())
+    )
+    assert np.abs(found.cosine.values - other.cosine.values).max() < 5e-5
+    assert np.abs(found.highlight.values - other.highlight.values).max() < 5e-5
+
+
+def test_direct_form_is_unstable(normal_pairs):
+    """As drawn, in the same words: harmless in short spans, useless in long ones."""
+    rng = np.random.default_rng(4)
+    left, right = (quantise(v) for v in normal_pairs(rng, 100, 10.0))
+    vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+    for length, least, most in ((8, 0, 1e-4), (256, 1e-3, 0.05), (2000, 0.02, 3)):
+        lengths = np.full(100, length)
+        direct, stable = (
+            errors(RecurrenceInterpolator(form), left, right, lengths, *vectors)[0].max()
+            for form in ("direct", "reinsch")
+        )
+        assert least <= direct < most
+        assert stable < 3e-5
+
+
+def test_wide_spans_are_flagged(normal_pairs):
+    rng = np.random.default_rng(5)
+    left, right = (quantise(v) for v in normal_pairs(rng, 5, [0, 45, 89.99, 90.02, 180]))
+    vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+    found = operands_of(RecurrenceInterpolator(), left, right, np.full(5, 3), *vectors)
+    np.testing.assert_array_equal(found.wide, [False, False, False, True, True])
+
+
+def test_refuses_a_form():
+    with pytest.raises(ValueError, match=r"^form must be one of reinsch, direct, not 'sine'$"):
+        RecurrenceInterpolator("sine")

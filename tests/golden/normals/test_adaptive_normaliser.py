@@ -1,0 +1,239 @@
+"""Adaptive normaliser: the twin against float64."""
+
+import re
+
+import numpy as np
+import pytest
+
+from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
+from blysk.golden.normals.bisection import Bisection
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.golden.reference.curves import interpolate
+
+VARIANTS = [
+    AdaptiveNormaliser(t, b) for t in (1 / 8, 2.0**-10, 2.0**-14) for b in (Bisection(), Bisection(1, 45))
+]
+LENGTHS = np.array([1, 2, 3, 4, 5, 9, 16, 17, 33, 64, 100, 129, 257, 1000, 4095])
+
+
+def run(parameters, normal_pairs, seed, angles, lengths):
+    rng = np.random.default_rng(seed)
+    left, right = (quantise(normals) for normals in normal_pairs(rng, len(lengths), angles))
+    result = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right), lengths)
+    span = np.repeat(np.arange(len(lengths)), lengths)
+    pixel = np.arange(len(span)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    return left, right, span, pixel, *result
+
+
+def lines(left, right, levels, t):
+    """Straight lines between points of the great circle, in float64 and in units of the word."""
+    scaled = t * 2.0**levels
+    segment = np.minimum(np.floor(scaled), 2.0**levels - 1)
+    before, after = (interpolate("slerp", left, right, (segment + k) / 2.0**levels) for k in (0, 1))
+    # The great circle has the length of its left end.
+    after = np.where((segment + 1 == 2.0**levels)[:, np.newaxis], right, after)
+    return before + (scaled - segment)[:, np.newaxis] * (after - before)
+
+
+@pytest.mark.parametrize("parameters", VARIANTS, ids=str)
+@pytest.mark.parametrize("first_step", [False, True])
+def test_error_under_its_bound(normal_pairs, parameters, first_step):
+    # A span that the unit does not divide shows its own arithmetic all the same.
+    low, high = (45.01, 90) if first_step and parameters.bisection.max_angle == 90 else (0.01, 44.99)
+    lengths = np.tile(LENGTHS, 12)
+    angles = np.random.default_rng(1).uniform(low, high, len(lengths))
+    left, right, span, pixel, normal, wide, levels = run(parameters, normal_pairs, 2, angles, lengths)
+    assert not wide.any()
+    t = pixel / np.maximum(lengths - 1, 1)[span]
+    exact = lines(left[span] / ONE, right[span] / ONE, levels[span], t) * (ONE * COMPONENT.step)
+    error = np.abs(normal.values - exact).max(axis=1)
+    bounds = np.array([parameters.error(k, low > 1) for k in range(parameters.depth + 1)])
+    assert np.all(error <= bounds[levels][span])
+    # Of every number of levels, the bound takes the widest span that asks for it.
+    assert (error / bounds[levels][span]).max() >= 0.3
+
+
+@pytest.mark.parametrize("parameters", VARIANTS, ids=str)
+def test_length_and_direction_keep_their_word(normal_pairs, parameters):
+    lengths = np.full(300, 1000)
+    angles = np.random.default_rng(3).uniform(0, parameters.bisection.max_angle - 0.01, 300)
+    left, right, span, pixel, normal, wide, levels = run(parameters, normal_pairs, 4, angles, lengths)
+    assert not wide.any()
+    vectors = normal.values / (ONE * COMPONENT.step)
+    length = np.linalg.norm(vectors, axis=1)
+    # Three components off by the arithmetic error, and the code vectors at the ends by their own rounding.
+    rounding = np.sqrt(3) * parameters.error(parameters.depth, bool(angles.max() > 45)) + 2.0**-17
+    assert length.min() >= 1 - parameters.threshold - 2.0**-19 - rounding
+    assert length.max() <= 1 + rounding
+    exact = interpolate("slerp", left[span] / ONE, right[span] / ONE, pixel / 999)
+    theta = np.radians(angles)[span] / 2.0 ** levels[span]
+    assert np.all(theta**2 <= 8.1 * parameters.threshold + 2.0**-15)
+    across = np.linalg.norm(np.cross(vectors, exact), axis=1)
+    assert np.all(across <= 0.017 * theta**3 + 1.1 * rounding)
+
+
+@pytest.mark.parametrize("threshold", [1 / 8, 2.0**-6, 2.0**-10, 2.0**-14])
+def test_levels_are_the_fewest(normal_pairs, threshold):
+    parameters = AdaptiveNormaliser(threshold)
+    angles = np.random.default_rng(5).uniform(0, 89.99, 40_000)
+    left, right = (quantise(normals) for normals in normal_pairs(np.random.default_rng(6), 40_000, angles))
+    _, u, wide = parameters.bisection.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    levels = parameters.levels(u, wide)
+
+    def sagitta(k):
+        return 1 - np.cos(np.radians(angles) / 2.0 ** (k + 1))
+
+    # The word of u is rounded by 2^-18, a quarter of which is the sagitta's, and so is the rounding of two
+    # unit vectors to code vectors, of up to 2^-16.
+    slack = (2.0**-18 + 2.0**-16) / 4 / 4.0**levels
+    assert np.all(sagitta(levels) <= threshold + slack)
+    divided = levels > 0
+    fewer = np.maximum(levels - 1, 0)
+    assert np.all(sagitta(fewer)[divided] * 1.068 + 4 * slack[divided] + 2.0**-20 >= threshold)
+    assert levels.min() == 0
+    assert levels.max() == parameters.depth
+
+
+def test_sagitta_is_never_under():
+    psi = np.radians(np.linspace(1e-3, 90, 5001))
+    q = (1 - np.cos(psi)) / 4
+    for k in range(9):
+        # 1 - cos x = 2 sin^2(x/2) keeps its digits.
+        ratio = (q + q * q) / 4**k / (2 * np.sin(psi / 2 ** (k + 2)) ** 2)
+        assert ratio.min() >= 1 - 1e-9
+        assert ratio.max() <= 1.0671
+
+
+@pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90])
+def test_stiff_ends_are_exact(normal_pairs, angle):
+    lengths = np.r_[np.arange(1, 70), 127, 128, 129, 255, 256, 257, 1023, 1024, 1025, 4093, 4094, 4095]
+    for parameters in (AdaptiveNormaliser(), AdaptiveNormaliser(2.0**-14)):
+        left, right, _, _, normal, wide, _ = run(parameters, normal_pairs, 7, angle, lengths)
+        assert not wide.any()
+        last = np.cumsum(lengths) - 1
+        np.testing.assert_array_equal(normal.codes[last - lengths + 1], left)
+        np.testing.assert_array_equal(normal.codes[last][lengths > 1], right[lengths > 1])
+
+
+def test_stiff_equal_normals_stay():
+    axes = np.vstack([np.eye(3), -np.eye(3)]).astype(np.int64) * ONE
+    lengths = np.array([1, 2, 3, 16, 4095, 100])
+    ends = Fixed(COMPONENT, axes)
+    normal, wide, levels = AdaptiveNormaliser().compute(ends, ends, lengths)
+    assert not wide.any()
+    assert not levels.any()
+    np.testing.assert_array_equal(normal.codes, np.repeat(axes, lengths, axis=0))
+
+
+@pytest.mark.parametrize(
+    ("degrees", "miss", "length"), [(1, 0.00015, 1.0003), (10, 0.15, 1.03), (45, 8.2, 1.47)]
+)
+def test_what_the_documented_extrapolation_costs(degrees, miss, length):
+    """The end on the chord's continuation at the next power of two, then normalised without an error."""
+    psi = np.radians(degrees)
+    steps = np.arange(1, 4095)
+    g = 2.0 ** np.ceil(np.log2(steps)) / steps
+    end = np.stack([1 - g + g * np.cos(psi), g * np.sin(psi)])
+    assert np.linalg.norm(end, axis=0).max() - 1 == pytest.approx(length - 1, rel=0.02)
+    # The last pixel lies at 1/g of the way to the new end.
+    last = np.degrees(np.arctan2(end[1], end[0])) / g
+    assert (degrees - last).max() == pytest.approx(miss, rel=0.03)
+    assert np.degrees(np.arctan2(2.0, 1 - 2.0)) == pytest.approx(116.6, abs=0.1)
+    # Ours gives the right end itself, to the bit: test_stiff_ends_are_exact.
+    ends = quantise(np.array([[1.0, 0, 0], [np.cos(psi), np.sin(psi), 0]]))
+    length = np.r_[2:300, 513:516, 4095]
+    normal, _, _ = AdaptiveNormaliser().compute(
+        *(Fixed(COMPONENT, np.tile(end, (len(length), 1))) for end in ends), length
+    )
+    assert np.all(normal.codes[np.cumsum(length) - 1] == ends[1])
+
+
+@pytest.mark.parametrize("angle", [90.01, 120, 180])
+def test_stiff_too_wide_is_flagged(normal_pairs, angle):
+    left, right, _, _, normal, wide, levels = run(
+        AdaptiveNormaliser(), normal_pairs, 8, angle, np.full(200, 33)
+    )
+    assert wide.all()
+    assert not levels.any()
+    np.testing.assert_array_equal(normal.codes[::33], left)
+    np.testing.assert_array_equal(normal.codes[32::33], right)
+
+
+@pytest.mark.parametrize("threshold", [1 / 8, 2.0**-10, 2.0**-14])
+@pytest.mark.parametrize("angle", [1, 44.9, 89.9])
+def test_stiff_drift_over_4095_pixels(normal_pairs, threshold, angle):
+    """A step is cut by under 2^-32: over a segment of n pixels its end is low by under n 2^-32."""
+    parameters = AdaptiveNormaliser(threshold)
+    lengths = np.full(6, 4095)
+    left, right, span, pixel, normal, _, levels = run(parameters, normal_pairs, 9, angle, lengths)
+    exact = lines(left[span] / ONE, right[span] / ONE, levels[span], pixel / 4094) * (ONE * COMPONENT.step)
+    error = np.abs(normal.values - exact).max()
+    assert error <= parameters.error(int(levels.max()), angle > 45)
+    # One segment, the longest way to drift, keeps within a step of the word and what its factors round off.
+    if not levels.any():
+        assert error <= 2.0**-18 + 2 * np.sin(np.radians(angle) / 2) * 2.0**-16 + 4095 * 2.0**-32
+
+
+@pytest.mark.parametrize("length", [3, 5, 16, 17, 4095])
+@pytest.mark.parametrize("angle", [1, 45, 89])
+def test_stiff_peaks(length, angle):
+    """N.H with H on a pixel and between two: the sagitta and the rounding are lost, no more."""
+    parameters, half = AdaptiveNormaliser(), np.radians(angle) / 2
+    ends = quantise(np.array([[np.cos(half), -np.sin(half), 0], [np.cos(half), np.sin(half), 0]]))
+    operands = (Fixed(COMPONENT, end[np.newaxis]) for end in ends)
+    normal, _, levels = parameters.compute(*operands, np.array([length]))
+    bound = parameters.threshold + 2.0**-19 + 2 * parameters.error(int(levels[0]), angle > 45) + 2.0**-16
+    for place in ((length - 1) / 2, (length - 1) // 2 + 0.5, 1):
+        turn = (2 * place / (length - 1) - 1) * half
+        found = normal.values @ np.array([np.cos(turn), np.sin(turn), 0])
+        ideal = np.cos((2 * np.arange(length) / (length - 1) - 1) * half - turn)
+        theta = 2 * half / 2.0 ** levels[0]
+        assert np.abs(found - ideal).max() <= bound + 0.017 * theta**3
+
+
+def test_stiff_normals_of_no_unit_length(normal_pairs):
+    """Words of any size come out at both ends as they went in, unless flagged; nothing fails in between."""
+    rng = np.random.default_rng(10)
+    left, right = normal_pairs(rng, 300, 5.0)
+    parameters, lengths = AdaptiveNormaliser(), np.resize([2, 3, 16, 100], 300)
+    corners = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (2, 300, 3))
+    scaled = [[np.rint(v * (1 - 1 / 256) * ONE) for v in (left, right)], np.zeros((2, 300, 3)), corners]
+    for ends in scaled:
+        before, after = (Fixed(COMPONENT, np.asarray(end).astype(np.int64)) for end in ends)
+        normal, wide, _ = parameters.compute(before, after, lengths)
+        last = np.cumsum(lengths) - 1
+        np.testing.assert_array_equal(normal.codes[last - lengths + 1], before.codes)
+        np.testing.assert_array_equal(normal.codes[last], after.codes)
+    # Of the short ones, which are not wide, every normal is as short as they are, and by its sagitta.
+    before, after = (Fixed(COMPONENT, end.astype(np.int64)) for end in scaled[0])
+    normal, wide, _ = parameters.compute(before, after, lengths)
+    assert not wide.any()
+    size = np.linalg.norm(normal.values, axis=1)
+    assert 1 - 3 / 256 < size.min() < 1 - 1 / 256
+
+
+@pytest.mark.long
+def test_every_length(normal_pairs):
+    parameters = AdaptiveNormaliser(2.0**-12)
+    for low in range(1, 4096, 128):
+        lengths = np.arange(low, min(low + 128, 4096))
+        angles = np.random.default_rng(low).uniform(0, 90, len(lengths))
+        left, right, span, pixel, normal, _, levels = run(parameters, normal_pairs, low, angles, lengths)
+        last = np.cumsum(lengths) - 1
+        np.testing.assert_array_equal(normal.codes[last - lengths + 1], left)
+        np.testing.assert_array_equal(normal.codes[last][lengths > 1], right[lengths > 1])
+        t = pixel / np.maximum(lengths - 1, 1)[span]
+        exact = lines(left[span] / ONE, right[span] / ONE, levels[span], t) * (ONE * COMPONENT.step)
+        assert np.abs(normal.values - exact).max() <= parameters.error(parameters.depth, True)
+
+
+def test_refuses(normal_pairs):
+    for threshold in (0.0, 2.0**-15, 0.2, float("nan")):
+        text = f"threshold must be 2^-14 to 1/8, not {threshold!r}"
+        with pytest.raises(ValueError, match=f"^{re.escape(text)}$"):
+            AdaptiveNormaliser(threshold)
+    normal = Fixed(COMPONENT, np.array([[0, 0, ONE]]))
+    for length in (-1, 4096):
+        with pytest.raises(ValueError, match=r"^lengths must be 0 to 4095$"):
+            AdaptiveNormaliser().compute(normal, normal, np.array([length]))

@@ -1,0 +1,256 @@
+"""Bisection: the twin against float64, and the figures of numbers.md."""
+
+import re
+
+import numpy as np
+import pytest
+
+from blysk.golden.normals.bisection import Bisection
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax, reciprocal_root
+from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+
+VARIANTS = [
+    Bisection(degree, max_angle, as_documented)
+    for degree in (1, 2)
+    for max_angle in (45, 90)
+    for as_documented in (False, True)
+]
+
+
+def bisect(parameters, left, right):
+    """Result of the twin and the exact middle of the same two code vectors, in units of the word."""
+    middle, u, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    a, b = left / ONE, right / ONE
+    r = np.einsum("ij,ij->i", a, b)
+    exact = (a + b) / np.sqrt(2 + 2 * r)[:, np.newaxis] * (ONE * COMPONENT.step)
+    return middle, u, wide, exact, r
+
+
+def codes(normal_pairs, seed, angles):
+    rng = np.random.default_rng(seed)
+    return (quantise(normals) for normals in normal_pairs(rng, len(angles), angles))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "first_step"),
+    [
+        (p, first_step)
+        for p in VARIANTS
+        for first_step in (False, True)
+        if p.max_angle == 90 or not first_step
+    ],
+    ids=str,
+)
+def test_error_under_its_bound(normal_pairs, parameters, first_step):
+    low, high = (45.01, 90) if first_step else (0, 44.99)
+    rng = np.random.default_rng(3)
+    angles = np.r_[rng.uniform(low, high, 40_000), np.full(1000, low), np.full(1000, high)]
+    left, right = codes(normal_pairs, 4, angles)
+    # Along an axis both components of a sum are as large as they get.
+    left[:20] = [0, 0, ONE]
+    right[:20] = left[:20] if not first_step else [0, ONE, 0]
+    middle, _, wide, exact, _ = bisect(parameters, left, right)
+    assert not wide.any()
+    worst = np.abs(middle.values - exact).max()
+    bound = parameters.error(first_step)
+    assert worst <= bound
+    # Not loose: the bound takes a component of the sum as 2, and the roundings all at their worst.
+    assert worst >= bound / 2.5
+
+
+@pytest.mark.parametrize("parameters", [Bisection(), Bisection(as_documented=True)], ids=str)
+@pytest.mark.parametrize("first_step", [False, True])
+def test_arithmetic_error_under_its_bound(normal_pairs, parameters, first_step):
+    low, high = (45.01, 90) if first_step else (0, 44.99)
+    left, right = codes(normal_pairs, 5, np.random.default_rng(6).uniform(low, high, 50_000))
+    middle, _, _, _, r = bisect(parameters, left, right)
+    constant, rest = parameters.polynomial(first_step)
+    x = r * (ONE * COMPONENT.step) ** 2
+    if not parameters.reads_cosine(first_step):
+        x = (ONE * COMPONENT.step) ** 2 - x
+    factor = 0.5 + np.polynomial.polynomial.polyval(x, np.r_[constant.values, rest.values])
+    same = (left + right) * COMPONENT.step * factor[:, np.newaxis]
+    # A factor that is too large takes a component near 1 out of the word.
+    same = np.clip(same, -1, ONE * COMPONENT.step)
+    worst = np.abs(middle.values - same).max()
+    assert parameters.arithmetic_error(first_step) / 3 <= worst <= parameters.arithmetic_error(first_step)
+
+
+def test_direction_is_exact(normal_pairs):
+    # Only rounding turns the middle: by no more than two roundings of 2^-18 a component.
+    left, right = codes(normal_pairs, 7, np.random.default_rng(8).uniform(0, 90, 50_000))
+    for parameters in VARIANTS:
+        if parameters.max_angle == 90:
+            middle, _, _, exact, _ = bisect(parameters, left, right)
+            kept = np.all(np.abs(middle.codes) < ONE, axis=1)
+            assert kept.mean() > 0.99
+            across = np.linalg.norm(np.cross(middle.values, exact), axis=1)[kept]
+            assert across.max() <= np.sqrt(3) * (2.0**-18 + 2.0**-18 * 0.4144 + 2.0**-21)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_equal_normals_stay(normal_pairs, degree):
+    left, _ = codes(normal_pairs, 9, np.zeros(20_000))
+    middle, u, wide = Bisection(degree).compute(Fixed(COMPONENT, left), Fixed(COMPONENT, left))
+    assert not wide.any()
+    # The length of a code vector is off by rounding, and the unit corrects it where it can.
+    assert np.abs(u.codes).max() <= 2
+    assert np.abs(middle.codes - left).max() <= 1
+    axes = np.vstack([np.eye(3), -np.eye(3)]).astype(np.int64) * ONE
+    middle, u, _ = Bisection(degree).compute(Fixed(COMPONENT, axes), Fixed(COMPONENT, axes))
+    np.testing.assert_array_equal(middle.codes, axes)
+    assert not u.codes.any()
+
+
+@pytest.mark.parametrize("parameters", [Bisection(), Bisection(1), Bisection(as_documented=True)], ids=str)
+@pytest.mark.parametrize("angle", [0, 1e-4, 1, 44.9, 45, 45.1, 89.9, 90])
+def test_stiff_angles_within_the_bound(normal_pairs, parameters, angle):
+    left, right = codes(normal_pairs, 11, np.full(4000, angle))
+    middle, _, wide, exact, _ = bisect(parameters, left, right)
+    assert not wide.any()
+    # At 45 degrees the rounding of the normals decides which polynomial is taken.
+    steps = {angle > 45, angle >= 45}
+    assert np.abs(middle.values - exact).max() <= max(parameters.error(step) for step in steps)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("excess", [-1 / 256, 1 / 256])
+@pytest.mark.parametrize("angle", [0, 1e-4, 1, 20, 44])
+def test_stiff_lengths_of_the_ends(normal_pairs, degree, angle, excess):
+    """Ends of length 1 +- 1/256: the bound holds, and the error of the middle's length is halved.
+
+    u may then be negative, to -2/256, where the fit goes on as smoothly as the function.
+    """
+    parameters = Bisection(degree)
+    left, right = normal_pairs(np.random.default_rng(12), 4000, angle)
+    left, right = (np.rint(n * (1 + excess) * ONE).astype(np.int64) for n in (left, right))
+    kept = (np.abs(left) <= ONE).all(axis=1) & (np.abs(right) <= ONE).all(axis=1)
+    left, right = left[kept], right[kept]
+    middle, _, wide, exact, _ = bisect(parameters, left, right)
+    assert not wide.any()
+    assert np.abs(middle.values - np.clip(exact, -1, ONE * COMPONENT.step)).max() <= parameters.error(False)
+    # Of (1 + x)^2 cos(psi/2)^2 in place of cos(psi/2)^2 under the root: x / (1 + r) at first order.
+    inside = np.all(np.abs(middle.codes) < ONE, axis=1)
+    length = np.linalg.norm(middle.codes, axis=1)[inside] / ONE
+    expected = 1 + excess / (1 + np.cos(np.radians(angle)))
+    slack = excess**2 + np.sqrt(3) * (parameters.error(False) + 2 * COMPONENT.step)
+    assert np.abs(length - expected).max() <= slack
+
+
+def test_stiff_normals_of_length_zero(normal_pairs):
+    """Such a normal is taken for one at 90 degrees: a unit up to 45 flags it, one up to 90 scales by h(0)."""
+    (left, _), zero = codes(normal_pairs, 13, np.zeros(2000)), np.zeros((2000, 3), dtype=np.int64)
+    for a, b in ((left, zero), (zero, left), (zero, zero)):
+        assert bisect(Bisection(2, 45), a, b)[2].all()
+        middle, u, wide, exact, _ = bisect(Bisection(), a, b)
+        assert not wide.any()
+        assert np.all(u.codes == Bisection.ONE.codes)
+        assert np.abs(middle.values - exact).max() <= Bisection().error(True)
+
+
+@pytest.mark.parametrize("parameters", VARIANTS, ids=str)
+def test_stiff_every_code_without_silent_wrap(parameters):
+    """Vectors of the words' ends: flagged, or a middle on the side of the sum, of 0.25 to 0.75 of it."""
+    ends = [COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1]
+    corners = np.stack(np.meshgrid(*[ends] * 6), axis=-1).reshape(-1, 6)
+    left, right = corners[:, :3], corners[:, 3:]
+    middle, _, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    dot = (left * right).sum(axis=1) / ONE**2
+    np.testing.assert_array_equal(wide, dot < np.cos(np.radians(parameters.max_angle)) - 1e-3)
+    total, found = (left + right)[~wide], middle.codes[~wide]
+    low, high = np.minimum(0.25 * total, 0.75 * total) - 1, np.maximum(0.25 * total, 0.75 * total) + 1
+    low, high = np.minimum(low, COMPONENT.max_code), np.maximum(high, COMPONENT.min_code)
+    assert np.all((low <= found) & (found <= high))
+
+
+def test_documented_degree_two_shortens_a_flat_face():
+    axis = Fixed(COMPONENT, np.array([[0, 0, ONE]]))
+    middle, _, _ = Bisection(as_documented=True).compute(axis, axis)
+    # 0.499 in place of 0.5.
+    assert middle.codes[0, 2] / ONE == pytest.approx(0.998, abs=2e-5)
+
+
+@pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90, 90.01, 120, 180])
+@pytest.mark.parametrize("max_angle", [45, 90])
+def test_stiff_angles_flag(normal_pairs, angle, max_angle):
+    left, right = codes(normal_pairs, 10, np.full(3000, angle))
+    *_, wide = Bisection(2, max_angle).compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    assert np.all(wide == (angle > max_angle))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "first_step", "error"),
+    [
+        # numbers.md: 2.5e-5 for the fit that is exact at zero angle, unquantised.
+        (Bisection(2), False, "2.5e-05"),
+        (Bisection(1), False, "8.3e-04"),
+        (Bisection(2), True, "1.1e-04"),
+        (Bisection(1, as_documented=True), False, "1.1e-03"),
+        (Bisection(2, as_documented=True), False, "1.0e-03"),
+        (Bisection(2, as_documented=True), True, "6.2e-04"),
+    ],
+    ids=str,
+)
+def test_model_error(parameters, first_step, error):
+    assert f"{parameters.model_error(first_step):.1e}" == error
+
+
+def test_published_polynomials():
+    def errors(function, coefficients, low, high):
+        return largest_error(function, np.array(coefficients), low, high)
+
+    z = (np.sqrt(2), 2.0)
+    assert errors(reciprocal_root, [0.64, -0.07], *z) == pytest.approx((1.1e-3, 0.00217), abs=5e-5)
+    assert errors(reciprocal_root, [0.681, -0.119, 0.014], *z) == pytest.approx((1.0e-3, 0.002), abs=5e-6)
+    fit = minimax(reciprocal_root, *z, 1)
+    assert fit == pytest.approx([0.64004095, -0.07032614], abs=2e-8)
+    assert largest_error(reciprocal_root, fit, *z) == pytest.approx((6.1e-4, 0.00122), abs=5e-6)
+    fit = minimax(reciprocal_root, *z, 2)
+    assert fit == pytest.approx([0.68084977, -0.1189218, 0.0142535], abs=1e-7)
+    assert largest_error(reciprocal_root, fit, *z) == pytest.approx((2.0e-5, 4.0e-5), abs=5e-7)
+
+    def h(r):
+        return half_angle_factor(1 - r)
+
+    fit = minimax(h, 0, 1, 2)
+    assert fit == pytest.approx([0.70519, -0.310337, 0.107064], abs=1e-6)
+    assert largest_error(h, fit, 0, 1) == pytest.approx((1.92e-3, 0.00383), abs=5e-6)
+    printed = errors(h, [0.707, -0.341, 0.193, -0.059], 0, 1)
+    assert printed == pytest.approx((6.1e-4, 0.00093), abs=5e-6)
+    fit = minimax(h, 0, 1, 3)
+    assert fit == pytest.approx([0.70681854, -0.34255322, 0.19682175, -0.06137531], abs=2e-7)
+    assert largest_error(h, fit, 0, 1) == pytest.approx((2.88e-4, 0.00058), abs=5e-6)
+
+    fit = minimax(half_angle_factor, 0, 1, 3, {0: 0.5})
+    assert fit[1:] == pytest.approx([0.13069871, 0.01734779, 0.05873483], abs=2e-7)
+    assert largest_error(half_angle_factor, fit, 0, 1)[0] == pytest.approx(3.3e-4, abs=5e-6)
+    for terms, coefficients, error in (
+        (2, [0.12188202, 0.06503349], 1.5e-4),
+        (3, [0.12534066, 0.04302247, 0.03132254], 9.0e-6),
+    ):
+        fit = minimax(half_angle_factor, 0, 0.5, terms, {0: 0.5})
+        # The note's three terms are a little off the optimum: 9.06e-6, where this fit has 9.02e-6.
+        assert fit[1:] == pytest.approx(coefficients, abs=5e-6)
+        assert largest_error(half_angle_factor, fit, 0, 0.5)[0] == pytest.approx(error, rel=0.04)
+    for terms, coefficients, error in (
+        (2, [0.06205092, 0.01405506], 2.5e-5),
+        (3, [0.0625277, 0.01144775, 0.00317987], 7.9e-7),
+    ):
+        domain = (0, 2 - np.sqrt(2))
+        fit = minimax(lambda v: reciprocal_root(2 - v), *domain, terms, {0: 0.5})
+        assert fit[1:] == pytest.approx(coefficients, abs=5e-6)
+        found = largest_error(lambda v: reciprocal_root(2 - v), fit, *domain)[0]
+        assert found == pytest.approx(error, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ((3,), "degree must be 1 or 2, not 3"),
+        ((2, 60), "max_angle must be 45 or 90, not 60"),
+    ],
+)
+def test_refuses(arguments, text):
+    with pytest.raises(ValueError, match=f"^{re.escape(text)}$"):
+        Bisection(*arguments)

@@ -1,0 +1,33 @@
+"""Meshes that are none: each refused with what is wrong."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.reference.geometry import Mesh
+
+VERTICES = np.eye(3)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"vertices": np.zeros((3, 2))}, r"vertices must have shape \(count, 3\), not \(3, 2\)"),
+        ({"faces": np.arange(3)}, r"faces must have shape \(count, 3\), not \(3,\)"),
+        ({"normals": np.zeros((4, 3))}, "there must be one normal a vertex, not 4 for 3"),
+        ({"faces": np.array([[0, 1, 3]])}, "faces must index the 3 vertices"),
+        ({"faces": np.array([[0, 1, -1]])}, "faces must index the 3 vertices"),
+        ({"vertices": np.full((3, 3), np.inf)}, "vertices and normals must be finite"),
+        ({"normals": np.full((3, 3), np.nan)}, "vertices and normals must be finite"),
+        ({"material": np.zeros(2, int)}, "material must be an index of 0 or more for each of the 1 faces"),
+        ({"material": np.array([-1])}, "material must be an index of 0 or more for each of the 1 faces"),
+    ],
+)
+def test_bad_arrays_are_refused(given, message):
+    arrays = {"vertices": VERTICES, "faces": np.array([[0, 1, 2]]), "normals": VERTICES} | given
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        Mesh(**arrays)
+
+
+def test_a_mesh_has_one_material_unless_told():
+    mesh = Mesh(VERTICES, np.array([[0, 1, 2], [2, 1, 0]]), VERTICES)
+    assert mesh.material.tolist() == [0, 0]

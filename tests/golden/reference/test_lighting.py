@@ -1,0 +1,314 @@
+import math
+
+import numpy as np
+import pytest
+
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.lighting import (
+    Light,
+    Material,
+    gram_determinant,
+    halfway_vector,
+    intensity,
+    intensity_of_cosines,
+    saturate,
+)
+from blysk.golden.reference.reflection import REFLECTION_MODELS, reflect
+
+V = np.array([0.0, 0.0, 1.0])
+
+
+def grey(value):
+    return (value, value, value)
+
+
+def random_units(count, seed):
+    return normalise(np.random.default_rng(seed).normal(size=(count, 3)))
+
+
+def test_worked_example():
+    material = Material(grey(0.1), grey(0.7), grey(0.5), 10)
+    light = Light((1, 1, 1))
+    # I_a = 0.2, I_d = 0.8, I_s = 1: one light has one color here, so I_d goes into k_d.
+    material = Material(material.ambient, grey(0.7 * 0.8), material.specular, 10)
+    value = intensity(np.array([0.0, 0.0, 1.0]), material, [light], grey(0.2), V, "phong")
+    assert value == pytest.approx(grey(0.345374), abs=0.5e-6)
+    dark = Material(material.ambient, grey(0), grey(0.5), 10)
+    value = intensity(np.array([0.0, 0.0, 1.0]), dark, [light], grey(0.2), V, "phong")
+    assert value == pytest.approx(grey(0.02 + 0.002058), abs=0.5e-6)
+    matt = Material(material.ambient, material.diffuse, grey(0), 10)
+    value = intensity(np.array([0.0, 0.0, 1.0]), matt, [light], grey(0.2), V, "phong")
+    assert value == pytest.approx(grey(0.02 + 0.323316), abs=0.5e-6)
+    # [T] 4.1 prints 0.0015 and 0.3445: half of 0.003 for 0.577^10, and the diffuse term to three digits.
+    assert f"{0.577350**10:.6f}" == "0.004115"
+    assert 0.5 * 0.003 == 0.0015
+    assert round(0.02 + 0.323 + 0.0015, 4) == 0.3445
+
+
+# The sum does not depend on the model; test_reflection.py holds each model to its formula.
+@pytest.mark.parametrize("model", REFLECTION_MODELS[:6])
+def test_formula_channel_by_channel(model):
+    n = 9
+    slopes = {"cosquad": n / 2, "cosquad7": 7 * n / 16, "cosquad_lin": 0.448 * n + 0.099}
+    slopes["cosquad_q"] = (0.8 - 1) / (0.64 ** (1 / n) - 1)
+    material = Material((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), n)
+    lights = [Light((3, 1, 2), (0.5, 0.6, 0.7)), Light((-1, 4, 1), (0.2, 0.1, 0.9))]
+    viewer = normalise([0.2, 0.3, 1])
+    ambient = (0.3, 0.2, 0.1)
+    normals = random_units(200, 2)
+    found = intensity(normals, material, lights, ambient, viewer, model)
+    lit = 0
+    for normal, value in zip(normals.tolist(), found, strict=True):
+        for channel in range(3):
+            total = material.ambient[channel] * ambient[channel]
+            for light in lights:
+                cosine = sum(a * b for a, b in zip(normal, light.direction, strict=True))
+                if cosine <= 0:
+                    continue
+                lit += 1
+                if model == "phong":
+                    reflected = [2 * cosine * a - b for a, b in zip(normal, light.direction, strict=True)]
+                    c = sum(a * b for a, b in zip(reflected, viewer, strict=True))
+                else:
+                    half = [a + b for a, b in zip(light.direction, viewer, strict=True)]
+                    c = sum(a * b for a, b in zip(normal, half, strict=True)) / math.hypot(*half)
+                highlight = max(slopes[model] * (c - 1) + 1, 0) ** 2 if model in slopes else max(c, 0) ** n
+                shade = material.diffuse[channel] * cosine + material.specular[channel] * highlight
+                total += light.color[channel] * shade
+            assert value[channel] == pytest.approx(total, abs=1e-12)
+    assert lit > 200
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+def test_light_behind_gives_nothing(model):
+    material = Material(grey(0.1), grey(0.7), grey(0.5), 1)
+    # N·L = 0 exactly, and below: with exponent 1 the cosine N·H alone would give a highlight.
+    for direction in ((1, 0, 0), (1, 0, -0.01)):
+        assert intensity(V, material, [Light(direction)], grey(1), V, model) == pytest.approx(grey(0.1))
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+def test_light_opposite_to_the_viewer_has_no_highlight(model):
+    material = Material(grey(0.1), grey(0.7), grey(0.5), 1)
+    direction = normalise([1, 2, 3])
+    light = Light(-direction)
+    assert (halfway_vector(light.direction, direction) == 0).all()
+    normals = random_units(50, 3)
+    found = intensity(normals, material, [light], grey(1), direction, model)
+    expected = 0.1 + 0.7 * np.maximum(normals @ -direction, 0)
+    assert found == pytest.approx(np.repeat(expected[:, np.newaxis], 3, axis=1), abs=1e-14)
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+@pytest.mark.parametrize("n", [1, 2, 3, 10, 100, 500, 1000])
+def test_stiff_exponents(model, n):
+    """The peak is 1 at every exponent, the highlight falls from it, and far from it nothing is left."""
+    material = Material(grey(0), grey(0), grey(1), n)
+    angle = np.linspace(0, np.pi / 2 - 1e-9, 2001)
+    normals = np.stack((np.sin(angle), np.zeros_like(angle), np.cos(angle)), axis=1)
+    value = intensity(normals, material, [Light(V)], grey(0), V, model)[:, 0]
+    assert value[0] == 1
+    assert (np.diff(value) <= 0).all()
+    assert np.isfinite(value).all()
+    # L = V = H: the angle of Blinn's models is that of the normal, Phong's twice it.
+    c = np.cos(2 * angle if model == "phong" else angle)
+    exact = np.array([max(value, 0.0) ** n for value in c.tolist()])
+    # The worst from n = 2 on is exp at 2, then cosquad; at n = 1 the lobes are wider than Blinn's.
+    bound = 1e-12 if model in ("phong", "blinn") else 0.162 if n > 1 else 0.5
+    assert np.abs(value - exact).max() <= bound
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+def test_stiff_terminator(model):
+    """N·L around 0 with ``k_s`` 1: the highlight is cut there, the diffuse term continuous."""
+    material = Material(grey(0), grey(1), grey(1), 1)
+    # Behind the light's edge as seen from V: N·H is far from 0 where N·L is 0.
+    light = Light((1, 0, 0))
+    halfway = halfway_vector(light.direction, V)
+    for tilt in (1e-3, 1e-9, 1e-15, 5e-324):
+        normal = np.array([tilt, 0, 1.0])
+        value = intensity(normal, material, [light], grey(0), V, model)
+        shine = reflect(model, 2 * tilt - 0 if model == "phong" else normal @ halfway, 1)
+        assert value == pytest.approx(np.full(3, tilt + shine), rel=1e-12)
+        assert (intensity(normal * (-1, 1, 1), material, [light], grey(0), V, model) == 0).all()
+    assert (intensity(V, material, [light], grey(0), V, model) == 0).all()
+
+
+def test_stiff_half_way_vectors():
+    """L = V, and L near -V, where L + V is all but 0."""
+    for direction in normalise(np.random.default_rng(11).normal(size=(20, 3))):
+        assert halfway_vector(direction, direction) == pytest.approx(direction, abs=1e-15)
+        assert (halfway_vector(-direction, direction) == 0).all()
+        side = normalise(np.cross(direction, [0.3, 0.5, 0.8]))
+        for angle in (1e-2, 1e-4, 1e-6, 1e-8):
+            opposite = -math.cos(angle) * direction + math.sin(angle) * side
+            half = halfway_vector(opposite, direction)
+            assert np.linalg.norm(half) == pytest.approx(1, abs=1e-14)
+            # H stands at right angles to V but for half the angle; L + V keeps 1e-16/angle of its digits.
+            assert half == pytest.approx(
+                math.cos(angle / 2) * side + math.sin(angle / 2) * direction, abs=1e-15 / angle
+            )
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+def test_stiff_lengths_of_normals(model):
+    """0 gives the ambient term alone; 1 +- 1/256 puts N·L off by 1/256; what is no number stays none."""
+    n = 1000
+    material = Material(grey(0.1), grey(0.5), grey(0.4), n)
+    lights = [Light(V)]
+    assert intensity(np.zeros(3), material, lights, grey(1), V, model) == pytest.approx(grey(0.1), abs=0)
+    assert np.isnan(intensity(np.full(3, np.nan), material, lights, grey(1), V, model)).all()
+    for scale in (1 - 1 / 256, 1 + 1 / 256):
+        value = intensity(V * scale, material, lights, grey(1), V, model)
+        # R·V with R = 2 (N·L) N - L: twice the scale squared, less 1.
+        cosine = min(2 * scale**2 - 1 if model == "phong" else scale, 1.0)
+        expected = 0.1 + 0.5 * scale + 0.4 * float(reflect(model, cosine, n))
+        assert value == pytest.approx(grey(expected), rel=1e-12)
+    # The error that a user gets from a normal 1/256 too short: the highlight of every model is gone.
+    assert float(reflect(model, 1 - 1 / 256, n)) < 0.05
+
+
+def test_halfway_vector():
+    rng = np.random.default_rng(4)
+    for light, viewer in normalise(rng.normal(size=(50, 2, 3))):
+        half = halfway_vector(light, viewer)
+        assert np.linalg.norm(half) == pytest.approx(1, abs=1e-15)
+        assert half @ light == pytest.approx(half @ viewer, abs=1e-12)
+        assert np.cross(light, viewer) @ half == pytest.approx(0, abs=1e-12)
+    assert halfway_vector(V, V) == pytest.approx(V)
+
+
+def test_halfway_vectors_of_arrays():
+    """Each as alone; opposite vectors have none."""
+    lights, viewers = random_units(50, 8), random_units(50, 9)
+    viewers[::5] = -lights[::5]
+    half = halfway_vector(lights, viewers)
+    for light, viewer, found in zip(lights, viewers, half, strict=True):
+        np.testing.assert_array_equal(found, halfway_vector(light, viewer))
+    assert not half[::5].any()
+    np.testing.assert_array_equal(halfway_vector(lights, V), [halfway_vector(light, V) for light in lights])
+
+
+# Point lights and a near viewer
+
+
+def test_point_light_towards():
+    light = Light(position=(1, 2, 3))
+    assert light.direction is None
+    assert light.towards(np.array([1.0, 2.0, 1.0])) == pytest.approx((0, 0, 1))
+    points = np.array([[1.0, 2, 3], [4, 2, 3], [1, 2 + 3e-200, 3 - 4e-200], [1, 5, -1]])
+    expected = [(0, 0, 0), (-1, 0, 0), (0, 0, 0), (0, -0.6, 0.8)]
+    assert light.towards(points) == pytest.approx(np.array(expected))
+    assert Light(direction=(0, 0, 2)).towards(points) == pytest.approx((0, 0, 1))
+    with pytest.raises(ValueError, match=r"^a point light needs the points that it lights$"):
+        light.towards()
+
+
+@pytest.mark.parametrize("chord", [False, True])
+@pytest.mark.parametrize("model", REFLECTION_MODELS[:6])
+def test_local_formula_point_by_point(model, chord):
+    """Each point as if it were alone, with a directional light and a distant viewer of its own."""
+    rng = np.random.default_rng(10)
+    normals, points = random_units(60, 11), rng.normal(size=(60, 3))
+    eye = np.array([0.3, 0.4, 5.0])
+    viewers = normalise(eye - points)
+    lights = [Light(position=(2, 1, 3), color=(0.5, 0.6, 0.7)), Light((-1, 4, 1)), Light(position=(0, -4, 1))]
+    material = Material((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), 9)
+    found = intensity(normals, material, lights, grey(0.5), viewers, model, chord, points)
+    for normal, point, viewer, value in zip(normals, points, viewers, found, strict=True):
+        alone = [
+            Light(np.subtract(light.position, point), light.color) if light.position else light
+            for light in lights
+        ]
+        expected = intensity(normal, material, alone, grey(0.5), viewer, model, chord)
+        assert value == pytest.approx(expected, abs=1e-12)
+    assert np.ptp(found, axis=0).min() > 0.1
+
+
+def test_far_point_light_is_a_directional_one():
+    normals, points = random_units(200, 12), random_units(200, 13)
+    material = Material(grey(0.1), grey(0.5), grey(0.5), 10)
+    near, far = Light(position=(3e7, 2e7, 6e7)), Light((3, 2, 6))
+    ambient = grey(1), V, "blinn"
+    found = intensity(normals, material, [near], *ambient, points=points)
+    assert found == pytest.approx(intensity(normals, material, [far], *ambient), abs=1e-6)
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS)
+def test_stiff_point_light_on_the_surface_and_behind_it(model):
+    """At its own place it gives nothing; with L = -V there is no highlight; nothing is NaN."""
+    material = Material(grey(0.1), grey(0.5), grey(0.5), 1)
+    light = Light(position=(0, 0, -1))
+    points = np.array([[0.0, 0, -1], [0, 0, 0], [0, 0, -2]])
+    normals = np.array([[0.0, 0, 1], [0, 0, -1], [0, 0, 1]])
+    value = intensity(normals, material, [light], grey(1), V, model, points=points)
+    # At the light, between light and viewer (L = -V) seen from behind, and beyond it, lit from the front.
+    assert value[0] == pytest.approx(grey(0.1))
+    assert value[1] == pytest.approx(grey(0.6))
+    assert value[2] == pytest.approx(grey(1.1), abs=1e-9)
+    # A point at the viewer's own place has no V.
+    nowhere = intensity(normals, material, [light], grey(1), np.zeros((3, 3)), model, points=points)
+    assert np.isfinite(nowhere).all()
+
+
+@pytest.mark.parametrize("model", REFLECTION_MODELS[1:])
+def test_intensity_of_cosines(model):
+    """The same sum from N·L and N·H."""
+    normals = random_units(300, 14)
+    lights = [Light((1, 2, 3), (0.5, 0.6, 0.7)), Light((-3, 2, 1))]
+    material = Material((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), 9)
+    cosine = np.stack([normals @ light.direction for light in lights], axis=-1)
+    highlight = np.stack([normals @ halfway_vector(light.direction, V) for light in lights], axis=-1)
+    found = intensity_of_cosines(material, lights, grey(0.5), cosine, highlight, model)
+    expected = intensity(normals, material, lights, grey(0.5), V, model)
+    assert found == pytest.approx(expected, abs=1e-14)
+    with pytest.raises(ValueError, match=r"model must be one of phong, .* not 'gauss'"):
+        intensity_of_cosines(material, lights, grey(0.5), cosine, highlight, "gauss")
+
+
+def test_gram_identity():
+    normals, lights, viewers = random_units(300, 5), random_units(300, 6), random_units(300, 7)
+    product = (np.cross(lights, normals) * viewers).sum(axis=1)
+    assert gram_determinant(normals, lights, viewers) == pytest.approx(product**2, abs=1e-14)
+    coplanar = normalise(normals + lights)
+    assert gram_determinant(normals, lights, coplanar) == pytest.approx(0, abs=1e-14)
+
+
+def test_normals_keep_their_length():
+    material = Material(grey(0), grey(1), grey(0), 10)
+    value = intensity(V * 0.5, material, [Light((0, 0, 1))], grey(1), V, "blinn")
+    assert value == pytest.approx(grey(0.5))
+
+
+def test_sums_over_one_and_sixteen_lights():
+    material = Material(grey(1), grey(1), grey(1), 2)
+    value = intensity(V, material, [Light((0, 0, 5))] * 16, grey(1), V, "blinn")
+    assert value == pytest.approx(grey(33))
+    assert saturate(value) == pytest.approx(grey(1))
+    assert intensity(np.zeros((4, 5, 3)), material, [], grey(0.5), V, "blinn").shape == (4, 5, 3)
+
+
+def test_refusals():
+    with pytest.raises(ValueError, match="a light's direction must not be 0"):
+        Light((0, 0, 0))
+    with pytest.raises(ValueError, match="a light's direction must be three finite numbers"):
+        Light((0, 0, math.nan))
+    for both in ({}, {"direction": (0, 0, 1), "position": (0, 0, 1)}):
+        with pytest.raises(ValueError, match=r"^a light must have either a direction or a position$"):
+            Light(**both)
+    with pytest.raises(ValueError, match="a light's position must be three finite numbers"):
+        Light(position=(0, math.inf, 0))
+    material, lamp = Material(grey(0), grey(1), grey(0), 1), Light(position=(0, 0, 1))
+    with pytest.raises(ValueError, match="a point light needs the points"):
+        intensity(V, material, [lamp], grey(0), V, "blinn")
+    with pytest.raises(ValueError, match="a light's color must be at least 0"):
+        Light((0, 0, 1), (1, -1, 1))
+    with pytest.raises(ValueError, match=r"a material's diffuse must be three finite numbers, not 0.5"):
+        Material(grey(0), 0.5, grey(0), 10)
+    for exponent in (0, 1001):
+        with pytest.raises(ValueError, match=f"exponent must be in 1 to 1000, not {exponent}"):
+            Material(grey(0), grey(0), grey(0), exponent)
+    with pytest.raises(TypeError):
+        Material(grey(0), grey(0), grey(0), 10.5)
+    with pytest.raises(ValueError, match=r"model must be one of phong, .* not 'gauss'"):
+        intensity(V, Material(grey(0), grey(0), grey(0), 1), [], grey(0), V, "gauss")

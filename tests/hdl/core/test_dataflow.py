@@ -1,0 +1,343 @@
+# amaranth: UnusedElaboratable=no
+"""Data-flow graphs: ages and turns by hand, and small units against NumPy, clock by clock."""
+
+import re
+from collections import Counter
+
+import numpy as np
+import pytest
+from amaranth.hdl import Cat, Const, Module, Mux, Value, signed, unsigned
+from amaranth.lib import data
+
+from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.hdl.core.dataflow import MULTIPLIER_BITS, Dataflow, checked_interval, dot, shared_sums
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.emit.cost import cost_of
+
+OPERAND = SQ(1, 17)
+INPUTS = data.StructLayout({"a": FixedShape(OPERAND), "b": FixedShape(OPERAND), "n": unsigned(5)})
+SQUARES = [k * k for k in range(32)]
+
+
+class GraphUnit(PipelinedUnit):
+    """A unit that is a graph: ``describe`` gives its results, by name, each with its shape."""
+
+    def __init__(self, interval, describe, multiplications=0):
+        self.graph = Dataflow(interval, multiplications)
+        inputs = {
+            name: self.graph.input(name, lambda operands, name=name: operands[name])
+            for name in INPUTS.members
+        }
+        self.results, shapes = describe(self.graph, **inputs)
+        latency = max(1, *(word.age for word in self.results.values()))
+        super().__init__(INPUTS, data.StructLayout(shapes), latency=latency, initiation_interval=interval)
+
+    def datapath(self, m, operands):
+        value = self.graph.build(m, self, operands)
+        names = self.o.payload.shape().members
+        words = (Value.cast(value(self.results[name], self.latency)) for name in names)
+        return self.o.payload.shape()(Cat(words))
+
+
+def beats_of(rng, count=200):
+    a, b = rng.integers(-(2**17), 2**17, (2, count))
+    ends = [-(2**17), 2**17 - 1]
+    a[:4], b[:4] = np.repeat(ends, 2), np.tile(ends, 2)
+    return {"a": a, "b": b, "n": rng.integers(0, 32, count)}
+
+
+# Ages by hand.
+
+
+@pytest.mark.parametrize(("interval", "first"), [(1, 0), (2, 1), (7, 1)])
+def test_earliest_ages(interval, first):
+    """An input stands at its register, or at once; a register takes one clock, a multiplication five."""
+    g = Dataflow(interval, 1)
+    a, b = (g.input(name, lambda operands: operands) for name in "ab")
+    assert (a.age, b.age) == (first, first)
+    assert a.stands == interval
+    late = g.register("late", lambda a: a, g.register("once", lambda a: a, a))
+    assert late.age == first + 2
+    both = g.register("both", lambda a, b: a + b, b, late)
+    assert both.age == first + 3
+    product = g.multiply("product", late, both)
+    assert (product.age, product.stands) == (first + 8, 1)
+    hurried = Dataflow(interval, 1, hurries=True)
+    a = hurried.input("a", lambda operands: operands)
+    assert hurried.multiply("product", a, a).age == first + 2
+    table = g.look_up("table", [0] * 4, 3, late)
+    assert (table.age, table.stands) == (first + 3, late.stands)
+
+
+def test_turns_by_hand():
+    """Three multiplications on one multiplier: the second and the third wait their turn."""
+    g = Dataflow(3, 3)
+    assert g.multiplier.count == 1
+    a = g.input("a", lambda operands: operands)
+    ages = [g.multiply(f"product_{k}", a, a).age for k in range(3)]
+    assert ages == [6, 7, 8]
+    # With two clocks there are two multipliers, and the third multiplication takes the first's next turn.
+    g = Dataflow(2, 3)
+    assert g.multiplier.count == 2
+    a = g.input("a", lambda operands: operands)
+    assert [g.multiply(f"product_{k}", a, a).age for k in range(3)] == [6, 6, 7]
+
+
+@pytest.mark.parametrize("interval", [1, 2, 3, 4, 5, 6, 7, 11])
+@pytest.mark.parametrize("latency", [1, 3])
+def test_turns_never_collide(interval, latency):
+    """Random graphs: no piece is used twice in a turn, and no use waits a whole interval."""
+    rng = np.random.default_rng(interval)
+    for _ in range(50):
+        uses = int(rng.integers(1, 40))
+        g = Dataflow(interval)
+        operator = g.share("operator", uses, (unsigned(1),), latency, lambda register, a: a)
+        assert operator.count == -(-uses // interval)
+        words = [g.input("a", lambda operands: operands)]
+        turns = Counter()
+        for k in range(uses):
+            operand = words[rng.integers(len(words))]
+            if rng.random() < 0.3:
+                operand = g.register(f"wait_{k}", lambda a: a, operand)
+            word = g.use(operator, f"use_{k}", (operand,), lambda a: (a,))
+            issued = word.age - 1 - latency
+            assert operand.age <= issued < operand.age + interval
+            turns[issued % interval] += 1
+            words.append(word)
+        assert max(turns.values()) <= operator.count
+        # Turns left over are those that the graph still has.
+        assert sum(sum(free) for free in operator.free) == operator.count * interval - uses
+
+
+# Hardware.
+
+
+def copies(g, a, b, n):
+    """The inputs again, long after they have gone, beside chains of registers."""
+    late = b
+    for k in range(13):
+        late = g.register(f"late_{k}", lambda x: x, late)
+    total = g.register("total", lambda a, late: a + late, a, late)
+    return {"a": a, "n": n, "total": total}, {
+        "a": FixedShape(OPERAND),
+        "n": unsigned(5),
+        "total": FixedShape(SQ(2, 17)),
+    }
+
+
+@pytest.mark.parametrize("interval", range(1, 7))
+def test_copies_hold_values(verify, interval):
+    beats = beats_of(np.random.default_rng(interval))
+    unit = GraphUnit(interval, copies)
+    assert unit.latency == 14 + (interval > 1)
+    expected = {"a": beats["a"], "n": beats["n"], "total": beats["a"] + beats["b"]}
+    verify(unit, beats, expected)
+
+
+def products(g, a, b, n):
+    """``a b``, ``b^2``, their product cut to operands, and ``a b`` again after all of it."""
+    ab, bb = g.multiply("ab", a, b), g.multiply("bb", b, b)
+    fourth = g.multiply("fourth", ab, bb, *([lambda x: x.truncate(15).saturate(SQ(1, 15))] * 2))
+    mixed = g.multiply("mixed", fourth, a, lambda x: x.truncate(10).saturate(SQ(1, 10)))
+    return {"ab": ab, "fourth": fourth, "mixed": mixed}, {
+        "ab": FixedShape(SQ(2, 34)),
+        "fourth": FixedShape(SQ(2, 30)),
+        "mixed": FixedShape(SQ(2, 27)),
+    }
+
+
+@pytest.mark.parametrize("interval", range(1, 7))
+def test_products(verify, interval):
+    beats = beats_of(np.random.default_rng(interval))
+    a, b = (Fixed(OPERAND, beats[name]) for name in "ab")
+    ab, bb = a * b, b * b
+    fourth = ab.truncate(15).saturate(SQ(1, 15)) * bb.truncate(15).saturate(SQ(1, 15))
+    mixed = fourth.truncate(10).saturate(SQ(1, 10)) * a
+    unit = GraphUnit(interval, products, 4)
+    expected = {"ab": ab.codes, "fourth": fourth.codes, "mixed": mixed.codes}
+    verify(unit, beats, expected)
+    assert cost_of(GraphUnit(interval, products, 4)).multiplier_count == -(-4 // interval)
+
+
+def table(g, a, b, n):
+    """``n^2`` from a table, in a sum and by itself, long after."""
+    square = g.look_up("squares", SQUARES, 10, n)
+    total = g.register("total", lambda square, n: (square + n)[:11], square, n)
+    late = total
+    for k in range(9):
+        late = g.register(f"late_{k}", lambda x: x, late)
+    return {"square": square, "total": total, "late": late}, {
+        "square": unsigned(10),
+        "total": unsigned(11),
+        "late": unsigned(11),
+    }
+
+
+@pytest.mark.parametrize("interval", range(1, 7))
+def test_look_up(verify, interval):
+    beats = beats_of(np.random.default_rng(interval))
+    total = beats["n"] ** 2 + beats["n"]
+    verify(GraphUnit(interval, table), beats, {"square": beats["n"] ** 2, "total": total, "late": total})
+
+
+def shifts(g, a, b, n):
+    """Shifts to the right by one operator of three registers, whose results feed it again."""
+
+    def make(register, value, amount):
+        coarse = register(value >> Cat(Const(0, 2), amount[2:]), "coarse")
+        fine = register(amount[:2], "fine")
+        shifted = register(coarse >> fine, "shifted")
+        return register(Mux(shifted[-1], -1, shifted)[:18].as_signed(), "result")
+
+    operator = g.share("shifter", 4, (signed(18), unsigned(4)), 3, make)
+
+    def use(name, value):
+        return g.use(operator, name, (value, n), lambda value, n: (Value.cast(value), n[:4]))
+
+    first, second = use("first", a), use("second", b)
+    return {"twice": use("twice", first), "again": use("again", second)}, {
+        "twice": signed(18),
+        "again": signed(18),
+    }
+
+
+@pytest.mark.parametrize("interval", range(1, 7))
+def test_operator_of_three_registers(verify, interval):
+    beats = beats_of(np.random.default_rng(interval))
+    amount = beats["n"] & 15
+
+    def shifted(value):
+        value = value >> amount
+        return np.where(value < 0, -1, value)
+
+    unit = GraphUnit(interval, shifts)
+    expected = {"twice": shifted(shifted(beats["a"])), "again": shifted(shifted(beats["b"]))}
+    verify(unit, beats, expected)
+
+
+# Refusals.
+
+
+@pytest.mark.parametrize("interval", [0, -3])
+def test_refuses_an_interval(interval):
+    with pytest.raises(ValueError, match=rf"^interval must be at least 1, not {interval}$"):
+        Dataflow(interval)
+
+
+@pytest.mark.parametrize("interval", [1, 4])
+def test_refuses_more_uses_than_announced(interval):
+    g = Dataflow(interval, 1)
+    a = g.input("a", lambda operands: operands)
+    g.multiply("first", a, a)
+    with pytest.raises(ValueError, match=r"^second is one use of the multiplier more than announced$"):
+        g.multiply("second", a, a)
+    with pytest.raises(ValueError, match=r"^third is one use of the shifter more than announced$"):
+        g.use(g.share("shifter", 0, (signed(4),), 1, None), "third", (a,), lambda a: (a,))
+
+
+@pytest.mark.parametrize(
+    ("format", "accepted"), [(SQ(1, 17), True), (SQ(2, 17), False), (UQ(0, 17), True), (UQ(1, 17), False)]
+)
+def test_refuses_an_operand_that_is_too_wide(format, accepted):
+    def describe(g, a, b, n):
+        operand = g.register(
+            "operand", lambda a: FixedValue(format, Cat(Value.cast(a), Value.cast(a))[: format.width]), a
+        )
+        word = g.multiply("product", b, operand)
+        return {"product": word}, {"product": FixedShape(OPERAND * format)}
+
+    unit = GraphUnit(1, describe, 1)
+    if accepted:
+        unit.datapath(Module(), unit.i.payload)
+        return
+    with pytest.raises(ValueError, match=rf"^{re.escape(str(format))} is too wide for a multiplier$"):
+        unit.datapath(Module(), unit.i.payload)
+
+
+def test_multiplier_bits():
+    assert MULTIPLIER_BITS == 18
+
+
+# Words that come later than they could, wiring, and dot products.
+
+
+@pytest.mark.parametrize("interval", [1, 3])
+def test_words_stand_no_earlier_than_asked(interval):
+    g = Dataflow(interval, 2 * interval)
+    a = g.input("a", lambda operands: operands)
+    assert g.register("late", lambda a: a, a, since=9).age == 9
+    assert g.register("soon", lambda a: a, a, since=1).age == a.age + 1
+    assert g.multiply("late", a, a, since=9).age == 9
+    assert g.multiply("soon", a, a, since=1).age == a.age + 5
+    # An age whose turn is taken is passed over.
+    operator = g.share("operator", 2, (unsigned(1),), 3, lambda register, a: a)
+    first, second = (g.use(operator, "use", (a,), lambda a: (a,), since=12).age for _ in range(2))
+    assert (first, second) == ((12, 12) if operator.count == 2 else (12, 13))
+    wire = g.wire("wire", lambda a: a, a)
+    assert (wire.age, wire.stands) == (a.age, a.stands)
+
+
+def late_and_early(g, a, b, n):
+    """A piece read after one register and after both; a wire that is copied in place of its word."""
+
+    def make(register, x, y):
+        first = register(x + y, "first")
+        return first, register((first + x).wrap(SQ(3, 17)), "second")
+
+    operator = g.share("adder", 3, (FixedShape(OPERAND), FixedShape(OPERAND)), 2, make)
+    early = g.use(operator, "early", (a, b), lambda *ab: ab, lambda results: results[0], latency=1)
+    low = g.wire("low", lambda a: Value.cast(a)[:5], a)
+    late = g.register("late", lambda low, n: low ^ n, low, n, since=early.age + 6)
+    again = g.use(operator, "again", (a, b), lambda *ab: ab, lambda results: results[0], latency=1, since=11)
+    return {"early": early, "late": late, "again": again}, {
+        "early": FixedShape(SQ(2, 17)),
+        "late": unsigned(5),
+        "again": FixedShape(SQ(2, 17)),
+    }
+
+
+@pytest.mark.parametrize("interval", range(1, 7))
+def test_late_words_and_early_results(verify, interval):
+    beats = beats_of(np.random.default_rng(interval))
+    total = beats["a"] + beats["b"]
+    expected = {"early": total, "late": beats["a"] & 31 ^ beats["n"], "again": total}
+    verify(GraphUnit(interval, late_and_early), beats, expected)
+
+
+@pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize("interval", [1, 2, 3, 5, 9])
+def test_dot_products(verify, interval, shared):
+    """Of two words, of a word and itself, and of a word and what is made from it."""
+
+    def describe(g, a, b, n):
+        half = FixedValue.constant(OPERAND, 0.5)
+
+        def vector_of(*words):
+            return data.ArrayLayout(FixedShape(OPERAND), 3)(Cat(Value.cast(word) for word in words))
+
+        vector = g.wire("vector", lambda a: vector_of(a, half, a), a)
+        other = g.register("other", lambda b: vector_of(b, b, half), b)
+        sums = shared_sums(g, 3, OPERAND * OPERAND) if shared else None
+        words = {
+            "two": dot(g, "two", vector, other, sums),
+            "own": dot(g, "own", vector, vector, sums),
+            "made": dot(g, "made", vector, lambda v: [v[1], v[2], v[1]], sums),
+        }
+        return words, dict.fromkeys(
+            words, FixedShape(OPERAND * OPERAND + OPERAND * OPERAND + OPERAND * OPERAND)
+        )
+
+    beats = beats_of(np.random.default_rng(interval))
+    a, b, half = beats["a"], beats["b"], 1 << 16
+    unit = GraphUnit(interval, describe, 9)
+    assert cost_of(unit).multiplier_count == -(-9 // interval)
+    verify(unit, beats, {"two": a * b + half * (b + a), "own": 2 * a * a + half * half, "made": 3 * half * a})
+
+
+def test_checked_interval():
+    assert [checked_interval(interval, 4) for interval in (1, 4, None)] == [1, 4, 4]
+    assert checked_interval(None, 4, 2) == 2
+    for interval in (0, 5, -1, 1.5):
+        with pytest.raises(ValueError, match=rf"^initiation_interval must be 1 to 4, not {interval}$"):
+            checked_interval(interval, 4)

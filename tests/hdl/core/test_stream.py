@@ -1,0 +1,400 @@
+# amaranth: UnusedElaboratable=no
+"""Connections that look at every field, and the control of a pipelined unit: stalls, distance, reset."""
+
+import itertools
+from functools import partial
+
+import numpy as np
+import pytest
+from amaranth.hdl import Cat, Module, ResetInserter, Signal, Value, signed, unsigned
+from amaranth.lib import data, enum, stream, wiring
+from amaranth.lib.wiring import In, Out
+from amaranth.sim import Simulator
+
+from blysk.hdl.core.fixed import SQ, UQ, FixedShape
+from blysk.hdl.core.stream import PipelinedUnit, connect, connect_registered, count_down, require_same_shape
+from blysk.sim.engines.simulate import simulate
+
+
+def struct(**fields):
+    return data.StructLayout(fields)
+
+
+class Color(enum.Enum, shape=2):
+    RED = 0
+    GREEN = 1
+
+
+class Size(enum.Enum, shape=2):
+    SMALL = 0
+    LARGE = 1
+
+
+EQUAL = [
+    lambda: unsigned(5),
+    lambda: signed(3),
+    lambda: SQ(1, 17),
+    lambda: UQ(-1, 18),
+    lambda: Color,
+    lambda: data.ArrayLayout(SQ(1, 17), 3),
+    lambda: struct(a=SQ(1, 17), b=data.ArrayLayout(struct(c=unsigned(2), d=UQ(0, 4)), 2)),
+    lambda: struct(),
+    lambda: data.UnionLayout({"a": unsigned(3), "b": signed(4)}),
+]
+
+# Two shapes, of equal width wherever that can be, and the end of the message.
+DIFFERENT = [
+    (SQ(1, 17), SQ(2, 16), "payload is SQ(1, 17) on one side, SQ(2, 16) on the other"),
+    (SQ(1, 17), UQ(1, 17), "payload is SQ(1, 17) on one side, UQ(1, 17) on the other"),
+    (SQ(1, 17), signed(18), "payload is SQ(1, 17) on one side, signed(18) on the other"),
+    (unsigned(18), UQ(1, 17), "payload is unsigned(18) on one side, UQ(1, 17) on the other"),
+    (unsigned(4), signed(4), "payload is unsigned(4) on one side, signed(4) on the other"),
+    (unsigned(4), unsigned(5), "payload is unsigned(4) on one side, unsigned(5) on the other"),
+    (
+        struct(a=SQ(1, 7), b=SQ(1, 7)),
+        struct(a=SQ(1, 7), b=SQ(2, 6)),
+        "payload.b is SQ(1, 7) on one side, SQ(2, 6) on the other",
+    ),
+    (
+        struct(a=unsigned(4)),
+        struct(b=unsigned(4)),
+        "payload has fields ['a'] on one side, ['b'] on the other",
+    ),
+    (
+        struct(a=unsigned(4), b=unsigned(4)),
+        struct(b=unsigned(4), a=unsigned(4)),
+        "payload has fields ['a', 'b'] on one side, ['b', 'a'] on the other",
+    ),
+    (
+        data.ArrayLayout(unsigned(6), 2),
+        data.ArrayLayout(unsigned(4), 3),
+        "payload has 2 elements on one side, 3 on the other",
+    ),
+    (
+        struct(n=data.ArrayLayout(struct(x=SQ(1, 3)), 2)),
+        struct(n=data.ArrayLayout(struct(x=SQ(0, 4)), 2)),
+        "payload.n[].x is SQ(1, 3) on one side, SQ(0, 4) on the other",
+    ),
+]
+
+
+@pytest.mark.parametrize("make", EQUAL)
+def test_equal_shapes_are_accepted(make):
+    require_same_shape(make(), make())
+
+
+@pytest.mark.parametrize(("a", "b", "message"), DIFFERENT, ids=[str(k) for k in range(len(DIFFERENT))])
+def test_different_shapes_are_refused(a, b, message):
+    with pytest.raises(TypeError) as error:
+        require_same_shape(a, b)
+    assert str(error.value) == message
+    with pytest.raises(TypeError):
+        require_same_shape(b, a)
+
+
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [
+        (struct(a=unsigned(4)), unsigned(4)),
+        (struct(a=unsigned(4)), data.ArrayLayout(unsigned(4), 1)),
+        (data.ArrayLayout(unsigned(2), 2), unsigned(4)),
+        (data.UnionLayout({"a": unsigned(3)}), data.UnionLayout({"b": unsigned(3)})),
+    ],
+)
+def test_kinds_are_told_apart(a, b):
+    """A structure is no plain number, nor an array, though the bits are as many."""
+    for one, other in ((a, b), (b, a)):
+        with pytest.raises(TypeError, match=r"on one side, .* on the other$"):
+            require_same_shape(one, other)
+
+
+def streams(source_shape, sink_shape):
+    return (
+        stream.Signature(shape).create(path=(name,))
+        for shape, name in ((source_shape, "a"), (sink_shape, "b"))
+    )
+
+
+def test_connect_refuses_a_moved_binary_point():
+    with pytest.raises(TypeError, match=r"^payload is SQ\(1, 17\) on one side, SQ\(2, 16\) on the other$"):
+        connect(Module(), *streams(SQ(1, 17), SQ(2, 16)))
+
+
+@pytest.mark.parametrize("shape", [SQ(1, 7), struct(a=SQ(1, 3), b=unsigned(4)), unsigned(8)])
+def test_connect_carries_payload_valid_and_ready(shape):
+    source, sink = streams(shape, shape)
+    m = Module()
+    connect(m, source, sink)
+
+    async def bench(ctx):
+        for code, valid, ready in ((0, 0, 0), (0x5A, 1, 0), (0xA5, 0, 1), (0xFF, 1, 1)):
+            ctx.set(Value.cast(source.payload).as_unsigned(), code)
+            ctx.set(source.valid, valid)
+            ctx.set(sink.ready, ready)
+            await ctx.delay(1e-9)
+            assert ctx.get(Value.cast(sink.payload).as_unsigned()) == code
+            assert (ctx.get(sink.valid), ctx.get(source.ready)) == (valid, ready)
+
+    simulator = Simulator(m)
+    simulator.add_testbench(bench)
+    simulator.run()
+
+
+class Registers(wiring.Component):
+    """So many registers in a row; each adds nothing but its clock."""
+
+    i: In(stream.Signature(unsigned(16)))
+    o: Out(stream.Signature(unsigned(16)))
+    initiation_interval = 1
+
+    def __init__(self, latency):
+        self.latency = latency
+        self.added = 0
+        super().__init__()
+
+    def elaborate(self, platform):
+        m = Module()
+        streams = [stream.Signature(unsigned(16)).create(path=(str(k),)) for k in range(self.latency - 1)]
+        streams = [wiring.flipped(self.i), *streams, wiring.flipped(self.o)]
+        for source, sink in itertools.pairwise(streams):
+            connect_registered(m, source, sink)
+        return m
+
+
+def test_registers_refuse_a_moved_binary_point():
+    with pytest.raises(TypeError, match=r"^payload is SQ\(1, 17\) on one side, SQ\(2, 16\) on the other$"):
+        connect_registered(Module(), *streams(SQ(1, 17), SQ(2, 16)))
+
+
+@pytest.mark.parametrize("clocks", [1, 3])
+def test_counter_follows_the_span(clocks):
+    """Against a plain count of spans of 0 to 5 pixels, on enabled clocks alone."""
+    rng = np.random.default_rng(clocks)
+    m, valid, length, advance = Module(), Signal(), Signal(3), Signal()
+    active, ends = count_down(m, valid, length, advance)
+    seen = []
+
+    async def bench(ctx):
+        left = 0
+        for _ in range(400):
+            assert (ctx.get(active), ctx.get(ends)) == (left > 0, left <= 1)
+            moves, given = bool(rng.random() < 1 / clocks), int(rng.integers(6))
+            offered = bool(rng.random() < 0.7)
+            begins = moves and left <= 1 and offered
+            ctx.set(advance, moves)
+            ctx.set(valid, offered)
+            ctx.set(length, given)
+            await ctx.tick()
+            if begins:
+                left = given
+                seen.append(given)
+            elif moves:
+                left = max(left - 1, 0)
+
+    simulator = Simulator(m)
+    simulator.add_clock(1e-8)
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert set(seen) == set(range(6))
+
+
+class Delay(PipelinedUnit):
+    """The input, plus 1 for every register but the first; one register a clock of latency."""
+
+    def __init__(self, latency, initiation_interval=1):
+        super().__init__(unsigned(16), unsigned(16), latency=latency, initiation_interval=initiation_interval)
+
+    def datapath(self, m, operands):
+        value = operands
+        for stage in range(self.latency - (self.initiation_interval > 1)):
+            value = self.register(m, (value + 1)[:16], f"stage_{stage}")
+        return value
+
+    @property
+    def added(self):
+        """What the registers add to the input."""
+        return self.latency - (self.initiation_interval > 1)
+
+
+class Ages(PipelinedUnit):
+    """How many enabled clocks ago each age of the beat that leaves was, 4 bits an age; one beat at a time."""
+
+    def __init__(self):
+        super().__init__(unsigned(1), unsigned(12), latency=4, initiation_interval=4)
+
+    def datapath(self, m, operands):
+        clock = Signal(4)
+        m.d.sync += clock.eq(clock + 1)
+        caught = [self.register(m, clock, f"clock_{age}", when=self.at(age)) for age in (1, 2, 3)]
+        return Cat((clock - register)[:4] for register in caught)
+
+
+@pytest.mark.parametrize(("latency", "interval"), [(0, 1), (-1, 1), (1, 0), (3, -2), (0, 0)])
+def test_latency_and_interval_are_at_least_one(latency, interval):
+    with pytest.raises(ValueError, match=r"^latency and initiation_interval must be at least 1$"):
+        Delay(latency, interval)
+
+
+def test_datapath_is_the_subclass_s():
+    with pytest.raises(NotImplementedError):
+        PipelinedUnit(unsigned(1), unsigned(1), latency=1).datapath(Module(), None)
+
+
+def test_constants_are_a_member_only_where_asked_for():
+    plain = PipelinedUnit(unsigned(1), unsigned(1), latency=1)
+    assert set(plain.signature.members) == {"i", "o"}
+    unit = PipelinedUnit(unsigned(1), unsigned(1), latency=1, constants=SQ(1, 17))
+    assert unit.constants.shape() == FixedShape(unit.constants.format)
+
+
+UNITS = [
+    pytest.param(make, id=f"{make.func.__name__}-{'-'.join(map(str, make.args))}")
+    for make in (
+        *(partial(Delay, *timing) for timing in ((1, 1), (4, 1), (2, 2), (5, 3), (9, 4))),
+        partial(Registers, 1),
+        partial(Registers, 3),
+    )
+]
+
+
+@pytest.mark.parametrize("make", UNITS)
+@pytest.mark.parametrize(("input_share", "output_share"), [(0, 0), (0.4, 0.4), (0.9, 0.1), (0.1, 0.9)])
+def test_stalls_and_distance(make, input_share, output_share):
+    """Nothing lost, repeated, or changed while it waits; without stalls every clock is as said."""
+    unit = make()
+    rng = np.random.default_rng(unit.latency)
+    latency, interval = unit.latency, unit.initiation_interval
+    codes = rng.integers(0, 2**15, 60)
+    stalls = {
+        "input_stalls": rng.random(97) < input_share,
+        "output_stalls": rng.random(89) < output_share,
+    }
+    run = simulate(unit, codes, count=60, engine="pysim", **stalls)
+    np.testing.assert_array_equal(run.beats, codes + unit.added)
+    if not input_share:
+        np.testing.assert_array_equal(run.input_clocks, np.arange(60) * interval)
+    if not output_share:
+        np.testing.assert_array_equal(run.clocks, run.input_clocks + latency)
+    assert (run.clocks - run.input_clocks >= latency).all()
+
+
+@pytest.mark.parametrize("make", UNITS)
+def test_a_stall_costs_its_own_clock(make):
+    """After beats have waited, those behind them follow on every clock that the interval allows."""
+    unit = make()
+    codes = np.arange(60)
+    stalled = simulate(unit, codes, count=60, engine="pysim", output_stalls=np.arange(1000) % 40 == 20)
+    free = simulate(unit, codes, count=60, engine="pysim")
+    lost = stalled.clocks - free.clocks
+    assert np.all(np.diff(lost) >= 0)
+    assert lost[-1] <= np.count_nonzero(np.arange(stalled.clocks[-1]) % 40 == 20)
+
+
+@pytest.mark.parametrize("make", UNITS)
+def test_ready_waits_for_no_other_ready(make):
+    """Input ready, output valid and payload are what registers say: no path leads to them from a port."""
+    unit = make()
+    rng = np.random.default_rng(unit.latency)
+    seen = set()
+
+    async def bench(ctx):
+        for _ in range(200):
+            found = set()
+            for ready, valid in ((0, 0), (0, 1), (1, 0), (1, 1)):
+                ctx.set(unit.o.ready, ready)
+                ctx.set(unit.i.valid, valid)
+                await ctx.delay(1e-9)
+                found.add((ctx.get(unit.i.ready), ctx.get(unit.o.valid), ctx.get(unit.o.payload)))
+            assert len(found) == 1
+            seen.add(next(iter(found))[:2])
+            ctx.set(unit.i.payload, int(rng.integers(2**15)))
+            ctx.set(unit.i.valid, bool(rng.random() < 0.8))
+            ctx.set(unit.o.ready, bool(rng.random() < 0.3))
+            await ctx.tick()
+
+    simulator = Simulator(unit)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert {(0, 1), (1, 0)} <= seen
+
+
+@pytest.mark.parametrize("interval", [2, 5])
+def test_beats_are_whole_turns_apart(interval):
+    """While a beat is inside, the next comes a multiple of the interval later; else at any time."""
+    unit = Delay(9, interval)
+    rng = np.random.default_rng(interval)
+    codes = rng.integers(0, 2**15, 200)
+    run = simulate(unit, codes, count=200, engine="pysim", input_stalls=rng.random(997) < 0.8)
+    distance = np.diff(run.input_clocks)
+    inside = distance < unit.latency
+    assert (distance[inside] % interval == 0).all()
+    assert inside.any()
+    assert (distance[~inside] % interval != 0).any()
+
+
+def drive(unit, codes, stalls, reset_at=None):
+    """Beats taken in pysim, each with its clock since power-up or since the reset, which lasts one clock.
+
+    The source offers one beat after the other as soon as it may; after the reset it begins again, as does the
+    pattern of stalls. A payload that waits must stay.
+    """
+    reset = Signal()
+    m = Module()
+    m.submodules.unit = ResetInserter(reset)(unit)
+    runs = []
+
+    async def run(ctx, clocks):
+        taken, sent, held = [], 0, None
+        for clock in range(clocks):
+            offered = sent < len(codes)
+            ready = not stalls[clock % len(stalls)]
+            ctx.set(unit.i.valid, offered)
+            ctx.set(unit.i.payload, codes[sent] if offered else 0xFFFF)
+            ctx.set(unit.o.ready, ready)
+            valid, code = ctx.get(unit.o.valid), ctx.get(unit.o.payload)
+            assert held is None or (valid, code) == (1, held)
+            held = code if valid and not ready else None
+            if valid and ready:
+                taken.append((clock, code))
+            sent += bool(offered and ctx.get(unit.i.ready))
+            await ctx.tick()
+        runs.append((taken, sent))
+
+    async def bench(ctx):
+        if reset_at is not None:
+            await run(ctx, reset_at)
+            ctx.set(reset, 1)
+            await ctx.tick()
+            ctx.set(reset, 0)
+        await run(ctx, 120)
+
+    simulator = Simulator(m)
+    simulator.add_clock(1e-8)
+    simulator.add_testbench(bench)
+    simulator.run()
+    return runs
+
+
+@pytest.mark.parametrize(("latency", "interval"), [(4, 1), (7, 3)])
+@pytest.mark.parametrize("reset_at", [5, 11, 12, 13])
+def test_reset_in_mid_stream_leaves_nothing_behind(latency, interval, reset_at):
+    """After a reset with beats inside, some of them waiting, the unit does as from power-up."""
+    rng = np.random.default_rng(reset_at)
+    codes = rng.integers(0, 2**15, 12).tolist()
+    stalls = (rng.random(31) < 0.4).tolist()
+    unit = Delay(latency, interval)
+    ((fresh, _),) = drive(unit, codes, stalls)
+    assert [code for _, code in fresh] == [code + unit.added for code in codes]
+    (before, sent), (after, _) = drive(Delay(latency, interval), codes, stalls, reset_at)
+    assert len(before) < sent
+    assert after == fresh
+
+
+def test_at_counts_enabled_clocks():
+    """Age 1 is 3 clocks before a beat leaves at age 4, and so on; clocks of standing still do not count."""
+    rng = np.random.default_rng(1)
+    stalls = {"input_stalls": rng.random(97) < 0.3, "output_stalls": rng.random(89) < 0.5}
+    run = simulate(Ages(), np.zeros(100, int), count=100, engine="pysim", **stalls)
+    assert (run.clocks - run.input_clocks > 4).any()
+    np.testing.assert_array_equal(run.beats, 3 | 2 << 4 | 1 << 8)

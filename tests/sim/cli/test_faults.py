@@ -1,0 +1,375 @@
+"""What the machine does to a run: killed programs, full and forbidden disks, spoilt and foreign caches."""
+
+import contextlib
+import errno
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from blysk.bench.store import Task, results_of
+from blysk.sim.engines import cxxrtl
+from blysk.sim.engines.engine import CompilerMissing
+from blysk.sim.errors import InputError
+from blysk.sim.frames.picture import write_image
+from blysk.sim.frames.workers import local_executor
+from blysk.sim.output import check_writable, write_json
+
+from ..engines.test_cxxrtl import BEATS, entries, scaled, script, start
+
+THREE = (3 * BEATS).tolist()
+NOBODY = 65534
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, users and permissions")
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    """A cache and a temporary folder of each test's own."""
+    folder = tmp_path / "cache"
+    monkeypatch.setenv("BLYSK_CACHE", str(folder))
+    monkeypatch.delenv("CXX", raising=False)
+    return folder
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setenv("TMPDIR", str(folder))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    cxxrtl._private_folder.cache_clear()
+    yield folder
+    cxxrtl._private_folder.cache_clear()
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of a few pages, of which one is free."""
+    folder = tmp_path / "disk"
+    folder.mkdir(mode=0o700)
+    options = ["-t", "tmpfs", "-o", "size=16k,mode=700", "tmpfs", str(folder)]
+    if not shutil.which("mount") or subprocess.run(["mount", *options], capture_output=True).returncode:
+        pytest.skip("may not mount a file system")
+    (folder / "old.json").write_text("old")
+    (folder / "filling").write_bytes(bytes(2 * 4096))
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+@contextlib.contextmanager
+def an_ordinary_user():
+    """The superuser, to whom nothing is forbidden, becomes somebody else for a while."""
+    if os.geteuid():
+        yield
+        return
+    os.setresuid(NOBODY, NOBODY, 0)
+    try:
+        yield
+    finally:
+        os.setresuid(0, 0, 0)
+
+
+def left_in(*folders):
+    return [path for folder in folders if folder.exists() for path in folder.rglob("*") if path.is_file()]
+
+
+# The compiler.
+
+
+def test_killed_compiler(cache, temporary, tmp_path, monkeypatch):
+    """It dies with half of the library written."""
+    text = 'case "$1" in --version) echo 1.0; exit 0;; esac; for last; do :; done; '
+    path = script(tmp_path, "killed", text + 'head -c 5000 "$0" > "$last"; kill -9 $$')
+    monkeypatch.setenv("CXX", path)
+    with pytest.raises(CompilerMissing) as caught:
+        scaled()
+    reason = f"no working C++ compiler ({path} ends with signal 9: no message): "
+    assert str(caught.value).startswith(reason)
+    assert left_in(cache, temporary) == []
+    monkeypatch.delenv("CXX")
+    assert scaled() == THREE
+
+
+def test_compiler_that_makes_nothing(cache, temporary, tmp_path, monkeypatch):
+    path = script(tmp_path, "lazy", "echo 1.0")
+    monkeypatch.setenv("CXX", path)
+    with pytest.raises(CompilerMissing, match=re.escape(f"no working C++ compiler ({path} makes nothing): ")):
+        scaled()
+    assert left_in(cache, temporary) == []
+
+
+def test_killed_while_compiling(cache, temporary, tmp_path):
+    """Of a process that is killed no half of a model is in the cache, and the next one builds it."""
+    text = 'case "$1" in --version) echo 1.0; exit 0;; esac; echo $$ > "$STARTED"; exec sleep 60'
+    started = tmp_path / "started"
+    program = "print(simulate(Triple(), np.arange(5), count=5).beats.tolist())"
+    process = start(program, CXX=script(tmp_path, "slow", text), STARTED=str(started))
+    patience = time.monotonic() + 60
+    while not (started.exists() and started.read_text().endswith("\n")):
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < patience
+        time.sleep(0.02)
+    process.kill()
+    os.kill(int(started.read_text()), signal.SIGKILL)
+    process.communicate(timeout=60)
+    assert left_in(cache) == []
+    again = start(program)
+    assert again.communicate(timeout=60) == ("[0, 3, 6, 9, 12]\n", "")
+    assert len(entries(cache)) == 1
+
+
+def test_full_cache(small_disk, temporary, monkeypatch):
+    """The model is built and used all the same, by the first compiler; a warning says why it is not kept."""
+    before = left_in(small_disk)
+    monkeypatch.setenv("BLYSK_CACHE", str(small_disk))
+    warning = rf"^cache folder {re.escape(str(small_disk))} cannot be written \(No space left on device\): "
+    with pytest.warns(RuntimeWarning, match=warning):
+        assert scaled() == THREE
+    assert left_in(small_disk) == before
+
+
+def test_full_cache_without_mounting(cache, temporary, monkeypatch):
+    copyfile = shutil.copyfile
+
+    def full(source, target):
+        if Path(target).parent == cache:
+            Path(target).write_bytes(b"half")
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return copyfile(source, target)
+
+    monkeypatch.setattr(shutil, "copyfile", full)
+    with pytest.warns(RuntimeWarning, match=r"cannot be written \(No space left on device\): compiled"):
+        assert scaled() == THREE
+    # To move a file within a file system takes no room.
+    assert all(path.suffix == ".model" for path in left_in(cache))
+    assert scaled() == THREE
+
+
+def test_full_temporary_folder(cache, small_disk, monkeypatch):
+    before = left_in(small_disk)
+    monkeypatch.setattr(tempfile, "tempdir", str(small_disk))
+    with pytest.raises(
+        InputError, match=r"^the temporary folder: cannot be used \(No space left on device\); "
+    ):
+        scaled()
+    assert left_in(cache, small_disk) == before
+
+
+@pytest.mark.parametrize(("at", "value"), [(4, b"\1"), (18, b"\xf7\0")], ids=["32 bits", "other processor"])
+def test_model_of_another_machine(cache, at, value):
+    """A library with a true checksum that is for another kind of processor is built again."""
+    assert scaled() == THREE
+    (entry,) = entries(cache)
+    content = entry.read_bytes()
+    if content[:4] != b"\x7fELF":
+        pytest.skip("libraries are of another format")
+    key = entry.stem.split("-")[0]
+    entry.unlink()
+    other = cache / "other"
+    other.write_bytes(content[:at] + value + content[at + len(value) :])
+    planted = other.rename(cache / f"{key}-{cxxrtl._digest(other)}.model")
+    assert scaled() == THREE
+    (again,) = entries(cache)
+    assert again != planted
+
+
+# Users and permissions.
+
+
+@pytest.fixture
+def open_folder():
+    """A folder in which an ordinary user may look; those above it are open, too."""
+    folder = Path(tempfile.mkdtemp())
+    folder.chmod(0o755)
+    yield folder
+    shutil.rmtree(folder)
+
+
+def test_read_only_cache(open_folder, monkeypatch):
+    folder = open_folder / "cache"
+    folder.mkdir(mode=0o500)
+    if not os.geteuid():
+        os.chown(folder, NOBODY, NOBODY)
+    monkeypatch.setenv("BLYSK_CACHE", str(folder))
+    cxxrtl._private_folder.cache_clear()
+    with an_ordinary_user(), pytest.warns(RuntimeWarning, match="cannot be written: compiled models are"):
+        chosen = cxxrtl.cache_folder()
+    assert chosen != folder
+    assert chosen.stat().st_mode & 0o777 == 0o700
+    shutil.rmtree(chosen)
+    cxxrtl._private_folder.cache_clear()
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give a folder away"
+)
+def test_cache_of_another_user(cache):
+    cache.mkdir(mode=0o700)
+    os.chown(cache, NOBODY, NOBODY)
+    with pytest.warns(RuntimeWarning, match="belongs to another user: compiled models are kept for this run"):
+        assert scaled() == THREE
+    assert left_in(cache) == []
+
+
+def test_forbidden_output(open_folder):
+    path = open_folder / "locked" / "a.json"
+    path.parent.mkdir(mode=0o500)
+    message = f"{path}: cannot be written, permission denied; choose a folder that you may write to"
+    with an_ordinary_user():
+        for attempt in (check_writable, lambda path: write_json(path, 1)):
+            with pytest.raises(InputError) as caught:
+                attempt(path)
+            assert str(caught.value) == message
+    assert left_in(open_folder) == []
+
+
+# Full disks.
+
+
+@pytest.mark.parametrize("name", ["old.json", "new.json", "new.png"])
+def test_full_disk(small_disk, name):
+    """The old file is as it was, and of the new one there is nothing."""
+    before = {path: path.read_bytes() for path in left_in(small_disk)}
+    noise = np.random.default_rng(1).integers(0, 256, (60, 60, 3)).astype(np.uint8)
+    write = write_image if name.endswith(".png") else write_json
+    with pytest.raises(InputError) as caught:
+        write(small_disk / name, noise)
+    reason = "cannot be written, the disk is full; free some space or choose another disk"
+    assert str(caught.value) == f"{small_disk / name}: {reason}"
+    assert {path: path.read_bytes() for path in left_in(small_disk)} == before
+
+
+LIMITED = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)); "
+
+
+@pytest.fixture
+def unmeasured(monkeypatch):
+    """Line coverage of a process would be in a file that is larger than it may write."""
+    monkeypatch.delenv("COVERAGE_PROCESS_CONFIG", raising=False)
+
+
+def test_largest_file_of_a_process(unmeasured, tmp_path):
+    """A limit of the shell in place of a full disk."""
+    program = "from blysk.sim.output import write_text; write_text(sys.argv[1], 5000 * 'x')"
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED + program, str(path)], capture_output=True, text=True
+    )
+    message = f"blysk.sim.errors.InputError: {path}: cannot be written, File too large; choose another file\n"
+    assert done.stderr.endswith(message)
+    assert path.read_text() == "old"
+    assert left_in(tmp_path) == [path]
+
+
+def test_yosys_that_cannot_work(unmeasured, cache):
+    """What it runs in ends with a traceback, of which the last line tells."""
+    run = start(LIMITED + "simulate(Triple(), np.arange(5), count=5, engine='cxxrtl')")
+    _, errors = run.communicate(timeout=60)
+    assert re.search(
+        r"\nblysk\.sim\.engines\.engine\.SimulationError: Yosys: \S.*File too large.*\n\Z", errors
+    )
+    assert left_in(cache) == []
+
+
+# Sweeps.
+
+
+def measured(number, mark):
+    """A measurement whose first run of number 3 ends with its process."""
+    if number == 3 and not Path(mark).exists():
+        Path(mark).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {"number": number, "run": time.time()}
+
+
+def test_killed_worker_of_a_sweep(cache, tmp_path):
+    tasks = [Task(measured, {"number": number, "mark": str(tmp_path / "mark")}) for number in range(6)]
+    reason = "^--jobs 1: a process died, perhaps for want of memory; use fewer, or smaller pictures$"
+    with pytest.raises(InputError, match=reason), local_executor(1) as executor:
+        results_of(tasks, executor)
+    kept = {path: path.read_bytes() for path in (cache / "results").iterdir()}
+    assert sorted(json.loads(entry)["result"]["number"] for entry in kept.values()) == [0, 1, 2]
+    with local_executor(1) as executor:
+        found = results_of(tasks, executor)
+    assert [result["number"] for result in found] == list(range(6))
+    assert all(path.read_bytes() == entry for path, entry in kept.items())
+
+
+PROGRAM = [sys.executable, "-c", "import sys; from blysk.sim.cli.main import main; sys.exit(main())"]
+
+
+@pytest.mark.long
+def test_termination_of_a_turntable(cache, temporary, tmp_path):
+    """As an interrupt: frames done stay, whole, and no process goes on, although the signal reaches one."""
+    arguments = ["render", "teapot", "--triangles", "100", "--size", "32x24", "--engine", "pysim"]
+    arguments += ["--frames", "500", "--jobs", "2", "-o", str(tmp_path / "a.gif")]
+    process = subprocess.Popen(
+        [*PROGRAM, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        patience = time.monotonic() + 120
+        while not (tmp_path / "a-0001.png").exists():
+            assert process.poll() is None
+            assert time.monotonic() < patience
+            time.sleep(0.02)
+        process.terminate()
+        # Returns when nobody holds the pipes any more: neither the program nor one of its workers.
+        assert process.communicate(timeout=60) == ("", "blysk: interrupted\n")
+        assert process.returncode == 130
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    left = left_in(tmp_path)
+    assert 1 <= len(left) < 500
+    assert all(re.fullmatch(r"a-\d{4}\.png", path.name) for path in left)
+    for path in left:
+        with Image.open(path) as image:
+            assert np.asarray(image).shape == (24, 32, 3)
+
+
+SWEEP = ["explore", "--size", "24x18", "--methods", "linear,renormalise,chord", "--models", "cosquad"]
+SWEEP += ["--degrees", "3", "--fraction-bits", "46", "--highlights", "chord", "--largest-error", "255"]
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="there is no /proc")
+def test_killed_worker_of_a_command(cache):
+    """One line, status 2; what was measured is kept, and the next run goes on from there."""
+    arguments = [*PROGRAM, *SWEEP, "--jobs", "2"]
+    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    patience = time.monotonic() + 120
+    while not left_in(cache / "results"):
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < patience
+        time.sleep(0.02)
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    worker = next(pid for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes())
+    os.kill(int(worker), signal.SIGKILL)
+    output, errors = process.communicate(timeout=60)
+    assert (process.returncode, output) == (2, "")
+    assert (
+        errors
+        == "blysk: --jobs 2: a process died, perhaps for want of memory; use fewer, or smaller pictures\n"
+    )
+    kept = {path: path.stat().st_mtime_ns for path in left_in(cache / "results")}
+    assert kept
+    done = subprocess.run(arguments, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "designs     6 of 6 have" in done.stdout
+    assert kept.items() < {path: path.stat().st_mtime_ns for path in left_in(cache / "results")}.items()

@@ -1,0 +1,161 @@
+"""Registers grouped by what lets them change: the text, and that the machine is the same."""
+
+import re
+
+import numpy as np
+import pytest
+from amaranth.back import rtlil
+from amaranth.hdl import Array, Module, Mux, Signal
+from amaranth.lib import data, stream
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import Component, In, Out
+
+from blysk.sim.engines import cxxrtl
+from blysk.sim.engines.guards import LEAST, _choice, group_registers
+from blysk.sim.engines.simulate import simulate
+
+
+class Tangle(Component):
+    """Registers that swap, hold, go round and depend on each other, under questions inside questions."""
+
+    i: In(stream.Signature(data.StructLayout({"x": 16, "on": 3})))
+    o: Out(stream.Signature(data.ArrayLayout(32, 4)))
+
+    def elaborate(self, platform):
+        m = Module()
+        x, on = self.i.payload.x, self.i.payload.on
+        advance = Signal()
+        m.d.comb += [advance.eq(~self.o.valid | self.o.ready), self.i.ready.eq(advance)]
+        swap = [Signal(16, init=k, name=f"swap_{k}") for k in range(6)]
+        ring = [Signal(32, init=3 * k + 1, name=f"ring_{k}") for k in range(6)]
+        wide = Signal(100, init=1)
+        free = Signal(8)
+        m.submodules.memory = memory = Memory(shape=16, depth=8, init=range(8))
+        read, write = memory.read_port(), memory.write_port()
+        m.d.comb += [
+            read.addr.eq(ring[0]),
+            read.en.eq(advance),
+            write.addr.eq(swap[1]),
+            write.data.eq(x),
+            write.en.eq(advance & on[1]),
+        ]
+        # In the middle of the rest, and free of every question.
+        m.d.sync += free.eq(free + 1)
+        with m.If(advance):
+            m.d.sync += self.o.valid.eq(self.i.valid)
+            with m.If(self.i.valid & on[0]):
+                m.d.sync += [to.eq(source) for to, source in zip(swap, reversed(swap), strict=True)]
+                m.d.sync += swap[2].eq(x)
+                with m.If(on[1]):
+                    m.d.sync += [
+                        to.eq(source + x) for to, source in zip(ring, ring[1:] + ring[:1], strict=True)
+                    ]
+                with m.Else():
+                    m.d.sync += [ring[0].eq(ring[3]), ring[1].eq(ring[0] ^ free), wide.eq(wide * 5 + x)]
+            with m.Elif(on[2]):
+                # Registers in both branches, and a part of one.
+                m.d.sync += [ring[4].eq(Mux(on[1], ring[5], ring[4])), ring[5][4:9].eq(x)]
+                m.d.sync += Array(swap)[x[:2]].eq(free)
+            with m.Switch(on):
+                with m.Case(1, 5):
+                    m.d.sync += [word.eq(word + 1) for word in ring[2:]]
+                with m.Case(7):
+                    m.d.sync += wide.eq(0)
+            m.d.sync += [
+                self.o.payload[0].eq(ring[0] ^ ring[4]),
+                self.o.payload[1].eq(sum(ring)),
+                self.o.payload[2].eq(wide >> 50),
+                self.o.payload[3].eq(sum(swap) + read.data),
+            ]
+        return m
+
+
+def generated(component, monkeypatch):
+    """CXXRTL's own text."""
+    with monkeypatch.context() as patch:
+        patch.setattr(cxxrtl, "group_registers", lambda text: text)
+        return cxxrtl._generate(rtlil.convert(component, name="top", emit_src=False))
+
+
+@pytest.fixture(autouse=True)
+def _cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
+
+
+def test_the_machine_is_the_same(monkeypatch):
+    """Against pysim, over ten times the clocks that a new model is checked with, with stalls."""
+    rng = np.random.default_rng(4)
+    beats = {"x": rng.integers(0, 1 << 16, 4000), "on": rng.integers(0, 8, 4000)}
+    component = Tangle()
+    assert "changed_1 = true" in group_registers(generated(component, monkeypatch))
+    stalls = {"input_stalls": rng.random(701) < 0.3, "output_stalls": rng.random(503) < 0.4}
+    fast, slow = (
+        simulate(component, beats, count=4000, engine=name, **stalls) for name in ("cxxrtl", "pysim")
+    )
+    assert np.array_equal(fast.beats, slow.beats)
+    assert np.array_equal(fast.clocks, slow.clocks)
+
+
+def test_every_register_is_copied_once(monkeypatch):
+    plain = generated(Tangle(), monkeypatch)
+    grouped = group_registers(plain)
+    copy = re.compile(r"if \((\w+)\.commit\(observer\)\) changed = true;")
+    assert sorted(copy.findall(grouped)) == sorted(copy.findall(plain))
+    # What stands under no question is copied always.
+    always = re.findall(r"^\t\tif \((\w+)\.commit", grouped, re.MULTILINE)
+    assert "p_free" in always
+    assert not any(name.startswith("p_ring__0") for name in always)
+    # Nothing is written to itself, and nobody asks for the reset.
+    assert not re.search(r"(\w+)\.next = \1\.curr;", grouped)
+    assert "p_rst ?" in plain
+
+
+class Few(Component):
+    """Fewer registers than are worth a flag."""
+
+    i: In(stream.Signature(8))
+    o: Out(stream.Signature(8))
+
+    def elaborate(self, platform):
+        m = Module()
+        m.d.comb += self.i.ready.eq(~self.o.valid | self.o.ready)
+        with m.If(self.i.ready):
+            m.d.sync += [self.o.valid.eq(self.i.valid), self.o.payload.eq(self.i.payload)]
+        return m
+
+
+def test_few_registers_have_no_flag(monkeypatch):
+    assert LEAST > 2
+    grouped = group_registers(generated(Few(), monkeypatch))
+    assert "changed_" not in grouped
+    assert grouped.count(".next = ") == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("(a ? b : c)", ("a", "b", "c")),
+        (
+            "(f<1>(a, (b ? c : d)) ? value<2>{0u} : (e ? f : g))",
+            ("f<1>(a, (b ? c : d))", "value<2>{0u}", "(e ? f : g)"),
+        ),
+        ("((a ? b : c) ? d : e)", ("(a ? b : c)", "d", "e")),
+        ("(a ? b : c).slice<1>().val()", None),
+        ("f(a ? b : c)", None),
+        ("(a)", None),
+        ("a.curr", None),
+        ("(a ? b : c) + (d)", None),
+    ],
+)
+def test_choice(text, parts):
+    assert _choice(text) == parts
+
+
+def test_text_that_is_not_understood_stays(monkeypatch):
+    plain = generated(Tangle(), monkeypatch)
+    # A combinational value after the first register.
+    odd = plain.replace("\treturn converged;\n", "\tp_x = p_y;\n\treturn converged;\n")
+    assert odd != plain
+    assert group_registers(odd) == odd
+    for text in ("", "struct p_top {};", plain.replace("posedge_p_clk", "posedge_p_other")):
+        assert group_registers(text) == text

@@ -1,0 +1,174 @@
+# amaranth: UnusedElaboratable=no
+"""Words that are watched: they are those of the twin, at their ages, and the pipeline stays as it is."""
+
+import numpy as np
+import pytest
+from amaranth.hdl import Fragment, Value
+from amaranth.sim import Simulator
+
+from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, quantise
+from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.reference.geometry import normalise
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.engines.beats import pack, unpack, word_count
+from blysk.sim.engines.probes import ObservedPipeline, probes_of
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.frames.frame import beats_of
+
+DESIGN = ShadingPipeline("chord", "cosquad", gate=True)
+
+
+def spans_near(rng, count):
+    """Spans that turn by some degrees, most of them lit."""
+    length = rng.integers(3, 9, count)
+    left = normalise(rng.normal(size=(count, 3)) * 0.5 + (0, 0, 1))
+    right = normalise(left + rng.normal(size=(count, 3)) * 0.03)
+    return Spans(np.arange(count) * 10, np.arange(count), length, quantise(left), quantise(right))
+
+
+def constants_of(exponent=20):
+    vectors = [quantise(normalise(np.array([v], dtype=float))) for v in ((0.2, 0.3, 1), (0.1, 0.15, 1))]
+    colors = [np.array([[c * 64] * 3]) for c in (120, 90)]
+    return FrameConstants(exponent, np.array([64 * 9, 64 * 5, 0]), *vectors, *colors)
+
+
+@pytest.fixture(scope="module")
+def observed():
+    component = ObservedPipeline(DESIGN)
+    Fragment.get(component, None)
+    return component
+
+
+def rows_of(component, spans, constants, clocks):
+    """Status on every clock, as its registers stand before the edge."""
+    queue = []
+    for stream, beats in (
+        (component.write, writes_of([constants])),
+        (component.i, beats_of(component.unit, spans)),
+    ):
+        words = pack(stream.payload.shape(), beats).astype("<u4")
+        queue += [(stream, int.from_bytes(row.tobytes(), "little")) for row in words]
+    status = Value.cast(component.status).as_unsigned()
+    codes = []
+
+    async def bench(context):
+        context.set(component.o.ready, 1)
+        for _ in range(clocks):
+            stream, word = queue[0] if queue else (component.i, 0)
+            context.set(Value.cast(stream.payload).as_unsigned(), word)
+            context.set(stream.valid, bool(queue))
+            moves = queue and context.get(stream.ready)
+            codes.append(context.get(status))
+            await context.tick()
+            context.set(stream.valid, 0)
+            if moves:
+                queue.pop(0)
+
+    simulator = Simulator(component)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    size = 4 * word_count(component.status.shape())
+    raw = b"".join(code.to_bytes(size, "little") for code in codes)
+    return unpack(component.status.shape(), np.frombuffer(raw, "<u4").reshape(clocks, -1).astype(np.uint32))
+
+
+def test_beats_are_those_without_probes(observed):
+    spans, constants = spans_near(np.random.default_rng(4), 6), constants_of()
+    options = {"count": int(spans.length.sum()), "write": writes_of([constants]), "engine": "pysim"}
+    plain = ShadingPipelineUnit(DESIGN)
+    runs = [simulate(component, beats_of(plain, spans), **options) for component in (observed, plain)]
+    np.testing.assert_array_equal(runs[0].beats, runs[1].beats)
+    np.testing.assert_array_equal(runs[0].clocks, runs[1].clocks)
+    for name in runs[1].status.dtype.names:
+        assert runs[0].status[name] == runs[1].status[name]
+    assert runs[0].status["gated_spans"] == np.count_nonzero(~DESIGN.lit_spans(spans, constants))
+
+
+def test_needs_a_light_and_a_gate():
+    for design in (ShadingPipeline("chord"), ShadingPipeline("chord", lights=2, gate=True)):
+        with pytest.raises(ValueError, match="one light and a gate"):
+            ObservedPipeline(design)
+
+
+@pytest.mark.parametrize(
+    ("method", "model"),
+    [
+        *(("chord", "cosquad"), ("chord", "lyon3_refitted"), ("linear", "exp")),
+        *(("renormalise", "coscos4"), ("quadratic", "blinn")),
+    ],
+)
+def test_formats_fit(method, model):
+    unit = ShadingPipelineUnit(ShadingPipeline(method, model, gate=True))
+    probes = {probe.name: probe for probe in probes_of(unit)}
+    assert {"cosine", "highlight", "gated", "diffuse", "specular", "red", "r", "x", "last"} <= set(probes)
+    assert isinstance(probes["specular"].shape, FixedShape)
+    assert ("highlight_0_sum" in probes) == (method == "chord")
+    assert ("normal_2_sum" in probes) == (method != "chord")
+    assert ("argument" in probes) == (model != "blinn")
+    assert ("base" in probes) == (model in ("cosquad", "lyon3_refitted"))
+    assert ("square_3" in probes) == (model == "lyon3_refitted")
+
+
+def test_words_are_those_of_the_twin(observed):
+    """Every word of every pixel, at its age behind the clock on which the lights take the pixel."""
+    spans, constants = spans_near(np.random.default_rng(5), 5), constants_of(4)
+    count = int(spans.length.sum())
+    rows = rows_of(observed, spans, constants, 200)
+    taken = np.flatnonzero(rows["taken"]).tolist()
+    assert len(taken) == count
+    numbers = dict(zip(taken, range(count), strict=True))
+
+    vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]
+    ends = [Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right)]
+    operands = DESIGN.interpolator.compute(*ends, spans.length, *vectors)
+    lit = np.repeat(DESIGN.lit_spans(spans, constants)[:, 0], spans.length)
+    cosine, u = operands.cosine.codes[:, 0], operands.highlight.codes[:, 0]
+    dark = (cosine <= 0) | ~lit
+    specular = DESIGN.highlight.compute(operands.highlight[:, 0], dark, constants.exponent)
+    pixels = DESIGN.compute(spans, constants)
+    expected = {
+        "cosine": cosine,
+        "highlight": u,
+        "gated": ~lit,
+        "argument": np.where(dark, 0, u),
+        "specular": specular.codes,
+        "r": pixels.color[:, 0],
+        "b": pixels.color[:, 2],
+        "x": pixels.x,
+        "last": pixels.last,
+        # Less the half step that makes a cut of the rounding.
+        "diffuse_0_sum": cosine,
+        "highlight_0_sum": u,
+    }
+    for probe in probes_of(observed.unit):
+        if probe.name not in expected:
+            continue
+        for clock, n in numbers.items():
+            code = int(rows[clock + probe.age][probe.name])
+            if probe.name.endswith("_sum"):
+                code >>= 46 - 25
+            assert code == int(expected[probe.name][n]), (probe.name, clock, n)
+
+    # What follows one word from another.
+    ages = {probe.name: probe.age for probe in probes_of(observed.unit)}
+    one = Specular.BASE_FORMAT.max_code
+    followed = 0
+    for clock in numbers:
+
+        def code(name, clock=clock):
+            return int(rows[clock + ages[name]][name])
+
+        if code("specular"):
+            assert code("base") == one - (code("product") >> 33 - 17)
+            assert code("square") == code("base") ** 2
+            assert code("specular") == code("square") >> 17
+            followed += 1
+        assert code("red_diffuse") == code("diffuse") * constants.diffuse[0, 0]
+        assert code("red_specular") == code("specular") * constants.specular[0, 0]
+        assert code("red") == code("red_diffuse") + code("red_specular") + (constants.ambient[0] << 17)
+    assert 3 <= followed < count

@@ -1,0 +1,246 @@
+"""Fitted pipelines: a test for each rule, and the frame of the full pipeline to the bit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.scene import Scene
+from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.frames.fit import for_scene
+from blysk.sim.frames.frame import FrameSimulator, prepare
+from blysk.sim.meshes.teapot import teapot
+
+KEY, FILL, BLACK = Light((-0.5, 0.8, 0.7)), Light((0.7, 0.1, 0.5)), Light((0, 0, 1), (0, 0, 0))
+CLAY = Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0.6, 0.6, 0.6), 50)
+
+FLOOR = Mesh(
+    np.array([[0.0, 0, 0], [4, 0, 0], [4, 0, -4], [0, 0, -4]]),
+    np.array([[0, 1, 2], [0, 2, 3]]),
+    np.tile([0.0, 1, 0], (4, 1)),
+)
+
+
+def scene_of(material=CLAY, lights=(KEY,), size=(600, 500), mesh=None, **options):
+    mesh = mesh or teapot(2000)
+    camera = Camera.framing(mesh.vertices, (0.4, 0.5, 1), "perspective", size[0] / size[1])
+    return Scene(mesh, camera, *size, material, lights, **options)
+
+
+def full_of(scene, **options):
+    options = {"gate": True, **options}
+    return ShadingPipeline(
+        "chord", lights=max(len(scene.lights), 1), materials=len(scene.materials), **options
+    )
+
+
+def pixels_of(scene, design):
+    constants = [FrameConstants.of(scene, design.lights, index=k) for k in range(design.materials)]
+    return design.compute(prepare(scene, design).spans, constants)
+
+
+def assert_same_frame(scene, fit):
+    """By the twins; spans of merged materials may come in another order."""
+    frames = []
+    for drawn, design in ((scene, fit.full), (fit.scenes[0], fit.design)):
+        pixels = pixels_of(drawn, design)
+        order = np.lexsort((*pixels.color.T, pixels.x, pixels.y))
+        frames.append((pixels.x[order], pixels.y[order], pixels.color[order]))
+    for full, fitted in zip(*frames, strict=True):
+        np.testing.assert_array_equal(full, fitted)
+
+
+def reasons(fit):
+    return {name: omission.reason for omission in fit.omissions for name in omission.changes}
+
+
+def test_everything_is_needed():
+    """Two materials that differ, coloured light, highlights: the widths alone are fitted."""
+    mesh = teapot(2000)
+    mesh = replace(mesh, material=np.arange(len(mesh.faces)) % 2)
+    scene = scene_of((CLAY, replace(CLAY, exponent=9)), (KEY, FILL), mesh=mesh)
+    fit = for_scene(scene, full_of(scene))
+    assert set(reasons(fit)) == {"x_bits", "y_bits", "length_bits"}
+    assert_same_frame(scene, fit)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("style", ["throughput", pytest.param("compact", marks=pytest.mark.long)])
+def test_no_specular_path(style):
+    scene = scene_of(replace(CLAY, specular=(0, 0, 0)))
+    fit = for_scene(scene, full_of(scene))
+    assert reasons(fit)["model"] == "no specular path: every k_s is 0"
+    assert (fit.design.model, fit.design.gate, fit.design.exponent) == (None, False, None)
+    assert_same_frame(scene, fit)
+    full, steps = fit.costs(None, style)
+    assert steps[0].multiplier_count <= full.multiplier_count - (6 if style == "throughput" else 1)
+    assert steps[-1].register_bits < steps[0].register_bits < 0.65 * full.register_bits
+    assert all(
+        after.rom_bits <= before.rom_bits for before, after in zip((full, *steps), steps, strict=False)
+    )
+
+
+def test_no_highlight_by_the_gate():
+    """A light from behind: its half-way vector is far from every normal."""
+    scene = scene_of(replace(CLAY, exponent=500), (Light((0.3, 0.3, -1)),), mesh=FLOOR)
+    fit = for_scene(scene, full_of(scene))
+    assert reasons(fit)["model"] == "no specular path: the gate proves that no span holds a highlight"
+    assert_same_frame(scene, fit)
+
+
+def test_no_gate():
+    """At exponent 1 the highlight is everywhere."""
+    scene = scene_of(replace(CLAY, exponent=1))
+    fit = for_scene(scene, full_of(scene))
+    assert reasons(fit)["gate"] == "no highlight gate: every span may hold a highlight"
+    assert not fit.design.gate
+    assert_same_frame(scene, fit)
+    assert "gate" not in reasons(for_scene(scene, full_of(scene, gate=False)))
+
+
+@pytest.mark.long
+def test_fixed_exponent():
+    scene = scene_of()
+    fit = for_scene(scene, full_of(scene))
+    assert reasons(fit)["exponent"] == "exponent fixed at 50: PROM folded"
+    assert_same_frame(scene, fit)
+    full, step = (cost_of(ShadingPipelineUnit(replace(fit.full, exponent=x))) for x in (None, 50))
+    assert step.rom_bits <= full.rom_bits - 2 * 1024 * 17
+    assert step.multiplier_count == full.multiplier_count - 1
+
+
+@pytest.mark.long
+def test_equal_materials():
+    mesh = teapot(2000)
+    mesh = replace(mesh, material=np.arange(len(mesh.faces)) % 3)
+    other = replace(CLAY, diffuse=(0.1, 0.2, 0.3))
+    scene = scene_of((CLAY, other, CLAY), mesh=mesh)
+    fit = for_scene(scene, full_of(scene))
+    assert reasons(fit)["materials"] == "a smaller memory of materials: 2 of 3 differ"
+    assert_same_frame(scene, fit)
+    scene = scene_of((CLAY, CLAY, CLAY), mesh=mesh)
+    fit = for_scene(scene, full_of(scene))
+    assert reasons(fit)["materials"] == "no memory of materials: 1 of 3 differ"
+    assert (fit.design.materials, fit.design.exponent) == (1, 50)
+    assert_same_frame(scene, fit)
+    full = cost_of(ShadingPipelineUnit(fit.full))
+    assert cost_of(ShadingPipelineUnit(fit.design)).ram_bits < full.ram_bits
+
+
+def test_black_lights():
+    scene = scene_of(lights=(KEY, BLACK, FILL))
+    fit = for_scene(scene, full_of(scene))
+    assert reasons(fit)["lights"] == "1 of 3 lights: they light nothing"
+    assert fit.scenes[0].lights == (KEY, FILL)
+    assert_same_frame(scene, fit)
+
+
+def test_methods_that_no_gate_serves():
+    """Spans that carry values are cut by all lights, the dark one too, and have no normals for a gate."""
+    scene = scene_of(replace(CLAY, exponent=400), (KEY, BLACK, FILL))
+    for method in ("chord-local", "quadratic-printed"):
+        fit = for_scene(scene, ShadingPipeline(method, lights=3))
+        assert ("lights" in reasons(fit)) == (method != "chord-local")
+        assert reasons(fit)["exponent"] == "exponent fixed at 400: PROM folded"
+        assert_same_frame(scene, fit)
+    dark = scene_of(lights=(BLACK,))
+    fit = for_scene(dark, ShadingPipeline("chord-local"))
+    assert reasons(fit)["lights"] == "no light path: no light lights anything"
+    assert_same_frame(dark, fit)
+
+
+@pytest.mark.parametrize(
+    ("material", "lights"),
+    [(CLAY, ()), (CLAY, (BLACK,)), (replace(CLAY, diffuse=(0, 0, 0), specular=(0, 0, 0)), (KEY,))],
+)
+def test_no_light_at_all(material, lights):
+    scene = scene_of(material, lights)
+    fit = for_scene(scene, full_of(scene))
+    assert reasons(fit)["lights"] == "no light path: no light lights anything"
+    assert_same_frame(scene, fit)
+    assert cost_of(ShadingPipelineUnit(fit.design)).multiplier_count == 0
+
+
+def test_one_channel():
+    scene = scene_of(Material((0.1,) * 3, (0.5,) * 3, (0.4,) * 3, 30))
+    fit = for_scene(scene, full_of(scene))
+    assert reasons(fit)["grey"] == "one channel of three: every colour is grey"
+    assert_same_frame(scene, fit)
+    tinted = replace(scene, lights=(Light((0, 0, 1), (1, 1, 0.9)),))
+    assert "grey" not in reasons(for_scene(tinted, full_of(tinted)))
+
+
+def test_widths():
+    scene = scene_of(size=(512, 300))
+    fit = for_scene(scene, full_of(scene))
+    longest = prepare(scene, fit.full).spans.length.max()
+    bits = int(longest).bit_length()
+    assert (fit.design.x_bits, fit.design.y_bits, fit.design.length_bits) == (9, 9, bits)
+    assert reasons(fit)["length_bits"] == f"length in {bits} bits: the longest span has {longest} pixels"
+    assert reasons(fit)["x_bits"] == "x in 9 bits: 512 columns"
+    assert_same_frame(scene, fit)
+
+
+@pytest.mark.long
+def test_shorter_words():
+    """Narrow and short spans; the pixels change by a step at most, and cost less."""
+    for mesh, terms in ((teapot(2000), 2), (FLOOR, 1)):
+        scene = scene_of(size=(100, 80), mesh=mesh)
+        full = full_of(scene)
+        assert {"terms", "fraction_bits"}.isdisjoint(reasons(for_scene(scene, full)))
+        fit = for_scene(scene, full, exact=False)
+        assert fit.design.terms == terms
+        assert reasons(fit)["terms"].startswith(f"polynomial of {terms} in place of 3 terms: the widest span")
+        assert reasons(fit)["fraction_bits"].startswith("differences of 36 in place of 46 fraction bits: ")
+        assert fit.design.highlight_gate.interpolator == fit.design.interpolator
+        spans, constants = prepare(scene, full).spans, FrameConstants.of(scene)
+        pixels = [design.compute(spans, constants) for design in (full, fit.design)]
+        assert [of.wide_spans for of in pixels] == [0, 0]
+        assert np.abs(np.diff([of.color.astype(int) for of in pixels], axis=0)).max() <= 1
+    words = {"terms": fit.design.terms, "fraction_bits": fit.design.fraction_bits}
+    less, more = (cost_of(ShadingPipelineUnit(replace(full, **changes))) for changes in (words, {}))
+    assert less.multiplier_count == more.multiplier_count - 1
+    assert less.register_bits < more.register_bits - 300
+
+
+def test_frames_of_a_turntable():
+    """What any of them needs stays."""
+    near, far = scene_of(), scene_of()
+    wide = Camera.framing(near.mesh.vertices * 4, (0.4, 0.5, 1), "perspective", 1.2)
+    far = replace(far, camera=wide)
+    full = full_of(near)
+    bits = [for_scene(scenes, full).design.length_bits for scenes in (near, far, (far, near))]
+    assert bits[1] < bits[0] == bits[2]
+
+
+def test_nothing_on_the_picture():
+    """No span: no highlight either, and the least of every width."""
+    mesh = teapot(200)
+    away = Camera.framing(np.add(mesh.vertices, (100.0, -100.0, 0.0)), (0.4, 0.5, 1), "perspective", 1.0)
+    scene = replace(scene_of(mesh=mesh), camera=away)
+    fit = for_scene(scene, full_of(scene))
+    assert (fit.design.model, fit.design.length_bits) == (None, 2)
+
+
+def test_default_is_the_chord_method_with_a_gate():
+    scene = scene_of(lights=())
+    assert for_scene(scene).full == ShadingPipeline("chord", gate=True)
+
+
+@pytest.mark.long
+def test_simulated_frame():
+    """The RTL of the fitted pipeline draws the frame of the full one."""
+    scene = scene_of(Material((0.1,) * 3, (0.5,) * 3, (0.4,) * 3, 30), (KEY, BLACK), size=(120, 90))
+    fit = for_scene(scene, full_of(scene))
+    assert {"lights", "exponent", "grey", "x_bits", "y_bits", "length_bits"} <= set(reasons(fit))
+    full = FrameSimulator(fit.full).render(scene)
+    fitted = FrameSimulator(fit.design).render(fit.scenes[0])
+    np.testing.assert_array_equal(full.image, fitted.image)
+    assert len(np.unique(full.image)) > 50
+    assert fitted.clocks <= full.clocks

@@ -1,0 +1,182 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from blysk.sim.errors import InputError
+from blysk.sim.frames.picture import check_image_path, write_comparison, write_image
+
+
+def frames(height, width, seed=4):
+    rng = np.random.default_rng(seed)
+    golden = rng.random((height, width, 3))
+    simulated = np.clip(np.rint(255 * golden) + rng.integers(-3, 4, golden.shape), 0, 255).astype(np.uint8)
+    return simulated, golden
+
+
+def read(path):
+    with Image.open(path) as image:
+        return np.asarray(image)
+
+
+def find(picture, panel):
+    """Row and column of every place where the panel stands in the picture, pixel for pixel."""
+    height, width, _ = panel.shape
+    rows, columns = np.nonzero((picture == panel[0, 0]).all(axis=2))
+    return [
+        (row, column)
+        for row, column in zip(rows, columns, strict=True)
+        if np.array_equal(picture[row : row + height, column : column + width], panel)
+    ]
+
+
+@pytest.mark.parametrize("suffix", ["png", "PNG", "bmp", "ppm", "tiff"])
+def test_pixels_come_back(tmp_path, suffix):
+    image, _ = frames(7, 5)
+    path = tmp_path / f"a.{suffix}"
+    write_image(path, image)
+    assert np.array_equal(read(path), image)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_jpeg_is_close(tmp_path):
+    image = np.full((16, 16, 3), (200, 100, 50), dtype=np.uint8)
+    write_image(tmp_path / "a.jpg", image)
+    assert read(tmp_path / "a.jpg").shape == image.shape
+    # A flat block loses only its conversion to luma and chroma, 8 bits each, and a quantised mean.
+    assert np.abs(read(tmp_path / "a.jpg").astype(int) - image).max() <= 4
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("a.xyz", "the suffix .xyz is no picture format"),
+        ("a", "the name has no suffix"),
+        ("a.fli", "the suffix .fli is no picture format"),  # Pillow reads it only
+    ],
+)
+def test_suffix(tmp_path, name, reason):
+    image, golden = frames(4, 4)
+    for attempt in (
+        check_image_path,
+        lambda path: write_image(path, image),
+        lambda path: write_comparison(path, image, golden, title="t"),
+    ):
+        with pytest.raises(InputError) as caught:
+            attempt(tmp_path / name)
+        assert str(caught.value) == f"{tmp_path / name}: {reason}; use .png, .jpg, .bmp, .ppm, .tiff or .webp"
+    assert not list(tmp_path.iterdir())
+
+
+def test_missing_folder(tmp_path):
+    with pytest.raises(InputError, match="make the folder first"):
+        check_image_path(tmp_path / "no" / "a.png")
+    check_image_path(tmp_path / "a.png")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.zeros((4, 4), np.uint8),
+        np.zeros((4, 4, 4), np.uint8),
+        np.zeros((4, 4, 3)),
+        np.zeros((0, 4, 3), np.uint8),
+    ],
+)
+def test_wrong_frame(tmp_path, image):
+    with pytest.raises(ValueError, match="a frame must be uint8 of shape"):
+        write_image(tmp_path / "a.png", image)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("height", "width"), [(1, 1), (16, 16), (37, 211), (300, 640), (3, 4095)])
+def test_panels_are_the_frames(tmp_path, height, width):
+    """Both frames stand in the picture untouched, side by side, and all text has a white border."""
+    simulated, golden = frames(height, width)
+    path = tmp_path / "a.png"
+    write_comparison(path, simulated, golden, title="A title", subtitle="exponent 20")
+    picture = read(path)
+    rounded = np.floor(255 * golden + 0.5).astype(np.uint8)
+    left, right = find(picture, simulated), find(picture, rounded)
+    assert len(left) == len(right) == 1
+    assert left[0][0] == right[0][0]
+    assert right[0][1] >= left[0][1] + width
+    for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1]):
+        assert (edge == 255).all()
+    assert (picture[: left[0][0]] < 128).any()
+
+
+def test_error_map(tmp_path):
+    """The map is monotonic in the largest channel error, which is taken from the golden frame unrounded."""
+    golden = np.full((16, 16, 3), 100.25 / 255)
+    simulated = np.full((16, 16, 3), 100, dtype=np.uint8)
+    simulated[:, 4:8, 0] = 102  # 1.75 LSB, in one channel
+    simulated[:, 8:12, 1] = 97  # 3.25 LSB, below
+    simulated[:, 12:] = 104  # 3.75 LSB, in all
+    path = tmp_path / "a.png"
+    write_comparison(path, simulated, golden, title="t")
+    picture = read(path)
+    [(row, start)] = find(picture, simulated)
+    [(_, middle)] = [place for place in find(picture, np.full_like(simulated, 100)) if place[1] > start]
+    third = 2 * middle - start
+    panel = picture[row : row + 16, third : third + 16]
+    bands = [panel[:, 4 * k : 4 * k + 4] for k in range(4)]
+    assert all((band == band[0, 0]).all() for band in bands)
+    # The scale below the map holds the same colours at 0.25, 1.75, 3.25 of 3.75 and at its end.
+    bar = next(
+        line for line in picture[row + 20 :] if all((line == band[0, 0]).all(axis=1).any() for band in bands)
+    )
+    ink = np.flatnonzero((bar != 255).any(axis=1))
+    found = [np.flatnonzero((bar == band[0, 0]).all(axis=1)).mean() for band in bands]
+    share = (np.array(found) - ink[0]) / (ink[-1] - ink[0])
+    # One of 256 colours is 1.2 pixels wide, and the frame of the bar one pixel.
+    assert share == pytest.approx([0.25 / 3.75, 1.75 / 3.75, 3.25 / 3.75, 1], abs=0.01)
+
+
+def test_equal_frames(tmp_path):
+    """Without any error the scale ends at 1 LSB, and the map is all of the colour at 0."""
+    simulated = np.full((16, 16, 3), 100, dtype=np.uint8)
+    write_comparison(tmp_path / "a.png", simulated, simulated / 255.0, title="t")
+    picture = read(tmp_path / "a.png")
+    assert find(picture, np.broadcast_to(np.uint8([0, 0, 4]), (16, 16, 3)))
+
+
+def test_titles_are_taken_as_they_are(tmp_path):
+    simulated, golden = frames(8, 8)
+    title = r"C:\new_model $k_s$ & 100 % " * 8
+    write_comparison(tmp_path / "a.png", simulated, golden, title=title)
+    picture = read(tmp_path / "a.png")
+    assert (picture[:, :5] == 255).all()
+    assert (picture[:, -5:] == 255).all()
+
+
+def test_same_picture_twice(tmp_path):
+    simulated, golden = frames(40, 60)
+    for name in "ab":
+        write_comparison(tmp_path / f"{name}.png", simulated, golden, title="t")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("golden", "text"),
+    [
+        (np.zeros((4, 5, 3)), "golden must be float64 of shape"),
+        (np.zeros((4, 4, 3), np.float32), "golden must be float64 of shape"),
+        (np.full((4, 4, 3), 1.01), "golden must be in"),
+        (np.full((4, 4, 3), np.nan), "golden must be in"),
+    ],
+)
+def test_wrong_golden(tmp_path, golden, text):
+    with pytest.raises(ValueError, match=text):
+        write_comparison(tmp_path / "a.png", np.zeros((4, 4, 3), np.uint8), golden, title="t")
+    assert not list(tmp_path.iterdir())
+
+
+def test_matplotlib_is_not_imported_before_it_is_needed():
+    program = "import sys, blysk.sim.frames.picture; assert 'matplotlib' not in sys.modules"
+    done = subprocess.run([sys.executable, "-c", program], cwd=Path(__file__).parents[3], check=False)
+    assert done.returncode == 0

@@ -1,0 +1,560 @@
+"""Cutting wide spans against the curve's own formula, and the pipeline's flag after quantisation."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.curves import interpolate
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.raster import Raster, fragment_normals, rasterise
+from blysk.golden.reference.reflection import reflect
+from blysk.golden.reference.renderer import fragment_positions, shade_spans
+from blysk.golden.reference.scene import Scene
+from blysk.sim.frames.spans import (
+    cut_local_spans,
+    cut_wide_spans,
+    local_values,
+    quantise_spans,
+    sort_by_material,
+)
+from blysk.sim.meshes.teapot import teapot
+
+WIDTH = 4095
+EPSILON = 2.0**-53
+
+
+def raster_of(rng, left, right, length):
+    """Spans of these normals and lengths anywhere on a picture; a span of one pixel has one normal."""
+    length = np.broadcast_to(length, len(left)).astype(np.int32)
+    right = np.where(length[:, np.newaxis] == 1, left, right)
+    count, fragments = len(length), int(length.sum())
+    x = rng.integers(0, WIDTH - length, endpoint=True).astype(np.int32)
+    y = rng.integers(0, 4095, count).astype(np.int32)
+    span = np.repeat(np.arange(count, dtype=np.int32), length)
+    offset = (np.arange(fragments) - np.repeat(np.cumsum(length) - length, length)).astype(np.int16)
+    return Raster(
+        x=x,
+        y=y,
+        length=length,
+        triangle=rng.integers(0, 1000, count).astype(np.int32),
+        normal_left=left,
+        normal_right=right,
+        magnitude_left=np.ones(count),
+        magnitude_right=np.ones(count),
+        weights_left=np.ones((count, 3)),
+        weights_right=np.ones((count, 3)),
+        back=rng.random(count) < 0.5,
+        span=span,
+        offset=offset,
+        pixel=(y[span] * WIDTH + x[span] + offset).astype(np.int32),
+        visible=rng.random(fragments) < 0.5,
+        triangles=1000,
+        degenerate=1,
+        culled=2,
+        outside=3,
+        uncovered=4,
+        hidden_spans=5,
+        repaired_normals=6,
+    )
+
+
+def angles(raster):
+    """Degrees between the ends of each span, by the form that is exact at both ends of the scale."""
+    left, right = raster.normal_left, raster.normal_right
+    sine = np.linalg.norm(left - right, axis=1)
+    return np.degrees(2 * np.arctan2(sine, np.linalg.norm(left + right, axis=1)))
+
+
+def origins(raster, cut):
+    """The given span of each part, by its first fragment."""
+    first = np.cumsum(cut.length) - cut.length
+    return raster.span[first], raster.offset[first]
+
+
+@pytest.fixture
+def wide(normal_pairs):
+    """Spans of 0 to 179.9 degrees and 1 to 60 pixels, and what they are cut to."""
+    rng = np.random.default_rng(11)
+    left, right = map(normalise, normal_pairs(rng, 5000, rng.uniform(0, 179.9, 5000)))
+    raster = raster_of(rng, left, right, rng.integers(1, 60, 5000, endpoint=True))
+    return raster, *cut_wide_spans(raster, MAX_SPAN_ANGLE)
+
+
+def test_fragments_and_pixels_stay(wide):
+    raster, cut, _ = wide
+    assert np.array_equal(cut.pixel, raster.pixel)
+    assert np.array_equal(cut.visible, raster.visible)
+    assert np.array_equal(cut.y[cut.span] * WIDTH + cut.x[cut.span] + cut.offset, raster.pixel)
+    assert np.array_equal(np.bincount(cut.span), cut.length)
+    assert (np.diff(cut.span) >= 0).all()
+    origin, _ = origins(raster, cut)
+    assert np.array_equal(np.bincount(origin, weights=cut.length), raster.length)
+    for name in ("triangle", "back", "y"):
+        assert np.array_equal(getattr(cut, name), getattr(raster, name)[origin])
+    for name in ("triangles", "degenerate", "culled", "outside", "uncovered", "hidden_spans"):
+        assert getattr(cut, name) == getattr(raster, name)
+    # Nothing may take the uncut spans' weights for those of the parts.
+    assert len(cut.magnitude_left) == len(cut.weights_right) == 0
+
+
+def test_every_part_is_narrow_or_one_pixel(wide):
+    _, cut, _ = wide
+    # The comparison of cosines is exact to 2**-52, an angle of 45 degrees to 2**-52 / sin 45 radians.
+    assert (angles(cut)[cut.length > 1] <= MAX_SPAN_ANGLE + 1e-12).all()
+
+
+def test_normals_at_cuts_are_on_the_curve(wide):
+    raster, cut, _ = wide
+    origin, first = origins(raster, cut)
+    for offset, normal in ((first, cut.normal_left), (first + cut.length - 1, cut.normal_right)):
+        t = offset / np.maximum(raster.length[origin] - 1, 1)
+        curve = (1 - t)[:, np.newaxis] * raster.normal_left[origin]
+        curve += t[:, np.newaxis] * raster.normal_right[origin]
+        size = np.linalg.norm(curve, axis=1, keepdims=True)
+        # Each term is rounded three times, on both sides; division by a short chord magnifies that.
+        assert (np.abs(normal - curve / size) <= 8 * EPSILON / size + 8 * EPSILON).all()
+
+
+def test_counts(wide):
+    raster, cut, count = wide
+    assert count == np.count_nonzero((angles(raster) > MAX_SPAN_ANGLE) & (raster.length > 1))
+    origin, _ = origins(raster, cut)
+    assert count == np.count_nonzero(np.bincount(origin) > 1)
+
+
+def quantised(raster):
+    return quantise_spans(raster, np.zeros(1 + raster.triangle.max(initial=0), dtype=np.int64))
+
+
+def test_narrow_spans_are_untouched(normal_pairs):
+    rng = np.random.default_rng(12)
+    left, right = normal_pairs(rng, 2000, rng.uniform(0, 44.999999, 2000))
+    raster = raster_of(rng, left, right, rng.integers(1, 30, 2000))
+    cut, count = cut_wide_spans(raster, MAX_SPAN_ANGLE)
+    assert count == 0
+    for name in ("x", "y", "length", "triangle", "normal_left", "normal_right", "span", "offset", "pixel"):
+        assert np.array_equal(getattr(cut, name), getattr(raster, name)), name
+
+
+def test_no_span_at_all():
+    rng = np.random.default_rng(13)
+    cut, count = cut_wide_spans(raster_of(rng, np.empty((0, 3)), np.empty((0, 3)), 0), MAX_SPAN_ANGLE)
+    assert (count, len(cut.length), len(quantised(cut))) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 4, 5, 4094, 4095])
+def test_opposite_normals(length):
+    """The curve jumps at its middle: an odd span has a pixel there, which any unit normal may have."""
+    rng = np.random.default_rng(14)
+    left = np.eye(3)[:1]
+    raster = raster_of(rng, left, -left, length)
+    cut, count = cut_wide_spans(raster, MAX_SPAN_ANGLE)
+    assert count == (length > 1)
+    # Halving closes in on the jump.
+    assert len(cut.length) <= 1 + length.bit_length()
+    assert (angles(cut)[cut.length > 1] == 0).all()
+    ends = np.concatenate([cut.normal_left, cut.normal_right])
+    assert (np.linalg.norm(ends, axis=1) == 1).all()
+    if length > 1:
+        assert np.array_equal(cut.normal_left[0], left[0])
+        assert np.array_equal(cut.normal_right[-1], -left[0])
+
+
+def test_the_pipeline_flags_no_span_after_the_cut(normal_pairs):
+    rng = np.random.default_rng(15)
+    angle = np.concatenate(
+        [
+            rng.uniform(0, 180, 40_000),
+            MAX_SPAN_ANGLE + rng.normal(0, 1e-4, 30_000),
+            2 * MAX_SPAN_ANGLE + rng.normal(0, 1e-4, 28_000),
+            np.full(1000, MAX_SPAN_ANGLE),
+            np.full(1000, 180.0),
+        ]
+    )
+    left, right = normal_pairs(rng, len(angle), angle)
+    raster = raster_of(rng, left, right, rng.integers(1, 12, len(angle), endpoint=True))
+
+    def flagged(raster):
+        spans = quantised(raster)
+        _, wide = MiddleNormal().compute(
+            Fixed(COMPONENT, spans.normal_left), Fixed(COMPONENT, spans.normal_right)
+        )
+        return np.count_nonzero(wide)
+
+    cut, _ = cut_wide_spans(raster, MAX_SPAN_ANGLE)
+    assert flagged(cut) == 0
+    assert flagged(raster) > 30_000
+    vector = np.array([[0, 0, ONE]])
+    constants = FrameConstants(10, np.zeros(3, int), vector, vector, np.zeros((1, 3), int), vector * 0)
+    assert ShadingPipeline().compute(quantised(cut), constants).wide_spans == 0
+
+
+def test_quantised_ends():
+    rng = np.random.default_rng(16)
+    left = np.array([[1.0, 0, 0], [0.6, 0, 0.8]])
+    raster = raster_of(rng, left, -left[::-1], 7)
+    spans = quantised(raster)
+    assert spans.normal_left[0].tolist() == [ONE, 0, 0]
+    for codes, normals in ((spans.normal_left, left), (spans.normal_right, -left[::-1])):
+        assert np.abs(codes / ONE - normals).max() < 2.0**-17
+    for name in ("x", "y", "length"):
+        assert np.array_equal(getattr(spans, name), getattr(raster, name))
+
+
+@pytest.mark.parametrize("materials", [2, 7, 1000])
+@pytest.mark.parametrize("cut", [False, True])
+def test_sorted_spans_are_a_permutation(normal_pairs, materials, cut):
+    """Every span and fragment once, with all that belongs to it, in the given order within a material.
+
+    x and the pixel are not read: they hold the numbers that spans and fragments had before.
+    """
+    rng = np.random.default_rng(17)
+    left, right = map(normalise, normal_pairs(rng, 3000, rng.uniform(0, 90, 3000)))
+    raster = raster_of(rng, left, right, rng.integers(1, 30, 3000))
+    if cut:
+        raster, _ = cut_wide_spans(raster, MAX_SPAN_ANGLE)
+    count = len(raster.length)
+    raster = replace(raster, x=np.arange(count), pixel=np.arange(len(raster.span)))
+    material = rng.integers(0, materials, 1000)
+    ordered = sort_by_material(raster, material)
+
+    spans, fragments = ordered.x, ordered.pixel
+    assert np.array_equal(np.sort(spans), np.arange(count))
+    assert np.array_equal(np.sort(fragments), np.arange(len(raster.span)))
+    assert not np.array_equal(spans, np.arange(count))
+    for name in (field.name for field in fields(raster)):
+        given, moved = getattr(raster, name), getattr(ordered, name)
+        if name in ("span", "offset", "visible"):
+            expected = given[fragments]
+            moved = spans[moved] if name == "span" else moved
+        elif np.ndim(given):
+            # The weights of a raster that was cut are empty.
+            expected = given[spans] if len(given) == count else given
+        else:
+            expected = given
+        if name != "pixel":
+            assert np.array_equal(moved, expected), name
+        assert np.asarray(getattr(ordered, name)).dtype == np.asarray(given).dtype, name
+
+    of_span = material[ordered.triangle]
+    steps = np.diff(of_span)
+    assert (steps >= 0).all()
+    assert (np.diff(spans)[steps == 0] > 0).all()
+    # A span's fragments stay together, from its first to its last.
+    assert np.array_equal(ordered.span, np.repeat(np.arange(count), ordered.length))
+    start = np.cumsum(ordered.length) - ordered.length
+    assert np.array_equal(ordered.offset, np.arange(len(ordered.span)) - start[ordered.span])
+
+
+def test_spans_in_order_are_untouched(normal_pairs):
+    rng = np.random.default_rng(18)
+    raster = raster_of(rng, *map(normalise, normal_pairs(rng, 100, 5.0)), 3)
+    assert sort_by_material(raster, np.zeros(1000, int)) is raster
+    raster = replace(raster, triangle=np.sort(raster.triangle))
+    assert sort_by_material(raster, np.arange(1000) // 100) is raster
+    empty = raster_of(rng, np.empty((0, 3)), np.empty((0, 3)), 0)
+    assert len(sort_by_material(empty, np.arange(1000)).length) == 0
+
+
+def test_spans_have_the_material_of_their_triangle(normal_pairs):
+    rng = np.random.default_rng(19)
+    raster = raster_of(rng, *map(normalise, normal_pairs(rng, 100, 5.0)), 3)
+    material = rng.integers(0, 9, 1000)
+    for given in (raster, sort_by_material(raster, material)):
+        assert np.array_equal(quantise_spans(given, material).material, material[given.triangle])
+
+
+@pytest.mark.parametrize("largest_bend", [1e-3, 1e-5])
+def test_parts_bend_evenly(largest_bend, normal_pairs):
+    """The curve of the whole span, in the middle of each part, is the middle normal of the part's ends."""
+    rng = np.random.default_rng(20)
+    count = 400
+    left, right = normal_pairs(rng, count, rng.uniform(5, 120, count))
+    raster = raster_of(rng, left, right, rng.integers(2, 200, count))
+    coarse, _ = cut_wide_spans(raster, 10.0)
+    fine, cut = cut_wide_spans(raster, 10.0, largest_bend)
+
+    def bends(parts):
+        """Of parts of more than two pixels, in radians."""
+        first = np.flatnonzero(parts.offset == 0)
+        place = first - np.concatenate([[0], np.cumsum(raster.length)])[raster.span[first]]
+        t = (place + (parts.length - 1) / 2) / (raster.length[raster.span[first]] - 1)
+        whole = raster.span[first]
+        own = interpolate("normalised", left[whole], right[whole], t)
+        middle = normalise(parts.normal_left + parts.normal_right)
+        return np.linalg.norm(own - middle, axis=1)[
+            (parts.length > 2) & (parts.length < raster.length[whole])
+        ]
+
+    assert bends(coarse).max() > largest_bend >= bends(fine).max()
+    assert len(fine.length) > len(coarse.length)
+    assert cut <= count
+    assert np.array_equal(fine.pixel, raster.pixel)
+
+
+# Point lights and a near viewer: three values of each light a span.
+
+
+METHOD = LocalChordInterpolator()
+ONE_VALUE = (ONE / 2**17) ** 2
+CENTRE = np.array([0.0, 1.575, 0.0])
+
+
+def material(exponent):
+    return Material((0.1,) * 3, (0.7,) * 3, (0.6,) * 3, exponent)
+
+
+def lit_teapot(exponent, triangles=1000, viewer="near"):
+    """A lamp to the upper left, one close to the lid, and the sun."""
+    mesh = teapot(triangles)
+    camera = Camera.framing(mesh.vertices, (0.4, 0.5, 1), "perspective", 4 / 3, field_of_view=45)
+    lamps = [Light(position=tuple(CENTRE + offset)) for offset in ([-3.2, 4.0, 4.5], [0.3, 2.1, 0.5])]
+    return Scene(mesh, camera, 320, 240, material(exponent), (*lamps, Light((1, 1, 1))), viewer=viewer)
+
+
+def floor(lamps, exponent=50, viewer="near", eye=(0, 1.5, 5)):
+    """A square of two triangles, from so near that its spans are as wide as the picture."""
+    vertices = np.array([[-4, 0, -4], [4, 0, -4], [4, 0, 4], [-4, 0, 4]], dtype=float)
+    mesh = Mesh(vertices, np.array([[0, 2, 1], [0, 3, 2]]), np.tile([0.0, 1, 0], (4, 1)))
+    camera = Camera(eye, (0, 0, 0), projection="perspective", field_of_view=50)
+    lights = tuple(Light(position=lamp) for lamp in lamps)
+    return Scene(mesh, camera, 320, 200, material(exponent), lights, back_faces="show", viewer=viewer)
+
+
+def exact_operands(scene, raster):
+    """N·L and u of every fragment, each vector normalised there."""
+    span = raster.span
+    t = raster.offset / np.maximum(raster.length[span] - 1, 1)
+    normal = interpolate("normalised", raster.normal_left[span], raster.normal_right[span], t)
+    point = fragment_positions(scene, raster, np.arange(len(span)))
+    viewer = scene.camera.position - point if scene.viewer == "near" else scene.camera.viewer
+    viewer = viewer / np.linalg.norm(viewer, axis=-1, keepdims=True)
+    cosine, u = [], []
+    for light in scene.lights:
+        towards = light.direction if light.position is None else light.position - point
+        towards = normalise(np.broadcast_to(towards, point.shape))
+        halfway = normalise(towards + viewer)
+        cosine.append((normal * towards).sum(axis=1))
+        u.append(((normal - halfway) ** 2).sum(axis=1) / 2)
+    return np.stack(cosine, axis=1), np.stack(u, axis=1)
+
+
+def local_errors(scene, by_material=False):
+    """Errors in LSB of full reflection over all fragments and lights, diffuse and specular; the cut spans."""
+    raster = rasterise(scene)
+    cut, count = cut_local_spans(scene, raster)
+    if by_material:
+        cut = sort_by_material(cut, scene.mesh.material)
+    values = local_values(scene, cut)
+    operands = METHOD.compute_values(values, cut.length)
+    assert not operands.wide.any()
+    # Every fragment by its triangle and pixel.
+    key, wanted = (
+        r.triangle[r.span].astype(np.int64) * scene.width * scene.height + r.pixel for r in (cut, raster)
+    )
+    place = np.argsort(key)[np.searchsorted(np.sort(key), wanted)]
+    assert np.array_equal(key[place], wanted)
+    found, highlight = operands.cosine[place], operands.highlight[place]
+    cosine, u = exact_operands(scene, raster)
+    diffuse = Diffuse(found.format).compute(found).values
+    specular, expected = np.zeros((2, *u.shape))
+    unit = Specular("cosquad", "one_minus_cosine")
+    material = scene.mesh.material[raster.triangle[raster.span]]
+    for index, coefficients in enumerate(scene.materials):
+        which, n = material == index, coefficients.exponent
+        specular[which] = unit.compute(highlight[which], Diffuse.dark(found[which]), n).values
+        expected[which] = np.where(cosine[which] > 0, reflect("cosquad", 1 - u[which], n), 0)
+    # At a step of the words from 0 the sign of N·L, and with it the highlight, may be the other.
+    sure = np.abs(cosine) > 2.0**-25
+    return (
+        255 * np.abs(diffuse - np.maximum(cosine, 0)).max(initial=0),
+        255 * np.abs(specular - expected)[sure].max(initial=0),
+        cut,
+        count,
+        expected,
+    )
+
+
+@pytest.mark.parametrize("exponent", [1, 10, 100, 1000])
+@pytest.mark.parametrize("triangles", [100, 1000, 10_000])
+def test_local_operands_of_the_teapot(exponent, triangles):
+    """Fit, arithmetic and the last units together, at every pixel: under half an LSB of full reflection.
+
+    0.4 and 0.12 LSB for the former; the specular unit's own error adds up to 0.05, the diffuse one's 0.01.
+    """
+    diffuse, specular, cut, count, expected = local_errors(lit_teapot(exponent, triangles))
+    print(
+        f"{triangles} triangles, n = {exponent}: {diffuse:.3f}, {specular:.3f} LSB, {len(cut.length)} spans"
+    )
+    assert count > 0
+    assert np.count_nonzero(expected > 0.1) > 20
+    assert 0.05 < diffuse <= METHOD.DIFFUSE_BUDGET + 0.01
+    assert 0.05 < specular <= METHOD.HIGHLIGHT_BUDGET + 0.05
+
+
+LAMPS = {
+    "high": [(0.5, 3.0, 0.5)],
+    "low": [(0.5, 0.05, 0.5)],
+    "in steps of pixels": [(0.3, 0.002, 1.0)],
+    "on the surface": [(0.25, 0.0, 0.5)],
+    "on a corner": [(4.0, 0.0, 4.0)],
+    "behind": [(0.5, -1.0, 0.5)],
+    "opposite to the viewer": [(0.0, -1.5, -5.0)],
+    "at the camera": [(0.0, 1.5, 5.0)],
+    "far": [(1e6, 2e6, 1e6)],
+    "through the floor": [(0.0, 1.5, -5.0), (0.1, 1.5, -4.0)],
+    "several": [(1.0, 0.3, 2.0), (-1.0, 0.1, 0.0), (0.0, -2.0, 0.0)],
+}
+
+
+@pytest.mark.parametrize("viewer", ["near", "distant"])
+@pytest.mark.parametrize("lamps", LAMPS)
+@pytest.mark.parametrize("exponent", [1, 50, 1000])
+def test_stiff_lamps_over_a_floor(lamps, viewer, exponent):
+    """Spans of hundreds of pixels, L and H that turn within a few of them: the same bounds, and no NaN."""
+    # From below the lamps above are opposite: L = -V here and there, and N·L over 0.
+    eye = (0, -1.5, 5) if lamps == "through the floor" else (0, 1.5, 5)
+    scene = floor(LAMPS[lamps], exponent, viewer, eye)
+    diffuse, specular, cut, _, _ = local_errors(scene)
+    print(f"{lamps}, {viewer}, n = {exponent}: {diffuse:.3f}, {specular:.3f} LSB, {len(cut.length)} spans")
+    assert diffuse <= METHOD.DIFFUSE_BUDGET + 0.01
+    assert specular <= METHOD.HIGHLIGHT_BUDGET + 0.05
+    # What the float64 renderer shows of the parts is what it shows of the whole spans.
+    raster = rasterise(scene)
+    whole = shade_spans(scene, raster, "normalised", "cosquad")
+    parts = shade_spans(scene, cut, "normalised", "cosquad")
+    assert np.isfinite(whole).all()
+    lit = np.abs(exact_operands(scene, raster)[0]).min(axis=1) > 1e-9
+    pixel = raster.pixel[lit & raster.visible]
+    assert np.abs(whole - parts).reshape(-1, 3)[pixel].max(initial=0) <= 1e-9
+
+
+def test_a_light_behind_cuts_nothing_but_what_turns():
+    """Where N·L stays negative the light gives nothing, however badly the quadratics fit."""
+    scene = floor([(0.5, -9.0, 0.5)], 10, "distant")
+    above = replace(scene, lights=(Light(position=(0.5, 9.0, 0.5)),))
+    fine, _ = cut_local_spans(above, rasterise(scene))
+    cut, _ = cut_local_spans(scene, rasterise(scene))
+    operands = METHOD.compute_values(local_values(scene, cut), cut.length)
+    assert (operands.cosine.codes < 0).all()
+    assert len(cut.length) < 0.8 * len(fine.length)
+
+
+def test_local_cut_keeps_fragments():
+    scene = lit_teapot(50, 100)
+    raster = rasterise(scene)
+    cut, count = cut_local_spans(scene, raster)
+    assert count == np.count_nonzero(np.bincount(origins(raster, cut)[0]) > 1)
+    for name in ("pixel", "visible"):
+        assert np.array_equal(getattr(cut, name), getattr(raster, name))
+    origin, _ = origins(raster, cut)
+    assert np.array_equal(np.bincount(origin, weights=cut.length), raster.length)
+    assert np.array_equal(cut.triangle, raster.triangle[origin])
+    # Positions and normals of the fragments are those of the whole spans.
+    everything = np.arange(len(raster.span))
+    points = (fragment_positions(scene, r, everything) for r in (raster, cut))
+    assert np.abs(np.subtract(*points)).max() < 1e-12
+    curve = interpolate(
+        "normalised",
+        raster.normal_left[raster.span],
+        raster.normal_right[raster.span],
+        raster.offset / np.maximum(raster.length[raster.span] - 1, 1),
+    )
+    assert np.abs(fragment_normals(scene, cut, everything) - curve).max() < 1e-12
+
+
+def test_local_values_by_hand():
+    """Of one span: first, middle and last, rounded to codes in units of ONE_SQUARED."""
+    scene = floor([(0.5, 0.4, 0.5), (-1, 2, 1)])
+    cut, _ = cut_local_spans(scene, rasterise(scene))
+    values = local_values(scene, cut)
+    span = int(np.argmax(cut.length))
+    length = int(cut.length[span])
+    assert length > 3
+    first = int(np.cumsum(cut.length)[span]) - length
+    ends = fragment_positions(scene, cut, np.array([first, first + length - 1]))
+    shares = [w / w.sum() for w in (cut.weights_left[span], cut.weights_right[span])]
+    middle = cut.weights_left[span] + cut.weights_right[span]
+    corners = scene.mesh.vertices[scene.mesh.faces[cut.triangle[span]]]
+    points = shares[0] @ corners, middle / middle.sum() @ corners, shares[1] @ corners
+    assert np.abs(ends - [points[0], points[2]]).max() < 1e-12
+    # On the floor's line of sight: halfway on the screen is not halfway in the world.
+    eye = np.array(scene.camera.position)
+    for index, light in enumerate(scene.lights):
+        for place, point in enumerate(points):
+            towards = np.subtract(light.position, point)
+            towards /= np.linalg.norm(towards)
+            sight = (eye - point) / np.linalg.norm(eye - point)
+            half = (towards + sight) / np.linalg.norm(towards + sight)
+            assert abs(values.diffuse[span, index, place] - ONE_VALUE * towards[1] * 2**25) < 0.51
+            u = ((half - [0, 1, 0]) ** 2).sum() / 2
+            assert abs(values.highlight[span, index, place] - ONE_VALUE * u * 2**26) < 0.51
+
+
+def test_short_local_spans_do_not_bend():
+    """A span of one pixel has one value, one of two the mean in the middle."""
+    scene = lit_teapot(1000, 1000)
+    cut, _ = cut_local_spans(scene, rasterise(scene))
+    values = local_values(scene, cut)
+    for codes in values:
+        alone, pairs = codes[cut.length == 1], codes[cut.length == 2]
+        assert len(alone) > 10
+        assert len(pairs) > 10
+        assert (alone == alone[..., :1]).all()
+        assert np.abs(pairs[..., 0] + pairs[..., 2] - 2 * pairs[..., 1]).max() <= 2
+
+
+def test_a_pipeline_of_more_lights():
+    """The lights that the scene has not are dark in every pixel."""
+    scene = lit_teapot(10, 100)
+    cut, _ = cut_local_spans(scene, rasterise(scene))
+    three, five = local_values(scene, cut), local_values(scene, cut, 5)
+    for a, b in zip(three, five, strict=True):
+        assert np.array_equal(a, b[:, :3])
+        assert not b[:, 3:].any()
+    assert Diffuse.dark(METHOD.compute_values(five, cut.length).cosine)[:, 3:].all()
+
+
+def test_no_light_and_no_span():
+    scene = replace(lit_teapot(10, 100), lights=())
+    cut, count = cut_local_spans(scene, rasterise(scene))
+    assert local_values(scene, cut).diffuse.shape == (len(cut.length), 0, 3)
+    assert count == np.count_nonzero(np.bincount(origins(rasterise(scene), cut)[0]) > 1)
+    empty = replace(scene, mesh=replace(scene.mesh, faces=scene.mesh.faces[:0], material=None))
+    cut, count = cut_local_spans(empty, rasterise(empty))
+    assert (count, len(cut.length), len(local_values(empty, cut).diffuse)) == (0, 0, 0)
+
+
+def test_local_results_do_not_depend_on_the_chunks(monkeypatch):
+    scene = lit_teapot(100, 100)
+    raster = rasterise(scene)
+    results = []
+    for chunk in (1 << 16, 97):
+        monkeypatch.setattr("blysk.sim.frames.spans._CHUNK", chunk)
+        cut, count = cut_local_spans(scene, raster)
+        results.append((cut.length, count, *local_values(scene, cut)))
+    for a, b in zip(*results, strict=True):
+        assert np.array_equal(a, b)
+
+
+def test_local_spans_by_material():
+    """Each triangle's own exponent decides; the spans may be put in the order of their materials."""
+    scene = lit_teapot(10, 1000)
+    faces = len(scene.mesh.faces)
+    mesh = replace(scene.mesh, material=np.arange(faces) % 2)
+    scene = replace(scene, mesh=mesh, material=(material(1000), material(10)))
+    diffuse, specular, cut, _, _ = local_errors(scene, by_material=True)
+    assert diffuse <= METHOD.DIFFUSE_BUDGET + 0.01
+    assert specular <= METHOD.HIGHLIGHT_BUDGET + 0.05
+    assert len(np.unique(scene.mesh.material[cut.triangle])) == 2

