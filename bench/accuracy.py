@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
-from blysk.golden.pipeline import METHODS, ShadingPipeline
+from blysk.golden.pipeline import Design
+from blysk.golden.presets import METHODS
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
@@ -32,7 +33,7 @@ def scene_for(mesh: Mesh, exponent: int, width: int = 640, height: int = 480) ->
 
 def measure(
     mesh: Mesh,
-    design: ShadingPipeline,
+    design: Design,
     exponents: Sequence[int] = EXPONENTS,
     width: int = 640,
     height: int = 480,

@@ -8,7 +8,7 @@ import numpy as np
 from blysk.golden.lighting.intensity import MAX_INTENSITY, MAX_LIGHTS, Intensity
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.reference.lighting import halfway_vector
-from blysk.golden.reference.reflection import energy_factor
+from blysk.golden.reference.reflection import ReflectionModel
 from blysk.golden.reference.scene import Scene
 
 __all__ = [
@@ -63,7 +63,7 @@ class FrameConstants:
 
     @classmethod
     def of(
-        cls, scene: Scene, lights: int | None = None, energy: str | None = None, index: int = 0
+        cls, scene: Scene, lights: int | None = None, energy: ReflectionModel | None = None, index: int = 0
     ) -> "FrameConstants":
         """Constants of a scene and one of its materials, for a pipeline with ``lights`` lights.
 
@@ -72,7 +72,7 @@ class FrameConstants:
         there are no vectors of a frame: they are 0.
 
         With ``energy`` the highlight is that of the energy-normalised form: the factor of
-        `energy_factor` multiplies k_s here, once a frame, and the specular unit stays as it
+        `ReflectionModel.energy_factor` multiplies k_s here, once a frame, and the specular unit stays as it
         is. Its error counts as many times. A colour operand holds ``k_s I_i`` times the factor up to 8, which
         with ``k_s I_i = 1`` allows exponents up to 48 (``phong``), 195 (``blinn``) and 36 (``cosquad_lin``);
         higher ones need a darker k_s.
@@ -83,9 +83,8 @@ class FrameConstants:
             Material, lights and viewer.
         lights : int, optional
             Lights of the pipeline; by default as many as the scene has, at least 1.
-        energy : str, optional
-            Model whose factor it is, ``"phong"``, ``"blinn"`` or ``"cosquad_lin"``. An approximation of
-            Blinn's power may take Blinn's.
+        energy : ReflectionModel, optional
+            Model whose factor it is: one that has one. An approximation of Blinn's power may take Blinn's.
         index : int
             Of the material.
 
@@ -100,7 +99,7 @@ class FrameConstants:
         Source of the factors: [C].
         """
         material = scene.materials[index]
-        factor = 1.0 if energy is None else energy_factor(energy, material.exponent)
+        factor = 1.0 if energy is None else energy.energy_factor(material.exponent)
         count = max(len(scene.lights), 1) if lights is None else lights
         if not len(scene.lights) <= count <= MAX_LIGHTS:
             raise ValueError(f"the pipeline has {count} lights, the scene {len(scene.lights)}")
@@ -119,7 +118,7 @@ class FrameConstants:
                 highlight = factor * np.multiply(material.specular, light.color)
                 if energy is not None and highlight.max() > MAX_INTENSITY:
                     raise ValueError(
-                        f"the energy factor {factor:.4g} of {energy} with exponent {material.exponent} "
+                        f"the energy factor {factor:.4g} of {energy.name} with exponent {material.exponent} "
                         f"makes a specular term of {highlight.max():.4g}, over {MAX_INTENSITY}; lower the "
                         "exponent, the specular coefficient or the light"
                     )

@@ -1,71 +1,31 @@
-"""The shading pipeline: spans in, pixels out; which methods and models there are, and the bit-true twin."""
+"""The shading pipeline: spans in, pixels out; how a design is composed, and its bit-accurate model."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
-from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.arccos import Arccos
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.power import Power
-from blysk.golden.lighting.specular import FURTHER_MODELS, MAX_EXPONENT, SPECULAR_MODELS, Specular
-from blysk.golden.methods.angular_interpolator import AngularInterpolator
-from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
 from blysk.golden.methods.interpolator import (
     Interpolator,
-    NormalInterpolator,
-    Operand,
     Operands,
     pixels_of,
     runs_of,
 )
-from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
-from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
-from blysk.golden.normals.bisection import Bisection
 from blysk.golden.normals.difference_setup import LENGTH_BITS
-from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT
 
-__all__ = ["METHODS", "MODELS", "PRINTED", "Pixels", "ShadingPipeline", "Spans"]
-
-METHODS: dict[str, Interpolator] = {
-    "linear": LinearInterpolator(),
-    "bisection": BisectionInterpolator(),
-    "quadratic": QuadraticInterpolator(),
-    "quadratic-eval": QuadraticInterpolator(form="direct"),
-    "quadratic-horner": QuadraticInterpolator(form="horner"),
-    "angular": AngularInterpolator(),
-    "recurrence": RecurrenceInterpolator(),
-    "renormalise": LinearInterpolator(renormalised=True),
-    "chord": ChordInterpolator(),
-    "chord-local": LocalChordInterpolator(),
-}
-"""Interpolation methods of the pipeline."""
-
-PRINTED: dict[str, Interpolator] = {
-    "bisection-printed": BisectionInterpolator(bisection=Bisection(as_documented=True)),
-    "quadratic-printed": QuadraticInterpolator(middle_normal=MiddleNormal("as_documented")),
-    "angular-printed": AngularInterpolator(AngularSetup("arccos", Arccos("printed"))),
-    "angular-corrected": AngularInterpolator(AngularSetup("arccos", Arccos("corrected"))),
-    "recurrence-direct": RecurrenceInterpolator("direct"),
-}
-"""Methods with the coefficients or in the form that the documents print, to be compared with the others: the
-polynomials of [T] 2.1 and 2.2, table 3.1 with its misprint and without, and formula 3.3 as it stands. A
-gate does not go with them."""
-
-MODELS = (*SPECULAR_MODELS, *FURTHER_MODELS, "blinn")
-"""Reflection models of the pipeline; every method serves each."""
-
-_ALL = METHODS | PRINTED
+__all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]
 
 
 @dataclass(frozen=True)
@@ -121,7 +81,7 @@ class Pixels:
         Red, green, blue.
     last : bool array, shape (pixels,)
         Whether a pixel is the last of its span.
-    wide_spans : int
+    out_of_range_spans : int
         Spans wider than the method can shade, whose pixels are not to be trusted.
     """
 
@@ -129,121 +89,128 @@ class Pixels:
     y: np.ndarray
     color: np.ndarray
     last: np.ndarray
-    wide_spans: int
+    out_of_range_spans: int
+
+
+STYLES = ("throughput", "compact")
+"""One pixel a cycle, or few multipliers."""
 
 
 @dataclass(frozen=True)
-class ShadingPipeline:
-    """An interpolator, diffuse and specular terms of each light, and the intensity.
-
-    The bit-true twin composes those of the devices; nothing is rounded in between. Formats and error bounds
-    are theirs.
+class Build:
+    """How a design is built: what changes its cost and its cycles, and no pixel.
 
     Parameters
     ----------
-    method : str
-        One of `METHODS` or `PRINTED`.
-    model : str or None
-        One of `MODELS`; ``None``: no specular light.
-    lights : int
-        Number of lights, 0 to 16. Without any there is ambient light alone, and no method.
-    operand : str or None
-        What the specular unit is given, ``"cosine"`` or ``"one_minus_cosine"``, for methods that find normals
-        (see `NormalInterpolator`). ``None``: what the method gives by itself.
-    materials : int
-        Number of materials, 1 to `MAX_MATERIALS`.
-    gate : bool
-        Whether a `HighlightGate` tells the lights which spans have no highlight. For
-        unit normals that changes no pixel.
+    style : {"throughput", "compact"}
+        One pixel a cycle, or few multipliers.
+    setup_interval : int or None
+        Cycles from a span to the next at the closest, where the method has that choice: a smaller one needs
+        more multipliers. ``None``: 4, or in the compact style the largest.
     exponent : int or None
-        A specular exponent for good; ``None``: that of the frame constants.
-    grey : bool
-        One channel in place of three: red's colour operands count, and the pixel has it three times.
-    x_bits, y_bits, length_bits : int
-        Bits of the coordinates, 1 to 12, and of a span's length, 2 to 12.
-    terms, fraction_bits : int or None
-        Of the chord method alone: terms of its polynomial, and bits of its differences, where they are to be
-        fewer than those of `ChordSetup`.
+        The specular exponent, fixed at build time; ``None``: that of the frame constants.
 
     Raises
     ------
     ValueError
-        If the method, the model, the number of lights or materials or the operand is unknown, the method has
-        no choice of operand, a number of bits or the exponent is out of range, or a gate is asked for without
-        specular light or with a method of `PRINTED`.
+        If the style is unknown or the exponent is out of range.
     """
 
-    method: str = "quadratic"
-    model: str | None = "cosquad"
+    style: Literal["throughput", "compact"] = "throughput"
+    setup_interval: int | None = None
+    exponent: int | None = None
+
+    def __post_init__(self):
+        if self.style not in STYLES:
+            raise ValueError(f"style must be one of {', '.join(STYLES)}, not {self.style!r}")
+        if self.exponent is not None and not 1 <= self.exponent <= MAX_EXPONENT:
+            raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {self.exponent}")
+
+
+@dataclass(frozen=True)
+class Design:
+    """A shading pipeline: an interpolator, diffuse and specular terms of each light, and the intensity.
+
+    `presets.preset` makes one by names. The bit-accurate model, `compute`, composes those of the units;
+    nothing is rounded in between. Formats and error bounds are theirs.
+
+    Parameters
+    ----------
+    interpolator : Interpolator
+        The method.
+    specular : Specular or Power or None
+        The highlight; it takes the operand that the interpolator gives. ``None``: no specular light.
+    lights : int
+        Number of lights, 0 to 16. Without any there is ambient light alone, and no method.
+    materials : int
+        Number of materials, 1 to `frame_constants.MAX_MATERIALS`.
+    gate : bool
+        Whether a `HighlightGate` tells the lights which spans have no highlight. For unit normals that
+        changes no pixel.
+    grey : bool
+        One channel in place of three: red's colour operands count, and the pixel has it three times.
+    x_bits, y_bits, length_bits : int
+        Bits of the coordinates, 1 to 12, and of a span's length, 2 to 12.
+    build : Build
+        How it is built.
+
+    Raises
+    ------
+    ValueError
+        If the number of lights or materials or a number of bits is out of range, or a gate is asked for
+        without specular light or with a method that has no error bound or no normals.
+    """
+
+    interpolator: Interpolator = field(default_factory=QuadraticInterpolator)
+    specular: Specular | Power | None = field(default_factory=Specular)
     lights: int = 1
-    operand: Operand | None = None
     materials: int = 1
     gate: bool = False
-    exponent: int | None = None
     grey: bool = False
     x_bits: int = 12
     y_bits: int = 12
     length_bits: int = 12
-    terms: int | None = None
-    fraction_bits: int | None = None
+    build: Build = field(default_factory=Build)
 
     def __post_init__(self):
-        if self.method not in _ALL:
-            raise ValueError(f"method must be one of {', '.join(METHODS)}, not {self.method!r}")
-        if self.model is not None and self.model not in MODELS:
-            raise ValueError(f"model must be one of {', '.join(MODELS)}, not {self.model!r}")
-        if self.operand not in (None, _ALL[self.method].operand):
-            if not isinstance(_ALL[self.method], NormalInterpolator):
-                raise ValueError(f"method {self.method} finds no normals, and gives 1 - cos gamma")
-            _ = self.interpolator
-        if self.method != "chord" and (self.terms, self.fraction_bits) != (None, None):
-            raise ValueError(f"terms and fraction_bits are for the method chord, not {self.method}")
-        _ = self.interpolator
+        if self.specular is not None and self.specular.operand != self.interpolator.operand:
+            matching = replace(self.specular, operand=self.interpolator.operand)
+            object.__setattr__(self, "specular", matching)
         Intensity(self.lights)
         if not 1 <= self.materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {self.materials}")
-        if self.gate and not (self.model and self.lights):
+        if self.gate and not (self.specular and self.lights):
             raise ValueError("without specular light there is nothing to gate")
-        if self.gate and not self.serves_gate:
+        if self.gate and not self.interpolator.serves_gate:
             lacks = "normals" if self.takes_values else "error bound"
             raise ValueError(f"method {self.method} has no {lacks} for a gate")
-        if self.exponent is not None and not 1 <= self.exponent <= MAX_EXPONENT:
-            raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {self.exponent}")
         for name, least in (("x_bits", 1), ("y_bits", 1), ("length_bits", 2)):
             if not least <= getattr(self, name) <= LENGTH_BITS:
                 raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
 
-    @cached_property
-    def interpolator(self) -> Interpolator:
-        """Twin of the method."""
-        interpolator = _ALL[self.method]
-        changes = {"terms": self.terms, "fraction_bits": self.fraction_bits}
-        if self.operand != interpolator.operand:
-            changes["operand"] = self.operand
-        return replace(interpolator, **{name: x for name, x in changes.items() if x is not None})
+    def built(self, **changes) -> "Design":
+        """The same design with other values of its `Build`."""
+        return replace(self, build=replace(self.build, **changes))
+
+    @property
+    def method(self) -> str:
+        """Name of the method."""
+        return self.interpolator.name
+
+    @property
+    def model(self) -> str | None:
+        """Name of the reflection model; ``None`` without specular light."""
+        return self.specular.name if self.specular else None
 
     @property
     def takes_values(self) -> bool:
         """Whether spans carry values of each light, in place of normals, so that L and H may be local."""
         return isinstance(self.interpolator, LocalChordInterpolator)
 
-    @property
-    def serves_gate(self) -> bool:
-        """Whether a highlight gate can tell what the method's pixels will be."""
-        return not self.takes_values and self.method not in PRINTED
-
-    @property
-    def highlight(self) -> Specular | Power | None:
-        """Twin of the specular unit."""
-        operand = self.interpolator.operand
-        if self.model is None:
-            return None
-        return Power(operand) if self.model == "blinn" else Specular(self.model, operand)
-
     @cached_property
     def highlight_gate(self) -> HighlightGate:
-        """Twin of the highlight gate."""
-        return HighlightGate(self.highlight, interpolator=self.interpolator)
+        """Bit-accurate model of the highlight gate."""
+        return HighlightGate(self.specular, interpolator=self.interpolator)
 
     def lit_spans(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> np.ndarray:
         """Which spans the highlight gate lets through, for each light: bool array, shape (spans, lights).
@@ -285,8 +252,9 @@ class ShadingPipeline:
             if len(of_material.direction) != self.lights:
                 given = len(of_material.direction)
                 raise ValueError(f"the constants are for {given} lights, not {self.lights}")
-            if self.exponent not in (None, of_material.exponent):
-                raise ValueError(f"the exponent is {self.exponent} for good, not {of_material.exponent}")
+            if self.build.exponent not in (None, of_material.exponent):
+                fixed = self.build.exponent
+                raise ValueError(f"the exponent is fixed at {fixed}, not {of_material.exponent}")
         if len(spans) and not 0 <= spans.material.min() <= spans.material.max() < self.materials:
             raise ValueError(f"material must be 0 to {self.materials - 1}")
         for name, bits in (("x", self.x_bits), ("y", self.y_bits), ("length", self.length_bits)):
@@ -299,7 +267,7 @@ class ShadingPipeline:
 
         span, step = pixels_of(length)
         color = np.empty((len(span), 3), dtype=np.uint8)
-        wide, done = 0, 0
+        out_of_range, done = 0, 0
         lit = self.lit_spans(spans, constants)[kept] if self.gate else None
         for part in runs_of(length):
             if not self.lights:
@@ -315,13 +283,13 @@ class ShadingPipeline:
                 color[done + which] = self._shade(
                     operands.cosine[which], operands.highlight[which], dark[which], constants[index]
                 )
-            wide, done = wide + int(np.count_nonzero(operands.wide)), done + count
+            out_of_range, done = out_of_range + int(np.count_nonzero(operands.out_of_range)), done + count
         return Pixels(
             x=(np.asarray(spans.x)[kept][span] + step) & ((1 << self.x_bits) - 1),
             y=np.asarray(spans.y)[kept][span],
             color=color,
             last=step == length[span] - 1,
-            wide_spans=wide,
+            out_of_range_spans=out_of_range,
         )
 
     def _interpolated(self, spans, kept, length, constants) -> Callable[[slice], Operands]:
@@ -344,8 +312,8 @@ class ShadingPipeline:
         dark = dark | diffuse_unit.dark(cosine)
         diffuse = diffuse_unit.compute(cosine)
         specular = Fixed(Intensity.TERM_FORMAT, np.zeros(dark.shape, dtype=np.int64))
-        if self.model is not None:
-            specular = self.highlight.compute(highlight, dark, constants.exponent)
+        if self.specular is not None:
+            specular = self.specular.compute(highlight, dark, constants.exponent)
         return self.intensity.compute(*self._colors(constants), diffuse, specular)
 
     def _ambient(self, constants: Sequence[FrameConstants], material: np.ndarray) -> np.ndarray:
@@ -357,7 +325,7 @@ class ShadingPipeline:
     @property
     def intensity(self) -> Intensity:
         """Twin of the intensity unit."""
-        return Intensity(self.lights, has_specular=self.model is not None, channels=1 if self.grey else 3)
+        return Intensity(self.lights, has_specular=self.specular is not None, channels=1 if self.grey else 3)
 
     def _colors(self, constants: FrameConstants) -> tuple[Fixed, ...]:
         colors = (constants.ambient, constants.diffuse, constants.specular)

@@ -61,7 +61,7 @@ class FrameConstantsUnit(wiring.Component):
     16 (light + 1) + 9 to 11 specular red, green, blue, ``UQ(11, 6)`` LSB
     ======================== ==========================================================
 
-    A constant is there 2 clocks after its write was taken. With several materials the exponent and the
+    A constant is there 2 cycles after its write was taken. With several materials the exponent and the
     colours stand in memories of a word each, written for the material whose index was last written to
     address 4 and read for that of ``material``: they follow it 1 clock behind, and a write 3. Writes for an
     index past the last material are lost. Memories are not cleared by reset.

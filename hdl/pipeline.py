@@ -2,7 +2,6 @@
 
 from functools import reduce
 from operator import and_
-from typing import Literal
 
 from amaranth.hdl import Module, Mux, Shape, Signal, Value, unsigned
 from amaranth.lib import data, fifo, stream, wiring
@@ -19,8 +18,8 @@ from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
-from blysk.golden.pipeline import ShadingPipeline
-from blysk.hdl.core.stream import BUFFER_LATENCY, connect, connect_buffered
+from blysk.golden.pipeline import Design
+from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
 from blysk.hdl.cosines.local_chord_setup import span_values_shape
 from blysk.hdl.frame_constants import FrameConstantsUnit, write_shape
 from blysk.hdl.lighting.diffuse import DiffuseUnit
@@ -37,19 +36,15 @@ from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUni
 from blysk.hdl.methods.quadratic_interpolator import QuadraticInterpolatorUnit
 from blysk.hdl.methods.recurrence_interpolator import RecurrenceInterpolatorUnit
 from blysk.hdl.normals.middle_normal import normal_shape
-from blysk.hdl.pixel_assembler import PixelAssemblerUnit, pixel_shape, place_shape
+from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
 
 __all__ = [
     "INTERPOLATORS",
     "PORT_DESCRIPTIONS",
-    "STYLES",
     "ShadingPipelineUnit",
     "span_shape",
     "status_shape",
 ]
-
-STYLES = ("throughput", "compact")
-"""One pixel a clock, or few multipliers."""
 
 INTERPOLATORS: dict[type[Interpolator], type[InterpolatorUnit]] = {
     AngularInterpolator: AngularInterpolatorUnit,
@@ -78,14 +73,14 @@ PORT_DESCRIPTIONS = {
     "o_last": "last pixel of its span",
     "write_address": "frame constant to write, see above",
     "write_data": "its code; taken when no span is inside",
-    "status_wide_spans": "spans too wide for the method since reset, at most 65535",
+    "status_out_of_range_spans": "spans too wide for the method since reset, at most 65535",
     "status_empty_spans": "spans of length 0 since reset, at most 65535",
     "status_overrun": "a span went past the largest column",
 }
 """What each port of the pipeline is, for the table in its Verilog."""
 
 
-def span_shape(parameters: ShadingPipeline) -> data.StructLayout:
+def span_shape(parameters: Design) -> data.StructLayout:
     """Shape of a raster span: first pixel, pixels, unit normals at the first and last pixel centre.
 
     Without lights there are no normals, and a method that takes values has them in their place; with several
@@ -97,7 +92,7 @@ def span_shape(parameters: ShadingPipeline) -> data.StructLayout:
         "length": unsigned(parameters.length_bits),
     }
     if parameters.lights and parameters.takes_values:
-        values = span_values_shape(parameters.lights, parameters.model is not None)
+        values = span_values_shape(parameters.lights, parameters.specular is not None)
         members["values"] = values.members["values"]
     elif parameters.lights:
         members |= {"normal_left": normal_shape(), "normal_right": normal_shape()}
@@ -109,12 +104,12 @@ def span_shape(parameters: ShadingPipeline) -> data.StructLayout:
 def status_shape() -> data.StructLayout:
     """Shape of what the pipeline has counted since reset; counters stop at their largest value.
 
-    ``wide_spans``: spans too wide for the method, whose pixels are not to be trusted; counted when that is
-    known, some clocks after they are taken. ``empty_spans``: spans of length 0.
-    ``overrun``: whether a span has gone past the largest x, where x starts again at 0.
+    ``out_of_range_spans``: spans too wide for the method, whose pixels are not to be trusted; counted when
+    that is known, some cycles after they are taken. ``empty_spans``: spans of length 0. ``overrun``: whether
+    a span has gone past the largest x, where x starts again at 0.
     """
     return data.StructLayout(
-        {"wide_spans": unsigned(16), "empty_spans": unsigned(16), "overrun": unsigned(1)}
+        {"out_of_range_spans": unsigned(16), "empty_spans": unsigned(16), "overrun": unsigned(1)}
     )
 
 
@@ -123,11 +118,11 @@ class ShadingPipelineUnit(wiring.Component):
 
     An interpolator takes spans to the operands of their pixels; a light unit for each light takes these to
     terms, and the intensity unit to colours. The setup of the next spans overlaps the pixels of this one; a
-    FIFO carries the spans' places round it. `ShadingPipeline` is the bit-true twin, and says
+    FIFO carries the spans' places round it. `Design` is the bit-true twin, and says
     what a pipeline may do without.
 
-    The first pixel of a span leaves `latency` clocks after an idle pipeline has taken it. Without stalls each
-    span then takes at most ``max(clocks_per_pixel length, setup_interval)`` clocks; two spans are held
+    The first pixel of a span leaves `latency` cycles after an idle pipeline has taken it. Without stalls each
+    span then takes at most ``max(cycles_per_pixel length, setup_interval)`` cycles; two spans are held
     ready, so that a long one pays for short ones after it, but for a clock. (``bisection`` takes longer where
     it divides spans.) A span of length 0 is taken like any other and gives nothing.
 
@@ -141,31 +136,26 @@ class ShadingPipelineUnit(wiring.Component):
     In the *compact* style one multiplier does the colours, one the specular terms of a light, two its
     products with a normal where there is one, and one or two the setup (as many as its longest interval
     needs). A pixel takes a clock a channel for each of its diffuse and specular terms that is not 0, at least
-    one; and, where its light is in front and its span not dark, as many clocks as its specular model has
+    one; and, where its light is in front and its span not dark, as many cycles as its specular model has
     products, a power 42. So what has no highlight costs less. The pixels are the same to the bit.
-    ``clocks_per_pixel`` and ``latency`` are then those of a pixel with every term.
+    ``cycles_per_pixel`` and ``latency`` are then those of a pixel with every term.
 
     A write is taken when no span is inside, and no span is taken while a write waits, so a frame's constants
     never change under a running span: ``i.ready`` falls on the clock on which ``write.valid`` rises, and
-    rises 2 clocks after the last write was taken. For the same reason a span of another material than the one
-    before it waits until no span is inside: it is taken 5 clocks after the last pixel has left, and its first
-    pixel comes ``latency + 5`` clocks after that one, where without the change it comes 1 clock after. Sort
+    rises 2 cycles after the last write was taken. For the same reason a span of another material than the one
+    before it waits until no span is inside: it is taken 5 cycles after the last pixel has left, and its first
+    pixel comes ``latency + 5`` cycles after that one, where without the change it comes 1 clock after. Sort
     spans by material.
 
     Parameters
     ----------
-    parameters : ShadingPipeline
+    parameters : Design
         Method, reflection model, numbers of lights and materials, and what is left out.
-    setup_interval : int or None
-        Clocks from a span to the next at the closest, where the method has that choice: a smaller one needs
-        more multipliers, and changes no pixel. ``None``: 4, or in the compact style the largest.
-    style : str
-        ``"throughput"`` or ``"compact"``.
 
     Raises
     ------
     ValueError
-        If the method is not built for the setup interval, or the style is unknown.
+        If the method is not built for the setup interval.
 
     Members
     -------
@@ -181,16 +171,9 @@ class ShadingPipelineUnit(wiring.Component):
     Source: pipeline.md; [T] figure 4.10.
     """
 
-    def __init__(
-        self,
-        parameters: ShadingPipeline | None = None,
-        setup_interval: int | None = None,
-        style: Literal["throughput", "compact"] = "throughput",
-    ):
-        if style not in STYLES:
-            raise ValueError(f"style must be one of {', '.join(STYLES)}, not {style!r}")
-        self.style = style
-        self.parameters = p = parameters or ShadingPipeline()
+    def __init__(self, parameters: Design | None = None):
+        self.parameters = p = parameters or Design()
+        style, setup_interval = p.build.style, p.build.setup_interval
         super().__init__(
             {
                 "i": In(stream.Signature(span_shape(p))),
@@ -201,8 +184,8 @@ class ShadingPipelineUnit(wiring.Component):
         )
         self._assembler = PixelAssemblerUnit(p.x_bits, p.y_bits, p.length_bits)
         self._interpolator, self._gate, self._slope, self._lights = None, None, None, []
-        self.setup_interval = self.clocks_per_pixel = 1
-        self.latency = BUFFER_LATENCY + self._assembler.place_latency
+        self.setup_interval = self.cycles_per_pixel = 1
+        self.latency = FIFO_LATENCY + self._assembler.coordinates_latency
         if not p.lights:
             if setup_interval is not None:
                 raise ValueError("without lights there is no setup, and no setup_interval")
@@ -216,12 +199,12 @@ class ShadingPipelineUnit(wiring.Component):
             setup_interval = served[-1]
         options = {} if setup_interval is None else {"setup_interval": setup_interval}
         if style == "compact" and isinstance(p.interpolator, NormalInterpolator):
-            # A pixel takes its channels' clocks at least.
+            # A pixel takes its channels' cycles at least.
             options["product_interval"] = p.intensity.channels
         self._interpolator = method(
             p.interpolator,
             p.lights,
-            highlights=p.model is not None,
+            highlights=p.specular is not None,
             length_bits=p.length_bits,
             **options,
         )
@@ -230,9 +213,9 @@ class ShadingPipelineUnit(wiring.Component):
         self._intensity = IntensityUnit(p.intensity, style)
         if p.gate:
             interval = min(self.setup_interval, 3 + 12 * p.lights)
-            self._gate = HighlightGateUnit(p.highlight_gate, interval, p.lights, p.exponent)
-        self.clocks_per_pixel = max(
-            self._interpolator.clocks_per_pixel,
+            self._gate = HighlightGateUnit(p.highlight_gate, interval, p.lights, p.build.exponent)
+        self.cycles_per_pixel = max(
+            self._interpolator.cycles_per_pixel,
             options.get("product_interval", 1),
             self._lights[0].initiation_interval,
             self._intensity.initiation_interval,
@@ -241,11 +224,11 @@ class ShadingPipelineUnit(wiring.Component):
         self.latency = sum(unit.latency for unit in chain)
         if p.gate:
             # A FIFO before the gate, and one after it.
-            decided = self._gate.latency + 2 * BUFFER_LATENCY
+            decided = self._gate.latency + 2 * FIFO_LATENCY
             self.latency += max(decided - self._interpolator.latency, 0)
 
     @property
-    def _places(self) -> int:
+    def _waiting_spans(self) -> int:
         """Spans that wait beside the interpolator for their colours: as many as may be on the way at a time.
 
         17 are a memory of 16 words, and a register behind it.
@@ -254,25 +237,26 @@ class ShadingPipelineUnit(wiring.Component):
 
     def _light_units(self) -> list:
         """Diffuse units, or light units, which share what follows from the exponent."""
-        p, compact = self.parameters, self.style == "compact"
+        p = self.parameters
+        compact, exponent = p.build.style == "compact", p.build.exponent
         diffuse = Diffuse(p.interpolator.COSINE_FORMAT)
-        if p.model is None:
+        if p.specular is None:
             return [DiffuseUnit(parameters=diffuse) for _ in range(p.lights)]
         interval, shares_slope = 1, False
-        if isinstance(p.highlight, Power):
+        if isinstance(p.specular, Power):
             interval = 42 if compact else 1
         else:
             if compact:
-                # A colour takes its channels' clocks anyway.
-                interval = max(SpecularUnit.multiplications(p.highlight, p.exponent), p.intensity.channels)
-            if p.exponent is None:
-                self._slope, shares_slope = SlopeUnit(p.highlight), True
+                # A colour takes its channels' cycles anyway.
+                interval = max(SpecularUnit.multiplications(p.specular, exponent), p.intensity.channels)
+            if exponent is None:
+                self._slope, shares_slope = SlopeUnit(p.specular), True
         return [
             LightUnit(
-                p.highlight,
+                p.specular,
                 diffuse,
                 interval,
-                exponent=p.exponent,
+                exponent=exponent,
                 shares_slope=shares_slope,
                 gated=p.gate,
             )
@@ -285,16 +269,18 @@ class ShadingPipelineUnit(wiring.Component):
         p = self.parameters
         m.submodules.pixel_assembler = assembler = self._assembler
         m.submodules.frame_constants = frame = FrameConstantsUnit(p.lights, p.materials)
-        place_layout = place_shape(p.x_bits, p.y_bits, p.length_bits)
-        m.submodules.places = places = fifo.SyncFIFOBuffered(width=place_layout.size, depth=self._places)
+        place_layout = coordinates_shape(p.x_bits, p.y_bits, p.length_bits)
+        m.submodules.coordinates = coordinates = fifo.SyncFIFOBuffered(
+            width=place_layout.size, depth=self._waiting_spans
+        )
 
         # Admission: a span goes to what sets it up, its place round it, to all or to none.
         place = Signal(place_layout)
         empty, offered, free, admit, settled, written = (Signal() for _ in range(6))
         span = self.i.payload
-        takers = [(places.w_en, places.w_rdy)]
+        sinks = [(coordinates.w_en, coordinates.w_rdy)]
         if p.lights:
-            takers += self._shade(m, frame)
+            sinks += self._shade(m, frame)
         else:
             ambient = frame.constants.ambient
             for channel, name in enumerate("rgb"):
@@ -305,28 +291,28 @@ class ShadingPipelineUnit(wiring.Component):
             empty.eq(span.length == 0),
             offered.eq(self.i.valid & ~empty),
             free.eq(~self.write.valid & ~written & settled),
-            self.i.ready.eq(free & reduce(and_, (ready for _, ready in takers))),
+            self.i.ready.eq(free & reduce(and_, (ready for _, ready in sinks))),
             admit.eq(offered & self.i.ready),
             place.x.eq(span.x),
             place.y.eq(span.y),
             place.length.eq(span.length),
-            places.w_data.eq(place),
+            coordinates.w_data.eq(place),
         ]
-        for index, (valid, _) in enumerate(takers):
-            others = (ready for k, (_, ready) in enumerate(takers) if k != index)
+        for index, (valid, _) in enumerate(sinks):
+            others = (ready for k, (_, ready) in enumerate(sinks) if k != index)
             m.d.comb += valid.eq(reduce(and_, others, offered & free))
         m.d.comb += [
-            assembler.places.payload.eq(places.r_data),
-            assembler.places.valid.eq(places.r_rdy),
-            places.r_en.eq(assembler.places.ready),
+            assembler.coordinates.payload.eq(coordinates.r_data),
+            assembler.coordinates.valid.eq(coordinates.r_rdy),
+            coordinates.r_en.eq(assembler.coordinates.ready),
         ]
         connect(m, assembler.o, wiring.flipped(self.o))
 
         # Writes, only while no span is inside.
         connect(m, wiring.flipped(self.write), frame.write)
-        # A constant is there two clocks after its write.
+        # A constant is there two cycles after its write.
         m.d.sync += written.eq(self.write.valid & self.write.ready)
-        inside = Signal(range(self._places + self._assembler.PLACES + 1))
+        inside = Signal(range(self._waiting_spans + self._assembler.SPANS_INSIDE + 1))
         finished = self.o.valid & self.o.ready & self.o.payload.last
         idle = Signal(init=1)
         m.d.comb += frame.hold.eq(~idle)
@@ -349,7 +335,7 @@ class ShadingPipelineUnit(wiring.Component):
 
         status = self.status
         for counter, event in (
-            (status.wide_spans, self._interpolator.wide if p.lights else 0),
+            (status.out_of_range_spans, self._interpolator.out_of_range if p.lights else 0),
             (status.empty_spans, self.i.valid & self.i.ready & empty),
             (status.overrun, admit & (span.x + span.length > 1 << p.x_bits)),
         ):
@@ -364,19 +350,19 @@ class ShadingPipelineUnit(wiring.Component):
         p, span = self.parameters, self.i.payload
         m.submodules.interpolator = interpolator = self._interpolator
         m.submodules.intensity = intensity = self._intensity
-        takers = [(interpolator.i.valid, interpolator.i.ready)]
+        sinks = [(interpolator.i.valid, interpolator.i.ready)]
         words = interpolator.i.payload
         m.d.comb += [Value.cast(words[name]).eq(Value.cast(span[name])) for name in words.shape().members]
         operands, gated = interpolator.o, None
         if self._gate is not None:
-            operands, gated = self._decide(m, frame, takers)
+            operands, gated = self._decide(m, frame, sinks)
         if self._slope is not None:
             m.submodules.slope = self._slope
             m.d.comb += self._slope.exponent.eq(frame.constants.exponent)
 
         # In lockstep, one handshake is that of all: equal units, offered the same beats and taken from on the
-        # same clocks. Where lights skip beats, all take one together, or none.
-        lockstep = p.model is None or not self._lights[0].skips_dark
+        # same cycles. Where lights skip beats, all take one together, or none.
+        lockstep = p.specular is None or not self._lights[0].skips_dark
         leaders = self._lights[:1] if lockstep else self._lights
         for index, light in enumerate(self._lights):
             m.submodules[f"light_{index}"] = light
@@ -392,7 +378,7 @@ class ShadingPipelineUnit(wiring.Component):
                 intensity.constants.specular[index].eq(constants.specular),
             ]
             words, terms = operands.payload[index], light.o.payload
-            if p.model is None:
+            if p.specular is None:
                 m.d.comb += [light.i.payload.eq(words.cosine), intensity.i.payload.diffuse[index].eq(terms)]
             else:
                 m.d.comb += [
@@ -418,19 +404,19 @@ class ShadingPipelineUnit(wiring.Component):
             intensity.constants.ambient.eq(frame.constants.ambient),
         ]
         connect(m, intensity.o, self._assembler.colors)
-        return takers
+        return sinks
 
-    def _decide(self, m: Module, frame: FrameConstantsUnit, takers: list) -> tuple[stream.Interface, Value]:
+    def _decide(self, m: Module, frame: FrameConstantsUnit, sinks: list) -> tuple[stream.Interface, Value]:
         """The highlight gate's decisions beside the operands of each pixel; it too takes the spans."""
         p, span = self.parameters, self.i.payload
         m.submodules.highlight_gate = gate = self._gate
         width = p.length_bits
-        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=width, depth=self._places)
-        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=p.lights, depth=self._places)
+        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=width, depth=self._waiting_spans)
+        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=p.lights, depth=self._waiting_spans)
         # The gate takes a span at a turn of its own, which is not always that of the setup.
         waiting = gate.i.signature.flip().create(path=("waiting",))
-        connect_buffered(m, "undecided", waiting, gate.i, depth=3)
-        takers += [(waiting.valid, waiting.ready), (lengths.w_en, lengths.w_rdy)]
+        connect_fifo(m, "undecided", waiting, gate.i, depth=3)
+        sinks += [(waiting.valid, waiting.ready), (lengths.w_en, lengths.w_rdy)]
         source = self._interpolator.o
         operands = source.signature.create(path=("decided",))
         place, last = Signal(p.length_bits), Signal()
@@ -452,7 +438,7 @@ class ShadingPipelineUnit(wiring.Component):
         ]
         for index in range(p.lights):
             m.d.comb += gate.constants.halfway[index].eq(frame.constants.lights[index].halfway)
-        if p.exponent is None:
+        if p.build.exponent is None:
             m.d.comb += gate.constants.exponent.eq(frame.constants.exponent)
         with m.If(moves):
             m.d.sync += place.eq(Mux(last, 0, place + 1))

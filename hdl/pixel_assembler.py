@@ -4,13 +4,13 @@ from amaranth.hdl import Cat, Module, Signal, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from blysk.hdl.core.stream import connect_registered, count_down, offer
+from blysk.hdl.core.stream import connect_slice, count_down, skid_buffer
 from blysk.hdl.lighting.intensity import pixel_color_shape
 
-__all__ = ["PixelAssemblerUnit", "pixel_shape", "place_shape"]
+__all__ = ["PixelAssemblerUnit", "coordinates_shape", "pixel_shape"]
 
 
-def place_shape(x_bits: int = 12, y_bits: int = 12, length_bits: int = 12) -> data.StructLayout:
+def coordinates_shape(x_bits: int = 12, y_bits: int = 12, length_bits: int = 12) -> data.StructLayout:
     """Shape of a span's place: first pixel and number of pixels."""
     return data.StructLayout({"x": unsigned(x_bits), "y": unsigned(y_bits), "length": unsigned(length_bits)})
 
@@ -42,7 +42,7 @@ class PixelAssemblerUnit(wiring.Component):
 
     Members
     -------
-    places : :py:`In(stream.Signature(place_shape(x_bits, y_bits, length_bits)))`
+    coordinates : :py:`In(stream.Signature(coordinates_shape(x_bits, y_bits, length_bits)))`
         Place of each span, of 1 pixel or more. Past the largest x it starts at 0.
     colors : :py:`In(stream.Signature(pixel_color_shape()))`
         Colours, in the order of the spans' pixels.
@@ -54,16 +54,16 @@ class PixelAssemblerUnit(wiring.Component):
 
     latency = 1
 
-    place_latency = 3
+    coordinates_latency = 3
     """Clocks from a place to its first pixel, if the colour waits."""
 
-    PLACES = 6
+    SPANS_INSIDE = 6
     """Spans inside at most: four places, and two pixels that wait."""
 
     def __init__(self, x_bits: int = 12, y_bits: int = 12, length_bits: int = 12):
         super().__init__(
             {
-                "places": In(stream.Signature(place_shape(x_bits, y_bits, length_bits))),
+                "coordinates": In(stream.Signature(coordinates_shape(x_bits, y_bits, length_bits))),
                 "colors": In(stream.Signature(pixel_color_shape())),
                 "o": Out(stream.Signature(pixel_shape(x_bits, y_bits))),
             }
@@ -72,16 +72,16 @@ class PixelAssemblerUnit(wiring.Component):
     def elaborate(self, platform):
         """Places of spans; from them places of pixels, which meet the colours; a register for the pixel."""
         m = Module()
-        place, color = self.places.payload, self.colors.payload
-        following = self.places.signature.create(path=("following",))
-        connect_registered(m, wiring.flipped(self.places), following)
+        place, color = self.coordinates.payload, self.colors.payload
+        following = self.coordinates.signature.create(path=("following",))
+        connect_slice(m, wiring.flipped(self.coordinates), following)
 
         x, y = Signal.like(place.x), Signal.like(place.y)
         load, moves = Signal(), Signal()
         active, ends = count_down(m, following.valid, following.payload.length, moves)
         spot = stream.Signature(data.StructLayout({"x": x.shape(), "y": y.shape(), "last": 1})).create()
         m.d.comb += [
-            moves.eq(offer(m, spot, active, Cat(x, y, ends))),
+            moves.eq(skid_buffer(m, spot, active, Cat(x, y, ends))),
             following.ready.eq(moves & ends),
             load.eq(following.ready & following.valid),
         ]
@@ -92,7 +92,7 @@ class PixelAssemblerUnit(wiring.Component):
 
         pixel, valid, advance = Signal(self.o.payload.shape()), Signal(), Signal()
         m.d.comb += [
-            advance.eq(offer(m, self.o, valid, pixel)),
+            advance.eq(skid_buffer(m, self.o, valid, pixel)),
             self.colors.ready.eq(advance & spot.valid),
             spot.ready.eq(advance & self.colors.valid),
         ]

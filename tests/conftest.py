@@ -61,8 +61,8 @@ def verify():
         count = length_of(beats)
         run = simulate(unit, beats, count=count, constants=constants, engine="auto")
         assert_beats_equal(run.beats, expected)
-        np.testing.assert_array_equal(run.input_clocks, np.arange(count) * unit.initiation_interval)
-        np.testing.assert_array_equal(run.clocks, run.input_clocks + unit.latency)
+        np.testing.assert_array_equal(run.input_cycles, np.arange(count) * unit.initiation_interval)
+        np.testing.assert_array_equal(run.cycles, run.input_cycles + unit.latency)
         for input_share, output_share in ((0.4, 0.4), (0.9, 0.1), (0.1, 0.9)):
             stalls = {
                 "input_stalls": rng.random(997) < input_share,
@@ -76,8 +76,8 @@ def verify():
                 for engine in ("pysim", "auto")
             )
             assert_beats_equal(slow.beats, take(expected, few))
-            np.testing.assert_array_equal(slow.clocks, fast.clocks)
-            np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+            np.testing.assert_array_equal(slow.cycles, fast.cycles)
+            np.testing.assert_array_equal(slow.input_cycles, fast.input_cycles)
 
     return verify
 
@@ -148,16 +148,16 @@ def verify_pauses():
         stalls = np.arange(pause * count) % pause != 0
         run = simulate(unit, beats, count=count, constants=constants, engine="auto", input_stalls=stalls)
         assert_beats_equal(run.beats, expected)
-        np.testing.assert_array_equal(run.clocks, run.input_clocks + unit.latency)
+        np.testing.assert_array_equal(run.cycles, run.input_cycles + unit.latency)
 
     return verify_pauses
 
 
 @pytest.fixture(scope="session")
 def verify_reset():
-    """Reset a unit with beats inside: it then answers as from power-up, on the same clocks."""
+    """Reset a unit with beats inside: it then answers as from power-up, on the same cycles."""
 
-    def verify_reset(unit, beats, befores, clocks, constants=None):
+    def verify_reset(unit, beats, befores, cycles, constants=None):
         """Clocks and payloads of what the first six beats give; the others are inside on the reset."""
         packed = [
             int.from_bytes(row.astype("<u4").tobytes(), "little")
@@ -170,9 +170,9 @@ def verify_reset():
             constants = sum(word << width * k for k, word in enumerate(words))
         reset, found = Signal(), []
 
-        async def send(context, words, clocks):
+        async def send(context, words, cycles):
             sent, taken = 0, []
-            for clock in range(clocks):
+            for clock in range(cycles):
                 context.set(unit.i.valid, sent < len(words))
                 context.set(Value.cast(unit.i.payload).as_unsigned(), words[min(sent, len(words) - 1)])
                 accepted = context.get(unit.i.valid & unit.i.ready)
@@ -192,7 +192,7 @@ def verify_reset():
                 await context.tick()
                 context.set(reset, 0)
                 assert not context.get(unit.o.valid)
-                found.append(await send(context, packed[:6], clocks))
+                found.append(await send(context, packed[:6], cycles))
 
         simulator = Simulator(ResetInserter(reset)(unit))
         simulator.add_clock(1e-6)

@@ -1,4 +1,4 @@
-"""Baselines: what each device and pipeline takes, and the clocks of a fixed set of frames, as they were.
+"""Baselines: what each device and pipeline takes, and the cycles of a fixed set of frames, as they were.
 
 The figures stand in ``bench/quality/baselines.json``, and a test fails when one moves by more than 2 % either
 way. ``python -m blysk.bench.quality.baselines`` measures all of them and prints what moved; the exit status
@@ -24,11 +24,12 @@ from blysk.bench.accuracy import scene_for
 from blysk.bench.command import run
 from blysk.bench.store import Task, results_of
 from blysk.bench.tools.blocks import BLOCKS, Block
-from blysk.golden.pipeline import METHODS, MODELS, ShadingPipeline
+from blysk.golden.pipeline import STYLES, Design
+from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.pipeline import STYLES, ShadingPipelineUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import Whole
 from blysk.sim.errors import InputError
 from blysk.sim.frames.frame import FrameSimulator
@@ -42,7 +43,7 @@ __all__ = [
     "TOLERANCE",
     "UPDATE",
     "Figures",
-    "clocks_of",
+    "cycles_of",
     "differences",
     "main",
     "measure",
@@ -76,12 +77,12 @@ def _scenes() -> dict[str, Scene]:
     }
 
 
-def clocks_of(design: ShadingPipeline, style: str = "throughput") -> dict[str, int]:
+def cycles_of(design: Design, style: str = "throughput") -> dict[str, int]:
     """Clocks of a pipeline from the first write of a constant to the last pixel.
 
     Parameters
     ----------
-    design : ShadingPipeline
+    design : Design
         The pipeline.
     style : str
         See `ShadingPipelineUnit`.
@@ -89,10 +90,10 @@ def clocks_of(design: ShadingPipeline, style: str = "throughput") -> dict[str, i
     Returns
     -------
     dict
-        By frame: ``teapot_clocks``, 256 triangles at 48x36; ``square_clocks``, a bent one at 32x24.
+        By frame: ``teapot_cycles``, 256 triangles at 48x36; ``square_cycles``, a bent one at 32x24.
     """
-    simulator = FrameSimulator(design, "pysim", style=style)
-    return {f"{name}_clocks": simulator.render(scene).clocks for name, scene in _scenes().items()}
+    simulator = FrameSimulator(design.built(style=style), "pysim")
+    return {f"{name}_cycles": simulator.render(scene).cycles for name, scene in _scenes().items()}
 
 
 @dataclass(frozen=True)
@@ -109,14 +110,14 @@ class _Pipeline:
         return f"pipeline {self.method}, {self.model}, {self.style}" + ", gate" * self.gate
 
     @property
-    def design(self) -> ShadingPipeline:
-        return ShadingPipeline(self.method, self.model, gate=self.gate)
+    def design(self) -> Design:
+        return preset(self.method, self.model, gate=self.gate)
 
     def parts(self) -> dict[str, int]:
-        return cost_of(ShadingPipelineUnit(self.design, style=self.style)).totals
+        return cost_of(ShadingPipelineUnit(self.design.built(style=self.style))).totals
 
-    def clocks(self) -> dict[str, int]:
-        return clocks_of(self.design, self.style)
+    def cycles(self) -> dict[str, int]:
+        return cycles_of(self.design, self.style)
 
 
 def _parts_of_block(block: Block) -> dict[str, int]:
@@ -127,8 +128,8 @@ def _entries() -> dict[str, Callable[[], dict[str, int]]]:
     pipelines = [_Pipeline(method, style=style) for style in STYLES for method in METHODS]
     pipelines += [_Pipeline(gate=True), _Pipeline("linear", gate=True)]
     pipelines += [_Pipeline(model="blinn", style="compact", gate=gate) for gate in (False, True)]
-    entries = {f"frames: {pipeline.name}": pipeline.clocks for pipeline in pipelines}
-    # In this style a model moves the clocks by its latency alone.
+    entries = {f"frames: {pipeline.name}": pipeline.cycles for pipeline in pipelines}
+    # In this style a model moves the cycles by its latency alone.
     pipelines += [_Pipeline(model=model) for model in MODELS if model != "cosquad"]
     entries |= {f"parts: {pipeline.name}": pipeline.parts for pipeline in pipelines}
     for block in BLOCKS:
@@ -140,7 +141,7 @@ def _entries() -> dict[str, Callable[[], dict[str, int]]]:
 ENTRIES: dict[str, Callable[[], dict[str, int]]] = _entries()
 """What is measured: for each entry a function that gives its figures.
 
-``frames``: `clocks_of` the pipelines of each method in both styles, and of some with a gate. ``parts``:
+``frames``: `cycles_of` the pipelines of each method in both styles, and of some with a gate. ``parts``:
 `Cost.totals` of these, of a pipeline of each model, and of every device of `BLOCKS`.
 """
 

@@ -3,7 +3,7 @@
 ``python -m blysk.bench.quality.mutants [DEVICE ...]`` takes faults of a device at random (a bit of a cell
 that is stuck, inverted, or inverted by a neighbour: Yosys' pass ``mutate``), and gives each the vectors of
 the device's tests. These are the real ones: the tests run, and what they send through the unit is kept. A
-mutant is killed if an output beat, or its clock, is not that of the unit; in a run without stalls the clocks
+mutant is killed if an output beat, or its clock, is not that of the unit; in a run without stalls the cycles
 of the inputs count, too. Of the others, those are equivalent that no stimulus could tell from the unit, as
 Yosys and ABC (package pyosys) prove; they count for nothing. The *score* is the share of the rest that is
 killed. Clocks are not mutated, and reset stays low: tests and proofs of their own hold each unit to it.
@@ -46,7 +46,7 @@ from blysk.bench.command import run
 from blysk.bench.store import Task, results_of, version_of
 from blysk.bench.tools.blocks import BLOCKS
 from blysk.bench.tools.fpga import _YOSYS, ToolError
-from blysk.golden.pipeline import METHODS, ShadingPipeline
+from blysk.golden.presets import METHODS, preset
 from blysk.hdl.pipeline import INTERPOLATORS, ShadingPipelineUnit
 from blysk.sim.cli.main import Whole
 from blysk.sim.engines import cxxrtl, pysim, simulate
@@ -113,7 +113,7 @@ def _devices() -> dict[str, Device]:
     for name, block in blocks.items():
         unit, module, within = block.unit, name, ""
         if methods.get(block.variant) == name and name != "local_chord_interpolator":
-            unit = partial(ShadingPipelineUnit, ShadingPipeline(block.variant))
+            unit = partial(ShadingPipelineUnit, preset(block.variant))
             module, within = "pipeline", "interpolator"
         else:
             unit = block.unit
@@ -281,8 +281,8 @@ class Wrapped(Component):
 class _Observed(Wrapped):
     """A unit, an input that chooses a mutant, and outputs that are 0 where no partner of a stream looks.
 
-    A ``ready`` is seen while ``valid`` is high, a payload likewise. The clocks on which a unit's ``wide`` is
-    high are its status, as in a pipeline.
+    A ``ready`` is seen while ``valid`` is high, a payload likewise. The cycles on which a unit's
+    ``out_of_range`` is high are its status, as in a pipeline.
 
     Parameters
     ----------
@@ -303,7 +303,7 @@ class _Observed(Wrapped):
         m = super().elaborate(platform)
         m.submodules.unit = self.unit
         if _flags(self.unit):
-            m.d.sync += self.status.eq(self.status + self.unit.wide)
+            m.d.sync += self.status.eq(self.status + self.unit.out_of_range)
         payload = Value.cast(self.o.payload)
         m.d.comb += payload.eq(Mux(self.o.valid, Value.cast(self.unit.o.payload).as_unsigned(), 0))
         for name in ("i", "write"):
@@ -315,7 +315,7 @@ class _Observed(Wrapped):
 
 def _flags(unit: Component) -> bool:
     """Whether a unit has a flag that no run of its own shows."""
-    return "wide" in unit.signature.members and "status" not in unit.signature.members
+    return "out_of_range" in unit.signature.members and "status" not in unit.signature.members
 
 
 # Reset is held low, so that it goes.
@@ -442,7 +442,7 @@ class _Mutants(cxxrtl.Model):
         ctypes.c_uint64.in_dll(self._library, "blysk_mutant").value = mutant
 
     def trace(self, stimulus: Stimulus) -> Trace:
-        """A run of so many clocks as the stimulus says."""
+        """A run of so many cycles as the stimulus says."""
         return self._run(stimulus, None)
 
 
@@ -466,8 +466,8 @@ def _killed(model: _Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants:
 def _seen(stimulus: Stimulus, trace: Trace) -> tuple:
     """What a test sees of a run. Clocks of the inputs follow from those of the outputs, but under stalls."""
     free = not (stimulus.input_stalls.any() or stimulus.output_stalls.any())
-    clocks = (trace.input_clocks,) if free else ()
-    return trace.end, trace.clock, trace.output, trace.clocks, trace.status, *clocks
+    cycles = (trace.input_cycles,) if free else ()
+    return trace.end, trace.clock, trace.output, trace.cycles, trace.status, *cycles
 
 
 # Equivalence.

@@ -24,7 +24,8 @@ from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.unit_vector import ONE, quantise
-from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.pipeline import Design, Spans
+from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import Whole
@@ -116,7 +117,7 @@ def random_constants(rng: np.random.Generator) -> FrameConstants:
 
 
 @functools.cache
-def _models(design: ShadingPipeline, rival: bool) -> tuple[ShadingPipelineUnit, Verilated | None]:
+def _models(design: Design, rival: bool) -> tuple[ShadingPipelineUnit, Verilated | None]:
     """The pipeline, and Verilator's model of it; built once in a process."""
     unit = ShadingPipelineUnit(design)
     return unit, Verilated(unit, Path(tempfile.mkdtemp(prefix="blysk-"))) if rival else None
@@ -151,7 +152,7 @@ def measure(
     Returns
     -------
     dict
-        ``pixels``, ``spans`` and ``clocks`` of the compiled engine, ``stalled``, pixels of those that ran
+        ``pixels``, ``spans`` and ``cycles`` of the compiled engine, ``stalled``, pixels of those that ran
         under stalls, and ``rival_pixels`` of Verilator's model.
 
     Raises
@@ -159,10 +160,10 @@ def measure(
     SimulationError
         If a beat differs, or an engine fails.
     """
-    design = ShadingPipeline(method, model, gate=gate)
+    design = preset(method, model, gate=gate)
     unit, verilated = _models(design, rival is not None)
     rng = np.random.default_rng([seed, part])
-    totals = dict.fromkeys(("pixels", "spans", "clocks", "stalled", "rival_pixels"), 0)
+    totals = dict.fromkeys(("pixels", "spans", "cycles", "stalled", "rival_pixels"), 0)
     while totals["pixels"] < pixels:
         constants = random_constants(rng)
         spans = random_spans(rng, min(_BATCH, pixels - totals["pixels"]), constants.halfway[0] / ONE)
@@ -180,7 +181,7 @@ def measure(
         where = f"{method}, {model}, part {part} of seed {seed}, from pixel {totals['pixels']}"
         _hold("cxxrtl", where, found.beats, expected)
         status = {
-            "wide_spans": twin.wide_spans,
+            "out_of_range_spans": twin.out_of_range_spans,
             "empty_spans": np.count_nonzero(spans.length == 0),
             "overrun": np.any((spans.x + spans.length > 4096) & (spans.length > 0)),
         }
@@ -192,7 +193,7 @@ def measure(
             totals["rival_pixels"] += len(twin.x)
         totals["pixels"] += len(twin.x)
         totals["spans"] += len(spans)
-        totals["clocks"] += int(found.total_clocks)
+        totals["cycles"] += int(found.total_cycles)
         totals["stalled"] += len(twin.x) * int(shares.any())
     return totals
 

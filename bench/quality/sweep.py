@@ -2,7 +2,7 @@
 
 ``python -m blysk.bench.quality.sweep [MESH ...]`` takes each mesh (the teapot by default) at 320x240, in
 white light and with a grey, glossy material, at every exponent from 1 to 1000 with the model cosquad and at
-30 of them with every other model. Each frame goes through `ShadingPipeline.compute`, which the simulated
+30 of them with every other model. Each frame goes through `Design.compute`, which the simulated
 pipeline equals to the bit (``python -m blysk.bench.report.pairs`` and the tests of `pipeline`), and is held
 against exactly normalised interpolation with the same model. ``--json`` keeps the figures of every frame. The
 exit status is 1 when a pixel is more than 1 LSB off, other than where a light is on in one and off in the
@@ -24,12 +24,14 @@ from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.local_chord_interpolator import SpanValues
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.golden.pipeline import METHODS, MODELS, ShadingPipeline, Spans
+from blysk.golden.pipeline import Design, Spans
+from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity_of_cosines, saturate
 from blysk.golden.reference.raster import Raster, rasterise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import Scene
 from blysk.sim.errors import InputError
 from blysk.sim.frames.spans import cut_local_spans, cut_wide_spans, local_values, quantise_spans
@@ -156,11 +158,11 @@ class Frame:
             scene.ambient_light,
             self._cosine[:, np.newaxis],
             self._highlight[:, np.newaxis],
-            model,
+            REFLECTION_MODELS[model],
         )
         return 255 * saturate(shaded)
 
-    def spans_of(self, design: ShadingPipeline, exponent: int) -> tuple[Raster, Spans]:
+    def spans_of(self, design: Design, exponent: int) -> tuple[Raster, Spans]:
         """Spans as `prepare` cuts and quantises them for a pipeline."""
         method, material = design.interpolator, self.scene.mesh.material
         if design.takes_values:
@@ -183,9 +185,9 @@ class Frame:
             Method of interpolation.
         """
         constants = FrameConstants.of(self.scene_of(exponent), 1)
-        cut, spans = self.spans_of(ShadingPipeline(method), exponent)
+        cut, spans = self.spans_of(preset(method), exponent)
         for model in models:
-            design = ShadingPipeline(method, model)
+            design = preset(method, model)
             color = design.compute(spans, constants).color[self._shown]
             error = np.abs(color - self.golden(model, exponent)).max(axis=1, initial=0)
             over = np.flatnonzero(error > LARGEST)
@@ -206,7 +208,7 @@ class Frame:
 
     def _switched(
         self,
-        design: ShadingPipeline,
+        design: Design,
         cut: Raster,
         spans: Spans,
         constants: FrameConstants,

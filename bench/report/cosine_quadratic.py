@@ -20,7 +20,7 @@ from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.metrics import error_figures
 from blysk.golden.reference.raster import rasterise
-from blysk.golden.reference.reflection import energy_factor, reflect, slope
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
 from blysk.sim.meshes.teapot import teapot
 
@@ -138,7 +138,7 @@ def errors(model: str) -> dict[str, Any]:
     for exponent in EXPONENTS:
         cosine = np.append(1 - _X[exponent >= _X] / exponent, ZONE ** (1 / exponent))
         blinn = cosine**exponent
-        error = np.abs(reflect(model, cosine, exponent) - blinn)
+        error = np.abs(REFLECTION_MODELS[model].reflect(cosine, exponent) - blinn)
         # The zone's own bound is in it.
         zone = blinn >= ZONE * (1 - 1e-12)
         found.append((exponent, float(error.max()), float((error[zone] / blinn[zone]).max())))
@@ -163,7 +163,7 @@ def slopes() -> dict[str, Any]:
     """
     every = np.array(EXPONENTS)
     exact, line, refitted = (
-        np.array([slope(model, n) for n in every])
+        np.array([REFLECTION_MODELS[model].slope(n) for n in every])
         for model in ("cosquad_q", "cosquad_lin", "cosquad_lin_refitted")
     )
     shown = np.unique(np.geomspace(2, 1000, 60).astype(int)) - every[0]
@@ -190,12 +190,12 @@ def coefficients() -> dict[str, Any]:
     closed form.
     """
     n = np.array(EXPONENTS, dtype=np.float64)
-    k = np.array([slope("cosquad_lin", value) for value in n])
+    k = np.array([REFLECTION_MODELS["cosquad_lin"].slope(value) for value in n])
     # With y = 1 - c from 0 to w: (1 - k y)^2 (1 - y).
     w = np.minimum(1 / k, 1)
     inside = w - (1 + 2 * k) * w**2 / 2 + (2 * k + k**2) * w**3 / 3 - k**2 * w**4 / 4
     ideal = 1 / (2 * np.pi * inside)
-    line = np.array([energy_factor("cosquad_lin", value) for value in n])
+    line = np.array([REFLECTION_MODELS["cosquad_lin"].energy_factor(value) for value in n])
     deviation = np.abs(line / ideal - 1)
     shown = np.unique(np.geomspace(2, 1000, 60).astype(int)) - EXPONENTS[0]
     return {
@@ -223,7 +223,9 @@ def curves(exponent: int) -> dict[str, Any]:
     """
     degrees = np.linspace(0, math.degrees(math.acos(max(1 - 6 / exponent, 0))), 121)
     cosine = np.cos(np.radians(degrees))
-    brightness = {model: reflect(model, cosine, exponent).tolist() for model in ("blinn", *_CURVES)}
+    brightness = {
+        model: REFLECTION_MODELS[model].reflect(cosine, exponent).tolist() for model in ("blinn", *_CURVES)
+    }
     return {"degrees": degrees.tolist(), **brightness}
 
 
@@ -244,7 +246,10 @@ def map_of_errors(model: str, size: int) -> dict[str, Any]:
     """
     degrees, exponents = np.linspace(0, 90, size), np.geomspace(2, 1000, size)
     cosine = np.cos(np.radians(degrees))
-    error = [reflect(model, cosine, n) - reflect("blinn", cosine, n) for n in exponents]
+    error = [
+        REFLECTION_MODELS[model].reflect(cosine, n) - REFLECTION_MODELS["blinn"].reflect(cosine, n)
+        for n in exponents
+    ]
     return {
         "degrees": degrees.tolist(),
         "exponents": exponents.tolist(),
@@ -286,9 +291,9 @@ def pictures(body: str, exponent: int, width: int, height: int) -> dict[str, Any
     scene = replace(scene, camera=Camera.framing(mesh.vertices, (0.2, 0.3, 1), "perspective", width / height))
     raster = rasterise(scene)
     found = {}
-    exact = render(scene, "phong", "blinn", raster)
+    exact = render(scene, "phong", REFLECTION_MODELS["blinn"], raster)
     for model in _PICTURED:
-        frame = render(scene, "phong", model, raster)
+        frame = render(scene, "phong", REFLECTION_MODELS[model], raster)
         figures = error_figures(frame.image * 255, exact.image * 255, exact.mask)
         shown = np.where(frame.mask[..., np.newaxis], frame.image, 1.0)
         buffer = BytesIO()

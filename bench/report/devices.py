@@ -17,12 +17,12 @@ _QUICK = (
 )
 """Devices of a quick report: those that take least time."""
 
-_PRINTED = ("documented", "printed")
+_PUBLISHED = ("as published", "as_published")
 """What the names of the variants with the documents' own constants have in them."""
 
 _COLUMNS = (
     *("device", "variant", "source", "as printed", "unit of the errors", "model error", "arithmetic error"),
-    *("total error", "latency, clocks", "interval, clocks", "multipliers", "multipliers by a constant"),
+    *("total error", "latency, cycles", "interval, cycles", "multipliers", "multipliers by a constant"),
     *("ROM, bits", "RAM, bits", "registers, bits", "samples", "operands", "note"),
 )
 
@@ -75,7 +75,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     lines = [
         (
             *(line["device"], line["variant"], line["source"]),
-            any(word in line["variant"] for word in _PRINTED),
+            any(word in line["variant"] for word in _PUBLISHED),
             *(line["error_unit"], line["model_error"], line["arithmetic_error"], line["total_error"]),
             *(line["latency"], line["initiation_interval"]),
             ", ".join(f"{count} of {widths}" for widths, count in line["multipliers"].items()),
@@ -96,8 +96,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     note = (
         "An error of 1 is a full term or the length of a unit vector, unless the unit says otherwise: *LSB* "
         "a step of an 8-bit channel, *rad* and *turn* angles, *rate* shares of a gate's decisions (let "
-        "through for nothing, stopped by mistake, both). Latency: clocks from an input to its first result; "
-        "interval: clocks from a result to the next. *As printed*: with the constants or the structure that "
+        "through for nothing, stopped by mistake, both). Latency: cycles from an input to its first result; "
+        "interval: cycles from a result to the next. *As printed*: with the constants or the structure that "
         "the document prints, which the others mend."
     )
     return Section(

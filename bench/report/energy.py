@@ -14,7 +14,7 @@ from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.tools.pages import svg
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.toggles import ToggleCounter
 from blysk.sim.frames.frame import prepare
@@ -26,7 +26,7 @@ EXPONENTS = (2, 50, 1000)
 
 BLOCKS: dict[str, tuple[str, ...]] = {
     "frame constants": ("frame_constants", "slope"),
-    "admission": ("top", "places"),
+    "admission": ("top", "coordinates"),
     "highlight gate": ("highlight_gate", "undecided", "lengths", "decisions"),
     "setup of spans": ("interpolator.chord_setup", "interpolator.prepared"),
     "sums of pixels": ("interpolator",),
@@ -83,10 +83,10 @@ def measure(
     Returns
     -------
     list of dict
-        By exponent: ``spans``, ``pixels``, ``clocks``, ``toggles`` by submodule, and ``same``, whether the
+        By exponent: ``spans``, ``pixels``, ``cycles``, ``toggles`` by submodule, and ``same``, whether the
         pixels are those of the twin.
     """
-    design = ShadingPipeline("chord", model, gate=gate)
+    design = preset("chord", model, gate=gate)
     counter = ToggleCounter(ShadingPipelineUnit(design))
     width, height, triangles = size
     mesh = teapot(triangles)
@@ -99,7 +99,7 @@ def measure(
             {
                 "spans": len(spans),
                 "pixels": int(np.sum(spans.length)),
-                "clocks": run.total_clocks,
+                "cycles": run.total_cycles,
                 "toggles": {path: int(run.status[path]) for path in run.status.dtype.names},
                 "same": same_pixels(run, design.compute(spans, constants)),
             }
@@ -162,14 +162,14 @@ def _a_pixel(frame: dict, block: str) -> float:
 
 
 def _table(found: dict, saved: dict, blocks: Sequence[str]) -> Table:
-    columns = ["model", "exponent", "gate", "spans", "pixels", "clocks"]
+    columns = ["model", "exponent", "gate", "spans", "pixels", "cycles"]
     columns += [*(f"{block}, bits a pixel" for block in blocks), "pipeline, bits a pixel", "saved, share"]
     rows: list[list[Cell]] = []
     grades: list[list[Grade]] = []
     for (model, exponent), of in found.items():
         for gate, frame in of.items():
             row: list[Cell] = [model, exponent, "on" if gate else "off"]
-            row += [frame[name] for name in ("spans", "pixels", "clocks")]
+            row += [frame[name] for name in ("spans", "pixels", "cycles")]
             row += [*(_a_pixel(frame, block) for block in blocks), _total(frame)]
             rows.append([*row, saved[model, exponent] if gate else None])
             grade: Grade = ("good" if saved[model, exponent] > 0 else "fair") if gate else ""

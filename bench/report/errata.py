@@ -22,8 +22,8 @@ from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import Light, Material, intensity
-from blysk.golden.reference.metrics import mnse_printed, nmse
-from blysk.golden.reference.reflection import energy_factor, exponent_ratio, reflect
+from blysk.golden.reference.metrics import mnse_published, nmse
+from blysk.golden.reference.reflection import REFLECTION_MODELS, exponent_ratio
 from blysk.golden.reference.renderer import Thresholds, gouraud_triangles
 from blysk.sim.meshes.teapot import teapot
 
@@ -109,7 +109,7 @@ def _row_error(coefficients: Sequence[float], x: np.ndarray) -> float:
 
 
 def _misprint() -> Evidence:
-    return tuple(_row_error(Arccos(table).coefficients[4], 0.96) for table in ("printed", "corrected"))
+    return tuple(_row_error(Arccos(table).coefficients[4], 0.96) for table in ("as_published", "corrected"))
 
 
 def _order() -> Evidence:
@@ -155,7 +155,7 @@ def _highlight_loss(exponent: int) -> Evidence:
     """LSB lost at the peak of a highlight on a flat face, by the plain fit and by one held at angle 0."""
 
     def lost(factor: float) -> float:
-        return 255 * (1 - float(reflect("cosquad", 2 * factor, exponent)))
+        return 255 * (1 - float(REFLECTION_MODELS["cosquad"].reflect(2 * factor, exponent)))
 
     plain = minimax(_by_cosine, 0, 1, 3).sum()
     held = minimax(half_angle_factor, 0, 0.5, 3, {0: 0.5})[0]
@@ -164,7 +164,7 @@ def _highlight_loss(exponent: int) -> Evidence:
 
 def _second_lobe() -> Evidence:
     cosine = math.cos(math.radians(60))
-    return (20 / 2 * (cosine - 1) + 1) ** 2, float(reflect("cosquad", cosine, 20))
+    return (20 / 2 * (cosine - 1) + 1) ** 2, float(REFLECTION_MODELS["cosquad"].reflect(cosine, 20))
 
 
 def _shortcut(degrees: float) -> Evidence:
@@ -195,8 +195,10 @@ def _worked_example() -> Evidence:
     # I_d = 0.8 and I_s = 1: two lights, one without a highlight and one that is nothing else.
     dull = Material((0.1,) * 3, (0.7,) * 3, (0,) * 3, 10)
     glossy = Material((0,) * 3, (0,) * 3, (0.5,) * 3, 10)
-    total = intensity(axis, dull, [Light((1, 1, 1), (0.8,) * 3)], (0.2,) * 3, axis, "phong")
-    total = total + intensity(axis, glossy, [Light((1, 1, 1))], (0, 0, 0), axis, "phong")
+    total = intensity(
+        axis, dull, [Light((1, 1, 1), (0.8,) * 3)], (0.2,) * 3, axis, REFLECTION_MODELS["phong"]
+    )
+    total = total + intensity(axis, glossy, [Light((1, 1, 1))], (0, 0, 0), axis, REFLECTION_MODELS["phong"])
     return 0.3445, float(total[0])
 
 
@@ -206,7 +208,7 @@ def _flat_picture() -> Evidence:
     reference[0, 1] = 0
     image = reference + 1
     # The mean is 100: all but two values are at it.
-    return mnse_printed(image, reference)[1], float(np.isfinite(nmse(image, reference)))
+    return mnse_published(image, reference)[1], float(np.isfinite(nmse(image, reference)))
 
 
 def _inverted_test() -> Evidence:
@@ -274,7 +276,10 @@ def _energy(model: str, exponent: int) -> Evidence:
     )[0]
     n = exponent
     printed = {"phong": (n + 2) / (2 * n), "blinn": (n + 2) * (n + 4) / (8 * n * (2 ** (n / 2) + n))}
-    return tuple(2 * math.pi * factor * reflected for factor in (printed[model], energy_factor(model, n)))
+    return tuple(
+        2 * math.pi * factor * reflected
+        for factor in (printed[model], REFLECTION_MODELS[model].energy_factor(n))
+    )
 
 
 def _mirror() -> Evidence:

@@ -1,9 +1,9 @@
-"""What the highlight gate saves: pixels, clocks of the compact style, and toggled register bits.
+"""What the highlight gate saves: pixels, cycles of the compact style, and toggled register bits.
 
 ``python -m blysk.bench.report.gate [MESH ...]`` renders each mesh (the teapot by default) at 320x240 by the
 chord method with one light, for the models cosquad, coscos4 and blinn and the exponents 2, 10, 50, 200 and
 1000, in the compact and the throughput style, without and with the gate. It prints three tables in Markdown:
-how many spans and pixels are gated, the clocks, and the register bits that change. The exit status is 1 when
+how many spans and pixels are gated, the cycles, and the register bits that change. The exit status is 1 when
 a frame is not the same, to the bit, in all four simulations and by the twin; 2 for bad input.
 
 Toggles are those of registers: what happens inside a multiplier between two of them is not counted. The gate
@@ -28,8 +28,9 @@ from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.golden.pipeline import MODELS as ALL_MODELS
-from blysk.golden.pipeline import Pixels, ShadingPipeline, Spans
+from blysk.golden.pipeline import Design, Pixels, Spans
+from blysk.golden.presets import MODELS as ALL_MODELS
+from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import Size
@@ -117,7 +118,7 @@ class GateRow:
         Of the highlight.
     shares : Shares
         What is gated.
-    clocks, compact_clocks : pair of int
+    cycles, compact_cycles : pair of int
         Of the throughput and of the compact style, from the first write of a constant to the last pixel.
     activity : pair of Activity
         Of the throughput style.
@@ -129,13 +130,13 @@ class GateRow:
     model: str
     exponent: int
     shares: Shares
-    clocks: tuple[int, int]
-    compact_clocks: tuple[int, int]
+    cycles: tuple[int, int]
+    compact_cycles: tuple[int, int]
     activity: tuple[Activity, Activity]
     identical: bool
 
 
-def shares_of(design: ShadingPipeline, spans: Spans, constants: FrameConstants) -> Shares:
+def shares_of(design: Design, spans: Spans, constants: FrameConstants) -> Shares:
     """Count what the gate of a design of one light and one material would do; it need not have one."""
     kept = np.flatnonzero(spans.length)
     length = np.asarray(spans.length, dtype=np.int64)[kept]
@@ -150,7 +151,7 @@ def shares_of(design: ShadingPipeline, spans: Spans, constants: FrameConstants) 
     )
     operands = design.interpolator.compute(left, right, length, direction, halfway)
     behind = Diffuse(operands.cosine.format).dark(operands.cosine)
-    dark = design.highlight.compute(operands.highlight, behind, constants.exponent).codes[:, 0] == 0
+    dark = design.specular.compute(operands.highlight, behind, constants.exponent).codes[:, 0] == 0
     gated = ~design.lit_spans(spans, constants)[kept, 0]
     span, _ = pixels_of(length)
     dark_span = np.bincount(span[~dark], minlength=len(length)) == 0
@@ -206,10 +207,10 @@ class GateUnits:
 
     def __init__(self, model: str, engine: str = "cxxrtl"):
         self.model, self.engine = model, engine
-        designs = [ShadingPipeline("chord", model, gate=gate) for gate in (False, True)]
+        designs = [preset("chord", model, gate=gate) for gate in (False, True)]
         self.design = designs[0]
         self._counters = [ToggleCounter(ShadingPipelineUnit(design)) for design in designs]
-        self._compact = [ShadingPipelineUnit(design, style="compact") for design in designs]
+        self._compact = [ShadingPipelineUnit(design.built(style="compact")) for design in designs]
 
     def compare(self, name: str, scene: Scene) -> GateRow:
         """A scene of one light and one material through all four."""
@@ -224,8 +225,8 @@ class GateUnits:
             model=self.model,
             exponent=constants.exponent,
             shares=shares_of(self.design, spans, constants),
-            clocks=(fast[0].total_clocks, fast[1].total_clocks),
-            compact_clocks=(small[0].total_clocks, small[1].total_clocks),
+            cycles=(fast[0].total_cycles, fast[1].total_cycles),
+            compact_cycles=(small[0].total_cycles, small[1].total_cycles),
             activity=(off, on),
             identical=all(same_pixels(run, expected) for run in (*fast, *small)),
         )
@@ -293,7 +294,7 @@ def _share_cells(row: GateRow) -> tuple[str, ...]:
 
 
 def _clock_cells(row: GateRow) -> tuple[str, ...]:
-    pairs = (row.compact_clocks, row.clocks)
+    pairs = (row.compact_cycles, row.cycles)
     return tuple(cell for pair in pairs for cell in (f"{pair[0]:,}", f"{pair[1]:,}", _saved(*pair)))
 
 
@@ -358,7 +359,7 @@ def _print(rows: Sequence[GateRow]) -> None:
 )
 @click.option("--json", "figures", type=click.Path(), help="File for every figure.")
 def _command(meshes, size, models, exponents, figures) -> int:
-    """Measure what the highlight gate saves: pixels, clocks, and toggled register bits."""
+    """Measure what the highlight gate saves: pixels, cycles, and toggled register bits."""
     if figures:
         check_writable(figures)
     loaded = [load_mesh(source) for source in meshes or ["teapot"]]

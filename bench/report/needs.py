@@ -9,14 +9,14 @@ import numpy as np
 from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.tools.pages import svg
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.sim.cli.printing import fit_figures
 from blysk.sim.frames.fit import Fit, Omission, for_scene
-from blysk.sim.frames.frame import FrameSimulator, twin_frame
+from blysk.sim.frames.frame import FrameSimulator, model_frame
 from blysk.sim.meshes.teapot import teapot
 
 __all__ = ["QUICK_SCENES", "SCENES", "measure", "ring", "section", "simulate_both", "tasks"]
@@ -25,7 +25,6 @@ _KEY = Light((-0.5, 0.8, 0.7))
 _COPPER = Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.20), (0.6,) * 3, 50)
 _FULL, _QUICK = (480, 360, 10_000), (160, 120, 1000)
 _RESOURCES = ("cells", "multipliers", "register_bits", "memory_bits")
-_SETTINGS = {"setup_interval": None, "style": "throughput"}
 
 
 def ring(around: int = 36, across: int = 18) -> Mesh:
@@ -120,7 +119,7 @@ QUICK_SCENES = ("copper teapot", "matt teapot, k_s = 0")
 def _fit(name: str, size: Sequence[int]) -> tuple[Scene, Fit]:
     build, options = SCENES[name]
     scene = build(*size)
-    return scene, for_scene(scene, options and ShadingPipeline(lights=len(scene.lights), **options))
+    return scene, for_scene(scene, options and preset(lights=len(scene.lights), **options))
 
 
 def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
@@ -138,17 +137,17 @@ def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
     Returns
     -------
     dict
-        That of `fit_figures` but for the clocks, and ``reasons``, what is left out and why,
+        That of `fit_figures` but for the cycles, and ``reasons``, what is left out and why,
         ``method``, ``model`` and ``pixels``.
     """
     scene, fit = _fit(name, size)
-    full, fitted = twin_frame(scene, fit.full), twin_frame(fit.scenes[0], fit.design)
+    full, fitted = model_frame(scene, fit.full), model_frame(fit.scenes[0], fit.design)
     counted = fit
     if not steps:
         together = {key: value for omission in fit.omissions for key, value in omission.changes.items()}
         counted = Fit(fit.full, (Omission("all of it", together),), fit.scenes)
-    figures = fit_figures(counted, _SETTINGS, fitted, full)
-    return {key: value for key, value in figures.items() if "clocks" not in key} | {
+    figures = fit_figures(counted, fitted, full)
+    return {key: value for key, value in figures.items() if "cycles" not in key} | {
         "reasons": [omission.reason for omission in fit.omissions],
         "method": fit.full.method,
         "model": fit.full.model,
@@ -157,7 +156,7 @@ def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
 
 
 def simulate_both(name: str, size: Sequence[int]) -> dict[str, int]:
-    """``clocks`` and ``full_clocks`` of the simulated pipelines, and ``different_pixels`` of their frames.
+    """``cycles`` and ``full_cycles`` of the simulated pipelines, and ``different_pixels`` of their frames.
 
     Parameters
     ----------
@@ -169,8 +168,8 @@ def simulate_both(name: str, size: Sequence[int]) -> dict[str, int]:
     fitted = FrameSimulator(fit.design).render(fit.scenes[0])
     different = (full.image != fitted.image).any(axis=-1)
     return {
-        "clocks": fitted.clocks,
-        "full_clocks": full.clocks,
+        "cycles": fitted.cycles,
+        "full_cycles": full.cycles,
         "different_pixels": int(np.count_nonzero(different)),
     }
 
@@ -188,11 +187,11 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     found: dict[str, dict[str, Any]] = {}
     for task, result in zip(tasks, results, strict=True):
         # Pixels that differ in either are worth telling.
-        of = found.setdefault(task.settings["name"], {"clocks": None, "full_clocks": None})
+        of = found.setdefault(task.settings["name"], {"cycles": None, "full_cycles": None})
         different = of.get("different_pixels", 0)
         of |= result
         of["different_pixels"] = max(different, result["different_pixels"])
-    simulated = sum(of["clocks"] is not None for of in found.values())
+    simulated = sum(of["cycles"] is not None for of in found.values())
     same = sum(of["different_pixels"] == 0 for of in found.values())
     least = min(found, key=lambda name: _left(found[name], "cells"))
     most = max(found, key=lambda name: _left(found[name], "cells"))
@@ -220,14 +219,14 @@ def _totals(found: dict[str, dict]) -> Table:
     for resource in _RESOURCES:
         name = resource.replace("_", " ")
         columns += [f"{name}, full", f"{name}, fitted"]
-    columns += ["clocks, full", "clocks, fitted", "pixels of another colour"]
+    columns += ["cycles, full", "cycles, fitted", "pixels of another colour"]
     rows: list[list[Cell]] = []
     grades: list[list[Grade]] = []
     for name, of in found.items():
         row: list[Cell] = [name, of["method"], of["model"], of["pixels"]]
         for resource in _RESOURCES:
             row += [of[which][resource] for which in ("full", "fitted")]
-        rows.append([*row, of["full_clocks"], of["clocks"], of["different_pixels"]])
+        rows.append([*row, of["full_cycles"], of["cycles"], of["different_pixels"]])
         grades.append([""] * (len(columns) - 1) + ["bad" if of["different_pixels"] else "good"])
     note = (
         "The full pipeline has as many lights and materials as the scene, 12-bit coordinates and lengths, a "

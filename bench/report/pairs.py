@@ -2,7 +2,7 @@
 
 ``python -m blysk.bench.report.pairs [MESH ...]`` renders each mesh (the teapot by default) at 96x72 and
 exponents 1, 30 and 1000 with each pair, without specular light too, in the compiled engine, and compares
-every pixel that comes out, hidden ones too, with `ShadingPipeline.compute`. It prints a line a pair. The exit
+every pixel that comes out, hidden ones too, with `Design.compute`. It prints a line a pair. The exit
 status is 1 when a pixel differs or a pair cannot be built, 2 for a mesh that cannot be read.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import METHODS, MODELS, ShadingPipeline
+from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.engine import SimulationError
@@ -92,7 +92,7 @@ def mismatches(
     for channel, name in enumerate("rgb"):
         wrong |= run.beats[name] != expected.color[:, channel]
     # A flag that differs is one more: no pixel would show it.
-    flags = int(run.status["wide_spans"]) != expected.wide_spans
+    flags = int(run.status["out_of_range_spans"]) != expected.out_of_range_spans
     return len(wrong), int(np.count_nonzero(wrong)) + flags
 
 
@@ -122,7 +122,7 @@ def measure(
             frames = pixels = wrong = 0
             failure = ""
             try:
-                unit = ShadingPipelineUnit(ShadingPipeline(method, model))
+                unit = ShadingPipelineUnit(preset(method, model))
                 for mesh in meshes:
                     for exponent in exponents:
                         of_frame = mismatches(unit, mesh, exponent, width, height)

@@ -15,9 +15,9 @@ from blysk.bench.speed.throughput import measure, spans_of
 from blysk.bench.store import Task
 from blysk.bench.tools.pages import svg
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import preset
 from blysk.golden.reference.raster import rasterise
-from blysk.golden.reference.reflection import exponent_ratio
+from blysk.golden.reference.reflection import REFLECTION_MODELS, exponent_ratio
 from blysk.golden.reference.renderer import render
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.meshes.teapot import teapot
@@ -29,7 +29,7 @@ __all__ = [
     "WAYS",
     "exponents",
     "frame_times",
-    "hardware_clocks",
+    "hardware_cycles",
     "operations",
     "section",
     "shading_times",
@@ -166,8 +166,8 @@ def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[s
     times = fastest(
         [
             lambda: rasterise(scene),
-            lambda: render(scene, "phong", "phong", raster),
-            lambda: render(scene, "phong", "blinn", raster),
+            lambda: render(scene, "phong", REFLECTION_MODELS["phong"], raster),
+            lambda: render(scene, "phong", REFLECTION_MODELS["blinn"], raster),
         ],
         repeats,
     )
@@ -178,7 +178,7 @@ def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[s
     }
 
 
-def hardware_clocks(model: str, triangles: int, width: int, height: int) -> dict[str, int]:
+def hardware_cycles(model: str, triangles: int, width: int, height: int) -> dict[str, int]:
     """Clocks of the same frame in the simulated pipeline, method chord.
 
     Parameters
@@ -191,12 +191,12 @@ def hardware_clocks(model: str, triangles: int, width: int, height: int) -> dict
     Returns
     -------
     dict
-        ``triangles``, ``pixels`` shaded, hidden ones included, and ``clocks``.
+        ``triangles``, ``pixels`` shaded, hidden ones included, and ``cycles``.
     """
     scene = scene_for(teapot(triangles), _EXPONENT, width, height)
-    unit = ShadingPipelineUnit(ShadingPipeline(_METHOD, model))
-    pixels, clocks = measure(unit, spans_of(scene, _METHOD), FrameConstants.of(scene, 1))
-    return {"triangles": len(scene.mesh.faces), "pixels": pixels, "clocks": clocks}
+    unit = ShadingPipelineUnit(preset(_METHOD, model))
+    pixels, cycles = measure(unit, spans_of(scene, _METHOD), FrameConstants.of(scene, 1))
+    return {"triangles": len(scene.mesh.faces), "pixels": pixels, "cycles": cycles}
 
 
 def tasks(quick: bool) -> list[Task]:
@@ -216,7 +216,7 @@ def tasks(quick: bool) -> list[Task]:
         settings = {"triangles": count, **size}
         found.append(Task(frame_times, {**settings, "repeats": 9 if quick else 2}, timed=True))
         models = _HARDWARE_MODELS[:1] if quick else _HARDWARE_MODELS
-        found += [Task(hardware_clocks, {"model": model, **settings}) for model in models]
+        found += [Task(hardware_cycles, {"model": model, **settings}) for model in models]
     return found
 
 
@@ -228,11 +228,11 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             for task, result in zip(tasks, results, strict=True)
             if task.function is function
         ]
-        for function in (exponents, operations, shading_times, frame_times, hardware_clocks)
+        for function in (exponents, operations, shading_times, frame_times, hardware_cycles)
     }
     ratio = by[exponents][0][1]
     ways = _ways_table(by[operations], by[shading_times])
-    frames = _frames_table(by[frame_times], by[hardware_clocks])
+    frames = _frames_table(by[frame_times], by[hardware_cycles])
     rows = ways.records()
     smallest, *_, largest = frames.records()
     size = by[frame_times][-1][0]
@@ -265,8 +265,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "The hardware pipeline has Blinn's model and its approximations: with L and V of the whole frame H "
         "is a constant, and N·H costs what N·L does. A pixel takes "
         + " and ".join(
-            f"{result['clocks'] / result['pixels']:.3f} clocks with `{settings['model']}`"
-            for settings, result in by[hardware_clocks][-len({s["model"] for s, _ in by[hardware_clocks]}) :]
+            f"{result['cycles'] / result['pixels']:.3f} cycles with `{settings['model']}`"
+            for settings, result in by[hardware_cycles][-len({s["model"] for s, _ in by[hardware_cycles]}) :]
         )
         + f" at {largest['triangles']:,} triangles.",
     ]
@@ -322,11 +322,11 @@ def _ways_table(counted: Sequence[tuple[dict, dict]], timed: Sequence[tuple[dict
 
 
 def _frames_table(timed: Sequence[tuple[dict, dict]], simulated: Sequence[tuple[dict, dict]]) -> Table:
-    clocks = {s["triangles"]: result for s, result in simulated if s["model"] == _HARDWARE_MODELS[0]}
+    cycles = {s["triangles"]: result for s, result in simulated if s["model"] == _HARDWARE_MODELS[0]}
     rows = []
     for settings, result in timed:
         phong, blinn = (result["raster"] + result[model] for model in ("phong", "blinn"))
-        run = clocks[settings["triangles"]]
+        run = cycles[settings["triangles"]]
         rows.append(
             [
                 *(result["triangles"], result["pixels"], phong / result["pixels"] * 1e9),
@@ -336,7 +336,7 @@ def _frames_table(timed: Sequence[tuple[dict, dict]], simulated: Sequence[tuple[
                     LESS_TIME[1] if run["triangles"] > 900_000 else None,
                 ),
                 result["raster"] / (result["raster"] + result["blinn"]),
-                *(run["clocks"], run["pixels"], run["clocks"] / run["pixels"]),
+                *(run["cycles"], run["pixels"], run["cycles"] / run["pixels"]),
             ]
         )
     width, height = timed[0][0]["width"], timed[0][0]["height"]
@@ -347,7 +347,7 @@ def _frames_table(timed: Sequence[tuple[dict, dict]], simulated: Sequence[tuple[
             *("triangles", "visible pixels", "Phong, ns a visible pixel", "Blinn, ns a visible pixel"),
             *("less time with Blinn, frame", "less time with Blinn, shading", "printed, at most"),
             "share of geometry",
-            *("hardware clocks", "pixels shaded in hardware", "clocks a pixel"),
+            *("hardware cycles", "pixels shaded in hardware", "cycles a pixel"),
         ),
         rows,
         f"Teapot at {width}x{height}, exponent {_EXPONENT}. Times: processor time of the golden renderer, "
@@ -383,8 +383,8 @@ def _frames_drawing(frames: Table, size: dict[str, int]) -> Drawing:
         times = [row[f"{model}, ns a visible pixel"] * row["visible pixels"] / 1e9 for row in rows]
         left.plot(triangles, times, color=colour, marker=marker, label=f"{model}'s model")
     left.set_ylabel("time of a frame, s")
-    right.plot(triangles, [row["clocks a pixel"] for row in rows], color="#009e73", marker="o", label=_METHOD)
-    right.set_ylabel("hardware clocks a pixel")
+    right.plot(triangles, [row["cycles a pixel"] for row in rows], color="#009e73", marker="o", label=_METHOD)
+    right.set_ylabel("hardware cycles a pixel")
     for panel in (left, right):
         panel.set_xscale("log")
         panel.set_xlabel("triangles")

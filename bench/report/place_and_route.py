@@ -6,7 +6,7 @@ from typing import Any
 from blysk.bench.report.section import Cell, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.tools.fpga import ECP5, FAMILIES, SEEDS, TooLarge, lay_out, tool_versions
-from blysk.golden.pipeline import METHODS, ShadingPipeline
+from blysk.golden.presets import METHODS, preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 
 __all__ = ["measure", "section", "task", "tasks"]
@@ -44,7 +44,7 @@ def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, s
     tools : dict of str to str or None
         Versions of the tools, which the result depends on.
     """
-    design = ShadingPipelineUnit(ShadingPipeline(method, model))
+    design = ShadingPipelineUnit(preset(method, model))
     if None in tools.values():
         return {"reason": "place and route is not installed: pip install 'blysk[fpga]'"}
     try:

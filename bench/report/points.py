@@ -39,17 +39,18 @@ from blysk.bench.report.section import Cell, Grade, Section, Table
 from blysk.bench.speed.renderer import timed
 from blysk.bench.store import Task
 from blysk.bench.tools.fpga import DEVICE, tool_versions
-from blysk.golden.pipeline import METHODS, MODELS, PRINTED, ShadingPipeline
+from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.metrics import error_figures
 from blysk.golden.reference.raster import Raster, rasterise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import SHADINGS, render, shade_spans
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.cxxrtl import find_compilers
 from blysk.sim.errors import InputError
-from blysk.sim.frames.frame import FrameSimulator, method_in_float64, prepare, twin_frame
+from blysk.sim.frames.frame import FrameSimulator, method_in_float64, model_frame, prepare
 from blysk.sim.meshes.mesh import load_mesh
 
 __all__ = [
@@ -89,7 +90,7 @@ GROUPS = {
 DESIGNS = [(method, "cosquad") for method in METHODS]
 DESIGNS += [("chord", model) for model in MODELS if model != "cosquad"]
 DESIGNS += [("renormalise", "exp"), ("renormalise", "blinn"), ("linear", "blinn")]
-DESIGNS += [(method, "cosquad") for method in PRINTED]
+DESIGNS += [(method, "cosquad") for method in PUBLISHED]
 """Method and model of the hardware's points."""
 
 QUICK_SIMULATED = [
@@ -100,7 +101,7 @@ QUICK_SIMULATED = [
     ("chord-local", "cosquad"),
     ("chord", "cosquad"),
 ]
-"""Those that the quick report simulates; of the others it has the twin's frames, and no clocks."""
+"""Those that the quick report simulates; of the others it has the twin's frames, and no cycles."""
 
 _KINDS = {
     "model": "model error",
@@ -141,7 +142,7 @@ ERRORS = [*_axes(("total", "method", "arithmetic", "model"), _FIGURES | _PERCEIV
 TIMES = [
     {"key": key, "title": title, "unit": unit, "better": better}
     for key, title, unit, better in (
-        ("clocks_per_pixel", "hardware, clocks", "clocks a pixel", "less"),
+        ("cycles_per_pixel", "hardware, cycles", "cycles a pixel", "less"),
         ("ns_per_pixel", "hardware, at the clock rate after place and route", "ns a pixel", "less"),
         ("simulated_pixels_per_second", "simulation of the hardware", "pixels a second", "more"),
         ("golden_ns_per_pixel", "the same in float64 NumPy", "ns a pixel", "less"),
@@ -181,7 +182,7 @@ def scenes_of(place: Mapping[str, Any], exponents: Sequence[int]) -> list[Scene]
 def frames(
     method: str, model: str, place: Mapping[str, Any], exponents: Sequence[int], simulated: bool
 ) -> list[dict[str, Any]]:
-    """Frames of a design: their errors, clocks and pictures.
+    """Frames of a design: their errors, cycles and pictures.
 
     Each error is between two images, over the pixels that show the surface:
 
@@ -195,7 +196,7 @@ def frames(
     Parameters
     ----------
     method, model : str
-        Of a `ShadingPipeline`.
+        Of a `Design`.
     place : dict
         ``source`` and ``triangles`` of the mesh (see `load_mesh`; ``None`` for a file), ``digest``
         of its arrays, by which the result is kept, ``width`` and ``height`` of the picture.
@@ -209,13 +210,13 @@ def frames(
     list of dict
         By exponent: ``settings``, ``errors`` (keys of `ERRORS`; no PSNR of equal images), ``verdicts``
         (``total``, ``method``: whether they look identical), ``pictures`` (see `section`), ``pixels`` shaded,
-        ``shown`` ones, ``spans``, ``wide_spans`` and ``clocks`` (``None`` if not simulated).
+        ``shown`` ones, ``spans``, ``out_of_range_spans`` and ``cycles`` (``None`` if not simulated).
     """
-    design = ShadingPipeline(method, model)
+    design = preset(method, model)
     simulator = FrameSimulator(design) if simulated else None
     results = []
     for scene in scenes_of(place, exponents):
-        frame = simulator.render(scene) if simulator else twin_frame(scene, design)
+        frame = simulator.render(scene) if simulator else model_frame(scene, design)
         same_method = method_in_float64(scene, design, frame.cut_raster)
         names = {"method": method, "model": model, "engine": frame.engine}
         results.append(
@@ -224,8 +225,8 @@ def frames(
                 **_judged(place, scene, frame.raster, frame.image, same_method, model),
                 "pixels": frame.pixels,
                 "spans": frame.spans,
-                "wide_spans": frame.wide_spans,
-                "clocks": frame.clocks if simulated else None,
+                "out_of_range_spans": frame.out_of_range_spans,
+                "cycles": frame.cycles if simulated else None,
             }
         )
     return results
@@ -246,12 +247,12 @@ def software_frames(shading: str, place: Mapping[str, Any], exponents: Sequence[
     Returns
     -------
     list of dict
-        As from `frames`, without clocks.
+        As from `frames`, without cycles.
     """
     results = []
     for scene in scenes_of(place, exponents):
         raster = rasterise(scene)
-        own = render(scene, shading, "blinn", raster=raster)
+        own = render(scene, shading, REFLECTION_MODELS["blinn"], raster=raster)
         image = np.floor(own.image * 255 + 0.5).astype(np.uint8)
         names = {"method": shading, "model": "blinn", "engine": "float64"}
         results.append(
@@ -260,8 +261,8 @@ def software_frames(shading: str, place: Mapping[str, Any], exponents: Sequence[
                 **_judged(place, scene, raster, image, own.image, "blinn"),
                 "pixels": len(raster.span),
                 "spans": len(raster.length),
-                "wide_spans": 0,
-                "clocks": None,
+                "out_of_range_spans": 0,
+                "cycles": None,
             }
         )
     return results
@@ -290,12 +291,12 @@ def _judged(
     model: str,
 ) -> dict[str, Any]:
     """Every error of a frame, its verdicts and its pictures."""
-    exact = render(scene, "phong", "blinn", raster=raster)
+    exact = render(scene, "phong", REFLECTION_MODELS["blinn"], raster=raster)
     if not exact.mask.any():
         size = f"{scene.width}x{scene.height}"
         raise InputError(place["source"], f"no pixel shows the surface at {size}", "choose another mesh")
-    golden = shade_spans(scene, raster, "normalised", model)
-    of_model = render(scene, "phong", model, raster=raster)
+    golden = shade_spans(scene, raster, "normalised", REFLECTION_MODELS[model])
+    of_model = render(scene, "phong", REFLECTION_MODELS[model], raster=raster)
     pairs = {
         "model": (of_model.image * 255, exact.image),
         "arithmetic": (image, same_method),
@@ -325,7 +326,7 @@ def hardware(method: str, model: str) -> dict[str, int]:
     dict
         See `Cost.totals`.
     """
-    return cost_of(ShadingPipelineUnit(ShadingPipeline(method, model))).totals
+    return cost_of(ShadingPipelineUnit(preset(method, model))).totals
 
 
 def speeds(
@@ -345,7 +346,7 @@ def speeds(
         ones included, in a second of its simulation (``None`` if not simulated), and ``golden_ns_per_pixel``,
         nanoseconds a shown pixel to shade the same spans by the same method and model in float64 NumPy.
     """
-    design = ShadingPipeline(method, model)
+    design = preset(method, model)
     simulator = FrameSimulator(design) if simulated else None
     results = []
     for scene in scenes_of(place, exponents):
@@ -371,7 +372,9 @@ def software_speeds(
     results = []
     for scene in scenes_of(place, exponents):
         raster = rasterise(scene)
-        timing, _ = timed(partial(render, scene, shading, "blinn", raster=raster), _REPEATS)
+        timing, _ = timed(
+            partial(render, scene, shading, REFLECTION_MODELS["blinn"], raster=raster), _REPEATS
+        )
         results.append(
             {
                 "simulated_pixels_per_second": None,
@@ -514,7 +517,7 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
 
 
 def _group(method: str) -> str:
-    if method in PRINTED:
+    if method in PUBLISHED:
         return "printed"
     if method.startswith("chord"):
         return "own"
@@ -559,7 +562,7 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
             software = task.function is software_frames
             taken = {} if software else of_design.get((method, model), {})
             fmax = taken.get("fmax_mhz")
-            clocks = None if found["clocks"] is None else found["clocks"] / found["pixels"]
+            cycles = None if found["cycles"] is None else found["cycles"] / found["pixels"]
             points.append(
                 {
                     "id": "/".join(map(str, key)),
@@ -570,8 +573,8 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
                     "errors": found["errors"],
                     "verdicts": found["verdicts"],
                     "times": {
-                        "clocks_per_pixel": clocks,
-                        "ns_per_pixel": None if None in (clocks, fmax) else clocks * 1e3 / fmax,
+                        "cycles_per_pixel": cycles,
+                        "ns_per_pixel": None if None in (cycles, fmax) else cycles * 1e3 / fmax,
                         **of_frame[key],
                     },
                     "hardware": {
@@ -579,7 +582,8 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
                         for name in ("multipliers", "cells", "register_bits", "memory_bits", "fmax_mhz")
                     },
                     "counts": {
-                        name: found[name] for name in ("pixels", "shown", "spans", "wide_spans", "clocks")
+                        name: found[name]
+                        for name in ("pixels", "shown", "spans", "out_of_range_spans", "cycles")
                     },
                     "pictures": found["pictures"],
                 }
@@ -648,7 +652,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         ``arithmetic``, ``model``;
       - ``hardware``: ``multipliers``, ``cells``, ``register_bits``, ``memory_bits``, ``fmax_mhz``, or
         ``None``;
-      - ``counts``: ``pixels``, ``shown``, ``spans``, ``wide_spans``, ``clocks``;
+      - ``counts``: ``pixels``, ``shown``, ``spans``, ``out_of_range_spans``, ``cycles``;
       - ``pictures``: ``frame``, ``error`` (map of the method error) and ``total`` (of the total error), data
         URIs of PNGs of one size, the maps transparent where no surface is;
 
@@ -699,7 +703,7 @@ def _text(points: Sequence[Mapping[str, Any]]) -> list[str]:
     )
     placed = any(point["hardware"]["fmax_mhz"] for point in points)
     of_time = (
-        "Run times: clocks a pixel from the simulation, first write of a constant to last pixel; nanoseconds "
+        "Run times: cycles a pixel from the simulation, first write of a constant to last pixel; nanoseconds "
         + (
             f"at the clock rate after place and route on an {DEVICE}, the median of some seeds, of one for "
             f"printed methods and other models than `{place_and_route.MODEL}`; "
@@ -715,7 +719,7 @@ def _text(points: Sequence[Mapping[str, Any]]) -> list[str]:
     twins = [point for point in points if point["settings"]["engine"] == "twin"]
     engines = f"{len(simulated):,} frames went through the simulated RTL"
     if twins:
-        engines += f", {len(twins):,} through its bit-true twin, which has no clocks"
+        engines += f", {len(twins):,} through its bit-true twin, which has no cycles"
     return [*map(_glance, _by_scene(points).values()), of_error, of_time, f"{engines}."]
 
 
@@ -736,15 +740,15 @@ def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
                 f"is up to {apart:.1f} LSB (`{point['label']}`)."
             )
     for title, kind, key in (
-        ("Fewest clocks", "times", "clocks_per_pixel"),
+        ("Fewest cycles", "times", "cycles_per_pixel"),
         ("Smallest total error", "errors", "total_max_lsb"),
         ("Smallest method error", "errors", "method_max_lsb"),
     ):
         measured = [point for point in hardware if point[kind][key] is not None]
         if measured:
             best = measured[int(np.argmin([point[kind][key] for point in measured]))]
-            errors, clocks = best["errors"], best["times"]["clocks_per_pixel"]
-            speed = "not simulated here" if clocks is None else f"{clocks:.3f} clocks a pixel"
+            errors, cycles = best["errors"], best["times"]["cycles_per_pixel"]
+            speed = "not simulated here" if cycles is None else f"{cycles:.3f} cycles a pixel"
             text += (
                 f" {title}: `{best['label']}`, {speed}, largest total error "
                 f"{errors['total_max_lsb']:.1f} LSB, method error {errors['method_max_lsb']:.2f}."
@@ -833,7 +837,7 @@ def _front_table(points: Sequence[Mapping[str, Any]], fronts: Mapping[str, Seque
 def readme_table(points: Sequence[Mapping[str, Any]]) -> str:
     """README's table of accuracy, as Markdown: the designs of `DESIGNS`.
 
-    Largest arithmetic and method error in LSB at each exponent; largest total error, clocks a pixel and
+    Largest arithmetic and method error in LSB at each exponent; largest total error, cycles a pixel and
     millions of simulated pixels a second at exponent 100.
 
     Parameters
@@ -846,7 +850,7 @@ def readme_table(points: Sequence[Mapping[str, Any]]) -> str:
     lines = [
         "| mesh | method | model | "
         + " | ".join(f"n = {exponent}" for exponent in exponents)
-        + " | total | clocks a pixel | Mpixel/s simulated |",
+        + " | total | cycles a pixel | Mpixel/s simulated |",
         f"|---|---|---|{'---:|' * (len(exponents) + 3)}",
     ]
     rows = {
@@ -863,7 +867,7 @@ def readme_table(points: Sequence[Mapping[str, Any]]) -> str:
         times = row[100]["times"]
         cells = [Path(source).stem, method, model]
         cells += [f"{error['arithmetic_max_lsb']:.2f} / {error['method_max_lsb']:.2f}" for error in errors]
-        cells += [f"{row[100]['errors']['total_max_lsb']:.1f}", f"{times['clocks_per_pixel']:.3f}"]
+        cells += [f"{row[100]['errors']['total_max_lsb']:.1f}", f"{times['cycles_per_pixel']:.3f}"]
         cells += [f"{times['simulated_pixels_per_second'] / 1e6:.1f}"]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join([*lines, ""])

@@ -89,7 +89,7 @@ AXES = {
     "ciede2000_p99": "CIEDE2000 colour difference, of which about 2.3 is just noticed; one pixel in a "
     "hundred has more.",
     "ciede2000_max": "CIEDE2000 colour difference, of which about 2.3 is just noticed; the worst pixel.",
-    "clocks_per_pixel": "Clocks of the simulated pipeline from the first write of a constant to the last "
+    "cycles_per_pixel": "Clocks of the simulated pipeline from the first write of a constant to the last "
     "pixel, over its pixels.",
     "ns_per_pixel": "Clocks a pixel at the clock rate that place and route achieves.",
     "simulated_pixels_per_second": "How fast this machine simulates the hardware: more is better, so the "

@@ -33,12 +33,14 @@ from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
-from blysk.golden.pipeline import METHODS, ShadingPipeline, Spans
+from blysk.golden.pipeline import Design, Spans
+from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity_of_cosines, saturate
 from blysk.golden.reference.raster import Raster, rasterise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_operands, shade_spans
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -179,7 +181,7 @@ class _Shaded(NamedTuple):
     error: np.ndarray
     stated: np.ndarray
     span: np.ndarray
-    wide: np.ndarray
+    out_of_range: np.ndarray
 
 
 def arcs(
@@ -472,16 +474,16 @@ def _bisection_error(is_wide: bool) -> float:
     return np.sqrt(3) * error + unit.threshold + 2.0**-19 + 0.017 * (8.1 * unit.threshold) ** 1.5
 
 
-def _design(case: Case, method: str) -> ShadingPipeline:
-    return ShadingPipeline(method, MODEL, lights=len(case.scene.lights))
+def _design(case: Case, method: str) -> Design:
+    return preset(method, MODEL, lights=len(case.scene.lights))
 
 
-def _spans(case: Case, design: ShadingPipeline, raster: Raster, codes: Sequence[np.ndarray]) -> Spans:
+def _spans(case: Case, design: Design, raster: Raster, codes: Sequence[np.ndarray]) -> Spans:
     spans = Spans(raster.x, raster.y, raster.length, *codes)
     return replace(spans, values=local_values(case.scene, raster)) if design.takes_values else spans
 
 
-def _operands(design: ShadingPipeline, spans: Spans, constants: FrameConstants) -> Operands:
+def _operands(design: Design, spans: Spans, constants: FrameConstants) -> Operands:
     if design.takes_values:
         return design.interpolator.compute_values(spans.values, spans.length)
     vectors = (spans.normal_left, spans.normal_right, constants.direction, constants.halfway)
@@ -489,12 +491,12 @@ def _operands(design: ShadingPipeline, spans: Spans, constants: FrameConstants) 
     return design.interpolator.compute(left, right, spans.length, direction, halfway)
 
 
-def _shade(case: Case, design: ShadingPipeline, raster: Raster, codes: Sequence[np.ndarray]) -> _Shaded:
+def _shade(case: Case, design: Design, raster: Raster, codes: Sequence[np.ndarray]) -> _Shaded:
     """Errors of the twin against exactly normalised interpolation in float64."""
     scene, material = case.scene, case.scene.materials[0]
     spans, constants = _spans(case, design, raster, codes), FrameConstants.of(scene)
     color = design.compute(spans, constants).color
-    wide = _operands(design, spans, constants).wide
+    out_of_range = _operands(design, spans, constants).out_of_range
 
     degrees = np.minimum(_angles(raster), design.interpolator.MAX_ANGLE).max(initial=0)
     error = operand_error(design.method, int(raster.length.max(initial=1)), float(degrees))
@@ -515,7 +517,7 @@ def _shade(case: Case, design: ShadingPipeline, raster: Raster, codes: Sequence[
                 scene.ambient_light,
                 np.where(near, side, cosine),
                 highlight,
-                MODEL,
+                REFLECTION_MODELS[MODEL],
             )
         )
         for side in (0.0, 2.0**-60)
@@ -523,21 +525,23 @@ def _shade(case: Case, design: ShadingPipeline, raster: Raster, codes: Sequence[
 
     if design.takes_values:
         cosine, u = design.interpolator.exact_operands(spans.values, spans.length)
-        own = shade_operands(scene, raster, cosine, 1 - u, MODEL)
+        own = shade_operands(scene, raster, cosine, 1 - u, REFLECTION_MODELS[MODEL])
     else:
         # From the codes on.
         given = replace(raster, normal_left=normalise(codes[0]), normal_right=normalise(codes[1]))
         uses_chord = design.interpolator.uses_chord
-        own = shade_spans(scene, given, design.interpolator.exact_normals, MODEL, uses_chord)
+        own = shade_spans(
+            scene, given, design.interpolator.exact_normals, REFLECTION_MODELS[MODEL], uses_chord
+        )
     own = own.reshape(-1, 3)[raster.pixel[shown]] * 255
     light = np.sum([light.color for light in scene.lights], axis=0)
     terms = np.multiply(material.diffuse, error)
-    terms = terms + np.multiply(material.specular, material.exponent * error + design.highlight.error)
+    terms = terms + np.multiply(material.specular, material.exponent * error + design.specular.error)
     arithmetic = 0.5 + _COLOR_ERROR * len(direction) + 255 * (light * terms).max()
     found, stated = (
         np.min([np.abs(of - one * 255).max(axis=1) for one in exact], axis=0) for of in (color[shown], own)
     )
-    return _Shaded(found, stated + arithmetic, raster.span[shown], wide)
+    return _Shaded(found, stated + arithmetic, raster.span[shown], out_of_range)
 
 
 def _angles(raster: Raster) -> np.ndarray:
@@ -561,7 +565,7 @@ def grade_of(grades: Sequence[Grade]) -> Grade:
 
 def _figures(shaded: _Shaded, inside: np.ndarray) -> dict[str, Any]:
     """Largest error of a case, that in spans that are not flagged, and its grades."""
-    flagged, served = shaded.wide[shaded.span], inside[shaded.span]
+    flagged, served = shaded.out_of_range[shaded.span], inside[shaded.span]
     large = shaded.error > GOOD
     bad = large & ~flagged & (~served | (shaded.error > shaded.stated))
 
@@ -574,7 +578,7 @@ def _figures(shaded: _Shaded, inside: np.ndarray) -> dict[str, Any]:
         "error": float(shaded.error.max(initial=0)),
         "silent": float(shaded.error[~flagged].max(initial=0)),
         "safe": float(shaded.error[served].max(initial=0)),
-        "flagged": int(np.count_nonzero(shaded.wide)),
+        "flagged": int(np.count_nonzero(shaded.out_of_range)),
         "grade": grade(np.ones_like(large)),
         "safe_grade": grade(served),
     }
@@ -635,17 +639,17 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
 class _Interrupted(wiring.Component):
     """A pipeline that shades other spans first, and is reset while they are inside."""
 
-    def __init__(self, unit: wiring.Component, before: dict[str, Sequence[int]], clocks: int):
-        """Words of ``write`` and ``i`` before the reset, which comes after so many clocks."""
+    def __init__(self, unit: wiring.Component, before: dict[str, Sequence[int]], cycles: int):
+        """Words of ``write`` and ``i`` before the reset, which comes after so many cycles."""
         super().__init__(dict(unit.signature.members))
-        self._unit, self._before, self._clocks = unit, before, clocks
+        self._unit, self._before, self._cycles = unit, before, cycles
 
     def elaborate(self, platform):
         m = Module()
         reset, begun = Signal(), Signal()
-        clock = Signal(range(self._clocks + 1))
+        clock = Signal(range(self._cycles + 1))
         m.submodules.unit = ResetInserter(reset)(self._unit)
-        m.d.comb += [begun.eq(clock == self._clocks), reset.eq(clock == self._clocks - 1)]
+        m.d.comb += [begun.eq(clock == self._cycles), reset.eq(clock == self._cycles - 1)]
         with m.If(~begun):
             m.d.sync += clock.eq(clock + 1)
         written = Signal()
@@ -697,9 +701,9 @@ def stream_patterns(unit: ShadingPipelineUnit) -> Iterator[tuple[str, dict[str, 
     ):
         sides = ("input_stalls", "output_stalls")
         yield name, {side: rng.random(997) < share for side, share in zip(sides, shares, strict=True)}
-    clocks = unit.latency + 150
+    cycles = unit.latency + 150
     for side in ("input", "output"):
-        for clock in range(clocks):
+        for clock in range(cycles):
             yield f"a single stall of the {side}", {f"{side}_stalls": np.arange(1 << 14) == clock}
 
 
@@ -719,7 +723,7 @@ def measure_stream(method: str, quick: bool) -> list[dict[str, Any]]:
         ``case``; ``runs``; ``pixels`` of a run; ``wrong``, pixels of all runs that are not the twin's, or
         ``None`` where a run came to a halt.
     """
-    design = ShadingPipeline(method, MODEL)
+    design = preset(method, MODEL)
     unit = ShadingPipelineUnit(design)
     rng = np.random.default_rng(STREAM_GROUP)
     lengths = np.array([5, 0, 1, 1, 0, 0, 9, 2, 3, 0])
@@ -751,8 +755,8 @@ def measure_stream(method: str, quick: bool) -> list[dict[str, Any]]:
     before = {"write": _words(unit.write.payload.shape(), write)}
     before["i"] = _words(unit.i.payload.shape(), beats) * 8
     loaded = len(before["write"])
-    for clocks in (unit.latency + 40,) if quick else (3, unit.latency // 2, unit.latency, unit.latency + 40):
-        interrupted = _Interrupted(unit, before, loaded + clocks)
+    for cycles in (unit.latency + 40,) if quick else (3, unit.latency // 2, unit.latency, unit.latency + 40):
+        interrupted = _Interrupted(unit, before, loaded + cycles)
         found.setdefault("reset in mid span", []).append(wrong(interrupted, engine="pysim")[0])
     return [
         {
@@ -788,12 +792,12 @@ def _flags(method: str, degrees: np.ndarray) -> np.ndarray:
     case = _case(2, "", ends, 5, SWEEP_EXPONENT)
     design = _design(case, method)
     spans = _spans(case, design, case.raster, [quantise(end) for end in ends])
-    return _operands(design, spans, FrameConstants.of(case.scene)).wide
+    return _operands(design, spans, FrameConstants.of(case.scene)).out_of_range
 
 
 def widest_span(method: str, exponent: int) -> float:
     """Widest span in degrees that is left whole: of ``chord-local``, none of a sample is cut."""
-    if not ShadingPipeline(method, MODEL).takes_values:
+    if not preset(method, MODEL).takes_values:
         return METHODS[method].widest_span(exponent)
     low, high = 0.0, 45.0
     while high - low > 0.05:

@@ -19,9 +19,10 @@ from blysk.bench.tools.blocks import BLOCKS, row_of
 from blysk.bench.tools.fpga import TooLarge, lay_out, tool_versions
 from blysk.bench.tools.pages import svg
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import METHODS, PRINTED, ShadingPipeline
-from blysk.golden.reference.metrics import error_figures, mnse_printed, nmse
+from blysk.golden.presets import METHODS, PUBLISHED, preset
+from blysk.golden.reference.metrics import error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import prepare
@@ -37,7 +38,7 @@ __all__ = [
     "clock_rate",
     "dot",
     "fastest",
-    "frame_clocks",
+    "frame_cycles",
     "hardware",
     "prices",
     "section",
@@ -461,7 +462,7 @@ def hardware(name: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``latency`` and ``interval`` in clocks, ``cells``, ``multipliers``, ``register_bits``, and
+        ``latency`` and ``interval`` in cycles, ``cells``, ``multipliers``, ``register_bits``, and
         ``memory_bits``.
     """
     row = row_of(_block(name), None)
@@ -498,7 +499,7 @@ def clock_rate(name: str, seeds: int, tools: dict[str, str | None]) -> dict[str,
     return {"fmax": layout.fmax[1], "reason": ""}
 
 
-def frame_clocks(name: str, triangles: int, width: int, height: int) -> float:
+def frame_cycles(name: str, triangles: int, width: int, height: int) -> float:
     """Clocks a pixel of a frame in the simulated pipeline with an interpolator of `DEVICES`.
 
     Parameters
@@ -512,9 +513,9 @@ def frame_clocks(name: str, triangles: int, width: int, height: int) -> float:
     """
     _, method = DEVICES[name]
     scene = scene_for(teapot(triangles), 50, width, height)
-    unit = ShadingPipelineUnit(ShadingPipeline(method))
-    pixels, clocks = measure(unit, spans_of(scene, method), FrameConstants.of(scene, 1))
-    return clocks / pixels
+    unit = ShadingPipelineUnit(preset(method))
+    pixels, cycles = measure(unit, spans_of(scene, method), FrameConstants.of(scene, 1))
+    return cycles / pixels
 
 
 def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict[str, Any]:
@@ -537,7 +538,10 @@ def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict
     scene = scene_for(teapot(triangles), 50, width, height)
     raster = rasterise(scene)
     actions = [lambda: rasterise(scene)]
-    actions += [lambda shading=shading: render(scene, shading, "phong", raster) for shading in _SHADINGS]
+    actions += [
+        lambda shading=shading: render(scene, shading, REFLECTION_MODELS["phong"], raster)
+        for shading in _SHADINGS
+    ]
     geometry, *times = fastest(actions, repeats)
     shares = {shading: time / (geometry + time) for shading, time in zip(_SHADINGS, times, strict=True)}
     return {"triangles": len(scene.mesh.faces), "pixels": int(raster.visible.sum()), **shares}
@@ -552,7 +556,7 @@ def square_errors(method: str, triangles: int, width: int, height: int) -> dict[
     Parameters
     ----------
     method : str
-        One of `METHODS` or `PRINTED`.
+        One of `METHODS` or `PUBLISHED`.
     triangles : int
         Of the teapot.
     width, height : int
@@ -567,7 +571,7 @@ def square_errors(method: str, triangles: int, width: int, height: int) -> dict[
         value, where it counts most and least, and ``one``: NMSE of either.
     """
     scene = scene_for(teapot(triangles), 50, width, height)
-    design = ShadingPipeline(method)
+    design = preset(method)
     prepared = prepare(scene, design)
     color = design.compute(prepared.spans, FrameConstants.of(scene, 1)).color
     exact = render(scene, raster=prepared.raster)
@@ -576,7 +580,7 @@ def square_errors(method: str, triangles: int, width: int, height: int) -> dict[
     image[prepared.cut_raster.pixel[seen]] = color[seen]
     shown, reference = image[exact.mask.ravel()], exact.image[exact.mask] * 255
     errors = error_figures(shown[np.newaxis], reference[np.newaxis])
-    printed, defined = mnse_printed(shown, reference)
+    printed, defined = mnse_published(shown, reference)
     distance = np.abs(reference - reference.mean()).ravel()
     order = np.argsort(distance)
     terms = np.square((shown - reference).ravel()[order] / distance[order])
@@ -584,7 +588,7 @@ def square_errors(method: str, triangles: int, width: int, height: int) -> dict[
     for place in (distance.argmin(), distance.argmax()):
         wrong = reference.copy().ravel()
         wrong[place] += 1
-        ones.append((mnse_printed(wrong, reference.ravel())[0], nmse(wrong, reference.ravel())))
+        ones.append((mnse_published(wrong, reference.ravel())[0], nmse(wrong, reference.ravel())))
     return {
         "nmse": nmse(shown, reference),
         "printed": printed,
@@ -625,12 +629,12 @@ def tasks(quick: bool) -> list[Task]:
         rate = {"seeds": _SEEDS, "tools": tool_versions()}
         found += [Task(clock_rate, {"name": name, **rate}) for name in devices]
         whole = [name for name in devices if name.endswith("interpolator")]
-        found += [Task(frame_clocks, {"name": name, "triangles": 10_000, **size}) for name in whole]
+        found += [Task(frame_cycles, {"name": name, "triangles": 10_000, **size}) for name in whole]
     found += [
         Task(shading_share, {"triangles": count, **size, "repeats": 7 if quick else 3}, timed=True)
         for count in (_TRIANGLES[:2] if quick else _TRIANGLES)
     ]
-    methods = ("linear", "quadratic", "renormalise", "chord") if quick else (*METHODS, *PRINTED)
+    methods = ("linear", "quadratic", "renormalise", "chord") if quick else (*METHODS, *PUBLISHED)
     count = 1_000 if quick else 10_000
     found += [Task(square_errors, {"method": method, "triangles": count, **size}) for method in methods]
     return found
@@ -652,12 +656,12 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             for task, result in zip(tasks, results, strict=True)
             if task.function is function
         ]
-        for function in (software, prices, hardware, clock_rate, frame_clocks, shading_share, square_errors)
+        for function in (software, prices, hardware, clock_rate, frame_cycles, shading_share, square_errors)
     }
     speeds = _software_table(by[software])
     devices = {settings["name"]: {**result, "frame": None} for settings, result in by[hardware]}
     rates = {settings["name"]: result for settings, result in by[clock_rate]}
-    for settings, result in by[frame_clocks]:
+    for settings, result in by[frame_cycles]:
         devices[settings["name"]]["frame"] = result
     squares = _squares_table(by[square_errors])
     reached = [_reached(claim, speeds) for claim in CLAIMS]
@@ -673,7 +677,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "alone would give the printed ratio, as on a machine whose roots cost so much.",
         "In hardware a unit that takes new operands on every clock gives a normal a clock whatever is "
         "inside, but for setups that take longer than a span: the claims turn into multipliers, cells and "
-        "registers that are saved, not into clocks. The table of devices restates them so; a rival's figure "
+        "registers that are saved, not into cycles. The table of devices restates them so; a rival's figure "
         "over a device's is above 1 where the device is the cheaper.",
         "Table 1.1 of [T] has the share of shading in the time of a frame. Its printed values were not at "
         "hand; the table below shows what the golden renderer, in NumPy, takes for either method.",
@@ -838,16 +842,16 @@ def _hardware_table(devices: dict[str, dict], rates: dict[str, dict]) -> Table:
         (
             *(
                 "device",
-                "latency, clocks",
-                "interval, clocks",
-                "clocks a pixel of a frame",
+                "latency, cycles",
+                "interval, cycles",
+                "cycles a pixel of a frame",
                 "multipliers",
                 "cells",
             ),
             *("register bits", "memory bits", "Fmax, MHz"),
         ),
         rows,
-        "Interval: clocks from one result to the next. Cells, before technology mapping, are operators, "
+        "Interval: cycles from one result to the next. Cells, before technology mapping, are operators, "
         "multiplexers, registers and memories of any width. An interpolator is whole: setup, and N·L and N·H "
         "of one light; its frame is a teapot's, through the simulated pipeline, setups of spans included. "
         f"Fmax: median of placements on an ECP5-25F. {missing}".strip(),
@@ -877,12 +881,12 @@ def _ratios_table(devices: dict[str, dict], rates: dict[str, dict]) -> Table:
         "thesis-hardware",
         "Speed claims of [T] in hardware: the rival's figure over the device's",
         (
-            *("claim", "device", "compared with", "printed ratio (software)", "clocks a result"),
-            "clocks a pixel of a frame",
+            *("claim", "device", "compared with", "printed ratio (software)", "cycles a result"),
+            "cycles a pixel of a frame",
             *("multipliers", "cells", "register bits", "Fmax (device over rival)"),
         ),
         rows,
-        "Above 1 the device of [T] needs less, or clocks faster. No figure: the device has no multiplier, or "
+        "Above 1 the device of [T] needs less, or cycles faster. No figure: the device has no multiplier, or "
         "there is no place and route. The rival is the direct renormaliser, a normal a clock.",
     )
 

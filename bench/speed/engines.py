@@ -9,7 +9,7 @@ times as fast as pysim, or is slower than Verilator, or the picture takes 2 s.
 
 Seconds are those of the processor in this process, which has one thread: other work on the machine does not
 count. A run of an engine is the whole call, beats packed and unpacked; one of Verilator is the loop over the
-clocks alone, from packed beats to packed beats.
+cycles alone, from packed beats to packed beats.
 """
 
 import hashlib
@@ -32,7 +32,8 @@ from amaranth.lib.wiring import Component
 from blysk.bench.accuracy import scene_for
 from blysk.bench.speed.verilator import Verilated, free_stimulus
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.pipeline import Design, Spans
+from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.simulate import Run, simulate
@@ -83,7 +84,7 @@ class Speed:
         Output beats a second.
     build : float
         Seconds on the clock to the compiled model and its first, short run; less with a warm cache.
-    clocks : int
+    cycles : int
         Clocks of the compiled run, up to the last transfer.
     verilator_beats : float or None
         Output beats a second of Verilator's model, ``None`` where it was not asked for.
@@ -94,7 +95,7 @@ class Speed:
     cxxrtl_beats: float
     pysim_beats: float
     build: float
-    clocks: int
+    cycles: int
     verilator_beats: float | None = None
 
     @property
@@ -128,7 +129,7 @@ def measure(
 
     The interpreted engine gets the first ``pysim_beats`` beats only, since it is the slower one by far. The
     compiled one runs those as well, for the comparison, and then all of them ``repeats`` times, in turn with
-    Verilator's model; the fastest of each counts. The clocks of waiting for the end are part of both engines'
+    Verilator's model; the fastest of each counts. The cycles of waiting for the end are part of both engines'
     times and counts.
 
     Parameters
@@ -136,7 +137,7 @@ def measure(
     component : Component
         Component that `simulate` takes.
     beats : structured array or mapping
-        Input beats; enough for some million clocks make a fair measure.
+        Input beats; enough for some million cycles make a fair measure.
     constants, write
         As `simulate` takes them.
     expected : mapping of field names to arrays, optional
@@ -156,7 +157,7 @@ def measure(
     ------
     ValueError
         If the engines differ in a beat or a clock, the compiled one gives other than expected, or Verilator's
-        model other beats or clocks than the compiled one.
+        model other beats or cycles than the compiled one.
     SimulationError
         If there is no Verilator, or it fails.
     """
@@ -164,7 +165,13 @@ def measure(
     def timed(engine: str, some: np.ndarray | Mapping) -> tuple[float, Run]:
         return _timed(
             lambda: simulate(
-                component, some, count=None, constants=constants, write=write, engine=engine, patience=_WAIT
+                component,
+                some,
+                count=None,
+                constants=constants,
+                write=write,
+                engine=engine,
+                idle_timeout=_WAIT,
             )
         )
 
@@ -173,7 +180,7 @@ def measure(
     _, compiled = timed("cxxrtl", few)
     build = time.perf_counter() - start
     pysim_time, interpreted = timed("pysim", few)
-    for name in ("beats", "clocks", "input_clocks", "total_clocks", "status"):
+    for name in ("beats", "cycles", "input_cycles", "total_cycles", "status"):
         if not np.array_equal(getattr(compiled, name), getattr(interpreted, name)):
             raise ValueError(f"the engines differ in {name}")
     times, runs, rival_times = [], [], []
@@ -188,22 +195,22 @@ def measure(
             runs.append(run)
             if model is not None:
                 stimulus = free_stimulus(model.ports, beats, write, len(run.beats), _WAIT)
-                seconds, (output, clocks) = _timed(lambda stimulus=stimulus: model.run(stimulus))
+                seconds, (output, cycles) = _timed(lambda stimulus=stimulus: model.run(stimulus))
                 rival_times.append(seconds)
                 same = _digest(output) == _digest(pack(model.ports.o, run.beats))
-                if not same or not np.array_equal(clocks, run.clocks):
+                if not same or not np.array_equal(cycles, run.cycles):
                     raise ValueError("Verilator's model and the compiled engine differ")
     for name, values in (expected or {}).items():
         if not np.array_equal(runs[0].beats[name], values):
             raise ValueError(f"the compiled engine gives another {name} than expected")
-    clocks = runs[0].total_clocks
+    cycles = runs[0].total_cycles
     return Speed(
-        cxxrtl=(clocks + _WAIT) / min(times),
-        pysim=(interpreted.total_clocks + _WAIT) / pysim_time,
+        cxxrtl=(cycles + _WAIT) / min(times),
+        pysim=(interpreted.total_cycles + _WAIT) / pysim_time,
         cxxrtl_beats=len(runs[0].beats) / min(times),
         pysim_beats=len(interpreted.beats) / pysim_time,
         build=build,
-        clocks=clocks,
+        cycles=cycles,
         verilator_beats=len(runs[0].beats) / min(rival_times) if rival_times else None,
     )
 
@@ -215,9 +222,7 @@ def _timed(work: Callable[[], Any]) -> tuple[float, Any]:
     return time.process_time() - start, result
 
 
-def teapot_spans(
-    design: ShadingPipeline, width: int, height: int, least: int = 1
-) -> tuple[Spans, FrameConstants]:
+def teapot_spans(design: Design, width: int, height: int, least: int = 1) -> tuple[Spans, FrameConstants]:
     """Spans of a teapot in a picture of that size, each of so many pixels or more, and one light's constants.
 
     The order is random, from a fixed seed: the first spans are then of the same lengths as all, which makes
@@ -280,7 +285,7 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
     int
         0, or 1 when the compiled engine missed a target.
     """
-    design = ShadingPipeline(method="chord", model="cosquad", lights=1)
+    design = preset(method="chord", model="cosquad", lights=1)
     spans, constants = teapot_spans(design, width, height, LEAST_LENGTH)
     pixels = design.compute(spans, [constants])
     expected = pixel_beats(pixels)
@@ -304,7 +309,7 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
         )
         wall, processor = picture_seconds()
     print(
-        f"teapot at {width}x{height}, {len(spans):,} spans: {len(pixels.x):,} pixels, {speed.clocks:,} clocks"
+        f"teapot at {width}x{height}, {len(spans):,} spans: {len(pixels.x):,} pixels, {speed.cycles:,} cycles"
     )
     print(f"{'engine':<14}{'pixels/s':>14}{'cxxrtl is faster':>20}")
     rates = {

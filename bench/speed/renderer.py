@@ -18,6 +18,7 @@ import numpy as np
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
 from blysk.sim.meshes.teapot import teapot
@@ -211,7 +212,9 @@ def main(triangles: int = 100_000, width: int = 1920, height: int = 1080, repeat
     del raster
     golden = {}
     for model in ("blinn", "phong"):
-        golden[model], frame = timed(lambda model=model: render(scene, "phong", model), repeats)
+        golden[model], frame = timed(
+            lambda model=model: render(scene, "phong", REFLECTION_MODELS[model]), repeats
+        )
         print(f"golden, {model:5}: {golden[model].wall:.3f} s, {golden[model].cpu:.3f} s of processor time")
     # Linux counts in KiB, macOS in bytes. Read before VTK is loaded.
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)

@@ -3,8 +3,8 @@
 ``python -m blysk.bench.speed.throughput [TRIANGLES ...]`` draws teapots of 1,000, 10,000, 100,000 and
 1,000,000 triangles at 1920x1080, and sends their spans through the simulated pipelines of the methods chord
 and quadratic, with setup intervals 1, 2, 4 and 7. It prints two tables in Markdown: how long the spans are,
-and how many clocks they take. ``--json`` prints the same as JSON. The exit status is 1 when spans of 16
-pixels and more take over 1.05 clocks a pixel.
+and how many cycles they take. ``--json`` prints the same as JSON. The exit status is 1 when spans of 16
+pixels and more take over 1.05 cycles a pixel.
 """
 
 import argparse
@@ -18,7 +18,8 @@ import numpy as np
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.pipeline import Spans
+from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
@@ -39,7 +40,7 @@ LONG = 16
 """Spans of so many pixels and more have a target."""
 
 LARGEST = 1.05
-"""Target: clocks a pixel of those."""
+"""Target: cycles a pixel of those."""
 
 _EXPONENT = 50
 
@@ -92,9 +93,9 @@ class Throughput:
         Method of interpolation.
     setup_interval : int
         Clocks from a span to the next at the closest.
-    pixels, clocks : int
-        Pixels of the frame, and clocks from the first write of a constant to the last pixel.
-    long_pixels, long_clocks : int
+    pixels, cycles : int
+        Pixels of the frame, and cycles from the first write of a constant to the last pixel.
+    long_pixels, long_cycles : int
         The same with the spans of `LONG` pixels and more only.
     """
 
@@ -102,35 +103,35 @@ class Throughput:
     method: str
     setup_interval: int
     pixels: int
-    clocks: int
+    cycles: int
     long_pixels: int
-    long_clocks: int
+    long_cycles: int
 
     @property
-    def clocks_per_pixel(self) -> float:
+    def cycles_per_pixel(self) -> float:
         """Clocks a pixel; NaN without pixels."""
-        return self.clocks / self.pixels if self.pixels else float("nan")
+        return self.cycles / self.pixels if self.pixels else float("nan")
 
     @property
     def setup_share(self) -> float:
-        """Share of the clocks on which no pixel comes: setup, constants and latency."""
-        return 1 - self.pixels / self.clocks
+        """Share of the cycles on which no pixel comes: setup, constants and latency."""
+        return 1 - self.pixels / self.cycles
 
     @property
-    def long_clocks_per_pixel(self) -> float | None:
+    def long_cycles_per_pixel(self) -> float | None:
         """Clocks a pixel of long spans; ``None`` where there are none."""
-        return self.long_clocks / self.long_pixels if self.long_pixels else None
+        return self.long_cycles / self.long_pixels if self.long_pixels else None
 
 
 def spans_of(scene: Scene, method: str) -> Spans:
     """Spans of a scene as a method gets them."""
-    return prepare(scene, ShadingPipeline(method)).spans
+    return prepare(scene, preset(method)).spans
 
 
 def measure(
     unit: ShadingPipelineUnit, spans: Spans, constants: FrameConstants, engine: str = "cxxrtl"
 ) -> tuple[int, int]:
-    """Pixels of spans, and the clocks that they take without stalls, both counted at the unit's output.
+    """Pixels of spans, and the cycles that they take without stalls, both counted at the unit's output.
 
     Parameters
     ----------
@@ -139,7 +140,7 @@ def measure(
     spans : Spans
         Spans, none of them empty.
     constants : FrameConstants
-        Written first; part of the clocks.
+        Written first; part of the cycles.
     engine : str
         As `simulate` takes it.
     """
@@ -152,14 +153,14 @@ def measure(
         write=constants.writes(),
         engine=engine,
     )
-    return len(run.beats), run.total_clocks
+    return len(run.beats), run.total_cycles
 
 
 def _frames(
     triangles: Iterable[int], methods: Sequence[str], intervals: Sequence[int], width: int, height: int
 ) -> Iterator[tuple[Lengths, list[Throughput]]]:
     units = {
-        (method, interval): ShadingPipelineUnit(ShadingPipeline(method), interval)
+        (method, interval): ShadingPipelineUnit(preset(method, setup_interval=interval))
         for method in methods
         for interval in intervals
     }
@@ -195,13 +196,13 @@ def _print(lengths: Sequence[Lengths], rows: Sequence[Throughput], width: int, h
         cells = " | ".join(f"{spans:.1%} / {pixels:.1%}" for spans, pixels in shares)
         print(f"| {row.triangles:,} | {row.method} | {row.spans:,} | {row.pixels:,} | {cells} |")
     print("\nClocks of the simulated pipeline, one light.\n")
-    print(f"| triangles | method | setup interval | clocks | a pixel | setup | a pixel, spans of {LONG}+ |")
+    print(f"| triangles | method | setup interval | cycles | a pixel | setup | a pixel, spans of {LONG}+ |")
     print("|---:|---|---:|---:|---:|---:|---:|")
     for row in rows:
-        long = "-" if row.long_clocks_per_pixel is None else f"{row.long_clocks_per_pixel:.4f}"
+        long = "-" if row.long_cycles_per_pixel is None else f"{row.long_cycles_per_pixel:.4f}"
         print(
-            f"| {row.triangles:,} | {row.method} | {row.setup_interval} | {row.clocks:,} "
-            f"| {row.clocks_per_pixel:.3f} | {row.setup_share:.1%} | {long} |"
+            f"| {row.triangles:,} | {row.method} | {row.setup_interval} | {row.cycles:,} "
+            f"| {row.cycles_per_pixel:.3f} | {row.setup_share:.1%} | {long} |"
         )
 
 
@@ -211,10 +212,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0, or 1 when long spans take too many clocks.
+        0, or 1 when long spans take too many cycles.
     """
     parser = argparse.ArgumentParser(
-        prog="blysk.bench.speed.throughput", description="clocks a pixel of real frames"
+        prog="blysk.bench.speed.throughput", description="cycles a pixel of real frames"
     )
     parser.add_argument("triangles", nargs="*", type=int, default=TRIANGLES)
     parser.add_argument("--width", type=int, default=1920)
@@ -234,20 +235,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         figures = [
             asdict(row)
             | {
-                "clocks_per_pixel": row.clocks_per_pixel,
+                "cycles_per_pixel": row.cycles_per_pixel,
                 "setup_share": row.setup_share,
-                "long_clocks_per_pixel": row.long_clocks_per_pixel,
+                "long_cycles_per_pixel": row.long_cycles_per_pixel,
             }
             for row in rows
         ]
-        json.dump({"bins": BINS, "lengths": [asdict(row) for row in lengths], "clocks": figures}, sys.stdout)
+        json.dump({"bins": BINS, "lengths": [asdict(row) for row in lengths], "cycles": figures}, sys.stdout)
         print()
     else:
         _print(lengths, rows, options.width, options.height)
-    slow = [row for row in rows if (row.long_clocks_per_pixel or 0) > LARGEST]
+    slow = [row for row in rows if (row.long_cycles_per_pixel or 0) > LARGEST]
     for row in slow:
         print(
-            f"missed: {row.long_clocks_per_pixel:.4f} clocks a pixel, spans of {LONG}+: {row.method}, "
+            f"missed: {row.long_cycles_per_pixel:.4f} cycles a pixel, spans of {LONG}+: {row.method}, "
             f"setup interval {row.setup_interval}, {row.triangles:,} triangles",
             file=sys.stderr,
         )

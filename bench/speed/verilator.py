@@ -49,14 +49,14 @@ static inline void place(uint32_t *words, int offset, int width, uint64_t value)
 // Clocks up to the last beat out, or -1.
 extern "C" int64_t run(
 		const uint32_t *write, int64_t writes, const uint32_t *input, int64_t inputs,
-		uint32_t *output, int64_t *clocks, int64_t outputs, int64_t patience) {{
+		uint32_t *output, int64_t *cycles, int64_t outputs, int64_t idle_timeout) {{
 	VerilatedContext context;
 	Vcore *const core = new Vcore(&context);
 	core->rst = 0;
 	core->o_ready = 1;
 	core->i_valid = 0;
 	int64_t written = 0, taken = 0, given = 0, clock = 0, last = 0;
-	for (; given < outputs && clock - last <= patience; clock++) {{
+	for (; given < outputs && clock - last <= idle_timeout; clock++) {{
 		if (written < writes) {{
 {write}
 		}} else if (taken < inputs) {{
@@ -70,7 +70,7 @@ extern "C" int64_t run(
 			uint32_t *const words = output + given * {output_words};
 			memset(words, 0, 4 * {output_words});
 {output}
-			clocks[given++] = last = clock;
+			cycles[given++] = last = clock;
 		}}
 		const bool input_moves = core->i_valid && core->i_ready;
 {moves}
@@ -147,7 +147,11 @@ def _run(command: list, folder: Path, **options) -> None:
 
 
 def free_stimulus(
-    ports: Ports, beats: np.ndarray | Mapping, write: np.ndarray | Mapping | None, count: int, patience: int
+    ports: Ports,
+    beats: np.ndarray | Mapping,
+    write: np.ndarray | Mapping | None,
+    count: int,
+    idle_timeout: int,
 ) -> Stimulus:
     """What `Verilated.run` takes: beats without a stall on either side.
 
@@ -159,7 +163,7 @@ def free_stimulus(
         As `simulate` takes them.
     count : int
         Output beats.
-    patience : int
+    idle_timeout : int
         Clocks without one after which the component counts as stuck.
     """
     return Stimulus(
@@ -169,7 +173,7 @@ def free_stimulus(
         input_stalls=np.zeros(1, dtype=bool),
         output_stalls=np.zeros(1, dtype=bool),
         count=count,
-        patience=patience,
+        idle_timeout=idle_timeout,
         settle=0,
     )
 
@@ -236,7 +240,7 @@ class Verilated:
         -------
         output : uint32 array, shape (count, words)
             Packed output beats.
-        clocks : int64 array, shape (count,)
+        cycles : int64 array, shape (count,)
             Clock of each.
 
         Raises
@@ -244,17 +248,17 @@ class Verilated:
         ValueError
             If the stimulus has stalls or no count.
         SimulationError
-            If nothing comes out for ``patience`` clocks.
+            If nothing comes out for ``idle_timeout`` cycles.
         """
         if stimulus.count is None or stimulus.input_stalls.any() or stimulus.output_stalls.any():
             raise ValueError("a stimulus with a count and without stalls is needed")
         write, beats = (np.ascontiguousarray(words) for words in (stimulus.write, stimulus.input))
         output = np.empty((stimulus.count, word_count(self.ports.o)), dtype=np.uint32)
-        clocks = np.empty(stimulus.count, dtype=np.int64)
+        cycles = np.empty(stimulus.count, dtype=np.int64)
         end = self._run(
             *(write.ctypes.data, len(write), beats.ctypes.data, len(beats)),
-            *(output.ctypes.data, clocks.ctypes.data, stimulus.count, stimulus.patience),
+            *(output.ctypes.data, cycles.ctypes.data, stimulus.count, stimulus.idle_timeout),
         )
         if end < 0:
-            raise SimulationError(f"Verilator's model gave nothing for {stimulus.patience} clocks")
-        return output, clocks
+            raise SimulationError(f"Verilator's model gave nothing for {stimulus.idle_timeout} cycles")
+        return output, cycles

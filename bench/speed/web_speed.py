@@ -39,8 +39,8 @@ _SCRIPT = """async ({design, mesh, frames}) => {
     }
     blysk.setOrbit(false);
     const {figures} = blysk.latest;
-    const {pixels, clocks, seconds} = figures;
-    return {rate: Math.max(...rates), pixels, clocks, seconds, count: 16 + 3 * frames};
+    const {pixels, cycles, seconds} = figures;
+    return {rate: Math.max(...rates), pixels, cycles, seconds, count: 16 + 3 * frames};
 }"""
 
 
@@ -88,7 +88,7 @@ def frame_rates(site: Path, designs: Sequence[str] = (), frames: int = 40) -> di
     -------
     dict
         By module and mesh: ``rate``, and ``processor_rate``, frames per second of the browser's processor
-        time; ``pixels``, ``clocks`` and ``seconds`` of the last frame's simulation.
+        time; ``pixels``, ``cycles`` and ``seconds`` of the last frame's simulation.
 
     Raises
     ------
@@ -137,12 +137,12 @@ def frame_rates(site: Path, designs: Sequence[str] = (), frames: int = 40) -> di
 def _command(site, designs) -> int:
     """Measure the frames a second of a SITE by `blysk web`, of all its modules or of those named."""
     found = frame_rates(site, designs)
-    head = f"{'module, mesh':<32}{'frames/s':>9}{'frames/CPU s':>14}{'pixels':>9}{'clocks':>9}"
+    head = f"{'module, mesh':<32}{'frames/s':>9}{'frames/CPU s':>14}{'pixels':>9}{'cycles':>9}"
     click.echo(f"{head}{'Mpixel/s simulated':>20}")
     for name, row in found.items():
         speed = row["pixels"] / row["seconds"] / 1e6
         rates = f"{row['rate']:>9.1f}{row['processor_rate']:>14.1f}"
-        click.echo(f"{name:<32}{rates}{row['pixels']:>9}{row['clocks']:>9}{speed:>20.2f}")
+        click.echo(f"{name:<32}{rates}{row['pixels']:>9}{row['cycles']:>9}{speed:>20.2f}")
     return 0
 
 

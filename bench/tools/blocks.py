@@ -29,7 +29,7 @@ from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.power import Power
-from blysk.golden.lighting.specular import FURTHER_MODELS, MAX_EXPONENT, SPECULAR_MODELS, Specular
+from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
 from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
@@ -45,10 +45,11 @@ from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS, QuadraticE
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
-from blysk.golden.pipeline import METHODS, ShadingPipeline, Spans
+from blysk.golden.pipeline import Spans
+from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.reflection import COSCOS_MODELS, reflect
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.arccos import ArccosUnit, HalfChordUnit
 from blysk.hdl.cosines.chord import ChordUnit
@@ -464,8 +465,13 @@ def _highlight(rng, count, unit, model):
             codes = _cosines(rng, share, exponent)
             cosine = codes / ONE_SQUARED.codes
             found = unit.compute(Fixed(unit.operand_format, codes), np.zeros(share, bool), exponent)
-            exact = reflect("blinn", cosine, exponent)
-            yield Sample(found.values, exact, reflect(model, cosine, exponent), exponent * (1 - cosine))
+            exact = REFLECTION_MODELS["blinn"].reflect(cosine, exponent)
+            yield Sample(
+                found.values,
+                exact,
+                REFLECTION_MODELS[model].reflect(cosine, exponent),
+                exponent * (1 - cosine),
+            )
 
     return _joined(samples())
 
@@ -505,7 +511,7 @@ def _intensity(rng, count):
 
 
 def _light(rng, count, model):
-    unit, dot = Specular(model), DotProduct()
+    unit, dot = Specular(REFLECTION_MODELS[model]), DotProduct()
 
     def samples():
         for exponent, share in _exponents(rng, count):
@@ -520,7 +526,12 @@ def _light(rng, count, model):
             specular = unit.compute(dot.compute(*_vectors(normal, halfway)), dark, exponent)
             diffuse = np.maximum(_dot(normal, light) / ONE**2, 0)
             exact, formula = (
-                np.stack([diffuse, reflect(name, _dot(normal, halfway) / ONE**2, exponent) * ~dark])
+                np.stack(
+                    [
+                        diffuse,
+                        REFLECTION_MODELS[name].reflect(_dot(normal, halfway) / ONE**2, exponent) * ~dark,
+                    ]
+                )
                 for name in ("blinn", model)
             )
             found = np.stack([Diffuse().compute(cosine).values, specular.values])
@@ -595,7 +606,7 @@ def _bisection_chain(rng, count, chain):
 def _adaptive_normaliser(rng, count, p):
     length = _span_lengths(rng, count)
     left, right = _ends(rng, len(length), p.bisection.max_angle)
-    found, wide, levels = p.compute(*_vectors(left, right), length)
+    found, out_of_range, levels = p.compute(*_vectors(left, right), length)
     span, pixel = pixels_of(length)
     t = pixel / np.maximum(length - 1, 1)[span]
     parts = 2.0 ** levels[span]
@@ -606,7 +617,7 @@ def _adaptive_normaliser(rng, count, p):
     lines = before + (t * parts - segment)[:, np.newaxis] * (after - before)
     # slerp has the length of its left end; the last pixel has that of the right one.
     exact = np.where((t == 1)[:, np.newaxis], b, interpolate("slerp", a, b, t))
-    kept = ~wide[span]
+    kept = ~out_of_range[span]
     angle = _degrees(left, right)[span[kept]]
     return Sample(found.values[kept], exact[kept] * _SCALE, lines[kept] * _SCALE, angle)
 
@@ -780,7 +791,7 @@ def _interpolator(rng, count, method):
                     p.exact_normals(left[span], right[span], t),
                 )
             )
-            kept = ~operands.wide[span]
+            kept = ~operands.out_of_range[span]
             angle = _degrees(left * ONE, right * ONE)[span[kept], 0]
             yield Sample(found[:, kept], exact[:, kept], formula[:, kept], angle)
 
@@ -843,7 +854,7 @@ def _local_chord_setup(rng, count):
     pixel = _pixels(rng, length)
     values, codes = _three_values(_local_curves(rng, count), count)
     unit = LocalChordSetup()
-    *words, wide = unit.compute(
+    *words, out_of_range = unit.compute(
         Fixed(unit.DIFFUSE_FORMAT, codes.diffuse), Fixed(unit.HIGHLIGHT_FORMAT, codes.highlight), length
     )
     k = pixel.astype(np.float64)
@@ -851,7 +862,7 @@ def _local_chord_setup(rng, count):
         w.start.values[:, 0] + k * w.first.values[:, 0] + k * (k - 1) / 2 * w.second.values[:, 0]
         for w in words
     ]
-    kept = ~wide
+    kept = ~out_of_range
     exact = _parabola(values, pixel / (length - 1))[:, kept]
     return Sample(np.stack(found)[:, kept] / ONE_SQUARED.values, exact, exact, pixel[kept])
 
@@ -865,7 +876,7 @@ def _local_chord_interpolator(rng, count):
     span, pixel = pixels_of(length)
     t = pixel / np.maximum(length - 1, 1)[span]
     found = np.stack([operands.cosine.values[:, 0], operands.highlight.values[:, 0]]) / ONE_SQUARED.values
-    kept = ~operands.wide[span]
+    kept = ~operands.out_of_range[span]
     exact, formula = curves(span, t), _parabola(values[:, span], t)
     # Between its three values a parabola may dip under 0, which is the least that the word holds.
     formula[1] = np.maximum(formula[1], 0)
@@ -907,19 +918,19 @@ def _highlight_gate(rng, count):
             length = np.floor(17 ** rng.random(share)).astype(np.int64)
             right[length == 1] = left[length == 1]
             lit = gate.compute(*_vectors(left, right, halfway), exponent)
-            normals, wide = interpolator.normals(*_vectors(left, right), length)
+            normals, out_of_range = interpolator.normals(*_vectors(left, right), length)
             span, pixel = pixels_of(length)
             cosine = DotProduct().compute(normals, *_vectors(halfway[span]))
             term = gate.specular.compute(cosine, np.zeros(len(span), bool), exponent)
             shows = np.maximum.reduceat(term.codes, np.flatnonzero(pixel == 0)) > 0
-            kept = ~wide
+            kept = ~out_of_range
             yield Decisions.of(lit[kept], shows[kept], _degrees(left, right)[kept, 0])
 
     return _joined(samples())
 
 
 def _pipeline(rng, count, method, model):
-    design = ShadingPipeline(method, model)
+    design = preset(method, model)
     interpolator = design.interpolator
     reflection = {"ambient": 0.1, "diffuse": 0.5, "specular": 0.4}
     ambient, k_d, k_s = reflection.values()
@@ -957,7 +968,9 @@ def _pipeline(rng, count, method, model):
                 (interpolator.exact_normals(*ends, t), model),
             ):
                 cosine = normal @ light[0] / ONE
-                highlight = reflect(name, normal @ halfway[0] / ONE, exponent) * (cosine > 0)
+                highlight = REFLECTION_MODELS[name].reflect(normal @ halfway[0] / ONE, exponent) * (
+                    cosine > 0
+                )
                 shades.append(255 * np.minimum(ambient + k_d * np.maximum(cosine, 0) + k_s * highlight, 1))
             # Behind the light the highlight is cut off at once, wherever rounding puts that.
             kept = cosine > 1 / 16
@@ -969,6 +982,7 @@ def _pipeline(rng, count, method, model):
 
 # The table.
 
+_PUBLISHED_MODELS = ("cosquad", "cosquad7", "cosquad_lin")
 _SPANS_45 = "spans to 45 degrees"
 _HIGHLIGHTS = "n 1 to 1000, N.H 0 to 1"
 _LONG = "2 to 4095 pixels"
@@ -1029,12 +1043,12 @@ def _blocks() -> Iterator[Block]:
         _SPANS_45,
     )
     yield Block("gpq", "", "[T] 2.8", GPQUnit, _gpq, _SPANS_45, note="exact")
-    for variant, documented, interval in (
+    for variant, published, interval in (
         ("", False, None),
         ("interval 1", False, 1),
-        ("documented", True, None),
+        ("as published", True, None),
     ):
-        unit = DifferenceSetup(documented)
+        unit = DifferenceSetup(published)
         yield Block(
             "difference_setup",
             variant,
@@ -1064,22 +1078,22 @@ def _blocks() -> Iterator[Block]:
             beat={"length": 64},
         )
     for degree in (1, 2):
-        for max_angle, documented in ((90, False), (45, False), (90, True), (45, True)):
-            p = Bisection(degree, max_angle, documented)
+        for max_angle, published in ((90, False), (45, False), (90, True), (45, True)):
+            p = Bisection(degree, max_angle, published)
             yield Block(
                 "bisection",
-                f"{degree}, {max_angle}" + ", documented" * documented,
+                f"{degree}, {max_angle}" + ", as published" * published,
                 "[T] 2.6",
                 partial(BisectionUnit, p),
                 partial(_bisection, p=p),
                 f"spans to {max_angle} degrees",
                 note=f"degree {degree}",
             )
-    for documented in (False, True):
-        chain = BisectionChain(Bisection(as_documented=documented))
+    for published in (False, True):
+        chain = BisectionChain(Bisection(as_published=published))
         yield Block(
             "bisection_chain",
-            "documented" if documented else "",
+            "as published" if published else "",
             "[T] 2.1",
             partial(BisectionChainUnit, chain),
             partial(_bisection_chain, chain=chain),
@@ -1087,11 +1101,11 @@ def _blocks() -> Iterator[Block]:
             beat={"normal_left": _Z_AXIS, "normal_right": _Z_AXIS, "level": 1},
             note="times of level 1",
         )
-    for exponent, documented in ((6, False), (10, False), (14, False), (10, True)):
-        p = AdaptiveNormaliser(2.0**-exponent, Bisection(as_documented=documented))
+    for exponent, published in ((6, False), (10, False), (14, False), (10, True)):
+        p = AdaptiveNormaliser(2.0**-exponent, Bisection(as_published=published))
         yield Block(
             "adaptive_normaliser",
-            f"threshold 2^-{exponent}" + ", printed" * documented,
+            f"threshold 2^-{exponent}" + ", as published" * published,
             "[T] 2.7",
             partial(AdaptiveNormaliserUnit, p),
             partial(_adaptive_normaliser, p=p),
@@ -1160,17 +1174,15 @@ def _blocks() -> Iterator[Block]:
             note="the same unit, given cos d = 1 - (1 - cos psi)/(m - 1)^2" if shortcut else "",
         )
     yield Block("diffuse", "", "[B] 4", DiffuseUnit, _diffuse, "N.L -1 to 1")
-    sources = dict.fromkeys(SPECULAR_MODELS + FURTHER_MODELS, "Lyon 1993")
-    sources |= {"cosquad": "[T] 3.6", "cosquad7": "[T] 3.7", "cosquad_lin": "[C]", "cosquad_q": "[C]"}
-    sources["cosquad_lin_refitted"] = "numbers"
-    sources |= {"exp": "models.md", **dict.fromkeys(COSCOS_MODELS, "[T] 3.1")}
+    served = {name: p for name, p in MODELS.items() if isinstance(p, Specular)}
+    sources = {name: p.model.source for name, p in served.items()}
     for model, source in sources.items():
         yield Block(
             "specular",
             model,
             source,
-            partial(SpecularUnit, Specular(model)),
-            partial(_highlight, unit=Specular(model), model=model),
+            partial(SpecularUnit, Specular(REFLECTION_MODELS[model])),
+            partial(_highlight, unit=Specular(REFLECTION_MODELS[model]), model=model),
             _HIGHLIGHTS,
         )
     yield Block(
@@ -1181,11 +1193,11 @@ def _blocks() -> Iterator[Block]:
         partial(_highlight, unit=Specular(), model="cosquad"),
         _HIGHLIGHTS,
     )
-    for model in SPECULAR_MODELS:
-        unit = Specular(model, as_documented=True)
+    for model in _PUBLISHED_MODELS:
+        unit = Specular(REFLECTION_MODELS[model], as_published=True)
         yield Block(
             "specular",
-            f"{model}, documented",
+            f"{model}, as published",
             sources[model],
             partial(SpecularUnit, unit),
             partial(_highlight, unit=unit, model=model),
@@ -1278,7 +1290,7 @@ def _blocks() -> Iterator[Block]:
             note="of N.L and 1 - N.H; exact: normalised interpolation"
             + "; the bisection's fit counts as arithmetic" * (method == "bisection"),
         )
-    designs = [("quadratic", model) for model in SPECULAR_MODELS]
+    designs = [("quadratic", model) for model in _PUBLISHED_MODELS]
     designs += [(method, "cosquad") for method in methods if method != "quadratic"]
     designs += [("chord", "exp"), ("chord", "blinn")]
     for method, model in designs:
@@ -1286,7 +1298,7 @@ def _blocks() -> Iterator[Block]:
             "pipeline",
             f"{method}, {model}",
             "[T] 4.10",
-            partial(ShadingPipelineUnit, ShadingPipeline(method, model)),
+            partial(ShadingPipelineUnit, preset(method, model)),
             partial(_pipeline, method=method, model=model),
             "spans to what the method asks for, 45 degrees at most, 1 to 4095 pixels, n 1 to 1000, "
             "N.L > 1/16",
@@ -1307,16 +1319,16 @@ BLOCKS: tuple[Block, ...] = tuple(map(_with_axis, _blocks()))
 
 
 def _times(block: Block, unit: Component) -> tuple[int, int]:
-    """Latency, and clocks from a result to the next: stated by the unit, else found by simulation."""
+    """Latency, and cycles from a result to the next: stated by the unit, else found by simulation."""
     latency = getattr(unit, "latency", None)
-    interval = getattr(unit, "initiation_interval", getattr(unit, "clocks_per_pixel", None))
+    interval = getattr(unit, "initiation_interval", getattr(unit, "cycles_per_pixel", None))
     if isinstance(latency, int) and isinstance(interval, int):
         return latency, interval
     beats = np.zeros(3, dtype_of(unit.i.payload.shape()))
     for name, value in block.beat.items():
         beats[name] = value
     run = simulate(unit, beats, count=3 * block.beat.get("length", 1), engine="pysim")
-    return int(run.clocks[0] - run.input_clocks[0]), int(np.median(np.diff(run.clocks)))
+    return int(run.cycles[0] - run.input_cycles[0]), int(np.median(np.diff(run.cycles)))
 
 
 def rows(
@@ -1469,8 +1481,8 @@ def command(samples, seed, jobs, figures):
     Errors are the largest found: of the model, the device's formula in float64 against the exact function;
     of the arithmetic, the device against that formula; and in total. They are in units of a full term or a
     vector's length, or as the fourth column says; rate: of a gate's decisions, those that let a dark span
-    through, those that stop a lit one, and both. For methods of whole spans a sample is a pixel. lat: clocks
-    from an input to its first result; int: clocks from a result to the next; ROM and regs in bits;
+    through, those that stop a lit one, and both. For methods of whole spans a sample is a pixel. lat: cycles
+    from an input to its first result; int: cycles from a result to the next; ROM and regs in bits;
     multipliers: 3*18 are three of 18x18 bits, 1*c is one by a constant. Of a bisection the variant is the
     degree and the widest span in degrees.
 

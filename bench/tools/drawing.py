@@ -103,7 +103,7 @@ def _lines(node: Node) -> list[tuple[str, str]]:
     if node.copies > 1:
         detail = f"{node.copies} × {detail}" if detail else f"{node.copies} ×"
     if node.stages > 1:
-        detail = f"{detail}, {node.stages} clocks"
+        detail = f"{detail}, {node.stages} cycles"
     if detail:
         lines.append(("detail", detail))
     return lines

@@ -36,18 +36,19 @@ from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.middle_normal import MiddleNormal
-from blysk.golden.pipeline import METHODS, MODELS, PRINTED, ShadingPipeline
+from blysk.golden.pipeline import STYLES, Design
+from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.lighting import Light
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.pipeline import STYLES, ShadingPipelineUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import Choice, OutputFile, Size, Whole
 from blysk.sim.cli.printing import ERRORS
 from blysk.sim.cli.scene_file import HIGHLIGHTS
 from blysk.sim.errors import InputError
 from blysk.sim.frames.animation import turned
-from blysk.sim.frames.frame import compare, twin_frame
+from blysk.sim.frames.frame import compare, model_frame
 from blysk.sim.frames.workers import check_address, cluster_executor, local_executor, processors
 from blysk.sim.output import check_writable, write_json
 
@@ -100,27 +101,13 @@ _SIZE = (320, 240)
 
 
 @dataclass(frozen=True)
-class _Refitted(ShadingPipeline):
-    """A pipeline whose quadratic or bisection method has a polynomial of another degree."""
-
-    degree: int = 0
-
-    @cached_property
-    def interpolator(self):
-        usual = ShadingPipeline(self.method, operand=self.operand).interpolator
-        if isinstance(usual, QuadraticInterpolator):
-            return replace(usual, middle_normal=MiddleNormal(_FITS[self.degree]))
-        return replace(usual, bisection=replace(usual.bisection, degree=self.degree))
-
-
-@dataclass(frozen=True)
 class Candidate:
     """A design of the sweep.
 
     Parameters
     ----------
     method, model, lights, operand
-        See `ShadingPipeline`.
+        See `Design`.
     degree : int, optional
         Of the method's polynomial in the angle: of the middle normal (``quadratic`` and its forms: 2, a plain
         minimax fit, or 3), of the chord method's bend (1 to 3), of the bisection's factor (1 or 2).
@@ -147,27 +134,31 @@ class Candidate:
         _ = self.design
 
     @cached_property
-    def design(self) -> ShadingPipeline:
+    def design(self) -> Design:
         """Its pipeline, and bit-true twin."""
-        usual = ShadingPipeline(self.method, self.model, self.lights, self.operand)
-        if isinstance(usual.interpolator, ChordInterpolator):
-            return replace(usual, terms=self.degree, fraction_bits=self.fraction_bits)
-        if self.fraction_bits is not None:
+        usual = preset(self.method, self.model, self.lights, operand=self.operand, style=self.style)
+        interpolator, changes = usual.interpolator, {}
+        if isinstance(interpolator, ChordInterpolator):
+            changes = {"terms": self.degree, "fraction_bits": self.fraction_bits}
+        elif self.fraction_bits is not None:
             raise ValueError(f"method {self.method} has no choice of words")
-        if self.degree is None:
-            return usual
-        if self.degree not in _degrees(self.method):
+        elif self.degree not in (None, *_degrees(self.method)):
             raise ValueError(f"method {self.method} has no polynomial of degree {self.degree}")
-        return _Refitted(**asdict(usual), degree=self.degree)
+        elif self.degree is not None and isinstance(interpolator, QuadraticInterpolator):
+            changes = {"middle_normal": MiddleNormal(_FITS[self.degree])}
+        elif self.degree is not None:
+            changes = {"bisection": replace(interpolator.bisection, degree=self.degree)}
+        changes = {name: value for name, value in changes.items() if value is not None}
+        return replace(usual, interpolator=replace(interpolator, **changes))
 
     def unit(self) -> ShadingPipelineUnit:
         """Its hardware."""
-        return ShadingPipelineUnit(self.design, style=self.style)
+        return ShadingPipelineUnit(self.design)
 
     @property
     def command(self) -> str:
         """What prints it as Verilog, in a shell."""
-        usual = ShadingPipeline(self.method, operand=self.operand).interpolator
+        usual = preset(self.method, operand=self.operand).interpolator
         if self.method in METHODS and self.design.interpolator == usual:
             words = ["blysk", "verilog", "--method", self.method, "--model", self.model]
             words += ["--lights", str(self.lights)] if self.lights != 1 else []
@@ -209,7 +200,7 @@ class Sweep(NamedTuple):
         for method in self.methods:
             degrees = self.degrees if _degrees(method) else (None,)
             words = self.fraction_bits if method == "chord" else (None,)
-            usual = (METHODS | PRINTED)[method].operand
+            usual = (METHODS | PUBLISHED)[method].operand
             operands = [None if operand == usual else operand for operand in self.operands]
             for values in product(self.models, self.lights, operands, degrees, words, self.styles):
                 try:
@@ -250,28 +241,28 @@ def errors_of(candidate: Mapping[str, Any], place: Mapping[str, Any], exponent: 
     -------
     dict
         ``errors``: by each of `ERRORS`, ``max_lsb``, ``p999_lsb`` and ``rmse_lsb``;
-        ``wide_spans``: spans that are too wide for the design, whose pixels are not to be trusted;
+        ``out_of_range_spans``: spans that are too wide for the design, whose pixels are not to be trusted;
         ``lengths``: pairs of a length of spans and how many have it.
     """
     tried = Candidate(**candidate)
     (scene,) = scenes_of(place, [exponent])
     scene = _lit(scene, tried.lights)
-    frame = twin_frame(scene, tried.design)
+    frame = model_frame(scene, tried.design)
     comparison = compare(scene, tried.design, frame)
     figures = {name: asdict(getattr(comparison, f"{name}_error")) for name in ERRORS}
     lengths, counts = np.unique(frame.cut_raster.length, return_counts=True)
     return {
         "errors": {name: {key: of[key] for key in _FIGURES} for name, of in figures.items()},
-        "wide_spans": frame.wide_spans,
+        "out_of_range_spans": frame.out_of_range_spans,
         "lengths": [list(pair) for pair in zip(lengths.tolist(), counts.tolist(), strict=True)],
     }
 
 
 def costs_of(candidate: Mapping[str, Any]) -> dict[str, int]:
-    """What a design takes, by `Cost.totals`; ``clocks_per_pixel`` and ``setup_interval``."""
+    """What a design takes, by `Cost.totals`; ``cycles_per_pixel`` and ``setup_interval``."""
     unit = Candidate(**candidate).unit()
     return cost_of(unit).totals | {
-        "clocks_per_pixel": unit.clocks_per_pixel,
+        "cycles_per_pixel": unit.cycles_per_pixel,
         "setup_interval": unit.setup_interval,
     }
 
@@ -298,20 +289,20 @@ class Explored:
         Of `errors_of`.
     costs : dict
         Of `Cost.totals`.
-    clocks_per_pixel : float or None
-        At most, as the units state it: of each span ``max(clocks_per_pixel length, setup_interval)``, over
+    cycles_per_pixel : float or None
+        At most, as the units state it: of each span ``max(cycles_per_pixel length, setup_interval)``, over
         the pixels. Besides, a frame takes its constants' writes and the latency. It takes fewer where long
         spans pay for short ones or pixels lack terms. ``None`` for ``bisection``, which states no interval
         of the spans that it divides.
-    wide_spans : int
+    out_of_range_spans : int
         Of `errors_of`.
     """
 
     candidate: Candidate
     errors: dict[str, dict[str, float]]
     costs: dict[str, int]
-    clocks_per_pixel: float | None
-    wide_spans: int
+    cycles_per_pixel: float | None
+    out_of_range_spans: int
 
     def as_dict(self) -> dict[str, Any]:
         """The figures under stable names."""
@@ -331,15 +322,15 @@ def explored(tasks: Sequence[Task], results: Sequence[Any]) -> list[Explored]:
             continue
         frame = measured[errors_of, replace(candidate, style="throughput")]
         lengths, counts = np.array(frame["lengths"]).T
-        clocks = np.maximum(result["clocks_per_pixel"] * lengths, result["setup_interval"])
+        cycles = np.maximum(result["cycles_per_pixel"] * lengths, result["setup_interval"])
         divides = isinstance(candidate.design.interpolator, BisectionInterpolator)
         found.append(
             Explored(
                 candidate,
                 frame["errors"],
                 {name: result[name] for name in COSTS.values()},
-                None if divides else float((clocks * counts).sum() / (lengths * counts).sum()),
-                frame["wide_spans"],
+                None if divides else float((cycles * counts).sum() / (lengths * counts).sum()),
+                frame["out_of_range_spans"],
             )
         )
     return found
@@ -364,7 +355,7 @@ def front_of(designs: Sequence[Explored], error: str, cost: str, *, given_values
     """
     errors = [
         None
-        if one.wide_spans or (one.candidate.design.takes_values and not given_values)
+        if one.out_of_range_spans or (one.candidate.design.takes_values and not given_values)
         else one.errors[error]["max_lsb"]
         for one in designs
     ]
@@ -386,7 +377,7 @@ def cheapest(designs: Sequence[Explored], error: str, largest: float, cost: str)
     usable = [
         (one.costs[COSTS[cost]], one.errors[error]["max_lsb"], index)
         for index, one in enumerate(designs)
-        if not one.wide_spans and one.errors[error]["max_lsb"] <= largest
+        if not one.out_of_range_spans and one.errors[error]["max_lsb"] <= largest
     ]
     return [index for *_, index in sorted(usable)]
 
@@ -428,7 +419,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         for cost in ("cells", "multipliers")
     }
     best = cheapest(designs, "method", 1.0, "cells")
-    wide = sum(one.wide_spans > 0 for one in designs)
+    out_of_range = sum(one.out_of_range_spans > 0 for one in designs)
     text = [
         f"{len(designs)} pipelines draw {place['source']} at {place['width']}x{place['height']}, exponent "
         f"{EXPONENT}: methods, reflection models, operands of the specular unit, degrees of the methods' "
@@ -437,10 +428,10 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "a design takes is counted in its netlist before technology mapping. `blysk explore` does the same "
         "for any mesh, and for more choices."
     ]
-    if wide:
+    if out_of_range:
         text.append(
-            f"{wide} of them flag spans of this scene as too wide, and are on no front: their polynomial is "
-            "for narrower ones."
+            f"{out_of_range} of them flag spans of this scene as too wide, and are on no front: their "
+            "polynomial is for narrower ones."
         )
     for given, which in (
         (False, "The cheapest within 1 LSB of exactly normalised interpolation"),
@@ -457,8 +448,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             *_choices(one.candidate),
             *(one.errors[name]["max_lsb"] for name in ERRORS),
             *(one.costs[name] for name in COSTS.values()),
-            one.clocks_per_pixel,
-            one.wide_spans,
+            one.cycles_per_pixel,
+            one.out_of_range_spans,
             *(bool(on_front[index]) for on_front in fronts.values()),
         )
         for index, one in enumerate(designs)
@@ -466,7 +457,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     columns = (
         *_CHOICES,
         *(f"largest {name} error, LSB" for name in ERRORS),
-        *("cells", "multipliers", "register bits", "memory bits", "clocks a pixel at most", "spans too wide"),
+        *("cells", "multipliers", "register bits", "memory bits", "cycles a pixel at most", "spans too wide"),
         *(f"front of {error} error and {cost}" for error, cost in fronts),
     )
     note = (
@@ -517,7 +508,7 @@ def _drawing(designs: Sequence[Explored], fronts: Mapping[tuple[str, str], np.nd
     for axes, ((error, cost), on_front) in zip(grid.flat, fronts.items(), strict=True):
         line = []
         for one, chosen in zip(designs, on_front.tolist(), strict=True):
-            if one.wide_spans:
+            if one.out_of_range_spans:
                 continue
             point = (one.costs[cost], one.errors[error]["max_lsb"])
             line += [point] if chosen else []
@@ -624,9 +615,9 @@ _USUAL = Sweep()
 )
 @_option(
     "--methods",
-    [*METHODS, *PRINTED],
+    [*METHODS, *PUBLISHED],
     _USUAL.methods,
-    f"Interpolation along a span; also {', '.join(PRINTED)}.",
+    f"Interpolation along a span; also {', '.join(PUBLISHED)}.",
 )
 @_option("--models", MODELS, _USUAL.models, f"Of the reflection models {', '.join(MODELS)}.")
 @_option("--lights", range(1, MAX_LIGHTS + 1), _USUAL.lights, f"Numbers of lights, to {MAX_LIGHTS}.")
@@ -702,13 +693,16 @@ def command(mesh, exponent, size, largest, error, cost, highlights, limit, jobs,
         )
     if impossible:
         print(f"impossible  {sum(impossible.values())} combinations: {left_out}")
-    wide = sum(one.wide_spans > 0 for one in designs)
-    if wide:
-        print(f"too narrow  {wide} of {len(designs)} designs: the scene has spans wider than they can shade")
+    out_of_range = sum(one.out_of_range_spans > 0 for one in designs)
+    if out_of_range:
+        print(
+            f"too narrow  {out_of_range} of {len(designs)} designs: "
+            "the scene has spans wider than they can shade"
+        )
     best = cheapest(designs, error, largest, cost)
     print(f"designs     {len(best)} of {len(designs)} have a {error} error of at most {largest:g} LSB")
     if not best:
-        usable = [one.errors[error]["max_lsb"] for one in designs if not one.wide_spans]
+        usable = [one.errors[error]["max_lsb"] for one in designs if not one.out_of_range_spans]
         least = f"the least is {min(usable):.2f} LSB" if usable else "all of them flag spans as too wide"
         raise InputError(
             f"--largest-error {largest:g}",
@@ -723,7 +717,7 @@ def command(mesh, exponent, size, largest, error, cost, highlights, limit, jobs,
         print(f"{number:>3}  {designs[index].candidate.command}")
 
 
-_HEAD = ("", "", *_CHOICES, *(f"{name} error" for name in ERRORS), *COSTS, "clocks")
+_HEAD = ("", "", *_CHOICES, *(f"{name} error" for name in ERRORS), *COSTS, "cycles")
 
 
 def _table(designs: Sequence[Explored], on_front: Sequence[bool]) -> str:
@@ -737,7 +731,7 @@ def _table(designs: Sequence[Explored], on_front: Sequence[bool]) -> str:
                 *("-" if x is None else str(x) for x in _choices(one.candidate)),
                 *(f"{one.errors[name]['max_lsb']:.2f}" for name in ERRORS),
                 *(f"{one.costs[name]:,}" for name in COSTS.values()),
-                "-" if one.clocks_per_pixel is None else f"{one.clocks_per_pixel:.2f}",
+                "-" if one.cycles_per_pixel is None else f"{one.cycles_per_pixel:.2f}",
             )
         )
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]

@@ -27,6 +27,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -42,7 +43,7 @@ from tqdm import tqdm
 from blysk.bench.store import version_of
 from blysk.bench.tools.blocks import BLOCKS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
-from blysk.golden.pipeline import METHODS
+from blysk.golden.presets import METHODS
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import Choice, OutputFile, Settings, Whole, chosen_design, design_options
 from blysk.sim.engines.cxxrtl import cache_folder
@@ -695,10 +696,7 @@ def _pipelines(
         name += [f"interval {settings['setup_interval']}"] if settings["setup_interval"] else []
         name += ["gate"] if settings["gate"] else []
 
-        def unit(design=design):
-            return ShadingPipelineUnit(design, settings["setup_interval"], settings["style"])
-
-        yield ", ".join(name), unit
+        yield ", ".join(name), partial(ShadingPipelineUnit, design)
 
 
 @click.command(short_help="Place and route for an FPGA: parts, clock rate.")

@@ -547,7 +547,7 @@ _STRUCTURE_NOTE = (
 _TIMING_NOTE = (
     "From a simulation, clock by clock as read just before the rising edge. A, B, C are the input beats, A0, "
     "A1 the results of A where it has several; the source pauses before the last beat, the sink stalls at a "
-    "first result. Dots stand for clocks without a change. A drawing for each interval; the latencies of all "
+    "first result. Dots stand for cycles without a change. A drawing for each interval; the latencies of all "
     "variants are in the table above."
 )
 

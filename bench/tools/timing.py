@@ -47,7 +47,7 @@ class Waves:
     outputs: list[str | None]
 
     @property
-    def clocks(self) -> int:
+    def cycles(self) -> int:
         """Clocks shown."""
         return len(self.inputs)
 
@@ -55,7 +55,7 @@ class Waves:
 def waves_of(unit: Component, beat: dict | None = None, beats: int = 3) -> Waves:
     """Simulate a unit with a pause of the source and a stall of the sink.
 
-    The source pauses for two clocks before its last beat; the sink is not ready for two clocks when the first
+    The source pauses for two cycles before its last beat; the sink is not ready for two cycles when the first
     result is there, or the second where a beat has several. Constants are 0, and where nothing is offered
     every bit of the payload is 1.
 
@@ -142,14 +142,14 @@ def _shown(waves: Waves) -> list[int | None]:
             waves.inputs[k],
             waves.outputs[k],
         )
-        for k in range(waves.clocks)
+        for k in range(waves.cycles)
     ]
     shown: list[int | None] = []
     start = 0
     for _, run in groupby(states):
         length = len(list(run))
-        clocks = list(range(start, start + length))
-        shown += [*clocks[:2], None, *clocks[-2:]] if length > QUIET else clocks
+        cycles = list(range(start, start + length))
+        shown += [*cycles[:2], None, *cycles[-2:]] if length > QUIET else cycles
         start += length
     return shown
 

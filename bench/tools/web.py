@@ -41,16 +41,22 @@ from blysk.bench.store import Task, version_of
 from blysk.bench.tools.pages import PROJECT
 from blysk.golden.frame_constants import FIELDS_OF_A_FRAME, FIELDS_OF_A_LIGHT, LIGHT_STRIDE
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
+from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.golden.pipeline import METHODS, MODELS, ShadingPipeline, Spans
+from blysk.golden.pipeline import Design, Spans
+from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
-from blysk.golden.reference.reflection import COSCOS_MODELS, LINE_MODELS, coscos_scale, slope
+from blysk.golden.reference.reflection import (
+    REFLECTION_MODELS,
+    AngleCosine,
+    PolynomialModel,
+    PowerModel,
+)
 from blysk.golden.reference.scene import Scene
 from blysk.sim.cli.main import Whole
-from blysk.sim.engines.engine import End
+from blysk.sim.engines.engine import StopReason
 from blysk.sim.engines.probes import ObservedPipeline, probes_of
 from blysk.sim.engines.wasm import build, format_of, ports_of
 from blysk.sim.errors import InputError
@@ -89,7 +95,7 @@ WIDTH, HEIGHT = 320, 240
 BANDS = (100, MAX_EXPONENT)
 """Spans are cut for these exponents; a frame has those of the smallest that is not under its own."""
 
-DESIGNS = tuple(pair for pair in accuracy.DESIGNS if not ShadingPipeline(pair[0]).takes_values)
+DESIGNS = tuple(pair for pair in accuracy.DESIGNS if not preset(pair[0]).takes_values)
 """Method and model of each module. Where spans carry values of the light, it cannot be moved without them."""
 
 BACKGROUND = "#1a1c20"
@@ -178,9 +184,9 @@ MESHES = {
 """Meshes of the page, by name."""
 
 
-def design_of(method: str, model: str) -> ShadingPipeline:
+def design_of(method: str, model: str) -> Design:
     """The pipeline of a module: one light, and a highlight gate."""
-    return ShadingPipeline(method, model, gate=True)
+    return preset(method, model, gate=True)
 
 
 @cache
@@ -289,7 +295,7 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
     streams: dict[str, list[int]] = {}
     cuts: dict[tuple, int] = {}
     for method in methods:
-        design = ShadingPipeline(method)
+        design = preset(method)
         streams[method] = []
         for exponent in BANDS:
             cut = design.interpolator.widest_span(exponent), design.interpolator.largest_bend(exponent)
@@ -345,17 +351,16 @@ def module_of(method: str, model: str) -> dict[str, Any]:
 def model_table(model: str) -> dict[str, Any]:
     """What float64 needs of a reflection model: its ``kind``; slopes or scales for exponents 1 to 1000."""
     exponents = range(1, MAX_EXPONENT + 1)
-    if model == "blinn":
+    unit, reflection = MODELS[model], REFLECTION_MODELS[model]
+    if isinstance(reflection, PowerModel):
         return {"kind": "power"}
-    p = Specular(model)
-    if model in LINE_MODELS:
-        slopes = [slope(model, exponent) for exponent in exponents]
-        return {"kind": "line", "power": 1 << p.squarings, "slopes": slopes}
-    found = {"slopes": p.slopes.values[1 : MAX_EXPONENT + 1].tolist()}
-    if model in COSCOS_MODELS:
-        power, rule = COSCOS_MODELS[model]
-        scales = [coscos_scale(exponent, power, rule) for exponent in exponents]
-        return found | {"kind": "coscos", "power": power, "scales": scales}
+    if isinstance(reflection, PolynomialModel):
+        slopes = [reflection.slope(exponent) for exponent in exponents]
+        return {"kind": "line", "power": 1 << unit.squarings, "slopes": slopes}
+    found = {"slopes": unit.slopes.values[1 : MAX_EXPONENT + 1].tolist()}
+    if isinstance(reflection, AngleCosine):
+        scales = [reflection.scale(exponent) for exponent in exponents]
+        return found | {"kind": "coscos", "power": reflection.power, "scales": scales}
     return found | {"kind": "exp"}
 
 
@@ -368,7 +373,7 @@ def tables() -> dict[str, Any]:
         "frame": FIELDS_OF_A_FRAME,
         "light": FIELDS_OF_A_LIGHT,
         "stride": LIGHT_STRIDE,
-        "done": int(End.DONE),
+        "done": int(StopReason.DONE),
     }
 
 
@@ -613,7 +618,7 @@ class _Design(click.ParamType):
         if isinstance(value, tuple):
             return value
         method, _, model = value.partition("/")
-        served = [name for name in METHODS if ShadingPipeline(name).serves_gate]
+        served = [name for name in METHODS if METHODS[name].serves_gate]
         if method not in served:
             raise InputError(f"--design {value}", "unknown method", f"use one of {', '.join(served)}")
         if model not in MODELS:

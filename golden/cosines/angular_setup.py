@@ -293,8 +293,8 @@ class AngularSetup:
         half = angle.scale(-1).extend(UQ(0, 40))
         phase = (direction.extend(self.PHASE_FORMAT) + half).wrap(self.PHASE_FORMAT)
         step = self._step(angle, angle_shift, length)
-        wide = obtuse & (chord.truncate(self.SHORTEST_SUM.format.fraction_bits) < self.SHORTEST_SUM)
-        return angle, phase, step, cos_beta, wide
+        out_of_range = obtuse & (chord.truncate(self.SHORTEST_SUM.format.fraction_bits) < self.SHORTEST_SUM)
+        return angle, phase, step, cos_beta, out_of_range
 
     def _by_arccos(self, cross: Fixed) -> Fixed:
         """Psi in turns, from the exact dot product of the normals."""

@@ -13,7 +13,7 @@ from blysk.golden.number.unit_vector import ONE_SQUARED
 
 __all__ = ["ARCCOS_TABLES", "PRINTED_COEFFICIENTS", "SEGMENT_BOUNDS", "Arccos", "HalfChord"]
 
-ARCCOS_TABLES = ("printed", "corrected", "refitted")
+ARCCOS_TABLES = ("as_published", "corrected", "refitted")
 """Coefficients that the arccos unit can hold."""
 
 SEGMENT_BOUNDS = (0.0, 0.5, 0.75, 0.9, 0.96, 1.0)
@@ -69,8 +69,8 @@ class Arccos:
     Parameters
     ----------
     table : str
-        ``"printed"``: [T] table 3.1 digit by digit; ``"corrected"``: with 74.457 for the misprinted 74.547;
-        ``"refitted"``: least maximum error of each segment, in words of the hardware.
+        ``"as_published"``: [T] table 3.1 digit by digit; ``"corrected"``: with 74.457 for the misprinted
+        74.547; ``"refitted"``: least maximum error of each segment, in words of the hardware.
 
     Raises
     ------
@@ -80,7 +80,7 @@ class Arccos:
     Source: [T] 3.3, table 3.1; numbers.md, "arccos".
     """
 
-    table: Literal["printed", "corrected", "refitted"] = "refitted"
+    table: Literal["as_published", "corrected", "refitted"] = "refitted"
 
     OPERAND_FORMAT = SQ(2, 16)
     MAGNITUDE_FORMAT = UQ(1, 16)

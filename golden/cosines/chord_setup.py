@@ -180,7 +180,7 @@ class ChordSetup:
         if {v.format for v in (normal_left, normal_right, direction, halfway)} != {COMPONENT}:
             raise ValueError(f"operands must be {COMPONENT}")
         w = Chord().compute(normal_right, normal_left).round_half_up(20).saturate(self.ANGLE_FORMAT)
-        wide = w > self.widest
+        out_of_range = w > self.widest
         coefficients = [self.coefficients[i] for i in range(self.terms)]
         total = coefficients.pop()
         while coefficients:
@@ -204,7 +204,7 @@ class ChordSetup:
         bend = (-(e * along).scale(2)).round_half_up(20).saturate(self.BEND_FORMAT)
         slope = (f_right - f_left - bend).round_half_up(18).wrap(self.HIGH_FORMAT)
         diffuse = self.differences(f_left, slope.extend(self.SLOPE_FORMAT), bend, *steps)
-        return diffuse, highlight, wide
+        return diffuse, highlight, out_of_range
 
     def highlight_error(self, angle: float, u: np.ndarray = 2.0) -> np.ndarray:
         """Largest error of u at any pixel against the quadratic through the exact values.

@@ -83,7 +83,7 @@ class LocalChordSetup:
                 f"not {diffuse.format}, {highlight.format}"
             )
         steps = ChordSetup.steps(length)
-        wide = np.zeros(len(length), dtype=bool)
+        out_of_range = np.zeros(len(length), dtype=bool)
         results = []
         for values, start_format, slope_format in (
             (diffuse, ChordSetup.COSINE_FORMAT, self.DIFFUSE_SLOPE_FORMAT),
@@ -92,13 +92,13 @@ class LocalChordSetup:
             left, middle, right = (values[..., place] for place in range(3))
             exact = (left + right - middle.scale(1)).scale(1).round_half_up(self.BEND_FORMAT.fraction_bits)
             bend = exact.saturate(self.BEND_FORMAT)
-            wide |= (exact != bend).any(axis=1)
+            out_of_range |= (exact != bend).any(axis=1)
             exact = (right - left - bend).round_half_up(slope_format.fraction_bits)
             slope = exact.saturate(slope_format)
-            wide |= (exact != slope).any(axis=1)
+            out_of_range |= (exact != slope).any(axis=1)
             slope = slope.extend(ChordSetup.SLOPE_FORMAT)
             results.append(ChordSetup().differences(left.extend(start_format), slope, bend, *steps))
-        return *results, wide
+        return *results, out_of_range
 
     @classmethod
     def highlight_error(cls, slope: np.ndarray, bend: np.ndarray) -> np.ndarray:

@@ -71,7 +71,7 @@ class Recurrence:
     bits at most 5.7e-5 and, F = 24, 2.3e-7. A rounded coefficient gives ``direct`` under 0.1 in the second
     and third case, by luck: ``2^F (2 - 2 cos d)`` is 1.1 there, close to a whole number.
 
-    **Interleaved**, for one pixel a clock: the loop holds a product, which takes several clocks, so four
+    **Interleaved**, for one pixel a clock: the loop holds a product, which takes several cycles, so four
     recurrences share it. Phase j has pixels j, j + 4, j + 8, ...: ``x(k+4) = 2 cos(4d) x(k) - x(k-4)``, the
     same recurrence with a step of 4d and start values of its own. It runs through ``ceil(m/4)`` values, so
     that `error` is that of so many pixels 4d apart: the same ``psi^2/2 2^-F``, a sixteenth of the cut's drift

@@ -241,7 +241,7 @@ class RecurrenceSetup:
             raise ValueError(f"operands must be {COMPONENT}")
         chord = Chord().compute(normal_right, normal_left)
         chord = chord + chord.scale(-16).truncate(35)
-        wide = chord >= self.WIDEST
+        out_of_range = chord >= self.WIDEST
         chord = chord.saturate(self.CHORD_FORMAT)
         q, q_shift = self._normalised(chord)
         square, inverse = (self._looked_up(t, chord.codes, 35) for t in self.chord_tables)
@@ -286,7 +286,7 @@ class RecurrenceSetup:
             codes = -(-(coefficient.codes << 1) >> shift)
             coefficient = Fixed(SQ(4, 16), codes - (2 << 16)).saturate(self.recurrence.coefficient_format)
             shift = np.zeros_like(shift)
-        return first, second, coefficient, shift, wide
+        return first, second, coefficient, shift, out_of_range
 
     def _cosine(self, normal: Fixed, vector: Fixed) -> Fixed:
         cosine = DotProduct().compute(normal, vector)

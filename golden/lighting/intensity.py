@@ -105,7 +105,7 @@ class Intensity:
         color = total.codes.astype(np.uint8)
         return color if self.channels == 3 else np.repeat(color[:, :1], 3, axis=-1)
 
-    def clocks(self, diffuse: Fixed, specular: Fixed) -> np.ndarray:
+    def cycles(self, diffuse: Fixed, specular: Fixed) -> np.ndarray:
         """Clocks that each pixel takes in the unit's compact style: ``channels max(1, terms not 0)``.
 
         Parameters

@@ -1,12 +1,13 @@
 """Exact power unit: Blinn's highlight by square and multiply, the baseline of the approximations."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from blysk.golden.lighting.specular import HighlightOperand
 from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.reference.reflection import BLINN
 
 __all__ = ["Power"]
 
@@ -50,9 +51,16 @@ class Power(HighlightOperand):
 
     operand: Literal["cosine", "one_minus_cosine"] = "cosine"
 
+    model: ClassVar = BLINN
+
     COMPLEMENT_FORMAT = UQ(0, 34)
     FACTOR_FORMAT = UQ(0, 17)
     ERROR = 6 * 2.0**-17
+
+    @property
+    def name(self) -> str:
+        """Name of the reflection model."""
+        return self.model.name
 
     @property
     def last_lit_arguments(self):

@@ -3,44 +3,25 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import UQ, Fixed, Format
 from blysk.golden.number.unit_vector import ONE_SQUARED
-from blysk.golden.reference.reflection import COSCOS_MODELS, coscos_scale, slope
+from blysk.golden.reference.reflection import (
+    COSQUAD,
+    AngleCosine,
+    Exponential,
+    PolynomialModel,
+    ReflectionModel,
+)
 
-__all__ = ["FURTHER_MODELS", "MAX_EXPONENT", "SPECULAR_MODELS", "Chords", "HighlightOperand", "Specular"]
+__all__ = ["MAX_EXPONENT", "Chords", "HighlightOperand", "Specular"]
 
 MAX_EXPONENT = 1000
 """Largest specular exponent."""
-
-SPECULAR_MODELS = ("cosquad", "cosquad7", "cosquad_lin")
-"""Reflection models of the documents that the unit serves, all of one latency."""
-
-# a and b of the slope k = a n + b, None where a table holds k; and how often the base is squared.
-_MODELS = {
-    "cosquad": ((1 / 2, 0.0), 1),
-    "cosquad7": ((7 / 16, 0.0), 1),
-    "cosquad_lin": ((0.448, 0.099), 1),
-    "cosquad_q": (None, 1),
-    "cosquad_lin_refitted": ((0.44813, 0.10235), 1),
-    "lyon1_refitted": ((0.3557, 0.2457), 1),
-    "lyon2": ((1 / 4, 0.0), 2),
-    "lyon2_refitted": ((0.2113, 0.1468), 2),
-    "lyon3": ((1 / 8, 0.0), 3),
-    "lyon3_refitted": ((0.1150, 0.0799), 3),
-    "exp": ((math.log2(math.e) / 16, 0.0), 0),
-    "coscos2": ((4 / math.pi**2, 0.0), 1),
-    "coscos4": ((2 / math.pi**2, 0.0), 2),
-    "coscos2_integral": (None, 1),
-    "coscos4_integral": (None, 2),
-}
-
-FURTHER_MODELS = tuple(model for model in _MODELS if model not in SPECULAR_MODELS)
-"""Reflection models that the unit serves beside those: more squarers, tables of a slope or a curve."""
 
 
 class HighlightOperand:
@@ -195,16 +176,16 @@ class Specular(HighlightOperand):
 
     Parameters
     ----------
-    model : str
-        One of `SPECULAR_MODELS` or `FURTHER_MODELS`.
+    model : ReflectionModel
+        A polynomial, an `AngleCosine` or an `Exponential`.
     operand : str
         ``"cosine"`` or ``"one_minus_cosine"``; see `HighlightOperand`.
-    as_documented : bool
-        The comparator of figure 3.6 as drawn, for `SPECULAR_MODELS`: it compares the *square*, with 2^-14 at
-        every exponent. Up to the base's zero the terms are those of the default to the bit. Past it the
-        parabola rises again and its second lobe comes through; squares over 1 saturate, so that from
-        ``k (1 - cos gamma) = 2`` on the surface is as bright as at the peak: at n = 20 from 37 degrees on.
-        A highlight gate for such a unit lets every span through.
+    as_published : bool
+        The comparator of figure 3.6 as drawn, for polynomials that are squared once: it compares the
+        *square*, with 2^-14 at every exponent. Up to the base's zero the terms are those of the default to
+        the bit. Past it the parabola rises again and its second lobe comes through; squares over 1 saturate,
+        so that from ``k (1 - cos gamma) = 2`` on the surface is as bright as at the peak: at n = 20 from 37
+        degrees on. A highlight gate for such a unit lets every span through.
 
     Raises
     ------
@@ -215,9 +196,12 @@ class Specular(HighlightOperand):
     numbers.md, "Traps in the documents".
     """
 
-    model: str = "cosquad"
+    model: ReflectionModel = COSQUAD
     operand: Literal["cosine", "one_minus_cosine"] = "cosine"
-    as_documented: bool = False
+    as_published: bool = False
+
+    SERVED: ClassVar = (PolynomialModel, AngleCosine, Exponential)
+    """Families of reflection models that the unit serves."""
 
     SLOPE_FORMAT = UQ(9, 18)
     SCALE_FORMAT = UQ(0, 17)
@@ -228,21 +212,36 @@ class Specular(HighlightOperand):
     ERROR = 2.0**-13
 
     def __post_init__(self):
-        if self.model not in _MODELS:
-            raise ValueError(f"the specular unit serves {', '.join(_MODELS)}, not {self.model!r}")
-        if self.as_documented and self.model not in SPECULAR_MODELS:
-            raise ValueError(f"as_documented is of {', '.join(SPECULAR_MODELS)}, not of {self.model}")
+        if not isinstance(self.model, self.SERVED):
+            raise ValueError(f"the specular unit does not serve {self.model.name}")
+        squared_once = isinstance(self.model, PolynomialModel) and self.model.squarings == 1
+        if self.as_published and not (squared_once and self.model.curve is None):
+            raise ValueError(
+                f"as_published is of polynomials that are squared once, not of {self.model.name}"
+            )
         super().__post_init__()
+
+    @property
+    def name(self) -> str:
+        """Name of the reflection model."""
+        return self.model.name
 
     @property
     def is_coscos(self) -> bool:
         """Whether the model is a power of ``cos(a gamma)``."""
-        return self.model in COSCOS_MODELS
+        return isinstance(self.model, AngleCosine)
+
+    @property
+    def is_exponential(self) -> bool:
+        """Whether the model is an exponential, which shifts in place of squaring."""
+        return isinstance(self.model, Exponential)
 
     @property
     def squarings(self) -> int:
         """How often the base is squared: 1 to 3, 0 for ``exp``."""
-        return _MODELS[self.model][1]
+        if self.is_coscos:
+            return self.model.power.bit_length() - 1
+        return 0 if self.is_exponential else self.model.squarings
 
     @property
     def error(self) -> float:
@@ -252,17 +251,23 @@ class Specular(HighlightOperand):
     @property
     def cutoff(self) -> Fixed:
         """Smallest base that is not cut off: what it leads to is 2^-14 at most."""
-        if self.model == "exp":
+        if self.is_exponential:
             return Fixed(self.BASE_FORMAT, self.BASE_FORMAT.code(1 / 8))
         return Fixed(self.BASE_FORMAT, math.floor(2.0 ** (17 - 14 / 2**self.squarings)))
 
     @property
     def slope_terms(self) -> tuple[Fixed, Fixed] | None:
         """``a`` and ``b`` of the slope ``k = a n + b``, in words of the hardware; None: a table holds k."""
-        line, _ = _MODELS[self.model]
-        if line is None:
+        if self.is_exponential:
+            a, b = math.log2(math.e) / 16, 0.0
+        elif self.is_coscos:
+            if self.model.rule != "taylor":
+                return None
+            a, b = 8 / (self.model.power * math.pi**2), 0.0
+        elif self.model.curve is not None:
             return None
-        a, b = line
+        else:
+            a, b = self.model.a, self.model.b
         return Fixed.round(UQ(0, 19), a), Fixed.round(UQ(0, 18), b)
 
     @cached_property
@@ -277,8 +282,8 @@ class Specular(HighlightOperand):
 
     def _slope(self, exponent: int) -> float:
         if self.is_coscos:
-            return 8 * (coscos_scale(exponent, *COSCOS_MODELS[self.model]) / math.pi) ** 2
-        return slope(self.model, exponent)
+            return 8 * (self.model.scale(exponent) / math.pi) ** 2
+        return self.model.slope(exponent)
 
     def scale(self, exponent: np.ndarray) -> tuple[Fixed, np.ndarray]:
         """``K`` and ``s`` of the slope ``k = K 2^s``, for exponents 0 to 1023.
@@ -299,7 +304,7 @@ class Specular(HighlightOperand):
     @cached_property
     def chords(self) -> Chords:
         """Table of ``exp``, ``2^-f``, or of ``coscos``, ``cos(pi/2 sqrt w)``: 64 chords."""
-        if self.model == "exp":
+        if self.is_exponential:
             return Chords.of(_lowered(lambda f: 2.0**-f, 64), UQ(0, 19), UQ(-6, 19))
         return Chords.of(_lowered(lambda w: np.cos(math.pi / 2 * np.sqrt(w)), 64), UQ(0, 19), UQ(-5, 19))
 
@@ -318,7 +323,7 @@ class Specular(HighlightOperand):
         format = self.SHIFTED_FORMAT
         exponent = np.arange(1 << self.EXPONENT_BITS)
         scale, shift = self.scale(exponent)
-        if self.as_documented:
+        if self.as_published:
             return Fixed(format, np.full(exponent.shape, format.max_code))
         if not self.is_coscos:
             largest = self.BASE_FORMAT.max_code - self.cutoff.codes
@@ -367,12 +372,12 @@ class Specular(HighlightOperand):
         scale, shift = self.scale(np.int64(exponent))
         shifted = Fixed(UQ(10, 26), argument.codes << (shift + 1)).truncate(16)
         lit = ~np.asarray(dark, dtype=bool)
-        if self.as_documented:
+        if self.as_published:
             return self._drawn(shifted.saturate(self.WIDE_FORMAT) * scale, lit)
         shifted = shifted.saturate(self.SHIFTED_FORMAT)
         lit &= shifted <= self.boundaries[exponent]
         product = shifted * scale
-        if self.model == "exp":
+        if self.is_exponential:
             return self._exponential(product.truncate(21).scale(4), lit)
         if self.is_coscos:
             base = self._cosine(argument, product)

@@ -38,6 +38,20 @@ class AngularInterpolator(Interpolator):
     CURVE = "slerp"
 
     @property
+    def name(self):
+        """Name on the command line and in tables."""
+        return (
+            "angular"
+            if self.serves_gate
+            else f"angular-{self.setup.arccos.table}".replace("as_published", "published")
+        )
+
+    @property
+    def serves_gate(self):
+        """Not with an arccosine."""
+        return self.setup.angle == "half_chord"
+
+    @property
     def highlight_excess(self):
         """Errors of the setup, of the cosine and of its cut: ``cos gamma(t)`` is the great circle's."""
         angles = np.linspace(1e-4, self.gate_angle, 1000)
@@ -50,8 +64,10 @@ class AngularInterpolator(Interpolator):
 
         def along(vector):
             vector = Fixed(COMPONENT, np.broadcast_to(vector, normal_left.codes.shape))
-            _, phase, step, cos_beta, wide = self.setup.compute(normal_left, normal_right, vector, length)
-            return HighlightCosine().compute(phase, step, cos_beta, *place).codes, wide
+            _, phase, step, cos_beta, out_of_range = self.setup.compute(
+                normal_left, normal_right, vector, length
+            )
+            return HighlightCosine().compute(phase, step, cos_beta, *place).codes, out_of_range
 
         one = Fixed(UQ(1, 25), 1 << 25)
         results = [[along(vector) for vector in vectors.codes] for vectors in (direction, halfway)]

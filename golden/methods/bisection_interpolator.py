@@ -46,6 +46,16 @@ class BisectionInterpolator(NormalInterpolator):
         AdaptiveNormaliser(self.threshold)
 
     @property
+    def name(self):
+        """Name on the command line and in tables."""
+        return "bisection" if self.serves_gate else "bisection-published"
+
+    @property
+    def serves_gate(self):
+        """Not with the published polynomials."""
+        return not self.bisection.as_published
+
+    @property
     def normaliser(self) -> AdaptiveNormaliser:
         """The unit."""
         return _normaliser(self.threshold, self.bisection)
@@ -63,8 +73,8 @@ class BisectionInterpolator(NormalInterpolator):
 
     def normals(self, normal_left, normal_right, length):
         """Bit-true normals."""
-        normals, wide, _ = self.normaliser.compute(normal_left, normal_right, length)
-        return normals, wide
+        normals, out_of_range, _ = self.normaliser.compute(normal_left, normal_right, length)
+        return normals, out_of_range
 
     def exact_normals(self, normal_left, normal_right, t):
         """Straight lines between exact points of the great circle."""

@@ -57,6 +57,11 @@ class ChordInterpolator(Interpolator):
     def __post_init__(self):
         _ = self.setup
 
+    @property
+    def name(self):
+        """Name on the command line and in tables."""
+        return "chord"
+
     @cached_property
     def setup(self) -> ChordSetup:
         """Twin of the setup."""
@@ -93,10 +98,12 @@ class ChordInterpolator(Interpolator):
 
     def compute(self, normal_left, normal_right, length, direction, halfway):
         """Bit-true operands."""
-        diffuse, highlight, wide = self.setup.compute(normal_left, normal_right, direction, halfway, length)
+        diffuse, highlight, out_of_range = self.setup.compute(
+            normal_left, normal_right, direction, halfway, length
+        )
         place = pixels_of(length)
         return Operands(
             self.accumulators["diffuse"].compute(*diffuse, *place),
             self.accumulators["highlight"].compute(*highlight, *place),
-            wide,
+            out_of_range,
         )

@@ -35,7 +35,7 @@ class Operands(NamedTuple):
 
     cosine: Fixed
     highlight: Fixed
-    wide: np.ndarray
+    out_of_range: np.ndarray
 
 
 def pixels_of(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -87,6 +87,16 @@ class Interpolator:
     COSINE_FORMAT: ClassVar[Format] = DotProduct().result_format
     MAX_ANGLE: ClassVar[float] = MAX_SPAN_ANGLE
     CURVE: ClassVar[str] = "normalised"
+
+    @property
+    def name(self) -> str:
+        """Name on the command line and in tables."""
+        raise NotImplementedError
+
+    @property
+    def serves_gate(self) -> bool:
+        """Whether a highlight gate can tell what the method's pixels will be: it has normals and a bound."""
+        return True
 
     @property
     def gate_angle(self) -> float:
@@ -221,7 +231,7 @@ class NormalInterpolator(Interpolator):
 
     def compute(self, normal_left, normal_right, length, direction, halfway) -> Operands:
         """Bit-true operands: exact products of the normals."""
-        normals, wide = self.normals(normal_left, normal_right, length)
+        normals, out_of_range = self.normals(normal_left, normal_right, length)
         normals = Fixed(COMPONENT, normals.codes[:, np.newaxis])
         product = DotProduct().compute if self.operand == "cosine" else Chord().operand
-        return Operands(DotProduct().compute(normals, direction), product(normals, halfway), wide)
+        return Operands(DotProduct().compute(normals, direction), product(normals, halfway), out_of_range)

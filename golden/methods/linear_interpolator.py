@@ -41,6 +41,11 @@ class LinearInterpolator(NormalInterpolator):
     renormalised: bool = False
 
     @property
+    def name(self):
+        """Name on the command line and in tables."""
+        return "renormalise" if self.renormalised else "linear"
+
+    @property
     def CURVE(self) -> str:
         """The curve in exact arithmetic."""
         return "normalised" if self.renormalised else "linear"
@@ -65,12 +70,12 @@ class LinearInterpolator(NormalInterpolator):
         """Bit-true normals."""
         difference = normal_right - normal_left
         p = difference.saturate(GPQ.P_FORMAT)
-        wide = np.any(p.codes != difference.codes, axis=-1)
+        out_of_range = np.any(p.codes != difference.codes, axis=-1)
         zero = Fixed(GPQ.G_FORMAT, np.zeros_like(p.codes))
         first, second = DifferenceSetup().compute(zero, p, length)
         span, step = pixels_of(length)
         normals = DifferenceAccumulator().compute(normal_left, first, second, span, step)
         if self.renormalised:
             normals, outside = Renormaliser().compute(normals)
-            wide[span[outside]] = True
-        return normals, wide
+            out_of_range[span[outside]] = True
+        return normals, out_of_range

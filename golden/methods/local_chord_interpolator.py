@@ -102,7 +102,7 @@ class LocalChordInterpolator(Interpolator):
         ValueError
             If a code or a length is out of range.
         """
-        diffuse, highlight, wide = LocalChordSetup().compute(
+        diffuse, highlight, out_of_range = LocalChordSetup().compute(
             Fixed(LocalChordSetup.DIFFUSE_FORMAT, values.diffuse),
             Fixed(LocalChordSetup.HIGHLIGHT_FORMAT, values.highlight),
             length,
@@ -111,7 +111,7 @@ class LocalChordInterpolator(Interpolator):
         return Operands(
             accumulators["diffuse"].compute(*diffuse, *place),
             accumulators["highlight"].compute(*highlight, *place),
-            wide,
+            out_of_range,
         )
 
     def exact_operands(self, values: SpanValues, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -172,6 +172,16 @@ class LocalChordInterpolator(Interpolator):
             At least 0.
         """
         return (np.asarray(exponent) - 1) * u < 7
+
+    @property
+    def name(self):
+        """Name on the command line and in tables."""
+        return "chord-local"
+
+    @property
+    def serves_gate(self):
+        """No: spans carry no normals."""
+        return False
 
     @property
     def diffuse_tolerance(self) -> float:

@@ -51,6 +51,18 @@ class QuadraticInterpolator(NormalInterpolator):
             QuadraticEvaluator(self.form)
 
     @property
+    def name(self):
+        """Name on the command line and in tables."""
+        return {"differences": "quadratic", "direct": "quadratic-eval", "horner": "quadratic-horner"}[
+            self.form
+        ] + ("" if self.serves_gate else "-published")
+
+    @property
+    def serves_gate(self):
+        """Not with another fit of the middle normal."""
+        return self.middle_normal == MiddleNormal()
+
+    @property
     def normal_error(self):
         """Errors of the middle normal, of the form that evaluates the curve, and of the last rounding.
 
@@ -73,10 +85,10 @@ class QuadraticInterpolator(NormalInterpolator):
 
     def normals(self, normal_left, normal_right, length):
         """Bit-true normals."""
-        middle, wide = self.middle_normal.compute(normal_left, normal_right)
+        middle, out_of_range = self.middle_normal.compute(normal_left, normal_right)
         g, p, q = GPQ().compute(normal_left, middle, normal_right)
         span, step = pixels_of(length)
         if self.form == "differences":
             first, second = DifferenceSetup().compute(g, p, length)
-            return DifferenceAccumulator().compute(q, first, second, span, step), wide
-        return QuadraticEvaluator(self.form).compute(g, p, q, length, span, step), wide
+            return DifferenceAccumulator().compute(q, first, second, span, step), out_of_range
+        return QuadraticEvaluator(self.form).compute(g, p, q, length, span, step), out_of_range

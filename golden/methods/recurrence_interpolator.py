@@ -46,6 +46,16 @@ class RecurrenceInterpolator(Interpolator):
     def __post_init__(self):
         _ = self.setup
 
+    @property
+    def name(self):
+        """Name on the command line and in tables."""
+        return "recurrence" if self.form == "reinsch" else "recurrence-direct"
+
+    @property
+    def serves_gate(self):
+        """Not with the direct form, which is unstable."""
+        return self.form == "reinsch"
+
     @cached_property
     def setup(self) -> RecurrenceSetup:
         """Setup, and the recurrence."""
@@ -65,7 +75,7 @@ class RecurrenceInterpolator(Interpolator):
         span, index = pixels_of(length)
         shape = (len(span), len(direction.codes))
         results = np.zeros((2, *shape), dtype=np.int64)
-        wide = np.zeros(len(length), dtype=bool)
+        out_of_range = np.zeros(len(length), dtype=bool)
         # All spans of a call go on as far as the longest does, so those of like length go together.
         size = np.frexp(length)[1]
         for group in np.unique(size):
@@ -74,11 +84,11 @@ class RecurrenceInterpolator(Interpolator):
             place = np.cumsum(inside)[span[pixels]] - 1
             for which, vectors in enumerate((direction, halfway)):
                 for light in range(shape[1]):
-                    *start, wide[part] = self.setup.compute(
+                    *start, out_of_range[part] = self.setup.compute(
                         normal_left[part], normal_right[part], vectors[light], length[part]
                     )
                     found = self.setup.recurrence.compute(*start, place, index[pixels])
                     results[which, pixels, light] = found.codes
         cosine, highlight = (Fixed(self.COSINE_FORMAT, codes) for codes in results)
         one = Fixed(UQ(1, 25), 1 << 25)
-        return Operands(cosine, (one - highlight).saturate(Specular.ARGUMENT_FORMAT), wide)
+        return Operands(cosine, (one - highlight).saturate(Specular.ARGUMENT_FORMAT), out_of_range)

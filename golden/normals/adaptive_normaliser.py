@@ -133,7 +133,7 @@ class AdaptiveNormaliser:
         difference = min(0.77, np.sqrt(8.1 * self.threshold))
         return self.end_error(levels, first_step) + difference * 2.0**-16 + 4096 * 2.0**-32 + 2.0**-18
 
-    def levels(self, one_minus_cosine: Fixed, wide: np.ndarray) -> np.ndarray:
+    def levels(self, one_minus_cosine: Fixed, out_of_range: np.ndarray) -> np.ndarray:
         """Number of levels k of spans, from what the bisection unit says of their ends.
 
         Parameters
@@ -147,7 +147,7 @@ class AdaptiveNormaliser:
         square = (operand * operand).scale(-4).truncate(20)
         sagitta = one_minus_cosine.scale(-2).extend(SQ(1, 20)) + square
         sagitta = sagitta.saturate(self.SAGITTA_FORMAT).codes[..., np.newaxis]
-        return np.where(wide, 0, (sagitta > self.limits.codes).sum(axis=-1))
+        return np.where(out_of_range, 0, (sagitta > self.limits.codes).sum(axis=-1))
 
     def compute(
         self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
@@ -179,8 +179,8 @@ class AdaptiveNormaliser:
         whole = 1 << self.depth
         ends = np.zeros((len(length), whole + 1, 3), dtype=np.int64)
         ends[:, 0], ends[:, -1] = normal_left.codes, normal_right.codes
-        _, u, wide = self.bisection.compute(normal_left, normal_right)
-        levels = self.levels(u, wide)
+        _, u, out_of_range = self.bisection.compute(normal_left, normal_right)
+        levels = self.levels(u, out_of_range)
         for level in range(1, self.depth + 1):
             active = np.flatnonzero(levels >= level)
             half = whole >> level
@@ -194,7 +194,7 @@ class AdaptiveNormaliser:
         right = Fixed(COMPONENT, ends[span, np.minimum((segment + 1) * spacing, whole)])
         difference = (right - left).saturate(COMPONENT)
         normal = self.walk(left, difference, length, levels, span, place, index)
-        return normal.truncate(COMPONENT.fraction_bits).saturate(COMPONENT), wide, levels
+        return normal.truncate(COMPONENT.fraction_bits).saturate(COMPONENT), out_of_range, levels
 
     def places(
         self, length: np.ndarray, levels: np.ndarray

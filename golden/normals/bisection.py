@@ -31,7 +31,7 @@ class Bisection:
     - from 45 to 90 degrees, the first step of a wide span: ``h(r) = 1/sqrt(2 (1 + r))``, the same function,
       as a cubic in r, fitted where it is used.
 
-    With ``as_documented`` both are polynomials in r with the printed coefficients (those of z doubled once
+    With ``as_published`` both are polynomials in r with the printed coefficients (those of z doubled once
     for every power of it).
 
     A span wider than `max_angle` by more than the rounding of its normals is flagged; its result means
@@ -78,7 +78,7 @@ class Bisection:
         1 or 2: degree of the polynomial for spans up to 45 degrees.
     max_angle : int
         90, or 45 for a unit without the first step, which saves its multiplications.
-    as_documented : bool
+    as_published : bool
         Take the coefficients printed in [T].
 
     Raises
@@ -91,7 +91,7 @@ class Bisection:
 
     degree: int = 2
     max_angle: int = 90
-    as_documented: bool = False
+    as_published: bool = False
 
     ANGLE_FORMAT = SQ(2, 17)
     OPERAND_FORMAT = SQ(1, 17)
@@ -129,14 +129,14 @@ class Bisection:
 
     def reads_cosine(self, first_step: bool) -> bool:
         """Whether a polynomial is one in r (else in u)."""
-        return first_step or self.as_documented
+        return first_step or self.as_published
 
     @cached_property
     def _polynomials(self) -> tuple[tuple[Fixed, Fixed], tuple[Fixed, Fixed]]:
         # The hardware reads u and r in units of `ONE_SQUARED`.
         one = ONE_SQUARED.values
-        narrow, wide = self.widest_narrow.values, self._limit(90).values
-        if self.as_documented:
+        narrow, out_of_range = self.widest_narrow.values, self._limit(90).values
+        if self.as_published:
             printed = [
                 [c * 2.0**power for power, c in enumerate(_PRINTED[self.degree])],
                 _PRINTED_FIRST_STEP,
@@ -155,7 +155,7 @@ class Bisection:
             )
             first = minimax_quantised(
                 lambda r: half_angle_factor(1 - r / one),
-                one - wide,
+                one - out_of_range,
                 one - narrow,
                 {0: UQ(0, 19), 1: self.SUM_FORMAT, 2: self.SUM_FORMAT, 3: self.SUM_FORMAT},
             )
@@ -208,7 +208,7 @@ class Bisection:
         slope, e = (0.3536, 0.2072) if first_step else (0.1585, 0.0412)
         x = (0.7072 if first_step else 1.0) if cosine else 0.2930
         # The slopes of the printed polynomials differ from the function's by less than a fifth.
-        slope *= 1.2 if self.as_documented else 1.0
+        slope *= 1.2 if self.as_published else 1.0
         factor = 2.0**-18 * (1 + cosine) * slope + 2.0**-19 * (x + x * x) + 2.0**-20
         return 2 * factor + 2.0**-18 * 2 * e + 2.0**-21 + 2.0**-18
 
@@ -233,12 +233,12 @@ class Bisection:
         """
         first_step = (u > self.widest_narrow) & (self.max_angle == 90)
         cosine = (self.ONE - u).saturate(self.OPERAND_FORMAT)
-        (narrow_constant, narrow), (wide_constant, wide) = map(self.polynomial, (False, True))
-        x = np.where(first_step | self.as_documented, cosine.codes, u.saturate(self.OPERAND_FORMAT).codes)
+        (narrow_constant, narrow), (wide_constant, out_of_range) = map(self.polynomial, (False, True))
+        x = np.where(first_step | self.as_published, cosine.codes, u.saturate(self.OPERAND_FORMAT).codes)
         x = Fixed(self.OPERAND_FORMAT, x)
 
         def coefficient(power: int) -> Fixed:
-            codes = np.where(first_step, wide.codes[power - 1], narrow.codes[power - 1])
+            codes = np.where(first_step, out_of_range.codes[power - 1], narrow.codes[power - 1])
             return Fixed(self.SUM_FORMAT, codes)
 
         total = coefficient(self.steps)
@@ -272,8 +272,8 @@ class Bisection:
         """
         dot = DotProduct().compute(normal_a, normal_b)
         u = (ONE_SQUARED - dot).round_half_up(17).saturate(self.ANGLE_FORMAT)
-        e, wide = self.factor(u)
+        e, out_of_range = self.factor(u)
         half_sum = (normal_a + normal_b).scale(-1)
         e = Fixed(e.format, e.codes[..., np.newaxis])
         correction = (e * half_sum.truncate(17)).scale(1).truncate(21)
-        return (half_sum + correction).round_half_up(17).saturate(self.FORMAT), u, wide
+        return (half_sum + correction).round_half_up(17).saturate(self.FORMAT), u, out_of_range

@@ -88,18 +88,18 @@ class BisectionChain:
         u_error, l_error, m_error, cosine = half, 0.0, 0.0, 0.0 if first_step else np.sqrt(0.5)
         weight_l, weight_m = 0.0, 1.0
         for k in range(1, level + 1):
-            wide = first_step and k == 1
-            constant, rest = p.polynomial(wide)
+            out_of_range = first_step and k == 1
+            constant, rest = p.polynomial(out_of_range)
             # Angles of this step: all up to the widest, or those of the first step.
-            cosines = np.linspace(cosine, np.sqrt(0.5) if wide else 1.0, 2001)
-            x = one * (cosines if p.reads_cosine(wide) else 1 - cosines)
+            cosines = np.linspace(cosine, np.sqrt(0.5) if out_of_range else 1.0, 2001)
+            x = one * (cosines if p.reads_cosine(out_of_range) else 1 - cosines)
             exact = half_angle_factor(1 - cosines) - 0.5
             fitted = np.polynomial.polynomial.polyval(x, np.r_[constant.values, rest.values])
-            slope = (0.3536 if wide else 0.1585) * (1.2 if p.as_documented else 1)
+            slope = (0.3536 if out_of_range else 0.1585) * (1.2 if p.as_published else 1)
             # Of the fit, u or r in 17 bits, the sums and e itself; then what u brings.
             own_error = (
                 np.abs(fitted - exact).max()
-                + slope * 2.0**-18 * (1 + p.reads_cosine(wide))
+                + slope * 2.0**-18 * (1 + p.reads_cosine(out_of_range))
                 + 2.0**-19 * 1.21
                 + 2.0**-20
             )
@@ -107,7 +107,7 @@ class BisectionChain:
             e = exact.max()
             # e follows an error of u, so that a quarter of it is left (0.28; 0.37 in the first step). The
             # 17-bit r, 1 in place of `ONE_SQUARED` and the two roundings add to it.
-            u_error = (0.37 if wide else 0.28) * u_error + 2 * own_error + e * 2.0**-15 + 2 * half
+            u_error = (0.37 if out_of_range else 0.28) * u_error + 2 * own_error + e * 2.0**-15 + 2 * half
             rounding = 2 * e * 2.0**-17 + 2.0**-21 + half
             l_error = (0.5 + e) * l_error + (weight_l + l_error + 1) * e_error + rounding
             m_error = (0.5 + e) * m_error + (weight_m + m_error) * e_error + rounding
@@ -146,12 +146,12 @@ class BisectionChain:
         u = (ONE_SQUARED - dot).round_half_up(20).saturate(word)
         weight_l = Fixed(word, np.zeros_like(level))
         weight_m = Fixed(word, np.full_like(level, word.code(1)))
-        wide = np.zeros(level.shape, dtype=bool)
+        out_of_range = np.zeros(level.shape, dtype=bool)
         for k in range(1, int(level.max(initial=0)) + 1):
             angle = u.round_half_up(17).saturate(p.ANGLE_FORMAT)
             e, flag = p.factor(angle)
             if k == 1:
-                wide = flag
+                out_of_range = flag
             cosine = (p.ONE - angle).saturate(p.OPERAND_FORMAT)
             going = k <= level
 
@@ -169,7 +169,7 @@ class BisectionChain:
             return Fixed(COMPONENT, factor.codes[..., np.newaxis]) * normal
 
         total = scale(weight_l, normal_left) + scale(weight_m, normal_right)
-        return total.round_half_up(17).saturate(self.FORMAT), wide
+        return total.round_half_up(17).saturate(self.FORMAT), out_of_range
 
     def _scaled(self, half: Fixed, e: Fixed) -> Fixed:
         """``2 half (1/2 + e)``."""

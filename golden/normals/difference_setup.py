@@ -89,7 +89,7 @@ class DifferenceSetup:
 
     A span of one pixel has no dt; it gets dt = 1, which nothing reads.
 
-    With ``as_documented`` the order of figure 2.11 is kept, ``W_0 = (G dt + P) dt`` and ``2 (G dt) dt``: nine
+    With ``as_published`` the order of figure 2.11 is kept, ``W_0 = (G dt + P) dt`` and ``2 (G dt) dt``: nine
     products in place of seven. With ``dt = 2 f' 2^-s``, f' the word of the table, ``G f'`` is rounded to
     ``SQ(0, 18)``, and ``G dt + P`` to ``SQ(1, 17)``, where it saturates; it is the mean slope of the first
     step, under 0.84 up to 45 degrees. dt^2 then is the square of the same dt, off by 2^-16 + 2^-34.
@@ -98,13 +98,13 @@ class DifferenceSetup:
 
     Parameters
     ----------
-    as_documented : bool
+    as_published : bool
         Keep the order of the products of [T].
 
     Source: [T] 2.3, figure 2.11; numbers.md, "Recurrences in fixed point".
     """
 
-    as_documented: bool = False
+    as_published: bool = False
 
     RECIPROCAL_FORMAT = UQ(0, 17)
     SLOPE_FORMAT = SQ(0, 18)
@@ -142,7 +142,7 @@ class DifferenceSetup:
                 f"operands must be {GPQ.G_FORMAT} and {GPQ.P_FORMAT}, not {g.format}, {p.format}"
             )
         reciprocal, shift, square, square_shift = self.steps(length)
-        if self.as_documented:
+        if self.as_published:
             bend = g.extend(COMPONENT) * Fixed(reciprocal.format, reciprocal.codes[:, np.newaxis])
             bend = bend.round_half_up(18).wrap(self.SLOPE_FORMAT)
             step = Fixed(SQ(1, 29), (bend.codes << 12) >> shift[:, np.newaxis])

@@ -12,7 +12,7 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 
 __all__ = ["MAX_SPAN_ANGLE", "MIDDLE_NORMAL_FITS", "MiddleNormal"]
 
-MIDDLE_NORMAL_FITS = ("exact", "as_documented", "minimax_2", "minimax_3")
+MIDDLE_NORMAL_FITS = ("exact", "as_published", "minimax_2", "minimax_3")
 """Names of the polynomials for h."""
 
 _PRINTED = (0.707, -0.341, 0.193, -0.059)
@@ -62,7 +62,7 @@ class MiddleNormal:
     fit               to 45 degrees relative at angle 0    over [0, 1]
     ================= ============= ======== ============= ===============
     ``exact``         8.2e-7        0.0002 % 0
-    ``as_documented`` 4.9e-4        0.093 %  0             6.1e-4, 0.093 %
+    ``as_published`` 4.9e-4        0.093 %  0             6.1e-4, 0.093 %
     ``minimax_2``     1.9e-3        0.38 %   0.38 % long   1.9e-3, 0.38 %
     ``minimax_3``     2.9e-4        0.058 %  0.058 % short 2.9e-4, 0.058 %
     ================= ============= ======== ============= ===============
@@ -176,7 +176,7 @@ def _coefficients(fit: str) -> tuple[int, np.ndarray]:
             held={0: 0.5},
         )
         return 0, codes
-    if fit == "as_documented":
+    if fit == "as_published":
         in_u = np.polynomial.Polynomial(_PRINTED)(np.polynomial.Polynomial([1, -1])).coef
     else:
         in_u = minimax(half_angle_factor, 0.0, 1.0, int(fit[-1]))

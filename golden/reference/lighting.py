@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.reflection import REFLECTION_MODELS, reflect
+from blysk.golden.reference.reflection import ReflectionModel
 
 __all__ = [
     "Light",
@@ -186,16 +186,16 @@ def intensity(
     lights: Sequence[Light],
     ambient_light: Sequence[float],
     viewer: Sequence[float],
-    model: str,
+    model: ReflectionModel,
     chord: bool = False,
     points: np.ndarray | None = None,
 ) -> np.ndarray:
     """Intensity of every normal, not saturated.
 
-    ``I = k_a I_a + sum_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6). The cosine of
-    ``phong`` is R·V with ``R = 2 (N·L) N - L``, that of the other models N·H. A light with ``N·L <= 0``
-    gives neither diffuse nor specular; one with ``L = -V`` has no half-way vector and gives no specular. A
-    point light gives nothing to the point where it is.
+    ``I = k_a I_a + sum_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6). The cosine of a
+    mirror model, such as Phong's, is R·V with ``R = 2 (N·L) N - L``, that of the others N·H. A light with
+    ``N·L <= 0`` gives neither diffuse nor specular; one with ``L = -V`` has no half-way vector and gives no
+    specular. A point light gives nothing to the point where it is.
 
     Parameters
     ----------
@@ -209,8 +209,8 @@ def intensity(
         I_a a channel.
     viewer : array, shape (3,) or (..., 3)
         Unit vector V to the viewer, constant over the frame or for each normal.
-    model : str
-        One of `REFLECTION_MODELS`.
+    model : ReflectionModel
+        The highlight.
     chord : bool
         Whether ``1 - |N - H|^2 / 2`` takes the place of N·H, which it equals for unit normals (chord.md).
     points : array, shape (..., 3), optional
@@ -223,9 +223,8 @@ def intensity(
     Raises
     ------
     ValueError
-        If the model is unknown, or a point light has no points.
+        If a point light has no points.
     """
-    _check_model(model)
     normals = np.asarray(normals, dtype=np.float64)
     viewer = np.asarray(viewer, dtype=np.float64)
     total = np.empty(normals.shape)
@@ -236,7 +235,7 @@ def intensity(
         halfway = halfway_vector(direction, viewer)
         if not (halfway.any() and any(material.specular)):
             highlight_cosine = None
-        elif model == "phong":
+        elif model.MIRROR:
             highlight_cosine = 2 * cosine * _dot(normals, viewer) - _dot(direction, viewer)
         elif chord:
             highlight_cosine = 1 - np.square(normals - halfway).sum(axis=-1) / 2
@@ -252,7 +251,7 @@ def intensity_of_cosines(
     ambient_light: Sequence[float],
     cosine: np.ndarray,
     highlight_cosine: np.ndarray,
-    model: str,
+    model: ReflectionModel,
 ) -> np.ndarray:
     """The same, from what a method gives instead of a normal.
 
@@ -266,24 +265,13 @@ def intensity_of_cosines(
     Returns
     -------
     float64 array, shape (..., 3)
-
-    Raises
-    ------
-    ValueError
-        If the model is unknown.
     """
-    _check_model(model)
     total = np.empty((*np.shape(cosine)[:-1], 3))
     total[...] = np.multiply(material.ambient, ambient_light)
     for index, light in enumerate(lights):
         given = cosine[..., index], highlight_cosine[..., index]
         _add_light(total, material, light, *given, np.True_, model)
     return total
-
-
-def _check_model(model: str) -> None:
-    if model not in REFLECTION_MODELS:
-        raise ValueError(f"model must be one of {', '.join(REFLECTION_MODELS)}, not {model!r}")
 
 
 def _dot(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -295,7 +283,7 @@ def _add_light(total, material, light, cosine, highlight_cosine, has_halfway, mo
     color = np.asarray(light.color)
     total += np.maximum(cosine, 0.0)[..., np.newaxis] * (color * material.diffuse)
     if highlight_cosine is not None:
-        highlight = reflect(model, highlight_cosine, material.exponent)
+        highlight = model.reflect(highlight_cosine, material.exponent)
         highlight = np.where((cosine > 0) & has_halfway, highlight, 0.0)
         total += highlight[..., np.newaxis] * (color * material.specular)
 

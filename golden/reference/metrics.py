@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["ErrorFigures", "error_figures", "mnse_printed", "nmse"]
+__all__ = ["ErrorFigures", "error_figures", "mnse_published", "nmse"]
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def nmse(image: np.ndarray, reference: np.ndarray) -> float:
     return error / spread if spread else math.inf
 
 
-def mnse_printed(image: np.ndarray, reference: np.ndarray) -> tuple[float, float]:
+def mnse_published(image: np.ndarray, reference: np.ndarray) -> tuple[float, float]:
     """MNSE as [T] 4.1 prints it: ``(1/N) sum (I_i-O_i)^2 / (I_i-mean(I))^2``, where it is defined.
 
     Parameters

@@ -2,52 +2,26 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
+from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import brentq
 
 __all__ = [
-    "COSCOS_MODELS",
-    "LINE_MODELS",
+    "BLINN",
+    "COSQUAD",
+    "PHONG",
     "REFLECTION_MODELS",
+    "AngleCosine",
+    "Exponential",
+    "PolynomialModel",
+    "PowerModel",
+    "ReflectionModel",
     "coscos_scale",
-    "energy_factor",
     "exponent_ratio",
-    "reflect",
-    "slope",
 ]
-
-# The level at which cosquad_q meets Blinn's power exactly; 0.64 is the best of [C].
-_Q = 0.64
-
-# Slope and power of every model of the form max(k (c - 1) + 1, 0)^p.
-_LINES: dict[str, tuple[Callable[[float], float], int]] = {
-    "cosquad": (lambda n: n / 2, 2),
-    "cosquad7": (lambda n: 7 * n / 16, 2),
-    "cosquad_q": (lambda n: (math.sqrt(_Q) - 1) / math.expm1(math.log(_Q) / n), 2),
-    "cosquad_lin": (lambda n: 0.448 * n + 0.099, 2),
-    "cosquad_lin_refitted": (lambda n: 0.44813 * n + 0.10235, 2),
-    "lyon2": (lambda n: n / 4, 4),
-    "lyon3": (lambda n: n / 8, 8),
-    "lyon1_refitted": (lambda n: 0.3557 * n + 0.2457, 2),
-    "lyon2_refitted": (lambda n: 0.2113 * n + 0.1468, 4),
-    "lyon3_refitted": (lambda n: 0.1150 * n + 0.0799, 8),
-}
-
-COSCOS_MODELS = {
-    "coscos2": (2, "taylor"),
-    "coscos4": (4, "taylor"),
-    "coscos2_integral": (2, "integral"),
-    "coscos4_integral": (4, "integral"),
-}
-"""Power k of the models ``cos^k(a gamma)``, and the rule by which `coscos_scale` finds a."""
-
-LINE_MODELS = tuple(_LINES)
-"""Names of the models that raise a line to a power, which `slope` knows."""
-
-REFLECTION_MODELS = ("phong", "blinn", *LINE_MODELS, *COSCOS_MODELS, "exp")
-"""Names of the models. ``phong`` takes the cosine R·V, all others N·H."""
 
 
 def _check_exponent(exponent: float) -> float:
@@ -57,45 +31,180 @@ def _check_exponent(exponent: float) -> float:
     return exponent
 
 
-def slope(model: str, exponent: float) -> float:
-    """Slope k of a line model ``max(k (c - 1) + 1, 0)^p``.
-
-    ======================== ================================= === ====================
-    model                    k                                 p   source
-    ======================== ================================= === ====================
-    ``cosquad`` (f2)         ``n / 2``                         2   [T] 3.4, fig. 3.6
-    ``cosquad7`` (W3)        ``7 n / 16``                      2   [T] fig. 3.7
-    ``cosquad_q`` (fQ)       ``(sqrt(Q)-1) / (Q^(1/n)-1)``,    2   [C]
-                             ``Q = 0.64``
-    ``cosquad_lin`` (fQ2)    ``0.448 n + 0.099``               2   [C]
-    ``cosquad_lin_refitted`` ``0.44813 n + 0.10235``           2   line through the slope
-                                                                   of ``cosquad_q``
-    ``lyon2``, ``lyon3``     ``n / 4``, ``n / 8``              4,8 Lyon 1993
-    ``lyon1_refitted``       ``0.3557 n + 0.2457``             2   minimax over the
-                                                                   whole range
-    ``lyon2_refitted``       ``0.2113 n + 0.1468``             4   the same
-    ``lyon3_refitted``       ``0.1150 n + 0.0799``             8   the same
-    ======================== ================================= === ====================
-
-    Lyon's model is ``max(1 - x/2^j, 0)^(2^j)`` with ``x = n (1 - c)``, which tends to ``exp(-x)``; its
-    first, j = 1, is ``cosquad``.
+@dataclass(frozen=True)
+class ReflectionModel:
+    """A highlight: its brightness S, from 0 to 1, for every cosine and exponent. One subclass a family.
 
     Parameters
     ----------
-    model : str
-        One of `LINE_MODELS`.
-    exponent : float
-        The exponent n of Blinn's model that is approximated, greater than 0.
+    name : str
+        Name on the command line and in tables.
+    source : str
+        Where the formula comes from; see docs/theory/models.md.
+    energy : callable, optional
+        Factor that normalises the reflected energy, by exponent; see `energy_factor`.
 
-    Raises
-    ------
-    ValueError
-        If the model has no slope, or the exponent is not finite and positive.
+    Attributes
+    ----------
+    MIRROR : bool
+        Whether the cosine is R·V, of the mirror direction; else N·H, of the half-way vector.
     """
-    exponent = _check_exponent(exponent)
-    if model not in _LINES:
-        raise ValueError(f"model must be one of {', '.join(LINE_MODELS)}, not {model!r}")
-    return _LINES[model][0](exponent)
+
+    name: str
+    source: str = ""
+    energy: Callable[[float], float] | None = None
+
+    MIRROR: ClassVar[bool] = False
+
+    def __repr__(self):
+        return f"<{type(self).__name__} {self.name}>"
+
+    def __reduce__(self):
+        # A function without a name of its own cannot be sent to another process; its model's name can.
+        if REFLECTION_MODELS.get(self.name) is self:
+            return _registered, (self.name,)
+        return super().__reduce__()
+
+    def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
+        raise NotImplementedError
+
+    def reflect(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
+        """Brightness S of a highlight, 0 to 1.
+
+        Parameters
+        ----------
+        cosine : array
+            N·H, or R·V for a model of the mirror direction. Values above 1, which vectors that are not quite
+            of unit length give, count as 1.
+        exponent : float
+            Exponent n of Blinn's model that is approximated, greater than 0.
+
+        Returns
+        -------
+        float64 array, the shape of ``cosine``
+
+        Raises
+        ------
+        ValueError
+            If the exponent is not finite and positive, or too small for the model.
+        """
+        return self._lobe(np.minimum(np.asarray(cosine, dtype=np.float64), 1.0), _check_exponent(exponent))
+
+    def energy_factor(self, exponent: float) -> float:
+        """Factor of the energy-normalised form, which is factor times S ([C]).
+
+        =============== ==================================== ==============================================
+        model           factor                               1 over
+        =============== ==================================== ==============================================
+        ``phong``       ``(n+2) / (2 pi)``                   ``2 pi integral_0^1 c^n c dc``
+        ``blinn``       ``(n+2)(n+4) / (8 pi (2^(-n/2)+n))`` ``integral cos^n(t/2) cos t`` over the
+                                                             hemisphere: viewer along the normal
+        ``cosquad_lin`` ``0.214 (0.807 + n)``                a line through ``2 pi integral_0^1 S(c) c
+                                                             dc``, off by at most 0.0533 for n >= 2
+        =============== ==================================== ==============================================
+
+        [C] integrates ``cosquad_lin`` over the angle itself, as for ``phong``, not over the half angle; it
+        prints n for pi in the denominators and n/2 for the exponent -n/2.
+
+        Parameters
+        ----------
+        exponent : float
+            Exponent n, greater than 0.
+
+        Raises
+        ------
+        ValueError
+            If the model has no such form, or the exponent is not finite and positive.
+        """
+        if self.energy is None:
+            known = ", ".join(name for name, model in REFLECTION_MODELS.items() if model.energy)
+            raise ValueError(f"model must be one of {known}, not {self.name}")
+        return self.energy(_check_exponent(exponent))
+
+
+@dataclass(frozen=True, repr=False)
+class PowerModel(ReflectionModel):
+    """``max(c, 0)^n``: of N·H Blinn's model ([B] 3), of R·V Phong's ([T] 6, [B] 2)."""
+
+    def _lobe(self, cosine, exponent):
+        return np.maximum(cosine, 0.0) ** exponent
+
+
+@dataclass(frozen=True, repr=False)
+class _MirrorPowerModel(PowerModel):
+    MIRROR = True
+
+
+@dataclass(frozen=True, repr=False)
+class PolynomialModel(ReflectionModel):
+    """``max(k (c - 1) + 1, 0)^(2^squarings)``, slope k: the cosine-quadratic family and Lyon's.
+
+    The base is gated, never the power, so that the parabola's second lobe does not show. Lyon's model is
+    ``max(1 - x/2^j, 0)^(2^j)`` with ``x = n (1 - c)``, which tends to ``exp(-x)``; its first is ``cosquad``.
+
+    Parameters
+    ----------
+    a, b : float
+        Of the slope ``k = a n + b``.
+    squarings : int
+        How often the base is squared, 1 to 3.
+    curve : callable, optional
+        Slope by exponent, where it is no line: hardware then holds it in a table.
+    """
+
+    a: float = 0.0
+    b: float = 0.0
+    squarings: int = 1
+    curve: Callable[[float], float] | None = None
+
+    def slope(self, exponent: float) -> float:
+        """Slope k at an exponent.
+
+        Raises
+        ------
+        ValueError
+            If the exponent is not finite and positive.
+        """
+        exponent = _check_exponent(exponent)
+        return self.curve(exponent) if self.curve else self.a * exponent + self.b
+
+    def _lobe(self, cosine, exponent):
+        base = np.maximum(self.slope(exponent) * (cosine - 1.0) + 1.0, 0.0)
+        for _ in range(self.squarings):
+            base = base * base
+        return base
+
+
+@dataclass(frozen=True, repr=False)
+class AngleCosine(ReflectionModel):
+    """``cos^k(a gamma)`` where ``a gamma <= pi/2``, else 0 ([T] 3.1).
+
+    Parameters
+    ----------
+    power : int
+        Power k, 2 or 4.
+    rule : str
+        By which `coscos_scale` finds a: ``"taylor"`` or ``"integral"``.
+    """
+
+    power: int = 2
+    rule: str = "taylor"
+
+    def scale(self, exponent: float) -> float:
+        """Scale a at an exponent; see `coscos_scale`."""
+        return coscos_scale(exponent, self.power, self.rule)
+
+    def _lobe(self, cosine, exponent):
+        angle = self.scale(exponent) * np.arccos(np.maximum(cosine, -1.0))
+        return np.cos(np.minimum(angle, math.pi / 2)) ** self.power * (angle < math.pi / 2)
+
+
+@dataclass(frozen=True, repr=False)
+class Exponential(ReflectionModel):
+    """``exp(n (c - 1))``, to which Blinn's power tends."""
+
+    def _lobe(self, cosine, exponent):
+        return np.exp(exponent * (cosine - 1.0))
 
 
 _gauss = cache(np.polynomial.legendre.leggauss)
@@ -154,102 +263,49 @@ def coscos_scale(exponent: float, power: int, rule: str = "taylor") -> float:
     return float(brentq(excess, 0.5, 1 + math.sqrt(exponent + 1), xtol=1e-15, rtol=1e-14))
 
 
-def reflect(model: str, cosine: np.ndarray, exponent: float) -> np.ndarray:
-    """Brightness S of a highlight, 0 to 1.
-
-    ====================== ============================================================================
-    model                  S
-    ====================== ============================================================================
-    ``phong``, ``blinn``   ``max(c, 0)^n``
-    `LINE_MODELS`          ``max(k (c - 1) + 1, 0)^p`` with `slope`'s k and p; the base is gated, never
-                           the power, so the parabola's second lobe does not show
-    ``coscos2``,           ``cos^k(a gamma)`` where ``a gamma <= pi/2``, else 0; k = 2 or 4, a from
-    ``coscos4``            `coscos_scale` by Taylor; ``coscos2_integral``, ``coscos4_integral``: by equal
-                           integrals
-    ``exp``                ``exp(n (c - 1))``
-    ====================== ============================================================================
-
-    Parameters
-    ----------
-    model : str
-        One of `REFLECTION_MODELS`.
-    cosine : array
-        R·V for ``phong``, N·H for the others. Values above 1, which vectors that are not quite of unit
-        length give, count as 1.
-    exponent : float
-        Exponent n, greater than 0.
-
-    Returns
-    -------
-    float64 array, the shape of ``cosine``
-
-    Raises
-    ------
-    ValueError
-        If the model is unknown, or the exponent is not finite and positive, or too small for the model.
-
-    Notes
-    -----
-    Sources: [B] 2 and 3, [T] 3.1, 3.4 and 6, [C], Lyon 1993.
-    """
-    exponent = _check_exponent(exponent)
-    cosine = np.minimum(np.asarray(cosine, dtype=np.float64), 1.0)
-    if model in ("phong", "blinn"):
-        return np.maximum(cosine, 0.0) ** exponent
-    if model in _LINES:
-        line, power = _LINES[model]
-        base = np.maximum(line(exponent) * (cosine - 1.0) + 1.0, 0.0)
-        while power > 1:
-            base, power = base * base, power // 2
-        return base
-    if model in COSCOS_MODELS:
-        power, rule = COSCOS_MODELS[model]
-        angle = coscos_scale(exponent, power, rule) * np.arccos(np.maximum(cosine, -1.0))
-        return np.cos(np.minimum(angle, math.pi / 2)) ** power * (angle < math.pi / 2)
-    if model == "exp":
-        return np.exp(exponent * (cosine - 1.0))
-    raise ValueError(f"model must be one of {', '.join(REFLECTION_MODELS)}, not {model!r}")
+def _level_slope(exponent: float, level: float = 0.64) -> float:
+    """Slope with which cosquad_q meets Blinn's power exactly at a level; 0.64 is the best of [C]."""
+    return (math.sqrt(level) - 1) / math.expm1(math.log(level) / exponent)
 
 
-def energy_factor(model: str, exponent: float) -> float:
-    """Factor that normalises a model's reflected energy: the energy-normalised form is factor times S.
+PHONG = _MirrorPowerModel("phong", "[T] 6, [B] 2", lambda n: (n + 2) / (2 * math.pi))
+"""Phong's model."""
 
-    =============== ========================================== =========================================
-    model           factor                                     1 over
-    =============== ========================================== =========================================
-    ``phong``       ``(n+2) / (2 pi)``                         ``2 pi integral_0^1 c^n c dc``
-    ``blinn``       ``(n+2)(n+4) / (8 pi (2^(-n/2) + n))``     ``integral cos^n(t/2) cos t`` over the
-                                                               hemisphere: viewer along the normal
-    ``cosquad_lin`` ``0.214 (0.807 + n)``                      a line through ``2 pi integral_0^1 S(c) c
-                                                               dc``, off by at most 0.0533 for n >= 2
-    =============== ========================================== =========================================
+BLINN = PowerModel("blinn", "[B] 3", lambda n: (n + 2) * (n + 4) / (8 * math.pi * (2 ** (-n / 2) + n)))
+"""Blinn's model, which the approximations approximate."""
 
-    [C] integrates ``cosquad_lin`` over the angle itself, as for ``phong``, not over the half angle.
+COSQUAD = PolynomialModel("cosquad", "[T] 3.4, figure 3.6", a=1 / 2)
+"""The cosine-quadratic model f2."""
 
-    Parameters
-    ----------
-    model : str
-        ``"phong"``, ``"blinn"`` or ``"cosquad_lin"``.
-    exponent : float
-        Exponent n, greater than 0.
+REFLECTION_MODELS: dict[str, ReflectionModel] = {
+    model.name: model
+    for model in (
+        PHONG,
+        BLINN,
+        COSQUAD,
+        PolynomialModel("cosquad7", "[T] figure 3.7", a=7 / 16),
+        PolynomialModel("cosquad_q", "[C]", curve=_level_slope),
+        PolynomialModel("cosquad_lin", "[C]", lambda n: 0.214 * (0.807 + n), a=0.448, b=0.099),
+        # A line through the slope of cosquad_q, in place of the one that [C] prints.
+        PolynomialModel("cosquad_lin_refitted", "own fit", a=0.44813, b=0.10235),
+        PolynomialModel("lyon2", "Lyon 1993", a=1 / 4, squarings=2),
+        PolynomialModel("lyon3", "Lyon 1993", a=1 / 8, squarings=3),
+        # Minimax over the whole range.
+        PolynomialModel("lyon1_refitted", "own fit", a=0.3557, b=0.2457),
+        PolynomialModel("lyon2_refitted", "own fit", a=0.2113, b=0.1468, squarings=2),
+        PolynomialModel("lyon3_refitted", "own fit", a=0.1150, b=0.0799, squarings=3),
+        AngleCosine("coscos2", "[T] 3.1"),
+        AngleCosine("coscos4", "[T] 3.1", power=4),
+        AngleCosine("coscos2_integral", "[T] 3.1", rule="integral"),
+        AngleCosine("coscos4_integral", "[T] 3.1", power=4, rule="integral"),
+        Exponential("exp", "own"),
+    )
+}
+"""Every reflection model, by name. A coefficient stands here and nowhere else."""
 
-    Raises
-    ------
-    ValueError
-        If the model is another, or the exponent is not finite and positive.
 
-    Notes
-    -----
-    Source: [C], which prints n for pi in the denominators and n/2 for the exponent -n/2.
-    """
-    exponent = _check_exponent(exponent)
-    if model == "phong":
-        return (exponent + 2) / (2 * math.pi)
-    if model == "blinn":
-        return (exponent + 2) * (exponent + 4) / (8 * math.pi * (2 ** (-exponent / 2) + exponent))
-    if model == "cosquad_lin":
-        return 0.214 * (0.807 + exponent)
-    raise ValueError(f"model must be phong, blinn or cosquad_lin, not {model!r}")
+def _registered(name: str) -> ReflectionModel:
+    return REFLECTION_MODELS[name]
 
 
 def exponent_ratio(cosine: np.ndarray) -> np.ndarray:

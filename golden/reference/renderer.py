@@ -16,6 +16,7 @@ from blysk.golden.reference.raster import (
     fragment_normals,
     rasterise,
 )
+from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.reference.scene import Scene
 
 __all__ = [
@@ -147,7 +148,7 @@ def gouraud_triangles(scene: Scene, thresholds: Thresholds | None = None) -> np.
 def render(
     scene: Scene,
     shading: str = "phong",
-    model: str = "blinn",
+    model: ReflectionModel = BLINN,
     raster: Raster | None = None,
     thresholds: Thresholds | None = None,
 ) -> Frame:
@@ -176,8 +177,8 @@ def render(
         What to draw.
     shading : str
         One of `SHADINGS`.
-    model : str
-        One of `REFLECTION_MODELS`.
+    model : ReflectionModel
+        The highlight.
     raster : Raster, optional
         The scene's own raster, when it is at hand already.
     thresholds : Thresholds, optional
@@ -186,7 +187,7 @@ def render(
     Raises
     ------
     ValueError
-        If the shading or the model is unknown.
+        If the shading is unknown.
     """
     if shading not in SHADINGS:
         raise ValueError(f"shading must be one of {', '.join(SHADINGS)}, not {shading!r}")
@@ -227,7 +228,7 @@ def render(
 class _NodeColors:
     """Colors at a few points of every triangle that shows, and their interpolation."""
 
-    def __init__(self, scene: Scene, raster: Raster, shading: str, model: str):
+    def __init__(self, scene: Scene, raster: Raster, shading: str, model: ReflectionModel):
         self.raster, self.shading = raster, shading
         shown, self.place = np.unique(raster.triangle, return_inverse=True)
         face = face_normals(scene.mesh)[shown][:, np.newaxis]
@@ -264,7 +265,7 @@ class _NodeColors:
 
 
 def shade_spans(
-    scene: Scene, raster: Raster, curve: str | Curve, model: str, chord: bool = False
+    scene: Scene, raster: Raster, curve: str | Curve, model: ReflectionModel, chord: bool = False
 ) -> np.ndarray:
     """Picture from spans alone, as the hardware sees them.
 
@@ -283,8 +284,8 @@ def shade_spans(
         quantised ones.
     curve : str or callable
         One of `CURVES`, or a function of the normals at both ends and t.
-    model : str
-        One of `REFLECTION_MODELS`.
+    model : ReflectionModel
+        The highlight.
     chord : bool
         See `intensity`.
 
@@ -296,7 +297,7 @@ def shade_spans(
     Raises
     ------
     ValueError
-        If the curve or the model is unknown, or spans without weights have point lights or a near viewer.
+        If the curve is unknown, or spans without weights have point lights or a near viewer.
     """
     image = _background(scene)
     colors = image.reshape(-1, 3)
@@ -312,7 +313,7 @@ def shade_spans(
 
 
 def shade_operands(
-    scene: Scene, raster: Raster, cosine: np.ndarray, highlight_cosine: np.ndarray, model: str
+    scene: Scene, raster: Raster, cosine: np.ndarray, highlight_cosine: np.ndarray, model: ReflectionModel
 ) -> np.ndarray:
     """Picture from what a method without normals gives for every fragment.
 
@@ -324,18 +325,13 @@ def shade_operands(
         The fragments; span, pixel, visible and triangle are used.
     cosine, highlight_cosine : arrays, shape (fragments, lights)
         N·L and N·H.
-    model : str
-        One of `REFLECTION_MODELS`.
+    model : ReflectionModel
+        The highlight.
 
     Returns
     -------
     float64 array, shape (height, width, 3)
         Intensities in [0, 1], not rounded.
-
-    Raises
-    ------
-    ValueError
-        If the model is unknown.
     """
     image = _background(scene)
     colors = image.reshape(-1, 3)
@@ -402,7 +398,7 @@ def _visible(raster: Raster) -> Iterator[np.ndarray]:
 def _shade(
     scene: Scene,
     normals: np.ndarray,
-    model: str,
+    model: ReflectionModel,
     triangles: np.ndarray,
     which: np.ndarray | slice,
     chord: bool = False,

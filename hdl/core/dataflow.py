@@ -15,7 +15,7 @@ __all__ = [
     "MULTIPLIER_BITS",
     "MULTIPLIER_LATENCY",
     "Dataflow",
-    "Operator",
+    "FunctionalUnit",
     "Word",
     "checked_interval",
     "dot",
@@ -39,18 +39,18 @@ class Word:
     name : str
         Of its register.
     age : int
-        Enabled clocks from when a beat is taken in until its word stands.
+        Enabled cycles from when a beat is taken in until its word stands.
     stands : int
         Clocks for which it stands before the next beat's may take its place.
     """
 
     name: str
-    age: int
-    stands: int
+    stage: int
+    lifetime: int
 
 
 @dataclass(frozen=True, eq=False)
-class Operator:
+class FunctionalUnit:
     """Equal pieces of hardware that take turns at the uses of a graph.
 
     Parameters
@@ -87,7 +87,7 @@ class Dataflow:
 
     Every word gets the earliest age at which its operands are there. What is shared, such as a multiplier,
     is used when a piece of it is free: beats come a whole multiple of the initiation interval apart, so a
-    piece has as many turns as the interval has clocks, and ``ceil(uses / interval)`` pieces serve all. Uses
+    piece has as many turns as the interval has cycles, and ``ceil(uses / interval)`` pieces serve all. Uses
     are placed in the order in which they are added. Words that are read later than they stand are copied on
     the way by `build`.
 
@@ -97,8 +97,8 @@ class Dataflow:
         Initiation interval of the unit, at least 1.
     multiplications : int
         How many there will be.
-    hurries : bool
-        Whether a product takes a single register, two clocks in all: for a unit whose results are waited for.
+    low_latency : bool
+        Whether a product takes a single register, two cycles in all: for a unit whose results are waited for.
 
     Raises
     ------
@@ -106,19 +106,19 @@ class Dataflow:
         If the interval is less than 1.
     """
 
-    def __init__(self, interval: int, multiplications: int = 0, *, hurries: bool = False):
+    def __init__(self, interval: int, multiplications: int = 0, *, low_latency: bool = False):
         if interval < 1:
             raise ValueError(f"interval must be at least 1, not {interval}")
         self.interval = interval
         self._makers: list[tuple[Word, Callable[[_Build], Any]]] = []
         latency, product = MULTIPLIER_LATENCY, registered_product
-        if hurries:
+        if low_latency:
             latency, product = 1, lambda register, a, b: register(a * b, "product")
         operand = signed(MULTIPLIER_BITS)
         self.multiplier = self.share("multiplier", multiplications, (operand, operand), latency, product)
 
-    def _add(self, name: str, age: int, stands: int, make: Callable[["_Build"], Any]) -> Word:
-        word = Word(name, age, stands)
+    def _add(self, name: str, stage: int, lifetime: int, make: Callable[["_Build"], Any]) -> Word:
+        word = Word(name, stage, lifetime)
         self._makers.append((word, make))
         return word
 
@@ -129,7 +129,7 @@ class Dataflow:
 
     def wire(self, name: str, function: Callable[[Any], Any], word: Word) -> Word:
         """Wiring from a word's value; where it is read later than it stands, it is copied in its place."""
-        return self._add(name, word.age, word.stands, lambda build: function(build.at(word, word.age)))
+        return self._add(name, word.stage, word.lifetime, lambda build: function(build.at(word, word.stage)))
 
     def register(self, name: str, function: Callable[..., Any], *words: Word, since: int = 0) -> Word:
         """A register that takes ``function`` of the words' values, one clock.
@@ -145,24 +145,26 @@ class Dataflow:
         since : int
             Age at which it stands at the earliest: a word that is read late need not be copied till then.
         """
-        age = max(since - 1, *(word.age for word in words))
+        stage = max(since - 1, *(word.stage for word in words))
 
         def make(build):
-            value = function(*(build.at(word, age) for word in words))
-            return build.unit.register(build.m, value, name, when=build.when(age))
+            value = function(*(build.at(word, stage) for word in words))
+            return build.unit.register(build.m, value, name, when=build.when(stage))
 
-        return self._add(name, age + 1, self.interval, make)
+        return self._add(name, stage + 1, self.interval, make)
 
     def share(
         self, name: str, uses: int, shapes: Sequence[ShapeLike], latency: int, make: Callable[..., Any]
-    ) -> Operator:
+    ) -> FunctionalUnit:
         """An operator for so many uses; the parameters are those of `Operator`."""
         pieces = -(-uses // self.interval)
-        return Operator(name, shapes, latency, make, [uses], [[True] * self.interval for _ in range(pieces)])
+        return FunctionalUnit(
+            name, shapes, latency, make, [uses], [[True] * self.interval for _ in range(pieces)]
+        )
 
     def use(
         self,
-        operator: Operator,
+        functional_unit: FunctionalUnit,
         name: str,
         words: Sequence[Word],
         operands: Callable[..., Sequence[Any]],
@@ -194,21 +196,21 @@ class Dataflow:
         ValueError
             If that is one use more than announced.
         """
-        if not operator.left[0]:
-            raise ValueError(f"{name} is one use of the {operator.name} more than announced")
-        operator.left[0] -= 1
-        latency = operator.latency if latency is None else latency
-        age = max(since - 1 - latency, *(word.age for word in words))
-        while not any(turns[age % self.interval] for turns in operator.free):
-            age += 1
-        piece = next(k for k, turns in enumerate(operator.free) if turns[age % self.interval])
-        operator.free[piece][age % self.interval] = False
+        if not functional_unit.left[0]:
+            raise ValueError(f"{name} is one use of the {functional_unit.name} more than announced")
+        functional_unit.left[0] -= 1
+        latency = functional_unit.latency if latency is None else latency
+        stage = max(since - 1 - latency, *(word.stage for word in words))
+        while not any(turns[stage % self.interval] for turns in functional_unit.free):
+            stage += 1
+        piece = next(k for k, turns in enumerate(functional_unit.free) if turns[stage % self.interval])
+        functional_unit.free[piece][stage % self.interval] = False
 
         def make(build):
-            given = operands(*(build.at(word, age) for word in words))
-            return result(build.issue(operator, piece, age, given))
+            given = operands(*(build.at(word, stage) for word in words))
+            return result(build.issue(functional_unit, piece, stage, given))
 
-        return self._add(name, age + 1 + latency, 1, make)
+        return self._add(name, stage + 1 + latency, 1, make)
 
     def multiply(
         self,
@@ -221,7 +223,7 @@ class Dataflow:
     ) -> Word:
         """Exact product of two words on a shared multiplier.
 
-        It is there `MULTIPLIER_LATENCY` clocks after its operands; one, in a graph that ``hurries``.
+        It is there `MULTIPLIER_LATENCY` cycles after its operands; one, in a graph that ``low_latency``.
 
         Parameters
         ----------
@@ -268,17 +270,17 @@ class Dataflow:
         address : Word
             As many bits as needed, unsigned.
         """
-        age = address.age
+        stage = address.stage
 
         def make(build):
             memory = Memory(shape=width, depth=len(words), init=words)
             build.m.submodules[name] = memory
             port = memory.read_port()
-            build.m.d.comb += port.addr.eq(build.at(address, age))
+            build.m.d.comb += port.addr.eq(build.at(address, stage))
             return port.data
 
         # The address stands for an interval, and so does what is read.
-        return self._add(name, age + 1, address.stands, make)
+        return self._add(name, stage + 1, address.lifetime, make)
 
     def build(self, m: Module, unit: PipelinedUnit, operands: Any) -> Callable[[Word, int], Any]:
         """Make the hardware; the result gives a word's value at an age.
@@ -294,12 +296,12 @@ class Dataflow:
         """
         build = _Build(m, unit, operands)
         for word, make in self._makers:
-            build.values[word] = {word.age: make(build)}
+            build.values[word] = {word.stage: make(build)}
         return build.at
 
 
 def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> Any:
-    """Exact product, `MULTIPLIER_LATENCY` clocks: two registers for each operand, two for the product.
+    """Exact product, `MULTIPLIER_LATENCY` cycles: two registers for each operand, two for the product.
 
     An FPGA's multipliers lie in few places, far from the multiplexers that operands come from and the adders
     that products go to. Of registers in a row each wire is short wherever those are; and some go into the
@@ -317,14 +319,14 @@ def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> A
     return register(register(a * b, "product_0"), "product")
 
 
-def shared_sums(graph: Dataflow, uses: int, product: Format) -> Operator:
-    """What sums so many dot products, whose products have a format: two clocks; see `dot`."""
+def shared_sums(graph: Dataflow, uses: int, product: Format) -> FunctionalUnit:
+    """What sums so many dot products, whose products have a format: two cycles; see `dot`."""
     shapes = FixedShape(product + product), FixedShape(product)
     return graph.share("sum", uses, shapes, 1, lambda register, x, y: register(x + y, "total"))
 
 
 def dot(
-    graph: Dataflow, name: str, a: Word, b: Word | Callable[[Any], Any], sums: Operator | None = None
+    graph: Dataflow, name: str, a: Word, b: Word | Callable[[Any], Any], sums: FunctionalUnit | None = None
 ) -> Word:
     """Exact dot product of two vectors: three multiplications of the graph, and two sums.
 
@@ -375,42 +377,43 @@ class _Build:
     def __init__(self, m: Module, unit: PipelinedUnit, operands: Any):
         self.m, self.unit, self.operands = m, unit, operands
         self.values: dict[Word, dict[int, Any]] = {}
-        self._pieces: dict[tuple[Operator, int], tuple[list[Signal], Any]] = {}
+        self._pieces: dict[tuple[FunctionalUnit, int], tuple[list[Signal], Any]] = {}
 
-    def when(self, age: int) -> Value | None:
+    def when(self, stage: int) -> Value | None:
         """When a register of that age is written; always where every clock brings a beat."""
-        return self.unit.at(age) if self.unit.initiation_interval > 1 else None
+        return self.unit.at(stage) if self.unit.initiation_interval > 1 else None
 
-    def at(self, word: Word, age: int) -> Any:
+    def at(self, word: Word, stage: int) -> Any:
         """Value of a word at an age, through copies where it no longer stands by itself."""
         copies = self.values[word]
         first = max(copies)
-        stands = word.stands if first == word.age else self.unit.initiation_interval
-        while age >= first + stands:
+        lifetime = word.lifetime if first == word.stage else self.unit.initiation_interval
+        while stage >= first + lifetime:
             value = copies[first]
-            first += stands
+            first += lifetime
             copies[first] = self.unit.register(
                 self.m, value, f"{word.name}_{first}", when=self.when(first - 1)
             )
-            stands = self.unit.initiation_interval
-        return copies[max(start for start in copies if start <= age)]
+            lifetime = self.unit.initiation_interval
+        return copies[max(start for start in copies if start <= stage)]
 
-    def issue(self, operator: Operator, piece: int, age: int, operands: Sequence[Any]) -> Any:
+    def issue(self, functional_unit: FunctionalUnit, piece: int, stage: int, operands: Sequence[Any]) -> Any:
         """Give a piece of an operator its operands at an age; its result, for all uses.
 
         Those of the first use are given whenever it is no other's turn, so that no register needs an enable.
         """
-        key, when = (operator, piece), self.when(age)
+        key, when = (functional_unit, piece), self.when(stage)
         if key not in self._pieces:
             when = None
             given = [
-                Signal(shape, name=f"{operator.name}_{piece}_{k}") for k, shape in enumerate(operator.shapes)
+                Signal(shape, name=f"{functional_unit.name}_{piece}_{k}")
+                for k, shape in enumerate(functional_unit.shapes)
             ]
 
             def register(value, name):
-                return self.unit.register(self.m, value, f"{operator.name}_{piece}_{name}")
+                return self.unit.register(self.m, value, f"{functional_unit.name}_{piece}_{name}")
 
-            self._pieces[key] = given, operator.make(register, *given)
+            self._pieces[key] = given, functional_unit.make(register, *given)
         given, result = self._pieces[key]
         assignments = [
             Value.cast(to).eq(Value.cast(value)) for to, value in zip(given, operands, strict=True)

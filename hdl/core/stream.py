@@ -7,22 +7,22 @@ from amaranth.lib.wiring import In, Out
 from blysk.hdl.core.fixed import FixedShape
 
 __all__ = [
-    "BUFFER_LATENCY",
-    "REGISTER_LATENCY",
+    "FIFO_LATENCY",
+    "SLICE_LATENCY",
     "PipelinedUnit",
     "connect",
-    "connect_buffered",
-    "connect_registered",
+    "connect_fifo",
+    "connect_slice",
     "count_down",
-    "offer",
     "require_same_shape",
+    "skid_buffer",
 ]
 
-BUFFER_LATENCY = 2
+FIFO_LATENCY = 2
 """Clocks that a payload takes through an empty buffer."""
 
-REGISTER_LATENCY = 1
-"""Clocks that a payload takes through the register of `connect_registered`."""
+SLICE_LATENCY = 1
+"""Clocks that a payload takes through the register of `connect_slice`."""
 
 
 def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> None:
@@ -78,12 +78,10 @@ def connect(m: Module, source: stream.Interface, sink: stream.Interface) -> None
     ]
 
 
-def connect_buffered(
-    m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int
-) -> None:
+def connect_fifo(m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int) -> None:
     """Connect two streams through a FIFO, which takes payloads in while the sink waits.
 
-    A payload takes `BUFFER_LATENCY` clocks through the empty FIFO.
+    A payload takes `FIFO_LATENCY` cycles through the empty FIFO.
 
     Parameters
     ----------
@@ -112,7 +110,7 @@ def connect_buffered(
     ]
 
 
-def offer(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
+def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
     """Offer on a stream what stands in registers; one more register holds what is not taken.
 
     The result, *advance*, tells whether the registers behind ``valid`` and ``payload`` take their next values
@@ -153,8 +151,8 @@ def offer(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueL
     return ~held
 
 
-def connect_registered(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
-    """Connect two streams through a register, which takes `REGISTER_LATENCY`; the source's ready is one, too.
+def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
+    """Connect two streams through a register, which takes `SLICE_LATENCY`; the source's ready is one, too.
 
     Parameters
     ----------
@@ -169,7 +167,7 @@ def connect_registered(m: Module, source: stream.Interface, sink: stream.Interfa
     require_same_shape(source.payload.shape(), sink.payload.shape())
     valid = Signal(name="valid")
     payload = Signal(Shape.cast(source.payload.shape()).width, name="payload", reset_less=True)
-    advance = offer(m, sink, valid, payload)
+    advance = skid_buffer(m, sink, valid, payload)
     m.d.comb += source.ready.eq(advance)
     with m.If(advance):
         m.d.sync += [valid.eq(source.valid), payload.eq(source.payload)]
@@ -211,14 +209,14 @@ def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[
 class PipelinedUnit(wiring.Component):
     """A unit with a fixed latency and initiation interval, moved on by one common enable.
 
-    A beat taken in on one clock is offered on the output ``latency`` clocks later, unless the output waits:
+    A beat taken in on one clock is offered on the output ``latency`` cycles later, unless the output waits:
     then the whole unit stands still, from the clock after the first on which a beat was not taken, and holds
     its payloads (`offer`). As long as a beat is inside, the next is taken in a whole multiple of
-    ``initiation_interval`` clocks after it, not counting those of standing still. ``i.ready`` and ``o.valid``
+    ``initiation_interval`` cycles after it, not counting those of standing still. ``i.ready`` and ``o.valid``
     follow from the unit's registers alone. Reset empties the unit.
 
     A subclass describes its registers in `datapath`, as if they moved on every clock. Control comes from the
-    *age* of a beat: `at` tells whether a beat was taken in so many enabled clocks ago.
+    *age* of a beat: `at` tells whether a beat was taken in so many enabled cycles ago.
 
     Parameters
     ----------
@@ -227,7 +225,7 @@ class PipelinedUnit(wiring.Component):
     latency : int
         Clocks from input to output, at least 1.
     initiation_interval : int
-        Distance in clocks of two inputs. With 1, `datapath` gets the input itself, and registers it;
+        Distance in cycles of two inputs. With 1, `datapath` gets the input itself, and registers it;
         with more, it gets a register that holds the input for ages 1 to ``initiation_interval``.
     constants : ShapeLike or None
         Shape of the port ``constants``: values that stay while beats are inside. ``None``: no such port.
@@ -264,9 +262,9 @@ class PipelinedUnit(wiring.Component):
         """Describe the registers in ``m`` and return the payload of the output, ``latency`` registers on."""
         raise NotImplementedError
 
-    def at(self, age: int) -> Value:
-        """Whether a beat was taken in ``age`` enabled clocks ago, 1 to ``latency``."""
-        return self._ages[age - 1]
+    def at(self, stage: int) -> Value:
+        """Whether a beat was taken in ``stage`` enabled cycles ago, 1 to ``latency``."""
+        return self._stages[stage - 1]
 
     @staticmethod
     def register(m: Module, value, name: str, *, when: Value | None = None):
@@ -282,7 +280,7 @@ class PipelinedUnit(wiring.Component):
     def elaborate(self, platform):
         """Build the control and put the data path under the common enable."""
         m = Module()
-        self._ages = Signal(self.latency, name="ages")
+        self._stages = Signal(self.latency, name="stages")
         advance, accept = Signal(), Signal()
         if self.initiation_interval == 1:
             m.d.comb += self.i.ready.eq(advance)
@@ -290,7 +288,7 @@ class PipelinedUnit(wiring.Component):
             m.d.comb += self.i.ready.eq(self._turn(m, advance, accept))
         m.d.comb += accept.eq(self.i.valid & self.i.ready)
         with m.If(advance):
-            m.d.sync += self._ages.eq(Cat(accept, self._ages[:-1]))
+            m.d.sync += self._stages.eq(Cat(accept, self._stages[:-1]))
 
         inner = Module()
         operands = self.i.payload
@@ -299,7 +297,7 @@ class PipelinedUnit(wiring.Component):
             operands = self.register(inner, operands, "operands", when=self.i.ready)
         result = self.datapath(inner, operands)
         m.submodules.datapath = EnableInserter(advance)(inner)
-        m.d.comb += advance.eq(offer(m, self.o, self._ages[-1], result))
+        m.d.comb += advance.eq(skid_buffer(m, self.o, self._stages[-1], result))
         return m
 
     def _turn(self, m: Module, advance: Value, accept: Value) -> Value:
@@ -313,7 +311,7 @@ class PipelinedUnit(wiring.Component):
         m.d.comb += opens.eq((turn == self.initiation_interval - 1) | ~(accept | stays))
         with m.If(advance):
             m.d.sync += [
-                stays.eq(Cat(accept, self._ages)[:-2].any()),
+                stays.eq(Cat(accept, self._stages)[:-2].any()),
                 turn.eq(Mux(opens, 0, turn + 1)),
             ]
         waits = self.o.valid & ~self.o.ready

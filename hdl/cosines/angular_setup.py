@@ -49,7 +49,7 @@ class AngularSetupUnit(PipelinedUnit):
     parameters : AngularSetup
         Where psi comes from, tables and formats.
     initiation_interval : int or None
-        1 to 26, or to 21 by arccos: distance in clocks of two inputs. ``None``: 6.
+        1 to 26, or to 21 by arccos: distance in cycles of two inputs. ``None``: 6.
 
     Raises
     ------
@@ -62,7 +62,7 @@ class AngularSetupUnit(PipelinedUnit):
         Unit vectors, three components ``SQ(1, 17)`` each; length 1 to 4095.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
         ``angle`` UQ(0, 36), ``phase`` SQ(0, 40), ``step`` UQ(0, 40), all in turns; ``cos_beta`` UQ(1, 25);
-        ``length``; ``wide``: the span is over 150 degrees, and its plane not to be trusted.
+        ``length``; ``out_of_range``: the span is over 150 degrees, and its plane not to be trusted.
 
     Source: [T] 3.1.
     """
@@ -89,10 +89,10 @@ class AngularSetupUnit(PipelinedUnit):
                     "step": FixedShape(AngularSetup.STEP_FORMAT),
                     "cos_beta": FixedShape(AngularSetup.COS_BETA_FORMAT),
                     "length": unsigned(DifferenceSetup.LENGTH_BITS),
-                    "wide": unsigned(1),
+                    "out_of_range": unsigned(1),
                 }
             ),
-            latency=max(word.age for word in self._words.values()),
+            latency=max(word.stage for word in self._words.values()),
             initiation_interval=interval,
         )
 
@@ -133,8 +133,8 @@ class AngularSetupUnit(PipelinedUnit):
         )
         shortest = p.SHORTEST_SUM
         limit = FixedValue.constant(shortest.format, shortest.values.item())
-        wide = g.register(
-            "wide",
+        out_of_range = g.register(
+            "out_of_range",
             lambda obtuse, chord: obtuse & (chord.truncate(shortest.format.fraction_bits) < limit),
             obtuse,
             chord,
@@ -163,7 +163,7 @@ class AngularSetupUnit(PipelinedUnit):
             "step": self._step(angle, obtuse, shift, length),
             "cos_beta": cos_beta,
             "length": length,
-            "wide": wide,
+            "out_of_range": out_of_range,
         }
 
     def _by_arccos(self, cross: Word) -> Word:
@@ -184,9 +184,12 @@ class AngularSetupUnit(PipelinedUnit):
 
         cosine = g.register("cosine_exact", exact, cross)
         cosine = g.register("cosine_rounded", lambda cosine: cosine.round_half_up(16), cosine)
-        operator = g.share("arccos", 1, [FixedShape(Arccos.OPERAND_FORMAT)], unit.latency, arccos)
+        functional_unit = g.share("arccos", 1, [FixedShape(Arccos.OPERAND_FORMAT)], unit.latency, arccos)
         radians = g.use(
-            operator, "radians_exact", [cosine], lambda cosine: [cosine.saturate(Arccos.OPERAND_FORMAT)]
+            functional_unit,
+            "radians_exact",
+            [cosine],
+            lambda cosine: [cosine.saturate(Arccos.OPERAND_FORMAT)],
         )
         radians = g.register(
             "radians", lambda radians: radians.round_half_up(15).saturate(p.RADIANS_FORMAT), radians
@@ -196,7 +199,7 @@ class AngularSetupUnit(PipelinedUnit):
         return g.register("turns", lambda turns: Value.cast(turns.extend(p.ANGLE_FORMAT)), turns)
 
     def _looked_up(self, name: str, table, address: Word, fraction: Word, sign: int, format) -> Word:
-        """Interpolated word of a table, rounded to a format of a binary place less: seven clocks at least."""
+        """Interpolated word of a table, rounded to a format of a binary place less: seven cycles at least."""
         g = self._graph
         values, changes = table
         width = changes.format.width
@@ -281,7 +284,7 @@ class AngularSetupUnit(PipelinedUnit):
             "psi_rounded", lambda psi: FixedValue(p.ANGLE_FORMAT, psi).round_half_up(18), leading
         )
         leading = g.register("psi_leading", lambda psi: psi.saturate(p.MANTISSA_FORMAT), leading)
-        reciprocal, places = reciprocal_words(g, length, since=leading.age - 4)
+        reciprocal, places = reciprocal_words(g, length, since=leading.stage - 4)
         if p.angle == "half_chord":
             places = g.register("places_sum", lambda a, b: (a + b)[:5], places, shift)
         else:
@@ -338,8 +341,8 @@ class AngularSetupUnit(PipelinedUnit):
         zeros = p.GAIN_BITS - p.ROTATED_FORMAT.fraction_bits
 
         def term(along, sign, places):
-            wide = Cat(Const(0, zeros), along).as_signed()
-            return wide >> places if sign > 0 else -(wide >> places)
+            out_of_range = Cat(Const(0, zeros), along).as_signed()
+            return out_of_range >> places if sign > 0 else -(out_of_range >> places)
 
         terms = [
             g.wire(f"gain_{places}", lambda along, t=(sign, places): term(along, *t), along)

@@ -22,10 +22,10 @@ class ArccosUnit(PipelinedUnit):
     Tables, formats and error bounds are those of `Arccos`, the bit-true twin of both forms.
 
     Sequential, as drawn: c0 goes into the accumulator, ``c2 x`` into the register, ``(c2 x) x`` and ``c1 x``
-    are added. The latency is 15 clocks and the initiation interval 4; one multiplier of 18 x 17 bits.
+    are added. The latency is 15 cycles and the initiation interval 4; one multiplier of 18 x 17 bits.
 
     Pipelined: the same in Horner's order, which has the same bits because ``c1 + c2 x`` is exact. The latency
-    is 14 clocks and the initiation interval 1; two multipliers of 18 x 17 bits.
+    is 14 cycles and the initiation interval 1; two multipliers of 18 x 17 bits.
 
     Parameters
     ----------
@@ -155,8 +155,8 @@ class ArccosUnit(PipelinedUnit):
         word, operand = Signal(signed(18)), Signal(17)
         product = register(m, word * operand, "product")
         scaled = register(m, _rounded(product), "scaled", when=at(7))
-        for age, factor in ((5, c2), (6, c1), (8, scaled)):
-            with m.If(at(age)):
+        for stage, factor in ((5, c2), (6, c1), (8, scaled)):
+            with m.If(at(stage)):
                 m.d.sync += [word.eq(factor), operand.eq(x)]
         aligned = register(m, self._aligned(product, Mux(at(8), segment, segment_late)), "aligned")
         total = Signal(signed(43))
@@ -194,7 +194,7 @@ class HalfChordUnit(PipelinedUnit):
     parameters : HalfChord
         Table and coefficients.
     initiation_interval : int or None
-        1 to 6, which ``None`` stands for: distance in clocks of two inputs.
+        1 to 6, which ``None`` stands for: distance in cycles of two inputs.
 
     Raises
     ------
@@ -221,7 +221,7 @@ class HalfChordUnit(PipelinedUnit):
                 {"chord_squared": FixedShape(HalfChord.OPERAND_FORMAT), "supplement": unsigned(1)}
             ),
             FixedShape(HalfChord.RESULT_FORMAT),
-            latency=self._angle.age,
+            latency=self._angle.stage,
             initiation_interval=interval,
         )
 
@@ -239,7 +239,7 @@ class HalfChordUnit(PipelinedUnit):
 
 
 def normalised_words(graph: Dataflow, chord_squared: Word) -> tuple[Word, Word]:
-    """``v = z 4^j`` in [1/4, 1) and j, for ``z = chord_squared / 4``: three clocks.
+    """``v = z 4^j`` in [1/4, 1) and j, for ``z = chord_squared / 4``: three cycles.
 
     Parameters
     ----------

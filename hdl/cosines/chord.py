@@ -62,7 +62,7 @@ def chord(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]
 class ChordUnit(PipelinedUnit):
     """``u = |a - b|^2 / 2``; `Chord` is the bit-true twin.
 
-    The latency is 11 clocks (difference, halving, operand, four for the product, two sums, alignment,
+    The latency is 11 cycles (difference, halving, operand, four for the product, two sums, alignment,
     saturation) and the initiation interval 1. Three multipliers of 18x18 bits.
 
     Members
@@ -83,7 +83,7 @@ class ChordUnit(PipelinedUnit):
         super().__init__(
             data.StructLayout({"a": normal_shape(), "b": normal_shape()}),
             FixedShape(Chord.ARGUMENT_FORMAT),
-            latency=u.age,
+            latency=u.stage,
         )
 
     def datapath(self, m, operands):

@@ -9,7 +9,7 @@ from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.normals.difference_setup import LENGTH_BITS
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.hdl.core.dataflow import Dataflow, Operator, Word, dot, shared_sums
+from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit, Word, dot, shared_sums
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.cosines.chord import chord
@@ -44,7 +44,7 @@ def chord_differences_shape(
         {
             "lights": data.ArrayLayout(data.StructLayout(light), lights),
             "length": unsigned(LENGTH_BITS),
-            "wide": unsigned(1),
+            "out_of_range": unsigned(1),
         }
     )
 
@@ -52,7 +52,8 @@ def chord_differences_shape(
 class ChordDifferencesUnit(PipelinedUnit):
     """What two setups share: their results, by name, from the words of a graph.
 
-    A subclass sets ``_graph`` and ``_results``: words by ``(light, function, name)``, ``length``, ``wide``.
+    A subclass sets ``_graph`` and ``_results``: words by ``(light, function, name)``, ``length``,
+    ``out_of_range``.
     """
 
     def datapath(self, m, operands):
@@ -64,7 +65,7 @@ class ChordDifferencesUnit(PipelinedUnit):
                 for name in ("start", "first", "second"):
                     word = self._results[index, function, name]
                     m.d.comb += light[function][name].eq(value(word, self.latency))
-        for name in ("length", "wide"):
+        for name in ("length", "out_of_range"):
             m.d.comb += result[name].eq(value(self._results[name], self.latency))
         return result
 
@@ -84,7 +85,7 @@ class ChordSetupUnit(ChordDifferencesUnit):
     lights : int
         Number of lights, 1 or more.
     initiation_interval : int
-        Distance in clocks of two inputs, at least 1.
+        Distance in cycles of two inputs, at least 1.
     length_bits : int
         Bits of the length, 2 to 12: spans have at most ``2^length_bits - 1`` pixels.
     highlights : bool
@@ -102,7 +103,8 @@ class ChordSetupUnit(ChordDifferencesUnit):
     i : :py:`In(stream.Signature(span_normals_shape()))`
         Spans; their length has `length_bits` bits and is at least 1.
     o : :py:`Out(stream.Signature(chord_differences_shape(lights, highlights, parameters)))`
-        Starts and differences; the length; ``wide``: the span is over 22.5 degrees and they mean nothing.
+        Starts and differences; the length; ``out_of_range``: the span is over 22.5 degrees and they mean
+        nothing.
     constants : :py:`In(light_vectors_shape(lights))`
         Unit vectors L and H; stay while beats are inside.
 
@@ -130,7 +132,7 @@ class ChordSetupUnit(ChordDifferencesUnit):
         super().__init__(
             span_normals_shape(length_bits),
             chord_differences_shape(lights, highlights, p),
-            latency=max(word.age for word in self._results.values()),
+            latency=max(word.stage for word in self._results.values()),
             initiation_interval=initiation_interval,
             constants=light_vectors_shape(lights),
         )
@@ -147,7 +149,7 @@ class ChordSetupUnit(ChordDifferencesUnit):
 
         rounded = g.register("w_rounded", lambda w: w.round_half_up(20), chord(g, "span", right, left))
         w = g.register("w", lambda w: w.saturate(p.ANGLE_FORMAT), rounded)
-        results["wide"] = g.register("wide", lambda w: w > _constant(p.widest), w)
+        results["out_of_range"] = g.register("out_of_range", lambda w: w > _constant(p.widest), w)
         steps = step_words(g, length, self.length_bits)
         products = {}
         for i in range(self.lights):
@@ -227,7 +229,7 @@ class ChordSetupUnit(ChordDifferencesUnit):
         results.update({(i, function, name): word for name, word in words.items()})
 
 
-def shared_shifters(graph: Dataflow, uses: int, parameters: ChordSetup) -> Operator:
+def shared_shifters(graph: Dataflow, uses: int, parameters: ChordSetup) -> FunctionalUnit:
     """What shifts for so many differences, two of each quadratic; see `difference_words`."""
     format = parameters.shifted_format
 
@@ -262,7 +264,7 @@ def step_words(
 
 def difference_words(
     graph: Dataflow,
-    shifters: Operator,
+    shifters: FunctionalUnit,
     name: str,
     start: Word,
     slope: Word,

@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit, count_down, offer
+from blysk.hdl.core.stream import PipelinedUnit, count_down, skid_buffer
 
 __all__ = ["HighlightCosineUnit", "highlight_shape"]
 
@@ -30,9 +30,9 @@ class HighlightCosineUnit(wiring.Component):
 
     Table, formats and error bounds are those of `HighlightCosine`, the bit-true twin.
 
-    A span of m pixels taken in on one clock gives its first value 12 clocks later (accumulator, folding,
+    A span of m pixels taken in on one clock gives its first value 12 cycles later (accumulator, folding,
     table and its register, rise, sum, operand, product, alignment, rounding, sum, saturation) and one more
-    on each of the m - 1 clocks after, unless the output waits; the next span is taken in on the clock that
+    on each of the m - 1 cycles after, unless the output waits; the next span is taken in on the clock that
     leaves no gap. A span of length 0 takes one clock and gives nothing. Two multipliers: one of 17 x 17 bits,
     and one of 14 x 14 for the interpolation, where there is one.
 
@@ -82,7 +82,7 @@ class HighlightCosineUnit(wiring.Component):
         inner = Module()
         result = self._wave(inner, Value.cast(theta).as_unsigned(), cos_beta)
         m.submodules.wave = EnableInserter(advance)(inner)
-        m.d.comb += advance.eq(offer(m, self.o, valid[-1], result))
+        m.d.comb += advance.eq(skid_buffer(m, self.o, valid[-1], result))
         return m
 
     def _wave(self, m, theta, cos_beta):

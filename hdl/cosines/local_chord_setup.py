@@ -48,7 +48,7 @@ class LocalChordSetupUnit(ChordDifferencesUnit):
     lights : int
         Number of lights, 1 or more.
     initiation_interval : int
-        Distance in clocks of two inputs, at least 1.
+        Distance in cycles of two inputs, at least 1.
     length_bits : int
         Bits of the length, 2 to 12: spans have at most ``2^length_bits - 1`` pixels.
     highlights : bool
@@ -64,7 +64,7 @@ class LocalChordSetupUnit(ChordDifferencesUnit):
     i : :py:`In(stream.Signature(span_values_shape(lights, highlights, length_bits)))`
         Spans; their length is at least 1.
     o : :py:`Out(stream.Signature(chord_differences_shape(lights, highlights)))`
-        Starts and differences; the length; ``wide``: a word does not fit, and they mean nothing.
+        Starts and differences; the length; ``out_of_range``: a word does not fit, and they mean nothing.
 
     Source: chord.md.
     """
@@ -87,7 +87,7 @@ class LocalChordSetupUnit(ChordDifferencesUnit):
         super().__init__(
             span_values_shape(lights, highlights, length_bits),
             chord_differences_shape(lights, highlights),
-            latency=max(word.age for word in self._results.values()),
+            latency=max(word.stage for word in self._results.values()),
             initiation_interval=initiation_interval,
         )
 
@@ -115,7 +115,7 @@ class LocalChordSetupUnit(ChordDifferencesUnit):
                     parameters=ChordSetup(),
                 )
                 results.update({(i, function, name): word for name, word in words.items()})
-        results["wide"] = g.register("wide", lambda *flags: Cat(flags).any(), *flags)
+        results["out_of_range"] = g.register("out_of_range", lambda *flags: Cat(flags).any(), *flags)
         return results
 
     def _quadratic(self, i: int, function: str, slope_format: Format, flags: list[Word]):

@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit, offer
+from blysk.hdl.core.stream import PipelinedUnit, skid_buffer
 
 __all__ = ["RecurrenceUnit"]
 
@@ -21,15 +21,15 @@ class RecurrenceUnit(wiring.Component):
     Forms, formats and error bound are those of `Recurrence`, the bit-true twin.
 
     With ``interleave`` 1, every pixel needs the one before, so that the registers of the loop cannot be
-    filled with other pixels: ``reinsch`` gives a pixel every 4 clocks (product, two stages of shift, sums),
+    filled with other pixels: ``reinsch`` gives a pixel every 4 cycles (product, two stages of shift, sums),
     ``direct`` every 3 (product, sum, saturation). The next span is taken in ``4 (m - 1) + 1``
-    (``3 (m - 1) + 1``) clocks after one of m pixels.
+    (``3 (m - 1) + 1``) cycles after one of m pixels.
 
     With ``interleave`` 4, every pixel needs the one four before. The four phases follow each other through
-    the loop's four registers, so there is a pixel on every clock; a span takes m clocks, and the next follows
+    the loop's four registers, so there is a pixel on every clock; a span takes m cycles, and the next follows
     without a gap.
 
-    Either way the first pixel comes 3 clocks after its span was taken in, and a span of length 0 takes one
+    Either way the first pixel comes 3 cycles after its span was taken in, and a span of length 0 takes one
     clock and gives nothing. Two multipliers, one a copy: 18 x 18 bits with the defaults.
 
     Parameters
@@ -53,7 +53,7 @@ class RecurrenceUnit(wiring.Component):
 
     def __init__(self, parameters: Recurrence | None = None):
         self.parameters = p = parameters or Recurrence()
-        self.clocks_per_pixel = 1 if p.interleave > 1 else {"reinsch": 4, "direct": 3}[p.form]
+        self.cycles_per_pixel = 1 if p.interleave > 1 else {"reinsch": 4, "direct": 3}[p.form]
         word = FixedShape(p.state_format)
         if p.interleave > 1:
             word = data.ArrayLayout(word, p.interleave)
@@ -74,17 +74,17 @@ class RecurrenceUnit(wiring.Component):
         """Counters, coefficient, the loop of each copy, and two registers for rounding and saturation."""
         m = Module()
         p, span = self.parameters, self.i.payload
-        active, after, phase = Signal(), Signal(p.LENGTH_BITS), Signal(range(self.clocks_per_pixel))
+        active, after, phase = Signal(), Signal(p.LENGTH_BITS), Signal(range(self.cycles_per_pixel))
         is_first = Signal()
         rounded_valid, rounded_last, valid = Signal(), Signal(), Signal()
         result = Signal(self.o.payload.shape())
         advance, load = Signal(), Signal()
         m.d.comb += [
-            advance.eq(offer(m, self.o, valid, result)),
+            advance.eq(skid_buffer(m, self.o, valid, result)),
             self.i.ready.eq(advance & (after == 0)),
             load.eq(self.i.valid & self.i.ready),
         ]
-        ends = phase == self.clocks_per_pixel - 1
+        ends = phase == self.cycles_per_pixel - 1
         # Interleaved: which of the next pixels are the first of their phases.
         first_to_come = Signal(p.interleave - 1)
         starts = load | first_to_come[0] if p.interleave > 1 else load
@@ -148,10 +148,10 @@ class RecurrenceUnit(wiring.Component):
             words.append(FixedValue(p.state_format, chosen))
         return words
 
-    def _late(self, m, value, clocks, name):
-        """Interleaved, ``value`` so many clocks on; else it has stayed for the whole of its pixel."""
+    def _late(self, m, value, cycles, name):
+        """Interleaved, ``value`` so many cycles on; else it has stayed for the whole of its pixel."""
         if self.parameters.interleave > 1:
-            for clock in range(clocks):
+            for clock in range(cycles):
                 value = PipelinedUnit.register(m, value, f"{name}_late_{clock}")
         return value
 

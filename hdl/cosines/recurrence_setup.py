@@ -28,7 +28,7 @@ def recurrence_starts_shape(parameters: RecurrenceSetup, lights: int) -> data.St
     }
     if r.form == "reinsch":
         members["shift"] = unsigned(r.SHIFT_BITS)
-    return data.StructLayout({**members, "length": unsigned(LENGTH_BITS), "wide": unsigned(1)})
+    return data.StructLayout({**members, "length": unsigned(LENGTH_BITS), "out_of_range": unsigned(1)})
 
 
 class RecurrenceSetupUnit(PipelinedUnit):
@@ -59,15 +59,15 @@ class RecurrenceSetupUnit(PipelinedUnit):
     lights : int
         Number of lights, 1 or more.
     initiation_interval : int
-        Distance in clocks of two inputs, at least 1.
+        Distance in cycles of two inputs, at least 1.
 
     Members
     -------
     i : :py:`In(stream.Signature(span_normals_shape()))`
         Spans of length 1 to 4095.
     o : :py:`Out(stream.Signature(recurrence_starts_shape(parameters, lights)))`
-        Start values; K of four pixels and its shift; the length; ``wide``: the span is over 90 degrees and
-        they mean nothing.
+        Start values; K of four pixels and its shift; the length; ``out_of_range``: the span is over 90
+        degrees and they mean nothing.
     constants : :py:`In(light_vectors_shape(lights))`
         Unit vectors L and H; stay while beats are inside.
 
@@ -90,7 +90,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         super().__init__(
             span_normals_shape(),
             recurrence_starts_shape(p, lights),
-            latency=max(word.age for word in self._results.values()),
+            latency=max(word.stage for word in self._results.values()),
             initiation_interval=initiation_interval,
             constants=light_vectors_shape(lights),
         )
@@ -119,7 +119,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         widest = FixedValue.constant(p.WIDEST.format, p.WIDEST.values.item())
         u = chord(g, "span", right, left)
         u = g.register("chord_unit", lambda u: u + u.scale(-16).truncate(35), u)
-        wide = g.register("wide", lambda u: u >= widest, u)
+        out_of_range = g.register("out_of_range", lambda u: u >= widest, u)
         u = g.register("chord", lambda u: u.saturate(p.CHORD_FORMAT), u)
         q, q_shift = self._normalised(u)
         square, inverse = self._looked_up("chord", p.chord_tables, g.register("chord_bits", Value.cast, u))
@@ -179,7 +179,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         rho, over = self._under_one("rho", rho)
         rho_shift = g.register("rho_shift", lambda shift, over: (shift - over)[:4], step_shift, over)
 
-        results = {"length": length, "wide": wide}
+        results = {"length": length, "out_of_range": out_of_range}
         if p.recurrence.form == "reinsch":
             results |= {"coefficient": phase_k, "shift": phase_s}
         else:

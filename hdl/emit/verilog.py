@@ -127,10 +127,10 @@ def emit(
     if declared is None:
         raise ValueError(f"name must not be a keyword of Verilog, not {name!r}")
     declared_names = re.findall(r"\w+", declared[1])
-    clocks = [key for key in ("clk", "rst") if key in declared_names]
-    if others := set(declared_names) - set(clocks) - {port.name for port in bits}:
+    cycles = [key for key in ("clk", "rst") if key in declared_names]
+    if others := set(declared_names) - set(cycles) - {port.name for port in bits}:
         raise ValueError(f"the component must have one clock domain, sync, but has {sorted(others)}")
-    ports = [_Port(key, In, 1) for key in clocks] + list(bits)
+    ports = [_Port(key, In, 1) for key in cycles] + list(bits)
     order = f"module {name} (\n  " + ",\n  ".join(port.name for port in ports) + "\n);"
     text = text[: declared.start()] + order + text[declared.end() :]
     return _comment(name, header, _table(ports, descriptions)) + text + "\n/* verilator lint_restore */\n"

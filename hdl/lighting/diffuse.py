@@ -11,7 +11,7 @@ __all__ = ["DiffuseUnit"]
 class DiffuseUnit(PipelinedUnit):
     """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated; `Diffuse` is its twin.
 
-    The latency is ``latency`` clocks, of which 2 work (rounding, saturation; one more to take the operand in
+    The latency is ``latency`` cycles, of which 2 work (rounding, saturation; one more to take the operand in
     where the initiation interval is over 1) and the rest wait, so that the term leaves together with that of
     a longer unit beside it. A register for each interval that it waits, no multipliers.
 
@@ -22,7 +22,7 @@ class DiffuseUnit(PipelinedUnit):
     parameters : Diffuse
         Format of the operand.
     initiation_interval : int
-        Distance in clocks of two inputs, at least 1.
+        Distance in cycles of two inputs, at least 1.
 
     Members
     -------
@@ -52,7 +52,7 @@ class DiffuseUnit(PipelinedUnit):
         self._result = graph.register(
             "result", lambda rounded: rounded.saturate(Diffuse.RESULT_FORMAT), rounded
         )
-        least = self._result.age
+        least = self._result.stage
         if latency is not None and latency < least:
             raise ValueError(f"latency must be at least {least}, not {latency}")
         super().__init__(

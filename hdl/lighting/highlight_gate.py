@@ -7,7 +7,7 @@ from amaranth.lib.memory import Memory
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.fixed import UQ
-from blysk.hdl.core.dataflow import Dataflow, Operator, Word, checked_interval, dot, shared_sums
+from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit, Word, checked_interval, dot, shared_sums
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit
 
@@ -39,7 +39,7 @@ class HighlightGateUnit(PipelinedUnit):
     parameters : HighlightGate
         Reflection model and width.
     initiation_interval : int or None
-        Distance in clocks of two inputs, from 1 to the number of multiplications. ``None``: 6.
+        Distance in cycles of two inputs, from 1 to the number of multiplications. ``None``: 6.
     lights : int
         Number of lights, at least 1.
     exponent : int or None
@@ -84,7 +84,7 @@ class HighlightGateUnit(PipelinedUnit):
         super().__init__(
             data.StructLayout({"normal_left": normal, "normal_right": normal}),
             unsigned(lights),
-            latency=self._lit.age,
+            latency=self._lit.stage,
             initiation_interval=interval,
             constants=data.StructLayout(constants),
         )
@@ -120,13 +120,15 @@ class HighlightGateUnit(PipelinedUnit):
         cut = g.register(
             "cut", lambda x: Value.cast(x.truncate(angle.fraction_bits).saturate(angle)), difference
         )
-        wide = g.register("wide", lambda cut: cut > p.widest.codes.item(), cut)
+        out_of_range = g.register("out_of_range", lambda cut: cut > p.widest.codes.item(), cut)
         u = g.register("u", lambda cut: Mux((cut + 3)[f], angle.max_code, (cut + 3)[:f])[:f], cut)
 
-        lit = [self._lit_by(index, left, right, u, wide, sums) for index in range(self.lights)]
+        lit = [self._lit_by(index, left, right, u, out_of_range, sums) for index in range(self.lights)]
         return lit[0] if len(lit) == 1 else g.register("lit", lambda *bits: Cat(bits), *lit)
 
-    def _lit_by(self, index: int, left: Word, right: Word, u: Word, wide: Word, sums: Operator) -> Word:
+    def _lit_by(
+        self, index: int, left: Word, right: Word, u: Word, out_of_range: Word, sums: FunctionalUnit
+    ) -> Word:
         """Word of the decision for one light."""
         g, p = self._graph, self.parameters
         f = p.fraction_bits
@@ -162,7 +164,7 @@ class HighlightGateUnit(PipelinedUnit):
             f"total_{index}",
             lambda partial, x: (partial - (Value.cast(x) << 2))[: 2 * f + 3].as_signed(),
             partial,
-            multiply("a_b", a, b, since=partial.age),
+            multiply("a_b", a, b, since=partial.stage),
         )
         exceeded = g.register(f"exceeded_{index}", lambda w: w[-1] | ~w[f + 2 :].any(), total)
         slack = g.register(f"slack_{index}", lambda w: w[f + 2 :][:f], total)
@@ -173,7 +175,7 @@ class HighlightGateUnit(PipelinedUnit):
             f"absolute_difference_{index}", lambda minus: Mux(minus[-1], -minus, minus)[:f], minus
         )
         product = multiply("u_slack", u, slack)
-        square = multiply("square", span, span, since=product.age)
+        square = multiply("square", span, span, since=product.stage)
         bright = g.register(
             f"bright_{index}",
             lambda x: Value.cast(x) >= (self._threshold << f),
@@ -193,6 +195,8 @@ class HighlightGateUnit(PipelinedUnit):
         )
         return g.register(
             f"lit_{index}",
-            lambda wide, bright, inside, exceeded, reached: wide | bright | (inside & (exceeded | reached)),
-            *(wide, bright, inside, exceeded, reached),
+            lambda out_of_range, bright, inside, exceeded, reached: (
+                out_of_range | bright | (inside & (exceeded | reached))
+            ),
+            *(out_of_range, bright, inside, exceeded, reached),
         )

@@ -10,7 +10,7 @@ from amaranth.lib import data
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.number.fixed import UQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit, offer
+from blysk.hdl.core.stream import PipelinedUnit, skid_buffer
 
 __all__ = ["IntensityUnit", "color_shape", "pixel_color_shape"]
 
@@ -31,18 +31,18 @@ class IntensityUnit(PipelinedUnit):
     Formats and error are those of `Intensity`, the bit-true twin. Nothing wraps: the sum
     grows by a bit at each level of the adder tree.
 
-    In the throughput style the latency is ``9 + ceil(log2(2 lights + 1))`` clocks (terms, two for the
+    In the throughput style the latency is ``9 + ceil(log2(2 lights + 1))`` cycles (terms, two for the
     factors, two for the products, two that the channels are apart, adder tree, rounding, saturation) and the
     initiation interval is 1. The channels follow each other by a clock: each multiplier has registers of its
     own, two in a row for its factor and for its product, as in `registered_product`. Six
     multipliers a light. Without specular terms there are ``lights`` in place of ``2 lights``, with one
-    channel a third of the multipliers and two clocks less.
+    channel a third of the multipliers and two cycles less.
 
     In the compact style there is one multiplier of 17 by 17 bits, and no product of a term that is 0. A pixel
-    takes ``c = 3 max(1, T)`` clocks, T the number of its diffuse and specular terms that are not 0
-    (`Intensity.clocks`): 3 for one light without and 6 with a highlight, 3 in the dark. The
-    next pixel is taken in c clocks after it, and the pixel leaves after ``c + 5`` (input, operands, product,
-    sum, rounding, saturation), clocks of standing still not counted. ``latency`` and ``initiation_interval``
+    takes ``c = 3 max(1, T)`` cycles, T the number of its diffuse and specular terms that are not 0
+    (`Intensity.cycles`): 3 for one light without and 6 with a highlight, 3 in the dark. The
+    next pixel is taken in c cycles after it, and the pixel leaves after ``c + 5`` (input, operands, product,
+    sum, rounding, saturation), cycles of standing still not counted. ``latency`` and ``initiation_interval``
     are those of a pixel with every term. One light has 230 register bits, against 1335; 16 have 808, against
     18769.
 
@@ -83,14 +83,14 @@ class IntensityUnit(PipelinedUnit):
         self.kinds = ("diffuse", "specular") if self.parameters.has_specular else ("diffuse",)
         self._terms = len(self.kinds) * lights
         channels = self.parameters.channels
-        clocks = channels * self._terms if style == "compact" else 1
+        cycles = channels * self._terms if style == "compact" else 1
         terms = data.ArrayLayout(FixedShape(Intensity.TERM_FORMAT), lights)
         colors = data.ArrayLayout(color_shape(), lights)
         super().__init__(
             data.StructLayout(dict.fromkeys(self.kinds, terms)),
             pixel_color_shape(),
-            latency=clocks + 5 if style == "compact" else 6 + channels + self._terms.bit_length(),
-            initiation_interval=clocks,
+            latency=cycles + 5 if style == "compact" else 6 + channels + self._terms.bit_length(),
+            initiation_interval=cycles,
             constants=data.StructLayout({"ambient": color_shape(), "diffuse": colors, "specular": colors}),
         )
 
@@ -185,7 +185,7 @@ class IntensityUnit(PipelinedUnit):
         rounded = Signal.like(Value.cast(total.round_half_up(0)))
         channels = [Signal(8, name=name) for name in "rgb"[: last_channel + 1]]
         pixel = Cat(*channels, *channels[:1] * (2 - last_channel))
-        m.d.comb += advance.eq(offer(m, self.o, valid, pixel))
+        m.d.comb += advance.eq(skid_buffer(m, self.o, valid, pixel))
         with m.If(advance):
             m.d.sync += [
                 Cat(notes).eq(Cat(busy, first, ends_channel, channel, notes[:-1])),

@@ -8,7 +8,7 @@ from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import PipelinedUnit, connect_buffered
+from blysk.hdl.core.stream import PipelinedUnit, connect_fifo
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SpecularUnit
@@ -23,7 +23,7 @@ class LightUnit(wiring.Component):
     no highlight.
 
     With an initiation interval of 1 the diffuse and the specular unit run in lockstep: their latencies are
-    equal, they are offered the same beats and taken from on the same clocks, so what holds of one handshake
+    equal, they are offered the same beats and taken from on the same cycles, so what holds of one handshake
     holds of the other. With a longer one, dark beats are not given to the specular unit at all: they wait
     beside it in order, and take a clock each.
 
@@ -37,7 +37,7 @@ class LightUnit(wiring.Component):
     diffuse : Diffuse
         Format of ``N . L``.
     initiation_interval : int
-        Distance in clocks of two inputs, at least 1. That of `Power` is 42 from 42 on, else 1.
+        Distance in cycles of two inputs, at least 1. That of `Power` is 42 from 42 on, else 1.
     exponent : int or None
         An exponent for good; see `SpecularUnit`.
     shares_slope : bool
@@ -134,7 +134,7 @@ class LightUnit(wiring.Component):
         # A term is under way while its mark waits.
         m.submodules.skips = skips = fifo.SyncFIFOBuffered(width=1, depth=depth + diffuse.latency)
         terms = diffuse.o.signature.create(path=("terms",))
-        connect_buffered(m, "waiting", diffuse.o, terms, depth)
+        connect_fifo(m, "waiting", diffuse.o, terms, depth)
         takes, gives, skip = Signal(), Signal(), skips.r_data
         m.d.comb += [
             takes.eq(diffuse.i.ready & skips.w_rdy),

@@ -21,9 +21,9 @@ class PowerUnit(PipelinedUnit):
 
     Method, formats and the error bound are those of `Power`, the bit-true twin.
 
-    The pipelined form has a latency of 32 clocks (one minus, saturation, three for each bit of the exponent)
+    The pipelined form has a latency of 32 cycles (one minus, saturation, three for each bit of the exponent)
     and an initiation interval of 1, with 18 multipliers. The sequential form has one, which makes nine
-    squares and ten products in turn: latency 44 clocks, initiation interval 42. All are 17 by 17 bits.
+    squares and ten products in turn: latency 44 cycles, initiation interval 42. All are 17 by 17 bits.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class PowerUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The complement of the cosine takes two clocks; then the bits of the exponent, lowest first."""
+        """The complement of the cosine takes two cycles; then the bits of the exponent, lowest first."""
         p, register = self.parameters, self.register
         complement = one_minus(p, operands.operand).extend(SQ(5, 34))
         complement = register(m, complement, "one_minus_cosine")
@@ -76,7 +76,7 @@ class PowerUnit(PipelinedUnit):
         return FixedValue(p.RESULT_FORMAT, ~Value.cast(s)[17:])
 
     def _pipelined(self, m, start):
-        """Three clocks a bit: product, difference, saturation; for squares and products side by side."""
+        """Three cycles a bit: product, difference, saturation; for squares and products side by side."""
         p, register = self.parameters, self.register
         format = p.COMPLEMENT_FORMAT
         x = register(m, start, "x_0")
@@ -99,7 +99,7 @@ class PowerUnit(PipelinedUnit):
         return s
 
     def _products(self, m, p, q, name):
-        """Registered ``p + q - p q``, two clocks on, and ``p`` at that time."""
+        """Registered ``p + q - p q``, two cycles on, and ``p`` at that time."""
         register = self.register
         product = register(m, p.truncate(17) * q.truncate(17), f"{name}_product")
         total = register(m, p + q, f"{name}_sum")
@@ -107,14 +107,14 @@ class PowerUnit(PipelinedUnit):
         return register(m, total - product, f"{name}_difference"), register(m, kept, f"{name}_late")
 
     def _sequential(self, m, start):
-        """Ages: bit j's square at 3 + 4j, its product at 4 + 4j, each in x or s four clocks later."""
+        """Ages: bit j's square at 3 + 4j, its product at 4 + 4j, each in x or s four cycles later."""
         p, at, register = self.parameters, self.at, self.register
         format = p.COMPLEMENT_FORMAT
         bits = range(p.EXPONENT_BITS)
         x, s = (Signal(FixedShape(format), name=name) for name in "xs")
 
-        def any_at(ages):
-            return reduce(or_, (at(age) for age in ages))
+        def any_at(stages):
+            return reduce(or_, (at(stage) for stage in stages))
 
         factors = [Signal(FixedShape(p.FACTOR_FORMAT), name=f"factor_{k}") for k in range(2)]
         with m.If(any_at(4 + 4 * bit for bit in bits)):

@@ -47,7 +47,7 @@ class SlopeUnit(wiring.Component):
     """What a `SpecularUnit` needs of the exponent: slope ``k = K 2^s``, and the PROM of the cutoff.
 
     Twins are `Specular.scale` and `Specular.boundaries`. ``slope`` follows
-    the exponent two clocks behind.
+    the exponent two cycles behind.
 
     One serves the units of all lights. It has a constant multiplier, a table of 1024 slopes of 27 bits in
     its place for ``cosquad_q`` and the models by equal integrals, none for ``k = n / 2^j``; and a PROM of
@@ -88,7 +88,7 @@ class SlopeUnit(wiring.Component):
             with m.If(code[s + 17] if s >= 0 else 1):
                 m.d.sync += [Value.cast(scale).eq((code << (9 - s))[10:27]), shift.eq(s + 1)]
         boundary = Const(p.SHIFTED_FORMAT.max_code, p.SHIFTED_FORMAT.width)
-        if not p.as_documented:
+        if not p.as_published:
             word = self._look_up(m, "boundaries", p.boundaries.codes, p.SHIFTED_FORMAT)
             boundary = Signal(p.SHIFTED_FORMAT.width)
             m.d.sync += boundary.eq(word)
@@ -114,10 +114,10 @@ class SpecularUnit(PipelinedUnit):
     as if its argument were 0, so nothing toggles from one dark beat to the next but its input and the first
     register.
 
-    With an initiation interval I of 1 the latency is 7 clocks (one minus, saturation, shift, saturation,
+    With an initiation interval I of 1 the latency is 7 cycles (one minus, saturation, shift, saturation,
     product, base, square), and each of M products has a multiplier: 17 by 17 bits, 17 by 11 and 14 by 11 in
     the chords of ``coscos``, 13 by 11 in those of ``exp``. With a longer interval they take turns at
-    ``ceil(M / I)`` multipliers of 18 by 18 bits; a product then takes four clocks more, for its operands
+    ``ceil(M / I)`` multipliers of 18 by 18 bits; a product then takes four cycles more, for its operands
     and the registers beside the multiplier (`registered_product`), and waits for its turn.
 
     ============= = ===== == == == == =====================================================
@@ -139,7 +139,7 @@ class SpecularUnit(PipelinedUnit):
     parameters : Specular
         Model, kind of operand, and whether the structure is the documented one.
     initiation_interval : int
-        Distance in clocks of two inputs, at least 1.
+        Distance in cycles of two inputs, at least 1.
     exponent : int or None
         An exponent for good, 1 to 1000: no PROM, a constant shift, and the slope multiplier one by a
         constant, so that M is one less. ``None``: the exponent is a port.
@@ -155,7 +155,7 @@ class SpecularUnit(PipelinedUnit):
         Specular term.
     constants : :py:`In(StructLayout({"exponent": 10}))` or :py:`In(slope_shape())`
         Exponent, 1 to 1000, or what a `SlopeUnit` gives; stays while beats are inside, and the slope from
-        two clocks after the first is taken. None with an exponent for good.
+        two cycles after the first is taken. None with an exponent for good.
 
     Raises
     ------
@@ -179,7 +179,7 @@ class SpecularUnit(PipelinedUnit):
         if exponent is not None and shares_slope:
             raise ValueError("a unit with an exponent of its own shares no slope")
         self.exponent, self.shares_slope = exponent, shares_slope
-        self._has_slope_turn = exponent is None and not p.as_documented
+        self._has_slope_turn = exponent is None and not p.as_published
         count = self.multiplications(p, exponent)
         self._graph = Dataflow(initiation_interval, count if initiation_interval > 1 else 0)
         self._result = self._describe()
@@ -191,16 +191,16 @@ class SpecularUnit(PipelinedUnit):
         super().__init__(
             highlight_shape(p),
             FixedShape(p.RESULT_FORMAT),
-            latency=self._result.age,
+            latency=self._result.stage,
             initiation_interval=initiation_interval,
             constants=constants,
         )
 
     @staticmethod
     def multiplications(parameters: Specular, exponent: int | None = None) -> int:
-        """M, of the table above: an initiation interval of as many clocks needs one multiplier."""
-        chords = 3 if parameters.is_coscos else int(parameters.model == "exp")
-        by_slope = exponent is None and not parameters.as_documented
+        """M, of the table above: an initiation interval of as many cycles needs one multiplier."""
+        chords = 3 if parameters.is_coscos else int(parameters.is_exponential)
+        by_slope = exponent is None and not parameters.as_published
         return by_slope + parameters.squarings + chords
 
     def datapath(self, m, operands):
@@ -209,7 +209,7 @@ class SpecularUnit(PipelinedUnit):
         return self._graph.build(m, self, operands)(self._result, self.latency)
 
     def _frame_values(self, m: Module) -> tuple[FixedValue, Value, FixedValue]:
-        """K, s + 1 and the boundary: a constant, from outside, or two clocks behind the exponent."""
+        """K, s + 1 and the boundary: a constant, from outside, or two cycles behind the exponent."""
         p = self.parameters
         if self.exponent is not None:
             (scale, shift), boundary = p.scale(self.exponent), p.boundaries[self.exponent]
@@ -247,16 +247,16 @@ class SpecularUnit(PipelinedUnit):
         argument = g.register("one_minus_cosine", lambda x: one_minus(p, x).truncate(25), operand)
         argument = g.register("argument", saturated, argument, dark)
         wide = g.register("shifted_wide", shifted, argument)
-        format = p.WIDE_FORMAT if p.as_documented else p.SHIFTED_FORMAT
+        format = p.WIDE_FORMAT if p.as_published else p.SHIFTED_FORMAT
         operand = g.register("shifted", lambda wide: wide.saturate(format), wide)
         if self._has_slope_turn:
             product = self._multiply("product", operand, operand, right=lambda _: self._slope[0])
         else:
             product = g.register("product", lambda x: x * self._slope[0], operand)
-        if p.as_documented:
+        if p.as_published:
             return self._drawn(product)
         lit = g.register("lit", is_lit, wide, dark)
-        if p.model == "exp":
+        if p.is_exponential:
             return self._exponential(product, lit)
 
         def below_one(product):
@@ -331,7 +331,7 @@ class SpecularUnit(PipelinedUnit):
         return self._interpolate("chords", p.chords, code, lit)
 
     def _exponential(self, product: Word, lit: Word) -> Word:
-        """``2^-power``: three clocks of chords, shift."""
+        """``2^-power``: three cycles of chords, shift."""
         p, g = self.parameters, self._graph
 
         def power(product):

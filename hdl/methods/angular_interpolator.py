@@ -6,7 +6,7 @@ from amaranth.lib import stream
 from blysk.golden.methods.angular_interpolator import AngularInterpolator
 from blysk.golden.number.fixed import UQ
 from blysk.hdl.core.fixed import FixedValue
-from blysk.hdl.core.stream import REGISTER_LATENCY, connect_registered
+from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit, highlight_shape
 from blysk.hdl.methods.interpolator import InterpolatorUnit
@@ -18,7 +18,7 @@ class AngularInterpolatorUnit(InterpolatorUnit):
     """Angular setup and highlight cosine, once for L and once for H of each light, side by side.
 
     `AngularInterpolator` is the twin. All chains are equal, are offered the same
-    spans and taken from on the same clocks, so what holds of one handshake holds of the others. Two
+    spans and taken from on the same cycles, so what holds of one handshake holds of the others. Two
     multipliers a vector, and those of the angular setup.
 
     Parameters
@@ -49,7 +49,7 @@ class AngularInterpolatorUnit(InterpolatorUnit):
             for name in (("direction", "halfway") if self.highlights else ("direction",))
         }
         setup, cosine = self._chains[0, "direction"]
-        self.latency = setup.latency + REGISTER_LATENCY + cosine.latency
+        self.latency = setup.latency + SLICE_LATENCY + cosine.latency
 
     def elaborate(self, platform):
         """Chains in lockstep, each with registers that hold spans ready."""
@@ -73,7 +73,7 @@ class AngularInterpolatorUnit(InterpolatorUnit):
                 setup.o.ready.eq(prepared.ready),
                 cosine.o.ready.eq(self.o.ready),
             ]
-            connect_registered(m, prepared, cosine.i)
+            connect_slice(m, prepared, cosine.i)
             result = self.o.payload[light]
             if name == "halfway":
                 m.d.comb += result.highlight.eq(cosine.o.payload)
@@ -83,6 +83,6 @@ class AngularInterpolatorUnit(InterpolatorUnit):
         m.d.comb += [
             self.i.ready.eq(setup.i.ready),
             self.o.valid.eq(cosine.o.valid),
-            self.wide.eq(setup.o.valid & setup.o.ready & setup.o.payload.wide),
+            self.out_of_range.eq(setup.o.valid & setup.o.ready & setup.o.payload.out_of_range),
         ]
         return m

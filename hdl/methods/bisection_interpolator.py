@@ -50,4 +50,4 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit):
             normals.valid.eq(normaliser.o.valid),
             normaliser.o.ready.eq(normals.ready),
         ]
-        return normals, normals.valid & normals.ready & pixel.last & pixel.wide
+        return normals, normals.valid & normals.ready & pixel.last & pixel.out_of_range

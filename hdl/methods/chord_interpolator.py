@@ -4,7 +4,7 @@ from amaranth.hdl import Module
 from amaranth.lib import wiring
 
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
-from blysk.hdl.core.stream import REGISTER_LATENCY, connect, connect_registered
+from blysk.hdl.core.stream import SLICE_LATENCY, connect, connect_slice
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape
 from blysk.hdl.methods.interpolator import InterpolatorUnit, operands_shape
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
@@ -75,7 +75,7 @@ class ChordInterpolatorUnit(InterpolatorUnit):
             lights, setup_interval, self.length_bits, self.highlights, parameters.setup
         )
         self._accumulator = ChordAccumulatorUnit(lights, self.highlights, parameters)
-        self.latency = self._setup.latency + REGISTER_LATENCY + self._accumulator.latency
+        self.latency = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
 
     def elaborate(self, platform):
         """Registers between the two hold spans ready, so that a long one pays for short ones after it."""
@@ -83,10 +83,10 @@ class ChordInterpolatorUnit(InterpolatorUnit):
         m.submodules.chord_setup = setup = self._setup
         m.submodules.chord_accumulator = accumulator = self._accumulator
         connect(m, wiring.flipped(self.i), setup.i)
-        connect_registered(m, setup.o, accumulator.i)
+        connect_slice(m, setup.o, accumulator.i)
         connect(m, accumulator.o, wiring.flipped(self.o))
         m.d.comb += [
             setup.constants.eq(self.constants),
-            self.wide.eq(setup.o.valid & setup.o.ready & setup.o.payload.wide),
+            self.out_of_range.eq(setup.o.valid & setup.o.ready & setup.o.payload.out_of_range),
         ]
         return m

@@ -54,8 +54,8 @@ class InterpolatorUnit(wiring.Component):
     """A method of the pipeline: spans in, the operands of their pixels out, first pixel first.
 
     One subclass a method, whose bit-true twin is the subclass of `Interpolator` of the
-    same name. It sets `latency`, clocks from a span to its first pixel when nothing waits;
-    `setup_interval`, clocks from a span to the next at the closest; and `clocks_per_pixel`.
+    same name. It sets `latency`, cycles from a span to its first pixel when nothing waits;
+    `setup_interval`, cycles from a span to the next at the closest; and `cycles_per_pixel`.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class InterpolatorUnit(wiring.Component):
         High for one clock for each span that is too wide for the method.
     """
 
-    clocks_per_pixel = 1
+    cycles_per_pixel = 1
 
     @classmethod
     def setup_intervals(cls, parameters: Interpolator) -> range:
@@ -104,7 +104,7 @@ class InterpolatorUnit(wiring.Component):
                 "i": In(stream.Signature(span_normals_shape(length_bits))),
                 "o": Out(stream.Signature(operands_shape(parameters, lights, highlights))),
                 "constants": In(light_vectors_shape(lights)),
-                "wide": Out(1),
+                "out_of_range": Out(1),
             }
         )
 
@@ -112,7 +112,7 @@ class InterpolatorUnit(wiring.Component):
 class LightProductsUnit(PipelinedUnit):
     """Products of a normal with L and H of every light: ``N . L``, and ``N . H`` or the chord.
 
-    With an initiation interval of 1 the latency is 7 clocks (operands, four for the products, two sums), with
+    With an initiation interval of 1 the latency is 7 cycles (operands, four for the products, two sums), with
     the chord 11. Six products a light, three without highlights; with a longer interval they take turns at
     fewer multipliers.
 
@@ -125,7 +125,7 @@ class LightProductsUnit(PipelinedUnit):
     highlights : bool
         Whether there is specular light.
     initiation_interval : int
-        Distance in clocks of two inputs, at least 1.
+        Distance in cycles of two inputs, at least 1.
 
     Members
     -------
@@ -157,7 +157,7 @@ class LightProductsUnit(PipelinedUnit):
         super().__init__(
             normal_shape(),
             operands_shape(parameters, lights, highlights),
-            latency=max(word.age for word in words.values()),
+            latency=max(word.stage for word in words.values()),
             initiation_interval=initiation_interval,
             constants=light_vectors_shape(lights),
         )
@@ -202,9 +202,9 @@ class NormalInterpolatorUnit(InterpolatorUnit):
     def elaborate(self, platform):
         """Normals, then products."""
         m = Module()
-        normals, wide = self.source(m)
+        normals, out_of_range = self.source(m)
         m.submodules.products = products = self._products
         connect(m, normals, products.i)
         connect(m, products.o, wiring.flipped(self.o))
-        m.d.comb += [products.constants.eq(self.constants), self.wide.eq(wide)]
+        m.d.comb += [products.constants.eq(self.constants), self.out_of_range.eq(out_of_range)]
         return m

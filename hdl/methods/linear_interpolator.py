@@ -5,7 +5,7 @@ from amaranth.lib import fifo, stream
 
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.normals.gpq import GPQ
-from blysk.hdl.core.stream import REGISTER_LATENCY, connect, connect_registered, offer
+from blysk.hdl.core.stream import SLICE_LATENCY, connect, connect_slice, skid_buffer
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
 from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
@@ -55,7 +55,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
         if parameters.renormalised:
             self._renormaliser = RenormaliserUnit()
             units.append(self._renormaliser)
-        self.latency = sum(unit.latency for unit in units) + REGISTER_LATENCY + self.product_latency
+        self.latency = sum(unit.latency for unit in units) + SLICE_LATENCY + self.product_latency
 
     def source(self, m):
         """Difference, its share a pixel, the sums."""
@@ -72,11 +72,11 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
         ]
         tops = (Value.cast(difference)[-2:] for difference in differences)
         far = Cat(top[0] ^ top[1] for top in tops).any()
-        connect_registered(m, setup.o, accumulator.i)
-        wide = Signal()
+        connect_slice(m, setup.o, accumulator.i)
+        out_of_range = Signal()
         if not self.parameters.renormalised:
-            m.d.sync += wide.eq(self.i.valid & self.i.ready & far)
-            return accumulator.o, wide
+            m.d.sync += out_of_range.eq(self.i.valid & self.i.ready & far)
+            return accumulator.o, out_of_range
         m.submodules.renormaliser = renormaliser = self._renormaliser
         connect(m, accumulator.o, renormaliser.i)
         normals = stream.Signature(normal_shape()).create(path=("normals",))
@@ -90,10 +90,10 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
         shown, shows = Signal(), Signal()
         before = shown & ~first
         m.d.comb += shows.eq((first & far) | renormaliser.o.payload.outside)
-        m.d.sync += wide.eq(0)
+        m.d.sync += out_of_range.eq(0)
         with m.If(normals.valid & normals.ready):
-            m.d.sync += [wide.eq(shows & ~before), shown.eq(shows | before)]
-        return normals, wide
+            m.d.sync += [out_of_range.eq(shows & ~before), shown.eq(shows | before)]
+        return normals, out_of_range
 
     def _marks(self, m, far):
         """Of a normal that the renormaliser offers: whether it is a span's first, and then ``far`` of it."""
@@ -112,7 +112,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
             # As many registers as the values go through in the unit, and one to wait in beside theirs.
             marks = Signal(2 * unit.latency, name=name)
             beside = stream.Signature(2).create(path=(name,))
-            advance = offer(m, beside, unit.o.valid, marks[-2:])
+            advance = skid_buffer(m, beside, unit.o.valid, marks[-2:])
             m.d.comb += beside.ready.eq(unit.o.ready)
             with m.If(advance):
                 m.d.sync += marks.eq(Cat(mark, marks))

@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.normals.difference_setup import LENGTH_BITS
-from blysk.hdl.core.stream import REGISTER_LATENCY, connect, connect_registered
+from blysk.hdl.core.stream import SLICE_LATENCY, connect, connect_slice
 from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit, span_values_shape
 from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
 from blysk.hdl.methods.interpolator import operands_shape
@@ -49,7 +49,7 @@ class LocalChordInterpolatorUnit(wiring.Component):
     Source: chord.md.
     """
 
-    clocks_per_pixel = 1
+    cycles_per_pixel = 1
 
     @classmethod
     def setup_intervals(cls, parameters):
@@ -72,12 +72,12 @@ class LocalChordInterpolatorUnit(wiring.Component):
         self.length_bits = length_bits
         self._setup = LocalChordSetupUnit(lights, setup_interval, length_bits, highlights)
         self._accumulator = ChordAccumulatorUnit(lights, highlights)
-        self.latency = self._setup.latency + REGISTER_LATENCY + self._accumulator.latency
+        self.latency = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
         super().__init__(
             {
                 "i": In(stream.Signature(span_values_shape(lights, highlights, length_bits))),
                 "o": Out(stream.Signature(operands_shape(parameters, lights, highlights))),
-                "wide": Out(1),
+                "out_of_range": Out(1),
             }
         )
 
@@ -87,7 +87,7 @@ class LocalChordInterpolatorUnit(wiring.Component):
         m.submodules.local_chord_setup = setup = self._setup
         m.submodules.chord_accumulator = accumulator = self._accumulator
         connect(m, wiring.flipped(self.i), setup.i)
-        connect_registered(m, setup.o, accumulator.i)
+        connect_slice(m, setup.o, accumulator.i)
         connect(m, accumulator.o, wiring.flipped(self.o))
-        m.d.comb += self.wide.eq(setup.o.valid & setup.o.ready & setup.o.payload.wide)
+        m.d.comb += self.out_of_range.eq(setup.o.valid & setup.o.ready & setup.o.payload.out_of_range)
         return m

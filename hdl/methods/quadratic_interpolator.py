@@ -4,7 +4,7 @@ from amaranth.lib import fifo, stream
 
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
-from blysk.hdl.core.stream import REGISTER_LATENCY, connect_registered
+from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
 from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
@@ -22,7 +22,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
     lengths go round the preparation in a FIFO.
 
     =============== ======================== ===================== ============
-    form            multipliers              setup interval        clocks/pixel
+    form            multipliers              setup interval        cycles/pixel
     =============== ======================== ===================== ============
     ``differences`` those of the two setups  ``setup_interval``    1
     ``direct``      7 and the middle normal  7                     1
@@ -59,12 +59,12 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
             )
             self._accumulator = DifferenceAccumulatorUnit()
             self.setup_interval = setup_interval
-            after = self._setup.latency + REGISTER_LATENCY + self._accumulator.latency
+            after = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
         else:
             self._evaluator = QuadraticEvaluatorUnit(QuadraticEvaluator(parameters.form))
-            # A pixel comes every two clocks, on which an interval of 7 does not end.
+            # A pixel comes every two cycles, on which an interval of 7 does not end.
             self.setup_interval = 7 if parameters.form == "direct" else 8
-            self.clocks_per_pixel = self._evaluator.clocks_per_pixel
+            self.cycles_per_pixel = self._evaluator.cycles_per_pixel
             after = self._evaluator.latency
         self.latency = before + after + self.product_latency
 
@@ -76,7 +76,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
         depth = -(-middle.latency // middle.initiation_interval) + gpq.latency + 2
         m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=self.length_bits, depth=depth)
         length = stream.Signature(self.length_bits).create(path=("length",))
-        connect_registered(m, lengths.r_stream, length)
+        connect_slice(m, lengths.r_stream, length)
         differences = self.parameters.form == "differences"
         curve = self._setup if differences else self._evaluator
         span = self.i.payload
@@ -103,9 +103,9 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
         if differences:
             m.submodules.difference_setup = curve
             m.submodules.difference_accumulator = accumulator = self._accumulator
-            connect_registered(m, curve.o, accumulator.i)
+            connect_slice(m, curve.o, accumulator.i)
             normals = accumulator.o
         else:
             m.submodules.evaluator = curve
             normals = curve.o
-        return normals, middle.o.valid & middle.o.ready & middle.o.payload.wide
+        return normals, middle.o.valid & middle.o.ready & middle.o.payload.out_of_range

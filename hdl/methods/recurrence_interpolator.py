@@ -5,7 +5,7 @@ from amaranth.hdl import Module, Value
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.number.fixed import UQ
 from blysk.hdl.core.fixed import FixedValue
-from blysk.hdl.core.stream import REGISTER_LATENCY, connect_registered
+from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
 from blysk.hdl.methods.interpolator import InterpolatorUnit, span_words
@@ -17,7 +17,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
     """Recurrence setup, then a recurrence unit for each light, which has a copy for L and one for H.
 
     `RecurrenceInterpolator` is the twin. All recurrence units are equal, are
-    offered the same spans and taken from on the same clocks. Two multipliers a light, and those of the
+    offered the same spans and taken from on the same cycles. Two multipliers a light, and those of the
     setup, ``ceil((14 + 32 lights) / setup_interval)``. Without highlights the setup and the units are the
     same, and what follows from H goes nowhere.
 
@@ -46,7 +46,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
         self._setup = RecurrenceSetupUnit(parameters.setup, lights, setup_interval)
         self._recurrences = [RecurrenceUnit(parameters.setup.recurrence) for _ in range(lights)]
         unit = self._recurrences[0]
-        self.latency = self._setup.latency + REGISTER_LATENCY + unit.latency
+        self.latency = self._setup.latency + SLICE_LATENCY + unit.latency
 
     def elaborate(self, platform):
         """Registers between the two hold spans ready, so that a long one pays for short ones after it."""
@@ -58,7 +58,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
             self.i.ready.eq(setup.i.ready),
         ]
         prepared = setup.o.signature.create(path=("prepared",))
-        connect_registered(m, setup.o, prepared)
+        connect_slice(m, setup.o, prepared)
         one = FixedValue.constant(UQ(1, 25), 1)
         for light, unit in enumerate(self._recurrences):
             m.submodules[f"recurrence_{light}"] = unit
@@ -84,6 +84,6 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit):
             prepared.ready.eq(self._recurrences[0].i.ready),
             self.o.valid.eq(self._recurrences[0].o.valid),
             setup.constants.eq(self.constants),
-            self.wide.eq(setup.o.valid & setup.o.ready & setup.o.payload.wide),
+            self.out_of_range.eq(setup.o.valid & setup.o.ready & setup.o.payload.out_of_range),
         ]
         return m

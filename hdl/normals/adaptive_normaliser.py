@@ -11,7 +11,7 @@ from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.number.fixed import SQ
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import count_down, offer
+from blysk.hdl.core.stream import count_down, skid_buffer
 from blysk.hdl.normals.bisection import BisectionUnit
 from blysk.hdl.normals.middle_normal import normal_shape
 
@@ -28,11 +28,11 @@ class AdaptiveNormaliserUnit(wiring.Component):
     `AdaptiveNormaliser`, the bit-true twin.
 
     Two halves work at once. The front prepares a span: it bisects, level by level (`BisectionUnit`), then
-    works out start, step and length of every segment, one in 14 clocks (3 for a segment without a pixel), and
+    works out start, step and length of every segment, one in 14 cycles (3 for a segment without a pixel), and
     puts them into a FIFO. The back gives one normal a clock from a span's first to its last, unless the
-    output waits; it begins a span when all of its segments are there. `preparation` is the number of clocks
+    output waits; it begins a span when all of its segments are there. `preparation` is the number of cycles
     from taking a span in to its first normal, where the back is free by then: 69 for k = 0, 83 for k = 1, 148
-    for k = 2. The next span is taken in two clocks before that, so spans of more pixels follow each other
+    for k = 2. The next span is taken in two cycles before that, so spans of more pixels follow each other
     without a gap. A span of length 0 takes one clock and gives nothing.
 
     Three multipliers: two in the bisection unit and one for the square of the error block and the segments.
@@ -49,8 +49,8 @@ class AdaptiveNormaliserUnit(wiring.Component):
     i : :py:`In(stream.Signature(StructLayout({"normal_left", "normal_right", "length": 12})))`
         Unit normals, three components ``SQ(1, 17)`` each; pixels.
     o : :py:`Out(stream.Signature(StructLayout({"normal", "wide": 1, "last": 1})))`
-        Normals, three components ``SQ(1, 17)``; ``wide``: of a span wider than the bisection's ``max_angle``;
-        ``last``: the last of its span.
+        Normals, three components ``SQ(1, 17)``; ``out_of_range``: of a span wider than the bisection's
+        ``max_angle``; ``last``: the last of its span.
 
     Source: [T] 2.1, figure 2.7.
     """
@@ -74,7 +74,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 "o": Out(
                     stream.Signature(
                         data.StructLayout(
-                            {"normal": normal_shape(), "wide": unsigned(1), "last": unsigned(1)}
+                            {"normal": normal_shape(), "out_of_range": unsigned(1), "last": unsigned(1)}
                         )
                     )
                 ),
@@ -100,7 +100,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 "step": data.ArrayLayout(FixedShape(p.STEP_FORMAT), 3),
                 "count": unsigned(p.LENGTH_BITS),
                 "last": unsigned(1),
-                "wide": unsigned(1),
+                "out_of_range": unsigned(1),
             }
         )
         depth = 1 << (p.depth + 1)
@@ -166,7 +166,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
         place, write_place = Signal(p.depth + 1), Signal(p.depth + 1)
         after_place = Signal(p.depth + 2)
         level, levels = Signal(range(p.depth + 2)), Signal(range(p.depth + 1))
-        wide = Signal()
+        out_of_range = Signal()
         one_minus_cosine = Signal(FixedShape(p.bisection.ANGLE_FORMAT))
         end_a = Signal(normal_shape())
         end_b = Signal(normal_shape())
@@ -208,7 +208,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
         m.d.comb += [
             segment.count.eq(count),
             segment.last.eq(last),
-            segment.wide.eq(wide),
+            segment.out_of_range.eq(out_of_range),
             *(segment.start[c].eq(start[c]) for c in range(3)),
             *(segment.step[c].eq(slope[c]) for c in range(3)),
             fifo.w_data.eq(segment.as_value()),
@@ -258,7 +258,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 with m.If(level == 1):
                     m.d.sync += [
                         one_minus_cosine.eq(bisection.o.payload.one_minus_cosine),
-                        wide.eq(bisection.o.payload.wide),
+                        out_of_range.eq(bisection.o.payload.out_of_range),
                     ]
                     m.next = "error"
                 with m.Elif(level == levels):
@@ -275,7 +275,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 with m.If(step == 3):
                     m.d.sync += levels.eq(0)
                     for k, code in enumerate(p.limits.codes.tolist()):
-                        with m.If((sagitta.as_value() > code) & ~wide):
+                        with m.If((sagitta.as_value() > code) & ~out_of_range):
                             m.d.sync += levels.eq(k + 1)
                 with m.If(step == 4):
                     m.d.sync += [
@@ -337,21 +337,25 @@ class AdaptiveNormaliserUnit(wiring.Component):
         """Interpolate: an accumulating adder a component."""
         p = self.parameters
         segment = data.View(segment_shape, fifo.r_data)
-        inside, wide, valid = Signal(), Signal(name="span_wide"), Signal(name="pixel_valid")
+        inside, out_of_range, valid = Signal(), Signal(name="span_wide"), Signal(name="pixel_valid")
         advance, load = Signal(name="back_advance"), Signal()
         given = fifo.r_rdy & (inside | (ready_spans != 0))
         active, ends = count_down(m, given, segment.count, advance)
         pixel = Signal(self.o.payload.shape())
         m.d.comb += [
-            advance.eq(offer(m, self.o, valid, pixel)),
+            advance.eq(skid_buffer(m, self.o, valid, pixel)),
             load.eq(advance & ends & given),
             begun.eq(load & ~inside),
             fifo.r_en.eq(load),
         ]
         with m.If(advance):
-            m.d.sync += [valid.eq(active), pixel.wide.eq(wide), pixel.last.eq(active & ends & ~inside)]
+            m.d.sync += [
+                valid.eq(active),
+                pixel.out_of_range.eq(out_of_range),
+                pixel.last.eq(active & ends & ~inside),
+            ]
         with m.If(load):
-            m.d.sync += [inside.eq(~segment.last), wide.eq(segment.wide)]
+            m.d.sync += [inside.eq(~segment.last), out_of_range.eq(segment.out_of_range)]
         for c in range(3):
             normal = Signal(FixedShape(p.ACCUMULATOR_FORMAT), name=f"normal_{c}")
             slope = Signal(FixedShape(p.STEP_FORMAT), name=f"step_{c}")

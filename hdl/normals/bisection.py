@@ -20,8 +20,10 @@ def coefficient(parameters: Bisection, power: int, first_step: Value) -> FixedVa
         constant, rest = parameters.polynomial(which)
         number = rest[power - 1] if power else constant
         codes.append(Const(number.codes.item(), signed(number.format.width)))
-    narrow, wide = codes
-    return FixedValue(number.format, narrow if parameters.max_angle == 45 else Mux(first_step, wide, narrow))
+    narrow, out_of_range = codes
+    return FixedValue(
+        number.format, narrow if parameters.max_angle == 45 else Mux(first_step, out_of_range, narrow)
+    )
 
 
 class BisectionUnit(PipelinedUnit):
@@ -48,7 +50,7 @@ class BisectionUnit(PipelinedUnit):
     parameters : Bisection
         Degree, widest span, coefficients and formats.
     initiation_interval : int or None
-        1 to ``s + 6``: distance in clocks of two inputs. ``None``: ``s + 3``.
+        1 to ``s + 6``: distance in cycles of two inputs. ``None``: ``s + 3``.
 
     Raises
     ------
@@ -60,8 +62,8 @@ class BisectionUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(StructLayout({"normal_a": ..., "normal_b": ...})))`
         Unit normals, three components ``SQ(1, 17)`` each.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
-        ``normal_middle``, three components ``SQ(1, 17)``; ``one_minus_cosine`` of the two normals in
-        ``SQ(2, 17)``; ``wide``: they are further apart than ``max_angle`` and the result means nothing.
+        ``normal_middle``, three components ``SQ(1, 17)``; ``one_minus_cosine`` of the two normals in ``SQ(2,
+        17)``; ``out_of_range``: they are further apart than ``max_angle`` and the result means nothing.
 
     Source: [T] 2.1, figure 2.6.
     """
@@ -70,7 +72,7 @@ class BisectionUnit(PipelinedUnit):
         self.parameters = parameters or Bisection()
         steps = self.parameters.steps
         interval = checked_interval(initiation_interval, steps + 6, steps + 3)
-        self._graph = Dataflow(interval, steps + 6, hurries=True)
+        self._graph = Dataflow(interval, steps + 6, low_latency=True)
         self._words = self._describe()
         super().__init__(
             data.StructLayout({"normal_a": normal_shape(), "normal_b": normal_shape()}),
@@ -78,10 +80,10 @@ class BisectionUnit(PipelinedUnit):
                 {
                     "normal_middle": normal_shape(),
                     "one_minus_cosine": FixedShape(Bisection.ANGLE_FORMAT),
-                    "wide": unsigned(1),
+                    "out_of_range": unsigned(1),
                 }
             ),
-            latency=max(word.age for word in self._words.values()),
+            latency=max(word.stage for word in self._words.values()),
             initiation_interval=interval,
         )
 
@@ -92,7 +94,7 @@ class BisectionUnit(PipelinedUnit):
         result = Signal(self.o.payload.shape())
         m.d.comb += [
             *(result.normal_middle[c].eq(read[c]) for c in range(3)),
-            *(result[name].eq(read[name]) for name in ("one_minus_cosine", "wide")),
+            *(result[name].eq(read[name]) for name in ("one_minus_cosine", "out_of_range")),
         ]
         return result
 
@@ -108,7 +110,10 @@ class BisectionUnit(PipelinedUnit):
         u = g.register("u", lambda x: x.saturate(p.ANGLE_FORMAT), rounded)
         limits = [FixedValue.constant(p.ANGLE_FORMAT, w.values.item()) for w in (p.widest_narrow, p.widest)]
         first_step = g.register("first_step", lambda u: u > limits[0], u)
-        words = {"one_minus_cosine": u, "wide": g.register("wide", lambda u: u > limits[1], u)}
+        words = {
+            "one_minus_cosine": u,
+            "out_of_range": g.register("out_of_range", lambda u: u > limits[1], u),
+        }
         one = FixedValue.constant(p.OPERAND_FORMAT, p.ONE.values.item())
         cosine = g.register("cosine", lambda u: one - u, u)
         angle = g.register("angle", lambda u: u.saturate(p.OPERAND_FORMAT), u)

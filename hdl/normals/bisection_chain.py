@@ -20,7 +20,7 @@ class BisectionChainUnit(wiring.Component):
     Formats and error statement are those of `BisectionChain`, the bit-true twin.
 
     Sequential: one span at a time. With s Horner steps of the bisection's factor, a span taken in on one
-    clock gives its normal ``17 + k (3 s + 8)`` clocks later (`latency`), and the next is taken in on the
+    clock gives its normal ``17 + k (3 s + 8)`` cycles later (`latency`), and the next is taken in on the
     clock after that at the earliest. Four multipliers: three in the dot product, used once, and one for all
     the rest.
 
@@ -34,7 +34,7 @@ class BisectionChainUnit(wiring.Component):
     i : :py:`In(stream.Signature(StructLayout({"normal_left", "normal_right", "level": 4})))`
         Unit normals, three components ``SQ(1, 17)`` each; k, 1 to 15 (0 counts as 16).
     o : :py:`Out(stream.Signature(StructLayout({"normal", "wide": 1})))`
-        The normal, three components ``SQ(1, 17)``; ``wide``: the span is wider than the bisection's
+        The normal, three components ``SQ(1, 17)``; ``out_of_range``: the span is wider than the bisection's
         ``max_angle`` and its normal means nothing.
 
     Source: [T] 2.1; blocks.md.
@@ -56,7 +56,9 @@ class BisectionChainUnit(wiring.Component):
                     )
                 ),
                 "o": Out(
-                    stream.Signature(data.StructLayout({"normal": normal_shape(), "wide": unsigned(1)}))
+                    stream.Signature(
+                        data.StructLayout({"normal": normal_shape(), "out_of_range": unsigned(1)})
+                    )
                 ),
             }
         )
@@ -160,7 +162,7 @@ class BisectionChainUnit(wiring.Component):
                 issue(after + 1, e.scale(2), half_l.truncate(17).saturate(COMPONENT))
                 issue(after + 2, e.scale(2), half_m.truncate(17).saturate(COMPONENT))
                 with m.If((step == 4) & first_round):
-                    m.d.sync += [self.o.payload.wide.eq(angle > limits[1]), first_round.eq(0)]
+                    m.d.sync += [self.o.payload.out_of_range.eq(angle > limits[1]), first_round.eq(0)]
                 with m.If(step == after + 2):
                     narrower = u.scale(-1) - e - product.scale(-2).truncate(21)
                     m.d.sync += u.eq(narrower.round_half_up(20).saturate(word))

@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import count_down, offer
+from blysk.hdl.core.stream import count_down, skid_buffer
 from blysk.hdl.normals.difference_setup import difference_shape
 from blysk.hdl.normals.middle_normal import normal_shape
 
@@ -21,8 +21,8 @@ class AccumulatorUnit(wiring.Component):
     Formats, rounding and bounds are those of `DifferenceAccumulator`, the
     bit-true twin of each.
 
-    A span of m pixels taken in on one clock gives its first values 2 clocks later and more on each of the
-    m - 1 clocks after, unless the output waits; the next span is taken in on the clock that leaves no gap. A
+    A span of m pixels taken in on one clock gives its first values 2 cycles later and more on each of the
+    m - 1 cycles after, unless the output waits; the next span is taken in on the clock that leaves no gap. A
     span of length 0 takes one clock and gives nothing. No multipliers.
 
     Parameters
@@ -60,7 +60,7 @@ class AccumulatorUnit(wiring.Component):
         active, ends = count_down(m, self.i.valid, self.i.payload.length, advance)
         values = Signal(self.o.payload.shape())
         m.d.comb += [
-            advance.eq(offer(m, self.o, valid, values)),
+            advance.eq(skid_buffer(m, self.o, valid, values)),
             self.i.ready.eq(advance & ends),
             load.eq(self.i.valid & self.i.ready),
         ]

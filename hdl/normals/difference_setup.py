@@ -46,7 +46,7 @@ def reciprocal_words(
 ) -> tuple[Word, Word]:
     """``dt = 1/(m - 1) = 2 reciprocal 2^-shift``, as `reciprocal_place` finds it.
 
-    Five clocks: m - 1, its leading one, the address, the table, a register. With fewer bits of the length the
+    Five cycles: m - 1, its leading one, the address, the table, a register. With fewer bits of the length the
     table has ``2^(length_bits - 1)`` words, those that shorter spans read of the whole.
 
     Parameters
@@ -90,7 +90,7 @@ def reciprocal_words(
 
 
 def square_words(graph: Dataflow, product: Word, shift: Word) -> tuple[Word, Word]:
-    """``dt^2 = 4 square 2^-square_shift``: two clocks.
+    """``dt^2 = 4 square 2^-square_shift``: two cycles.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     parameters : DifferenceSetup
         Table, formats and order of the products.
     initiation_interval : int or None
-        1 to 7, or to 9 in the order of [T]: distance in clocks of two inputs. ``None``: that of one busy
+        1 to 7, or to 9 in the order of [T]: distance in cycles of two inputs. ``None``: that of one busy
         multiplier.
     order : int
         2; or 1 for a straight line, G = 0 and no port for it: three multiplications and a second difference
@@ -202,7 +202,7 @@ class DifferenceSetupUnit(PipelinedUnit):
         self.parameters = parameters or DifferenceSetup()
         self.order = order
         self.length_bits = checked_length_bits(length_bits)
-        longest = 9 if self.parameters.as_documented else 7
+        longest = 9 if self.parameters.as_published else 7
         uses = longest if order == 2 else 3
         interval = checked_interval(initiation_interval, longest, uses)
         self._graph = Dataflow(interval)
@@ -219,7 +219,7 @@ class DifferenceSetupUnit(PipelinedUnit):
         super().__init__(
             data.StructLayout({**coefficients, "length": unsigned(length_bits)}),
             difference_shape(),
-            latency=max(word.age for word in self._words.values()),
+            latency=max(word.stage for word in self._words.values()),
             initiation_interval=interval,
         )
 
@@ -245,7 +245,7 @@ class DifferenceSetupUnit(PipelinedUnit):
                     f"first_{c}", reciprocal, p, shift, lambda p, c=c: p[c], _plus_one
                 )
             return words
-        describe = self._documented if self.parameters.as_documented else self._products
+        describe = self._documented if self.parameters.as_published else self._products
         describe(words, p, g.input("g", lambda operands: operands.g), reciprocal, shift)
         return words
 

@@ -14,7 +14,7 @@ class DotProductUnit(PipelinedUnit):
 
     The sum keeps every bit (``SQ(4, 34)`` for unit vectors), so there is neither rounding nor overflow.
 
-    The latency is 3 clocks (products, first sum, second sum) and the initiation interval is 1. Three
+    The latency is 3 cycles (products, first sum, second sum) and the initiation interval is 1. Three
     multipliers.
 
     Parameters

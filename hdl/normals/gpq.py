@@ -18,7 +18,7 @@ class GPQUnit(PipelinedUnit):
 
     Exact for spans up to 45 degrees, saturated beyond; `GPQ` is the bit-true twin.
 
-    The latency is 3 clocks (first sums, second sums, saturation) and the initiation interval is 1. No
+    The latency is 3 cycles (first sums, second sums, saturation) and the initiation interval is 1. No
     multipliers.
 
     Members

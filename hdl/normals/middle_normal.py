@@ -43,7 +43,7 @@ class MiddleNormalUnit(PipelinedUnit):
     parameters : MiddleNormal
         Fit of h and formats.
     initiation_interval : int or None
-        1 to 9: distance in clocks of two inputs. ``None``: 6.
+        1 to 9: distance in cycles of two inputs. ``None``: 6.
 
     Raises
     ------
@@ -55,8 +55,8 @@ class MiddleNormalUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(StructLayout({"normal_left": ..., "normal_right": ...})))`
         Unit normals of the span's ends, three components ``SQ(1, 17)`` each.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
-        The same two normals, ``normal_middle`` in ``SQ(1, 19)``, and ``wide``: the span is wider than 45
-        degrees and its middle normal not to be trusted.
+        The same two normals, ``normal_middle`` in ``SQ(1, 19)``, and ``out_of_range``: the span is wider than
+        45 degrees and its middle normal not to be trusted.
 
     Source: [T] 2.2; the fit of numbers.md.
     """
@@ -73,10 +73,10 @@ class MiddleNormalUnit(PipelinedUnit):
                 {
                     **ends,
                     "normal_middle": data.ArrayLayout(FixedShape(MiddleNormal.FORMAT), 3),
-                    "wide": unsigned(1),
+                    "out_of_range": unsigned(1),
                 }
             ),
-            latency=max(word.age for word in self._words.values()),
+            latency=max(word.stage for word in self._words.values()),
             initiation_interval=interval,
         )
 
@@ -86,7 +86,7 @@ class MiddleNormalUnit(PipelinedUnit):
         read = {name: value(word, self.latency) for name, word in self._words.items()}
         result = Signal(self.o.payload.shape())
         m.d.comb += [
-            *(result[name].eq(read[name]) for name in ("normal_left", "normal_right", "wide")),
+            *(result[name].eq(read[name]) for name in ("normal_left", "normal_right", "out_of_range")),
             *(result.normal_middle[c].eq(read[c]) for c in range(3)),
         ]
         return result
@@ -104,7 +104,7 @@ class MiddleNormalUnit(PipelinedUnit):
         bits = p.ANGLE_FORMAT.fraction_bits
         u = g.register("u", lambda x: x.truncate(bits).saturate(p.ANGLE_FORMAT), difference)
         widest = FixedValue.constant(p.ANGLE_FORMAT, p.widest.values.item())
-        wide = g.register("wide", lambda u: u > widest, u)
+        out_of_range = g.register("out_of_range", lambda u: u > widest, u)
 
         # A multiplier takes at most 18 signed bits twice; wired shifts align what it is given.
         c1, c2, c3 = (FixedValue.constant(p.SUM_FORMAT, value) for value in p.coefficients.values.tolist())
@@ -121,10 +121,10 @@ class MiddleNormalUnit(PipelinedUnit):
             return e.saturate(p.factor_format)
 
         e = g.register("e", factor, product)
-        words = {"normal_left": left, "normal_right": right, "wide": wide}
+        words = {"normal_left": left, "normal_right": right, "out_of_range": out_of_range}
         for c in range(3):
             half_sum = g.register(
-                f"half_sum_{c}", lambda a, b, c=c: (a[c] + b[c]).scale(-1), left, right, since=e.age
+                f"half_sum_{c}", lambda a, b, c=c: (a[c] + b[c]).scale(-1), left, right, since=e.stage
             )
             product = g.multiply(f"scaled_{c}", e, half_sum, right=_cut)
             middle = g.register(f"middle_sum_{c}", _corrected, half_sum, product)

@@ -32,12 +32,12 @@ class QuadraticEvaluatorUnit(wiring.Component):
     bit-true twin. The table of reciprocals holds 2048 words of 18 bits.
 
     ``direct`` (figure 2.9 a): seven multipliers, t^2 once and two products a component (the figure draws one
-    component, with three). A span's first normal comes 14 clocks after it was taken in, then one a clock.
+    component, with three). A span's first normal comes 14 cycles after it was taken in, then one a clock.
 
     ``horner`` (figure 2.9 b): one multiplier, one adder and multiplexers a component, three multipliers in
-    all. The first normal comes 17 clocks after its span, then one every two clocks.
+    all. The first normal comes 17 cycles after its span, then one every two cycles.
 
-    The step of the next span is prepared while this one runs: spans are taken in 7 clocks apart at the
+    The step of the next span is prepared while this one runs: spans are taken in 7 cycles apart at the
     closest, and there is no gap between their pixels when they have 7 pixels (``horner``: 4) or more. A
     span of length 0 gives nothing.
 
@@ -60,7 +60,7 @@ class QuadraticEvaluatorUnit(wiring.Component):
         self.parameters = parameters or QuadraticEvaluator()
         direct = self.parameters.form == "direct"
         self.latency = 14 if direct else 17
-        self.clocks_per_pixel = 1 if direct else 2
+        self.cycles_per_pixel = 1 if direct else 2
         super().__init__(
             {
                 "i": In(stream.Signature(data.StructLayout({**_coefficients(), "length": unsigned(12)}))),
@@ -121,7 +121,7 @@ class _StepUnit(PipelinedUnit):
         super().__init__(
             data.StructLayout(span),
             data.StructLayout({**span, "step": FixedShape(parameters.STEP_FORMAT)}),
-            latency=self._words["step"].age,
+            latency=self._words["step"].stage,
             initiation_interval=7,
         )
 

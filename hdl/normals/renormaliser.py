@@ -21,7 +21,7 @@ class RenormaliserUnit(PipelinedUnit):
     Segments, formats, error bound and the flag are those of `Renormaliser`, the bit-true
     twin.
 
-    The latency is 12 clocks (dot product 3, segment, table, four for the polynomial, scaling, sum,
+    The latency is 12 cycles (dot product 3, segment, table, four for the polynomial, scaling, sum,
     saturation) and the initiation interval is 1. Eight multipliers: three squares, two in the polynomial,
     three scalings. The table holds 18 words of 49 bits.
 
@@ -59,8 +59,8 @@ class RenormaliserUnit(PipelinedUnit):
             dot_product.o.ready.eq(1),
         ]
         vector = [operands]
-        for age in range(1, 11):
-            vector.append(register(m, vector[-1], f"vector_{age}"))
+        for stage in range(1, 11):
+            vector.append(register(m, vector[-1], f"vector_{stage}"))
 
         square = dot_product.o.payload.truncate(p.OFFSET_FORMAT.fraction_bits)
         low = FixedValue.constant(UQ(0, 22), p.LOW)
@@ -79,12 +79,12 @@ class RenormaliserUnit(PipelinedUnit):
         c0, u = register(m, c0, "c0_7"), register(m, u, "u_7")
         linear_term = register(m, u * slope, "linear_term")
         c0 = register(m, c0, "c0_8")
-        for age in range(6, 9):
-            outside = register(m, outside, f"outside_{age}")
+        for stage in range(6, 9):
+            outside = register(m, outside, f"outside_{stage}")
         e = (c0 - linear_term).truncate(18).wrap(p.FACTOR_FORMAT)
         e = FixedValue(p.FACTOR_FORMAT, register(m, Mux(outside, 0, Value.cast(e)), "e"))
-        for age in range(9, 13):
-            outside = register(m, outside, f"outside_{age}")
+        for stage in range(9, 13):
+            outside = register(m, outside, f"outside_{stage}")
 
         result = Signal(self.o.payload.shape())
         m.d.comb += result.outside.eq(outside)

@@ -23,7 +23,8 @@ from tqdm import tqdm
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants, address_table
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.pipeline import METHODS, MODELS, PRINTED, ShadingPipeline
+from blysk.golden.pipeline import STYLES, Design
+from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.camera import PROJECTIONS, Camera
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import Light, Material
@@ -31,7 +32,7 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import BACK_FACES, LARGEST_SIDE, VIEWERS, Scene
 from blysk.hdl.emit.verilog import emit
 from blysk.hdl.emit.yosys import NetlistError
-from blysk.hdl.pipeline import INTERPOLATORS, PORT_DESCRIPTIONS, STYLES, ShadingPipelineUnit
+from blysk.hdl.pipeline import INTERPOLATORS, PORT_DESCRIPTIONS, ShadingPipelineUnit
 from blysk.sim.cli.printing import (
     fit_figures,
     frame_figures,
@@ -234,7 +235,7 @@ def design_options(command):
         ),
         click.option(
             "--method",
-            type=Choice("method", METHODS | PRINTED),
+            type=Choice("method", METHODS | PUBLISHED),
             default="quadratic",
             show_default=True,
             help="Interpolation along a span.",
@@ -318,7 +319,7 @@ def _over_file(context: click.Context, mesh: str, options: dict) -> Settings:
     return Settings({**options, **values, "given": given | set(file.values)}, origins)
 
 
-def chosen_design(settings: Settings, lights: int) -> ShadingPipeline:
+def chosen_design(settings: Settings, lights: int) -> Design:
     """The pipeline that the design options describe, with one material.
 
     Parameters
@@ -335,16 +336,18 @@ def chosen_design(settings: Settings, lights: int) -> ShadingPipeline:
     """
     if settings["model"] not in MODELS:
         raise settings.refuse("model", "the pipeline finds N.H, not R.V", f"use one of {', '.join(MODELS)}")
-    if settings["gate"] and not ShadingPipeline(settings["method"]).serves_gate:
-        lacks = "error bound" if settings["method"] in PRINTED else "normals"
+    if settings["gate"] and not (METHODS | PUBLISHED)[settings["method"]].serves_gate:
+        lacks = "error bound" if settings["method"] in PUBLISHED else "normals"
         raise settings.refuse("gate", f"{settings['method']} has no {lacks} for one", "leave it out", "")
     try:
-        design = ShadingPipeline(
+        design = preset(
             settings["method"],
             settings["model"],
             lights,
-            _OPERANDS.get(settings["highlight"]),
+            operand=_OPERANDS.get(settings["highlight"]),
             gate=settings["gate"],
+            style=settings["style"],
+            setup_interval=settings["setup_interval"],
         )
     except ValueError as error:
         raise settings.refuse("highlight", str(error), "leave it out") from None
@@ -559,8 +562,7 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
         seconds["build"] = perf_counter() - start - seconds["load"]
         stage.set_description_str("rasterising and simulating")
         if frames:
-            options = settings["engine"], settings["setup_interval"], settings["style"]
-            film = Film(fit.scenes[0], fit.design, *options, design)
+            film = Film(fit.scenes[0], fit.design, settings["engine"], design)
             cameras = [scene.camera for scene in scenes]
             report = _shoot_film(loaded, film, cameras, pictures, seconds, jobs, address)
             stage.set_description_str("writing the animation")
@@ -574,7 +576,7 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
             if settings["fit"]:
                 stage.set_description_str("comparing with the full pipeline")
                 whole = None if vcd else _simulate(_simulator(design, settings), scenes[0], None)
-                report["fit"] = fit_figures(fit, settings, frame, whole)
+                report["fit"] = fit_figures(fit, frame, whole)
             stage.set_description_str("writing")
             if output:
                 write_image(output, frame.image)
@@ -597,7 +599,7 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
             print(f"{name:<12}{path}")
 
 
-def _fitted(scenes: Sequence[Scene], design: ShadingPipeline, settings: Settings) -> Fit:
+def _fitted(scenes: Sequence[Scene], design: Design, settings: Settings) -> Fit:
     if settings["fit"]:
         return for_scene(scenes, design, exact=not settings["words"])
     return Fit(design, (), tuple(scenes))
@@ -637,18 +639,17 @@ def verilog(lights, materials, name, output, testbench, **settings):
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise InputError(f"--name {name}", "no Verilog name", "use letters, digits and underscores")
     design = chosen_design(Settings(settings), lights)
-    setup_interval, style = settings["setup_interval"], settings["style"]
     design = dataclasses.replace(design, materials=materials)
     _check_outputs([testbench] if testbench else [], pictures=[], others=[output])
     if testbench is not None:
         check_folder(testbench)
-    unit = ShadingPipelineUnit(design, setup_interval, style)
+    unit = ShadingPipelineUnit(design)
     header = [
         f"blysk {version('blysk')} shading pipeline",
-        f"method {design.method}, model {design.model}, lights {lights}, materials {materials}, {style} style"
-        + (", highlight gate" if design.gate else ""),
-        f"latency {unit.latency} clocks, {unit.clocks_per_pixel} a pixel",
-        f"a span takes at most max({unit.clocks_per_pixel} length, {unit.setup_interval}) clocks",
+        f"method {design.method}, model {design.model}, lights {lights}, materials {materials}, "
+        f"{design.build.style} style" + (", highlight gate" if design.gate else ""),
+        f"latency {unit.latency} cycles, {unit.cycles_per_pixel} a pixel",
+        f"a span takes at most max({unit.cycles_per_pixel} length, {unit.setup_interval}) cycles",
         "",
         "Frame constants, through the write port:",
         *address_table(lights, materials),
@@ -721,18 +722,15 @@ def _load(settings: Settings) -> LoadedMesh:
         raise settings.refuse("mesh", f"{error.thing}, {error.reason}", error.remedy) from error
 
 
-def _simulator(
-    design: ShadingPipeline, settings: Settings, address: str | None = None
-) -> FrameSimulator | None:
+def _simulator(design: Design, settings: Settings, address: str | None = None) -> FrameSimulator | None:
     """The frame simulator; ``None`` if only a cluster's workers can build it.
 
     Where the slow engine stands in, the settings become its own.
     """
-    options = settings["setup_interval"], settings["style"]
     if settings["engine"] == "pysim":
-        return FrameSimulator(design, "pysim", *options)
+        return FrameSimulator(design, "pysim")
     try:
-        simulator = FrameSimulator(design, "cxxrtl", *options)
+        simulator = FrameSimulator(design, "cxxrtl")
     except CompilerMissing as error:
         if address:
             simulator = None
@@ -740,7 +738,7 @@ def _simulator(
             settings["size"] = width, height = _at_most(settings["size"], SLOW_SIZE)
             settings["engine"] = "pysim"
             tqdm.write(f"blysk: pysim at {width}x{height} instead of cxxrtl, {error}", file=sys.stderr)
-            return FrameSimulator(design, "pysim", *options)
+            return FrameSimulator(design, "pysim")
         else:
             raise
     settings["engine"] = "cxxrtl"
@@ -858,7 +856,7 @@ def _shoot_film(
             bar.update()
         name = crew.name
     figures = [done[index] for index in range(len(cameras))]
-    pixels, clocks = (sum(frame[key] for frame in figures) for key in ("pixels", "clocks"))
+    pixels, cycles = (sum(frame[key] for frame in figures) for key in ("pixels", "cycles"))
     counts = {key: sum(frame["counts"][key] for frame in figures) for key in figures[0]["counts"]}
     seconds["frames"] = perf_counter() - start
     same = ("mesh", "method", "model", "exponent", "lights", "materials")
@@ -869,8 +867,8 @@ def _shoot_film(
         "frame_count": len(figures),
         "visible_pixels": sum(frame["visible_pixels"] for frame in figures),
         "pixels": pixels,
-        "clocks": clocks,
-        "clocks_per_pixel": clocks / pixels if pixels else math.nan,
+        "cycles": cycles,
+        "cycles_per_pixel": cycles / pixels if pixels else math.nan,
         **worst_errors(figures),
         "counts": {**counts, **_mesh_counts(loaded)},
         "frames": figures,
@@ -887,10 +885,10 @@ def _print_film(report: dict) -> None:
         "turntable": f"{report['frame_count']:,} frames, "
         f"{report['frame_count'] / report['seconds']['frames']:.2f} a second",
         "pixels": f"{report['pixels']:,} shaded, {report['visible_pixels']:,} visible",
-        "clocks": f"{report['clocks']:,}",
+        "cycles": f"{report['cycles']:,}",
     }
     if report["pixels"]:
-        rows["clocks"] += f", {report['clocks_per_pixel']:.3f} a pixel"
+        rows["cycles"] += f", {report['cycles_per_pixel']:.3f} a pixel"
     for name, value in rows.items():
         print(f"{name:<12}{value}")
     print(f"{'errors':<12}the worst of every frame")
@@ -920,7 +918,7 @@ def _captions(report: dict) -> dict[str, str]:
         "title": f"{report['mesh']}: {report['method']}, {report['model']}, exponent {report['exponent']}",
         "subtitle": (
             f"simulated RTL beside normalised Phong interpolation in float64: largest error "
-            f"{report['method_error']['max_lsb']:.2f} LSB, {report['clocks']:,} clocks for "
+            f"{report['method_error']['max_lsb']:.2f} LSB, {report['cycles']:,} cycles for "
             f"{report['pixels']:,} pixels"
             if report["visible_pixels"]
             else "no pixel shows the surface"

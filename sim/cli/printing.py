@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.pipeline import Design
 from blysk.golden.reference.scene import Scene
 from blysk.sim.frames.fit import Fit
 from blysk.sim.frames.frame import Comparison, SimulatedFrame
@@ -40,12 +40,12 @@ _COUNTS = {
     "repaired_span_normals": "span ends whose normal was 0",
     "hidden_spans": "spans wholly hidden, left out",
     "cut_spans": "spans too wide for the method, cut",
-    "wide_spans": "spans flagged as too wide by the pipeline",
+    "out_of_range_spans": "spans flagged as too wide by the pipeline",
 }
 
 
 def frame_figures(
-    scene: Scene, design: ShadingPipeline, frame: SimulatedFrame, comparison: Comparison
+    scene: Scene, design: Design, frame: SimulatedFrame, comparison: Comparison
 ) -> dict[str, Any]:
     """Figures of a frame, ready for `write_json`.
 
@@ -72,13 +72,13 @@ def frame_figures(
         "spans": frame.spans,
         "pixels": frame.pixels,
         "visible_pixels": int(np.count_nonzero(frame.cut_raster.visible)),
-        "clocks": frame.clocks,
-        "clocks_per_pixel": frame.clocks / frame.pixels if frame.pixels else math.nan,
+        "cycles": frame.cycles,
+        "cycles_per_pixel": frame.cycles / frame.pixels if frame.pixels else math.nan,
         "simulated_pixels_per_second": frame.pixels / frame.seconds["simulate"],
         **{f"{name}_error": dataclasses.asdict(getattr(comparison, f"{name}_error")) for name in ERRORS},
         "nmse": comparison.nmse,
-        "mnse_printed": comparison.mnse_printed,
-        "mnse_printed_share": comparison.mnse_printed_share,
+        "mnse_published": comparison.mnse_published,
+        "mnse_published_share": comparison.mnse_published_share,
         "counts": {
             "degenerate_triangles": raster.degenerate,
             "culled_triangles": raster.culled,
@@ -87,7 +87,7 @@ def frame_figures(
             "repaired_span_normals": raster.repaired_normals,
             "hidden_spans": raster.hidden_spans,
             "cut_spans": frame.spans_cut,
-            "wide_spans": frame.wide_spans,
+            "out_of_range_spans": frame.out_of_range_spans,
         },
         "seconds": {**frame.seconds, "golden": comparison.seconds},
     }
@@ -125,41 +125,37 @@ def print_figures(figures: Mapping[str, Any]) -> None:
         "triangles": f"{figures['triangles']:,}",
         "spans": f"{figures['spans']:,}",
         "pixels": f"{figures['pixels']:,} shaded, {figures['visible_pixels']:,} visible",
-        "clocks": f"{figures['clocks']:,}",
+        "cycles": f"{figures['cycles']:,}",
     }
     if figures["pixels"]:
-        rows["clocks"] += f", {figures['clocks_per_pixel']:.3f} a pixel"
+        rows["cycles"] += f", {figures['cycles_per_pixel']:.3f} a pixel"
         rows["simulated"] = f"{figures['simulated_pixels_per_second']:,.0f} pixels a second"
     for name, value in rows.items():
         print(f"{name:<12}{value}")
     print_errors(figures if figures["visible_pixels"] else None)
     if figures["visible_pixels"]:
         print(
-            f"{'NMSE':<12}{figures['nmse']:.3g} (MNSE as printed {figures['mnse_printed']:.3g}, "
-            f"defined for {figures['mnse_printed_share']:.1%})"
+            f"{'NMSE':<12}{figures['nmse']:.3g} (MNSE as printed {figures['mnse_published']:.3g}, "
+            f"defined for {figures['mnse_published_share']:.1%})"
         )
     print_counts(figures["counts"])
     times = ", ".join(f"{name} {value:.2f}" for name, value in figures["seconds"].items())
     print(f"{'seconds':<12}{times}")
 
 
-def fit_figures(
-    fit: Fit, settings: Mapping[str, Any], frame: SimulatedFrame, full_frame: SimulatedFrame | None
-) -> dict[str, Any]:
+def fit_figures(fit: Fit, frame: SimulatedFrame, full_frame: SimulatedFrame | None) -> dict[str, Any]:
     """What a fitted pipeline leaves out, and what that saves, each omission on top of those before it.
 
     Parameters
     ----------
     fit : Fit
         The pipeline and what it leaves out.
-    settings : mapping
-        ``setup_interval`` and ``style``.
     frame : SimulatedFrame
         Its frame.
     full_frame : SimulatedFrame or None
         That of the full pipeline, if it has been simulated.
     """
-    full, steps = fit.costs(settings["setup_interval"], settings["style"])
+    full, steps = fit.costs()
     before = [full, *steps]
     figures = {
         "full": full.totals,
@@ -171,10 +167,10 @@ def fit_figures(
             }
             for omission, cost, after in zip(fit.omissions, before, steps, strict=False)
         ],
-        "clocks": frame.clocks,
+        "cycles": frame.cycles,
     }
     if full_frame is not None:
-        figures["full_clocks"] = full_frame.clocks
+        figures["full_cycles"] = full_frame.cycles
         difference = np.abs(full_frame.image.astype(np.int16) - frame.image)
         figures["largest_difference"] = int(difference.max(initial=0))
         figures["different_pixels"] = int(np.count_nonzero(difference.any(axis=-1)))
@@ -192,10 +188,10 @@ def print_fit(figures: Mapping[str, Any] | None) -> None:
         print(f"{'left out':<12}{omission['reason']}; saves {saves or 'nothing'}")
     full, fitted = figures["full"], figures["fitted"]
     parts = [f"{count:,} of {full[name]:,} {name.replace('_', ' ')}" for name, count in fitted.items()]
-    if "full_clocks" in figures:
-        parts.append(f"{figures['clocks']:,} of {figures['full_clocks']:,} clocks")
+    if "full_cycles" in figures:
+        parts.append(f"{figures['cycles']:,} of {figures['full_cycles']:,} cycles")
     print(f"{'fitted':<12}{', '.join(parts)}")
-    if "full_clocks" in figures:
+    if "full_cycles" in figures:
         text = "the frame is that of the full pipeline, to the bit"
         if figures["different_pixels"]:
             text = (

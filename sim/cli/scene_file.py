@@ -11,10 +11,10 @@ from typing import Any
 
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.pipeline import METHODS, MODELS, PRINTED
+from blysk.golden.pipeline import STYLES
+from blysk.golden.presets import METHODS, MODELS, PUBLISHED
 from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.scene import BACK_FACES, LARGEST_SIDE, VIEWERS
-from blysk.hdl.pipeline import STYLES
 from blysk.sim.errors import InputError, one_line
 
 __all__ = ["HIGHLIGHTS", "MAX_BYTES", "SceneFile", "read_scene_file"]
@@ -379,7 +379,7 @@ _TOP = {
         "exponent": ("exponent", _whole(1, MAX_EXPONENT)),
     },
     "pipeline": {
-        "method": ("method", _choice(METHODS | PRINTED)),
+        "method": ("method", _choice(METHODS | PUBLISHED)),
         "model": ("model", _choice(MODELS)),
         "highlight": ("highlight", _choice(HIGHLIGHTS)),
         "setup_interval": ("setup_interval", _whole(1, 46)),

@@ -1,8 +1,8 @@
 """The compiled engine: a component through CXXRTL to C++, compiled, cached, and driven by compiled code.
 
 Amaranth gives RTLIL, Yosys' CXXRTL a C++ class that `guards` rewrites, and `cxxrtl_driver.cc` the loop over
-the clocks; Python is called once in a million clocks. The first run of a newly built model is compared with
-pysim over its first clocks, before the model goes into the cache.
+the cycles; Python is called once in a million cycles. The first run of a newly built model is compared with
+pysim over its first cycles, before the model goes into the cache.
 """
 
 import atexit
@@ -34,7 +34,7 @@ from amaranth.back import rtlil
 from amaranth.lib.wiring import Component
 
 from blysk.sim.engines.beats import word_count
-from blysk.sim.engines.engine import CompilerMissing, End, Ports, SimulationError, Stimulus, Trace
+from blysk.sim.engines.engine import CompilerMissing, Ports, SimulationError, Stimulus, StopReason, Trace
 from blysk.sim.engines.guards import group_registers
 from blysk.sim.engines.pysim import Model as Interpreted
 from blysk.sim.errors import InputError
@@ -48,7 +48,7 @@ _SCRIPT = "hierarchy -auto-top; proc; flatten; write_cxxrtl -O6 -g0"
 _BATCH = 1_000_000
 _ROOM = 1 << 24
 _CHECK_BEATS = 64
-_CHECK_CLOCKS = 512
+_CHECK_CYCLES = 512
 _TELLING = re.compile("error|failed|No space left")
 _REMEDY = "install one, or pip install 'blysk[native]', or use the engine pysim"
 
@@ -214,9 +214,9 @@ class _Job(ctypes.Structure):
             for name in ("constants", "write", "input", "input_stalls", "output_stalls")
         ),
         *((name, ctypes.c_int64) for name in ("write_count", "input_count", "input_period", "output_period")),
-        *((name, ctypes.c_int64) for name in ("count", "patience", "settle")),
+        *((name, ctypes.c_int64) for name in ("count", "idle_timeout", "settle")),
         *((name, ctypes.c_int64) for name in ("clock", "last", "written", "taken", "given")),
-        *((name, ctypes.c_void_p) for name in ("output", "clocks", "input_clocks", "status")),
+        *((name, ctypes.c_void_p) for name in ("output", "cycles", "input_cycles", "status")),
     )
 
 
@@ -400,7 +400,7 @@ def _copied(built: Path, folder: Path, key: str) -> Path:
 
 
 def _room(width: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places for so many output beats and their clocks."""
+    """Places for so many output beats and their cycles."""
     return np.empty((count, width), dtype=np.uint32), np.empty(count, dtype=np.int64)
 
 
@@ -485,15 +485,15 @@ class Model:
 
     def _check(self, stimulus: Stimulus) -> None:
         component, target, entry = self._unchecked
-        limit = len(stimulus.write) + _CHECK_CLOCKS
+        limit = len(stimulus.write) + _CHECK_CYCLES
         first = replace(
-            stimulus, input=stimulus.input[:_CHECK_BEATS], count=None, patience=limit, limit=limit
+            stimulus, input=stimulus.input[:_CHECK_BEATS], count=None, idle_timeout=limit, limit=limit
         )
         difference = self._run(first, None).differs(Interpreted(component).run(first))
         if difference:
             raise SimulationError(
                 f"the compiled model of {type(component).__name__} and pysim differ in {difference} within "
-                f"the first {limit} clocks: a fault of the compiler or of CXXRTL; use the engine pysim, or "
+                f"the first {limit} cycles: a fault of the compiler or of CXXRTL; use the engine pysim, or "
                 "another compiler in CXX"
             )
         # A cache that fills up or goes away meanwhile costs the next process a build, no more.
@@ -503,7 +503,7 @@ class Model:
 
     def _run(self, stimulus: Stimulus, progress: Callable[[int], object] | None) -> Trace:
         width = word_count(self.ports.o)
-        input_clocks = np.empty(len(stimulus.input), dtype=np.int64)
+        input_cycles = np.empty(len(stimulus.input), dtype=np.int64)
         status = np.zeros(
             (1, 0 if self.ports.status is None else word_count(self.ports.status)), dtype=np.uint32
         )
@@ -511,7 +511,7 @@ class Model:
             name: np.ascontiguousarray(getattr(stimulus, name))
             for name in ("constants", "write", "input", "input_stalls", "output_stalls")
         }
-        arrays |= {"input_clocks": input_clocks, "status": status}
+        arrays |= {"input_cycles": input_cycles, "status": status}
         job = _Job(
             **{name: array.ctypes.data for name, array in arrays.items()},
             write_count=len(stimulus.write),
@@ -519,27 +519,27 @@ class Model:
             input_period=len(stimulus.input_stalls),
             output_period=len(stimulus.output_stalls),
             count=-1 if stimulus.count is None else stimulus.count,
-            patience=stimulus.patience,
+            idle_timeout=stimulus.idle_timeout,
             settle=stimulus.settle,
             last=-1,
         )
-        output, clocks = _room(width, _BATCH if stimulus.count is None else min(stimulus.count, _ROOM))
+        output, cycles = _room(width, _BATCH if stimulus.count is None else min(stimulus.count, _ROOM))
         handle = self._library.blysk_open()
         try:
-            end = End.LIMIT
-            while end == End.LIMIT and job.clock != stimulus.limit:
+            end = StopReason.LIMIT
+            while end == StopReason.LIMIT and job.clock != stimulus.limit:
                 batch = _BATCH if stimulus.limit is None else min(_BATCH, stimulus.limit - job.clock)
                 # At most one beat a clock.
                 most = job.given + batch if stimulus.count is None else min(job.given + batch, stimulus.count)
                 if most > len(output):
                     more = _room(width, max(batch, len(output)))
-                    output, clocks = (
+                    output, cycles = (
                         np.concatenate([old[: job.given], new])
-                        for old, new in zip((output, clocks), more, strict=True)
+                        for old, new in zip((output, cycles), more, strict=True)
                     )
                 job.output = output[job.given :].ctypes.data
-                job.clocks = clocks[job.given :].ctypes.data
-                end = End(self._library.blysk_run(handle, ctypes.byref(job), batch))
+                job.cycles = cycles[job.given :].ctypes.data
+                end = StopReason(self._library.blysk_run(handle, ctypes.byref(job), batch))
                 if progress:
                     progress(job.given)
         finally:
@@ -547,10 +547,10 @@ class Model:
         return Trace(
             end=end,
             clock=job.clock,
-            total_clocks=job.last + 1,
+            total_cycles=job.last + 1,
             write_count=job.written,
             output=output[: job.given],
-            clocks=clocks[: job.given],
-            input_clocks=input_clocks[: job.taken],
+            cycles=cycles[: job.given],
+            input_cycles=input_cycles[: job.taken],
             status=status,
         )

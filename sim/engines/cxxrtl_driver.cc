@@ -402,12 +402,12 @@ struct Job {
 	const uint8_t *input_stalls, *output_stalls;
 	int64_t write_count, input_count, input_period, output_period;
 	int64_t count; // -1: as many as come
-	int64_t patience, settle;
+	int64_t idle_timeout, settle;
 	// Where the run stands.
 	int64_t clock, last, written, taken, given;
-	// `output` and `clocks` hold one batch, `input_clocks` the whole run.
+	// `output` and `cycles` hold one batch, `input_cycles` the whole run.
 	uint32_t *output;
-	int64_t *clocks, *input_clocks;
+	int64_t *cycles, *input_cycles;
 	uint32_t *status;
 };
 
@@ -428,12 +428,12 @@ void *blysk_open() {
 
 void blysk_close(void *handle) { delete static_cast<Simulation *>(handle); }
 
-int32_t blysk_run(void *handle, Job *job, int64_t clocks) {
+int32_t blysk_run(void *handle, Job *job, int64_t cycles) {
 	Simulation &simulation = *static_cast<Simulation *>(handle);
 	Model &model = simulation.model;
 	bool offered = simulation.offered, waiting = simulation.waiting;
 	int64_t clock = job->clock, last = job->last, written = job->written, taken = job->taken, given = job->given;
-	const int64_t limit = clock + clocks, given_before = given;
+	const int64_t limit = clock + cycles, given_before = given;
 	int64_t input_phase = clock % job->input_period, output_phase = clock % job->output_period;
 	uint32_t *output = job->output;
 	End end = LIMIT;
@@ -447,7 +447,7 @@ int32_t blysk_run(void *handle, Job *job, int64_t clocks) {
 			end = DONE;
 			break;
 		}
-		if (clock - last > job->patience) {
+		if (clock - last > job->idle_timeout) {
 			end = job->count < 0 && taken == job->input_count ? DONE : STUCK;
 			break;
 		}
@@ -492,7 +492,7 @@ int32_t blysk_run(void *handle, Job *job, int64_t clocks) {
 		if (valid && ready) {
 			store(output, model.p_o____payload);
 			output += count(model.p_o____payload);
-			job->clocks[given - given_before] = clock;
+			job->cycles[given - given_before] = clock;
 			given++;
 			moved = true;
 		}
@@ -513,7 +513,7 @@ int32_t blysk_run(void *handle, Job *job, int64_t clocks) {
 		}
 #endif
 		if (input_moves) {
-			job->input_clocks[taken] = clock;
+			job->input_cycles[taken] = clock;
 			taken++;
 			offered = false;
 			moved = true;

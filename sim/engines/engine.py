@@ -1,10 +1,10 @@
-"""One interface to the simulation engines: an array of beats in, an array of beats and their clocks out.
+"""One interface to the simulation engines: an array of beats in, an array of beats and their cycles out.
 
 A component that can be simulated is an `amaranth.lib.wiring.Component` in the clock domain ``sync`` with
 the streams ``i`` (in) and ``o`` (out) and, where it wants them, ``constants`` (in, driven for the whole
 run), ``write`` (a stream in, served before the first input beat) and ``status`` (out, read after the run).
 
-Both engines do the same on every clock, so they give equal beats at equal clocks:
+Both engines do the same on every clock, so they give equal beats at equal cycles:
 
 1. The writes are offered first, each until it is taken. From the clock after the last of them on, the
    source offers the next input beat unless ``input_stalls`` says otherwise on this clock; an offered beat
@@ -27,7 +27,7 @@ from amaranth.lib.wiring import Component, Flow
 
 from blysk.sim.engines.beats import word_count
 
-__all__ = ["CompilerMissing", "End", "Model", "Ports", "SimulationError", "Stimulus", "Trace"]
+__all__ = ["CompilerMissing", "Model", "Ports", "SimulationError", "Stimulus", "StopReason", "Trace"]
 
 
 class SimulationError(Exception):
@@ -113,9 +113,9 @@ class Stimulus:
         Stall patterns, repeated; shape (1,) and ``False`` for none.
     count : int or None
         Output beats expected; ``None`` for as many as come.
-    patience : int
+    idle_timeout : int
         The run ends (``STUCK``, or ``DONE`` if no count is given and all input is taken) after so many
-        clocks without a transfer.
+        cycles without a transfer.
     settle : int
         Clocks to go on after the last transfer of a complete run.
     limit : int or None
@@ -128,12 +128,12 @@ class Stimulus:
     input_stalls: np.ndarray
     output_stalls: np.ndarray
     count: int | None
-    patience: int
+    idle_timeout: int
     settle: int
     limit: int | None = None
 
 
-class End(IntEnum):
+class StopReason(IntEnum):
     """Why an engine stopped; the compiled driver has the same numbers."""
 
     LIMIT = 0
@@ -154,25 +154,25 @@ class Trace:
         Why it stopped.
     clock : int
         Clock at which it stopped.
-    total_clocks : int
+    total_cycles : int
         Clocks up to and with the last transfer.
     write_count : int
         Writes taken.
     output : uint32 array, shape (count, words)
         Output beats.
-    clocks, input_clocks : int64 array
+    cycles, input_cycles : int64 array
         Clocks of the transfers.
     status : uint32 array, shape (1, words)
         Status; 0 after a run that broke off.
     """
 
-    end: End
+    end: StopReason
     clock: int
-    total_clocks: int
+    total_cycles: int
     write_count: int
     output: np.ndarray
-    clocks: np.ndarray
-    input_clocks: np.ndarray
+    cycles: np.ndarray
+    input_cycles: np.ndarray
     status: np.ndarray
 
     def differs(self, other: "Trace") -> str | None:

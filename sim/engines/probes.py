@@ -13,7 +13,7 @@ from blysk.golden.lighting.specular import Specular
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import Format
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.pipeline import Design
 from blysk.hdl.core.fixed import FixedValue
 from blysk.hdl.pipeline import ShadingPipelineUnit
 
@@ -64,7 +64,7 @@ class ObservedPipeline(Component):
 
     Parameters
     ----------
-    design : ShadingPipeline
+    design : Design
         What is observed; one light, and a gate.
 
     Members
@@ -82,7 +82,7 @@ class ObservedPipeline(Component):
         If the design has another number of lights, or no gate.
     """
 
-    def __init__(self, design: ShadingPipeline):
+    def __init__(self, design: Design):
         if design.lights != 1 or not design.gate:
             raise ValueError("a pipeline with one light and a gate is observed")
         self.design = design
@@ -213,7 +213,7 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
     datapath = _part(fragment, "light_0.specular.datapath")
     words = _registers(datapath)
     ages = _ages(datapath, _unit(fragment, "light_0.specular").i.payload)
-    p = design.highlight
+    p = design.specular
     if isinstance(p, Specular):
         squares = ["square", "square_2", "square_3"][: p.squarings if "base" in words else 0]
         formats = {
@@ -252,7 +252,7 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
         yield Probe(name, title, "output", Shape.cast(value.shape()), age, ""), value
 
 
-def _accumulators(fragment, design: ShadingPipeline, number, one: float, one_squared: float):
+def _accumulators(fragment, design: Design, number, one: float, one_squared: float):
     """Sums of the methods that have them, and what is added to them."""
     words = _registers(_part(fragment, "interpolator.chord_accumulator"))
     if words:

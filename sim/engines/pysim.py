@@ -9,7 +9,7 @@ from amaranth.lib.wiring import Component
 from amaranth.sim import Simulator
 
 from blysk.sim.engines.beats import word_count
-from blysk.sim.engines.engine import End, Ports, Stimulus, Trace
+from blysk.sim.engines.engine import Ports, Stimulus, StopReason, Trace
 
 __all__ = ["Model"]
 
@@ -77,18 +77,22 @@ class Model:
             ctx.set(write_payload, -1)
 
         output: list[int] = []
-        clocks: list[int] = []
-        input_clocks: list[int] = []
+        cycles: list[int] = []
+        input_cycles: list[int] = []
         written, offered, held = 0, False, None
-        clock, last, end = 0, -1, End.LIMIT
+        clock, last, end = 0, -1, StopReason.LIMIT
         ctx.set(input_payload, -1)
         while clock != stimulus.limit:
-            complete = count is not None and len(input_clocks) == len(inputs) and len(output) == count
+            complete = count is not None and len(input_cycles) == len(inputs) and len(output) == count
             if complete and written == len(writes) and clock - last > stimulus.settle:
-                end = End.DONE
+                end = StopReason.DONE
                 break
-            if clock - last > stimulus.patience:
-                end = End.DONE if count is None and len(input_clocks) == len(inputs) else End.STUCK
+            if clock - last > stimulus.idle_timeout:
+                end = (
+                    StopReason.DONE
+                    if count is None and len(input_cycles) == len(inputs)
+                    else StopReason.STUCK
+                )
                 break
 
             writing = written < len(writes)
@@ -97,35 +101,35 @@ class Model:
                 ctx.set(write_payload, writes[written])
             elif (
                 not offered
-                and len(input_clocks) < len(inputs)
+                and len(input_cycles) < len(inputs)
                 and not input_stalls[clock % len(input_stalls)]
             ):
                 offered = True
                 ctx.set(component.i.valid, 1)
-                ctx.set(input_payload, inputs[len(input_clocks)])
+                ctx.set(input_payload, inputs[len(input_cycles)])
             ready = not output_stalls[clock % len(output_stalls)]
             ctx.set(component.o.ready, ready)
 
             valid = ctx.get(component.o.valid)
             payload = ctx.get(output_payload) if valid else None
             if held is not None and payload != held:
-                end = End.CHANGED if valid else End.DROPPED
+                end = StopReason.CHANGED if valid else StopReason.DROPPED
                 break
             if valid and len(output) == count:
-                end = End.EXTRA
+                end = StopReason.EXTRA
                 break
             held = payload if valid and not ready else None
             write_moves = writing and ctx.get(component.write.ready)
             input_moves = offered and ctx.get(component.i.ready)
             if valid and ready:
                 output.append(payload)
-                clocks.append(clock)
+                cycles.append(clock)
                 last = clock
             if write_moves:
                 written += 1
                 last = clock
             if input_moves:
-                input_clocks.append(clock)
+                input_cycles.append(clock)
                 offered = False
                 last = clock
 
@@ -142,16 +146,16 @@ class Model:
 
         status = np.zeros((1, 0), dtype=np.uint32)
         if ports.status is not None:
-            whole = end in (End.DONE, End.LIMIT)
+            whole = end in (StopReason.DONE, StopReason.LIMIT)
             code = ctx.get(Value.cast(component.status).as_unsigned()) if whole else 0
             status = _words([code], word_count(ports.status))
         return Trace(
             end=end,
             clock=clock,
-            total_clocks=last + 1,
+            total_cycles=last + 1,
             write_count=written,
             output=_words(output, word_count(ports.o)),
-            clocks=np.array(clocks, dtype=np.int64),
-            input_clocks=np.array(input_clocks, dtype=np.int64),
+            cycles=np.array(cycles, dtype=np.int64),
+            input_cycles=np.array(input_cycles, dtype=np.int64),
             status=status,
         )

@@ -11,7 +11,15 @@ from amaranth.lib.wiring import Component
 
 from blysk.sim.engines import cxxrtl, pysim
 from blysk.sim.engines.beats import dtype_of, pack, unpack
-from blysk.sim.engines.engine import CompilerMissing, End, Model, Ports, SimulationError, Stimulus, Trace
+from blysk.sim.engines.engine import (
+    CompilerMissing,
+    Model,
+    Ports,
+    SimulationError,
+    Stimulus,
+    StopReason,
+    Trace,
+)
 
 __all__ = ["Run", "simulate"]
 
@@ -27,11 +35,11 @@ class Run:
     ----------
     beats : array, shape (count,)
         Output beats, of type ``dtype_of(payload shape)``.
-    clocks : int64 array, shape (count,)
+    cycles : int64 array, shape (count,)
         Clock at whose end each output beat was taken; clock 0 is the first after power-up.
-    input_clocks : int64 array, shape (input beats,)
+    input_cycles : int64 array, shape (input beats,)
         The same of each input beat.
-    total_clocks : int
+    total_cycles : int
         Clocks from clock 0 up to and with the last transfer (of an input, an output or a write).
     status : scalar of the status layout's type, or None
         The component's ``status`` at the end of the run.
@@ -40,9 +48,9 @@ class Run:
     """
 
     beats: np.ndarray
-    clocks: np.ndarray
-    input_clocks: np.ndarray
-    total_clocks: int
+    cycles: np.ndarray
+    input_cycles: np.ndarray
+    total_cycles: int
     status: np.generic | None
     engine: str
 
@@ -108,7 +116,7 @@ def simulate(
     engine: str = "cxxrtl",
     input_stalls: np.ndarray | None = None,
     output_stalls: np.ndarray | None = None,
-    patience: int = 10_000,
+    idle_timeout: int = 10_000,
     settle: int = 64,
     progress: Callable[[int], object] | None = None,
     vcd: str | None = None,
@@ -126,8 +134,8 @@ def simulate(
         Input beats, as `beats.pack` takes them.
     count : int or None
         Output beats expected: the run ends when they and all input beats have moved and ``settle`` more
-        clocks have passed. ``None`` takes as many as come, until all input is taken and nothing has moved
-        for ``patience`` clocks.
+        cycles have passed. ``None`` takes as many as come, until all input is taken and nothing has moved
+        for ``idle_timeout`` cycles.
     constants : scalar of the constants' type, or mapping of names to codes
         Driven for the whole run; needed when the component has ``constants``.
     write : structured array or mapping, optional
@@ -138,7 +146,7 @@ def simulate(
     input_stalls, output_stalls : bool array, optional
         Repeated for ever; ``True`` on a clock keeps the source from offering a new beat, or the sink from
         being ready.
-    patience : int
+    idle_timeout : int
         Clocks without a transfer after which the component counts as stuck.
     settle : int
         Clocks to watch for a beat too many.
@@ -155,7 +163,7 @@ def simulate(
     ------
     SimulationError
         If the component withdraws or changes a beat that waits, gives a beat too many, or gets stuck; the
-        clock is named. If the engines disagree on the first clocks of a newly built model.
+        clock is named. If the engines disagree on the first cycles of a newly built model.
     CompilerMissing
         If there is no working C++ compiler for ``"cxxrtl"``.
     ValueError, TypeError
@@ -173,7 +181,7 @@ def simulate(
         input_stalls=_pattern("input_stalls", input_stalls),
         output_stalls=_pattern("output_stalls", output_stalls),
         count=None if count is None else _whole("count", count, 0),
-        patience=_whole("patience", patience, 1),
+        idle_timeout=_whole("idle_timeout", idle_timeout, 1),
         settle=_whole("settle", settle, 0),
     )
     model: Model
@@ -192,9 +200,9 @@ def simulate(
     _judge(stimulus, trace)
     return Run(
         beats=_unpacked(ports.o, trace.output),
-        clocks=trace.clocks,
-        input_clocks=trace.input_clocks,
-        total_clocks=trace.total_clocks,
+        cycles=trace.cycles,
+        input_cycles=trace.input_cycles,
+        total_cycles=trace.total_cycles,
         status=None if ports.status is None else unpack(ports.status, trace.status)[0],
         engine=engine,
     )
@@ -212,17 +220,17 @@ def _unpacked(shape, words: np.ndarray) -> np.ndarray:
 def _judge(stimulus: Stimulus, trace: Trace) -> None:
     """Raise `SimulationError` unless the run is complete."""
     where = f"at clock {trace.clock}, output beat {len(trace.output)}"
-    if trace.end == End.DROPPED:
+    if trace.end == StopReason.DROPPED:
         raise SimulationError(f"{where}: valid went low while the beat waited for ready")
-    if trace.end == End.CHANGED:
+    if trace.end == StopReason.CHANGED:
         raise SimulationError(f"{where}: the payload changed while the beat waited for ready")
-    if trace.end == End.EXTRA:
+    if trace.end == StopReason.EXTRA:
         raise SimulationError(f"{where}: a beat more than the {stimulus.count} expected")
-    if trace.end == End.STUCK:
+    if trace.end == StopReason.STUCK:
         expected = "" if stimulus.count is None else f" of {stimulus.count}"
         raise SimulationError(
-            f"nothing moved for {stimulus.patience} clocks up to clock {trace.clock}: "
+            f"nothing moved for {stimulus.idle_timeout} cycles up to clock {trace.clock}: "
             f"{len(trace.output)}{expected} output beats came, "
-            f"{len(trace.input_clocks)} of {len(stimulus.input)} input beats and "
+            f"{len(trace.input_cycles)} of {len(stimulus.input)} input beats and "
             f"{trace.write_count} of {len(stimulus.write)} writes were taken"
         )

@@ -21,8 +21,8 @@ class ToggleCounter(Component):
 
     Counted are registers and the words that memories give on a clock, each bit on each clock on which it
     differs from the clock before; not the bits inside a memory, and no wires. A change is in the count two
-    clocks later. Counters have 48 bits: 2^48 toggles are more than 1000 registers of 18 bits make in
-    10^10 clocks.
+    cycles later. Counters have 48 bits: 2^48 toggles are more than 1000 registers of 18 bits make in
+    10^10 cycles.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def count_toggles(
         Those of `simulate`.
     engine : str
         As for `simulate`. With the sums a component takes the compiled engine three times as long to build,
-        a pipeline half a minute; the interpreted one is done before with some hundred clocks.
+        a pipeline half a minute; the interpreted one is done before with some hundred cycles.
 
     Returns
     -------

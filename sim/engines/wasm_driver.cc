@@ -36,14 +36,14 @@ extern "C" void __cxa_pure_virtual() { __builtin_trap(); }
 EXPORT(reserve) void *reserve(uint32_t size) { return give(size); }
 EXPORT(release) void release() { top = 0; }
 
-// What is known after a run: clocks up to and with the last transfer, pixels given, and words of the status.
-EXPORT(clocks) int32_t clocks() { return job.last + 1; }
+// What is known after a run: cycles up to and with the last transfer, pixels given, and words of the status.
+EXPORT(cycles) int32_t cycles() { return job.last + 1; }
 EXPORT(given) int32_t given() { return job.given; }
 EXPORT(status) const uint32_t *status() { return status_words; }
 
 // Sets the run that follows: arrays as those of `Job`, every one reserved before; starts at power-up.
 EXPORT(prepare) void prepare(const uint32_t *write, int32_t writes, const uint32_t *input, int32_t inputs, uint32_t *output,
-		int32_t count, int64_t *clocks, int64_t *input_clocks) {
+		int32_t count, int64_t *cycles, int64_t *input_cycles) {
 	job = Job{};
 	job.write = write;
 	job.write_count = writes;
@@ -52,12 +52,12 @@ EXPORT(prepare) void prepare(const uint32_t *write, int32_t writes, const uint32
 	job.input_stalls = job.output_stalls = &never;
 	job.input_period = job.output_period = 1;
 	job.count = count;
-	job.patience = 10000;
+	job.idle_timeout = 10000;
 	job.settle = 64;
 	job.last = -1;
 	job.output = output;
-	job.clocks = clocks;
-	job.input_clocks = input_clocks;
+	job.cycles = cycles;
+	job.input_cycles = input_cycles;
 	job.status = status_words;
 }
 
@@ -70,7 +70,7 @@ EXPORT(run) int32_t run() {
 }
 
 // The same a clock at a time, with the status after each in `rows`: words as they stand on the next clock. As many
-// clocks as `limit`, or to the end. The number of rows; `End` is in `ended`.
+// cycles as `limit`, or to the end. The number of rows; `End` is in `ended`.
 EXPORT(trace) int32_t trace(uint32_t *rows, int32_t limit, int32_t *ended) {
 	const uintptr_t before = top;
 	Simulation *simulation = static_cast<Simulation *>(blysk_open());
@@ -80,7 +80,7 @@ EXPORT(trace) int32_t trace(uint32_t *rows, int32_t limit, int32_t *ended) {
 		const int64_t given = job.given;
 		*ended = blysk_run(simulation, &job, 1);
 		job.output += (job.given - given) * pixel_words;
-		job.clocks += job.given - given;
+		job.cycles += job.given - given;
 		if (*ended != LIMIT) break;
 		memcpy(rows + row++ * words, status_words, sizeof status_words);
 	}

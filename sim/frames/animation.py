@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.pipeline import Design
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.scene import Scene
@@ -113,24 +113,19 @@ class Film:
     ----------
     scene : Scene
         What is drawn; its camera counts for nothing.
-    design : ShadingPipeline
+    design : Design
         The pipeline.
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
-    setup_interval : int, optional
-    style : str
-        See `ShadingPipelineUnit`.
-    full : ShadingPipeline, optional
+    full : Design, optional
         What the pipeline was fitted from, whose method and model the frames are held against. ``None``: the
         pipeline itself.
     """
 
     scene: Scene
-    design: ShadingPipeline
+    design: Design
     engine: str = "cxxrtl"
-    setup_interval: int | None = None
-    style: str = "throughput"
-    full: ShadingPipeline | None = None
+    full: Design | None = None
 
 
 @dataclass(frozen=True)
@@ -154,10 +149,8 @@ _film: Film | None = None
 
 
 @functools.lru_cache(maxsize=1)
-def _simulator(
-    design: ShadingPipeline, engine: str, setup_interval: int | None, style: str
-) -> FrameSimulator:
-    return FrameSimulator(design, engine, setup_interval, style)
+def _simulator(design: Design, engine: str) -> FrameSimulator:
+    return FrameSimulator(design, engine)
 
 
 def shot(film: Film, camera: Camera) -> Shot:
@@ -167,7 +160,7 @@ def shot(film: Film, camera: Camera) -> Shot:
     """
     with _ONE_AT_A_TIME:
         scene = replace(film.scene, camera=camera)
-        frame = _simulator(film.design, film.engine, film.setup_interval, film.style).render(scene)
+        frame = _simulator(film.design, film.engine).render(scene)
         full = film.full or film.design
         return Shot(frame.image, frame_figures(scene, full, frame, compare(scene, full, frame)))
 

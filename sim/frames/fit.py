@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,8 @@ import numpy as np
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.number.unit_vector import values
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.pipeline import Design
+from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.emit.cost import Cost, cost_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -27,11 +29,19 @@ class Omission(NamedTuple):
     reason : str
         What is left out, and why: one line.
     changes : dict
-        Parameters of `ShadingPipeline` without it.
+        Fields of `Design` without it; of a field that is itself a record, those of its fields.
     """
 
     reason: str
     changes: dict[str, object]
+
+
+def _without(design: Design, omission: Omission) -> Design:
+    changes = {
+        name: replace(getattr(design, name), **value) if isinstance(value, dict) else value
+        for name, value in omission.changes.items()
+    }
+    return replace(design, **changes)
 
 
 @dataclass(frozen=True)
@@ -40,7 +50,7 @@ class Fit:
 
     Parameters
     ----------
-    full : ShadingPipeline
+    full : Design
         What has everything.
     omissions : tuple of Omission
         What the scene does not need.
@@ -48,38 +58,23 @@ class Fit:
         The scenes, without lights that give none and with equal materials merged: what `design` draws.
     """
 
-    full: ShadingPipeline
+    full: Design
     omissions: tuple[Omission, ...]
     scenes: tuple[Scene, ...]
 
     @cached_property
-    def design(self) -> ShadingPipeline:
+    def design(self) -> Design:
         """The smallest pipeline."""
-        return replace(self.full, **{name: x for each in self.omissions for name, x in each.changes.items()})
+        return reduce(_without, self.omissions, self.full)
 
-    def costs(
-        self, setup_interval: int | None = None, style: str = "throughput"
-    ) -> tuple[Cost, tuple[Cost, ...]]:
-        """Cost of the full pipeline, and of that without the first omission, the first two, and so on.
-
-        Parameters
-        ----------
-        setup_interval, style
-            See `ShadingPipelineUnit`.
-        """
-        changes: dict[str, object] = {}
-        costs = []
-        for changed in ({}, *(omission.changes for omission in self.omissions)):
-            changes |= changed
-            design = replace(self.full, **changes)
-            interval = setup_interval if design.lights else None
-            costs.append(cost_of(ShadingPipelineUnit(design, interval, style)))
+    def costs(self) -> tuple[Cost, tuple[Cost, ...]]:
+        """Cost of the full pipeline, and of that without the first omission, the first two, and so on."""
+        designs = accumulate(self.omissions, _without, initial=self.full)
+        costs = [cost_of(ShadingPipelineUnit(design)) for design in designs]
         return costs[0], tuple(costs[1:])
 
 
-def for_scene(
-    scenes: Scene | Sequence[Scene], full: ShadingPipeline | None = None, *, exact: bool = True
-) -> Fit:
+def for_scene(scenes: Scene | Sequence[Scene], full: Design | None = None, *, exact: bool = True) -> Fit:
     """The smallest pipeline for a scene, of which every part is used.
 
     Left out are: lights that light nothing; the specular path, where no span has specular light; the
@@ -93,7 +88,7 @@ def for_scene(
     ----------
     scenes : Scene or sequence of Scene
         What it is to draw: one scene, or several that differ in the camera.
-    full : ShadingPipeline, optional
+    full : Design, optional
         Method and model, with as many lights and materials as the scene. By default, the chord method with a
         highlight gate.
     exact : bool
@@ -107,9 +102,7 @@ def for_scene(
     scenes = (scenes,) if isinstance(scenes, Scene) else tuple(scenes)
     first = scenes[0]
     if full is None:
-        full = ShadingPipeline(
-            "chord", lights=max(len(first.lights), 1), materials=len(first.materials), gate=True
-        )
+        full = preset("chord", lights=max(len(first.lights), 1), materials=len(first.materials), gate=True)
     omissions = []
 
     constants = [FrameConstants.of(first, full.lights, index=k) for k in range(len(first.materials))]
@@ -119,7 +112,7 @@ def for_scene(
         count = int(np.count_nonzero(bright))
         kept = tuple(light for light, lit in zip(first.lights, bright, strict=False) if lit)
         scenes = tuple(replace(scene, lights=kept) for scene in scenes)
-        changes = {"lights": count} if count else {"lights": 0, "model": None, "gate": False}
+        changes = {"lights": count} if count else {"lights": 0, "specular": None, "gate": False}
         reason = f"{full.lights - count} of {full.lights} lights: they light nothing"
         omissions.append(Omission(reason if count else "no light path: no light lights anything", changes))
 
@@ -144,9 +137,11 @@ def for_scene(
     if design.lights:
         omissions += _without_highlights(design, prepared, constants)
     exponents = {of.exponent for of in constants}
-    if len(exponents) == 1 and not any(omission.changes.get("model", 0) is None for omission in omissions):
+    if len(exponents) == 1 and not any(omission.changes.get("specular", 0) is None for omission in omissions):
         (exponent,) = exponents
-        omissions.append(Omission(f"exponent fixed at {exponent}: PROM folded", {"exponent": exponent}))
+        omissions.append(
+            Omission(f"exponent fixed at {exponent}: PROM folded", {"build": {"exponent": exponent}})
+        )
     colors = [np.reshape(x, (-1, 3)) for of in constants for x in (of.ambient, of.diffuse, of.specular)]
     if np.all(np.ptp(np.concatenate(colors), axis=1) == 0):
         omissions.append(Omission("one channel of three: every colour is grey", {"grey": True}))
@@ -185,22 +180,22 @@ def _shorter_words(prepared: Sequence, longest: int) -> list[Omission]:
     terms = [terms for terms, widest in ChordSetup.ANGLES.items() if angle < widest - 0.01]
     if terms and min(terms) < 3:
         reason = f"polynomial of {min(terms)} in place of 3 terms: the widest span has {angle:.2f} degrees"
-        omissions.append(Omission(reason, {"terms": min(terms)}))
+        omissions.append(Omission(reason, {"interpolator": {"terms": min(terms)}}))
     bits = min(bits for bits in range(36, 47, 2) if longest <= ChordSetup(fraction_bits=bits).longest)
     if bits < 46:
         reason = f"differences of {bits} in place of 46 fraction bits: the longest span has {longest} pixels"
-        omissions.append(Omission(reason, {"fraction_bits": bits}))
+        omissions.append(Omission(reason, {"interpolator": {"fraction_bits": bits}}))
     return omissions
 
 
-def _without_highlights(design: ShadingPipeline, prepared: Sequence, constants: Sequence) -> list[Omission]:
+def _without_highlights(design: Design, prepared: Sequence, constants: Sequence) -> list[Omission]:
     """What the spans' highlights allow."""
-    if design.model is None:
+    if design.specular is None:
         return []
-    nothing = {"model": None, "gate": False}
+    nothing = {"specular": None, "gate": False}
     if not any(of.specular.any() for of in constants):
         return [Omission("no specular path: every k_s is 0", nothing)]
-    if not design.serves_gate:
+    if not design.interpolator.serves_gate:
         return []
     lit = np.concatenate([design.lit_spans(frame.spans, constants) for frame in prepared])
     shown = np.array([of.specular.any(axis=-1) for of in constants])

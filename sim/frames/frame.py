@@ -12,9 +12,10 @@ import numpy as np
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.methods.local_chord_interpolator import SpanValues
 from blysk.golden.number.unit_vector import COMPONENT, quantise
-from blysk.golden.pipeline import ShadingPipeline, Spans
-from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_printed, nmse
+from blysk.golden.pipeline import Design, Spans
+from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import Raster, rasterise
+from blysk.golden.reference.reflection import BLINN
 from blysk.golden.reference.renderer import render, shade_operands, shade_spans
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -38,8 +39,8 @@ __all__ = [
     "compare",
     "cut_spans",
     "method_in_float64",
+    "model_frame",
     "prepare",
-    "twin_frame",
 ]
 
 
@@ -58,9 +59,9 @@ class SimulatedFrame:
         the order of their materials.
     spans_cut : int
         How many were cut.
-    clocks : int
+    cycles : int
         Clocks from the first write of a constant to the last pixel.
-    wide_spans : int
+    out_of_range_spans : int
         Spans that the pipeline flagged as wider than it can shade.
     engine : str
         ``"cxxrtl"`` or ``"pysim"``; ``"twin"`` for a frame that was not simulated.
@@ -72,8 +73,8 @@ class SimulatedFrame:
     raster: Raster
     cut_raster: Raster
     spans_cut: int
-    clocks: int
-    wide_spans: int
+    cycles: int
+    out_of_range_spans: int
     engine: str
     seconds: dict[str, float]
 
@@ -128,7 +129,7 @@ def beats_of(unit: ShadingPipelineUnit, spans: Spans) -> dict[str, np.ndarray]:
     return beats
 
 
-def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
+def prepare(scene: Scene, design: Design) -> PreparedFrame:
     """Rasterise a scene, and cut and quantise its spans for a pipeline.
 
     Raises
@@ -147,7 +148,7 @@ def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
     return PreparedFrame(raster, cut, count, spans)
 
 
-def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Raster, int]:
+def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int]:
     """Cut spans as the method of a pipeline needs it: the cut ones, and how many were cut."""
     interpolator = design.interpolator
     if design.takes_values:
@@ -157,8 +158,8 @@ def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Ra
     return cut_wide_spans(raster, widest, min(map(interpolator.largest_bend, exponents)))
 
 
-def twin_frame(scene: Scene, design: ShadingPipeline) -> SimulatedFrame:
-    """A frame by the bit-true twin: the simulated one to the bit, without clocks, which are 0.
+def model_frame(scene: Scene, design: Design) -> SimulatedFrame:
+    """A frame by the bit-true twin: the simulated one to the bit, without cycles, which are 0.
 
     Parameters
     ----------
@@ -179,14 +180,14 @@ def twin_frame(scene: Scene, design: ShadingPipeline) -> SimulatedFrame:
         raster=raster,
         cut_raster=cut_raster,
         spans_cut=spans_cut,
-        clocks=0,
-        wide_spans=pixels.wide_spans,
+        cycles=0,
+        out_of_range_spans=pixels.out_of_range_spans,
         engine="twin",
         seconds={"raster": prepared - start, "simulate": perf_counter() - prepared},
     )
 
 
-def _constants_of(scene: Scene, design: ShadingPipeline) -> list[FrameConstants]:
+def _constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
     if len(scene.materials) != design.materials:
         raise ValueError(f"the pipeline has {design.materials} materials, the scene {len(scene.materials)}")
     return [FrameConstants.of(scene, design.lights, index=index) for index in range(design.materials)]
@@ -205,13 +206,10 @@ class FrameSimulator:
 
     Parameters
     ----------
-    design : ShadingPipeline
+    design : Design
         Method, reflection model, number of lights.
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
-    setup_interval : int, optional
-    style : str
-        See `ShadingPipelineUnit`. Without lights there is no interval.
 
     Attributes
     ----------
@@ -226,17 +224,11 @@ class FrameSimulator:
         If the engine is ``"cxxrtl"`` and no C++ compiler works.
     """
 
-    def __init__(
-        self,
-        design: ShadingPipeline,
-        engine: str = "cxxrtl",
-        setup_interval: int | None = None,
-        style: str = "throughput",
-    ):
+    def __init__(self, design: Design, engine: str = "cxxrtl"):
         start = perf_counter()
         self.design = design
         self.engine = engine
-        self._unit = ShadingPipelineUnit(design, setup_interval if design.lights else None, style)
+        self._unit = ShadingPipelineUnit(design)
         spans, constants = _sample(design)
         expected = design.compute(spans, constants)
         run = self._run(spans, constants, len(expected.x))
@@ -293,8 +285,8 @@ class FrameSimulator:
             raster=raster,
             cut_raster=cut_raster,
             spans_cut=spans_cut,
-            clocks=run.total_clocks,
-            wide_spans=int(run.status["wide_spans"]),
+            cycles=run.total_cycles,
+            out_of_range_spans=int(run.status["out_of_range_spans"]),
             engine=run.engine,
             seconds={"raster": rastered - start, "simulate": perf_counter() - rastered},
         )
@@ -316,7 +308,7 @@ class Comparison:
         Against the exact frame: Phong shading as on a GPU, Blinn's model.
     nmse : float
         Against the exact frame.
-    mnse_printed, mnse_printed_share : float
+    mnse_published, mnse_published_share : float
         MNSE as [T] prints it, against the exact frame, and the share of values where it is defined.
     seconds : float
         Time of the three golden frames.
@@ -327,12 +319,12 @@ class Comparison:
     method_error: ErrorFigures
     total_error: ErrorFigures
     nmse: float
-    mnse_printed: float
-    mnse_printed_share: float
+    mnse_published: float
+    mnse_published_share: float
     seconds: float
 
 
-def method_in_float64(scene: Scene, design: ShadingPipeline, raster: Raster) -> np.ndarray:
+def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarray:
     """A frame by the method and the model of a pipeline, in exact arithmetic.
 
     Parameters
@@ -351,19 +343,21 @@ def method_in_float64(scene: Scene, design: ShadingPipeline, raster: Raster) -> 
     if design.takes_values:
         values = local_values(scene, raster)
         cosine, one_minus_cosine = interpolator.exact_operands(values, raster.length)
-        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, design.model)
-    return shade_spans(scene, raster, interpolator.exact_normals, design.model, interpolator.uses_chord)
+        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, design.specular.model)
+    return shade_spans(
+        scene, raster, interpolator.exact_normals, design.specular.model, interpolator.uses_chord
+    )
 
 
-def compare(scene: Scene, design: ShadingPipeline, frame: SimulatedFrame) -> Comparison:
+def compare(scene: Scene, design: Design, frame: SimulatedFrame) -> Comparison:
     """Hold a simulated frame against the golden renderer.
 
     Of a frame that shows no surface every figure is NaN.
     """
     start = perf_counter()
     same_method = method_in_float64(scene, design, frame.cut_raster)
-    golden = shade_spans(scene, frame.raster, "normalised", design.model)
-    exact = render(scene, "phong", "blinn", raster=frame.raster)
+    golden = shade_spans(scene, frame.raster, "normalised", design.specular.model)
+    exact = render(scene, "phong", BLINN, raster=frame.raster)
     seconds = perf_counter() - start
     if exact.mask.any():
         figures = [
@@ -371,7 +365,7 @@ def compare(scene: Scene, design: ShadingPipeline, frame: SimulatedFrame) -> Com
             for reference in (same_method, golden, exact.image)
         ]
         shown, reference = frame.image[exact.mask], exact.image[exact.mask] * 255
-        squares = (nmse(shown, reference), *mnse_printed(shown, reference))
+        squares = (nmse(shown, reference), *mnse_published(shown, reference))
     else:
         figures = [ErrorFigures(*[math.nan] * len(dataclasses.fields(ErrorFigures)))] * 3
         squares = (math.nan,) * 3
@@ -382,7 +376,7 @@ def _colors(beats: np.ndarray) -> np.ndarray:
     return np.stack([beats[channel] for channel in "rgb"], axis=-1)
 
 
-def _sample(design: ShadingPipeline) -> tuple[Spans, list[FrameConstants]]:
+def _sample(design: Design) -> tuple[Spans, list[FrameConstants]]:
     """A few spans of every kind, lights from all sides and materials, to check a model with."""
     rng = np.random.default_rng(2025)
     length = np.r_[1, 2, 3, rng.integers(0, min(24, 1 << design.length_bits), 37)]
@@ -406,7 +400,7 @@ def _sample(design: ShadingPipeline) -> tuple[Spans, list[FrameConstants]]:
     constants = []
     for index in range(design.materials):
         colors = rng.integers(0, 255 * 64, (2, design.lights, 3))
-        exponent = design.exponent or 7 + index
+        exponent = design.build.exponent or 7 + index
         ambient = rng.integers(0, 255 * 8, 3)
         constants.append(FrameConstants(exponent, ambient, vectors[0], vectors[1], colors[0], colors[1]))
     return spans, constants

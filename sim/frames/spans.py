@@ -65,20 +65,38 @@ def cut_wide_spans(
     left, right = raster.normal_left, raster.normal_right
     cosine = np.cos(np.radians(largest_angle))
     while True:
-        wide = (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
+        out_of_range = (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
         # A whole span bends evenly; a part of two pixels has nothing between them.
-        part = np.flatnonzero((last - first > 1) & (last - first < raster.length[origin] - 1) & ~wide)
+        part = np.flatnonzero((last - first > 1) & (last - first < raster.length[origin] - 1) & ~out_of_range)
         if len(part) and largest_bend < math.inf:
             own = normals(origin[part], (first[part] + last[part]) / 2)
             bend = np.linalg.norm(own - normalise(left[part] + right[part]), axis=-1)
-            wide[part[bend > largest_bend]] = True
-        if not wide.any():
+            out_of_range[part[bend > largest_bend]] = True
+        if not out_of_range.any():
             break
-        middle = (first[wide] + last[wide] + 1) // 2
+        middle = (first[out_of_range] + last[out_of_range] + 1) // 2
         parts = [
-            (origin[~wide], first[~wide], last[~wide], left[~wide], right[~wide]),
-            (origin[wide], first[wide], middle - 1, left[wide], normals(origin[wide], middle - 1)),
-            (origin[wide], middle, last[wide], normals(origin[wide], middle), right[wide]),
+            (
+                origin[~out_of_range],
+                first[~out_of_range],
+                last[~out_of_range],
+                left[~out_of_range],
+                right[~out_of_range],
+            ),
+            (
+                origin[out_of_range],
+                first[out_of_range],
+                middle - 1,
+                left[out_of_range],
+                normals(origin[out_of_range], middle - 1),
+            ),
+            (
+                origin[out_of_range],
+                middle,
+                last[out_of_range],
+                normals(origin[out_of_range], middle),
+                right[out_of_range],
+            ),
         ]
         origin, first, last, left, right = (np.concatenate(field) for field in zip(*parts, strict=True))
     result = _parts(raster, origin, first, last, left, right)
@@ -217,12 +235,14 @@ def cut_local_spans(
     last = raster.length.astype(np.int64) - 1
     settled = []
     while len(origin):
-        wide = np.zeros(len(origin), dtype=bool)
+        out_of_range = np.zeros(len(origin), dtype=bool)
         for part in _chunks(len(origin)):
             exponent = exponents[scene.mesh.material[raster.triangle[origin[part]]]]
-            wide[part] = _is_wide(scene, whole, interpolator, exponent, origin[part], first[part], last[part])
-        settled.append((origin[~wide], first[~wide], last[~wide]))
-        origin, first, last = origin[wide], first[wide], last[wide]
+            out_of_range[part] = _is_wide(
+                scene, whole, interpolator, exponent, origin[part], first[part], last[part]
+            )
+        settled.append((origin[~out_of_range], first[~out_of_range], last[~out_of_range]))
+        origin, first, last = origin[out_of_range], first[out_of_range], last[out_of_range]
         middle = (first + last + 1) // 2
         origin = np.concatenate((origin, origin))
         first, last = np.concatenate((first, middle)), np.concatenate((middle - 1, last))
@@ -241,7 +261,7 @@ def cut_local_spans(
 
 def _is_wide(scene, raster, interpolator, exponent, origin, first, last) -> np.ndarray:
     """Whether pixels first to last of spans are too many for one quadratic."""
-    wide = np.zeros(len(origin), dtype=bool)
+    out_of_range = np.zeros(len(origin), dtype=bool)
     # One pixel never is.
     several = np.flatnonzero(last > first)
     origin, first, last, exponent = origin[several], first[several], last[several], exponent[several]
@@ -249,7 +269,7 @@ def _is_wide(scene, raster, interpolator, exponent, origin, first, last) -> np.n
     pixels = last - first + 1
     ends = [_Places.at(scene, raster, origin, place / steps) for place in (first, last)]
     turned = (pixels > 3) & ends[0].turned(ends[1], interpolator)
-    wide[several[turned]] = True
+    out_of_range[several[turned]] = True
     # Of the rest, what lies between tells.
     part = np.flatnonzero(~turned)
     origin, first, last, steps = origin[part], first[part], last[part], steps[part]
@@ -294,8 +314,8 @@ def _is_wide(scene, raster, interpolator, exponent, origin, first, last) -> np.n
     chosen = np.flatnonzero(turns_dark.any(axis=1) & ~bad)
     kept = (origin, first, last, turns_dark, *diffuse)
     bad[chosen] = _mistakes_sign(scene, raster, *(values[chosen] for values in kept))
-    wide[several[part[bad]]] = True
-    return wide
+    out_of_range[several[part[bad]]] = True
+    return out_of_range
 
 
 def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, bend) -> np.ndarray:

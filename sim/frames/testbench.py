@@ -10,7 +10,7 @@ from string import Template
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants, writes_of
-from blysk.golden.pipeline import Pixels, ShadingPipeline, Spans
+from blysk.golden.pipeline import Design, Pixels, Spans
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
@@ -29,13 +29,13 @@ _TRIANGLES = 400
 
 
 def teapot_frame(
-    design: ShadingPipeline, size: tuple[int, int] = _SIZE, triangles: int = _TRIANGLES
+    design: Design, size: tuple[int, int] = _SIZE, triangles: int = _TRIANGLES
 ) -> tuple[Spans, list[FrameConstants], Pixels]:
     """A teapot for a pipeline, with as many lights and materials as it has, and nothing too bright.
 
     Parameters
     ----------
-    design : ShadingPipeline
+    design : Design
         The pipeline.
     size : two ints
         Width and height of the picture.
@@ -55,7 +55,7 @@ def teapot_frame(
     width, height = size
     materials = [
         Material((0.08, 0.05, 0.03), np.roll((0.75, 0.42, 0.2), k), (0.6,) * 3, exponent)
-        for k, exponent in enumerate(design.exponent or 20 + k % 100 for k in range(design.materials))
+        for k, exponent in enumerate(design.build.exponent or 20 + k % 100 for k in range(design.materials))
     ]
     lights = [
         Light((np.cos(2 * k + 2), 0.8, np.sin(2 * k + 2)), np.roll((1.0, 0.8, 0.6), k) / design.lights)
@@ -95,7 +95,10 @@ def vectors(unit: ShadingPipelineUnit) -> dict[str, dict[str, np.ndarray]]:
         "writes": ("write", writes_of(constants)),
         "spans": ("i", beats_of(unit, spans)),
         "pixels": ("o", pixel_beats(pixels)),
-        "status": ("status", {"wide_spans": [pixels.wide_spans], "empty_spans": [1], "overrun": [0]}),
+        "status": (
+            "status",
+            {"out_of_range_spans": [pixels.out_of_range_spans], "empty_spans": [1], "overrun": [0]},
+        ),
     }
     return {name: dict(_columns(*table)) for name, table in tables.items()}
 

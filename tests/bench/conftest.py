@@ -156,8 +156,8 @@ def frame(rng, task, exponent, simulated):
         "pixels": pixels,
         "shown": pixels - 100,
         "spans": 700,
-        "wide_spans": 0,
-        "clocks": int(pixels * rng.uniform(1, 3)) if simulated else None,
+        "out_of_range_spans": 0,
+        "cycles": int(pixels * rng.uniform(1, 3)) if simulated else None,
     }
 
 

@@ -1,12 +1,12 @@
 """Frames of the exponents asked for, and their errors."""
 
 from blysk.bench.accuracy import measure
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import preset
 from blysk.sim.meshes.teapot import teapot
 
 
 def test_measures_every_exponent():
-    rows = list(measure(teapot(500), ShadingPipeline(), (1, 100), 64, 48))
+    rows = list(measure(teapot(500), preset(), (1, 100), 64, 48))
     assert [row[0] for row in rows] == [1, 100]
     first, second = (row[1] for row in rows)
     assert first.pixels == second.pixels > 500

@@ -14,34 +14,34 @@ from .rules import never_resumes
 
 @pytest.fixture
 def prove(tmp_path):
-    """Prove the claims of a harness, for runs of any length, or of so many clocks from power-up.
+    """Prove the claims of a harness, for runs of any length, or of so many cycles from power-up.
 
     So many must be enough for a beat to wait, another to come, and one to leave.
     """
     if missing_tool():
         pytest.skip(missing_tool())
 
-    def prove(harness, clocks=None):
-        verdict = decide(harness, tmp_path, clocks)
-        assert verdict.holds is not None, f"not decided in time, after {verdict.clocks} clocks"
-        assert verdict.holds, f"refuted after {verdict.clocks} clocks:\n{verdict.trace}"
-        if clocks is not None:
+    def prove(harness, cycles=None):
+        verdict = decide(harness, tmp_path, cycles)
+        assert verdict.holds is not None, f"not decided in time, after {verdict.cycles} cycles"
+        assert verdict.holds, f"refuted after {verdict.cycles} cycles:\n{verdict.trace}"
+        if cycles is not None:
             runs = harness.without_claims()
             never_resumes(runs)
-            assert decide(runs, tmp_path, clocks).holds is False, f"nothing moves on in {clocks} clocks"
+            assert decide(runs, tmp_path, cycles).holds is False, f"nothing moves on in {cycles} cycles"
 
     return prove
 
 
 @pytest.fixture
 def refute(tmp_path):
-    """Find a counterexample to the claims of a harness, of at most so many clocks; the planted bug's."""
+    """Find a counterexample to the claims of a harness, of at most so many cycles; the planted bug's."""
     if missing_tool():
         pytest.skip(missing_tool())
 
-    def refute(harness, clocks=40):
-        verdict = decide(harness, tmp_path, clocks)
-        assert verdict.holds is False, f"no counterexample in {verdict.clocks} clocks"
+    def refute(harness, cycles=40):
+        verdict = decide(harness, tmp_path, cycles)
+        assert verdict.holds is False, f"no counterexample in {verdict.cycles} cycles"
 
     return refute
 

@@ -124,14 +124,14 @@ class Verdict:
     ----------
     holds : bool or None
         Whether they hold, on every clock or on so many as asked for; ``None``: not decided in time.
-    clocks : int
+    cycles : int
         Clocks after the first of the counterexample's last, or the frames that the search has seen.
     trace : str
         The counterexample: a line a clock, the bits of the inputs that are 1; empty if there is none.
     """
 
     holds: bool | None
-    clocks: int
+    cycles: int
     trace: str = ""
 
 
@@ -148,7 +148,7 @@ def _run_yosys(script: str, folder: Path) -> None:
         raise RuntimeError(f"Yosys failed: {done.stderr[-2000:] or done.stdout[-2000:]}")
 
 
-def decide(harness: Harness, folder: Path, clocks: int | None = None) -> Verdict:
+def decide(harness: Harness, folder: Path, cycles: int | None = None) -> Verdict:
     """Decide whether the claims of a harness hold.
 
     Parameters
@@ -157,8 +157,8 @@ def decide(harness: Harness, folder: Path, clocks: int | None = None) -> Verdict
         The claims.
     folder : path
         For the netlist.
-    clocks : int or None
-        Look for a counterexample of at most so many clocks from power-up, by bounded model checking.
+    cycles : int or None
+        Look for a counterexample of at most so many cycles from power-up, by bounded model checking.
         ``None``: prove the claims for runs of any length, by property-directed reachability (IC3), which
         finds an inductive invariant and verifies it.
 
@@ -169,7 +169,7 @@ def decide(harness: Harness, folder: Path, clocks: int | None = None) -> Verdict
     """
     (folder / "top.il").write_text(harness.netlist())
     _run_yosys(_SCRIPT, folder)
-    engine = f"pdr -T {_SECONDS}" if clocks is None else f"bmc3 -F {clocks} -T {_SECONDS}"
+    engine = f"pdr -T {_SECONDS}" if cycles is None else f"bmc3 -F {cycles} -T {_SECONDS}"
     abc = Path(find_spec("pyosys").origin).parent / "yosys-abc"
     command = f"read_aiger top.aig; fold; {engine}; print_status; write_cex -n top.cex"
     done = subprocess.run([abc, "-c", command], capture_output=True, encoding="utf-8", cwd=folder)
@@ -179,14 +179,14 @@ def decide(harness: Harness, folder: Path, clocks: int | None = None) -> Verdict
     code, frames = int(status[1]), int(status[2])
     if code == 0:
         return Verdict(False, frames, _trace(folder / "top.cex"))
-    if code == 1 or (clocks is not None and f"No output asserted in {clocks} frames" in done.stdout):
+    if code == 1 or (cycles is not None and f"No output asserted in {cycles} frames" in done.stdout):
         return Verdict(True, frames)
     return Verdict(None, frames)
 
 
 def _trace(path: Path) -> str:
     """Inputs of a counterexample: for each clock the names of the bits that are 1."""
-    clocks: dict[int, list[str]] = {}
+    cycles: dict[int, list[str]] = {}
     for name, clock, bit in re.findall(r"^(\S+)@(\d+)=([01])$", path.read_text(), re.MULTILINE):
-        clocks.setdefault(int(clock), []).extend([name] if bit == "1" else [])
-    return "\n".join(f"{clock}: {' '.join(names)}" for clock, names in sorted(clocks.items()))
+        cycles.setdefault(int(clock), []).extend([name] if bit == "1" else [])
+    return "\n".join(f"{clock}: {' '.join(names)}" for clock, names in sorted(cycles.items()))

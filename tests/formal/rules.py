@@ -27,7 +27,7 @@ def stays(harness: Harness, channel: stream.Interface) -> Signal:
 def never_resumes(harness: Harness) -> None:
     """Claim that of the harness's unit no beat leaves once one has waited and another come: to be refuted.
 
-    If that holds for so many clocks, a proof of so many has seen no beat lost, or dropped, that waited.
+    If that holds for so many cycles, a proof of so many has seen no beat lost, or dropped, that waited.
     """
     unit, waited, came = harness.unit, Signal(name="waited"), Signal(name="came")
     harness.m.d.sync += [
@@ -37,11 +37,11 @@ def never_resumes(harness: Harness) -> None:
     harness.claim(~(came & taken(unit.o)))
 
 
-def answers(harness: Harness, due: Value, answer: Value, clocks: int, when: Value) -> None:
-    """Claim that what is due fails to come on at most so many clocks in a row, all of them ``when``."""
-    missed = Signal(range(clocks + 2), name="missed")
-    harness.m.d.sync += missed.eq(Mux(due & ~answer & when & (missed <= clocks), missed + 1, 0))
-    harness.claim(missed <= clocks)
+def answers(harness: Harness, due: Value, answer: Value, cycles: int, when: Value) -> None:
+    """Claim that what is due fails to come on at most so many cycles in a row, all of them ``when``."""
+    missed = Signal(range(cycles + 2), name="missed")
+    harness.m.d.sync += missed.eq(Mux(due & ~answer & when & (missed <= cycles), missed + 1, 0))
+    harness.claim(missed <= cycles)
 
 
 def follows(

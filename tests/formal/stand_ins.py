@@ -17,7 +17,7 @@ def short(
 ) -> type[PipelinedUnit]:
     """A class with a unit's streams and control, a latency of its own, and a data path that hands bits on.
 
-    `test_units` proves of every `PipelinedUnit` that beats leave in order, each once, ``latency`` clocks on.
+    `test_units` proves of every `PipelinedUnit` that beats leave in order, each once, ``latency`` cycles on.
 
     Parameters
     ----------

@@ -2,9 +2,9 @@
 """Proofs of the adaptive normaliser: its segments have the pixels of their span, and each pixel leaves once.
 
 Between its two halves is a queue of segments, `amaranth.lib.fifo.SyncFIFOBuffered`, which hands on what it
-takes. In its place is one that takes segments on any clocks and gives any: what is claimed of either half
-holds whatever the other does. The bisection is a stand-in of 3 clocks whose results are free; products are,
-too, and thus the number of levels. Lengths have 3 bits, and a segment is prepared in 6 clocks instead of 14,
+takes. In its place is one that takes segments on any cycles and gives any: what is claimed of either half
+holds whatever the other does. The bisection is a stand-in of 3 cycles whose results are free; products are,
+too, and thus the number of levels. Lengths have 3 bits, and a segment is prepared in 6 cycles instead of 14,
 of which the others are for its start and step.
 """
 
@@ -32,12 +32,12 @@ PROGRESS_CLOCKS = 25
 THRESHOLDS = {1: 1 / 8, 3: 2.0**-6}
 """By the levels that they lead to, at most."""
 
-SEGMENT = data.StructLayout({"count": LENGTH_BITS, "last": 1, "wide": 1})
+SEGMENT = data.StructLayout({"count": LENGTH_BITS, "last": 1, "out_of_range": 1})
 """Upper bits of what goes through the queue."""
 
 
 class Queue(Elaboratable, FIFOInterface):
-    """Takes segments and gives others, each on any clocks: what it says is left open."""
+    """Takes segments and gives others, each on any cycles: what it says is left open."""
 
     def elaborate(self, platform):
         return Module()
@@ -99,7 +99,7 @@ def of_segments(h, queue):
 
 
 def of_progress(h, queue):
-    """A segment comes in so many clocks; a span is taken when there are no more."""
+    """A segment comes in so many cycles; a span is taken when there are no more."""
     gives, left = pixels_left(h, queue)
     answers(h, left.any(), gives, PROGRESS_CLOCKS, queue.w_rdy)
     answers(h, h.unit.i.valid & ~left.any(), h.unit.i.ready, 1, 1)
@@ -116,7 +116,7 @@ def of_pixels(h, queue):
     source = SimpleNamespace(valid=queue.r_rdy, ready=queue.r_en, payload=segment)
 
     def image(came, place, last, pixel):
-        return (pixel.last == (last & came.last)) & (pixel.wide == came.wide)
+        return (pixel.last == (last & came.last)) & (pixel.out_of_range == came.out_of_range)
 
     stays(h, h.unit.o)
     owed = pixels_follow(h, source, h.unit.o, segment.count, 2 * ((1 << LENGTH_BITS) - 1) + 2, image)
@@ -141,7 +141,7 @@ def test_segments(prove, harness, levels):
 
 
 def test_progress(prove, harness):
-    """Inductive, up to one level: while the queue takes them, segments come 25 clocks apart at most."""
+    """Inductive, up to one level: while the queue takes them, segments come 25 cycles apart at most."""
     prove(of_progress(*harness(THRESHOLDS[1])))
 
 

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.prove
 
 
 def of_spans():
-    """A model counts the clocks that a span still has to come."""
+    """A model counts the cycles that a span still has to come."""
     unit = BisectionChainUnit()
     h = Harness(unit)
     stays(h, unit.o)
@@ -30,18 +30,18 @@ def of_spans():
         h.m.d.sync += left.eq(left - 1)
     h.claim(unit.o.valid == (inside.any() & ~left.any()))
     h.claim(unit.i.ready == ~inside.any())
-    # What makes it inductive: the states, and the clocks from each to the end.
+    # What makes it inductive: the states, and the cycles from each to the end.
     state, step, remaining = (h.register(name) for name in ("fsm_state", "step", "remaining"))
     h.claim((state == 0) == ~inside.any())
     to_come = [ends - 1 + rounds(remaining) - step, 10 + rounds(remaining) - step, 10 - step, 0]
-    for number, clocks in enumerate(to_come, 1):
-        h.claim((state != number) | (left == clocks))
+    for number, cycles in enumerate(to_come, 1):
+        h.claim((state != number) | (left == cycles))
     h.claim(state <= len(to_come))
     return h
 
 
 def test_spans(prove):
-    """Inductive, all levels: what waits stays; a span that is taken in is offered once, `latency` clocks on,
+    """Inductive, all levels: what waits stays; a span that is taken in is offered once, `latency` cycles on,
     and until it is taken, no other is."""
     prove(of_spans())
 

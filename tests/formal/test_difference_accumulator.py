@@ -51,7 +51,7 @@ def of_pixels():
 def test_pixels_are_as_many_as_asked_for(prove):
     """Inductive, lengths 0 to 7: what waits stays, as many values leave as the lengths say, no deadlock.
 
-    While the output is ready, the first value leaves 2 clocks after its span was taken, then one every clock,
+    While the output is ready, the first value leaves 2 cycles after its span was taken, then one every clock,
     and a span is taken at the latest when the one before it has had a clock for each pixel.
     """
     prove(of_pixels())

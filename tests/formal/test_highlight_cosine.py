@@ -44,11 +44,11 @@ def of_pixels():
 
 
 def test_pixels(prove):
-    """Inductive, lengths 0 to 3, `LATENCY` clocks in place of 12: what waits stays; a span's pixels leave in
+    """Inductive, lengths 0 to 3, `LATENCY` cycles in place of 12: what waits stays; a span's pixels leave in
     order, each once, each at its angle and with its span's cos beta.
 
-    While the output is ready, the first leaves `LATENCY` clocks after its span was taken, then one every
-    clock, and a span is taken in 3 clocks, and one.
+    While the output is ready, the first leaves `LATENCY` cycles after its span was taken, then one every
+    clock, and a span is taken in 3 cycles, and one.
     """
     prove(of_pixels())
 

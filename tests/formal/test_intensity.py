@@ -21,16 +21,19 @@ def of_sums(lights):
     live, first, channel = note[0], note[1], note[3:5]
     fraction = Intensity.TERM_FORMAT.fraction_bits
     ambient = Array(Value.cast(unit.constants.ambient[min(k, 2)]) << fraction for k in range(4))[channel]
-    wide, terms = Signal(len(total) + 4, name="wide"), Signal(range(2 * lights + 3), name="terms")
+    out_of_range, terms = (
+        Signal(len(total) + 4, name="out_of_range"),
+        Signal(range(2 * lights + 3), name="terms"),
+    )
     with h.m.If(~h.register("held") & live):
         h.m.d.sync += [
-            wide.eq(Mux(first, ambient, wide) + product),
+            out_of_range.eq(Mux(first, ambient, out_of_range) + product),
             terms.eq(Mux(first, 1, terms + (terms <= 2 * lights))),
         ]
-    h.claim(total == wide)
+    h.claim(total == out_of_range)
     # What leads there: ambient light and each term have 11 bits before the point.
     h.claim(terms <= 2 * lights)
-    h.claim(wide <= (terms + 1) << len(product))
+    h.claim(out_of_range <= (terms + 1) << len(product))
     return h
 
 
@@ -90,7 +93,7 @@ PIXELS_CLOCKS = {3: None, 1: 16}
 @pytest.mark.parametrize("channels", PIXELS_CLOCKS)
 def test_pixels(prove, choices, channels):
     """Inductive, but for `PIXELS_CLOCKS`, one light: what waits stays; pixels leave in order, each once, each
-    as the sum of its own terms; while the output is ready, one leaves in the clocks of a pixel with every
+    as the sum of its own terms; while the output is ready, one leaves in the cycles of a pixel with every
     term, and one is taken in as many as that has products, and one."""
     prove(of_pixels(channels), PIXELS_CLOCKS[channels])
 

@@ -2,7 +2,7 @@
 """Proofs about interpolators, of proven units put together: a span's pixels leave, all and in order.
 
 The parts are proved by themselves. In the place of each `PipelinedUnit` is one of the same streams and
-control and of 1 to 3 clocks, which hands on a word: a tag of the span, and the pixel's place in it.
+control and of 1 to 3 cycles, which hands on a word: a tag of the span, and the pixel's place in it.
 Accumulators, recurrence and highlight cosine keep their control, and take words of few bits from pixel to
 pixel; normaliser and quadratic evaluator are accumulators.
 """
@@ -37,7 +37,7 @@ from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedValue
-from blysk.hdl.core.stream import PipelinedUnit, offer
+from blysk.hdl.core.stream import PipelinedUnit, skid_buffer
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.methods.angular_interpolator import AngularInterpolatorUnit
@@ -58,7 +58,7 @@ from .stand_ins import short, short_wave
 
 pytestmark = pytest.mark.prove
 
-# Spans of 0 to 3 pixels, and the clocks from one to the next that setups are built for.
+# Spans of 0 to 3 pixels, and the cycles from one to the next that setups are built for.
 LENGTH_BITS, INTERVAL = 2, 2
 TAG_BITS = 2
 WORD_BITS = LENGTH_BITS + TAG_BITS
@@ -197,7 +197,7 @@ def walk(find, place):
 class Line(AccumulatorUnit):
     """In place of a unit that takes spans to normals: an accumulator of its streams."""
 
-    clocks_per_pixel = 1
+    cycles_per_pixel = 1
 
     def __init__(self, parameters):
         unit = self.OF(parameters)
@@ -207,7 +207,7 @@ class Line(AccumulatorUnit):
 
 
 class Normaliser(Line):
-    """Of a span that is not divided; the unit itself takes 69 clocks to its first pixel."""
+    """Of a span that is not divided; the unit itself takes 69 cycles to its first pixel."""
 
     OF = AdaptiveNormaliserUnit
     quadratics = walk(left, lambda values: values.normal[0])
@@ -225,12 +225,12 @@ class Evaluator(Line):
 
 @pytest.fixture(autouse=True)
 def stand_ins(monkeypatch):
-    """Units of 2 or 3 clocks, and accumulators of few bits, hand words on."""
+    """Units of 2 or 3 cycles, and accumulators of few bits, hand words on."""
     for module, name, hand_on, latency in (
         (blysk.hdl.methods.interpolator, "LightProductsUnit", products, 2),
         (blysk.hdl.methods.linear_interpolator, "DifferenceSetupUnit", difference_setup, 3),
         (blysk.hdl.methods.linear_interpolator, "RenormaliserUnit", renormaliser, 2),
-        # A length takes three clocks round these two.
+        # A length takes three cycles round these two.
         (blysk.hdl.methods.quadratic_interpolator, "MiddleNormalUnit", middle_normal, 3),
         (blysk.hdl.methods.quadratic_interpolator, "GPQUnit", coefficients, 1),
         (blysk.hdl.methods.quadratic_interpolator, "DifferenceSetupUnit", difference_setup, 3),
@@ -398,7 +398,7 @@ UNITS = {
 
 
 def in_step(harness: Harness) -> None:
-    """Claim that units side by side are ready, and offer what they have, on the same clocks."""
+    """Claim that units side by side are ready, and offer what they have, on the same cycles."""
     unit = harness.unit
     if isinstance(unit, AngularInterpolatorUnit):
         rows = list(zip(*unit._chains.values(), strict=True))
@@ -422,7 +422,7 @@ def of_stretch(name: str, place: int) -> Harness:
     return h
 
 
-def of_clocks(name: str, *, exact: bool = False) -> Harness:
+def of_cycles(name: str, *, exact: bool = False) -> Harness:
     """Spans of a pixel or more, on all stretches at once: counted, or followed exactly."""
     make, stretches = UNITS[name]
     h = Harness(unit := make())
@@ -460,7 +460,7 @@ def test_pixels(prove, name, place):
 
     The stretches follow each other from the input to the output: one ends with the stream with which the next
     begins. So a span's pixels leave the whole, all and in order, each at its place, with the tag of its span.
-    Units side by side take and give on the same clocks, those of the output.
+    Units side by side take and give on the same cycles, those of the output.
     """
     prove(of_stretch(name, place))
 
@@ -468,8 +468,8 @@ def test_pixels(prove, name, place):
 @pytest.mark.parametrize("name", UNITS)
 def test_stability_and_progress(prove, name):
     """Inductive, spans of 1 to 3 pixels: what waits stays; while the output is ready, a pixel that is to come
-    leaves, and a span that is offered is taken, in as many clocks as the latency and one."""
-    prove(of_clocks(name))
+    leaves, and a span that is offered is taken, in as many cycles as the latency and one."""
+    prove(of_cycles(name))
 
 
 # Of each bug the unit of which it refutes the claims, the text where it is planted, and the bug.
@@ -525,7 +525,7 @@ def test_bugs_are_found(refute, plant, bug):
     name, *change = BUGS[bug]
     unit = UNITS[name][0].func
     plant(unit, "source" if issubclass(unit, NormalInterpolatorUnit) else "elaborate", *change)
-    refute(of_clocks(name, exact=True), 30)
+    refute(of_cycles(name, exact=True), 30)
 
 
 @pytest.mark.parametrize(
@@ -535,16 +535,16 @@ def test_lost_products_are_found(refute, plant, name):
     """Products that are dropped while they wait, planted in all methods that find normals."""
     bug = "products.o.ready.eq(1), self.wide.eq(wide)"
     plant(NormalInterpolatorUnit, "elaborate", "self.wide.eq(wide)", bug)
-    refute(of_clocks(name, exact=True), 30)
+    refute(of_cycles(name, exact=True), 30)
 
 
 def test_dropped_cosines_are_found(refute, monkeypatch):
     """What waits is dropped at the output of the highlight-cosine unit."""
 
     def dropping(m, output, valid, payload):
-        advance = offer(m, output, valid, payload)
+        advance = skid_buffer(m, output, valid, payload)
         m.d.comb += Value.cast(output.payload).eq(Value.cast(payload))
         return advance
 
-    monkeypatch.setattr(blysk.hdl.cosines.highlight_cosine, "offer", dropping)
-    refute(of_clocks("angular"), 30)
+    monkeypatch.setattr(blysk.hdl.cosines.highlight_cosine, "skid_buffer", dropping)
+    refute(of_cycles("angular"), 30)

@@ -53,14 +53,14 @@ def of_light(unit):
 
 
 def test_both_units_move_in_lockstep(prove, make):
-    """Inductive, with an interval of 1: both terms of each beat leave once, in order, 2 clocks on; the
+    """Inductive, with an interval of 1: both terms of each beat leave once, in order, 2 cycles on; the
     specular one 0 where N.L is not above 0; what waits stays; no deadlock."""
     prove(of_light(make(1)))
 
 
 @pytest.mark.parametrize("interval", [2, 3])
 def test_dark_beats_keep_their_places(prove, make, interval):
-    """In 12 clocks, with specular terms every so many: both terms of each beat leave once, in order, the
+    """In 12 cycles, with specular terms every so many: both terms of each beat leave once, in order, the
     specular one 0 where N.L is not above 0; what waits stays; no deadlock."""
     prove(of_light(make(interval)), 12)
 

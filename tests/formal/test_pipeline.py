@@ -7,8 +7,8 @@ import blysk.hdl.lighting.light
 import blysk.hdl.pipeline
 from blysk.golden.frame_constants import FIELDS_OF_A_FRAME
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
-from blysk.golden.pipeline import ShadingPipeline
-from blysk.hdl.core.stream import count_down, offer
+from blysk.golden.presets import preset
+from blysk.hdl.core.stream import count_down, skid_buffer
 from blysk.hdl.frame_constants import FrameConstantsUnit
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
@@ -51,7 +51,7 @@ class Line(InterpolatorUnit):
         for index, light in enumerate(operands):
             words = (Value.cast(light[name]) for name in light.shape().members)
             m.d.comb += [word.eq((code + index)[:2]) for word in words]
-        m.d.comb += advance.eq(offer(m, self.o, active, operands))
+        m.d.comb += advance.eq(skid_buffer(m, self.o, active, operands))
         return m
 
 
@@ -89,8 +89,8 @@ def stand_ins(monkeypatch):
         for module, unit, *options in units:
             monkeypatch.setattr(module, unit.__name__, short(unit, *options))
         monkeypatch.setitem(blysk.hdl.pipeline.INTERPOLATORS, LinearInterpolator, Line)
-        monkeypatch.setattr(ShadingPipelineUnit, "_places", 3)
-        return ShadingPipelineUnit(parameters, style=style)
+        monkeypatch.setattr(ShadingPipelineUnit, "_waiting_spans", 3)
+        return ShadingPipelineUnit(parameters.built(style=style))
 
     return pipeline
 
@@ -98,8 +98,8 @@ def stand_ins(monkeypatch):
 def of_writes(parameters):
     """Spans inside are those taken in whose last pixel has not left.
 
-    Assumed, as `of_places` and the proofs of the assembler have it: a last pixel leaves only while a span is
-    inside, and there are at most as many as the FIFO of places and the assembler hold.
+    Assumed, as `of_waiting_spans` and the proofs of the assembler have it: a last pixel leaves only while a
+    span is inside, and there are at most as many as the FIFO of places and the assembler hold.
     """
     h = Harness(unit := ShadingPipelineUnit(parameters))
     inside = Signal(6)
@@ -107,7 +107,7 @@ def of_writes(parameters):
     finished = taken(unit.o) & unit.o.payload.last
     h.m.d.sync += inside.eq(inside + admitted - finished)
     h.assume(~finished | inside.any())
-    h.assume(inside <= unit._places + unit._assembler.PLACES)
+    h.assume(inside <= unit._waiting_spans + unit._assembler.SPANS_INSIDE)
     h.claim(unit.write.ready == ~inside.any())
     h.claim(~(taken(unit.write) & taken(unit.i)))
     # What makes it inductive.
@@ -117,7 +117,7 @@ def of_writes(parameters):
 
 def of_constants():
     """Without lights: a pixel's colour is that of the last write before its span was taken in."""
-    h = Harness(unit := ShadingPipelineUnit(ShadingPipeline(lights=0, grey=True, **NARROW)))
+    h = Harness(unit := ShadingPipelineUnit(preset(lights=0, grey=True, **NARROW)))
     ambient, (address, _) = Signal(17), FIELDS_OF_A_FRAME["ambient"]
     write = unit.write.payload
     with h.m.If(taken(unit.write) & (write.address == address)):
@@ -127,8 +127,8 @@ def of_constants():
     return h
 
 
-def of_places(unit, late):
-    """Pixels, and spans that the interpolator takes; what is due comes in so many clocks.
+def of_waiting_spans(unit, late):
+    """Pixels, and spans that the interpolator takes; what is due comes in so many cycles.
 
     No span is taken while a write or another span is offered, and a pixel leaves until that is taken: so it
     is, in the end.
@@ -150,7 +150,7 @@ def of_places(unit, late):
         return right & (pixel.r == Cat(terms))
 
     stays(h, unit.o)
-    capacity = 3 * (unit._places + unit._assembler.PLACES)
+    capacity = 3 * (unit._waiting_spans + unit._assembler.SPANS_INSIDE)
     owed = pixels_follow(h, unit.i, unit.o, span.length, capacity, image)
     # Pixels that are inside leave first.
     leaves = taken(unit.o)
@@ -163,11 +163,11 @@ def of_places(unit, late):
     return h
 
 
-AMBIENT = ShadingPipeline(lights=0, grey=True, **NARROW)
-LINEAR = ShadingPipeline(method="linear", model=None, grey=True, **NARROW)
-GATED = ShadingPipeline(method="linear", exponent=10, gate=True, grey=True, **NARROW)
-LIT = ShadingPipeline(method="linear", exponent=10, grey=True, **NARROW)
-TWO_LIGHTS = ShadingPipeline(method="linear", exponent=10, grey=True, lights=2, **NARROW)
+AMBIENT = preset(lights=0, grey=True, **NARROW)
+LINEAR = preset(method="linear", model=None, grey=True, **NARROW)
+GATED = preset(method="linear", exponent=10, gate=True, grey=True, **NARROW)
+LIT = preset(method="linear", exponent=10, grey=True, **NARROW)
+TWO_LIGHTS = preset(method="linear", exponent=10, grey=True, lights=2, **NARROW)
 
 
 @pytest.mark.parametrize("parameters", [AMBIENT, LINEAR, GATED], ids=["ambient", "linear", "gated"])
@@ -177,11 +177,11 @@ def test_writes_wait_for_spans(prove, parameters):
 
 
 def test_constants_stay(prove):
-    """In 16 clocks, one channel: each pixel has the colour of the last write before its span was taken in."""
+    """In 16 cycles, one channel: each pixel has the colour of the last write before its span was taken in."""
     prove(of_constants(), 16)
 
 
-# Clocks that the output, ready, stands at most, and clocks of the proof.
+# Clocks that the output, ready, stands at most, and cycles of the proof.
 PIPELINES = {
     "ambient": (AMBIENT, "throughput", 4, 12),
     "diffuse": (LINEAR, "throughput", 4, 14),
@@ -194,11 +194,11 @@ PIPELINES = {
 
 @pytest.mark.parametrize("name", PIPELINES)
 def test_pixels(prove, stand_ins, name):
-    """In so many clocks, spans of 0 to 3 pixels, with `stand_ins`: every span that is taken in goes to the
+    """In so many cycles, spans of 0 to 3 pixels, with `stand_ins`: every span that is taken in goes to the
     interpolator and to the places round it, so that its pixels leave in order, each once, each at its place
     and of its colour, the last of them marked; what is due comes, a waiting write too."""
-    *pipeline, late, clocks = PIPELINES[name]
-    prove(of_places(stand_ins(*pipeline), late), clocks)
+    *pipeline, late, cycles = PIPELINES[name]
+    prove(of_waiting_spans(stand_ins(*pipeline), late), cycles)
 
 
 BUGS = {
@@ -212,8 +212,8 @@ BUGS = {
     "a place is lost": (
         "diffuse",
         "elaborate",
-        "places.r_en.eq(assembler.places.ready)",
-        "places.r_en.eq(1)",
+        "coordinates.r_en.eq(assembler.coordinates.ready)",
+        "coordinates.r_en.eq(1)",
     ),
     "spans overtake a write": ("ambient", "elaborate", "free.eq(~self.write.valid & ", "free.eq("),
     "a light takes what the other does not": (
@@ -234,11 +234,11 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, plant, stand_ins, bug):
-    """Planted in `ShadingPipelineUnit`, each refutes the claims, in the clocks of the proof."""
+    """Planted in `ShadingPipelineUnit`, each refutes the claims, in the cycles of the proof."""
     name, *change = BUGS[bug]
-    *pipeline, late, clocks = PIPELINES[name]
+    *pipeline, late, cycles = PIPELINES[name]
     plant(ShadingPipelineUnit, *change)
-    refute(of_places(stand_ins(*pipeline), late), clocks)
+    refute(of_waiting_spans(stand_ins(*pipeline), late), cycles)
 
 
 WRITE_BUGS = {

@@ -11,23 +11,23 @@ from .rules import answers, follows, pixels_follow, stays, taken
 pytestmark = pytest.mark.prove
 
 
-def of_places():
+def of_waiting_spans():
     """Coordinates and lengths of 2 bits: spans of 1 to 3 pixels, which run past the largest column, too."""
     unit = PixelAssemblerUnit(2, 1, 2)
     h = Harness(unit)
-    h.assume(unit.places.payload.length != 0)
+    h.assume(unit.coordinates.payload.length != 0)
 
     def image(span, place, last, pixel):
         return (pixel.x == (span.x + place)[:2]) & (pixel.y == span.y) & (pixel.last == last)
 
     stays(h, unit.o)
     # Two places wait, one is told of, and the pixels of two more.
-    owed = pixels_follow(h, unit.places, unit.o, unit.places.payload.length, 4 * 3 + 2, image)
+    owed = pixels_follow(h, unit.coordinates, unit.o, unit.coordinates.payload.length, 4 * 3 + 2, image)
     # Spans whose last pixel has not left.
-    spans = Signal(range(unit.PLACES + 2))
+    spans = Signal(range(unit.SPANS_INSIDE + 2))
     finished = taken(unit.o) & unit.o.payload.last
-    h.m.d.sync += spans.eq(spans + taken(unit.places) - finished)
-    h.claim(spans <= unit.PLACES)
+    h.m.d.sync += spans.eq(spans + taken(unit.coordinates) - finished)
+    h.claim(spans <= unit.SPANS_INSIDE)
     h.claim(spans.any() == owed.any())
     return h
 
@@ -36,11 +36,11 @@ def of_progress():
     """The same spans, counted alone, while colours are offered and the output is ready."""
     unit = PixelAssemblerUnit(2, 1, 2)
     h = Harness(unit)
-    h.assume(unit.places.payload.length != 0)
-    owed = pixels_follow(h, unit.places, unit.o, unit.places.payload.length, 4 * 3 + 2)
+    h.assume(unit.coordinates.payload.length != 0)
+    owed = pixels_follow(h, unit.coordinates, unit.o, unit.coordinates.payload.length, 4 * 3 + 2)
     flows = unit.o.ready & unit.colors.valid
-    answers(h, owed.any(), taken(unit.o), unit.place_latency - 1, flows)
-    answers(h, unit.places.valid, unit.places.ready, 3 + 2, flows)
+    answers(h, owed.any(), taken(unit.o), unit.coordinates_latency - 1, flows)
+    answers(h, unit.coordinates.valid, unit.coordinates.ready, 3 + 2, flows)
     return h
 
 
@@ -49,7 +49,7 @@ def of_colors():
     unit = PixelAssemblerUnit(1, 1, 2)
     h = Harness(unit)
     color = unit.colors.payload
-    h.assume(unit.places.payload.length != 0)
+    h.assume(unit.coordinates.payload.length != 0)
     for channel in "rgb":
         h.assume(color[channel][2:] == 0)
 
@@ -61,16 +61,16 @@ def of_colors():
     return h
 
 
-def test_places(prove):
+def test_waiting_spans(prove):
     """Inductive: a span's pixels leave in order, from x on, modulo 2^x_bits, with y, the last of them marked.
 
-    At most `PixelAssemblerUnit.PLACES` spans are inside.
+    At most `PixelAssemblerUnit.SPANS_INSIDE` spans are inside.
     """
-    prove(of_places())
+    prove(of_waiting_spans())
 
 
 def test_progress(prove):
-    """Inductive: with colours offered and the output ready, a pixel leaves every 3 clocks at the latest, and
+    """Inductive: with colours offered and the output ready, a pixel leaves every 3 cycles at the latest, and
     a place is taken in 5: the pixels of a span, and two registers."""
     prove(of_progress())
 
@@ -81,11 +81,11 @@ def test_colors(prove):
 
 
 BUGS = {
-    "x stands": (of_places, "m.Elif(moves)", "m.Elif(0)"),
-    "x moves while it stands": (of_places, "m.Elif(moves)", "m.Else()"),
+    "x stands": (of_waiting_spans, "m.Elif(moves)", "m.Elif(0)"),
+    "x moves while it stands": (of_waiting_spans, "m.Elif(moves)", "m.Else()"),
     "a colour is taken without a place": (of_colors, "advance & spot.valid", "advance"),
-    "a place is taken without a colour": (of_places, "advance & self.colors.valid", "advance"),
-    "the next span comes early": (of_places, "moves & ends", "moves"),
+    "a place is taken without a colour": (of_waiting_spans, "advance & self.colors.valid", "advance"),
+    "the next span comes early": (of_waiting_spans, "moves & ends", "moves"),
     "a pixel needs another span": (
         of_progress,
         "spot.valid & self.colors.valid",

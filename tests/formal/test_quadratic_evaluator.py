@@ -14,7 +14,7 @@ from .stand_ins import short
 
 pytestmark = pytest.mark.prove
 
-# Of each form, with the stand-ins: pixels inside at most, and clocks for which a span waits at most.
+# Of each form, with the stand-ins: pixels inside at most, and cycles for which a span waits at most.
 FORMS = {"direct": (12, 4), "horner": (11, 7)}
 
 
@@ -69,7 +69,7 @@ def of_pixels(form):
 @pytest.mark.parametrize("form", FORMS)
 def test_pixels(prove, form):
     """Inductive, lengths 0 to 3: what waits stays; a span's pixels leave in order, each once, each with its t
-    and its span's coefficients; while the output is ready, one leaves in 4 clocks, the stand-ins' latency and
+    and its span's coefficients; while the output is ready, one leaves in 4 cycles, the stand-ins' latency and
     one, and a span is taken in as many as `FORMS` says, and one."""
     prove(of_pixels(form))
 

@@ -177,9 +177,9 @@ def test_start_values_of_the_setup_keep_the_bound(normal_pairs):
         left, right = (quantise(normals) for normals in normal_pairs(rng, 20_000, degrees))
         near = rng.random((len(left), 1)) < 0.5
         vector = np.where(near, left, quantise(normal_pairs(rng, len(left), 0.0)[0]))
-        *start, wide = setup.compute(
+        *start, out_of_range = setup.compute(
             *(Fixed(COMPONENT, codes) for codes in (left, right, vector)), rng.choice(lengths, len(left))
         )
-        assert not wide.any()
+        assert not out_of_range.any()
         shares.append(share_at_start(setup.recurrence, *start))
     assert 0.98 < max(shares) <= 1

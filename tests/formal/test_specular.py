@@ -6,13 +6,14 @@ from amaranth.hdl import Cat, Fragment, Mux, Signal, Value
 from amaranth.hdl._ast import Switch
 
 import blysk.hdl.lighting.specular
-from blysk.golden.lighting.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from blysk.golden.lighting.specular import Specular
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import ONE_SQUARED
-from blysk.golden.reference.reflection import reflect
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.lighting.specular import SpecularUnit
 from blysk.sim.engines.simulate import simulate
 
+from ..lists import FURTHER_MODELS, SPECULAR_MODELS
 from .prover import Harness
 
 pytestmark = pytest.mark.prove
@@ -57,7 +58,7 @@ def reads_one_word(unit, name):
 
 
 def of_argument(unit, name, format, if_dark):
-    """That register has it two clocks on, cut and limited, and a code of its own if the beat is dark."""
+    """That register has it two cycles on, cut and limited, and a code of its own if the beat is dark."""
     h = Harness(unit)
     words, _, (dark,) = words_of(unit, h._fragment)
     argument, first, dark = words[name], words["one_minus_cosine"], words[dark]
@@ -78,7 +79,9 @@ def of_argument(unit, name, format, if_dark):
 
 
 def of_specular(model, operand):
-    return of_argument(SpecularUnit(Specular(model, operand)), "argument", Specular.ARGUMENT_FORMAT, 0)
+    return of_argument(
+        SpecularUnit(Specular(REFLECTION_MODELS[model], operand)), "argument", Specular.ARGUMENT_FORMAT, 0
+    )
 
 
 def every_argument(unit, exponent):
@@ -121,7 +124,7 @@ def check(unit, exponent):
     cosine = operand.values + (1 - ONE_SQUARED.values)
     if parameters.operand == "one_minus_cosine":
         cosine = 1 - operand.values
-    exact = reflect(parameters.model, np.maximum(cosine, -1), exponent) * 2.0**14
+    exact = parameters.model.reflect(np.maximum(cosine, -1), exponent) * 2.0**14
     assert not terms[exact < 0.99].any(), "a term goes on past the cutoff"
     assert terms[~dark & (exact > 1.01)].all(), "a term ends before the cutoff"
     np.testing.assert_array_equal(terms, parameters.compute(operand, dark, exponent).codes)
@@ -135,7 +138,7 @@ def test_term_follows_from_the_argument(prove, model, operand):
     So it never rises with the cosine, and where the operand is 1 - cos gamma it is that operand: what holds
     of the terms of every argument holds for both. A dark beat has the argument 0.
     """
-    reads_one_word(SpecularUnit(Specular(model, operand)), "argument")
+    reads_one_word(SpecularUnit(Specular(REFLECTION_MODELS[model], operand)), "argument")
     prove(of_specular(model, operand))
 
 
@@ -143,7 +146,7 @@ def test_term_follows_from_the_argument(prove, model, operand):
 @pytest.mark.parametrize("model", SPECULAR_MODELS + FURTHER_MODELS)
 def test_term_never_rises(model, operand):
     """Every argument; every exponent for the first model and 1 - cos gamma, `SOME` for the others."""
-    unit = SpecularUnit(Specular(model, operand))
+    unit = SpecularUnit(Specular(REFLECTION_MODELS[model], operand))
     is_first = (model, operand) == (SPECULAR_MODELS[0], "one_minus_cosine")
     for exponent in range(1, 1001) if is_first else SOME:
         check(unit, exponent)
@@ -213,6 +216,6 @@ def test_bugs_are_found(plant, bug, operand):
     """Planted in the unit, each breaks a claim."""
     text, change, claim = BUGS[bug]
     plant(SpecularUnit, "_describe", text, change)
-    unit = SpecularUnit(Specular("cosquad", operand))
+    unit = SpecularUnit(Specular(REFLECTION_MODELS["cosquad"], operand))
     with pytest.raises(AssertionError, match=f"^{claim}"):
         check(unit, 1000)

@@ -8,7 +8,7 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 import blysk.hdl.core.stream
-from blysk.hdl.core.stream import PipelinedUnit, connect_registered
+from blysk.hdl.core.stream import PipelinedUnit, connect_slice
 
 from .prover import Harness
 from .rules import answers, follows, stays, taken
@@ -28,10 +28,10 @@ class Delay(PipelinedUnit):
         stages = self.latency
         if self.initiation_interval > 1:
             # Read as late as the operand stands.
-            age = min(self.initiation_interval, self.latency - 1)
-            if age:
-                operands = self.register(m, operands, "late", when=self.at(age))
-            stages -= age + 1
+            stage = min(self.initiation_interval, self.latency - 1)
+            if stage:
+                operands = self.register(m, operands, "late", when=self.at(stage))
+            stages -= stage + 1
         for stage in range(stages):
             operands = self.register(m, operands, f"stage_{stage}")
         return operands
@@ -54,11 +54,11 @@ class Chain(wiring.Component):
 
 
 def registered(m, number, source, sink):
-    connect_registered(m, source, sink)
+    connect_slice(m, source, sink)
 
 
 def buffered(depth):
-    return lambda m, number, source, sink: blysk.hdl.core.stream.connect_buffered(
+    return lambda m, number, source, sink: blysk.hdl.core.stream.connect_fifo(
         m, f"buffer_{number}", source, sink, depth
     )
 
@@ -68,7 +68,7 @@ def equal(came, leaves):
 
 
 def of_stream(unit, capacity, latency, distance):
-    """What is claimed of every stream: a beat leaves in ``latency`` clocks, one is taken in ``distance``."""
+    """What is claimed of every stream: a beat leaves in ``latency`` cycles, one is taken in ``distance``."""
     h = Harness(unit)
     stays(h, unit.o)
     inside = follows(h, unit.i, unit.o, capacity, equal)
@@ -84,22 +84,22 @@ def of_delay(latency, interval):
     """The claims of a stream, and those of the turns."""
     unit = Delay(latency, interval)
     h = of_stream(unit, -(-latency // interval) + 1, latency - 1, interval)
-    m, ages, came = h.m, Signal(latency), Signal()
-    stands, turn = Signal(), Signal(range(interval))
+    m, stages, came = h.m, Signal(latency), Signal()
+    lifetime, turn = Signal(), Signal(range(interval))
     m.d.sync += [
-        stands.eq(unit.o.valid & ~unit.o.ready),
-        ages.eq(unit._ages),
+        lifetime.eq(unit.o.valid & ~unit.o.ready),
+        stages.eq(unit._stages),
         came.eq(taken(unit.i)),
     ]
     stood = Signal()
-    m.d.sync += stood.eq(stands)
-    h.claim(unit._ages == Mux(stood, ages, Cat(came, ages)[:latency]))
-    # Enabled clocks since the last beat was taken, modulo the interval.
+    m.d.sync += stood.eq(lifetime)
+    h.claim(unit._stages == Mux(stood, stages, Cat(came, stages)[:latency]))
+    # Enabled cycles since the last beat was taken, modulo the interval.
     with m.If(taken(unit.i)):
         m.d.sync += turn.eq(1 % interval)
-    with m.Elif(~stands):
+    with m.Elif(~lifetime):
         m.d.sync += turn.eq(Mux(turn == interval - 1, 0, turn + 1))
-    h.claim(~(taken(unit.i) & unit._ages[:-1].any()) | (turn == 0))
+    h.claim(~(taken(unit.i) & unit._stages[:-1].any()) | (turn == 0))
     return h
 
 
@@ -108,9 +108,9 @@ def test_pipelined_unit(prove, latency, interval):
     """Inductive: stable, in order, none lost or invented, capacity, no deadlock, turns.
 
     A unit holds a beat for each interval of its latency, and one that waits. While the output is ready, a
-    beat that is inside leaves ``latency`` clocks later at most, and one that is offered is taken after
-    ``initiation_interval`` clocks at most. All ages move on every clock but one after a clock on which a beat
-    was not taken; while a beat is inside, the next comes a whole multiple of the interval of such clocks on.
+    beat that is inside leaves ``latency`` cycles later at most, and one that is offered is taken after
+    ``initiation_interval`` cycles at most. All ages move on every clock but one after a clock on which a beat
+    was not taken; while a beat is inside, the next comes a whole multiple of the interval of such cycles on.
     """
     prove(of_delay(latency, interval))
 
@@ -128,7 +128,7 @@ def test_registers(prove, count):
 
 @pytest.mark.parametrize("depth", [3, 4, 6])
 def test_buffer(prove, depth):
-    """Inductive: the claims of a stream; ``depth`` beats inside, two clocks through."""
+    """Inductive: the claims of a stream; ``depth`` beats inside, two cycles through."""
     prove(of_stream(Chain(buffered(depth)), depth, 1, 1))
 
 
@@ -142,14 +142,14 @@ BUFFER_BUGS = {
 
 @pytest.mark.parametrize("bug", BUFFER_BUGS)
 def test_bugs_of_a_buffer_are_found(refute, plant, bug):
-    """Planted in `connect_buffered`, each refutes the claims of a stream."""
-    plant(blysk.hdl.core.stream, "connect_buffered", *BUFFER_BUGS[bug])
+    """Planted in `connect_fifo`, each refutes the claims of a stream."""
+    plant(blysk.hdl.core.stream, "connect_fifo", *BUFFER_BUGS[bug])
     refute(of_stream(Chain(buffered(3)), 3, 1, 1))
 
 
 def test_a_proof_of_too_few_clocks_is_found(prove):
-    """Nothing that waited leaves in 6 clocks of a unit of 4: what is lost then is not seen."""
-    with pytest.raises(AssertionError, match="nothing moves on in 6 clocks"):
+    """Nothing that waited leaves in 6 cycles of a unit of 4: what is lost then is not seen."""
+    with pytest.raises(AssertionError, match="nothing moves on in 6 cycles"):
         prove(of_stream(Delay(4), 5, 3, 1), 6)
 
 

@@ -15,7 +15,7 @@ from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import preset
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.arccos import ArccosUnit, HalfChordUnit
@@ -102,8 +102,8 @@ OTHERS = {
     "recurrence_interpolator": partial(RecurrenceInterpolatorUnit, RecurrenceInterpolator(), 1),
     "renormalise": partial(LinearInterpolatorUnit, LinearInterpolator(renormalised=True), 1),
     "pipeline": ShadingPipelineUnit,
-    "pipeline-compact": partial(ShadingPipelineUnit, ShadingPipeline(method="chord"), style="compact"),
-    "pipeline-gated": partial(ShadingPipelineUnit, ShadingPipeline(method="chord", gate=True)),
+    "pipeline-compact": partial(ShadingPipelineUnit, preset(method="chord"), style="compact"),
+    "pipeline-gated": partial(ShadingPipelineUnit, preset(method="chord", gate=True)),
 }
 UNITS = PIPELINED | OTHERS
 
@@ -133,7 +133,7 @@ def of_beats(unit):
     m.d.sync += waits.eq(unit.o.valid & ~unit.o.ready)
     with m.If(~waits):
         m.d.sync += places.eq(Cat(taken(unit.i), places))
-    h.claim(unit._ages == places)
+    h.claim(unit._stages == places)
     h.claim(unit.o.valid == (waits | places[-1]))
     h.claim(~(waits & taken(unit.i)))
     answers(h, unit.i.valid, unit.i.ready, unit.initiation_interval, unit.o.ready)
@@ -142,10 +142,10 @@ def of_beats(unit):
 
 @pytest.mark.parametrize("name", PIPELINED)
 def test_beats_of_a_pipelined_unit(prove, name):
-    """Inductive: each beat that comes leaves ``latency`` clocks after, not counting those on which it stands.
+    """Inductive: each beat that comes leaves ``latency`` cycles after, not counting those on which it stands.
 
     It stands on those alone that follow one on which a beat was not taken. So none is lost or invented, and
-    all leave in order. While the output is ready, one is taken in ``initiation_interval`` clocks.
+    all leave in order. While the output is ready, one is taken in ``initiation_interval`` cycles.
     """
     prove(of_beats(PIPELINED[name]()))
 
@@ -164,8 +164,8 @@ def of_counts(unit, latency):
 
 @pytest.mark.parametrize("name", COUNTED)
 def test_pixels_of_other_units(prove, name):
-    """In 8 clocks more than the latency: what leaves has come; as long as a pixel is to come and the output
-    is ready, one leaves in as many clocks as the latency."""
+    """In 8 cycles more than the latency: what leaves has come; as long as a pixel is to come and the output
+    is ready, one leaves in as many cycles as the latency."""
     unit = OTHERS[name]()
     prove(of_counts(unit, unit.latency), unit.latency + 8)
 

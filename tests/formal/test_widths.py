@@ -13,7 +13,7 @@ from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
-from blysk.golden.lighting.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
@@ -28,6 +28,7 @@ from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS, QuadraticE
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT, ONE_SQUARED
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.cosines.arccos import HalfChordUnit
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
 from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit
@@ -43,6 +44,7 @@ from blysk.hdl.normals.middle_normal import MiddleNormalUnit
 from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 from blysk.hdl.normals.renormaliser import RenormaliserUnit
 
+from ..lists import FURTHER_MODELS, SPECULAR_MODELS
 from .bounds import Bounds, cut_by, registers_of, unknown, word, wrapped_by
 
 pytestmark = [pytest.mark.prove, pytest.mark.usefixtures("wraps")]
@@ -54,8 +56,8 @@ def of_middle_normal(fit):
     MiddleNormal(fit).compute(word(COMPONENT, 1, 3), word(COMPONENT, 1, 3))
 
 
-def of_difference_setup(as_documented):
-    DifferenceSetup(as_documented).compute(word(GPQ.G_FORMAT, 1, 1), word(GPQ.P_FORMAT, 1, 1), LENGTHS)
+def of_difference_setup(as_published):
+    DifferenceSetup(as_published).compute(word(GPQ.G_FORMAT, 1, 1), word(GPQ.P_FORMAT, 1, 1), LENGTHS)
 
 
 def of_quadratic_evaluator(form):
@@ -119,7 +121,7 @@ def walk(unit, start, first, second, span, step):
         unit.difference_format.wrap(changes)
 
 
-def of_normals(as_documented, fits, format=DifferenceSetup.FORMAT):
+def of_normals(as_published, fits, format=DifferenceSetup.FORMAT):
     """Spans to 45 degrees, as of the middle normal's flag.
 
     By vectors of exactly unit length ``|N_r - N_l| = 2 sin(psi/2)``, ``|G| = 4 (1 - cos(psi/2))``, one across
@@ -137,7 +139,7 @@ def of_normals(as_documented, fits, format=DifferenceSetup.FORMAT):
     for lengths, span, step in parts_of_lengths():
         n, g_rows, p_rows = (rows(bounds, lengths) for bounds in (left, g, p))
         g_word, p_word = Fixed(GPQ.G_FORMAT, g_rows), Fixed(GPQ.P_FORMAT, p_rows)
-        differences = DifferenceSetup(as_documented).compute(g_word, p_word, lengths)
+        differences = DifferenceSetup(as_published).compute(g_word, p_word, lengths)
         walk(DifferenceAccumulator(format=format), Fixed(COMPONENT, n), *differences, span, step)
 
 
@@ -190,17 +192,17 @@ def of_chord_sums(name, fraction_bits, format=None):
         )
 
 
-def of_bisection(degree, max_angle, as_documented):
-    unit = Bisection(degree, max_angle, as_documented)
+def of_bisection(degree, max_angle, as_published):
+    unit = Bisection(degree, max_angle, as_published)
     unit.factor(Fixed(unit.ANGLE_FORMAT, np.arange(-2, unit.widest.codes + 1)))
 
 
-def of_bisection_chain(degree, max_angle, as_documented):
+def of_bisection_chain(degree, max_angle, as_published):
     """Every word of u up to the flag, through all levels: u alone decides the factors of each.
 
     Angles that a level gives to the bisection's factor are those of `of_bisection`.
     """
-    unit = BisectionChain(Bisection(degree, max_angle, as_documented))
+    unit = BisectionChain(Bisection(degree, max_angle, as_published))
     p, factor, levels = unit.bisection, unit.bisection.factor, (1 << unit.LEVEL_BITS) - 1
     # Of eight words one angle; from -2, as lengths may be over 1.
     u = np.arange(-2, p.widest.codes + 0.5, 1 / 8)
@@ -235,7 +237,7 @@ def of_half_chord():
 
 
 def of_specular_slopes(model):
-    assert len(Specular(model).slopes.codes) == 1 << Specular.EXPONENT_BITS
+    assert len(Specular(REFLECTION_MODELS[model]).slopes.codes) == 1 << Specular.EXPONENT_BITS
 
 
 def sectors(degrees, one, like):
@@ -397,7 +399,9 @@ def test_no_word_of_a_half_chord_wraps(wraps):
     assert wrapped_by(HalfChordUnit()) <= set(wraps)
 
 
-@pytest.mark.parametrize("model", [m for m in SPECULAR_MODELS + FURTHER_MODELS if Specular(m).slope_terms])
+@pytest.mark.parametrize(
+    "model", [m for m in SPECULAR_MODELS + FURTHER_MODELS if Specular(REFLECTION_MODELS[m]).slope_terms]
+)
 def test_slopes_of_the_specular_unit_do_not_wrap(wraps, model):
     """Every exponent; other models read a table."""
     of_specular_slopes(model)
@@ -472,10 +476,10 @@ def test_words_of_the_recurrence_wrap_in_the_format_of_its_state(parameters):
     assert wrapped_by(RecurrenceUnit(parameters)) == {parameters.state_format}
 
 
-@pytest.mark.parametrize(("as_documented", "fits"), [(False, MIDDLE_NORMAL_FITS), (True, ("exact",))])
-def test_sums_of_normals_do_not_wrap(as_documented, fits):
+@pytest.mark.parametrize(("as_published", "fits"), [(False, MIDDLE_NORMAL_FITS), (True, ("exact",))])
+def test_sums_of_normals_do_not_wrap(as_published, fits):
     """By bounds, for spans to 45 degrees: at every pixel of each length from 1 to 4095."""
-    of_normals(as_documented, fits)
+    of_normals(as_published, fits)
 
 
 def test_sums_of_straight_lines_do_not_wrap(wraps):

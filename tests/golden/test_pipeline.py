@@ -6,17 +6,20 @@ import pytest
 from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.lighting.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
-from blysk.golden.pipeline import METHODS, PRINTED, ShadingPipeline, Spans
+from blysk.golden.pipeline import Spans
+from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity, saturate
-from blysk.golden.reference.reflection import reflect, slope
+from blysk.golden.reference.reflection import REFLECTION_MODELS
+
+from ..lists import FURTHER_MODELS, SPECULAR_MODELS
 
 AMBIENT, DIFFUSE, SPECULAR = 0.1, 0.6, 0.5
 LARGEST_ANGLE = 20.0
@@ -37,7 +40,7 @@ def error_bounds(model, exponent):
     middle moves by ``1/cos(psi/2)`` of the ends' mean. The middle adds `MiddleNormal.ERROR` a component, the
     setup three relative steps of G and one of P, the accumulator half a step a component.
     """
-    k = slope(model, exponent)
+    k = REFLECTION_MODELS[model].slope(exponent)
     sine = np.sqrt(1 - max(1 - 1 / k, 0) ** 2)
     root = np.sqrt(3)
     half = np.radians(LARGEST_ANGLE) / 2
@@ -77,7 +80,7 @@ def sweep(rng, frames, count, model, exponent, normal_pairs):
     """Errors in LSB of the well-posed pixels, how many others there are, and how many pixels saturate."""
     errors, ill_posed, full = [], 0, 0
     band, _ = error_bounds(model, exponent)
-    design = ShadingPipeline(model=model)
+    design = preset(model=model)
     material = Material(*((value,) * 3 for value in (AMBIENT, DIFFUSE, SPECULAR)), exponent)
     for _ in range(frames):
         light, viewer = normalise(rng.normal(size=(2, 3)))
@@ -93,13 +96,13 @@ def sweep(rng, frames, count, model, exponent, normal_pairs):
         )
         zero = np.zeros(count, dtype=int)
         pixels = design.compute(Spans(zero, zero, length, quantise(left), quantise(right)), constants)
-        assert pixels.wide_spans == 0
+        assert pixels.out_of_range_spans == 0
         span = np.repeat(np.arange(count), length)
         step = np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)
         np.testing.assert_array_equal(pixels.x, step)
         t = step / np.maximum(length - 1, 1)[span]
         normals = interpolate("quadratic", left[span], right[span], t)
-        exact = intensity(normals, material, [Light(light)], (1, 1, 1), viewer, model)
+        exact = intensity(normals, material, [Light(light)], (1, 1, 1), viewer, REFLECTION_MODELS[model])
         error = np.abs(pixels.color - 255 * saturate(exact)).max(axis=1)
         # Where N.L may have either sign, light and highlight may be there or not.
         terminator = np.abs(normals @ light) <= band
@@ -187,7 +190,7 @@ def chord_bound(model, exponent):
     of the span outside of the cone where ``1 - cos gamma < 1/k``, in which a pixel is lit. Lengths are
     ONE / 2^17, so u comes out 2^-16 short.
     """
-    k, angle = slope(model, exponent), largest_span_angle(exponent)
+    k, angle = REFLECTION_MODELS[model].slope(exponent), largest_span_angle(exponent)
     outside = min(np.arccos(max(1 - 1 / k, -1)) + np.radians(angle), np.pi)
     sine = 1.0 if outside > np.pi / 2 else np.sin(outside)
     square = (2 * np.sqrt(3) * STEP) ** 2
@@ -233,13 +236,17 @@ def chord_errors(frame, model, exponent, reference, diffuse, specular):
         Intensity.color(np.full((1, 3), diffuse)),
         Intensity.color(np.full((1, 3), specular)),
     )
-    pixels = ShadingPipeline("chord", model).compute(spans, constants)
-    assert pixels.wide_spans == 0
+    pixels = preset("chord", model).compute(spans, constants)
+    assert pixels.out_of_range_spans == 0
     f, u = references[reference]
     # Where N.L may have either sign, light and highlight may be there or not.
     band = chord_cosine_bound(exponent) + (reference == NORMALISED) * DIFFUSE_FIT / 255
     well_posed = np.abs(f) > band
-    exact = AMBIENT + diffuse * np.maximum(f, 0) + specular * reflect(model, 1 - u, exponent) * (f > 0)
+    exact = (
+        AMBIENT
+        + diffuse * np.maximum(f, 0)
+        + specular * REFLECTION_MODELS[model].reflect(1 - u, exponent) * (f > 0)
+    )
     return np.abs(pixels.color[:, 0] - 255 * np.minimum(exact, 1))[well_posed], well_posed
 
 
@@ -338,7 +345,7 @@ def shade(left, right, length, constants, model="cosquad"):
     span = Spans(
         np.array([7]), np.array([9]), np.array([length]), quantise(left[None]), quantise(right[None])
     )
-    return ShadingPipeline(model=model, lights=len(constants.direction)).compute(span, constants)
+    return preset(model=model, lights=len(constants.direction)).compute(span, constants)
 
 
 def tilted(degrees):
@@ -421,38 +428,38 @@ def test_coefficients_over_one_saturate():
     assert channel[0] < 255
 
 
-@pytest.mark.parametrize(("angle", "wide"), [(0, 0), (1e-4, 0), (45, 0), (45.01, 1), (180, 1)])
-def test_wide_spans_are_counted(angle, wide):
-    assert shade(UP, tilted(angle), 5, constants_of([(UP, 0.5, 0.5)])).wide_spans == wide
+@pytest.mark.parametrize(("angle", "out_of_range"), [(0, 0), (1e-4, 0), (45, 0), (45.01, 1), (180, 1)])
+def test_wide_spans_are_counted(angle, out_of_range):
+    assert shade(UP, tilted(angle), 5, constants_of([(UP, 0.5, 0.5)])).out_of_range_spans == out_of_range
 
 
 def test_empty_spans_give_nothing():
     zero = np.zeros(2, dtype=int)
     spans = Spans(zero, zero, zero, quantise(np.array([UP, UP])), quantise(np.array([UP, UP])))
     assert len(spans) == 2
-    pixels = ShadingPipeline().compute(spans, constants_of([(UP, 0.5, 0.5)]))
+    pixels = preset().compute(spans, constants_of([(UP, 0.5, 0.5)]))
     assert pixels.color.shape == (0, 3)
 
 
 def test_bad_arguments_are_refused():
     with pytest.raises(ValueError, match=r"^method must be one of .*quadratic.*, not 'unknown'$"):
-        ShadingPipeline(method="unknown")
+        preset(method="unknown")
     with pytest.raises(ValueError, match=r"^model must be one of cosquad, .*, blinn, not 'phong'$"):
-        ShadingPipeline(model="phong")
+        preset(model="phong")
     with pytest.raises(ValueError, match=r"^operand must be 'cosine' or 'one_minus_cosine', not 'sine'$"):
-        ShadingPipeline(operand="sine")
+        preset(operand="sine")
     for method in ("angular", "chord"):
         with pytest.raises(ValueError, match=rf"^method {method} finds no normals, and gives 1 - cos gamma$"):
-            ShadingPipeline(method, operand="cosine")
+            preset(method, operand="cosine")
     with pytest.raises(ValueError, match=r"^lights must be 0 to 16, not -1$"):
-        ShadingPipeline(lights=-1)
+        preset(lights=-1)
     spans = Spans(*np.zeros((3, 1), dtype=int), np.array([[0, 0, ONE]]), np.array([[0, 0, 2**17]]))
     spans.length[:] = 2
     constants = constants_of([(UP, 0.5, 0.5)])
     with pytest.raises(ValueError, match=r"exceed SQ\(1, 17\)$"):
-        ShadingPipeline().compute(spans, constants)
+        preset().compute(spans, constants)
     with pytest.raises(ValueError, match=r"^the constants are for 1 lights, not 2$"):
-        ShadingPipeline(lights=2).compute(spans, constants)
+        preset(lights=2).compute(spans, constants)
 
 
 @pytest.mark.parametrize(
@@ -472,14 +479,14 @@ def test_bad_arguments_are_refused():
 )
 def test_parameters_that_no_pipeline_has(given, message):
     with pytest.raises(ValueError, match=f"^{message}$"):
-        ShadingPipeline(**given)
+        preset(**given)
 
 
 @pytest.mark.parametrize(
     ("given", "changed", "message"),
     [
         ({"materials": 2}, {}, "the constants are for 1 materials, not 2"),
-        ({"exponent": 30}, {}, "the exponent is 30 for good, not 20"),
+        ({"exponent": 30}, {}, "the exponent is fixed at 30, not 20"),
         ({}, {"material": -1}, "material must be 0 to 0"),
         ({}, {"material": 1}, "material must be 0 to 0"),
         ({}, {"x": 4096}, "x must be 0 to 4095"),
@@ -495,7 +502,7 @@ def test_spans_that_a_pipeline_does_not_take(given, changed, message):
     spans = Spans(**words, normal_left=normal, normal_right=normal)
     constants = constants_of([(UP, 0.5, 0.5)])
     with pytest.raises(ValueError, match=f"^{message}$"):
-        ShadingPipeline(**given).compute(spans, constants)
+        preset(**given).compute(spans, constants)
 
 
 def spans_near_a_highlight(rng, halfway, level, angle):
@@ -519,11 +526,11 @@ GATED = [(method, None) for method in METHODS if method != "chord-local"] + [
 def test_gated_spans_have_no_highlight(method, operand, model):
     """About the threshold of each exponent, where the gate has to let spans through that seem dark."""
     rng = np.random.default_rng(3)
-    design = ShadingPipeline(method, model, operand=operand)
+    design = preset(method, model, operand=operand)
     gate = design.highlight_gate
     suppressed = shaded = 0
     for exponent in (3, 20, 150, 1000):
-        last = design.highlight.last_lit_arguments[exponent] * 2.0**-25
+        last = design.specular.last_lit_arguments[exponent] * 2.0**-25
         for _ in range(2):
             halfway = quantise(normalise(rng.normal(size=3)))
             count = 400
@@ -538,9 +545,9 @@ def test_gated_spans_have_no_highlight(method, operand, model):
             lit = gate.compute(left, right, vector, exponent)
             vectors = Fixed(COMPONENT, halfway[np.newaxis])
             operands = design.interpolator.compute(left, right, length, vectors, vectors)
-            assert not (operands.wide & ~lit).any()
+            assert not (operands.out_of_range & ~lit).any()
             dark = np.zeros((len(operands.highlight.codes), 1), dtype=bool)
-            term = design.highlight.compute(operands.highlight, dark, exponent)
+            term = design.specular.compute(operands.highlight, dark, exponent)
             of_span = np.bincount(pixels_of(length)[0], weights=term.codes[:, 0])
             assert not of_span[~lit].any()
             suppressed += np.count_nonzero(~lit)
@@ -552,9 +559,9 @@ def test_gated_spans_have_no_highlight(method, operand, model):
 @pytest.mark.parametrize(
     ("printed", "method", "degrees", "factor"),
     [
-        ("bisection-printed", "bisection", 5.0, 10),
-        ("quadratic-printed", "quadratic", 40.0, 10),
-        ("angular-printed", "angular-corrected", 40.0, 2),
+        ("bisection-published", "bisection", 5.0, 10),
+        ("quadratic-published", "quadratic", 40.0, 10),
+        ("angular-published", "angular-corrected", 40.0, 2),
         ("angular-corrected", "angular", 5.0, 1000),
         ("recurrence-direct", "recurrence", 5.0, 10),
     ],
@@ -567,11 +574,11 @@ def test_what_the_documents_print_is_worse(printed, method, degrees, factor, nor
     length = np.full(300, 40)
     span, place = pixels_of(length)
     ends = (normalise(codes)[span] for codes in (left, right))
-    exact = ShadingPipeline(method).interpolator.exact_normals(*ends, place / 39)
+    exact = preset(method).interpolator.exact_normals(*ends, place / 39)
     exact = np.sum(exact * normalise(vector), axis=-1)
     worst = {}
     for name in (printed, method):
-        design = ShadingPipeline(name)
+        design = preset(name)
         words = [Fixed(COMPONENT, codes) for codes in (left, right)]
         vectors = Fixed(COMPONENT, vector)
         found = design.interpolator.compute(*words, length, vectors, vectors).cosine.values[:, 0]
@@ -580,7 +587,7 @@ def test_what_the_documents_print_is_worse(printed, method, degrees, factor, nor
 
 
 def test_printed_methods_serve_no_gate():
-    for name in PRINTED:
-        assert not ShadingPipeline(name).serves_gate
+    for name in PUBLISHED:
+        assert not preset(name).interpolator.serves_gate
         with pytest.raises(ValueError, match=f"^method {name} has no error bound for a gate$"):
-            ShadingPipeline(name, gate=True)
+            preset(name, gate=True)

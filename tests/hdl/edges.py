@@ -8,7 +8,7 @@ from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.number.fixed import UQ, Fixed
 from blysk.golden.number.unit_vector import ONE, quantise
-from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.geometry import normalise
 
 __all__ = ["SHADE", "constants_of", "highlight_edges", "spans_on_edges"]
@@ -23,13 +23,13 @@ def constants_of(code: np.ndarray, exponent: int) -> FrameConstants:
     return FrameConstants(exponent, nothing, code[np.newaxis], code[np.newaxis], 0 * specular, specular)
 
 
-def highlight_edges(design: ShadingPipeline, exponent: int) -> np.ndarray:
+def highlight_edges(design: Design, exponent: int) -> np.ndarray:
     """Codes of N.H, of 25 fraction bits, that are shown otherwise than those before them."""
     constants = constants_of(np.zeros(3, dtype=int), exponent)
     # The unit reads them to 2^-16 of what the exponent makes of them.
-    step = 1 << (9 - int(design.highlight.scale(np.array(exponent))[1]))
+    step = 1 << (9 - int(design.specular.scale(np.array(exponent))[1]))
     arguments = Fixed(UQ(1, 25), np.arange(0, (1 << 26) // max(exponent, 2), step)[:, np.newaxis])
-    terms = design.highlight.compute(arguments, np.zeros(arguments.shape, dtype=bool), exponent)
+    terms = design.specular.compute(arguments, np.zeros(arguments.shape, dtype=bool), exponent)
     colors = (constants.ambient, constants.diffuse, constants.specular)
     colors = (Fixed(Intensity.COLOR_FORMAT, codes) for codes in colors)
     shown = design.intensity.compute(*colors, Fixed(terms.format, 0 * terms.codes), terms)

@@ -28,5 +28,5 @@ def assert_equals_twin(
     beats, write = beats_of(unit, spans), constants.writes()
     run = simulate(unit, beats, count=len(pixels.x), write=write, engine="auto", **stalls)
     assert_pixels(run, pixels)
-    assert run.status["wide_spans"] == pixels.wide_spans
+    assert run.status["out_of_range_spans"] == pixels.out_of_range_spans
     return run

@@ -19,7 +19,8 @@ from blysk.golden.frame_constants import (
 )
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.number.unit_vector import ONE, quantise
-from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.pipeline import Spans
+from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.frame_constants import FrameConstantsUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -69,7 +70,7 @@ async def write(ctx, unit, address, data):
 
 @pytest.mark.parametrize("lights", [1, 3])
 def test_every_address_writes_its_constant_and_no_other(lights):
-    """All 512 addresses, in random order, twice: a word is seen two clocks later, every other one stays."""
+    """All 512 addresses, in random order, twice: a word is seen two cycles later, every other one stays."""
     rng = np.random.default_rng(lights)
     unit = FrameConstantsUnit(lights)
     words = words_of(unit.constants, lights)
@@ -98,7 +99,7 @@ def test_every_address_writes_its_constant_and_no_other(lights):
 def test_every_address_writes_its_materials_constant_and_no_other(lights):
     """All 512 addresses, and now and then another material, in random order.
 
-    A write is seen 3 clocks later where the word is of the material, and 2 where it is not; another
+    A write is seen 3 cycles later where the word is of the material, and 2 where it is not; another
     material's constants are seen 1 clock after its index is given.
     """
     rng = np.random.default_rng(10 + lights)
@@ -236,26 +237,26 @@ class Driver:
         self.reset = Signal()
         self.module.submodules.unit = ResetInserter(self.reset)(unit)
 
-    async def run(self, ctx, clocks, spans, writes, late=None, stalls=(False,)):
+    async def run(self, ctx, cycles, spans, writes, late=None, stalls=(False,)):
         """Writes, then spans; ``late = (clock, writes)`` offers more writes from that clock on.
 
-        Returns the pixels with their clocks, the clocks of spans taken, and those of writes taken.
+        Returns the pixels with their cycles, the cycles of spans taken, and those of writes taken.
         """
         unit = self.unit
         queue = list(zip(writes["address"].tolist(), writes["data"].tolist(), strict=True))
-        pixels, span_clocks, write_clocks = [], [], []
+        pixels, span_cycles, write_cycles = [], [], []
         total = len(queue)
-        for clock in range(clocks):
+        for clock in range(cycles):
             if late and clock == late[0]:
                 queue += zip(late[1]["address"].tolist(), late[1]["data"].tolist(), strict=True)
                 total = len(queue)
-            writing = len(write_clocks) < len(queue)
-            address, data = queue[len(write_clocks)] if writing else (511, 2**18 - 1)
+            writing = len(write_cycles) < len(queue)
+            address, data = queue[len(write_cycles)] if writing else (511, 2**18 - 1)
             ctx.set(unit.write.valid, writing)
             ctx.set(unit.write.payload, {"address": address, "data": data})
             # The first frame's writes come before its spans; a late one beside them.
-            offered = len(span_clocks) < len(spans) and (len(write_clocks) >= len(writes["address"]))
-            index = len(span_clocks)
+            offered = len(span_cycles) < len(spans) and (len(write_cycles) >= len(writes["address"]))
+            index = len(span_cycles)
             if offered:
                 ctx.set(
                     unit.i.payload,
@@ -274,14 +275,14 @@ class Driver:
             if ctx.get(unit.o.valid) and not stalled:
                 pixels.append((clock, tuple(ctx.get(unit.o.payload[name]) for name in self.PIXEL)))
             if writing and ctx.get(unit.write.ready):
-                write_clocks.append(clock)
+                write_cycles.append(clock)
             if offered and ctx.get(unit.i.ready):
-                span_clocks.append(clock)
+                span_cycles.append(clock)
             await ctx.tick()
         ctx.set(unit.write.valid, 0)
         ctx.set(unit.i.valid, 0)
-        assert len(write_clocks) == total or clocks < 200
-        return pixels, span_clocks, write_clocks
+        assert len(write_cycles) == total or cycles < 200
+        return pixels, span_cycles, write_cycles
 
 
 def pixels_of(design, spans, constants):
@@ -300,31 +301,31 @@ def test_constants_never_change_under_a_span(late_clock, materials, normal_pairs
     materials the second frame writes all, and the spans come in six runs of one.
     """
     rng = np.random.default_rng(late_clock)
-    design = ShadingPipeline(materials=materials)
+    design = preset(materials=materials)
     first, second = random_materials(rng, 1, materials), random_materials(rng, 1, materials)
     spans = random_spans(rng, rng.integers(1, 12, 60), normal_pairs)
     spans = replace(spans, material=np.arange(60) // 10 % materials)
-    clocks = 960 if materials == 1 else 1700
+    cycles = 960 if materials == 1 else 1700
     driver = Driver(ShadingPipelineUnit(design))
     result = []
 
     async def bench(ctx):
         stalls = (rng.random(31) < 0.3).tolist()
         result.append(
-            await driver.run(ctx, clocks, spans, writes_of(first), (late_clock, writes_of(second)), stalls)
+            await driver.run(ctx, cycles, spans, writes_of(first), (late_clock, writes_of(second)), stalls)
         )
 
     run_bench(driver.module, bench)
-    pixels, span_clocks, write_clocks = result[0]
-    late_writes = write_clocks[len(writes_of(first)["address"]) :]
-    before = sum(clock < late_writes[0] for clock in span_clocks)
-    assert 0 < before < len(spans) == len(span_clocks)
+    pixels, span_cycles, write_cycles = result[0]
+    late_writes = write_cycles[len(writes_of(first)["address"]) :]
+    before = sum(clock < late_writes[0] for clock in span_cycles)
+    assert 0 < before < len(spans) == len(span_cycles)
     expected = pixels_of(design, part(spans, 0, before), first)
     last_clock = pixels[len(expected) - 1][0]
     expected += pixels_of(design, part(spans, before, None), second)
     assert [pixel for _, pixel in pixels] == expected
     # No span comes between the offer of the writes and the last of them, and no write before the last pixel.
-    assert not any(late_clock <= clock <= late_writes[-1] for clock in span_clocks)
+    assert not any(late_clock <= clock <= late_writes[-1] for clock in span_cycles)
     assert late_writes[0] == last_clock + 1
     assert np.all(np.diff(late_writes) == 1)
 
@@ -333,17 +334,17 @@ def test_constants_never_change_under_a_span(late_clock, materials, normal_pairs
 def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, normal_pairs):
     """Spans in the setup, in the FIFOs and half shaded: after a reset the pipeline does as from power-up."""
     rng = np.random.default_rng(reset_at)
-    design = ShadingPipeline(materials=materials)
+    design = preset(materials=materials)
     spans = random_spans(rng, np.r_[40, rng.integers(0, 12, 11)], normal_pairs)
     spans = replace(spans, material=np.arange(12) // 4 % materials)
     constants = random_materials(rng, 1, materials)
     writes = writes_of(constants)
-    clocks = 330 if materials == 1 else 600
+    cycles = 330 if materials == 1 else 600
     stalls = (rng.random(31) < 0.2).tolist()
     fresh, again, status = [], [], []
 
     async def from_power_up(ctx):
-        fresh.append(await fresh_driver.run(ctx, clocks, spans, writes, stalls=stalls))
+        fresh.append(await fresh_driver.run(ctx, cycles, spans, writes, stalls=stalls))
 
     async def after_reset(ctx):
         other = random_spans(rng, rng.integers(0, 30, 40), normal_pairs)
@@ -353,9 +354,9 @@ def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, normal_pai
         ctx.set(driver.reset, 1)
         await ctx.tick()
         ctx.set(driver.reset, 0)
-        status.append([ctx.get(unit.status[n]) for n in ("wide_spans", "empty_spans", "overrun")])
+        status.append([ctx.get(unit.status[n]) for n in ("out_of_range_spans", "empty_spans", "overrun")])
         assert ctx.get(unit.o.valid) == 0
-        again.append(await driver.run(ctx, clocks, spans, writes, stalls=stalls))
+        again.append(await driver.run(ctx, cycles, spans, writes, stalls=stalls))
         status.append(ctx.get(unit.status.empty_spans))
 
     fresh_driver, driver = Driver(ShadingPipelineUnit(design)), Driver(ShadingPipelineUnit(design))
@@ -407,7 +408,7 @@ def test_pipeline_of_three_materials_equals_its_twin(method, normal_pairs):
     ``linear`` has the shortest way from a span to the constants that it needs.
     """
     rng = np.random.default_rng(33)
-    design = ShadingPipeline(method=method, lights=2, materials=3)
+    design = preset(method=method, lights=2, materials=3)
     unit = ShadingPipelineUnit(design)
     spans = random_spans(rng, rng.integers(0, 20, 150), normal_pairs)
     runs = np.repeat(np.arange(40), rng.integers(1, 9, 40))[:150]
@@ -416,9 +417,7 @@ def test_pipeline_of_three_materials_equals_its_twin(method, normal_pairs):
     pixels = design.compute(spans, constants)
     # The materials make a difference: each shaded alone, with one material's pipeline.
     for index in range(3):
-        alone = ShadingPipeline(method=method, lights=2).compute(
-            replace(spans, material=None), constants[index]
-        )
+        alone = preset(method=method, lights=2).compute(replace(spans, material=None), constants[index])
         own = np.repeat(spans.material, spans.length) == index
         np.testing.assert_array_equal(pixels.color[own], alone.color[own])
         assert (pixels.color[~own] != alone.color[~own]).any(axis=-1).mean() > 0.9
@@ -435,18 +434,18 @@ def test_pipeline_of_three_materials_equals_its_twin(method, normal_pairs):
         for engine in ("pysim", "auto")
     )
     assert_pixels(slow, pixels)
-    np.testing.assert_array_equal(slow.clocks, fast.clocks)
-    np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+    np.testing.assert_array_equal(slow.cycles, fast.cycles)
+    np.testing.assert_array_equal(slow.input_cycles, fast.input_cycles)
 
 
 def test_cost_of_a_material_change(normal_pairs):
-    """A span of another material is taken 5 clocks after the last pixel of the span before it has left.
+    """A span of another material is taken 5 cycles after the last pixel of the span before it has left.
 
-    Its first pixel comes `latency` clocks later, against 1 clock without the change. An empty span of yet
-    another material takes 5 clocks; one of the same takes 1.
+    Its first pixel comes `latency` cycles later, against 1 clock without the change. An empty span of yet
+    another material takes 5 cycles; one of the same takes 1.
     """
     rng = np.random.default_rng(34)
-    design = ShadingPipeline(method="linear", materials=3)
+    design = preset(method="linear", materials=3)
     unit = ShadingPipelineUnit(design)
     lengths = np.array([20, 20, 20, 20, 0, 20, 0, 20, 20, 0, 0, 20])
     material = np.array([0, 0, 1, 2, 2, 1, 2, 1, 0, 1, 2, 0])
@@ -467,18 +466,18 @@ def test_cost_of_a_material_change(normal_pairs):
         # Two empty spans of other materials before it.
         11: 5 + 5 + 5,
     }
-    for span, clocks in waits.items():
-        gone = run.clocks[first[span] - 1]
-        assert run.input_clocks[span] - gone == clocks, span
-        assert run.clocks[first[span]] - gone == clocks + unit.latency, span
-    assert run.clocks[first[1]] - run.clocks[first[1] - 1] == 1
+    for span, cycles in waits.items():
+        gone = run.cycles[first[span] - 1]
+        assert run.input_cycles[span] - gone == cycles, span
+        assert run.cycles[first[span]] - gone == cycles + unit.latency, span
+    assert run.cycles[first[1]] - run.cycles[first[1] - 1] == 1
 
 
 @pytest.mark.long
 def test_indices_of_no_material_change_nothing(normal_pairs):
     """Writes for a material past the last one are taken and lost: 3 words have indices of 2 bits."""
     rng = np.random.default_rng(35)
-    design = ShadingPipeline(method="linear", materials=3)
+    design = preset(method="linear", materials=3)
     unit = ShadingPipelineUnit(design)
     spans = random_spans(rng, rng.integers(1, 9, 12), normal_pairs)
     spans = replace(spans, material=np.arange(12) // 4)

@@ -14,18 +14,19 @@ from amaranth.sim import Simulator
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.lighting.specular import SPECULAR_MODELS
 from blysk.golden.methods.local_chord_interpolator import SpanValues
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, quantise
-from blysk.golden.pipeline import METHODS, MODELS, ShadingPipeline, Spans
+from blysk.golden.pipeline import STYLES, Build, Spans
+from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.pipeline import INTERPOLATORS, STYLES, ShadingPipelineUnit
+from blysk.hdl.pipeline import INTERPOLATORS, ShadingPipelineUnit
 from blysk.sim.engines.beats import dtype_of, pack, unpack
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import beats_of
 
+from ..lists import SPECULAR_MODELS
 from .pixels import assert_pixels
 
 FROM_NORMALS = [method for method in METHODS if method != "chord-local"]
@@ -71,7 +72,7 @@ def run_under_stalls(rng, unit, spans, constants, pixels):
         }
         results.append(run(unit, spans, constants, pixels, **stalls))
         assert_pixels(results[-1], pixels)
-        assert results[-1].status["wide_spans"] == pixels.wide_spans == 0
+        assert results[-1].status["out_of_range_spans"] == pixels.out_of_range_spans == 0
         assert results[-1].status["empty_spans"] == np.count_nonzero(spans.length == 0)
         assert not results[-1].status["overrun"]
     return results
@@ -92,7 +93,7 @@ def run_under_stalls(rng, unit, spans, constants, pixels):
 )
 def test_equals_twin_under_stalls(model, lights, normal_pairs):
     rng = np.random.default_rng(lights)
-    parameters = ShadingPipeline(model=model, lights=lights)
+    parameters = preset(model=model, lights=lights)
     unit = ShadingPipelineUnit(parameters)
     for exponent in (1, 30, 1000):
         spans = make_spans(rng, rng.integers(0, 60, 600), normal_pairs)
@@ -105,7 +106,7 @@ def test_equals_twin_under_stalls(model, lights, normal_pairs):
 @pytest.mark.long
 def test_sixteen_lights(normal_pairs):
     rng = np.random.default_rng(16)
-    parameters = ShadingPipeline(lights=16)
+    parameters = preset(lights=16)
     spans = make_spans(rng, rng.integers(1, 60, 100), normal_pairs)
     constants = make_constants(rng, 16, brightness=0.1)
     pixels = parameters.compute(spans, constants)
@@ -113,22 +114,22 @@ def test_sixteen_lights(normal_pairs):
 
 
 @pytest.mark.parametrize("lights", [1, pytest.param(3, marks=pytest.mark.long)])
-def test_clocks(lights, normal_pairs):
+def test_cycles(lights, normal_pairs):
     """One pixel a clock; a span costs its length or the setup interval, whichever is more, and no more.
 
     Spans that the buffer holds ready cost their length alone.
     """
     rng = np.random.default_rng(7)
     lengths = np.r_[rng.integers(1, 40, 500), np.full(50, 1), np.full(50, 7), [4095, 4095, 1, 1]]
-    parameters = ShadingPipeline(lights=lights)
+    parameters = preset(lights=lights)
     unit = ShadingPipelineUnit(parameters)
     spans = make_spans(rng, lengths, normal_pairs)
     constants = make_constants(rng, lights)
     pixels = parameters.compute(spans, constants)
     result = run(unit, spans, constants, pixels)
     starts = np.cumsum(lengths) - lengths
-    first_pixels = result.clocks[starts]
-    assert first_pixels[0] == result.input_clocks[0] + unit.latency
+    first_pixels = result.cycles[starts]
+    assert first_pixels[0] == result.input_cycles[0] + unit.latency
     assert unit.latency == 94 + math.ceil(math.log2(2 * lights + 1))
     assert unit.setup_interval == 4
     taken = np.diff(first_pixels)
@@ -138,18 +139,18 @@ def test_clocks(lights, normal_pairs):
     np.testing.assert_array_equal(taken[long_enough], lengths[:-1][long_enough])
     # In a long run of short spans each costs the setup interval.
     assert np.all(taken[510:548] == unit.setup_interval)
-    within = np.delete(np.diff(result.clocks), starts[1:] - 1)
+    within = np.delete(np.diff(result.cycles), starts[1:] - 1)
     assert np.all(within == 1)
 
 
 @pytest.mark.long
 def test_engines_agree(normal_pairs):
     rng = np.random.default_rng(8)
-    parameters = ShadingPipeline(model="cosquad_lin", lights=2)
+    parameters = preset(model="cosquad_lin", lights=2)
     spans = make_spans(rng, rng.integers(0, 12, 60), normal_pairs, largest_angle=90)
     constants = make_constants(rng, 2)
     pixels = parameters.compute(spans, constants)
-    assert pixels.wide_spans > 10
+    assert pixels.out_of_range_spans > 10
     stalls = {"input_stalls": rng.random(97) < 0.5, "output_stalls": rng.random(89) < 0.4}
     unit = ShadingPipelineUnit(parameters)
     slow, fast = (
@@ -157,28 +158,28 @@ def test_engines_agree(normal_pairs):
     )
     assert_pixels(slow, pixels)
     assert_pixels(fast, pixels)
-    np.testing.assert_array_equal(slow.clocks, fast.clocks)
-    np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+    np.testing.assert_array_equal(slow.cycles, fast.cycles)
+    np.testing.assert_array_equal(slow.input_cycles, fast.input_cycles)
     assert slow.status == fast.status
-    assert slow.status["wide_spans"] == pixels.wide_spans
+    assert slow.status["out_of_range_spans"] == pixels.out_of_range_spans
 
 
 def test_wide_spans_are_counted(normal_pairs):
     rng = np.random.default_rng(9)
-    parameters = ShadingPipeline()
-    for angle, wide in ((0.0, False), (44.99, False), (45.1, True), (90.0, True), (180.0, True)):
+    parameters = preset()
+    for angle, out_of_range in ((0.0, False), (44.99, False), (45.1, True), (90.0, True), (180.0, True)):
         left, right = normal_pairs(rng, 50, angle)
         spans = Spans(np.zeros(50, int), np.zeros(50, int), np.full(50, 9), quantise(left), quantise(right))
         constants = make_constants(rng, 1)
         pixels = parameters.compute(spans, constants)
         result = run(ShadingPipelineUnit(parameters), spans, constants, pixels)
         assert_pixels(result, pixels)
-        assert result.status["wide_spans"] == pixels.wide_spans == 50 * wide
+        assert result.status["out_of_range_spans"] == pixels.out_of_range_spans == 50 * out_of_range
 
 
 def test_span_past_the_last_column_is_flagged(normal_pairs):
     rng = np.random.default_rng(10)
-    parameters = ShadingPipeline()
+    parameters = preset()
     spans = make_spans(rng, [10, 10], normal_pairs)
     for x, flagged in ((4086, 0), (4087, 1)):
         spans.x[:] = x
@@ -241,26 +242,26 @@ def lit_constants(rng, spans, lights, exponent):
 @pytest.mark.parametrize(("method", "model", "lights", "operand"), DESIGNS)
 def test_every_method_equals_its_twin_under_stalls(method, model, lights, operand, normal_pairs):
     rng = np.random.default_rng(lights + len(method))
-    design = ShadingPipeline(method, model, lights, operand)
+    design = preset(method, model, lights, operand=operand)
     unit = ShadingPipelineUnit(design)
     spans = spans_of_every_kind(rng, design, 250, normal_pairs)
     constants = lit_constants(rng, spans, lights, 20)
     pixels = design.compute(spans, constants)
     assert len(np.unique(pixels.color)) > 100
-    clocks = run_under_stalls(rng, unit, spans, constants, pixels)
-    # The first span and the clocks of each, without stalls.
+    cycles = run_under_stalls(rng, unit, spans, constants, pixels)
+    # The first span and the cycles of each, without stalls.
     starts = np.cumsum(spans.length) - spans.length
     full = np.flatnonzero(spans.length)
-    first = clocks[0].clocks[starts[full]]
-    started = first[0] - clocks[0].input_clocks[full[0]]
+    first = cycles[0].cycles[starts[full]]
+    started = first[0] - cycles[0].input_cycles[full[0]]
     taken, length = np.diff(first), spans.length[full][:-1]
-    assert np.all(taken >= length * unit.clocks_per_pixel)
+    assert np.all(taken >= length * unit.cycles_per_pixel)
     if method == "bisection":
         # Spans that are divided take longer.
         assert started >= unit.latency
     else:
         assert started == unit.latency
-        assert np.all(taken <= np.maximum(length * unit.clocks_per_pixel, unit.setup_interval))
+        assert np.all(taken <= np.maximum(length * unit.cycles_per_pixel, unit.setup_interval))
 
 
 @pytest.mark.long
@@ -268,7 +269,7 @@ def test_every_method_equals_its_twin_under_stalls(method, model, lights, operan
 @pytest.mark.parametrize("method", FROM_NORMALS)
 def test_every_method_with_every_model(method, model, normal_pairs):
     rng = np.random.default_rng(MODELS.index(model))
-    design = ShadingPipeline(method, model)
+    design = preset(method, model)
     spans = spans_of_every_kind(rng, design, 24, normal_pairs)
     constants = lit_constants(rng, spans, 1, 5)
     pixels = design.compute(spans, constants)
@@ -296,10 +297,10 @@ def intervals():
 
 @pytest.mark.parametrize(("method", "interval"), list(intervals()))
 def test_setup_interval(method, interval, normal_pairs):
-    """The pixels do not depend on it; a span takes its pixels' clocks or the interval, and no more."""
+    """The pixels do not depend on it; a span takes its pixels' cycles or the interval, and no more."""
     rng = np.random.default_rng(interval)
-    design = ShadingPipeline(method)
-    unit = ShadingPipelineUnit(design, interval)
+    design = preset(method)
+    unit = ShadingPipelineUnit(design.built(setup_interval=interval))
     assert unit.setup_interval == interval
     lengths = np.r_[rng.integers(1, 12, 40), np.full(12, 1), 40, 1, 1]
     spans = make_spans(rng, lengths, normal_pairs, design.interpolator.MAX_ANGLE - 0.01)
@@ -307,8 +308,8 @@ def test_setup_interval(method, interval, normal_pairs):
     pixels = design.compute(spans, constants)
     result = run(unit, spans, constants, pixels, engine="pysim")
     assert_pixels(result, pixels)
-    first = result.clocks[np.cumsum(lengths) - lengths]
-    assert first[0] == result.input_clocks[0] + unit.latency
+    first = result.cycles[np.cumsum(lengths) - lengths]
+    assert first[0] == result.input_cycles[0] + unit.latency
     taken = np.diff(first)
     assert np.all(taken >= lengths[:-1])
     assert np.all(taken <= np.maximum(lengths[:-1], interval))
@@ -338,7 +339,7 @@ def test_intervals_that_there_are(never_built):
     )
     for method, allowed in methods_with_intervals().items():
         if 4 in allowed:
-            assert ShadingPipelineUnit(ShadingPipeline(method)).setup_interval == 4
+            assert ShadingPipelineUnit(preset(method)).setup_interval == 4
 
 
 def test_every_method_has_a_unit():
@@ -348,7 +349,7 @@ def test_every_method_has_a_unit():
 # Just within, and beyond, what each method takes. Linear normals of 45 degrees differ by less than 1 in every
 # component, of 120 degrees by 1.7 in length: by 1 in some.
 @pytest.mark.parametrize(
-    ("method", "narrow", "wide", "flagged"),
+    ("method", "narrow", "out_of_range", "flagged"),
     [
         ("linear", 45.0, 140.0, 20),
         ("renormalise", 45.0, 140.0, 20),
@@ -359,14 +360,14 @@ def test_every_method_has_a_unit():
         ("chord", 22.49, 22.52, 50),
     ],
 )
-def test_wide_spans_of_every_method_are_counted(method, narrow, wide, flagged, normal_pairs):
+def test_wide_spans_of_every_method_are_counted(method, narrow, out_of_range, flagged, normal_pairs):
     rng = np.random.default_rng(9)
-    design = ShadingPipeline(method)
+    design = preset(method)
     left, right = (
-        np.vstack(v) for v in zip(*(normal_pairs(rng, 50, a) for a in (narrow, wide)), strict=True)
+        np.vstack(v) for v in zip(*(normal_pairs(rng, 50, a) for a in (narrow, out_of_range)), strict=True)
     )
     left, right = quantise(left), quantise(right)
-    if wide == 180.0:
+    if out_of_range == 180.0:
         right[50:] = -left[50:]
     spans = Spans(np.zeros(100, int), np.zeros(100, int), rng.integers(1, 4, 100), left, right)
     constants = make_constants(rng, 1)
@@ -375,8 +376,8 @@ def test_wide_spans_of_every_method_are_counted(method, narrow, wide, flagged, n
     engine = "auto" if method in ("linear", "bisection", "chord") else "pysim"
     result = run(ShadingPipelineUnit(design), spans, constants, pixels, engine=engine)
     assert_pixels(result, pixels)
-    assert flagged <= pixels.wide_spans <= 50
-    assert result.status["wide_spans"] == pixels.wide_spans
+    assert flagged <= pixels.out_of_range_spans <= 50
+    assert result.status["out_of_range_spans"] == pixels.out_of_range_spans
 
 
 # How many spans, and the longest, for `test_every_bit_counts`.
@@ -486,7 +487,7 @@ def test_every_bit_counts(method, one_minus_cosines):
     the full light, and in a narrow highlight; and at the ends of the longest spans.
     """
     rng = np.random.default_rng(15)
-    design = ShadingPipeline(method)
+    design = preset(method)
     unit = ShadingPipelineUnit(design)
     widest = design.interpolator.MAX_ANGLE - 0.01
     light, halfway = normalise(rng.normal(size=(2, 3)))
@@ -532,7 +533,7 @@ def test_every_bit_counts(method, one_minus_cosines):
             output_stalls=rng.random(1009) < share,
         )
         assert_pixels(result, pixels)
-        assert result.status["wide_spans"] == pixels.wide_spans
+        assert result.status["out_of_range_spans"] == pixels.out_of_range_spans
 
 
 def test_halves_round_up():
@@ -542,7 +543,7 @@ def test_halves_round_up():
     (2^22 - 0 or 1 - 2^17 ambient - c d) / s modulo 2^23, where it is a colour.
     """
     rng = np.random.default_rng(22)
-    design = ShadingPipeline()
+    design = preset()
     unit = ShadingPipelineUnit(design)
     count = 8192
     for share in np.repeat([0.0, 0.5], 12):
@@ -555,7 +556,7 @@ def test_halves_round_up():
         flat = Spans(zero, zero, zero + 1, normal, normal)
         cosine, highlight, dark = operands_of(design, flat, constants)
         d = Diffuse(cosine.format).compute(cosine).codes
-        s = design.highlight.compute(highlight, dark, constants.exponent).codes
+        s = design.specular.compute(highlight, dark, constants.exponent).codes
         # The inverse of an odd number: each step doubles its bits, of which three are right at the start.
         inverse = s
         for _ in range(3):
@@ -582,7 +583,7 @@ def test_brightest_light_saturates(normal_pairs):
     The constants are written over others with all bits 1, and again over such with all bits 0.
     """
     rng = np.random.default_rng(16)
-    design = ShadingPipeline()
+    design = preset()
     spans = make_spans(rng, rng.integers(1, 30, 60), normal_pairs)
     constants = lit_constants(rng, spans, 1, 30)
     constants.direction[:] = constants.halfway
@@ -600,7 +601,7 @@ def test_brightest_light_saturates(normal_pairs):
 
 def test_counters_stop_at_their_largest_value(normal_pairs):
     rng = np.random.default_rng(17)
-    design = ShadingPipeline()
+    design = preset()
     kinds = make_spans(rng, [1, 0], normal_pairs, 0)
     kinds.normal_right[0] = -kinds.normal_left[0]
     spans = kinds[np.repeat([0, 1], (1 << 16) + 2)]
@@ -608,8 +609,8 @@ def test_counters_stop_at_their_largest_value(normal_pairs):
     pixels = design.compute(spans, constants)
     result = run(ShadingPipelineUnit(design), spans, constants, pixels)
     assert_pixels(result, pixels)
-    assert pixels.wide_spans == (1 << 16) + 2
-    assert result.status["wide_spans"] == result.status["empty_spans"] == 65535
+    assert pixels.out_of_range_spans == (1 << 16) + 2
+    assert result.status["out_of_range_spans"] == result.status["empty_spans"] == 65535
 
 
 def words(layout, beats):
@@ -642,10 +643,10 @@ class Driver:
         await context.tick()
         return taken, pixel
 
-    async def run(self, context, writes, spans, clocks=10**6, pixels=10**6):
-        """Writes, then spans, until so many clocks or pixels; the pixels and the clock of each."""
+    async def run(self, context, writes, spans, cycles=10**6, pixels=10**6):
+        """Writes, then spans, until so many cycles or pixels; the pixels and the clock of each."""
         writes, spans, found = list(writes), list(spans), []
-        for clock in range(clocks):
+        for clock in range(cycles):
             beats = {"write": writes[0] if writes else None, "i": spans[0] if spans else None}
             if writes:
                 beats["i"] = None
@@ -675,9 +676,9 @@ def assert_colors(beats, pixels):
 
 @pytest.mark.parametrize("method", FROM_NORMALS)
 def test_reset_in_mid_span(method, normal_pairs):
-    """After a reset with spans inside: the pixels and clocks are those from power-up."""
+    """After a reset with spans inside: the pixels and cycles are those from power-up."""
     rng = np.random.default_rng(12)
-    design = ShadingPipeline(method)
+    design = preset(method)
     unit = ShadingPipelineUnit(design)
     driver = Driver(unit)
     spans = make_spans(rng, [5, 1, 9, 3], normal_pairs, 20)
@@ -691,14 +692,14 @@ def test_reset_in_mid_span(method, normal_pairs):
     async def bench(context):
         for before in (0, len(writes) + 3, len(writes) + unit.latency // 2, len(writes) + unit.latency + 40):
             if before:
-                await driver.run(context, writes, other_codes, clocks=before)
+                await driver.run(context, writes, other_codes, cycles=before)
                 context.set(driver.reset, 1)
                 await driver.clock(context, {"write": None, "i": None})
                 context.set(driver.reset, 0)
                 assert not context.get(unit.o.valid)
             runs.append(await driver.run(context, writes, codes, pixels=len(pixels.x)))
             # Nothing comes after the last pixel; the pipeline is empty for the next round.
-            assert not await driver.run(context, [], [], clocks=unit.latency + 10)
+            assert not await driver.run(context, [], [], cycles=unit.latency + 10)
             context.set(driver.reset, 1)
             await driver.clock(context, {"write": None, "i": None})
             context.set(driver.reset, 0)
@@ -713,7 +714,7 @@ def test_reset_in_mid_span(method, normal_pairs):
 def test_constants_never_change_under_a_span(method, normal_pairs):
     """Writes that wait while spans go by: each span has the constants of before, or all of the new ones."""
     rng = np.random.default_rng(13)
-    design = ShadingPipeline(method)
+    design = preset(method)
     unit = ShadingPipelineUnit(design)
     driver = Driver(unit)
     before, after = (make_spans(rng, rng.integers(1, 20, 8), normal_pairs, 20) for _ in range(2))
@@ -726,7 +727,7 @@ def test_constants_never_change_under_a_span(method, normal_pairs):
     found = []
 
     async def bench(context):
-        await driver.run(context, writes[0], [], clocks=len(writes[0]) + 5)
+        await driver.run(context, writes[0], [], cycles=len(writes[0]) + 5)
         waiting, late, spans = list(codes[0]), list(writes[1]), list(codes[1])
         out = 0
         while len(found) < sum(len(pixels.x) for pixels in expected):
@@ -766,12 +767,12 @@ def test_constants_never_change_under_a_span(method, normal_pairs):
 def test_refuses_a_setup_interval(method, interval, choice, never_built):
     text = f"setup_interval of {method} must be {choice}, not {interval}"
     with pytest.raises(ValueError, match=f"^{text}$"):
-        ShadingPipelineUnit(ShadingPipeline(method), interval)
+        ShadingPipelineUnit(preset(method, setup_interval=interval))
 
 
 @pytest.mark.parametrize("method", ["bisection", "quadratic-eval", "quadratic-horner"])
 def test_method_without_a_choice_of_interval(method, never_built):
-    assert ShadingPipelineUnit(ShadingPipeline(method)).setup_interval > 4
+    assert ShadingPipelineUnit(preset(method)).setup_interval > 4
     assert len(methods_with_intervals()[method]) == 0
 
 
@@ -786,11 +787,11 @@ def test_method_without_a_choice_of_interval(method, never_built):
 )
 def test_compact_style_equals_twin_under_stalls(method, model, lights, normal_pairs):
     rng = np.random.default_rng(lights)
-    design = ShadingPipeline(method, model, lights)
+    design = preset(method, model, lights)
     spans = make_spans(rng, rng.integers(0, 24, 40), normal_pairs, 20.0)
     constants = make_constants(rng, lights)
     pixels = design.compute(spans, constants)
-    unit = ShadingPipelineUnit(design, style="compact")
+    unit = ShadingPipelineUnit(design.built(style="compact"))
     for share in (0, 0.4):
         stalls = {"input_stalls": rng.random(97) < share, "output_stalls": rng.random(89) < share}
         assert_pixels(run(unit, spans, constants, pixels, **stalls), pixels)
@@ -798,19 +799,19 @@ def test_compact_style_equals_twin_under_stalls(method, model, lights, normal_pa
 
 @pytest.mark.long
 def test_compact_style_takes_three_clocks_a_term(normal_pairs):
-    """Highlights cost clocks, and what has none does not."""
+    """Highlights cost cycles, and what has none does not."""
     rng = np.random.default_rng(1)
-    design = ShadingPipeline("chord")
+    design = preset("chord")
     spans = make_spans(rng, np.full(30, 60), normal_pairs, 20.0)
     constants = make_constants(rng, 1, exponent=3)
     cosine, highlight, dark = operands_of(design, spans, constants)
-    specular = design.highlight.compute(highlight, dark, constants.exponent)
-    clocks = Intensity().clocks(Diffuse(cosine.format).compute(cosine), specular)
-    assert set(clocks.tolist()) == {3, 6}
-    unit = ShadingPipelineUnit(design, style="compact")
+    specular = design.specular.compute(highlight, dark, constants.exponent)
+    cycles = Intensity().cycles(Diffuse(cosine.format).compute(cosine), specular)
+    assert set(cycles.tolist()) == {3, 6}
+    unit = ShadingPipelineUnit(design.built(style="compact"))
     found = run(unit, spans, constants, design.compute(spans, constants))
-    np.testing.assert_array_equal(np.diff(found.clocks), clocks[1:])
-    assert unit.clocks_per_pixel == 6
+    np.testing.assert_array_equal(np.diff(found.cycles), cycles[1:])
+    assert unit.cycles_per_pixel == 6
     assert cost_of(unit).multiplier_count == 3
 
 
@@ -819,8 +820,8 @@ def test_compact_style_takes_three_clocks_a_term(normal_pairs):
 def test_spans_with_values(lights, style, materials):
     """The local chord method: its spans carry values of each light, and no normals."""
     rng = np.random.default_rng(lights)
-    design = ShadingPipeline("chord-local", lights=lights, materials=materials)
-    unit = ShadingPipelineUnit(design, style=style)
+    design = preset("chord-local", lights=lights, materials=materials)
+    unit = ShadingPipelineUnit(design.built(style=style))
     lengths = np.r_[0, 1, 2, 3, 16, rng.integers(1, 40, 150)]
     count = len(lengths)
     start, step = rng.uniform(0.41, 0.6, (2, count, lights, 1)), rng.uniform(-0.2, 0.2, (2, count, lights, 1))
@@ -834,7 +835,7 @@ def test_spans_with_values(lights, style, materials):
     constants = [make_constants(rng, lights, exponent) for exponent in (20, 3, 100)[:materials]]
     pixels = design.compute(spans, constants)
     assert len(np.unique(pixels.color)) > 100
-    assert pixels.wide_spans == 0
+    assert pixels.out_of_range_spans == 0
     beats = {name: getattr(spans, name) for name in unit.i.payload.shape().members}
     beats["values"] = np.zeros((count, lights), dtype_of(unit.i.payload.shape()["values"].shape).base)
     for name in ("diffuse", "highlight"):
@@ -846,9 +847,9 @@ def test_spans_with_values(lights, style, materials):
         result = simulate(unit, beats, count=len(pixels.x), write=write, engine="auto", **stalls)
         assert_pixels(result, pixels)
         if not share and style == "throughput":
-            assert result.clocks[0] == result.input_clocks[1] + unit.latency
+            assert result.cycles[0] == result.input_cycles[1] + unit.latency
     with pytest.raises(ValueError, match=r"^method chord-local has no normals for a gate$"):
-        ShadingPipeline("chord-local", gate=True)
+        preset("chord-local", gate=True)
     with pytest.raises(
         ValueError, match=rf"^method chord-local takes spans with values for {lights} lights$"
     ):
@@ -872,9 +873,9 @@ GATED = [
 def test_gate_changes_no_pixel(method, model, lights, operand, style, normal_pairs):
     """The twin without a gate says what the pixels are."""
     rng = np.random.default_rng(lights + len(method))
-    design = ShadingPipeline(method, model, lights, operand)
+    design = preset(method, model, lights, operand=operand)
     gated = replace(design, gate=True)
-    unit = ShadingPipelineUnit(gated, style=style)
+    unit = ShadingPipelineUnit(gated.built(style=style))
     spans = spans_of_every_kind(rng, design, 250, normal_pairs)
     for exponent in (2, 50, 1000):
         constants = lit_constants(rng, spans, lights, exponent)
@@ -886,7 +887,7 @@ def test_gate_changes_no_pixel(method, model, lights, operand, style, normal_pai
             result = run(unit, spans, constants, pixels, **stalls)
             assert_pixels(result, pixels)
             if style == "throughput" and method != "bisection" and not share:
-                assert result.clocks[0] == result.input_clocks[0] + unit.latency
+                assert result.cycles[0] == result.input_cycles[0] + unit.latency
 
 
 @pytest.mark.long
@@ -897,48 +898,48 @@ def test_gate_changes_no_pixel(method, model, lights, operand, style, normal_pai
 def test_gate_costs_no_clock(method, interval, normal_pairs):
     """Decisions come in time for spans of every length, however many single pixels are on the way."""
     rng = np.random.default_rng(interval)
-    design = ShadingPipeline(method, gate=True)
-    unit = ShadingPipelineUnit(design, interval)
+    design = preset(method, gate=True)
+    unit = ShadingPipelineUnit(design.built(setup_interval=interval))
     lengths = np.r_[rng.integers(1, 40, 200), np.full(150, 1), np.full(60, 5)]
     spans = make_spans(rng, lengths, normal_pairs, 20.0)
     constants = lit_constants(rng, spans, 1, 20)
     pixels = design.compute(spans, constants)
     result = run(unit, spans, constants, pixels)
     assert_pixels(result, pixels)
-    first = result.clocks[np.cumsum(lengths) - lengths]
+    first = result.cycles[np.cumsum(lengths) - lengths]
     assert np.all(np.diff(first) <= np.maximum(lengths[:-1], interval))
 
 
 @pytest.mark.long
-def test_gate_spares_the_compact_style_clocks(normal_pairs):
-    """A power takes 42 clocks a pixel, but for pixels behind the light and in spans without a highlight."""
+def test_gate_spares_the_compact_style_cycles(normal_pairs):
+    """A power takes 42 cycles a pixel, but for pixels behind the light and in spans without a highlight."""
     rng = np.random.default_rng(3)
-    design = ShadingPipeline("chord", "blinn")
+    design = preset("chord", "blinn")
     spans = make_spans(rng, np.full(30, 40), normal_pairs, 20.0)
     constants = make_constants(rng, 1, exponent=300)
     constants.halfway[:] = spans.normal_left[:1]
     constants.direction[:] = constants.halfway
     behind = operands_of(design, spans, constants)[2][:, 0]
     pixels = design.compute(spans, constants)
-    clocks = []
+    cycles = []
     for gate in (False, True):
         gated = replace(design, gate=gate)
-        found = run(ShadingPipelineUnit(gated, style="compact"), spans, constants, pixels)
+        found = run(ShadingPipelineUnit(gated.built(style="compact")), spans, constants, pixels)
         assert_pixels(found, pixels)
         dark = behind | ~np.repeat(gated.lit_spans(spans, constants)[:, 0], 40) if gate else behind
-        # Few pixels wait beside the power unit, so that dark ones take their three clocks between powers.
+        # Few pixels wait beside the power unit, so that dark ones take their three cycles between powers.
         expected = np.where(dark, 3, 42).sum()
-        assert expected * 0.95 <= found.total_clocks <= expected * 1.05
-        clocks.append(found.total_clocks)
-    assert clocks[1] < clocks[0] / 3
+        assert expected * 0.95 <= found.total_cycles <= expected * 1.05
+        cycles.append(found.total_cycles)
+    assert cycles[1] < cycles[0] / 3
 
 
 LEFT_OUT = {
-    "specular": {"model": None},
-    "exponent": {"exponent": 20},
+    "specular": {"specular": None},
+    "exponent": {"build": Build(exponent=20)},
     "channels": {"grey": True},
     "widths": {"x_bits": 9, "y_bits": 8, "length_bits": 5},
-    "all": {"model": None, "grey": True, "x_bits": 9, "y_bits": 8, "length_bits": 5},
+    "all": {"specular": None, "grey": True, "x_bits": 9, "y_bits": 8, "length_bits": 5},
 }
 
 
@@ -956,8 +957,8 @@ LEFT_OUT = {
 def test_less_hardware_shades_the_same(what, style, normal_pairs):
     """A scene that does not need a part has the pixels of the full pipeline without it, and it costs less."""
     rng = np.random.default_rng(5)
-    full = ShadingPipeline("chord", lights=2, gate=True)
-    design = replace(full, gate=full.gate and "model" not in LEFT_OUT[what], **LEFT_OUT[what])
+    full = preset("chord", lights=2, gate=True)
+    design = replace(full, gate=full.gate and "specular" not in LEFT_OUT[what], **LEFT_OUT[what])
     spans = make_spans(rng, rng.integers(0, 32, 60), normal_pairs, 20.0)
     spans.x[:] = rng.integers(0, 480, 60)
     spans.y[:] = rng.integers(0, 256, 60)
@@ -969,11 +970,11 @@ def test_less_hardware_shades_the_same(what, style, normal_pairs):
             colors[...] = colors[..., :1]
     pixels = full.compute(spans, constants)
     assert len(np.unique(pixels.color)) > 50
-    unit = ShadingPipelineUnit(design, style=style)
+    unit = ShadingPipelineUnit(design.built(style=style))
     stalls = {"input_stalls": rng.random(97) < 0.3, "output_stalls": rng.random(89) < 0.3}
     assert_pixels(run(unit, spans, constants, pixels, **stalls), pixels)
     assert_pixels(run(unit, spans, constants, pixels), pixels)
-    less, more = (cost_of(ShadingPipelineUnit(each, style=style)) for each in (design, full))
+    less, more = (cost_of(ShadingPipelineUnit(each.built(style=style))) for each in (design, full))
     assert less.register_bits < more.register_bits
     assert less.multiplier_count <= more.multiplier_count
     if what in ("specular", "exponent", "channels") and style == "throughput":
@@ -983,7 +984,7 @@ def test_less_hardware_shades_the_same(what, style, normal_pairs):
 @pytest.mark.parametrize("materials", [1, 3])
 def test_without_lights_there_is_ambient_light(materials, normal_pairs, never_built):
     rng = np.random.default_rng(1)
-    design = ShadingPipeline(lights=0, materials=materials)
+    design = preset(lights=0, materials=materials)
     unit = ShadingPipelineUnit(design)
     spans = make_spans(rng, rng.integers(0, 20, 50), normal_pairs)
     spans.material[:] = np.sort(rng.integers(0, materials, 50))
@@ -1007,16 +1008,16 @@ def test_without_lights_there_is_ambient_light(materials, normal_pairs, never_bu
     cost = cost_of(unit)
     assert cost.multiplier_count == 0
     with pytest.raises(ValueError, match=r"^without lights there is no setup, and no setup_interval$"):
-        ShadingPipelineUnit(design, 4)
+        ShadingPipelineUnit(design.built(setup_interval=4))
 
 
 @pytest.mark.parametrize(("method", "lights"), [("quadratic", 1), ("renormalise", 2)])
 def test_products_with_normals_share_multipliers_in_the_compact_style(method, lights, never_built):
-    full, compact = (ShadingPipelineUnit(ShadingPipeline(method, lights=lights), style=s) for s in STYLES)
+    full, compact = (ShadingPipelineUnit(preset(method, lights=lights, style=s)) for s in STYLES)
     counts = [cost_of(unit._interpolator._products).multiplier_count for unit in (full, compact)]
     assert counts == [6 * lights, 2 * lights]
 
 
 def test_unknown_style(never_built):
     with pytest.raises(ValueError, match=r"^style must be one of throughput, compact, not 'small'$"):
-        ShadingPipelineUnit(style="small")
+        preset(style="small")

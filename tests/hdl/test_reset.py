@@ -25,7 +25,7 @@ UNITS = {
     "angular_setup_by_arccos": lambda: AngularSetupUnit(AngularSetup("arccos"), 4),
     "highlight_cosine": HighlightCosineUnit,
     "highlight_gate": HighlightGateUnit,
-    "highlight_gate_every_4_clocks": lambda: HighlightGateUnit(initiation_interval=4),
+    "highlight_gate_every_4_cycles": lambda: HighlightGateUnit(initiation_interval=4),
     "recurrence": RecurrenceUnit,
     "recurrence_direct": lambda: RecurrenceUnit(Recurrence("direct")),
     "recurrence_interleaved": lambda: RecurrenceUnit(Recurrence(interleave=4)),
@@ -65,10 +65,10 @@ class Driver:
         self.simulator = Simulator(ResetInserter(self.reset)(unit))
         self.simulator.add_clock(1e-6)
 
-    async def run(self, context, codes, clocks, stalls):
+    async def run(self, context, codes, cycles, stalls):
         """Clock and payload of every beat taken from the output."""
         unit, found, sent = self.unit, [], 0
-        for clock in range(clocks):
+        for clock in range(cycles):
             context.set(unit.o.ready, not stalls[clock % len(stalls)])
             context.set(unit.i.valid, sent < len(codes))
             if sent < len(codes):
@@ -89,7 +89,7 @@ def test_reset_in_mid_span_leaves_nothing_behind(name):
     codes, others = random_beats(rng, shape, 6), random_beats(rng, shape, 200)
     stalls = (rng.random(31) < 0.3).tolist()
     latency = getattr(unit, "latency", 100)
-    clocks = {"adaptive_normaliser": 900}.get(name, 3 * latency + 250)
+    cycles = {"adaptive_normaliser": 900}.get(name, 3 * latency + 250)
     runs = {}
 
     async def bench(context):
@@ -108,7 +108,7 @@ def test_reset_in_mid_span_leaves_nothing_behind(name):
             await context.tick()
             context.set(driver.reset, 0)
             assert not context.get(unit.o.valid)
-            runs[reset_at] = await driver.run(context, codes, clocks, stalls)
+            runs[reset_at] = await driver.run(context, codes, cycles, stalls)
 
     driver = Driver(unit)
     driver.simulator.add_testbench(bench)

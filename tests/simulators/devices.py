@@ -19,7 +19,7 @@ from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.power import Power
-from blysk.golden.lighting.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
@@ -34,8 +34,9 @@ from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED, quantise
-from blysk.golden.pipeline import METHODS
+from blysk.golden.presets import METHODS
 from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.arccos import ArccosUnit, HalfChordUnit
 from blysk.hdl.cosines.chord import ChordUnit
@@ -62,6 +63,8 @@ from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 from blysk.hdl.normals.renormaliser import RenormaliserUnit
 from blysk.hdl.pipeline import INTERPOLATORS
 from blysk.sim.engines.beats import dtype_of
+
+from ..lists import FURTHER_MODELS, SPECULAR_MODELS
 
 __all__ = ["DEVICES", "Case"]
 
@@ -137,9 +140,11 @@ def _middle_normal(rng, count, fit, interval):
     twin = MiddleNormal(fit)
     left, right = _normals(rng, count)
     beats = {"normal_left": left, "normal_right": right}
-    middle, wide = twin.compute(*_fixed(left, right))
+    middle, out_of_range = twin.compute(*_fixed(left, right))
     return Case(
-        MiddleNormalUnit(twin, interval), beats, {**beats, "normal_middle": middle.codes, "wide": wide}
+        MiddleNormalUnit(twin, interval),
+        beats,
+        {**beats, "normal_middle": middle.codes, "out_of_range": out_of_range},
     )
 
 
@@ -189,35 +194,35 @@ def _quadratic_evaluator(rng, count, form):
 
 def _bisection(rng, count, twin):
     left, right = _normals(rng, count)
-    middle, u, wide = twin.compute(*_fixed(left, right))
+    middle, u, out_of_range = twin.compute(*_fixed(left, right))
     return Case(
         BisectionUnit(twin),
         {"normal_a": left, "normal_b": right},
-        {"normal_middle": middle.codes, "one_minus_cosine": u.codes, "wide": wide},
+        {"normal_middle": middle.codes, "one_minus_cosine": u.codes, "out_of_range": out_of_range},
     )
 
 
 def _bisection_chain(rng, count):
     left, right = _normals(rng, count)
-    # Most are short, as a level takes 17 clocks.
+    # Most are short, as a level takes 17 cycles.
     level = 1 + (rng.zipf(2, count) - 1) % ((1 << BisectionChain.LEVEL_BITS) - 1)
-    normal, wide = BisectionChain().compute(*_fixed(left, right), level)
+    normal, out_of_range = BisectionChain().compute(*_fixed(left, right), level)
     return Case(
         BisectionChainUnit(),
         {"normal_left": left, "normal_right": right, "level": level},
-        {"normal": normal.codes, "wide": wide},
+        {"normal": normal.codes, "out_of_range": out_of_range},
     )
 
 
 def _adaptive_normaliser(rng, count):
     length = _lengths(rng, count)
     left, right = _normals(rng, len(length))
-    normal, wide, _ = AdaptiveNormaliser().compute(*_fixed(left, right), length)
+    normal, out_of_range, _ = AdaptiveNormaliser().compute(*_fixed(left, right), length)
     span, pixel = pixels_of(length)
     return Case(
         AdaptiveNormaliserUnit(),
         {"normal_left": left, "normal_right": right, "length": length},
-        {"normal": normal.codes, "wide": wide[span], "last": pixel == length[span] - 1},
+        {"normal": normal.codes, "out_of_range": out_of_range[span], "last": pixel == length[span] - 1},
     )
 
 
@@ -259,12 +264,12 @@ def _highlight_cosine(rng, count, interpolated):
 
 def _angular_setup(rng, count, twin):
     (left, right), vector, length = _normals(rng, count), _vectors(rng, count), _any_lengths(rng, count)
-    angle, phase, step, cos_beta, wide = twin.compute(*_fixed(left, right, vector), length)
+    angle, phase, step, cos_beta, out_of_range = twin.compute(*_fixed(left, right, vector), length)
     words = {"angle": angle, "phase": phase, "step": step, "cos_beta": cos_beta}
     return Case(
         AngularSetupUnit(twin),
         {"normal_left": left, "normal_right": right, "vector": vector, "length": length},
-        {name: word.codes for name, word in words.items()} | {"length": length, "wide": wide},
+        {name: word.codes for name, word in words.items()} | {"length": length, "out_of_range": out_of_range},
     )
 
 
@@ -361,13 +366,13 @@ def _constants(unit, direction, halfway) -> np.ndarray:
     return constants
 
 
-def _differences(unit, words, length, wide) -> np.ndarray:
+def _differences(unit, words, length, out_of_range) -> np.ndarray:
     """Output beats of a setup of differences."""
     expected = np.zeros(len(length), dtype_of(unit.o.payload.shape()))
     for name, differences in zip(("diffuse", "highlight"), words, strict=True):
         for field in ("start", "first", "second"):
             expected["lights"][name][field] = getattr(differences, field).codes
-    expected["length"], expected["wide"] = length, wide
+    expected["length"], expected["out_of_range"] = length, out_of_range
     return expected
 
 
@@ -375,11 +380,11 @@ def _chord_setup(rng, count, interval):
     unit = ChordSetupUnit(_LIGHTS, interval)
     (left, right), length = _normals(rng, count), _any_lengths(rng, count)
     vectors = [_vectors(rng, _LIGHTS) for _ in range(2)]
-    *words, wide = ChordSetup().compute(*_fixed(left, right, *vectors), length)
+    *words, out_of_range = ChordSetup().compute(*_fixed(left, right, *vectors), length)
     return Case(
         unit,
         {"normal_left": left, "normal_right": right, "length": length},
-        _differences(unit, words, length, wide),
+        _differences(unit, words, length, out_of_range),
         _constants(unit, *vectors),
     )
 
@@ -391,11 +396,13 @@ def _recurrence_setup(rng, count):
     expected = np.zeros(count, dtype_of(unit.o.payload.shape()))
     for name, of_lights in zip(("diffuse", "highlight"), vectors, strict=True):
         for light, vector in enumerate(of_lights):
-            first, second, coefficient, shift, wide = twin.compute(*_fixed(left, right, vector), length)
+            first, second, coefficient, shift, out_of_range = twin.compute(
+                *_fixed(left, right, vector), length
+            )
             expected["lights"][name]["first"][:, light] = first.codes
             expected["lights"][name]["second"][:, light] = second.codes
     expected["coefficient"], expected["shift"] = coefficient.codes, shift
-    expected["length"], expected["wide"] = length, wide
+    expected["length"], expected["out_of_range"] = length, out_of_range
     beats = {"normal_left": left, "normal_right": right, "length": length}
     return Case(unit, beats, expected, _constants(unit, *vectors))
 
@@ -422,8 +429,8 @@ def _local_chord_setup(rng, count):
     unit, twin = LocalChordSetupUnit(_LIGHTS), LocalChordSetup()
     values, length = _values(rng, count), _any_lengths(rng, count)
     formats = twin.DIFFUSE_FORMAT, twin.HIGHLIGHT_FORMAT
-    *words, wide = twin.compute(*map(Fixed, formats, values), length)
-    return Case(unit, _value_beats(unit, values, length), _differences(unit, words, length, wide))
+    *words, out_of_range = twin.compute(*map(Fixed, formats, values), length)
+    return Case(unit, _value_beats(unit, values, length), _differences(unit, words, length, out_of_range))
 
 
 def _operands(unit, operands) -> np.ndarray:
@@ -457,7 +464,7 @@ DEVICES: dict[str, Callable[[np.random.Generator, int], Case]] = {
     "middle_normal, interval 1": partial(_middle_normal, fit="minimax_3", interval=1),
     "gpq": _gpq,
     "difference_setup": partial(_difference_setup, twin=DifferenceSetup(), interval=7),
-    "difference_setup, documented": partial(_difference_setup, twin=DifferenceSetup(True), interval=1),
+    "difference_setup, as published": partial(_difference_setup, twin=DifferenceSetup(True), interval=1),
     "difference_accumulator": _difference_accumulator,
     "quadratic_evaluator": partial(_quadratic_evaluator, form="direct"),
     "quadratic_evaluator, horner": partial(_quadratic_evaluator, form="horner"),
@@ -478,16 +485,18 @@ DEVICES: dict[str, Callable[[np.random.Generator, int], Case]] = {
     "recurrence, interleaved": partial(_recurrence, twin=Recurrence(interleave=4)),
     "diffuse": _diffuse,
     **{
-        f"specular, {model}": partial(_specular, twin=Specular(model), unit=SpecularUnit)
+        f"specular, {model}": partial(_specular, twin=Specular(REFLECTION_MODELS[model]), unit=SpecularUnit)
         for model in SPECULAR_MODELS + FURTHER_MODELS
     },
-    "specular, documented": partial(
-        _specular, twin=Specular("cosquad", as_documented=True), unit=SpecularUnit
+    "specular, as published": partial(
+        _specular, twin=Specular(REFLECTION_MODELS["cosquad"], as_published=True), unit=SpecularUnit
     ),
     "specular, interval 2": partial(
         _specular, twin=Specular(), unit=partial(SpecularUnit, initiation_interval=2)
     ),
-    "specular, of a chord": partial(_specular, twin=Specular("lyon3", "one_minus_cosine"), unit=SpecularUnit),
+    "specular, of a chord": partial(
+        _specular, twin=Specular(REFLECTION_MODELS["lyon3"], "one_minus_cosine"), unit=SpecularUnit
+    ),
     "power": partial(_specular, twin=Power(), unit=PowerUnit),
     "power, sequential": partial(_specular, twin=Power(), unit=partial(PowerUnit, form="sequential")),
     "light": _light,

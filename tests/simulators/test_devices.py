@@ -25,7 +25,7 @@ FEWER = 100_000
 
 @pytest.fixture
 def check(tmp_path):
-    """Hold a device's Verilog against its twin; what was run, and the clocks found."""
+    """Hold a device's Verilog against its twin; what was run, and the cycles found."""
 
     def check(name, simulator, beats, **options):
         if missing_tool(simulator):
@@ -36,7 +36,7 @@ def check(tmp_path):
         bench = VerilogBench(case.unit, tmp_path, **options)
         found = bench.run(simulator, case.beats, beats, constants=case.constants, **stalls)
         assert_beats(found.beats, case.expected)
-        return case, stalls, found.clocks
+        return case, stalls, found.cycles
 
     return check
 
@@ -44,12 +44,12 @@ def check(tmp_path):
 @pytest.mark.parametrize("simulator", ["icarus", pytest.param("verilator", marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", QUICK)
 def test_device(check, name, simulator):
-    """On the clocks of the compiled engine, too."""
-    case, stalls, clocks = check(name, simulator, QUICK_BEATS)
+    """On the cycles of the compiled engine, too."""
+    case, stalls, cycles = check(name, simulator, QUICK_BEATS)
     run = simulate(
         case.unit, case.beats, count=QUICK_BEATS, constants=case.constants, engine="auto", **stalls
     )
-    np.testing.assert_array_equal(clocks, run.clocks)
+    np.testing.assert_array_equal(cycles, run.cycles)
 
 
 @pytest.mark.long

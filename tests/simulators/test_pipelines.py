@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from blysk.golden.frame_constants import writes_of
-from blysk.golden.pipeline import METHODS, ShadingPipeline
+from blysk.golden.presets import METHODS, preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats, teapot_frame
@@ -15,18 +15,18 @@ from blysk.sim.frames.testbench import pixel_beats, teapot_frame
 from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool
 
 PIPELINES = {
-    **{method: (ShadingPipeline(method), "throughput") for method in METHODS},
-    "compact": (ShadingPipeline("chord"), "compact"),
-    "compact, normals and a power": (ShadingPipeline("linear", "blinn"), "compact"),
-    "gate": (ShadingPipeline("chord", "exp", gate=True), "throughput"),
-    "gate, compact": (ShadingPipeline("quadratic", "lyon3", gate=True), "compact"),
+    **{method: (preset(method), "throughput") for method in METHODS},
+    "compact": (preset("chord"), "compact"),
+    "compact, normals and a power": (preset("linear", "blinn"), "compact"),
+    "gate": (preset("chord", "exp", gate=True), "throughput"),
+    "gate, compact": (preset("quadratic", "lyon3", gate=True), "compact"),
     "lights and materials": (
-        ShadingPipeline("quadratic", "cosquad_lin", lights=3, materials=4, operand="one_minus_cosine"),
+        preset("quadratic", "cosquad_lin", lights=3, materials=4, operand="one_minus_cosine"),
         "throughput",
     ),
-    "exponent": (ShadingPipeline("chord", "coscos4", lights=2, exponent=60), "throughput"),
-    "grey": (ShadingPipeline("chord", None, grey=True), "throughput"),
-    "without lights": (ShadingPipeline(lights=0, materials=2), "throughput"),
+    "exponent": (preset("chord", "coscos4", lights=2, exponent=60), "throughput"),
+    "grey": (preset("chord", None, grey=True), "throughput"),
+    "without lights": (preset(lights=0, materials=2), "throughput"),
 }
 QUICK = ("chord",)
 FRAME = (640, 480), 10_000
@@ -42,7 +42,7 @@ def check(tmp_path):
             pytest.skip(missing_tool(simulator))
         design, style = PIPELINES[name]
         spans, constants, pixels = teapot_frame(design, *size)
-        unit = ShadingPipelineUnit(design, style=style)
+        unit = ShadingPipelineUnit(design.built(style=style))
         rng = np.random.default_rng(2026)
         found = VerilogBench(unit, tmp_path, **options).run(
             simulator,
@@ -54,7 +54,10 @@ def check(tmp_path):
         )
         assert_beats(found.beats, pixel_beats(pixels))
         assert len(np.unique(pixels.color)) > 10 * min(design.lights, 1)
-        assert (found.status["wide_spans"], found.status["empty_spans"]) == (pixels.wide_spans, 1)
+        assert (found.status["out_of_range_spans"], found.status["empty_spans"]) == (
+            pixels.out_of_range_spans,
+            1,
+        )
 
     return check
 

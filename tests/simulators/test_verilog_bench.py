@@ -122,7 +122,7 @@ def test_beats_clocks_and_status_are_those_of_the_engine(simulator, tmp_path):
         expected = simulate(component, beats, count=400, engine="pysim", **others, **stalls)
         found = bench.run(simulator, beats, 400, **others, **stalls)
         np.testing.assert_array_equal(found.beats, expected.beats)
-        np.testing.assert_array_equal(found.clocks, expected.clocks)
+        np.testing.assert_array_equal(found.cycles, expected.cycles)
         assert found.status == expected.status
         assert found.status["taken"] == 400
 
@@ -145,7 +145,7 @@ def test_breaks_of_the_rules_end_a_run(tmp_path, plant, says):
         pytest.skip(missing_tool("icarus"))
     bench = VerilogBench(Register(), tmp_path, register(**plant))
     with pytest.raises(BenchError, match=rf"^{says} at clock \d+, output beat \d+ of 100$"):
-        bench.run("icarus", np.arange(100), 100, patience=500, **pauses(1))
+        bench.run("icarus", np.arange(100), 100, idle_timeout=500, **pauses(1))
 
 
 def test_the_register_itself_is_right(tmp_path):

@@ -1,7 +1,7 @@
 """The emitted Verilog in simulators that are not ours: one bench, in plain Verilog, which both run.
 
 The bench does on every clock what `engine` says: the writes first, then the beats; either side pauses by
-its pattern; every bit of a payload is 1 while there is none. So beats and their clocks are comparable. It
+its pattern; every bit of a payload is 1 while there is none. So beats and their cycles are comparable. It
 begins with a clock of reset; clock 0 is the one after.
 """
 
@@ -35,7 +35,7 @@ _PAUSES = 1024
 _BENCH = """\
 module bench (input clk);
   integer writes, inputs, outputs, constants, done;
-  integer count, patience, settle, input_period, output_period;
+  integer count, idle_timeout, settle, input_period, output_period;
   integer clock, last;
   reg input_stalls [0:{pauses} - 1], output_stalls [0:{pauses} - 1];
   reg rst, write_valid, i_valid, o_ready, held, written;
@@ -57,7 +57,7 @@ module bench (input clk);
     $readmemb("input_stalls.bin", input_stalls);
     $readmemb("output_stalls.bin", output_stalls);
     done = $value$plusargs("count=%d", count);
-    done = $value$plusargs("patience=%d", patience);
+    done = $value$plusargs("idle_timeout=%d", idle_timeout);
     done = $value$plusargs("settle=%d", settle);
     done = $value$plusargs("input_period=%d", input_period);
     done = $value$plusargs("output_period=%d", output_period);
@@ -98,7 +98,7 @@ module bench (input clk);
       end
       if (i_valid && i_ready || write_valid && write_ready) last = clock;
       if (clock - last > settle && count == 0 && $feof(inputs) && !i_valid) finish("complete");
-      else if (clock - last > patience) finish("stuck");
+      else if (clock - last > idle_timeout) finish("stuck");
     end
     held <= clock >= 0 && o_valid && !o_ready;
     held_word <= o_word;
@@ -163,7 +163,7 @@ class Found:
     """What came out of a simulation; the fields are those of `Run`."""
 
     beats: np.ndarray
-    clocks: np.ndarray
+    cycles: np.ndarray
     status: np.generic | None
 
 
@@ -212,7 +212,7 @@ class VerilogBench:
         write: np.ndarray | Mapping | None = None,
         input_stalls: np.ndarray | None = None,
         output_stalls: np.ndarray | None = None,
-        patience: int = 10_000,
+        idle_timeout: int = 10_000,
         settle: int = 64,
     ) -> Found:
         """Drive a stimulus, as `simulate` does, in one of `SIMULATORS`.
@@ -221,10 +221,10 @@ class VerilogBench:
         ------
         BenchError
             If an output is undefined, changes or is withdrawn while it waits, or comes when none is due; if
-            nothing moves for ``patience`` clocks; if a simulator fails.
+            nothing moves for ``idle_timeout`` cycles; if a simulator fails.
         """
         shapes, folder = self.shapes, self._folder
-        numbers = {"count": count, "patience": patience, "settle": settle}
+        numbers = {"count": count, "idle_timeout": idle_timeout, "settle": settle}
         for name, stalls in (("input", input_stalls), ("output", output_stalls)):
             stalls = np.zeros(1, dtype=bool) if stalls is None else stalls
             numbers[f"{name}_period"] = len(stalls)
@@ -244,7 +244,7 @@ class VerilogBench:
         if ended is None:
             raise BenchError(f"{simulator} did not end the bench: {printed.strip()[-500:]}")
         reason, clock, status = ended.groups()
-        clocks, words = _beats((folder / "output.hex").read_bytes(), shapes.o)
+        cycles, words = _beats((folder / "output.hex").read_bytes(), shapes.o)
         if reason != "complete":
             raise BenchError(f"{reason} at clock {clock}, output beat {len(words)} of {count}")
         counted = None
@@ -254,7 +254,7 @@ class VerilogBench:
         # A million beats are 50 MB, which a folder of tests would keep.
         for path in folder.glob("*.hex"):
             path.unlink()
-        return Found(unpack(shapes.o, words), clocks, counted)
+        return Found(unpack(shapes.o, words), cycles, counted)
 
 
 def assert_beats(found: np.ndarray, expected: np.ndarray | Mapping, path: str = "beat") -> None:

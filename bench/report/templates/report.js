@@ -141,9 +141,9 @@
   byId("mesh-label").hidden = meshes.length < 2;
   byId("mesh-label").style.display = meshes.length < 2 ? "none" : "";
   if (exponents.includes(100)) controls.exponent.value = 100;
-  // Nanoseconds tell designs apart that take the same clocks, where there are any.
+  // Nanoseconds tell designs apart that take the same cycles, where there are any.
   const having = (key) => points.filter((point) => point.times[key] !== null).length;
-  if (having("ns_per_pixel") && 2 * having("ns_per_pixel") > having("clocks_per_pixel")) {
+  if (having("ns_per_pixel") && 2 * having("ns_per_pixel") > having("cycles_per_pixel")) {
     controls.time.value = "ns_per_pixel";
   }
 

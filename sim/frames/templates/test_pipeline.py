@@ -107,7 +107,7 @@ class Sink:
         return self.taken == len(self.expected)
 
 
-async def clocks(dut, parts, count=None):
+async def cycles(dut, parts, count=None):
     """Clock so many times, or until every part is done."""
     idle = clock = 0
     while clock != count and not (count is None and all(part.done for part in parts)):
@@ -117,19 +117,19 @@ async def clocks(dut, parts, count=None):
         await ReadOnly()
         moved = [part.observe() for part in parts]
         idle, clock = 0 if any(moved) else idle + 1, clock + 1
-        assert idle < PATIENCE or count is not None, f"stuck: nothing moved for {PATIENCE} clocks"
+        assert idle < PATIENCE or count is not None, f"stuck: nothing moved for {PATIENCE} cycles"
     return clock
 
 
 @cocotb.test()
 @cocotb.parametrize(pauses=[(0.0, 0.0), (0.4, 0.4), (0.8, 0.1), (0.1, 0.8)])
 async def every_pixel(dut, pauses):
-    """Constants, then spans in and pixels out; sources and the sink pause for these parts of the clocks."""
+    """Constants, then spans in and pixels out; sources and the sink pause for these parts of the cycles."""
     for port in ("i_valid", "write_valid", "o_ready"):
         getattr(dut, port).value = 0
     dut.rst.value = 1
     Clock(dut.clk, 10, unit="ns").start(start_high=False)
-    await clocks(dut, [], 2)
+    await cycles(dut, [], 2)
     await FallingEdge(dut.clk)
     dut.rst.value = 0
 
@@ -137,10 +137,10 @@ async def every_pixel(dut, pauses):
     writes = Source(dut, "write", read("writes"), of_sources)
     spans = Source(dut, "i", read("spans"), of_sources, after=writes)
     sink = Sink(dut, read("pixels"), of_sink)
-    taken = await clocks(dut, [writes, spans, sink])
-    await clocks(dut, [sink], SETTLE)
+    taken = await cycles(dut, [writes, spans, sink])
+    await cycles(dut, [sink], SETTLE)
     await FallingEdge(dut.clk)
     for port, code in read("status")[0].items():
         found = sample(dut, [port])[port]
         assert found == code, f"{port} is {found}, expected {code}"
-    dut._log.info("%d pixels as expected, in %d clocks", sink.taken, taken)
+    dut._log.info("%d pixels as expected, in %d cycles", sink.taken, taken)

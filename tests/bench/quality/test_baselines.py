@@ -11,7 +11,7 @@ from blysk.bench.quality.baselines import (
     ENTRIES,
     TOLERANCE,
     UPDATE,
-    clocks_of,
+    cycles_of,
     differences,
     main,
     measure,
@@ -19,10 +19,11 @@ from blysk.bench.quality.baselines import (
 )
 from blysk.bench.tools.blocks import BLOCKS
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import METHODS, MODELS, ShadingPipeline
+from blysk.golden.pipeline import STYLES
+from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.normals.dot_product import DotProductUnit
-from blysk.hdl.pipeline import STYLES, ShadingPipelineUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.errors import InputError
 from blysk.sim.frames.frame import prepare
@@ -70,7 +71,7 @@ def test_entries_are_every_block_method_model_and_style():
 def test_figures_are_positive_numbers():
     assert {figure for figures in BASELINES.values() for figure in figures} == {
         *("cells", "multipliers", "register_bits", "memory_bits"),
-        *("teapot_clocks", "square_clocks"),
+        *("teapot_cycles", "square_cycles"),
     }
     for name, figures in BASELINES.items():
         assert all(type(value) is int and value >= 0 for value in figures.values())
@@ -91,10 +92,10 @@ def test_parts_are_those_of_the_cost():
 
 def test_clocks_are_those_of_the_pixels():
     """The simulation by hand, to the last pixel; at least a clock a pixel."""
-    design = ShadingPipeline("linear")
-    clocks = clocks_of(design)
+    design = preset("linear")
+    cycles = cycles_of(design)
     scenes = baselines._scenes()
-    assert set(clocks) == {f"{name}_clocks" for name in scenes}
+    assert set(cycles) == {f"{name}_cycles" for name in scenes}
     for name, scene in scenes.items():
         spans, constants = prepare(scene, design).spans, FrameConstants.of(scene)
         fields = {
@@ -104,11 +105,11 @@ def test_clocks_are_those_of_the_pixels():
         run = simulate(
             ShadingPipelineUnit(design), fields, count=count, write=constants.writes(), engine="pysim"
         )
-        assert clocks[f"{name}_clocks"] == run.clocks[-1] + 1 >= count
+        assert cycles[f"{name}_cycles"] == run.cycles[-1] + 1 >= count
 
 
 def test_frames_have_short_spans_and_long_ones():
-    spans = {name: prepare(scene, ShadingPipeline()).spans for name, scene in baselines._scenes().items()}
+    spans = {name: prepare(scene, preset()).spans for name, scene in baselines._scenes().items()}
     assert np.median(spans["teapot"].length) < 4
     assert spans["square"].length.max() >= 16
 

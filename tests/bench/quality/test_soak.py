@@ -14,7 +14,8 @@ from blysk.bench.quality.soak import (
     tasks,
 )
 from blysk.golden.number.unit_vector import ONE
-from blysk.golden.pipeline import METHODS, ShadingPipeline
+from blysk.golden.pipeline import Design
+from blysk.golden.presets import METHODS
 from blysk.sim.engines.engine import SimulationError
 
 DESIGN = {"method": "chord", "model": "cosquad", "gate": False, "seed": 1, "part": 0, "rival": None}
@@ -44,23 +45,23 @@ def test_parts_make_the_whole():
     work = tasks(10**9, 5, None)
     assert sum(task.settings["pixels"] for task in work) >= 10**9
     assert len({task.settings["part"] for task in work}) == len(work)
-    rows = table(work, [{"pixels": 2, "clocks": 3}] * len(work))
+    rows = table(work, [{"pixels": 2, "cycles": 3}] * len(work))
     assert len(rows) == len(DESIGNS) + 1
-    assert rows[-1] == {"design": "all", "pixels": 2 * len(work), "clocks": 3 * len(work)}
+    assert rows[-1] == {"design": "all", "pixels": 2 * len(work), "cycles": 3 * len(work)}
 
 
 def test_beats_are_counted_and_a_wrong_one_stops_the_run(monkeypatch):
     found = measure(pixels=3000, **DESIGN)
     assert 3000 <= found["pixels"] < 3000 + 4096
-    assert found["clocks"] >= found["pixels"]
-    compute = ShadingPipeline.compute
+    assert found["cycles"] >= found["pixels"]
+    compute = Design.compute
 
     def wrong(design, spans, constants):
         pixels = compute(design, spans, constants)
         pixels.color[77, 2] ^= 1
         return pixels
 
-    monkeypatch.setattr(ShadingPipeline, "compute", wrong)
+    monkeypatch.setattr(Design, "compute", wrong)
     with pytest.raises(
         SimulationError, match=r"^cxxrtl: chord, cosquad, part 0 of seed 1, .*: beat 77: b is"
     ):

@@ -12,9 +12,10 @@ from blysk.bench.quality import sweep
 from blysk.bench.quality.sweep import EXPONENTS, FEW_EXPONENTS, LARGEST, Frame, Point, main, summarise
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.number.unit_vector import quantise
-from blysk.golden.pipeline import MODELS, ShadingPipeline
+from blysk.golden.presets import MODELS, preset
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_spans
 from blysk.sim.frames.frame import prepare
 from blysk.sim.meshes.mesh import load_mesh
@@ -33,7 +34,9 @@ def test_exponents():
 def test_reference_is_the_renderer(model, exponent):
     """Worked out once a mesh, the exact frame is that which the golden renderer draws from the spans."""
     frame = Frame(teapot(1000), 96, 72)
-    image = shade_spans(frame.scene_of(exponent), frame.raster, "normalised", model).reshape(-1, 3)
+    image = shade_spans(
+        frame.scene_of(exponent), frame.raster, "normalised", REFLECTION_MODELS[model]
+    ).reshape(-1, 3)
     shown = frame.raster.pixel[frame.raster.visible]
     assert len(shown) == frame.pixels > 1500
     np.testing.assert_allclose(frame.golden(model, exponent), 255 * image[shown], rtol=0, atol=1e-9)
@@ -42,7 +45,7 @@ def test_reference_is_the_renderer(model, exponent):
 @pytest.mark.parametrize("method", ["chord", "chord-local", "quadratic"])
 def test_spans_are_those_of_a_frame(method):
     """The raster is kept; the rest is as for a frame by itself."""
-    frame, design = Frame(load_mesh(STRESS).mesh, 64, 48), ShadingPipeline(method)
+    frame, design = Frame(load_mesh(STRESS).mesh, 64, 48), preset(method)
     for exponent in (3, 700):
         cut, spans = frame.spans_of(design, exponent)
         expected = prepare(frame.scene_of(exponent), design)
@@ -56,7 +59,7 @@ def test_spans_are_those_of_a_frame(method):
 def test_errors_are_those_of_the_simulated_frame():
     mesh = teapot(500)
     frame = Frame(mesh, 64, 48)
-    for exponent, _, result in accuracy.measure(mesh, ShadingPipeline("chord"), (2, 300), 64, 48):
+    for exponent, _, result in accuracy.measure(mesh, preset("chord"), (2, 300), 64, 48):
         (point,) = frame.points(exponent, ["cosquad"])
         assert point.max_lsb == pytest.approx(result.method_error.max_lsb, abs=1e-9)
         assert (point.model, point.exponent, point.over) == ("cosquad", exponent, 0)

@@ -6,7 +6,7 @@ import pytest
 from blysk.bench.report.energy import BLOCKS, EXPONENTS, by_block, measure, section, tasks
 from blysk.bench.report.gate import MODELS
 from blysk.bench.report.section import Drawing, Table
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.toggles import ToggleCounter
 
@@ -16,7 +16,7 @@ def test_every_register_is_in_a_block(model):
     """Of the real pipeline, with a gate and without; the gate's are those that it has more."""
     found = {}
     for gate in (False, True):
-        unit = ToggleCounter(ShadingPipelineUnit(ShadingPipeline("chord", model, gate=gate)))
+        unit = ToggleCounter(ShadingPipelineUnit(preset("chord", model, gate=gate)))
         found[gate] = by_block(dict.fromkeys(unit.status.shape().members, 1))
         assert set(found[gate]) == set(BLOCKS)
         assert all(count or (block == "highlight gate" and not gate) for block, count in found[gate].items())
@@ -49,7 +49,7 @@ def test_counts_of_a_small_frame():
     """The pixels are the twin's, and every block has something to do."""
     [found] = measure("cosquad", True, [50], [20, 15, 64], "pysim")
     assert found["same"]
-    assert 20 < found["spans"] <= found["pixels"] < found["clocks"]
+    assert 20 < found["spans"] <= found["pixels"] < found["cycles"]
     assert all(by_block(found["toggles"]).values())
 
 
@@ -67,7 +67,7 @@ def test_the_gate_spares_the_specular_unit():
 
 
 def frame(same=True, **toggles):
-    return {"spans": 10, "pixels": 20, "clocks": 40, "toggles": toggles, "same": same}
+    return {"spans": 10, "pixels": 20, "cycles": 40, "toggles": toggles, "same": same}
 
 
 def test_section():

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""The gate table: shares against counts made pixel by pixel, frames and clocks of both pipelines, output."""
+"""The gate table: shares against counts made pixel by pixel, frames and cycles of both pipelines, output."""
 
 import dataclasses
 import json
@@ -22,7 +22,8 @@ from blysk.bench.report.gate import (
     shares_of,
 )
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.pipeline import Spans
+from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.toggles import ToggleCounter
 from blysk.sim.frames.frame import prepare
@@ -52,7 +53,7 @@ def dark_pixels(design, spans, constants, term):
 @pytest.mark.parametrize(("model", "exponent"), [("cosquad", 20), ("coscos4", 200), ("blinn", 50)])
 def test_shares_are_those_of_the_pixels(model, exponent):
     """Counted in pictures of the terms alone, span by span."""
-    design = ShadingPipeline("chord", model)
+    design = preset("chord", model)
     spans, constants = frame(design, 1000, exponent, 160, 120)
     dark = dark_pixels(design, spans, constants, "specular")
     behind = dark_pixels(design, spans, constants, "diffuse")
@@ -79,7 +80,7 @@ def test_shares_are_those_of_the_pixels(model, exponent):
 
 
 def test_empty_spans_do_not_count():
-    design = ShadingPipeline("chord")
+    design = preset("chord")
     spans, constants = frame(design, 300, 50, 40, 30)
     fields = {name: getattr(spans, name) for name in ("x", "y", "length", "normal_left", "normal_right")}
     longer = Spans(**{name: np.repeat(codes, 2, axis=0) for name, codes in fields.items()})
@@ -90,21 +91,24 @@ def test_empty_spans_do_not_count():
 
 
 def test_gate_saves_clocks_of_the_compact_style_and_no_pixel_changes():
-    """Blinn's power takes 42 clocks a pixel: a gated pixel takes 3, one a channel of its diffuse term."""
-    off, on = (ShadingPipeline("chord", "blinn", gate=gate) for gate in (False, True))
+    """Blinn's power takes 42 cycles a pixel: a gated pixel takes 3, one a channel of its diffuse term."""
+    off, on = (preset("chord", "blinn", gate=gate) for gate in (False, True))
     spans, constants = frame(off, 300, 200, 10, 8)
     expected = off.compute(spans, constants)
     runs = frames(
-        [ShadingPipelineUnit(design, style="compact") for design in (off, on)], spans, constants, "pysim"
+        [ShadingPipelineUnit(design.built(style="compact")) for design in (off, on)],
+        spans,
+        constants,
+        "pysim",
     )
     assert all(same_pixels(run, expected) for run in runs)
     shares = shares_of(off, spans, constants)
-    assert runs[0].total_clocks > 42 * (shares.pixels - shares.behind_pixels)
-    assert runs[1].total_clocks < runs[0].total_clocks
+    assert runs[0].total_cycles > 42 * (shares.pixels - shares.behind_pixels)
+    assert runs[1].total_cycles < runs[0].total_cycles
 
 
 def test_a_pixel_that_differs_is_found():
-    design = ShadingPipeline("chord")
+    design = preset("chord")
     pixels = design.compute(*frame(design, 300, 50, 40, 30))
     names = ("x", "y", "r", "g", "b", "last")
     beats = np.zeros(len(pixels.x), [(name, np.int64) for name in names])
@@ -120,7 +124,7 @@ def test_a_pixel_that_differs_is_found():
 
 def test_activity_counts_every_register_once():
     """Powers of two for counts: the names of the real pipeline, each in the sum that it belongs to."""
-    unit = ToggleCounter(ShadingPipelineUnit(ShadingPipeline("chord", gate=True)))
+    unit = ToggleCounter(ShadingPipelineUnit(preset("chord", gate=True)))
     paths = list(unit.status.shape().members)
     status = np.zeros((), [(path, object) for path in paths])
     for index, path in enumerate(paths):
@@ -143,8 +147,8 @@ ROW = GateRow(
     "blinn",
     50,
     SHARES,
-    clocks=(1100, 1100),
-    compact_clocks=(42000, 21000),
+    cycles=(1100, 1100),
+    compact_cycles=(42000, 21000),
     activity=(Activity(10000, 0, 100000), Activity(4000, 1000, 95000)),
     identical=True,
 )
@@ -194,7 +198,7 @@ def test_json(counted, capsys, tmp_path):
         {"specular": 4000, "gate": 1000, "pipeline": 95000},
     ]
     assert row["shares"] == dataclasses.asdict(SHARES)
-    assert row["compact_clocks"] == [42000, 21000]
+    assert row["compact_cycles"] == [42000, 21000]
 
 
 def test_a_frame_that_differs_fails(counted, capsys):
@@ -224,14 +228,14 @@ def test_bad_input_is_one_line(arguments, message, capsys):
 
 @pytest.mark.long
 def test_measures_what_the_gate_saves():
-    """Real frames: the gate takes no clocks, and the smaller the highlights, the more toggles it saves."""
+    """Real frames: the gate takes no cycles, and the smaller the highlights, the more toggles it saves."""
     units = GateUnits("cosquad")
     saved = []
     for exponent in (10, 200):
         row = units.compare("teapot", scene_for(teapot(1000), exponent, 160, 120))
         assert row.identical
         assert row.exponent == exponent
-        (off, on), (small_off, small_on) = row.clocks, row.compact_clocks
+        (off, on), (small_off, small_on) = row.cycles, row.compact_cycles
         assert off <= on <= off + 8
         assert small_on <= small_off
         quiet, gated = row.activity

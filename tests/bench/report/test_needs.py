@@ -9,12 +9,12 @@ import pytest
 from blysk.bench.report import needs
 from blysk.bench.report.needs import QUICK_SCENES, SCENES, measure, ring, section, simulate_both, tasks
 from blysk.bench.report.section import Drawing, Table
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.pipeline import Design
 from blysk.golden.reference.raster import face_normals
 from blysk.hdl.emit.cost import Cost
 from blysk.sim.cli.scene_file import read_scene_file
 from blysk.sim.frames.fit import Fit
-from blysk.sim.frames.frame import twin_frame
+from blysk.sim.frames.frame import model_frame
 from blysk.sim.meshes.mesh import load_mesh
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -37,7 +37,7 @@ WHY = {
 def costs(monkeypatch):
     """Costs without a netlist: a cell less with each step."""
 
-    def counted(fit, setup_interval=None, style="throughput"):
+    def counted(fit):
         full, *steps = (
             Cost(cells, {(18, 18): cells // 10}, 0, 10 * cells, 5, cells)
             for cells in range(100, 99 - len(fit.omissions), -1)
@@ -57,20 +57,20 @@ def test_scenes(name, costs):
     assert [omission["reason"] for omission in found["omissions"]] == found["reasons"]
     saved = sum(omission["saves"]["cells"] for omission in found["omissions"])
     assert found["full"]["cells"] - found["fitted"]["cells"] == saved == len(found["reasons"])
-    assert not {"clocks", "full_clocks"} & set(found)
+    assert not {"cycles", "full_cycles"} & set(found)
     assert measure(name, SMALL, steps=False)["fitted"]["cells"] == 99
 
 
 def test_a_frame_that_differs_is_told(monkeypatch, costs):
-    compute = ShadingPipeline.compute
+    compute = Design.compute
 
     def brighter(self, spans, constants):
         pixels = compute(self, spans, constants)
-        if self.exponent is not None:
+        if self.build.exponent is not None:
             pixels.color[:, 0] ^= 1
         return pixels
 
-    monkeypatch.setattr(ShadingPipeline, "compute", brighter)
+    monkeypatch.setattr(Design, "compute", brighter)
     found = measure("copper teapot", SMALL, steps=True)
     assert found["different_pixels"] > 300
     assert found["largest_difference"] == 1
@@ -84,7 +84,7 @@ def test_a_matt_scene_saves_half():
         assert 0 < found["fitted"][resource] < 0.6 * found["full"][resource]
     simulated = simulate_both("matt teapot, k_s = 0", SMALL)
     assert simulated["different_pixels"] == 0
-    assert found["pixels"] < simulated["clocks"] <= simulated["full_clocks"]
+    assert found["pixels"] < simulated["cycles"] <= simulated["full_cycles"]
 
 
 def test_both_are_simulated(monkeypatch):
@@ -97,13 +97,13 @@ def test_both_are_simulated(monkeypatch):
 
         def render(self, scene):
             asked.append((self.design, len(scene.lights)))
-            frame = twin_frame(scene, self.design)
+            frame = model_frame(scene, self.design)
             frame.image[0, : len(asked) - 1] ^= 1
             return frame
 
     monkeypatch.setattr(needs, "FrameSimulator", Simulator)
     found = simulate_both("one of two lights is off", SMALL)
-    assert found == {"clocks": 0, "full_clocks": 0, "different_pixels": 1}
+    assert found == {"cycles": 0, "full_cycles": 0, "different_pixels": 1}
     assert [(design.lights, lights) for design, lights in asked] == [(2, 2), (1, 1)]
 
 
@@ -145,7 +145,7 @@ def test_section():
         "pixels": 7,
     }
     full = [task for task in tasks(quick=False) if task.settings["name"] in QUICK_SCENES]
-    simulated = {"clocks": 9, "full_clocks": 12, "different_pixels": 0}
+    simulated = {"cycles": 9, "full_cycles": 12, "different_pixels": 0}
     results = [counted, counted | {"fitted": figures}, simulated, simulated | {"different_pixels": 3}]
     assert [task.function for task in full] == [measure, measure, simulate_both, simulate_both]
     made = section(full, results)
@@ -153,7 +153,7 @@ def test_section():
     totals, omissions = (part for part in made.parts if isinstance(part, Table))
     assert [part.name for part in made.parts if isinstance(part, Drawing)] == ["needs-shares"]
     first, second = totals.records()
-    assert (first["cells, full"], first["cells, fitted"], first["clocks, fitted"]) == (100, 50, 9)
+    assert (first["cells, full"], first["cells, fitted"], first["cycles, fitted"]) == (100, 50, 9)
     assert (first["pixels of another colour"], second["pixels of another colour"]) == (0, 3)
     assert [row[-1] for row in totals.grades] == ["good", "bad"]
     assert [row["saves cells"] for row in omissions.records()] == [50, 50]
@@ -166,5 +166,5 @@ def test_section():
     assert [task.settings["name"] for task in quick] == list(QUICK_SCENES)
     several = counted | {"reasons": ["this", "that"]}
     totals, _, omissions = section(quick, [several, several]).parts
-    assert totals.records()[0]["clocks, full"] is None
+    assert totals.records()[0]["cycles, full"] is None
     assert [row["saves cells"] for row in omissions.records()] == [None, None, 50] * 2

@@ -10,7 +10,7 @@ import pytest
 from blysk.bench.accuracy import scene_for
 from blysk.bench.report import pairs
 from blysk.bench.report.pairs import Pair, main, measure
-from blysk.golden.pipeline import METHODS, MODELS, PRINTED
+from blysk.golden.presets import METHODS, MODELS, PUBLISHED
 from blysk.golden.reference.raster import rasterise
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
@@ -30,11 +30,11 @@ def test_every_pixel_is_compared(method):
     assert pixels > 500
 
 
-@pytest.mark.parametrize("field", ["x", "y", "last", "r", "g", "b", "wide_spans"])
+@pytest.mark.parametrize("field", ["x", "y", "last", "r", "g", "b", "out_of_range_spans"])
 def test_a_difference_is_found(monkeypatch, field):
     def changed(*arguments, **options):
         run = simulate(*arguments, **options)
-        if field == "wide_spans":
+        if field == "out_of_range_spans":
             status = run.status.copy()
             status[field] += 1
             return replace(run, status=status)
@@ -100,7 +100,7 @@ def test_bad_mesh_is_one_line(capsys):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "method", [pytest.param(name, marks=() if "quad" in name else pytest.mark.long) for name in PRINTED]
+    "method", [pytest.param(name, marks=() if "quad" in name else pytest.mark.long) for name in PUBLISHED]
 )
 def test_what_the_documents_print_runs_as_hardware_too(method):
     (pair,) = measure([load_mesh(STRESS).mesh], [method], ["cosquad"], (30,), 48, 36)

@@ -5,7 +5,7 @@ import pytest
 from blysk.bench.report import place_and_route
 from blysk.bench.report.place_and_route import OTHERS, OTHERS_SEEDS, measure, section, tasks
 from blysk.bench.tools.fpga import FAMILIES, Layout, Parts, Place, TooLarge, ToolError
-from blysk.golden.pipeline import METHODS
+from blysk.golden.presets import METHODS
 
 
 def versions(family):

@@ -34,7 +34,8 @@ from blysk.bench.report.points import (
     tasks,
 )
 from blysk.bench.store import Task
-from blysk.golden.pipeline import METHODS, MODELS, PRINTED, ShadingPipeline
+from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import SHADINGS, render
 from blysk.sim.cli.main import main
 from blysk.sim.errors import InputError
@@ -63,7 +64,7 @@ def measured():
     chosen = [
         *design(*SIMULATED, simulated=True),
         *design("linear"),
-        *design("angular-printed"),
+        *design("angular-published"),
         *design("chord", "exp"),
         *design("chord", "blinn"),
         Task(hardware, dict(zip(("method", "model"), SIMULATED, strict=True))),
@@ -82,7 +83,7 @@ def found(measured):
 
 
 def test_every_method_and_model_is_a_design():
-    assert {method for method, _ in DESIGNS} == {*METHODS, *PRINTED}
+    assert {method for method, _ in DESIGNS} == {*METHODS, *PUBLISHED}
     assert {model for method, model in DESIGNS if method == "chord"} == set(MODELS)
     assert len(set(DESIGNS)) == len(DESIGNS)
     assert set(QUICK_SIMULATED) < set(DESIGNS)
@@ -145,15 +146,15 @@ def test_mesh_that_does_not_show(tmp_path):
 
 
 def test_simulated_point_is_that_of_the_frame_runner(found):
-    design = ShadingPipeline(*SIMULATED)
+    design = preset(*SIMULATED)
     mesh = teapot(PLACE["triangles"])
     for exponent, frame, result in accuracy.measure(mesh, design, (10, 100), 64, 48):
         point = found[f"teapot/chord-local/cosquad/{exponent}"]
         for kind in ("arithmetic", "method", "total"):
             for name, value in asdict(getattr(result, f"{kind}_error")).items():
                 assert point["errors"][f"{kind}_{name}"] == pytest.approx(value, rel=1e-12)
-        assert point["times"]["clocks_per_pixel"] == frame.clocks / frame.pixels
-        assert point["counts"]["clocks"] == frame.clocks
+        assert point["times"]["cycles_per_pixel"] == frame.cycles / frame.pixels
+        assert point["counts"]["cycles"] == frame.cycles
         assert point["times"]["simulated_pixels_per_second"] > 0
         assert point["hardware"]["multipliers"] > 0
 
@@ -162,9 +163,9 @@ def test_twin_has_the_simulated_frame(measured):
     simulated = measured[1][0]
     twin = frames(*SIMULATED, PLACE, [10, 100], simulated=False)
     for one, other in zip(simulated, json.loads(json.dumps(twin)), strict=True):
-        assert one["clocks"] > one["pixels"]
+        assert one["cycles"] > one["pixels"]
         assert (one["settings"]["engine"], other["settings"]["engine"]) == ("cxxrtl", "twin")
-        same = {**one, "clocks": None, "settings": {**one["settings"], "engine": "twin"}}
+        same = {**one, "cycles": None, "settings": {**one["settings"], "engine": "twin"}}
         assert same == other
 
 
@@ -195,7 +196,7 @@ def test_errors_of_software(found):
     assert found["teapot/phong/100"]["verdicts"]["total"]
     assert not found["teapot/gouraud/100"]["verdicts"]["total"]
     assert found["teapot/phong/100"]["times"] == {
-        "clocks_per_pixel": None,
+        "cycles_per_pixel": None,
         "ns_per_pixel": None,
         "simulated_pixels_per_second": None,
         "golden_ns_per_pixel": pytest.approx(1e5, rel=1),
@@ -240,7 +241,7 @@ def test_fronts(measured):
     figures = section(*measured).figures
     assert set(figures["fronts"]) == {f"{e['key']}|{t['key']}" for e in ERRORS for t in TIMES}
     by_id = {point["id"]: point for point in figures["points"]}
-    for error, time in (("total_max_lsb", "golden_ns_per_pixel"), ("method_p999_lsb", "clocks_per_pixel")):
+    for error, time in (("total_max_lsb", "golden_ns_per_pixel"), ("method_p999_lsb", "cycles_per_pixel")):
         front = figures["fronts"][f"{error}|{time}"]
         for exponent in (10, 100):
             scene = [point for point in by_id.values() if point["settings"]["exponent"] == exponent]
@@ -265,8 +266,8 @@ def test_clock_rate(measured):
     ):
         figures = section([*chosen, task], [*results, found]).figures
         point = next(p for p in figures["points"] if p["id"] == "teapot/chord-local/cosquad/10")
-        clocks = point["times"]["clocks_per_pixel"]
-        assert point["times"]["ns_per_pixel"] == (expected and pytest.approx(expected * clocks))
+        cycles = point["times"]["cycles_per_pixel"]
+        assert point["times"]["ns_per_pixel"] == (expected and pytest.approx(expected * cycles))
         assert point["hardware"]["multipliers"] != 3
 
 
@@ -280,7 +281,7 @@ def test_section(measured):
         assert record["design"] == point["label"]
         assert record["exponent"] == point["settings"]["exponent"]
         assert record["total error, largest, LSB"] == point["errors"]["total_max_lsb"]
-        assert record["hardware, clocks, clocks a pixel"] == point["times"]["clocks_per_pixel"]
+        assert record["hardware, cycles, cycles a pixel"] == point["times"]["cycles_per_pixel"]
     assert on_front.rows
     # The best of all designs, those too that were not simulated.
     exponents = sorted({point["settings"]["exponent"] for point in made.figures["points"]})
@@ -296,7 +297,7 @@ def test_section(measured):
     assert groups == {
         "chord-local, cosquad": "own",
         "linear, cosquad": "rival",
-        "angular-printed, cosquad": "printed",
+        "angular-published, cosquad": "printed",
         "chord, exp": "own",
         "chord, blinn": "own",
         "gouraud, software": "software",
@@ -320,8 +321,8 @@ def picture(uri):
 def test_pictures_hold_the_frame_and_its_errors(found, measured):
     point = found["teapot/chord-local/cosquad/100"]
     scene = accuracy.scene_for(teapot(PLACE["triangles"]), 100, 64, 48)
-    frame = FrameSimulator(ShadingPipeline(*SIMULATED)).render(scene)
-    exact = render(scene, "phong", "blinn", raster=frame.raster)
+    frame = FrameSimulator(preset(*SIMULATED)).render(scene)
+    exact = render(scene, "phong", REFLECTION_MODELS["blinn"], raster=frame.raster)
     rows, columns = np.nonzero(exact.mask)
     shown = slice(rows.min(), rows.max() + 1), slice(columns.min(), columns.max() + 1)
     np.testing.assert_array_equal(picture(point["pictures"]["frame"]), frame.image[shown][..., 0])
@@ -362,7 +363,7 @@ def test_smaller_pictures_keep_the_largest_error():
     "name",
     [
         "chord-local/cosquad",
-        pytest.param("angular-printed/cosquad", marks=pytest.mark.long),
+        pytest.param("angular-published/cosquad", marks=pytest.mark.long),
         pytest.param("chord/blinn", marks=pytest.mark.long),
     ],
 )
@@ -410,18 +411,18 @@ def test_readme_table(measured):
     kept = [(t, r) for t, r in zip(chosen, results, strict=True) if t.settings.get("method") == SIMULATED[0]]
     made = section(*zip(*kept, strict=True))
     head, rule, line, end = readme_table(made.figures["points"]).split("\n")
-    assert head.startswith("| mesh | method | model | n = 10 | n = 100 | total | clocks a pixel |")
+    assert head.startswith("| mesh | method | model | n = 10 | n = 100 | total | cycles a pixel |")
     assert len(rule.split("|")) == len(head.split("|")) == len(line.split("|"))
     assert end == ""
     cells = line.strip("| ").split(" | ")
     assert cells[:3] == ["teapot", *SIMULATED]
-    design = ShadingPipeline(*SIMULATED)
+    design = preset(*SIMULATED)
     for cell, (exponent, frame, result) in zip(
         cells[3:], accuracy.measure(teapot(400), design, (10, 100), 64, 48), strict=False
     ):
         assert cell == f"{result.arithmetic_error.max_lsb:.2f} / {result.method_error.max_lsb:.2f}"
         if exponent == 100:
-            assert cells[5:7] == [f"{result.total_error.max_lsb:.1f}", f"{frame.clocks / frame.pixels:.3f}"]
+            assert cells[5:7] == [f"{result.total_error.max_lsb:.1f}", f"{frame.cycles / frame.pixels:.3f}"]
 
 
 def test_readme_table_of_no_report(tmp_path):

@@ -68,7 +68,7 @@ def panel(page, key):
 
 def test_a_point_opens_its_figures(open_page, figures):
     page = open_page()
-    points = drawn(figures, "total_max_lsb", "clocks_per_pixel")
+    points = drawn(figures, "total_max_lsb", "cycles_per_pixel")
     places = dots(page)
     assert set(places) == set(points)
     # One that stands apart.
@@ -87,8 +87,8 @@ def test_a_point_opens_its_figures(open_page, figures):
         value = point["errors"][axis["key"]]
         assert float(panel(page, axis["key"]).get_attribute("title")) == value
         assert panel(page, axis["key"]).inner_text() == shown(value)
-    clocks = page.locator("#panel-times td").first
-    assert float(clocks.get_attribute("title")) == point["times"]["clocks_per_pixel"]
+    cycles = page.locator("#panel-times td").first
+    assert float(cycles.get_attribute("title")) == point["times"]["cycles_per_pixel"]
     times = page.locator("#panel-times td").all_inner_texts()
     assert times == [shown(point["times"][axis["key"]]) for axis in figures["times"]]
     counts = page.locator("#panel-hardware td").all_inner_texts()
@@ -109,8 +109,8 @@ def test_axes_and_front(open_page, figures):
     for error, time, exponent in [
         ("method_rmse_lsb", "golden_ns_per_pixel", 10),
         ("total_psnr_db", "simulated_pixels_per_second", 100),
-        ("arithmetic_max_lsb", "clocks_per_pixel", 10),
-        ("total_flip_p99", "clocks_per_pixel", 100),
+        ("arithmetic_max_lsb", "cycles_per_pixel", 10),
+        ("total_flip_p99", "cycles_per_pixel", 100),
     ]:
         page.locator("#error-axis").select_option(error)
         page.locator("#time-axis").select_option(time)
@@ -140,7 +140,7 @@ def test_axes_and_front(open_page, figures):
 def test_groups(open_page, figures):
     page = open_page()
     page.locator("#groups input[value=rival]").uncheck()
-    points = drawn(figures, "total_max_lsb", "clocks_per_pixel")
+    points = drawn(figures, "total_max_lsb", "cycles_per_pixel")
     assert set(dots(page)) == {name for name, point in points.items() if point["group"] != "rival"}
     rows = page.locator("#every-point tbody tr:visible")
     groups = set(rows.locator("td:nth-child(2)").all_inner_texts())
@@ -185,9 +185,9 @@ def column(page, table, title):
 
 def test_table_of_points_sorts(open_page, figures):
     page = open_page()
-    heading, cells = column(page, "#part-points", "hardware, clocks, clocks a pixel")
+    heading, cells = column(page, "#part-points", "hardware, cycles, cycles a pixel")
     points = [point for point in figures["points"] if point["settings"]["exponent"] == 100]
-    expected = sorted(p["times"]["clocks_per_pixel"] for p in points if p["times"]["clocks_per_pixel"])
+    expected = sorted(p["times"]["cycles_per_pixel"] for p in points if p["times"]["cycles_per_pixel"])
     missing = len(points) - len(expected)
     assert missing > 0
     heading.get_by_role("button").click()

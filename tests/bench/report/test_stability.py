@@ -34,7 +34,9 @@ from blysk.bench.report.stability import (
 from blysk.bench.store import Task
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.number.unit_vector import quantise
-from blysk.golden.pipeline import METHODS, ShadingPipeline, Spans
+from blysk.golden.pipeline import Design, Spans
+from blysk.golden.presets import METHODS, preset
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_spans
 
 # Their quadratic is that of another method.
@@ -94,7 +96,7 @@ def test_a_stall_on_every_clock():
 
 
 def test_wrong_pixels_of_a_stream_are_counted(monkeypatch):
-    compute = ShadingPipeline.compute
+    compute = Design.compute
 
     def inverted(self, spans, constants):
         pixels = compute(self, spans, constants)
@@ -102,7 +104,7 @@ def test_wrong_pixels_of_a_stream_are_counted(monkeypatch):
         color[:2] ^= 255
         return dataclasses.replace(pixels, color=color)
 
-    monkeypatch.setattr(ShadingPipeline, "compute", inverted)
+    monkeypatch.setattr(Design, "compute", inverted)
     monkeypatch.setattr(stability, "stream_patterns", lambda unit: [("back to back", {})])
     assert [case["wrong"] for case in measure_stream("linear", quick=True)] == [2, 2]
 
@@ -111,7 +113,7 @@ def test_wrong_pixels_of_a_stream_are_counted(monkeypatch):
 def test_an_error_that_nothing_tells_of_is_bad(places, monkeypatch):
     """One step more than the worst of a frame may be, in one pixel or in all."""
     [case] = [case for case in cases(1) if case.name == "exponent 10"]
-    compute = ShadingPipeline.compute
+    compute = Design.compute
     right = measure_case(case, "renormalise")
     assert right["prepared"]["grade"] == "good"
 
@@ -121,7 +123,7 @@ def test_an_error_that_nothing_tells_of_is_bad(places, monkeypatch):
         color[places] += np.where(color[places] < 128, 2, -2)
         return dataclasses.replace(pixels, color=color)
 
-    monkeypatch.setattr(ShadingPipeline, "compute", brighter)
+    monkeypatch.setattr(Design, "compute", brighter)
     found = measure_case(case, "renormalise")
     for way in ("given", "prepared"):
         assert found[way]["grade"] == "bad"
@@ -131,12 +133,12 @@ def test_an_error_that_nothing_tells_of_is_bad(places, monkeypatch):
 def test_error_is_that_of_the_pictures():
     """Against the golden renderer's picture of the spans, where no pixel is at the terminator."""
     [case] = [case for case in cases(1) if case.name == "exponent 100"]
-    raster, design = case.raster, ShadingPipeline("quadratic")
+    raster, design = case.raster, preset("quadratic")
     spans = Spans(
         raster.x, raster.y, raster.length, quantise(raster.normal_left), quantise(raster.normal_right)
     )
     pixels = design.compute(spans, FrameConstants.of(case.scene))
-    picture = shade_spans(case.scene, raster, "normalised", "cosquad") * 255
+    picture = shade_spans(case.scene, raster, "normalised", REFLECTION_MODELS["cosquad"]) * 255
     error = np.abs(pixels.color - picture[pixels.y, pixels.x]).max()
     assert measure_case(case, "quadratic")["given"]["error"] == pytest.approx(error, abs=1e-9)
 
@@ -144,10 +146,10 @@ def test_error_is_that_of_the_pictures():
 def test_wide_spans_are_told():
     """Of spans over the widest, some flagged and some not: silently wrong, unless it is small."""
     by_angle = {case.name: measure_case(case, "linear")["given"] for case in cases(2)}
-    wide = by_angle["90 degrees"]
-    assert wide["grade"] == "bad"
-    assert 0 < wide["flagged"] < 60
-    assert 100 < wide["silent"] <= wide["error"]
+    out_of_range = by_angle["90 degrees"]
+    assert out_of_range["grade"] == "bad"
+    assert 0 < out_of_range["flagged"] < 60
+    assert 100 < out_of_range["silent"] <= out_of_range["error"]
     assert (by_angle["120 degrees"]["grade"], by_angle["120 degrees"]["flagged"]) == ("fair", 60)
     assert by_angle["0 degrees"]["grade"] == "good"
 

@@ -20,7 +20,7 @@ from blysk.bench.report.thesis import (
     Counted,
     clock_rate,
     fastest,
-    frame_clocks,
+    frame_cycles,
     hardware,
     prices,
     section,
@@ -162,9 +162,9 @@ def test_hardware():
 
 
 @pytest.mark.long
-def test_frame_clocks():
-    """A pixel a clock at most, and spans of one pixel four clocks at most."""
-    assert 1 < frame_clocks("renormalise interpolator", 500, 64, 48) < 5
+def test_frame_cycles():
+    """A pixel a clock at most, and spans of one pixel four cycles at most."""
+    assert 1 < frame_cycles("renormalise interpolator", 500, 64, 48) < 5
 
 
 def test_devices_are_in_the_table():
@@ -277,7 +277,7 @@ def test_hardware_tables(made):
     devices = {row["device"]: row for row in by_name["thesis-devices"].records()}
     assert devices.keys() == {"renormaliser", "forward differences"}
     (row,) = by_name["thesis-hardware"].records()
-    assert row["clocks a result"] == 1
+    assert row["cycles a result"] == 1
     # A device without multipliers has no ratio.
     assert row["multipliers"] is None
     assert row["cells"] == devices["renormaliser"]["cells"] / devices["forward differences"]["cells"]
@@ -285,7 +285,7 @@ def test_hardware_tables(made):
 
 
 def test_ratios_of_interpolators():
-    """The rival's clocks a pixel over the device's; no figure without both."""
+    """The rival's cycles a pixel over the device's; no figure without both."""
     one = {"interval": 1, "multipliers": 2, "cells": 3, "register_bits": 4}
     devices = {
         "quadratic interpolator": {**one, "frame": 2.0},
@@ -294,9 +294,9 @@ def test_ratios_of_interpolators():
     }
     rates = {name: {"fmax": fmax} for name, fmax in zip(devices, (90.0, None, 120.0), strict=True)}
     rows = {row["device"]: row for row in thesis._ratios_table(devices, rates).records()}
-    assert rows["quadratic interpolator"]["clocks a pixel of a frame"] == 0.75
+    assert rows["quadratic interpolator"]["cycles a pixel of a frame"] == 0.75
     assert rows["quadratic interpolator"]["Fmax (device over rival)"] == 0.75
-    assert rows["bisection interpolator"]["clocks a pixel of a frame"] is None
+    assert rows["bisection interpolator"]["cycles a pixel of a frame"] is None
     assert rows["bisection interpolator"]["Fmax (device over rival)"] is None
 
 
@@ -361,4 +361,4 @@ def test_tasks():
         assert len(keys) == len(chosen)
         assert {task.function for task in chosen if task.timed} == {software, prices, shading_share}
     full = {task.function for task in tasks(quick=False)}
-    assert {clock_rate, frame_clocks, hardware} < full
+    assert {clock_rate, frame_cycles, hardware} < full

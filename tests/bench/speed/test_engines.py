@@ -62,7 +62,7 @@ def _cache(tmp_path, monkeypatch):
 def test_measure():
     beats = np.random.default_rng(1).integers(-(1 << 17), 1 << 17, 500_000)
     speed = measure(Powers(), beats, constants=300, repeats=2)
-    assert speed.clocks == 500_000 + 9
+    assert speed.cycles == 500_000 + 9
     # The promise of the compiled engine, which is kept by a wide margin.
     assert speed.ratio > 200
     assert speed.build > 0
@@ -92,9 +92,9 @@ def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, seconds, missed)
         assert others["rival"] is not gate
         if gate:
             assert others["expected"] is asked["expected"]
-            return Speed(6e6, 2000.0, 6e6, 2000.0, build=4.5, clocks=9000)
+            return Speed(6e6, 2000.0, 6e6, 2000.0, build=4.5, cycles=9000)
         asked.update(others, beats=beats)
-        return Speed(cxxrtl, pysim, cxxrtl, pysim, build=4.25, clocks=9000, verilator_beats=verilator)
+        return Speed(cxxrtl, pysim, cxxrtl, pysim, build=4.25, cycles=9000, verilator_beats=verilator)
 
     monkeypatch.setattr(blysk.bench.speed.engines, "measure", measured)
     # Amaranth complains of components that are made and not used.
@@ -108,7 +108,7 @@ def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, seconds, missed)
     assert asked["rival"]
     assert pixels == len(asked["expected"]["r"]) > 1000
     spans = len(asked["beats"]["x"])
-    assert lines[0] == f"teapot at 1000x750, {spans:,} spans: {pixels:,} pixels, 9,000 clocks"
+    assert lines[0] == f"teapot at 1000x750, {spans:,} spans: {pixels:,} pixels, 9,000 cycles"
     assert lines[2].split() == ["cxxrtl", f"{cxxrtl:,.0f}", "1.00x"]
     assert lines[3].split() == ["verilator", f"{verilator:,.0f}", f"{cxxrtl / verilator:,.2f}x"]
     assert lines[4].split() == ["pysim", f"{pysim:,.0f}", f"{cxxrtl / pysim:,.2f}x"]
@@ -143,10 +143,10 @@ class Rival:
 
     def run(self, stimulus):
         run = simulate(self.component, stimulus.input[:, 0].astype(np.int64), count=stimulus.count)
-        output, clocks = pack(self.ports.o, run.beats), run.clocks.copy()
+        output, cycles = pack(self.ports.o, run.beats), run.cycles.copy()
         output[3] ^= self.beat
-        clocks[5] += self.clock
-        return output, clocks
+        cycles[5] += self.clock
+        return output, cycles
 
 
 def test_rival(monkeypatch):
@@ -173,8 +173,8 @@ def test_engines_that_differ_are_no_measure(monkeypatch):
 
     def late(*arguments, engine, **others):
         run = simulate(*arguments, engine=engine, **others)
-        return dataclasses.replace(run, clocks=run.clocks + (engine == "cxxrtl"))
+        return dataclasses.replace(run, cycles=run.cycles + (engine == "cxxrtl"))
 
     monkeypatch.setattr(blysk.bench.speed.engines, "simulate", late)
-    with pytest.raises(ValueError, match=r"^the engines differ in clocks$"):
+    with pytest.raises(ValueError, match=r"^the engines differ in cycles$"):
         measure(Powers(), np.arange(10), constants=1)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from blysk.bench.speed import renderer
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
 
 
@@ -14,7 +15,7 @@ def test_vtk_draws_the_same_picture():
     draw, name = renderer.vtk_image(scene)
     drawn = draw()
     assert name
-    frame = render(scene, "phong", "phong")
+    frame = render(scene, "phong", REFLECTION_MODELS["phong"])
     assert frame.mask.mean() > 0.2
     # Rounding to 8 bits is 0.25 in the mean. Pixels on silhouettes may be decided either way.
     difference = np.abs(frame.image * 255 - drawn)[frame.mask]

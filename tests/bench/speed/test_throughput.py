@@ -10,7 +10,8 @@ from blysk.bench.accuracy import scene_for
 from blysk.bench.speed import throughput
 from blysk.bench.speed.throughput import BINS, Lengths, Throughput, main, measure, spans_of
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.pipeline import Spans
+from blysk.golden.presets import preset
 from blysk.golden.reference.raster import rasterise
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
@@ -41,10 +42,10 @@ def test_clocks_are_those_of_the_arithmetic(method, interval, monkeypatch):
     lengths = np.repeat([20, 1, 9, 3, interval], 30)
     # A long span pays for a short one after it, but for a clock.
     lengths = np.append(lengths, [1, 2 * interval - 1] * 8)
-    unit = ShadingPipelineUnit(ShadingPipeline(method), interval)
+    unit = ShadingPipelineUnit(preset(method, setup_interval=interval))
     pixels, total = measure(unit, spans(lengths), CONSTANTS, engine="pysim")
     assert pixels == lengths.sum()
-    ends = runs[0].clocks[np.cumsum(lengths) - 1]
+    ends = runs[0].cycles[np.cumsum(lengths) - 1]
     assert total == ends[-1] + 1
     # By then those of the lengths before are paid for.
     for group in range(5):
@@ -85,26 +86,26 @@ def test_spans_hold_the_frame():
 
 
 def test_figures():
-    row = Throughput(1000, "chord", 4, pixels=900, clocks=1000, long_pixels=800, long_clocks=820)
-    assert row.clocks_per_pixel == pytest.approx(10 / 9)
+    row = Throughput(1000, "chord", 4, pixels=900, cycles=1000, long_pixels=800, long_cycles=820)
+    assert row.cycles_per_pixel == pytest.approx(10 / 9)
     assert row.setup_share == pytest.approx(0.1)
-    assert row.long_clocks_per_pixel == pytest.approx(1.025)
-    none = Throughput(1000, "chord", 4, pixels=0, clocks=1, long_pixels=0, long_clocks=0)
-    assert math.isnan(none.clocks_per_pixel)
-    assert none.long_clocks_per_pixel is None
+    assert row.long_cycles_per_pixel == pytest.approx(1.025)
+    none = Throughput(1000, "chord", 4, pixels=0, cycles=1, long_pixels=0, long_cycles=0)
+    assert math.isnan(none.cycles_per_pixel)
+    assert none.long_cycles_per_pixel is None
 
 
 @pytest.fixture
 def counted(monkeypatch):
-    """A pipeline of so many clocks a pixel, without the run."""
-    rate = {"clocks": 1.04}
+    """A pipeline of so many cycles a pixel, without the run."""
+    rate = {"cycles": 1.04}
 
     def measured(unit, some, constants):
         pixels = int(np.sum(some.length))
-        return pixels, math.ceil(pixels * rate["clocks"])
+        return pixels, math.ceil(pixels * rate["cycles"])
 
     monkeypatch.setattr(throughput, "measure", measured)
-    monkeypatch.setattr(throughput, "ShadingPipelineUnit", lambda design, interval: None)
+    monkeypatch.setattr(throughput, "ShadingPipelineUnit", lambda design: None)
     return rate
 
 
@@ -125,13 +126,13 @@ def test_tables(counted, capsys):
 def test_json(counted, capsys):
     assert main([*SMALL, "--json", "--methods", "chord"]) == 0
     figures = json.loads(capsys.readouterr().out)
-    assert [row["setup_interval"] for row in figures["clocks"]] == [2, 4]
+    assert [row["setup_interval"] for row in figures["cycles"]] == [2, 4]
     assert sum(figures["lengths"][0]["span_share"]) == pytest.approx(1)
-    for row in figures["clocks"]:
-        assert row["clocks_per_pixel"] == row["clocks"] / row["pixels"]
+    for row in figures["cycles"]:
+        assert row["cycles_per_pixel"] == row["cycles"] / row["pixels"]
 
 
 def test_target(counted, capsys):
-    counted["clocks"] = 1.06
+    counted["cycles"] = 1.06
     assert main([*SMALL, "--methods", "chord"]) == 1
-    assert capsys.readouterr().err.count("clocks a pixel, spans of 16+: chord, setup interval") == 2
+    assert capsys.readouterr().err.count("cycles a pixel, spans of 16+: chord, setup interval") == 2

@@ -1,4 +1,4 @@
-"""Verilator's model of the emitted Verilog: equal beats at equal clocks, and one line where there is none."""
+"""Verilator's model of the emitted Verilog: equal beats at equal cycles, and one line where there is none."""
 
 import dataclasses
 import re
@@ -71,7 +71,7 @@ def _cache(tmp_path, monkeypatch):
 
 def stimulus(ports, beats, write, count, **others):
     free = np.zeros(1, dtype=bool)
-    given = {"input_stalls": free, "output_stalls": free, "patience": 100, "settle": 0} | others
+    given = {"input_stalls": free, "output_stalls": free, "idle_timeout": 100, "settle": 0} | others
     return Stimulus(
         pack(ports.i, beats),
         pack(ports.write, write),
@@ -95,12 +95,12 @@ def test_equal_to_the_engine(tmp_path):
     run = simulate(component, beats, count=300, write=write)
     model = Verilated(component, tmp_path)
     assert model.compiler
-    output, clocks = model.run(stimulus(model.ports, beats, write, 300))
+    output, cycles = model.run(stimulus(model.ports, beats, write, 300))
     assert np.array_equal(output, pack(model.ports.o, run.beats))
-    assert np.array_equal(clocks, run.clocks)
+    assert np.array_equal(cycles, run.cycles)
     # From power-up every time; a beat that never comes ends the run.
     assert np.array_equal(model.run(stimulus(model.ports, beats, write, 300))[0], output)
-    with pytest.raises(SimulationError, match=r"^Verilator's model gave nothing for 100 clocks$"):
+    with pytest.raises(SimulationError, match=r"^Verilator's model gave nothing for 100 cycles$"):
         model.run(stimulus(model.ports, beats, write, 301))
     with pytest.raises(ValueError, match=r"^a stimulus with a count and without stalls is needed$"):
         model.run(stimulus(model.ports, beats, write, 300, output_stalls=np.array([True, False])))

@@ -35,11 +35,12 @@ from blysk.bench.tools.explore import (
     tasks_of,
 )
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import METHODS, PRINTED, ShadingPipeline
+from blysk.golden.pipeline import STYLES
+from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.renderer import render
 from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.pipeline import STYLES, ShadingPipelineUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import cli
 from blysk.sim.cli.printing import ERRORS
 from blysk.sim.errors import InputError
@@ -66,11 +67,9 @@ def run(*arguments):
 
 
 def test_candidates_are_the_pipelines_that_they_name():
-    assert Candidate("chord", degree=2, fraction_bits=40).design == ShadingPipeline(
-        "chord", terms=2, fraction_bits=40
-    )
-    assert Candidate("linear", "exp", 2, "one_minus_cosine").design == ShadingPipeline(
-        "linear", "exp", 2, "one_minus_cosine"
+    assert Candidate("chord", degree=2, fraction_bits=40).design == preset("chord", terms=2, fraction_bits=40)
+    assert Candidate("linear", "exp", 2, "one_minus_cosine").design == preset(
+        "linear", "exp", 2, operand="one_minus_cosine"
     )
     assert Candidate("quadratic", degree=2).design.interpolator.middle_normal.fit == "minimax_2"
     assert Candidate("bisection", degree=1).design.interpolator.bisection.degree == 1
@@ -92,7 +91,7 @@ def test_another_degree_keeps_the_operand():
         {"method": "linear", "fraction_bits": 46},
         {"method": "chord", "fraction_bits": 41},
         {"method": "angular", "operand": "cosine"},
-        {"method": "quadratic-printed", "degree": 3},
+        {"method": "quadratic-published", "degree": 3},
     ],
 )
 def test_impossible_candidates_are_refused(values):
@@ -123,8 +122,8 @@ def test_sweep_has_every_design_once_and_counts_the_impossible():
 def test_every_method_is_in_the_default_sweep():
     found, _ = Sweep().candidates()
     assert {one.method for one in found} == set(METHODS)
-    printed, _ = Sweep(methods=tuple(PRINTED)).candidates()
-    assert {one.method for one in printed} == set(PRINTED)
+    printed, _ = Sweep(methods=tuple(PUBLISHED)).candidates()
+    assert {one.method for one in printed} == set(PUBLISHED)
 
 
 @pytest.mark.parametrize(
@@ -156,7 +155,7 @@ def test_command_of_a_design_makes_it(candidate, is_plain, monkeypatch, capsys):
     unit = made.pop()
     assert unit.parameters.interpolator == candidate.design.interpolator
     assert (unit.parameters.model, unit.parameters.lights) == (candidate.model, candidate.lights)
-    assert unit.style == candidate.style
+    assert unit.parameters.build.style == candidate.style
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnusedElaboratable)
         del unit
@@ -177,14 +176,14 @@ def test_errors_are_those_of_the_simulated_frame():
         assert result["errors"][name] == {
             key: getattr(figures, key) for key in ("max_lsb", "p999_lsb", "rmse_lsb")
         }
-    assert result["wide_spans"] == frame.wide_spans
+    assert result["out_of_range_spans"] == frame.out_of_range_spans
     assert sum(length * count for length, count in result["lengths"]) == frame.pixels
 
 
 def test_narrow_polynomials_flag_wide_spans():
     narrow, usual = (errors_of({"method": "chord", "degree": degree}, place(), EXPONENT) for degree in (1, 3))
-    assert narrow["wide_spans"] > 0
-    assert usual["wide_spans"] == 0
+    assert narrow["out_of_range_spans"] > 0
+    assert usual["out_of_range_spans"] == 0
 
 
 def test_several_lights_are_as_bright_as_one_and_all_used():
@@ -201,14 +200,14 @@ def test_several_lights_are_as_bright_as_one_and_all_used():
 
 def test_costs_are_those_of_the_netlist():
     result = costs_of({"method": "linear", "model": "cosquad", "style": "compact"})
-    unit = ShadingPipelineUnit(ShadingPipeline("linear"), style="compact")
+    unit = ShadingPipelineUnit(preset("linear", style="compact"))
     cost = cost_of(unit)
     assert result == {
         "cells": cost.cells,
         "multipliers": cost.multiplier_count,
         "register_bits": cost.register_bits,
         "memory_bits": cost.rom_bits + cost.ram_bits,
-        "clocks_per_pixel": unit.clocks_per_pixel,
+        "cycles_per_pixel": unit.cycles_per_pixel,
         "setup_interval": unit.setup_interval,
     }
 
@@ -243,7 +242,7 @@ def test_cheapest_are_under_the_error_and_nothing_cheaper_is(error, cost):
         under = [
             k
             for k, one in enumerate(designs)
-            if one.errors[error]["max_lsb"] <= largest and not one.wide_spans
+            if one.errors[error]["max_lsb"] <= largest and not one.out_of_range_spans
         ]
         assert sorted(chosen) == under
         keys = [(designs[k].costs[COSTS[cost]], designs[k].errors[error]["max_lsb"]) for k in chosen]
@@ -259,9 +258,9 @@ def test_front_by_brute_force():
         pairs += [(a.errors["method"]["max_lsb"], b.errors["method"]["max_lsb"])]
         return all(x <= y for x, y in pairs) and any(x < y for x, y in pairs)
 
-    usable = [one for one in designs if not one.wide_spans]
+    usable = [one for one in designs if not one.out_of_range_spans]
     for one, on_front in zip(designs, chosen, strict=True):
-        assert on_front == (not one.wide_spans and not any(beats(other, one) for other in usable))
+        assert on_front == (not one.out_of_range_spans and not any(beats(other, one) for other in usable))
     assert chosen.any()
 
 
@@ -281,22 +280,22 @@ def test_designs_of_two_styles_share_the_errors_and_not_the_costs():
     assert [task.function for task in todo] == [costs_of, errors_of, costs_of]
     frame = {
         "errors": {name: {"max_lsb": 0.5} for name in ERRORS},
-        "wide_spans": 0,
+        "out_of_range_spans": 0,
         "lengths": [[1, 3], [2, 1], [10, 2]],
     }
     parts = dict(zip(COSTS.values(), (10, 2, 30, 40), strict=True))
     results = [
-        {**parts, "clocks_per_pixel": 1, "setup_interval": 4},
+        {**parts, "cycles_per_pixel": 1, "setup_interval": 4},
         frame,
-        {**parts, "cells": 7, "clocks_per_pixel": 3, "setup_interval": 7},
+        {**parts, "cells": 7, "cycles_per_pixel": 3, "setup_interval": 7},
     ]
     first, second = explored(todo, results)
     assert [first.candidate, second.candidate] == candidates
     assert first.errors == second.errors == frame["errors"]
     assert (first.costs, second.costs) == (parts, {**parts, "cells": 7})
     # Three spans of 1, one of 2, two of 10 pixels: 25 pixels.
-    assert first.clocks_per_pixel == pytest.approx((3 * 4 + 4 + 2 * 10) / 25)
-    assert second.clocks_per_pixel == pytest.approx((3 * 7 + 7 + 2 * 30) / 25)
+    assert first.cycles_per_pixel == pytest.approx((3 * 4 + 4 + 2 * 10) / 25)
+    assert second.cycles_per_pixel == pytest.approx((3 * 7 + 7 + 2 * 30) / 25)
 
 
 def test_stated_clocks_are_a_bound_of_those_of_frames():
@@ -309,21 +308,21 @@ def test_stated_clocks_are_a_bound_of_those_of_frames():
                 warnings.simplefilter("ignore", UnusedElaboratable)
                 unit = candidate.unit()
                 latency = unit.latency
-                figures = {"clocks_per_pixel": unit.clocks_per_pixel, "setup_interval": unit.setup_interval}
+                figures = {"cycles_per_pixel": unit.cycles_per_pixel, "setup_interval": unit.setup_interval}
                 del unit
                 gc.collect()
             for name, scene in baselines._scenes().items():
                 length = prepare(scene, candidate.design).spans.length
                 counts = [[k, int(count)] for k, count in enumerate(np.bincount(length)) if count]
-                frame = {"errors": {}, "wide_spans": 0, "lengths": counts}
+                frame = {"errors": {}, "out_of_range_spans": 0, "lengths": counts}
                 results = [figures | dict.fromkeys(COSTS.values(), 0), frame]
                 (one,) = explored(tasks_of([candidate], {}, EXPONENT), results)
                 if method == "bisection":
-                    assert one.clocks_per_pixel is None
+                    assert one.cycles_per_pixel is None
                     continue
                 besides = latency + len(FrameConstants.of(scene).writes()["data"])
-                clocks = measured[f"frames: pipeline {method}, cosquad, {style}"][f"{name}_clocks"]
-                assert length.sum() < clocks <= one.clocks_per_pixel * length.sum() + besides
+                cycles = measured[f"frames: pipeline {method}, cosquad, {style}"][f"{name}_cycles"]
+                assert length.sum() < cycles <= one.cycles_per_pixel * length.sum() + besides
 
 
 # The command.
@@ -339,7 +338,9 @@ def test_sweep_of_four_designs_and_again(tmp_path, monkeypatch):
     saved = json.loads(path.read_text())
     assert len(saved["designs"]) == 4
     under = [
-        one for one in saved["designs"] if one["errors"]["method"]["max_lsb"] <= 1.5 and not one["wide_spans"]
+        one
+        for one in saved["designs"]
+        if one["errors"]["method"]["max_lsb"] <= 1.5 and not one["out_of_range_spans"]
     ]
     under.sort(key=lambda one: (one["costs"]["cells"], one["errors"]["method"]["max_lsb"]))
     lines = result.output.splitlines()
@@ -361,7 +362,7 @@ def test_sweep_of_four_designs_and_again(tmp_path, monkeypatch):
     def forbidden(*_):
         raise AssertionError("measured again")
 
-    monkeypatch.setattr(explore, "twin_frame", forbidden)
+    monkeypatch.setattr(explore, "model_frame", forbidden)
     monkeypatch.setattr(explore, "cost_of", forbidden)
     again = run(*options)
     assert again.output == result.output
@@ -375,7 +376,7 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
         calls.append(candidate.method)
         if len(calls) == 3:
             raise KeyboardInterrupt
-        return SimpleNamespace(clocks_per_pixel=1, setup_interval=4)
+        return SimpleNamespace(cycles_per_pixel=1, setup_interval=4)
 
     monkeypatch.setattr(Candidate, "unit", unit)
     costs = SimpleNamespace(totals=dict.fromkeys(COSTS.values(), 1))
@@ -431,12 +432,15 @@ def test_jobs_are_not_for_a_cluster():
     assert "--jobs: a cluster has its own workers" in str(result.exception)
 
 
-def made_up(monkeypatch, wide=False, error=0.5):
+def made_up(monkeypatch, out_of_range=False, error=0.5):
     """Results without measuring."""
 
     def results(todo, *_):
-        frame = {"errors": {name: {"max_lsb": error} for name in ERRORS}, "wide_spans": int(wide)}
-        parts = {**dict.fromkeys(COSTS.values(), 5), "clocks_per_pixel": 1, "setup_interval": 4}
+        frame = {
+            "errors": {name: {"max_lsb": error} for name in ERRORS},
+            "out_of_range_spans": int(out_of_range),
+        }
+        parts = {**dict.fromkeys(COSTS.values(), 5), "cycles_per_pixel": 1, "setup_interval": 4}
         return [parts if task.function is costs_of else {**frame, "lengths": [[3, 9]]} for task in todo]
 
     monkeypatch.setattr(explore, "results_of", results)
@@ -452,7 +456,7 @@ def test_no_design_under_the_error_is_one_line(monkeypatch, tmp_path):
         "allow more, or sweep more"
     )
     assert json.loads(path.read_text())["designs"]
-    made_up(monkeypatch, wide=True)
+    made_up(monkeypatch, out_of_range=True)
     assert "all of them flag spans as too wide" in str(run().exception)
 
 

@@ -192,7 +192,7 @@ def test_error_plot_shows_the_largest_error():
 def test_documented_variant_is_drawn_beside_the_default():
     at = np.linspace(1, 9, 900)
     samples = [Sample(np.full(900, error), np.zeros(900), None, at) for error in (1e-3, 2e-3, 5e-2)]
-    variants = ("one", "two", "two, documented")
+    variants = ("one", "two", "two, as published")
     blocks = [replace(DEVICES["bisection"][0], variant=variant) for variant in variants]
     figure = draw_errors(blocks, samples)
     one, two = (axes for axes in figure.axes if axes.get_visible())

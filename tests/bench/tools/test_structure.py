@@ -201,7 +201,7 @@ def test_submodules_are_boxes():
 def test_large_structures_are_cut_down():
     few = graph_of(BisectionUnit(), most=1)
     assert len(few.nodes) < len(structure_of(BisectionUnit).nodes)
-    assert {node.name for node in few.nodes.values()} >= {"normal_a", "normal_b", "wide"}
+    assert {node.name for node in few.nodes.values()} >= {"normal_a", "normal_b", "out_of_range"}
     assert all(node.kind != "register" or node.operations["×"] for node in few.nodes.values())
 
 

@@ -30,7 +30,7 @@ def test_times_are_those_of_the_unit(unit):
     inputs, outputs = moves(waves, "i"), moves(waves, "o")
     assert inputs[0] == 0
     assert [waves.inputs[k] for k in inputs] == [waves.outputs[k] for k in outputs] == ["A", "B", "C"]
-    # The first result is there after the latency, and waits for two clocks.
+    # The first result is there after the latency, and waits for two cycles.
     assert np.flatnonzero(waves.levels["o.valid"])[0] == unit.latency
     assert outputs[0] == unit.latency + 2
     assert inputs[1] == unit.initiation_interval
@@ -59,12 +59,12 @@ def test_rules_of_a_stream(unit, beat):
     assert offered[-1] >= last
 
 
-def test_drawing_leaves_out_quiet_clocks():
+def test_drawing_leaves_out_quiet_cycles():
     waves = waves_of(AdaptiveNormaliserUnit(), SPANS[1][1])
     figure = draw_timing(waves)
     texts = [text.get_text() for text in figure.axes[0].texts]
     assert "⋯" in texts
-    assert len([text for text in texts if text.isdigit()]) < waves.clocks / 2
+    assert len([text for text in texts if text.isdigit()]) < waves.cycles / 2
     assert {"A0", "A1", "A2", "C2", "i.valid", "o.payload"} <= set(texts)
     short = [text.get_text() for text in draw_timing(waves_of(DotProductUnit())).axes[0].texts]
     assert "⋯" not in short

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from blysk.bench.report.report import chosen_tasks
 from blysk.bench.tools import web
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import main
 from blysk.sim.engines.probes import probes_of
@@ -52,7 +52,7 @@ def unpacked(data):
 @pytest.mark.parametrize("mesh", web.MESHES)
 def test_spans_as_they_are_sent(mesh):
     scene = web.scene_of(web.START | {"mesh": mesh, "view": web.MESHES[mesh].views - 1})
-    frame = prepare(scene, ShadingPipeline("chord"))
+    frame = prepare(scene, preset("chord"))
     codes, visible = unpacked(web.encode(frame.spans, frame.cut_raster.visible))
     for name in ("x", "y", "length"):
         np.testing.assert_array_equal(codes[name], getattr(frame.spans, name))
@@ -92,7 +92,7 @@ def test_streams_of_a_view():
     }
     assert counts["chord"][0] < counts["chord"][1]
     for k, exponent in enumerate(web.BANDS):
-        frame = prepare(web.scene_of(web.START | {"exponent": exponent}), ShadingPipeline("chord"))
+        frame = prepare(web.scene_of(web.START | {"exponent": exponent}), preset("chord"))
         assert counts["chord"][k] == len(frame.spans)
 
 
@@ -120,7 +120,11 @@ def probes():
 
 @pytest.fixture(scope="module")
 def script():
-    return resources.files("blysk.bench.tools").joinpath("templates", "web", "app.js").read_text(encoding="utf-8")
+    return (
+        resources.files("blysk.bench.tools")
+        .joinpath("templates", "web", "app.js")
+        .read_text(encoding="utf-8")
+    )
 
 
 def names_in(braces):

@@ -17,6 +17,7 @@ from blysk.bench.tools import web
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.number.unit_vector import ONE
 from blysk.golden.reference.metrics import error_figures
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_spans
 from blysk.sim.engines.beats import pack, unpack
 from blysk.sim.engines.cxxrtl import find_compilers
@@ -157,7 +158,7 @@ def test_first_frame_is_that_of_the_native_engine(open_page):
     image, run = natively(state)
     assert len(np.unique(image)) > 100
     assert digest(picture_of(page)) == digest(image)
-    assert figure(page, "clocks") == run.total_clocks
+    assert figure(page, "cycles") == run.total_cycles
     assert figure(page, "gated") == run.status["gated_spans"] > 0
     # What the gate does not prove may have no highlight either.
     assert page.locator("[data-figure=gated]").inner_text().startswith("≥ ")
@@ -181,7 +182,7 @@ def test_every_module_gives_the_frame_of_the_native_engine(open_page, tmp_path):
         image, run = natively(state)
         shown = digest(picture_of(page))
         assert shown == digest(image), (method, model)
-        assert figure(page, "clocks") == run.total_clocks, (method, model)
+        assert figure(page, "cycles") == run.total_cycles, (method, model)
         assert figure(page, "gated") == run.status["gated_spans"], (method, model)
         digests.add(shown)
     # Those that differ by their arithmetic do so in some pixel: none is shown for another.
@@ -248,7 +249,7 @@ def test_same_frame_as_the_command_renders(open_page):
     frame = FrameSimulator(web.design_of("chord", "cosquad"), engine="cxxrtl" if has_compiler() else "pysim")
     rendered = frame.render(web.scene_of(state))
     assert digest(rendered.image) == digest(picture_of(page))
-    assert figure(page, "clocks") == rendered.clocks
+    assert figure(page, "cycles") == rendered.cycles
 
 
 def test_constants_are_those_of_python(open_page):
@@ -322,7 +323,9 @@ def test_reference_is_that_of_golden(open_page, reference):
             normal_right=frame.spans.normal_right / ONE,
         )
         curve = entry["curve"] or design.interpolator.exact_normals
-        golden = shade_spans(scene, raster, curve, entry["model"] or model, design.interpolator.uses_chord)
+        golden = shade_spans(
+            scene, raster, curve, REFLECTION_MODELS[entry["model"] or model], design.interpolator.uses_chord
+        )
         mask = np.zeros((web.HEIGHT, web.WIDTH), dtype=bool)
         mask.reshape(-1)[raster.pixel[raster.visible]] = True
         figures = error_figures(picture_of(page), golden * 255, mask)
@@ -338,9 +341,8 @@ def test_reference_is_that_of_golden(open_page, reference):
 def test_every_curve_and_model_in_float64(open_page):
     """Also those whose modules this site has not got."""
     page = open_page()
-    from blysk.golden.pipeline import MODELS
+    from blysk.golden.presets import MODELS
     from blysk.golden.reference.curves import CURVES, interpolate
-    from blysk.golden.reference.reflection import reflect
 
     rng = np.random.default_rng(3)
     ends = rng.normal(size=(2, 20, 3))
@@ -371,7 +373,9 @@ def test_every_curve_and_model_in_float64(open_page):
     for model in MODELS:
         for exponent in (1, 7, 100, 1000):
             found = page.evaluate(script, [web.model_table(model), cosine.tolist(), exponent])
-            np.testing.assert_allclose(found, reflect(model, cosine, exponent), atol=1e-9, err_msg=model)
+            np.testing.assert_allclose(
+                found, REFLECTION_MODELS[model].reflect(cosine, exponent), atol=1e-9, err_msg=model
+            )
 
 
 def test_error_figures_of_few_and_equal_values(open_page):
@@ -399,7 +403,7 @@ def looked_at(page):
 
 
 def traced(page, component):
-    """Status of pysim on the clocks of the page's trace."""
+    """Status of pysim on the cycles of the page's trace."""
     inside = page.evaluate(
         """() => {
             const {from, to, span, start, length, firstClock, lastClock, clock} = blysk.inside;
@@ -416,7 +420,7 @@ def traced(page, component):
         input_stalls=none,
         output_stalls=none,
         count=int(spans.length.sum()),
-        patience=1000,
+        idle_timeout=1000,
         settle=64,
     )
 
@@ -434,8 +438,8 @@ def test_waveform_is_that_of_pysim(open_page):
     inside, stimulus, status = traced(page, component)
     run = Model(component).run(stimulus)
     own = slice(inside["start"], inside["start"] + inside["length"])
-    assert inside["lastClock"] == run.clocks[own][-1]
-    assert inside["firstClock"] == run.input_clocks[inside["span"] - inside["from"]]
+    assert inside["lastClock"] == run.cycles[own][-1]
+    assert inside["firstClock"] == run.input_cycles[inside["span"] - inside["from"]]
     cells = "row => Object.fromEntries([...row.cells].slice(1).map(c => [c.dataset.clock, c.dataset.code]))"
     for clock in (inside["clock"], inside["clock"] + 2, inside["lastClock"]):
         row = status(clock)
@@ -454,7 +458,7 @@ def test_waveform_is_that_of_pysim(open_page):
     # The pixel that was clicked comes out with the colour that the picture has.
     pixel = picture_of(page)[y, x]
     place = page.evaluate("([x, y]) => blysk.inside.spans.codes.x[blysk.inside.span]", [x, y])
-    clock = int(run.clocks[own][x - place])
+    clock = int(run.cycles[own][x - place])
     for name, value in zip("rgb", pixel, strict=True):
         assert int(page.locator(f"#wave tr[data-word={name}]").evaluate(cells)[str(clock)]) == value
     assert int(page.locator("#wave tr[data-word=x]").evaluate(cells)[str(clock)]) == x

@@ -91,9 +91,9 @@ def test_stiff_span_angles_by_arccos(degrees, table, normal_pairs):
         (UNIT, [5.0e-7, 7.4e-7, 3.8e-6, 1.3e-5]),
         (AngularSetup("arccos"), [0.0095, 0.0012, 0.0049, 2.6e-4]),
         (AngularSetup("arccos", Arccos("corrected")), [0.042, 0.034, 3.5e-4, 5.0e-4]),
-        (AngularSetup("arccos", Arccos("printed")), [0.088, 0.078, 0.045, 5.0e-4]),
+        (AngularSetup("arccos", Arccos("as_published")), [0.088, 0.078, 0.045, 5.0e-4]),
     ],
-    ids=["half_chord", "refitted", "corrected", "printed"],
+    ids=["half_chord", "refitted", "corrected", "as_published"],
 )
 def test_error_by_where_psi_comes_from(unit, stated, normal_pairs):
     for degrees, largest in zip((1e-4, 1, 10, 45), stated, strict=True):
@@ -147,7 +147,7 @@ def test_stiff_words_at_their_ends():
     """Every corner of the words gives something in range, none an exception."""
     ends = np.array([COMPONENT.min_code, 0, COMPONENT.max_code])
     corners = np.stack(np.meshgrid(*[ends] * 9), axis=-1).reshape(-1, 9)[::7]
-    for unit in (UNIT, AngularSetup("arccos", Arccos("printed"))):
+    for unit in (UNIT, AngularSetup("arccos", Arccos("as_published"))):
         result = setup(
             corners[:, :3],
             corners[:, 3:6],
@@ -192,7 +192,7 @@ def test_each_figure(degrees, normal_pairs):
     left, right = normal_pairs(rng, count, degrees)
     vector, _ = normal_pairs(rng, count, 0)
     length = rng.integers(2, 4096, count)
-    angle, phase, step, cos_beta, wide = setup(*(quantise(v) for v in (left, right, vector)), length)
+    angle, phase, step, cos_beta, out_of_range = setup(*(quantise(v) for v in (left, right, vector)), length)
     to_left, to_right = dot(left, vector), dot(right, vector)
     side = (to_right - np.cos(psi) * to_left) / np.sin(psi)
     # Codes are off by under a step in each component; sin psi turns that into an angle of the plane.
@@ -205,16 +205,16 @@ def test_each_figure(degrees, normal_pairs):
         assert np.abs(turn * radius).max() <= 2 * plane
     off = np.abs(step.values * (length - 1) - angle.values)
     assert np.all(off <= (2.0**-19 / 0.159 + 2.0**-17) * angle.values + 4095 * 2.0**-40)
-    assert not wide.any()
+    assert not out_of_range.any()
 
 
 def test_stiff_equal_normals(normal_pairs):
     left, _, vector, length = operands(normal_pairs, 7, 0)
     result = setup(left, left, vector, length)
-    angle, _, step, _, wide = result
+    angle, _, step, _, out_of_range = result
     assert not angle.codes.any()
     assert not step.codes.any()
-    assert not wide.any()
+    assert not out_of_range.any()
     assert np.abs(cosines(result, 0) - dot(left, vector) / ONE**2).max() <= UNIT.error(0)
 
 

@@ -39,7 +39,7 @@ def test_printed_segments(segment, absolute, relative):
 
 
 def test_misprint_of_the_last_segment():
-    printed, corrected = Arccos("printed").coefficients[4], Arccos("corrected").coefficients[4]
+    printed, corrected = Arccos("as_published").coefficients[4], Arccos("corrected").coefficients[4]
     assert printed[1] == 74.547
     assert corrected[1] == 74.457
     at_start = [np.polynomial.polynomial.polyval(0.96, c) - np.arccos(0.96) for c in (printed, corrected)]
@@ -129,7 +129,7 @@ def test_stiff_past_one_is_one(table):
 @pytest.mark.parametrize(
     ("table", "model"),
     [
-        ("printed", [0.0012, 0.0011, 0.0019, 0.0012, 0.174]),
+        ("as_published", [0.0012, 0.0011, 0.0019, 0.0012, 0.174]),
         ("corrected", [0.0012, 0.0011, 0.0019, 0.0012, 0.084]),
         ("refitted", [0.00092, 0.00054, 0.00082, 0.00052, 0.019]),
     ],
@@ -170,7 +170,7 @@ def test_stiff_angles(degrees, table):
     around = np.clip(np.cos(psi) + np.array([-1, 1]) * 2.0**-17, -1, 1)
     model = np.array(
         {
-            "printed": [0.0012, 0.0011, 0.0019, 0.0012, 0.1745],
+            "as_published": [0.0012, 0.0011, 0.0019, 0.0012, 0.1745],
             "corrected": [0.0012, 0.0011, 0.0019, 0.0012, 0.0845],
             "refitted": [0.00093, 0.00055, 0.00083, 0.00053, 0.0195],
         }[table]
@@ -245,7 +245,7 @@ def test_half_chord_keeps_what_arccos_loses(normal_pairs):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Arccos("best"), "the arccos table must be printed, corrected, refitted, not 'best'"),
+        (lambda: Arccos("best"), "the arccos table must be as_published, corrected, refitted, not 'best'"),
         (
             lambda: Arccos().compute(Fixed(SQ(1, 17), [0])),
             r"operand must be SQ\(2, 16\), not SQ\(1, 17\)",

@@ -8,7 +8,7 @@ from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.reflection import reflect
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 
 ONE_VALUE = float(ONE_SQUARED.values)
 ANGLES = [0.0, 1e-4, 1.0, 6.3, 9.0, 15.0, 22.4]
@@ -73,8 +73,8 @@ def errors(rng, count, angle, length, normal_pairs, spread=0.1):
     left, right = spans_about(rng, count, angle, h, spread, normal_pairs)
     left, right = quantise(left), quantise(right)
     length = np.broadcast_to(length, count)
-    diffuse, highlight, wide = setup(left, right, direction, halfway, length)
-    assert not wide.any()
+    diffuse, highlight, out_of_range = setup(left, right, direction, halfway, length)
+    assert not out_of_range.any()
     step = np.where(rng.random(count) < 0.5, length - 1, rng.integers(0, length))
     t = step / np.maximum(length - 1, 1)
     ends = unit(left), middle(unit(left), unit(right)), unit(right)
@@ -141,8 +141,8 @@ def test_stiff_equal_normals_stay_constant(length, normal_pairs):
     normals = quantise(normal_pairs(rng, 2000, 0.0)[0])
     normals[:200] = rng.integers(-ONE // 2, ONE // 2, (200, 3))
     vectors = quantise(normal_pairs(rng, 3, 0.0)[0])
-    diffuse, highlight, wide = setup(normals, normals, vectors, vectors, np.full(2000, length))
-    assert not wide.any()
+    diffuse, highlight, out_of_range = setup(normals, normals, vectors, vectors, np.full(2000, length))
+    assert not out_of_range.any()
     for differences in (diffuse, highlight):
         assert differences.start.codes.any()
         assert not differences.first.codes.any()
@@ -172,8 +172,8 @@ def test_stiff_lengths_of_vectors(normal_pairs):
         left, right = normal_pairs(rng, 2000, 5.0)
         near = np.abs(left[:, 2]) < 0.9
         left, right = (np.rint(v[near] * ONE * stretch).astype(int) for v in (left, right))
-        diffuse, highlight, wide = setup(left, right, up, up, np.full(len(left), 2))
-        assert not wide.any()
+        diffuse, highlight, out_of_range = setup(left, right, up, up, np.full(len(left), 2))
+        assert not out_of_range.any()
         e = 1 - stretch
         for step, normals in ((0, left), (1, right)):
             n = unit(normals)
@@ -217,8 +217,8 @@ def test_flag():
         right = np.cos(angle)[:, np.newaxis] * axis + np.sin(angle)[:, np.newaxis] * side
         left = np.broadcast_to(quantise(axis), (100, 3))
         vector = quantise(axis)
-        _, _, wide = setup(left, quantise(right), vector, vector, np.full(100, 9))
-        np.testing.assert_array_equal(wide, angle > np.radians(22.5))
+        _, _, out_of_range = setup(left, quantise(right), vector, vector, np.full(100, 9))
+        np.testing.assert_array_equal(out_of_range, angle > np.radians(22.5))
 
 
 def test_lights_are_independent(normal_pairs):
@@ -269,7 +269,7 @@ def fit_error(model, exponent, psi):
             return 1 - np.cos(beta) * np.cos(azimuth - a)
 
         exact, fit = u(along(t, psi)), three_points(u, psi, t)
-        terms = [reflect(model, 1 - value, exponent) for value in (fit, exact)]
+        terms = [REFLECTION_MODELS[model].reflect(1 - value, exponent) for value in (fit, exact)]
         worst = max(worst, 255 * np.abs(terms[0] - terms[1]).max())
     return worst
 
@@ -300,7 +300,7 @@ def test_fit_of_the_diffuse_term():
 def steepest(model, exponent):
     """Largest slope of the term over u; a chord over small steps of a float64 curve."""
     u = np.linspace(0, 4 / exponent, 4001)
-    return np.abs(np.diff(reflect(model, 1 - u, exponent)) / np.diff(u)).max() * (1 + 1e-3)
+    return np.abs(np.diff(REFLECTION_MODELS[model].reflect(1 - u, exponent)) / np.diff(u)).max() * (1 + 1e-3)
 
 
 def total_error(rng, count, model, exponent, normal_pairs):
@@ -313,13 +313,13 @@ def total_error(rng, count, model, exponent, normal_pairs):
     left, right = spans_about(rng, count, angle, h, 1.5 / np.sqrt(exponent), normal_pairs)
     left, right = quantise(left), quantise(right)
     length = rng.integers(2, 4095, count, endpoint=True)
-    diffuse, highlight, wide = setup(left, right, direction, halfway, length)
-    assert not wide.any()
+    diffuse, highlight, out_of_range = setup(left, right, direction, halfway, length)
+    assert not out_of_range.any()
     step = rng.integers(0, length)
     t = (step / (length - 1))[:, np.newaxis]
     normals = normalise((1 - t) * unit(left) + t * unit(right))
     u, exact = at(highlight, step) / ONE_VALUE, half_chord(normals, h)
-    terms = [reflect(model, 1 - value, exponent) for value in (u, exact)]
+    terms = [REFLECTION_MODELS[model].reflect(1 - value, exponent) for value in (u, exact)]
     lit = np.count_nonzero(terms[1] > 0.1)
     return (
         255 * np.abs(terms[0] - terms[1]).max(),

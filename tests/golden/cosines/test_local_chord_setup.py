@@ -52,8 +52,8 @@ def test_error(size, length):
         for curve, format in ((f, P.DIFFUSE_FORMAT), (u, P.HIGHLIGHT_FORMAT))
     ]
     length = rng.integers(2, 4095, count, endpoint=True) if length is None else np.full(count, length)
-    diffuse, highlight, wide = setup(*codes, length)
-    assert not wide.any()
+    diffuse, highlight, out_of_range = setup(*codes, length)
+    assert not out_of_range.any()
     step = np.where(rng.random(count) < 0.5, length - 1, rng.integers(0, length))
     t = step / np.maximum(length - 1, 1)
     for differences, (start, slope, bend), bound in (
@@ -76,8 +76,8 @@ def test_stiff_equal_values_stay(length):
     for value, format in zip(codes, formats, strict=True):
         value[:2, 0] = format.min_code, format.max_code
     codes = [np.repeat(value, 3, axis=1) for value in codes]
-    diffuse, highlight, wide = setup(*codes, np.full(500, length))
-    assert not wide.any()
+    diffuse, highlight, out_of_range = setup(*codes, np.full(500, length))
+    assert not out_of_range.any()
     for differences, value, format in zip((diffuse, highlight), codes, formats, strict=True):
         np.testing.assert_array_equal(differences.start.values[:, 0], value[:, 0] * format.step)
         assert not differences.first.codes.any()
@@ -118,27 +118,27 @@ def test_flag():
     highlight = np.stack([0 * end, end >> 1, end], axis=1)
     bend = (2 * (end - 2 * (end >> 1)) / 2.0**26 * 2**20 + 0.5) // 1
     assert not bend.any()
-    _, _, wide = setup(zero, highlight, length)
-    np.testing.assert_array_equal(wide, end >= half)
+    _, _, out_of_range = setup(zero, highlight, length)
+    np.testing.assert_array_equal(out_of_range, end >= half)
     # The other way -1/2 itself fits.
-    _, _, wide = setup(zero, highlight[:, ::-1], length)
-    np.testing.assert_array_equal(wide, end > half)
+    _, _, out_of_range = setup(zero, highlight[:, ::-1], length)
+    np.testing.assert_array_equal(out_of_range, end > half)
 
     # G = 4 (v_l - v_m) with equal ends: 1/8 at v_l - v_m = 2^-5, rounded half up to 2^-20.
     bump = (1 << 21) + offset
     for sign in (1, -1):
         highlight = np.stack([half + 0 * bump, half - sign * bump, half + 0 * bump], axis=1)
-        _, _, wide = setup(zero, highlight, length)
+        _, _, out_of_range = setup(zero, highlight, length)
         bend = np.floor(sign * 4 * bump / 2.0**26 * 2**20 + 0.5)
-        np.testing.assert_array_equal(wide, (bend >= 2**17) | (bend < -(2**17)))
-        assert 0 < np.count_nonzero(wide) < count
+        np.testing.assert_array_equal(out_of_range, (bend >= 2**17) | (bend < -(2**17)))
+        assert 0 < np.count_nonzero(out_of_range) < count
 
     # f: P rounded to 18 fraction bits.
     end = (1 << 24) + offset
     diffuse = np.stack([0 * end, end >> 1, end], axis=1)
-    _, _, wide = setup(diffuse, zero, length)
-    np.testing.assert_array_equal(wide, np.floor(end / 2.0**25 * 2**18 + 0.5) >= 2**17)
-    assert 0 < np.count_nonzero(wide) < count
+    _, _, out_of_range = setup(diffuse, zero, length)
+    np.testing.assert_array_equal(out_of_range, np.floor(end / 2.0**25 * 2**18 + 0.5) >= 2**17)
+    assert 0 < np.count_nonzero(out_of_range) < count
 
 
 def test_sums_never_wrap():
@@ -152,8 +152,8 @@ def test_sums_never_wrap():
         codes.append(np.where(rng.random((count, 1)) < 0.5, ends, anywhere))
     length = rng.integers(1, 4096, count)
     length[::5] = 2
-    diffuse, highlight, wide = setup(*codes, length)
-    assert 0.5 < wide.mean() < 1
+    diffuse, highlight, out_of_range = setup(*codes, length)
+    assert 0.5 < out_of_range.mean() < 1
     worst = 0.0
     for differences in (diffuse, highlight):
         for step in (length - 1, *(rng.integers(0, length) for _ in range(5))):
@@ -197,7 +197,7 @@ def test_lights_are_independent():
     diffuse = rng.integers(-(1 << 20), 1 << 20, shape)
     highlight = rng.integers(1 << 20, 1 << 22, shape)
     length = rng.integers(1, 4096, 300)
-    *together, wide = setup(diffuse, highlight, length)
+    *together, out_of_range = setup(diffuse, highlight, length)
     flags = np.zeros(300, dtype=bool)
     for light in range(3):
         *alone, flag = setup(diffuse[:, light], highlight[:, light], length)
@@ -205,7 +205,7 @@ def test_lights_are_independent():
         for both, one in zip(together, alone, strict=True):
             for a, b in zip(both, one, strict=True):
                 np.testing.assert_array_equal(a.codes[:, light], b.codes[:, 0])
-    np.testing.assert_array_equal(wide, flags)
+    np.testing.assert_array_equal(out_of_range, flags)
 
 
 def test_refuses():

@@ -30,8 +30,8 @@ def curve(left, right, vector, length):
 
 def states_of(setup, left, right, vector, length):
     left, right, vector = (Fixed(COMPONENT, codes) for codes in (left, right, vector))
-    *start, wide = setup.compute(left, right, vector, np.full(len(left.codes), length))
-    return setup.recurrence.states(*start, length), wide
+    *start, out_of_range = setup.compute(left, right, vector, np.full(len(left.codes), length))
+    return setup.recurrence.states(*start, length), out_of_range
 
 
 def make_spans(rng, normal_pairs, count, degrees):
@@ -50,9 +50,9 @@ def test_stiff_spans_keep_the_bound(normal_pairs, length, degrees):
     rng = np.random.default_rng(length)
     setup = RecurrenceSetup()
     spans = make_spans(rng, normal_pairs, 300, degrees)
-    states, wide = states_of(setup, *spans, length)
+    states, out_of_range = states_of(setup, *spans, length)
     error = np.abs(setup.recurrence.result(states).values - curve(*spans, length)).max()
-    assert not wide.any()
+    assert not out_of_range.any()
     assert error <= setup.error(length, np.radians(degrees))
 
 
@@ -124,8 +124,8 @@ def test_wide_spans_are_flagged(normal_pairs):
     rng = np.random.default_rng(6)
     for degrees, flagged in ((89.99, False), (90, False), (90.02, True), (120, True), (180, True)):
         spans = make_spans(rng, normal_pairs, 500, degrees)
-        _, wide = states_of(RecurrenceSetup(), *spans, 2)
-        assert np.all(wide == flagged)
+        _, out_of_range = states_of(RecurrenceSetup(), *spans, 2)
+        assert np.all(out_of_range == flagged)
 
 
 @pytest.mark.parametrize("length", [2, 3, 5, 16, 2049, 4095])
@@ -138,18 +138,18 @@ def test_stiff_words_at_their_ends(length):
     rng = np.random.default_rng(7)
     left, right, vector = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (3, 3000, 3))
     setup, step = RecurrenceSetup(), 2.0**-34
-    first, _, coefficient, shift, wide = setup.compute(
+    first, _, coefficient, shift, out_of_range = setup.compute(
         *(Fixed(COMPONENT, codes) for codes in (left, right, vector)), np.full(3000, length)
     )
     unit = 1 + 2.0**-16
     chord = np.square(right - left).sum(axis=1) / 2 * step * unit
-    np.testing.assert_array_equal(wide, chord >= 1 + 2.0**-13)
-    assert 900 < np.count_nonzero(wide) < 2100
+    np.testing.assert_array_equal(out_of_range, chord >= 1 + 2.0**-13)
+    assert 900 < np.count_nonzero(out_of_range) < 2100
     cosine = (left * vector).sum(axis=1) * step * unit
     assert np.count_nonzero(np.abs(cosine) >= 2) > 20
     assert np.abs(first.values[:, 0] - np.clip(cosine, -2, 2 - step)).max() < step
     angle = 4 * 2 * np.arcsin(np.sqrt(np.minimum(chord, 1) / 2)) / (length - 1)
-    used = ~wide & (angle <= np.pi / 2)
+    used = ~out_of_range & (angle <= np.pi / 2)
     exact = 4 * np.square(np.sin(angle[used] / 2))
     found = coefficient.values[used] * 2.0 ** (2 - shift[used])
     word, table = 2.0**-18, setup.TABLE_ERROR

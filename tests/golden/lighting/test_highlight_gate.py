@@ -5,7 +5,7 @@ import pytest
 
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.lighting.highlight_gate import HighlightGate
-from blysk.golden.lighting.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.interpolator import NormalInterpolator, pixels_of
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
@@ -15,8 +15,11 @@ from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
+
+from ...lists import FURTHER_MODELS, SPECULAR_MODELS
 
 EXPONENTS = (2, 3, 5, 10, 30, 100, 300, 500, 1000)
 
@@ -114,7 +117,7 @@ def random_spans(rng, count, exponent, gate):
 def largest_cosine(left, right, halfway, length, middle_normal=None):
     """Largest code of N·H over the pixels of each span, by the pipeline's twin."""
     left, right = (Fixed(COMPONENT, codes) for codes in (left, right))
-    middle, wide = (middle_normal or MiddleNormal()).compute(left, right)
+    middle, out_of_range = (middle_normal or MiddleNormal()).compute(left, right)
     g, p, q = GPQ().compute(left, middle, right)
     first, second = DifferenceSetup().compute(g, p, length)
     span = np.repeat(np.arange(len(length)), length)
@@ -122,7 +125,7 @@ def largest_cosine(left, right, halfway, length, middle_normal=None):
     step = np.arange(len(span)) - np.repeat(start, length)
     normals = DifferenceAccumulator().compute(q, first, second, span, step)
     cosine = DotProduct().compute(normals, Fixed(COMPONENT, halfway[span]))
-    return Fixed(cosine.format, np.maximum.reduceat(cosine.codes, start)), wide
+    return Fixed(cosine.format, np.maximum.reduceat(cosine.codes, start)), out_of_range
 
 
 def check_spans(gate, rng, count, shaded_share=1 / 20):
@@ -133,8 +136,8 @@ def check_spans(gate, rng, count, shaded_share=1 / 20):
         length = rng.choice([1, 2, 3, 5, 8, 16], len(left), p=[0.1, 0.3, 0.3, 0.2, 0.08, 0.02])
         operands = (Fixed(COMPONENT, codes) for codes in (left, right, halfway))
         lit = gate.compute(*operands, exponent)
-        cosine, wide = largest_cosine(left, right, halfway, length, gate.interpolator.middle_normal)
-        assert not wide.any()
+        cosine, out_of_range = largest_cosine(left, right, halfway, length, gate.interpolator.middle_normal)
+        assert not out_of_range.any()
         # The specular term falls with N·H: that of the largest is the largest.
         term = gate.specular.compute(cosine, np.zeros(len(lit), bool), exponent)
         assert not term.codes[~lit].any()
@@ -150,7 +153,7 @@ def test_no_pixel_is_suppressed():
 
 @pytest.mark.parametrize("model", ["cosquad7", "lyon3", "exp"])
 def test_no_pixel_is_suppressed_in_other_models(model):
-    check_spans(HighlightGate(Specular(model)), np.random.default_rng(2), 20_000)
+    check_spans(HighlightGate(Specular(REFLECTION_MODELS[model])), np.random.default_rng(2), 20_000)
 
 
 def test_no_pixel_is_suppressed_with_other_middle_normals():
@@ -257,13 +260,13 @@ def test_step_3_of_the_proof():
     assert np.all((level >= dot.values) | (level == gate.level_format.max_code * gate.level_format.step))
     top = (gate.level_format.max_code * gate.level_format.step) ** 2
     for model in SPECULAR_MODELS + FURTHER_MODELS:
-        assert HighlightGate(Specular(model)).thresholds.values.max() < top
+        assert HighlightGate(Specular(REFLECTION_MODELS[model])).thresholds.values.max() < top
 
 
 @pytest.mark.parametrize("model", SPECULAR_MODELS + FURTHER_MODELS)
 def test_the_term_is_0_everywhere_below(model):
     """No second lobe: the unit shades nothing from N.H = -1 up to the threshold and its margin."""
-    gate, rng = HighlightGate(Specular(model)), np.random.default_rng(9)
+    gate, rng = HighlightGate(Specular(REFLECTION_MODELS[model])), np.random.default_rng(9)
     for exponent in (2, 3, 5, 10, 20, 100, 500, 1000):
         # T was cut, so the root is under tau.
         tau = np.sqrt(gate.thresholds.values[exponent])
@@ -303,7 +306,7 @@ def test_margin_covers_the_pipeline():
 
 def test_thresholds_lie_under_what_the_unit_shades():
     for model in SPECULAR_MODELS + FURTHER_MODELS:
-        gate = HighlightGate(Specular(model))
+        gate = HighlightGate(Specular(REFLECTION_MODELS[model]))
         lowest = gate.thresholds.values
         for exponent in (1, 2, 3, 10, 100, 500, 999, 1000):
             # The largest N·H that is shaded 0, by halving.
@@ -354,9 +357,9 @@ def test_stiff_spans(normal_pairs):
 
 def suppressed(model, left, right, halfway, length, exponent, method="quadratic", operand=None):
     """Which spans are not lit, and which of these have a term other than 0 in the pipeline of a method."""
-    pipeline = ShadingPipeline(method, model, operand=operand)
+    pipeline = preset(method, model, operand=operand)
     interpolator = pipeline.interpolator
-    gate = HighlightGate(pipeline.highlight, interpolator=interpolator)
+    gate = HighlightGate(pipeline.specular, interpolator=interpolator)
     left, right, halfway = (Fixed(COMPONENT, codes) for codes in (left, right, halfway))
     lit = gate.compute(left, right, halfway, exponent)
     span, _ = pixels_of(length)
@@ -371,7 +374,7 @@ def suppressed(model, left, right, halfway, length, exponent, method="quadratic"
             for k in (slice(k, k + 1) for k in range(len(length)))
         ]
         highlight = Fixed(found[0].format, np.concatenate([part.codes[:, 0] for part in found]))
-    term = pipeline.highlight.compute(highlight, np.zeros(len(span), bool), exponent).codes
+    term = pipeline.specular.compute(highlight, np.zeros(len(span), bool), exponent).codes
     lost = np.bincount(span, weights=(term > 0) & ~lit[span], minlength=len(lit)) > 0
     return ~lit, lost
 
@@ -439,10 +442,10 @@ def test_stiff_normals_of_wrong_length(exponent):
     left = normalise(rng.normal(size=(900, 3)))
     side = normalise(np.cross(left, rng.normal(size=(900, 3))))
     angle = np.radians(np.repeat([89.9, 90, 180], 300))[:, np.newaxis]
-    wide = (left, left * np.cos(angle) + side * np.sin(angle))
+    out_of_range = (left, left * np.cos(angle) + side * np.sin(angle))
     for scale in (1 - 1 / 256, 1 + 1 / 256):
         not_lit, _ = suppressed(
-            "cosquad", *(codes_of(n * scale) for n in wide), quantise(left), np.full(900, 3), exponent
+            "cosquad", *(codes_of(n * scale) for n in out_of_range), quantise(left), np.full(900, 3), exponent
         )
         assert not not_lit.any()
 
@@ -515,7 +518,7 @@ def test_stiff_normals_too_long(model, exponent):
 
     Where the middle normal saturates, the three wide models with the lowest threshold over 0 suffer first.
     """
-    threshold = np.sqrt(HighlightGate(Specular(model)).thresholds.values[exponent])
+    threshold = np.sqrt(HighlightGate(Specular(REFLECTION_MODELS[model])).thresholds.values[exponent])
     assert 0 < threshold < 0.07
     rng = np.random.default_rng(12)
     for excess, safe in ((1 / 256, True), (1 / 128, True), (1 / 16, False)):

@@ -121,5 +121,5 @@ def test_clocks_of_the_compact_style():
     """Three for each term that is not 0, three for a pixel without any; by hand."""
     diffuse = Fixed(TERM, [[0, 0], [0, 0], [1, 0], [1, 0], [7, TERM.max_code], [0, 0]])
     specular = Fixed(TERM, [[0, 0], [0, 5], [0, 0], [1, 0], [3, TERM.max_code], [2, 2]])
-    assert Intensity().clocks(diffuse, specular).tolist() == [3, 3, 3, 6, 12, 6]
-    assert Intensity(channels=1).clocks(diffuse, specular).tolist() == [1, 1, 1, 2, 4, 2]
+    assert Intensity().cycles(diffuse, specular).tolist() == [3, 3, 3, 6, 12, 6]
+    assert Intensity(channels=1).cycles(diffuse, specular).tolist() == [1, 1, 1, 2, 4, 2]

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from blysk.golden.lighting.power import Power
-from blysk.golden.lighting.specular import SPECULAR_MODELS, Specular
+from blysk.golden.lighting.specular import Specular
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.unit_vector import ONE_SQUARED
-from blysk.golden.reference.reflection import reflect
+from blysk.golden.reference.reflection import REFLECTION_MODELS
+
+from ...lists import SPECULAR_MODELS
 
 EXPONENTS = (1, 2, 3, 10, 100, 500, 1000)
 
@@ -98,7 +100,7 @@ def test_stiff_exponents(exponent):
     """Over the half sphere, the bound of a cosine; at the peak, and past it by rounding, 1 to a step."""
     unit, one = Power(), ONE_SQUARED.codes.item()
     codes = np.unique(np.r_[np.linspace(0, one, 5000), one - np.geomspace(1, one, 5000)].astype(np.int64))
-    ideal = reflect("blinn", codes / one, exponent)
+    ideal = REFLECTION_MODELS["blinn"].reflect(codes / one, exponent)
     assert np.abs(shade(unit, codes, exponent).values - ideal).max() <= Power.ERROR + 2.0**-16
     assert (shade(unit, [one, one + 1, one + 2**20], exponent).codes == 2**17 - 1).all()
 
@@ -127,7 +129,7 @@ def test_stiff_normals_of_wrong_length():
         codes = np.rint(length * one * np.cos(np.linspace(0, np.pi / 2, 2000))).astype(np.int64)
         for exponent in EXPONENTS:
             found = shade(unit, codes, exponent).values
-            ideal = reflect("blinn", codes / one, exponent)
+            ideal = REFLECTION_MODELS["blinn"].reflect(codes / one, exponent)
             assert np.abs(found - ideal).max() <= Power.ERROR + 2.0**-16
     peak = shade(unit, np.rint(one * (1 - 1 / 256)).astype(np.int64), 1000).values
     assert peak == pytest.approx(0.01996, abs=2e-4)
@@ -151,7 +153,7 @@ def test_nearer_to_blinn_than_the_approximations():
     codes = ONE_SQUARED.codes - (np.linspace(0, 0.12, 5000) * 2.0**34).astype(np.int64)
     ideal = exact(1 - codes / ONE_SQUARED.codes, 100)
     off = {
-        model: np.abs(shade(Specular(model), codes, 100).values - ideal).max()
+        model: np.abs(shade(Specular(REFLECTION_MODELS[model]), codes, 100).values - ideal).max()
         for model in (*SPECULAR_MODELS, "lyon3_refitted", "exp")
     }
     assert 50 * np.abs(shade(Power(), codes, 100).values - ideal).max() < min(off.values())

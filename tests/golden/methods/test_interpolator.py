@@ -13,7 +13,7 @@ from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
-from blysk.golden.pipeline import METHODS
+from blysk.golden.presets import METHODS
 from blysk.golden.reference.curves import CURVES, interpolate
 
 STEP = 2.0**-17
@@ -75,8 +75,8 @@ def test_formats(method, normal_pairs):
     assert operands.highlight.format == Specular(operand=interpolator.operand).operand_format
     shape = (length.sum(), 3)
     assert (operands.cosine.codes.shape, operands.highlight.codes.shape) == (shape, shape)
-    assert operands.wide.shape == (50,)
-    assert not operands.wide.any()
+    assert operands.out_of_range.shape == (50,)
+    assert not operands.out_of_range.any()
 
 
 @pytest.mark.parametrize("method", NORMAL_STEPS)
@@ -85,10 +85,10 @@ def test_normals(method, normal_pairs):
     rng = np.random.default_rng(2)
     interpolator = METHODS[method]
     left, right, length = spans(rng, normal_pairs)
-    normals, wide = interpolator.normals(
+    normals, out_of_range = interpolator.normals(
         Fixed(COMPONENT, quantise(left)), Fixed(COMPONENT, quantise(right)), length
     )
-    assert not wide.any()
+    assert not out_of_range.any()
     span, t = places(length)
     exact = interpolator.exact_normals(left[span], right[span], t)
     error = np.abs(normals.codes / ONE - exact).max() / STEP
@@ -175,7 +175,7 @@ def test_stiff_equal_normals(method, length, normal_pairs):
     left, _ = normal_pairs(rng, 3, 0.0)
     lengths = np.full(3, length)
     operands = compute(METHODS[method], left, left, lengths, *vectors(rng, normal_pairs, 1))
-    assert not operands.wide.any()
+    assert not operands.out_of_range.any()
     for values in (operands.cosine, operands.highlight):
         values = values.codes.reshape(3, length)
         np.testing.assert_array_equal(values, values[:, :1].repeat(length, axis=1))
@@ -208,7 +208,7 @@ def test_widest_span():
 
 
 @pytest.mark.parametrize(
-    ("method", "narrow", "wide"),
+    ("method", "narrow", "out_of_range"),
     [
         ("bisection", 89.99, 90.1),
         ("quadratic", 44.99, 45.1),
@@ -216,12 +216,12 @@ def test_widest_span():
         ("recurrence", 89.98, 90.1),
     ],
 )
-def test_flag(method, narrow, wide, normal_pairs):
+def test_flag(method, narrow, out_of_range, normal_pairs):
     rng = np.random.default_rng(8)
-    for angle, flagged in ((narrow, False), (wide, True)):
+    for angle, flagged in ((narrow, False), (out_of_range, True)):
         left, right = normal_pairs(rng, 200, angle)
         operands = compute(METHODS[method], left, right, np.full(200, 2), *vectors(rng, normal_pairs, 1))
-        assert (operands.wide == flagged).all()
+        assert (operands.out_of_range == flagged).all()
 
 
 @pytest.mark.parametrize("method", ["linear", "renormalise"])
@@ -232,14 +232,14 @@ def test_flag_of_linear_normals(method, normal_pairs):
     operands = compute(METHODS[method], left, right, np.full(2000, 2), *vectors(rng, normal_pairs, 1))
     difference = quantise(right) - quantise(left)
     far = np.any((difference < COMPONENT.min_code) | (difference > COMPONENT.max_code), axis=1)
-    np.testing.assert_array_equal(operands.wide, far)
+    np.testing.assert_array_equal(operands.out_of_range, far)
     assert 300 < np.count_nonzero(far) < 1700
 
 
 def test_flag_of_opposite_normals():
     x = np.array([[1.0, 0, 0]])
     operands = compute(METHODS["angular"], x, -x, np.array([3]), x, x)
-    assert operands.wide.tolist() == [True]
+    assert operands.out_of_range.tolist() == [True]
 
 
 def test_refuses():

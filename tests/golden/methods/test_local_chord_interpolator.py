@@ -9,9 +9,9 @@ from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
 from blysk.golden.number.fixed import SQ
 from blysk.golden.number.unit_vector import ONE, ONE_SQUARED
-from blysk.golden.pipeline import MODELS
+from blysk.golden.presets import MODELS
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.reflection import reflect
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 
 ONE_VALUE = float(ONE_SQUARED.values)
 METHOD = LocalChordInterpolator()
@@ -71,8 +71,8 @@ def test_operands():
     values = surface.values()
     operands = METHOD.compute_values(values, length)
     # A light nearly opposite to the viewer turns H a great deal.
-    assert operands.wide.mean() < 0.01
-    kept = ~operands.wide[pixels_of(length)[0]]
+    assert operands.out_of_range.mean() < 0.01
+    kept = ~operands.out_of_range[pixels_of(length)[0]]
     assert operands.cosine.format == METHOD.COSINE_FORMAT == SQ(2, 25)
     assert operands.highlight.format == Specular(operand=METHOD.operand).operand_format
     assert operands.cosine.codes.shape == operands.highlight.codes.shape == (length.sum(), 2)
@@ -114,7 +114,7 @@ def test_stiff_equal_values(length):
     diffuse[:2], highlight[:2] = [[[-1.0]], [[1.0]]], [[[0.0]], [[2.0]]]
     values = SpanValues.quantise(diffuse.repeat(3, axis=2), highlight.repeat(3, axis=2))
     operands = METHOD.compute_values(values, np.full(40, length))
-    assert not operands.wide.any()
+    assert not operands.out_of_range.any()
     for operand, codes in ((operands.cosine, values.diffuse), (operands.highlight, values.highlight / 2)):
         found = operand.codes.reshape(40, length, 2)
         np.testing.assert_array_equal(found, np.repeat(np.floor(codes[:, None, :, 0] + 0.5), length, axis=1))
@@ -140,7 +140,7 @@ def test_highlight_tolerance(model):
         worst = 0.0
         for end in (2.0, min(2.0, 12 / n)):
             u = np.linspace(0, end, 20_001)
-            slope = np.abs(np.diff(reflect(model, 1 - u, n)) / np.diff(u))
+            slope = np.abs(np.diff(REFLECTION_MODELS[model].reflect(1 - u, n)) / np.diff(u))
             worst = max(worst, (255 * slope * METHOD.highlight_tolerance(n, u[:-1])).max())
         assert worst <= METHOD.HIGHLIGHT_BUDGET * (1.6 if n == 1 else 1.25)
         assert worst >= METHOD.HIGHLIGHT_BUDGET * 0.75
@@ -165,7 +165,7 @@ def test_is_lit(model):
         u = np.linspace(0, 2, 20_001)
         dark = ~METHOD.is_lit(n, u)
         assert dark.any() == (n > 4)
-        assert (255 * reflect(model, 1 - u[dark], n)).max(initial=0) <= 0.25
+        assert (255 * REFLECTION_MODELS[model].reflect(1 - u[dark], n)).max(initial=0) <= 0.25
 
 
 @pytest.mark.parametrize("opposite", [False, True])
@@ -195,14 +195,14 @@ def test_total_error(exponent, opposite):
     good &= (miss_of_f <= METHOD.diffuse_tolerance).all(axis=1)
     length = rng.integers(4, 100, count)
     operands = METHOD.compute_values(values, length)
-    good &= ~operands.wide
+    good &= ~operands.out_of_range
     assert np.count_nonzero(good) > count // 20
     of_pixel, step = pixels_of(length)
     exact_f, exact_u = surface.at(of_pixel, step / (length - 1)[of_pixel])
     kept = good[of_pixel]
     diffuse = 255 * np.abs(operands.cosine.values / ONE_VALUE - exact_f)[kept]
     terms = [
-        reflect("cosquad", 1 - value, exponent)[kept]
+        REFLECTION_MODELS["cosquad"].reflect(1 - value, exponent)[kept]
         for value in (operands.highlight.values / ONE_VALUE, exact_u)
     ]
     specular = 255 * np.abs(terms[0] - terms[1])

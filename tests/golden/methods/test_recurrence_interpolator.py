@@ -42,7 +42,7 @@ def test_operands_keep_the_bound(normal_pairs, lights):
     interpolator = RecurrenceInterpolator()
     worst, found = errors(interpolator, left, right, length, direction, halfway)
     assert found.cosine.shape == found.highlight.shape == (length.sum(), lights)
-    assert not found.wide.any()
+    assert not found.out_of_range.any()
     # The curve follows the codes' lengths, which are off by up to 2^-17 or so, and so does the angle.
     assert np.all(worst <= interpolator.setup.error(length, np.radians(degrees)) + 2.0**-16)
 
@@ -60,7 +60,7 @@ def test_spans_do_not_depend_on_each_other(normal_pairs):
         pixels = slice(ends[k] - length[k], ends[k])
         np.testing.assert_array_equal(single.cosine.codes, whole.cosine.codes[pixels])
         np.testing.assert_array_equal(single.highlight.codes, whole.highlight.codes[pixels])
-        assert single.wide == whole.wide[k]
+        assert single.out_of_range == whole.out_of_range[k]
 
 
 def test_agrees_with_the_angular_method(normal_pairs):
@@ -97,7 +97,7 @@ def test_wide_spans_are_flagged(normal_pairs):
     left, right = (quantise(v) for v in normal_pairs(rng, 5, [0, 45, 89.99, 90.02, 180]))
     vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
     found = operands_of(RecurrenceInterpolator(), left, right, np.full(5, 3), *vectors)
-    np.testing.assert_array_equal(found.wide, [False, False, False, True, True])
+    np.testing.assert_array_equal(found.out_of_range, [False, False, False, True, True])
 
 
 def test_refuses_a_form():

@@ -15,7 +15,7 @@ from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
-from blysk.golden.pipeline import METHODS
+from blysk.golden.presets import METHODS
 from blysk.golden.reference.curves import interpolate
 
 STEP = COMPONENT.step
@@ -80,7 +80,7 @@ def test_stiff_peak(method, length, pixel, degrees):
         ends, halfway = turned(rng, degrees, pixel / (length - 1), off)
         cosine, highlight, found = operands(method, *ends, lengths, halfway)
         exact = reference(method, *ends, lengths, halfway[np.newaxis])
-        assert not found.wide.any()
+        assert not found.out_of_range.any()
         assert np.abs(cosine - exact).max() <= largest
         assert np.abs(highlight - np.clip(exact, -1, 1)).max() <= largest + 2.0**-25
         # Around the peak the curve is even: two pixels as far from it on either side are alike.
@@ -184,7 +184,7 @@ def test_stiff_normals_of_wrong_length(method, scales, normal_pairs):
     largest = bound(method, 9, 44) * (1 + 1 / 256)
     if method == "bisection":
         largest += 1 / 256
-    assert not found.wide.any()
+    assert not found.out_of_range.any()
     # 1 - cos gamma has a word from 0 to 2. The angular method has it of L too.
     held = exact if method in NORMALS else np.clip(exact, -1, 1)
     assert np.abs(cosine - (held if method == "angular" else exact)).max() <= largest
@@ -204,7 +204,7 @@ def span_errors(method, left, right, vector):
     exact = reference(method, left, right, length, vector[np.newaxis].repeat(len(left), 0))
     if method == "angular":
         exact = np.clip(exact, -1, 1)
-    return np.abs(cosine - exact).reshape(-1, 9).max(axis=1), found.wide
+    return np.abs(cosine - exact).reshape(-1, 9).max(axis=1), found.out_of_range
 
 
 @pytest.mark.parametrize("method", NAMES)
@@ -214,14 +214,14 @@ def test_stiff_axes_at_the_ends_of_the_words(method):
     left, right = pairs_of(axes)
     cosine = (left * right).sum(axis=1)
     for vector in quantise(np.array([[0.48, 0.6, 0.64], [0.8, 0.0, -0.6], [0.0, 1.0, 0.0]])):
-        error, wide = span_errors(method, left, right, vector)
+        error, out_of_range = span_errors(method, left, right, vector)
         # The smallest code is a step longer than the code of length 1.
-        assert (error[~wide] <= bound(method, 9, 90) + STEP).all()
-        assert not wide[cosine > 0].any()
-        assert wide[cosine < 0].all()
+        assert (error[~out_of_range] <= bound(method, 9, 90) + STEP).all()
+        assert not out_of_range[cosine > 0].any()
+        assert out_of_range[cosine < 0].all()
         # Of the straight lines, a difference by the smallest code saturates.
         if method not in ("linear", "renormalise"):
-            assert (wide[cosine == 0] == method.startswith("quadratic")).all()
+            assert (out_of_range[cosine == 0] == method.startswith("quadratic")).all()
 
 
 @pytest.mark.parametrize("method", ["linear", "renormalise", "recurrence"])
@@ -234,11 +234,11 @@ def test_stiff_words_at_their_ends(method):
     left, right = pairs_of(np.stack(np.meshgrid(codes, codes, codes), axis=-1).reshape(-1, 3))
     flagged = 0
     for vector in quantise(np.array([[0.48, 0.6, 0.64], [0.8, 0.0, -0.6], [0.6, -0.8, 0.0]])):
-        error, wide = span_errors(method, left, right, vector)
+        error, out_of_range = span_errors(method, left, right, vector)
         # P is up to sqrt 3 long, so 1/(m-1) counts so often.
         largest = bound(method, 9, 90) + (method != "recurrence") * 2 * STEP
-        assert (error[~wide] <= largest).all()
-        flagged += np.count_nonzero(wide)
+        assert (error[~out_of_range] <= largest).all()
+        flagged += np.count_nonzero(out_of_range)
     assert 0.3 < flagged / (3 * len(left)) < 0.99
 
 
@@ -264,8 +264,8 @@ def test_stiff_long_normals(method, lost):
         # A chord of 2 has no angle.
         near &= np.square(right - left).sum(axis=1) * STEP**2 < 3.5
     vector = quantise(np.array([[0.48, 0.6, 0.64]]))[0]
-    error, wide = span_errors(method, left[near], right[near], vector)
-    assert not wide.any()
+    error, out_of_range = span_errors(method, left[near], right[near], vector)
+    assert not out_of_range.any()
     assert error.max() > lost
 
 
@@ -282,7 +282,9 @@ def test_stiff_flag_of_renormalised_normals(normal_pairs):
         for end, scale in zip((left, right), scales, strict=True)
     )
     length = rng.integers(1, 40, 4000)
-    normals, wide = METHODS["renormalise"].normals(*(Fixed(COMPONENT, v) for v in (left, right)), length)
+    normals, out_of_range = METHODS["renormalise"].normals(
+        *(Fixed(COMPONENT, v) for v in (left, right)), length
+    )
     span, index = pixels_of(length)
     t = index / np.maximum(length - 1, 1)[span]
     line = interpolate("linear", left[span] * STEP, right[span] * STEP, t)
@@ -296,11 +298,11 @@ def test_stiff_flag_of_renormalised_normals(normal_pairs):
     by_pixels = np.bincount(span, out, minlength=4000) > 0
     unsure = np.bincount(span, near, minlength=4000) > 0
     sure = ~unsure | far
-    np.testing.assert_array_equal(wide[sure], (far | by_pixels)[sure])
+    np.testing.assert_array_equal(out_of_range[sure], (far | by_pixels)[sure])
     assert np.count_nonzero(far & ~by_pixels) > 20
     assert np.count_nonzero(by_pixels & ~far) > 500
-    assert np.count_nonzero(~wide) > 500
-    served = ~wide[span]
+    assert np.count_nonzero(~out_of_range) > 500
+    served = ~out_of_range[span]
     exact = line / np.sqrt(square)[:, np.newaxis]
     distance = np.linalg.norm(normals.codes / ONE - exact, axis=1)[served].max()
     # Ends up to 94 degrees apart and down to 0.685 long.

@@ -43,8 +43,8 @@ def test_error_under_its_bound(normal_pairs, parameters, first_step):
     low, high = (45.01, 90) if first_step and parameters.bisection.max_angle == 90 else (0.01, 44.99)
     lengths = np.tile(LENGTHS, 12)
     angles = np.random.default_rng(1).uniform(low, high, len(lengths))
-    left, right, span, pixel, normal, wide, levels = run(parameters, normal_pairs, 2, angles, lengths)
-    assert not wide.any()
+    left, right, span, pixel, normal, out_of_range, levels = run(parameters, normal_pairs, 2, angles, lengths)
+    assert not out_of_range.any()
     t = pixel / np.maximum(lengths - 1, 1)[span]
     exact = lines(left[span] / ONE, right[span] / ONE, levels[span], t) * (ONE * COMPONENT.step)
     error = np.abs(normal.values - exact).max(axis=1)
@@ -58,8 +58,8 @@ def test_error_under_its_bound(normal_pairs, parameters, first_step):
 def test_length_and_direction_keep_their_word(normal_pairs, parameters):
     lengths = np.full(300, 1000)
     angles = np.random.default_rng(3).uniform(0, parameters.bisection.max_angle - 0.01, 300)
-    left, right, span, pixel, normal, wide, levels = run(parameters, normal_pairs, 4, angles, lengths)
-    assert not wide.any()
+    left, right, span, pixel, normal, out_of_range, levels = run(parameters, normal_pairs, 4, angles, lengths)
+    assert not out_of_range.any()
     vectors = normal.values / (ONE * COMPONENT.step)
     length = np.linalg.norm(vectors, axis=1)
     # Three components off by the arithmetic error, and the code vectors at the ends by their own rounding.
@@ -78,8 +78,8 @@ def test_levels_are_the_fewest(normal_pairs, threshold):
     parameters = AdaptiveNormaliser(threshold)
     angles = np.random.default_rng(5).uniform(0, 89.99, 40_000)
     left, right = (quantise(normals) for normals in normal_pairs(np.random.default_rng(6), 40_000, angles))
-    _, u, wide = parameters.bisection.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
-    levels = parameters.levels(u, wide)
+    _, u, out_of_range = parameters.bisection.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    levels = parameters.levels(u, out_of_range)
 
     def sagitta(k):
         return 1 - np.cos(np.radians(angles) / 2.0 ** (k + 1))
@@ -109,8 +109,8 @@ def test_sagitta_is_never_under():
 def test_stiff_ends_are_exact(normal_pairs, angle):
     lengths = np.r_[np.arange(1, 70), 127, 128, 129, 255, 256, 257, 1023, 1024, 1025, 4093, 4094, 4095]
     for parameters in (AdaptiveNormaliser(), AdaptiveNormaliser(2.0**-14)):
-        left, right, _, _, normal, wide, _ = run(parameters, normal_pairs, 7, angle, lengths)
-        assert not wide.any()
+        left, right, _, _, normal, out_of_range, _ = run(parameters, normal_pairs, 7, angle, lengths)
+        assert not out_of_range.any()
         last = np.cumsum(lengths) - 1
         np.testing.assert_array_equal(normal.codes[last - lengths + 1], left)
         np.testing.assert_array_equal(normal.codes[last][lengths > 1], right[lengths > 1])
@@ -120,8 +120,8 @@ def test_stiff_equal_normals_stay():
     axes = np.vstack([np.eye(3), -np.eye(3)]).astype(np.int64) * ONE
     lengths = np.array([1, 2, 3, 16, 4095, 100])
     ends = Fixed(COMPONENT, axes)
-    normal, wide, levels = AdaptiveNormaliser().compute(ends, ends, lengths)
-    assert not wide.any()
+    normal, out_of_range, levels = AdaptiveNormaliser().compute(ends, ends, lengths)
+    assert not out_of_range.any()
     assert not levels.any()
     np.testing.assert_array_equal(normal.codes, np.repeat(axes, lengths, axis=0))
 
@@ -151,10 +151,10 @@ def test_what_the_documented_extrapolation_costs(degrees, miss, length):
 
 @pytest.mark.parametrize("angle", [90.01, 120, 180])
 def test_stiff_too_wide_is_flagged(normal_pairs, angle):
-    left, right, _, _, normal, wide, levels = run(
+    left, right, _, _, normal, out_of_range, levels = run(
         AdaptiveNormaliser(), normal_pairs, 8, angle, np.full(200, 33)
     )
-    assert wide.all()
+    assert out_of_range.all()
     assert not levels.any()
     np.testing.assert_array_equal(normal.codes[::33], left)
     np.testing.assert_array_equal(normal.codes[32::33], right)
@@ -201,14 +201,14 @@ def test_stiff_normals_of_no_unit_length(normal_pairs):
     scaled = [[np.rint(v * (1 - 1 / 256) * ONE) for v in (left, right)], np.zeros((2, 300, 3)), corners]
     for ends in scaled:
         before, after = (Fixed(COMPONENT, np.asarray(end).astype(np.int64)) for end in ends)
-        normal, wide, _ = parameters.compute(before, after, lengths)
+        normal, out_of_range, _ = parameters.compute(before, after, lengths)
         last = np.cumsum(lengths) - 1
         np.testing.assert_array_equal(normal.codes[last - lengths + 1], before.codes)
         np.testing.assert_array_equal(normal.codes[last], after.codes)
     # Of the short ones, which are not wide, every normal is as short as they are, and by its sagitta.
     before, after = (Fixed(COMPONENT, end.astype(np.int64)) for end in scaled[0])
-    normal, wide, _ = parameters.compute(before, after, lengths)
-    assert not wide.any()
+    normal, out_of_range, _ = parameters.compute(before, after, lengths)
+    assert not out_of_range.any()
     size = np.linalg.norm(normal.values, axis=1)
     assert 1 - 3 / 256 < size.min() < 1 - 1 / 256
 

@@ -11,20 +11,20 @@ from blysk.golden.number.polynomials import half_angle_factor, largest_error, mi
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 
 VARIANTS = [
-    Bisection(degree, max_angle, as_documented)
+    Bisection(degree, max_angle, as_published)
     for degree in (1, 2)
     for max_angle in (45, 90)
-    for as_documented in (False, True)
+    for as_published in (False, True)
 ]
 
 
 def bisect(parameters, left, right):
     """Result of the twin and the exact middle of the same two code vectors, in units of the word."""
-    middle, u, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    middle, u, out_of_range = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
     a, b = left / ONE, right / ONE
     r = np.einsum("ij,ij->i", a, b)
     exact = (a + b) / np.sqrt(2 + 2 * r)[:, np.newaxis] * (ONE * COMPONENT.step)
-    return middle, u, wide, exact, r
+    return middle, u, out_of_range, exact, r
 
 
 def codes(normal_pairs, seed, angles):
@@ -50,8 +50,8 @@ def test_error_under_its_bound(normal_pairs, parameters, first_step):
     # Along an axis both components of a sum are as large as they get.
     left[:20] = [0, 0, ONE]
     right[:20] = left[:20] if not first_step else [0, ONE, 0]
-    middle, _, wide, exact, _ = bisect(parameters, left, right)
-    assert not wide.any()
+    middle, _, out_of_range, exact, _ = bisect(parameters, left, right)
+    assert not out_of_range.any()
     worst = np.abs(middle.values - exact).max()
     bound = parameters.error(first_step)
     assert worst <= bound
@@ -59,7 +59,7 @@ def test_error_under_its_bound(normal_pairs, parameters, first_step):
     assert worst >= bound / 2.5
 
 
-@pytest.mark.parametrize("parameters", [Bisection(), Bisection(as_documented=True)], ids=str)
+@pytest.mark.parametrize("parameters", [Bisection(), Bisection(as_published=True)], ids=str)
 @pytest.mark.parametrize("first_step", [False, True])
 def test_arithmetic_error_under_its_bound(normal_pairs, parameters, first_step):
     low, high = (45.01, 90) if first_step else (0, 44.99)
@@ -92,8 +92,8 @@ def test_direction_is_exact(normal_pairs):
 @pytest.mark.parametrize("degree", [1, 2])
 def test_equal_normals_stay(normal_pairs, degree):
     left, _ = codes(normal_pairs, 9, np.zeros(20_000))
-    middle, u, wide = Bisection(degree).compute(Fixed(COMPONENT, left), Fixed(COMPONENT, left))
-    assert not wide.any()
+    middle, u, out_of_range = Bisection(degree).compute(Fixed(COMPONENT, left), Fixed(COMPONENT, left))
+    assert not out_of_range.any()
     # The length of a code vector is off by rounding, and the unit corrects it where it can.
     assert np.abs(u.codes).max() <= 2
     assert np.abs(middle.codes - left).max() <= 1
@@ -103,12 +103,12 @@ def test_equal_normals_stay(normal_pairs, degree):
     assert not u.codes.any()
 
 
-@pytest.mark.parametrize("parameters", [Bisection(), Bisection(1), Bisection(as_documented=True)], ids=str)
+@pytest.mark.parametrize("parameters", [Bisection(), Bisection(1), Bisection(as_published=True)], ids=str)
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 44.9, 45, 45.1, 89.9, 90])
 def test_stiff_angles_within_the_bound(normal_pairs, parameters, angle):
     left, right = codes(normal_pairs, 11, np.full(4000, angle))
-    middle, _, wide, exact, _ = bisect(parameters, left, right)
-    assert not wide.any()
+    middle, _, out_of_range, exact, _ = bisect(parameters, left, right)
+    assert not out_of_range.any()
     # At 45 degrees the rounding of the normals decides which polynomial is taken.
     steps = {angle > 45, angle >= 45}
     assert np.abs(middle.values - exact).max() <= max(parameters.error(step) for step in steps)
@@ -127,8 +127,8 @@ def test_stiff_lengths_of_the_ends(normal_pairs, degree, angle, excess):
     left, right = (np.rint(n * (1 + excess) * ONE).astype(np.int64) for n in (left, right))
     kept = (np.abs(left) <= ONE).all(axis=1) & (np.abs(right) <= ONE).all(axis=1)
     left, right = left[kept], right[kept]
-    middle, _, wide, exact, _ = bisect(parameters, left, right)
-    assert not wide.any()
+    middle, _, out_of_range, exact, _ = bisect(parameters, left, right)
+    assert not out_of_range.any()
     assert np.abs(middle.values - np.clip(exact, -1, ONE * COMPONENT.step)).max() <= parameters.error(False)
     # Of (1 + x)^2 cos(psi/2)^2 in place of cos(psi/2)^2 under the root: x / (1 + r) at first order.
     inside = np.all(np.abs(middle.codes) < ONE, axis=1)
@@ -143,8 +143,8 @@ def test_stiff_normals_of_length_zero(normal_pairs):
     (left, _), zero = codes(normal_pairs, 13, np.zeros(2000)), np.zeros((2000, 3), dtype=np.int64)
     for a, b in ((left, zero), (zero, left), (zero, zero)):
         assert bisect(Bisection(2, 45), a, b)[2].all()
-        middle, u, wide, exact, _ = bisect(Bisection(), a, b)
-        assert not wide.any()
+        middle, u, out_of_range, exact, _ = bisect(Bisection(), a, b)
+        assert not out_of_range.any()
         assert np.all(u.codes == Bisection.ONE.codes)
         assert np.abs(middle.values - exact).max() <= Bisection().error(True)
 
@@ -155,10 +155,10 @@ def test_stiff_every_code_without_silent_wrap(parameters):
     ends = [COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1]
     corners = np.stack(np.meshgrid(*[ends] * 6), axis=-1).reshape(-1, 6)
     left, right = corners[:, :3], corners[:, 3:]
-    middle, _, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    middle, _, out_of_range = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
     dot = (left * right).sum(axis=1) / ONE**2
-    np.testing.assert_array_equal(wide, dot < np.cos(np.radians(parameters.max_angle)) - 1e-3)
-    total, found = (left + right)[~wide], middle.codes[~wide]
+    np.testing.assert_array_equal(out_of_range, dot < np.cos(np.radians(parameters.max_angle)) - 1e-3)
+    total, found = (left + right)[~out_of_range], middle.codes[~out_of_range]
     low, high = np.minimum(0.25 * total, 0.75 * total) - 1, np.maximum(0.25 * total, 0.75 * total) + 1
     low, high = np.minimum(low, COMPONENT.max_code), np.maximum(high, COMPONENT.min_code)
     assert np.all((low <= found) & (found <= high))
@@ -166,7 +166,7 @@ def test_stiff_every_code_without_silent_wrap(parameters):
 
 def test_documented_degree_two_shortens_a_flat_face():
     axis = Fixed(COMPONENT, np.array([[0, 0, ONE]]))
-    middle, _, _ = Bisection(as_documented=True).compute(axis, axis)
+    middle, _, _ = Bisection(as_published=True).compute(axis, axis)
     # 0.499 in place of 0.5.
     assert middle.codes[0, 2] / ONE == pytest.approx(0.998, abs=2e-5)
 
@@ -175,8 +175,8 @@ def test_documented_degree_two_shortens_a_flat_face():
 @pytest.mark.parametrize("max_angle", [45, 90])
 def test_stiff_angles_flag(normal_pairs, angle, max_angle):
     left, right = codes(normal_pairs, 10, np.full(3000, angle))
-    *_, wide = Bisection(2, max_angle).compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
-    assert np.all(wide == (angle > max_angle))
+    *_, out_of_range = Bisection(2, max_angle).compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    assert np.all(out_of_range == (angle > max_angle))
 
 
 @pytest.mark.parametrize(
@@ -186,9 +186,9 @@ def test_stiff_angles_flag(normal_pairs, angle, max_angle):
         (Bisection(2), False, "2.5e-05"),
         (Bisection(1), False, "8.3e-04"),
         (Bisection(2), True, "1.1e-04"),
-        (Bisection(1, as_documented=True), False, "1.1e-03"),
-        (Bisection(2, as_documented=True), False, "1.0e-03"),
-        (Bisection(2, as_documented=True), True, "6.2e-04"),
+        (Bisection(1, as_published=True), False, "1.1e-03"),
+        (Bisection(2, as_published=True), False, "1.0e-03"),
+        (Bisection(2, as_published=True), True, "6.2e-04"),
     ],
     ids=str,
 )

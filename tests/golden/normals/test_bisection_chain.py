@@ -29,7 +29,7 @@ def test_closed_form_is_the_great_circle(normal_pairs, level):
     )
 
 
-@pytest.mark.parametrize("bisection", [Bisection(), Bisection(1), Bisection(as_documented=True)], ids=str)
+@pytest.mark.parametrize("bisection", [Bisection(), Bisection(1), Bisection(as_published=True)], ids=str)
 @pytest.mark.parametrize("first_step", [False, True])
 def test_error_under_its_bound(normal_pairs, bisection, first_step):
     rng = np.random.default_rng(3)
@@ -40,10 +40,10 @@ def test_error_under_its_bound(normal_pairs, bisection, first_step):
     psi = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
     parameters = BisectionChain(bisection)
     for level in (1, 2, 3, 4, 6, 8, 15):
-        normal, wide = parameters.compute(
+        normal, out_of_range = parameters.compute(
             Fixed(COMPONENT, left), Fixed(COMPONENT, right), np.full(len(left), level)
         )
-        assert not wide.any()
+        assert not out_of_range.any()
         weight_l, weight_m = weights(psi, level)
         exact = (weight_l[:, np.newaxis] * a + b) / weight_m[:, np.newaxis] * (ONE * COMPONENT.step)
         worst = np.abs(normal.values - exact).max()
@@ -71,8 +71,10 @@ def test_error_statement(level, narrow, first):
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90, 90.01, 120, 180])
 def test_stiff_angles_flag(normal_pairs, angle):
     left, right = (quantise(normals) for normals in normal_pairs(np.random.default_rng(5), 1000, angle))
-    _, wide = BisectionChain().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right), np.full(1000, 3))
-    assert np.all(wide == (angle > 90))
+    _, out_of_range = BisectionChain().compute(
+        Fixed(COMPONENT, left), Fixed(COMPONENT, right), np.full(1000, 3)
+    )
+    assert np.all(out_of_range == (angle > 90))
 
 
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 44.9, 45, 45.1, 89.9, 90])
@@ -83,10 +85,10 @@ def test_stiff_angles_within_the_bound(normal_pairs, angle):
     psi = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
     chain = BisectionChain()
     for level in range(1, 16):
-        normal, wide = chain.compute(
+        normal, out_of_range = chain.compute(
             Fixed(COMPONENT, left), Fixed(COMPONENT, right), np.full(len(left), level)
         )
-        assert not wide.any()
+        assert not out_of_range.any()
         weight_l, weight_m = weights(psi, level)
         exact = (weight_l[:, np.newaxis] * a + b) / weight_m[:, np.newaxis] * (ONE * COMPONENT.step)
         # At 45 degrees the rounding of the normals decides which polynomial is taken.
@@ -110,10 +112,10 @@ def test_stiff_lengths_of_the_ends(normal_pairs, excess):
     left, right = left[kept], right[kept]
     for level in (1, 2, 5, 15):
         slack = np.sqrt(3) * (BisectionChain().error(level, False) + COMPONENT.step)
-        normal, wide = BisectionChain().compute(
+        normal, out_of_range = BisectionChain().compute(
             Fixed(COMPONENT, left), Fixed(COMPONENT, right), np.full(len(left), level)
         )
-        assert not wide.any()
+        assert not out_of_range.any()
         inside = np.all(np.abs(normal.codes) < ONE, axis=1)
         length = np.linalg.norm(normal.codes[inside], axis=1) / ONE
         assert np.abs(length - 1).max() <= abs(excess) + 2 * excess**2 + slack
@@ -126,8 +128,8 @@ def test_stiff_normals_of_length_zero(normal_pairs):
     for a, b in ((left, zero), (zero, left), (zero, zero)):
         operands = Fixed(COMPONENT, a), Fixed(COMPONENT, b), level
         assert BisectionChain(Bisection(2, 45)).compute(*operands)[1].all()
-        normal, wide = BisectionChain().compute(*operands)
-        assert not wide.any()
+        normal, out_of_range = BisectionChain().compute(*operands)
+        assert not out_of_range.any()
     assert not normal.codes.any()
 
 
@@ -137,17 +139,17 @@ def test_stiff_every_code_is_accepted():
     corners = np.stack(np.meshgrid(*[ends] * 6), axis=-1).reshape(-1, 6)
     left, right = corners[:, :3], corners[:, 3:]
     for level in (1, 3, 15):
-        normal, wide = BisectionChain().compute(
+        normal, out_of_range = BisectionChain().compute(
             Fixed(COMPONENT, left), Fixed(COMPONENT, right), np.full(len(left), level)
         )
         dot = (left * right).sum(axis=1) / ONE**2
-        np.testing.assert_array_equal(wide, dot < -1e-3)
+        np.testing.assert_array_equal(out_of_range, dot < -1e-3)
         # Where nothing is flagged, a normal is a sum of the ends with weights of 0 to 1 each.
         low = np.minimum(left, 0) + np.minimum(right, 0) - 2
         high = np.maximum(left, 0) + np.maximum(right, 0) + 2
         found = normal.codes
         inside = (low <= found) & (found <= high)
-        assert inside[~wide].all()
+        assert inside[~out_of_range].all()
 
 
 def test_refuses():

@@ -26,14 +26,14 @@ def whole_spans(rng, count, angle, length, normal_pairs):
     """Twins from the end normals to the pixels', and float64 normals of the same ends."""
     exact_left, exact_right = normal_pairs(rng, count, angle)
     left, right = Fixed(COMPONENT, quantise(exact_left)), Fixed(COMPONENT, quantise(exact_right))
-    middle, wide = MIDDLE.compute(left, right)
+    middle, out_of_range = MIDDLE.compute(left, right)
     g, p, q = GPQ().compute(left, middle, right)
     lengths = np.full(count, length)
     span, step = np.repeat(np.arange(count), length), np.tile(np.arange(length), count)
     normals = UNIT.compute(q, *DifferenceSetup().compute(g, p, lengths), span, step)
     t = step / max(length - 1, 1)
     exact = interpolate("quadratic", exact_left[span], exact_right[span], t) * (ONE / 2**17)
-    return normals, exact, wide, (left, right)
+    return normals, exact, out_of_range, (left, right)
 
 
 def test_stiff_closed_form_equals_the_recurrence_and_its_wraps():
@@ -116,8 +116,8 @@ def test_stiff_whole_spans(angle, length, normal_pairs):
     """
     rng = np.random.default_rng(length)
     count = max(20, 60_000 // length)
-    normals, exact, wide, (left, right) = whole_spans(rng, count, angle, length, normal_pairs)
-    assert not wide.any()
+    normals, exact, out_of_range, (left, right) = whole_spans(rng, count, angle, length, normal_pairs)
+    assert not out_of_range.any()
     half = np.radians(angle) / 2
     largest_g, largest_p = 4 * (1 - np.cos(half)), 2 * half * 1.06
     # 1/(2 cos) of both ends, and the change of h with r: sqrt(3) steps of each end along the other.
@@ -149,8 +149,8 @@ def test_lengths_of_the_normals(normal_pairs):
 def test_stiff_wide_spans_are_flagged_and_stay_in_their_words(normal_pairs):
     rng = np.random.default_rng(10)
     for angle in (45.01, 60, 89.9, 90, 135, 180):
-        normals, _, wide, _ = whole_spans(rng, 200, angle, 50, normal_pairs)
-        assert wide.all()
+        normals, _, out_of_range, _ = whole_spans(rng, 200, angle, 50, normal_pairs)
+        assert out_of_range.all()
         assert COMPONENT.min_code <= normals.codes.min() <= normals.codes.max() <= COMPONENT.max_code
 
 

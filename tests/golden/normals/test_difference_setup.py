@@ -153,7 +153,7 @@ def test_documented_order():
 
     For coefficients up to half of their words, where ``G dt + P`` does not saturate; every length.
     """
-    unit = DifferenceSetup(as_documented=True)
+    unit = DifferenceSetup(as_published=True)
     rng = np.random.default_rng(7)
     worst = 0
     for share in (0.5, 0.5, 0.5, 0.01):
@@ -172,7 +172,7 @@ def test_documented_order():
 
 def test_documented_order_saturates():
     """Slopes past the end of ``SQ(1, 17)``, at the ends of the words: clipped, never wrapped."""
-    unit = DifferenceSetup(as_documented=True)
+    unit = DifferenceSetup(as_published=True)
     ends = [
         (a, b) for a in (GPQ.G_FORMAT.min_code, 0, GPQ.G_FORMAT.max_code) for b in (-(2**17), 0, 2**17 - 1)
     ]

@@ -25,8 +25,8 @@ def exact(left, right):
 
 
 def largest(left, right):
-    middle, wide = compute(left, right)
-    assert not wide.any()
+    middle, out_of_range = compute(left, right)
+    assert not out_of_range.any()
     return np.abs(middle.values - exact(left, right)).max()
 
 
@@ -70,9 +70,9 @@ def test_equal_ends_give_that_normal_exactly():
     near = quantise(np.column_stack([near, np.sqrt(1 - (near**2).sum(axis=1))]))
     assert np.abs(np.linalg.norm(near, axis=1) - ONE).max() > 0.45
     for normals in (everywhere, near, -near, near[:, ::-1], np.eye(3, dtype=int) * ONE):
-        middle, wide = compute(normals, normals)
+        middle, out_of_range = compute(normals, normals)
         np.testing.assert_array_equal(middle.codes, 4 * normals)
-        assert not wide.any()
+        assert not out_of_range.any()
 
 
 def test_order_of_the_ends_does_not_matter(normal_pairs):
@@ -88,8 +88,8 @@ def test_stiff_angles_beyond_are_flagged(normal_pairs):
     rng = np.random.default_rng(4)
     for angle, flag in ((45.0, False), (45.01, True), (60, True), (89.9, True), (90, True), (180, True)):
         left, right = (quantise(normals) for normals in normal_pairs(rng, 50_000, angle))
-        middle, wide = compute(left, right)
-        assert (wide == flag).all()
+        middle, out_of_range = compute(left, right)
+        assert (out_of_range == flag).all()
         assert UNIT.FORMAT.min_code <= middle.codes.min() <= middle.codes.max() <= UNIT.FORMAT.max_code
     angles = rng.uniform(45.01, 180, 100_000)
     assert compute(*(quantise(normals) for normals in normal_pairs(rng, 100_000, angles)))[1].all()
@@ -111,10 +111,10 @@ def test_stiff_every_code_is_accepted():
     """Vectors that are no unit vectors give some number of the format, and a flag when far apart."""
     ends = [COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1]
     corners = np.stack(np.meshgrid(*[ends] * 6), axis=-1).reshape(-1, 6)
-    middle, wide = compute(corners[:, :3], corners[:, 3:])
+    middle, out_of_range = compute(corners[:, :3], corners[:, 3:])
     assert UNIT.FORMAT.min_code <= middle.codes.min() <= middle.codes.max() <= UNIT.FORMAT.max_code
     dot = (corners[:, :3] * corners[:, 3:]).sum(axis=1) / ONE**2
-    np.testing.assert_array_equal(wide, dot < np.cos(np.radians(45)) - 1e-3)
+    np.testing.assert_array_equal(out_of_range, dot < np.cos(np.radians(45)) - 1e-3)
 
 
 def test_coefficients_are_the_known_words():
@@ -134,8 +134,8 @@ def test_stiff_lengths_of_the_ends(angle, excess, normal_pairs):
     left, right = (n * (1 + excess) * ONE for n in normal_pairs(rng, 20_000, angle))
     kept = (np.abs(left) <= ONE).all(axis=1) & (np.abs(right) <= ONE).all(axis=1)
     left, right = (np.rint(n[kept]).astype(np.int64) for n in (left, right))
-    middle, wide = compute(left, right)
-    assert not wide.any()
+    middle, out_of_range = compute(left, right)
+    assert not out_of_range.any()
     r = np.einsum("ij,ij->i", left, right) / ONE**2
     exact = (left + right) / np.sqrt(2 * (1 + np.minimum(r, 1)))[:, np.newaxis] / 2**17
     # A middle longer than 1 saturates along an axis.
@@ -160,7 +160,7 @@ def test_stiff_normals_of_length_zero(normal_pairs):
     ("fit", "error", "relative"),
     [
         ("exact", "8.2e-07", "0.0002"),
-        ("as_documented", "4.9e-04", "0.0931"),
+        ("as_published", "4.9e-04", "0.0931"),
         ("minimax_2", "1.9e-03", "0.3834"),
         ("minimax_3", "2.9e-04", "0.0576"),
     ],
@@ -194,7 +194,7 @@ def test_published_polynomials():
     r = np.linspace(0, 1, 1001)
     one = float(ONE_SQUARED.values)
     for fit, coefficients in (
-        ("as_documented", printed),
+        ("as_published", printed),
         ("minimax_2", minimax(h, 0, 1, 2)),
         ("minimax_3", minimax(h, 0, 1, 3)),
     ):
@@ -213,8 +213,8 @@ def test_error_of_every_fit(fit, normal_pairs):
     left, right = (quantise(normals) for normals in normal_pairs(rng, len(angles), angles))
     # Along an axis a component of the sum is as large as it gets.
     left[:100, :] = right[:100, :] = [0, -ONE, 0]
-    middle, wide = compute(left, right, unit)
-    assert not wide.any()
+    middle, out_of_range = compute(left, right, unit)
+    assert not out_of_range.any()
     worst = np.abs(middle.values - exact(left, right)).max()
     assert unit.error / 3 < worst <= unit.error
     if fit == "exact":
@@ -224,7 +224,7 @@ def test_error_of_every_fit(fit, normal_pairs):
 def test_flat_faces_feel_the_plain_fit(normal_pairs):
     """The default and the printed polynomial keep a normal; the plain cubic makes it 0.06 % short."""
     normals = quantise(normal_pairs(np.random.default_rng(8), 20_000, 0)[0])
-    for fit in ("exact", "as_documented"):
+    for fit in ("exact", "as_published"):
         np.testing.assert_array_equal(compute(normals, normals, MiddleNormal(fit))[0].codes, 4 * normals)
     length = np.linalg.norm(normals, axis=1) * 4
     for fit, change in (("minimax_2", 3.83e-3), ("minimax_3", -5.76e-4)):
@@ -236,6 +236,6 @@ def test_flat_faces_feel_the_plain_fit(normal_pairs):
 
 
 def test_refuses_another_fit():
-    text = "fit must be one of exact, as_documented, minimax_2, minimax_3, not 'printed'"
+    text = "fit must be one of exact, as_published, minimax_2, minimax_3, not 'printed'"
     with pytest.raises(ValueError, match=f"^{re.escape(text)}$"):
         MiddleNormal("printed")

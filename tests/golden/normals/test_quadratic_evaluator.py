@@ -19,8 +19,8 @@ def curves(normal_pairs, seed, angles):
     """Ends and G, P, Q of spans, by the documented chain."""
     left, right = normal_pairs(np.random.default_rng(seed), len(angles), angles)
     left, right = (Fixed(COMPONENT, quantise(normals)) for normals in (left, right))
-    middle, wide = MiddleNormal().compute(left, right)
-    assert not wide.any()
+    middle, out_of_range = MiddleNormal().compute(left, right)
+    assert not out_of_range.any()
     return left, right, GPQ().compute(left, middle, right)
 
 
@@ -91,8 +91,8 @@ def test_stiff_wide_spans_stay_on_their_polynomial(normal_pairs, form, degrees):
     length = np.tile(STIFF_LENGTHS, 20)
     left, right = normal_pairs(np.random.default_rng(15), len(length), degrees)
     left, right = (Fixed(COMPONENT, quantise(normals)) for normals in (left, right))
-    middle, wide = MiddleNormal().compute(left, right)
-    assert wide.all()
+    middle, out_of_range = MiddleNormal().compute(left, right)
+    assert out_of_range.all()
     coefficients = GPQ().compute(left, middle, right)
     span, index = pixels(length)
     normals = QuadraticEvaluator(form).compute(*coefficients, length, span, index)
@@ -109,8 +109,8 @@ def test_stiff_error_that_a_wide_span_gets(normal_pairs, degrees, off):
     """The docstring's figures: P saturates from 53 degrees on, G from 57, and the curve misses its end."""
     left, right = normal_pairs(np.random.default_rng(17), 20_000, degrees)
     codes = [Fixed(COMPONENT, quantise(normals)) for normals in (left, right)]
-    middle, wide = MiddleNormal().compute(*codes)
-    assert wide.all()
+    middle, out_of_range = MiddleNormal().compute(*codes)
+    assert out_of_range.all()
     coefficients = GPQ().compute(codes[0], middle, codes[1])
     span, index = pixels(np.full(20_000, 5))
     normals = QuadraticEvaluator().compute(*coefficients, np.full(20_000, 5), span, index)

@@ -11,7 +11,7 @@ from blysk.golden.number.polynomials import (
     minimax_quantised,
     reciprocal_root,
 )
-from blysk.golden.reference.reflection import reflect
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 
 ROOT = np.sqrt(2)
 
@@ -180,7 +180,7 @@ def test_plain_fit_dims_flat_faces():
     """
     length = 2 * minimax(factor_of_cosine, 0, 1, 3).sum()
     assert f"{1 - length:.2%}" == "0.06%"
-    loss = [255 * (1 - float(reflect("cosquad", length, n))) for n in (100, 1000)]
+    loss = [255 * (1 - float(REFLECTION_MODELS["cosquad"].reflect(length, n))) for n in (100, 1000)]
     assert [f"{value:.1f}" for value in loss] == ["14.5", "125.8"]
 
 

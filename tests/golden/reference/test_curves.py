@@ -6,7 +6,7 @@ import pytest
 from blysk.golden.number.polynomials import half_angle_factor, minimax
 from blysk.golden.reference.curves import CURVES, interpolate
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.reflection import reflect
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 
 LEFT = np.array([0.0, 0.0, 1.0])
 T = np.linspace(0, 1, 20001)
@@ -127,7 +127,7 @@ def test_published_errors_of_the_chord(n, degrees, shown):
     and 12 of the chord beside them; ours are 4.5 and 14.
     """
     left, right, halfway = random_spans(degrees, 1, reach=2 / math.sqrt(n))
-    exact = reflect("cosquad", exact_cosines(left, right, halfway), n)
+    exact = REFLECTION_MODELS["cosquad"].reflect(exact_cosines(left, right, halfway), n)
     assert (exact > 0).mean() > 0.2
     a, b, h = rounded(left), rounded(right), rounded(halfway)
     middle = rounded(normalise(a + b))
@@ -173,7 +173,7 @@ def test_published_errors_of_the_diffuse_fit(degrees, shown, ours):
 def test_length_error_in_dot_product_and_chord():
     """chord.md: N (1 + e) puts the base off by ``n e/2`` with the dot, the chord by e^2 and e theta^2."""
     n, e = 1000, 1e-4
-    assert 1 - math.sqrt(reflect("cosquad", 1 - e, n)) == pytest.approx(0.05, rel=1e-9)
+    assert 1 - math.sqrt(REFLECTION_MODELS["cosquad"].reflect(1 - e, n)) == pytest.approx(0.05, rel=1e-9)
     left, _ = pair(30)
     for degrees in (0, 1, 3):
         normal = interpolate("slerp", *pair(30), degrees / 30)

@@ -13,7 +13,7 @@ from blysk.golden.reference.lighting import (
     intensity_of_cosines,
     saturate,
 )
-from blysk.golden.reference.reflection import REFLECTION_MODELS, reflect
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 
 V = np.array([0.0, 0.0, 1.0])
 
@@ -31,13 +31,13 @@ def test_worked_example():
     light = Light((1, 1, 1))
     # I_a = 0.2, I_d = 0.8, I_s = 1: one light has one color here, so I_d goes into k_d.
     material = Material(material.ambient, grey(0.7 * 0.8), material.specular, 10)
-    value = intensity(np.array([0.0, 0.0, 1.0]), material, [light], grey(0.2), V, "phong")
+    value = intensity(np.array([0.0, 0.0, 1.0]), material, [light], grey(0.2), V, REFLECTION_MODELS["phong"])
     assert value == pytest.approx(grey(0.345374), abs=0.5e-6)
     dark = Material(material.ambient, grey(0), grey(0.5), 10)
-    value = intensity(np.array([0.0, 0.0, 1.0]), dark, [light], grey(0.2), V, "phong")
+    value = intensity(np.array([0.0, 0.0, 1.0]), dark, [light], grey(0.2), V, REFLECTION_MODELS["phong"])
     assert value == pytest.approx(grey(0.02 + 0.002058), abs=0.5e-6)
     matt = Material(material.ambient, material.diffuse, grey(0), 10)
-    value = intensity(np.array([0.0, 0.0, 1.0]), matt, [light], grey(0.2), V, "phong")
+    value = intensity(np.array([0.0, 0.0, 1.0]), matt, [light], grey(0.2), V, REFLECTION_MODELS["phong"])
     assert value == pytest.approx(grey(0.02 + 0.323316), abs=0.5e-6)
     # [T] 4.1 prints 0.0015 and 0.3445: half of 0.003 for 0.577^10, and the diffuse term to three digits.
     assert f"{0.577350**10:.6f}" == "0.004115"
@@ -46,7 +46,7 @@ def test_worked_example():
 
 
 # The sum does not depend on the model; test_reflection.py holds each model to its formula.
-@pytest.mark.parametrize("model", REFLECTION_MODELS[:6])
+@pytest.mark.parametrize("model", list(REFLECTION_MODELS)[:6])
 def test_formula_channel_by_channel(model):
     n = 9
     slopes = {"cosquad": n / 2, "cosquad7": 7 * n / 16, "cosquad_lin": 0.448 * n + 0.099}
@@ -56,7 +56,7 @@ def test_formula_channel_by_channel(model):
     viewer = normalise([0.2, 0.3, 1])
     ambient = (0.3, 0.2, 0.1)
     normals = random_units(200, 2)
-    found = intensity(normals, material, lights, ambient, viewer, model)
+    found = intensity(normals, material, lights, ambient, viewer, REFLECTION_MODELS[model])
     lit = 0
     for normal, value in zip(normals.tolist(), found, strict=True):
         for channel in range(3):
@@ -84,7 +84,9 @@ def test_light_behind_gives_nothing(model):
     material = Material(grey(0.1), grey(0.7), grey(0.5), 1)
     # N·L = 0 exactly, and below: with exponent 1 the cosine N·H alone would give a highlight.
     for direction in ((1, 0, 0), (1, 0, -0.01)):
-        assert intensity(V, material, [Light(direction)], grey(1), V, model) == pytest.approx(grey(0.1))
+        assert intensity(
+            V, material, [Light(direction)], grey(1), V, REFLECTION_MODELS[model]
+        ) == pytest.approx(grey(0.1))
 
 
 @pytest.mark.parametrize("model", REFLECTION_MODELS)
@@ -94,7 +96,7 @@ def test_light_opposite_to_the_viewer_has_no_highlight(model):
     light = Light(-direction)
     assert (halfway_vector(light.direction, direction) == 0).all()
     normals = random_units(50, 3)
-    found = intensity(normals, material, [light], grey(1), direction, model)
+    found = intensity(normals, material, [light], grey(1), direction, REFLECTION_MODELS[model])
     expected = 0.1 + 0.7 * np.maximum(normals @ -direction, 0)
     assert found == pytest.approx(np.repeat(expected[:, np.newaxis], 3, axis=1), abs=1e-14)
 
@@ -106,7 +108,7 @@ def test_stiff_exponents(model, n):
     material = Material(grey(0), grey(0), grey(1), n)
     angle = np.linspace(0, np.pi / 2 - 1e-9, 2001)
     normals = np.stack((np.sin(angle), np.zeros_like(angle), np.cos(angle)), axis=1)
-    value = intensity(normals, material, [Light(V)], grey(0), V, model)[:, 0]
+    value = intensity(normals, material, [Light(V)], grey(0), V, REFLECTION_MODELS[model])[:, 0]
     assert value[0] == 1
     assert (np.diff(value) <= 0).all()
     assert np.isfinite(value).all()
@@ -127,11 +129,13 @@ def test_stiff_terminator(model):
     halfway = halfway_vector(light.direction, V)
     for tilt in (1e-3, 1e-9, 1e-15, 5e-324):
         normal = np.array([tilt, 0, 1.0])
-        value = intensity(normal, material, [light], grey(0), V, model)
-        shine = reflect(model, 2 * tilt - 0 if model == "phong" else normal @ halfway, 1)
+        value = intensity(normal, material, [light], grey(0), V, REFLECTION_MODELS[model])
+        shine = REFLECTION_MODELS[model].reflect(2 * tilt - 0 if model == "phong" else normal @ halfway, 1)
         assert value == pytest.approx(np.full(3, tilt + shine), rel=1e-12)
-        assert (intensity(normal * (-1, 1, 1), material, [light], grey(0), V, model) == 0).all()
-    assert (intensity(V, material, [light], grey(0), V, model) == 0).all()
+        assert (
+            intensity(normal * (-1, 1, 1), material, [light], grey(0), V, REFLECTION_MODELS[model]) == 0
+        ).all()
+    assert (intensity(V, material, [light], grey(0), V, REFLECTION_MODELS[model]) == 0).all()
 
 
 def test_stiff_half_way_vectors():
@@ -156,16 +160,20 @@ def test_stiff_lengths_of_normals(model):
     n = 1000
     material = Material(grey(0.1), grey(0.5), grey(0.4), n)
     lights = [Light(V)]
-    assert intensity(np.zeros(3), material, lights, grey(1), V, model) == pytest.approx(grey(0.1), abs=0)
-    assert np.isnan(intensity(np.full(3, np.nan), material, lights, grey(1), V, model)).all()
+    assert intensity(np.zeros(3), material, lights, grey(1), V, REFLECTION_MODELS[model]) == pytest.approx(
+        grey(0.1), abs=0
+    )
+    assert np.isnan(
+        intensity(np.full(3, np.nan), material, lights, grey(1), V, REFLECTION_MODELS[model])
+    ).all()
     for scale in (1 - 1 / 256, 1 + 1 / 256):
-        value = intensity(V * scale, material, lights, grey(1), V, model)
+        value = intensity(V * scale, material, lights, grey(1), V, REFLECTION_MODELS[model])
         # R·V with R = 2 (N·L) N - L: twice the scale squared, less 1.
         cosine = min(2 * scale**2 - 1 if model == "phong" else scale, 1.0)
-        expected = 0.1 + 0.5 * scale + 0.4 * float(reflect(model, cosine, n))
+        expected = 0.1 + 0.5 * scale + 0.4 * float(REFLECTION_MODELS[model].reflect(cosine, n))
         assert value == pytest.approx(grey(expected), rel=1e-12)
     # The error that a user gets from a normal 1/256 too short: the highlight of every model is gone.
-    assert float(reflect(model, 1 - 1 / 256, n)) < 0.05
+    assert float(REFLECTION_MODELS[model].reflect(1 - 1 / 256, n)) < 0.05
 
 
 def test_halfway_vector():
@@ -205,7 +213,7 @@ def test_point_light_towards():
 
 
 @pytest.mark.parametrize("chord", [False, True])
-@pytest.mark.parametrize("model", REFLECTION_MODELS[:6])
+@pytest.mark.parametrize("model", list(REFLECTION_MODELS)[:6])
 def test_local_formula_point_by_point(model, chord):
     """Each point as if it were alone, with a directional light and a distant viewer of its own."""
     rng = np.random.default_rng(10)
@@ -214,13 +222,13 @@ def test_local_formula_point_by_point(model, chord):
     viewers = normalise(eye - points)
     lights = [Light(position=(2, 1, 3), color=(0.5, 0.6, 0.7)), Light((-1, 4, 1)), Light(position=(0, -4, 1))]
     material = Material((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), 9)
-    found = intensity(normals, material, lights, grey(0.5), viewers, model, chord, points)
+    found = intensity(normals, material, lights, grey(0.5), viewers, REFLECTION_MODELS[model], chord, points)
     for normal, point, viewer, value in zip(normals, points, viewers, found, strict=True):
         alone = [
             Light(np.subtract(light.position, point), light.color) if light.position else light
             for light in lights
         ]
-        expected = intensity(normal, material, alone, grey(0.5), viewer, model, chord)
+        expected = intensity(normal, material, alone, grey(0.5), viewer, REFLECTION_MODELS[model], chord)
         assert value == pytest.approx(expected, abs=1e-12)
     assert np.ptp(found, axis=0).min() > 0.1
 
@@ -229,7 +237,7 @@ def test_far_point_light_is_a_directional_one():
     normals, points = random_units(200, 12), random_units(200, 13)
     material = Material(grey(0.1), grey(0.5), grey(0.5), 10)
     near, far = Light(position=(3e7, 2e7, 6e7)), Light((3, 2, 6))
-    ambient = grey(1), V, "blinn"
+    ambient = grey(1), V, REFLECTION_MODELS["blinn"]
     found = intensity(normals, material, [near], *ambient, points=points)
     assert found == pytest.approx(intensity(normals, material, [far], *ambient), abs=1e-6)
 
@@ -241,17 +249,19 @@ def test_stiff_point_light_on_the_surface_and_behind_it(model):
     light = Light(position=(0, 0, -1))
     points = np.array([[0.0, 0, -1], [0, 0, 0], [0, 0, -2]])
     normals = np.array([[0.0, 0, 1], [0, 0, -1], [0, 0, 1]])
-    value = intensity(normals, material, [light], grey(1), V, model, points=points)
+    value = intensity(normals, material, [light], grey(1), V, REFLECTION_MODELS[model], points=points)
     # At the light, between light and viewer (L = -V) seen from behind, and beyond it, lit from the front.
     assert value[0] == pytest.approx(grey(0.1))
     assert value[1] == pytest.approx(grey(0.6))
     assert value[2] == pytest.approx(grey(1.1), abs=1e-9)
     # A point at the viewer's own place has no V.
-    nowhere = intensity(normals, material, [light], grey(1), np.zeros((3, 3)), model, points=points)
+    nowhere = intensity(
+        normals, material, [light], grey(1), np.zeros((3, 3)), REFLECTION_MODELS[model], points=points
+    )
     assert np.isfinite(nowhere).all()
 
 
-@pytest.mark.parametrize("model", REFLECTION_MODELS[1:])
+@pytest.mark.parametrize("model", list(REFLECTION_MODELS)[1:])
 def test_intensity_of_cosines(model):
     """The same sum from N·L and N·H."""
     normals = random_units(300, 14)
@@ -259,11 +269,9 @@ def test_intensity_of_cosines(model):
     material = Material((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), 9)
     cosine = np.stack([normals @ light.direction for light in lights], axis=-1)
     highlight = np.stack([normals @ halfway_vector(light.direction, V) for light in lights], axis=-1)
-    found = intensity_of_cosines(material, lights, grey(0.5), cosine, highlight, model)
-    expected = intensity(normals, material, lights, grey(0.5), V, model)
+    found = intensity_of_cosines(material, lights, grey(0.5), cosine, highlight, REFLECTION_MODELS[model])
+    expected = intensity(normals, material, lights, grey(0.5), V, REFLECTION_MODELS[model])
     assert found == pytest.approx(expected, abs=1e-14)
-    with pytest.raises(ValueError, match=r"model must be one of phong, .* not 'gauss'"):
-        intensity_of_cosines(material, lights, grey(0.5), cosine, highlight, "gauss")
 
 
 def test_gram_identity():
@@ -276,16 +284,20 @@ def test_gram_identity():
 
 def test_normals_keep_their_length():
     material = Material(grey(0), grey(1), grey(0), 10)
-    value = intensity(V * 0.5, material, [Light((0, 0, 1))], grey(1), V, "blinn")
+    value = intensity(V * 0.5, material, [Light((0, 0, 1))], grey(1), V, REFLECTION_MODELS["blinn"])
     assert value == pytest.approx(grey(0.5))
 
 
 def test_sums_over_one_and_sixteen_lights():
     material = Material(grey(1), grey(1), grey(1), 2)
-    value = intensity(V, material, [Light((0, 0, 5))] * 16, grey(1), V, "blinn")
+    value = intensity(V, material, [Light((0, 0, 5))] * 16, grey(1), V, REFLECTION_MODELS["blinn"])
     assert value == pytest.approx(grey(33))
     assert saturate(value) == pytest.approx(grey(1))
-    assert intensity(np.zeros((4, 5, 3)), material, [], grey(0.5), V, "blinn").shape == (4, 5, 3)
+    assert intensity(np.zeros((4, 5, 3)), material, [], grey(0.5), V, REFLECTION_MODELS["blinn"]).shape == (
+        4,
+        5,
+        3,
+    )
 
 
 def test_refusals():
@@ -300,7 +312,7 @@ def test_refusals():
         Light(position=(0, math.inf, 0))
     material, lamp = Material(grey(0), grey(1), grey(0), 1), Light(position=(0, 0, 1))
     with pytest.raises(ValueError, match="a point light needs the points"):
-        intensity(V, material, [lamp], grey(0), V, "blinn")
+        intensity(V, material, [lamp], grey(0), V, REFLECTION_MODELS["blinn"])
     with pytest.raises(ValueError, match="a light's color must be at least 0"):
         Light((0, 0, 1), (1, -1, 1))
     with pytest.raises(ValueError, match=r"a material's diffuse must be three finite numbers, not 0.5"):
@@ -310,5 +322,3 @@ def test_refusals():
             Material(grey(0), grey(0), grey(0), exponent)
     with pytest.raises(TypeError):
         Material(grey(0), grey(0), grey(0), 10.5)
-    with pytest.raises(ValueError, match=r"model must be one of phong, .* not 'gauss'"):
-        intensity(V, Material(grey(0), grey(0), grey(0), 1), [], grey(0), V, "gauss")

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from blysk.golden.reference.metrics import error_figures, mnse_printed, nmse
+from blysk.golden.reference.metrics import error_figures, mnse_published, nmse
 
 
 def test_by_hand():
@@ -49,11 +49,11 @@ def test_normalised_errors():
     reference = np.array([[0.0, 2.0, 4.0, 6.0]])
     image = np.array([[1.0, 2.0, 4.0, 4.0]])
     assert nmse(image, reference) == pytest.approx((1 + 4) / (9 + 1 + 1 + 9))
-    value, share = mnse_printed(image, reference)
+    value, share = mnse_published(image, reference)
     assert value == pytest.approx((1 / 9 + 0 + 0 + 4 / 9) / 4)
     assert share == 1
     # The middle value is the mean: printed form undefined there.
-    value, share = mnse_printed(np.array([1.0, 3.0, 3.0]), np.array([0.0, 2.0, 4.0]))
+    value, share = mnse_published(np.array([1.0, 3.0, 3.0]), np.array([0.0, 2.0, 4.0]))
     assert value == pytest.approx((1 / 4 + 1 / 4) / 2)
     assert share == pytest.approx(2 / 3)
 
@@ -69,7 +69,7 @@ def test_flat_reference(level):
     flat = np.full((33, 31, 3), level)
     assert nmse(flat, flat) == 0
     assert nmse(flat + 1, flat) == math.inf
-    value, share = mnse_printed(flat + 1, flat)
+    value, share = mnse_published(flat + 1, flat)
     assert math.isnan(value)
     assert share == 0
 

@@ -10,7 +10,7 @@ from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.polynomials import largest_error, minimax
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.golden.reference.reflection import coscos_scale, energy_factor, exponent_ratio, reflect
+from blysk.golden.reference.reflection import REFLECTION_MODELS, coscos_scale, exponent_ratio
 
 X = np.linspace(0, 30, 6001)
 """``n (1 - cos gamma)``; above 30 Blinn is below 1e-13."""
@@ -33,15 +33,23 @@ def test_schlick_is_no_better_than_the_parabola(n, shown):
     cosine = cosines(n)
     error = np.abs(schlick(cosine, n) - cosine**n).max()
     assert f"{error:.2f}" == shown
-    assert error > np.abs(reflect("cosquad", cosine, n) - reflect("blinn", cosine, n)).max()
+    assert (
+        error
+        > np.abs(
+            REFLECTION_MODELS["cosquad"].reflect(cosine, n) - REFLECTION_MODELS["blinn"].reflect(cosine, n)
+        ).max()
+    )
 
 
 @pytest.mark.parametrize("n", [16, 64, 256, 1000])
 def test_slope_of_the_epicentre_fit(n):
     """fQ2 is the better line where Blinn >= 0.5, its refitted slope the better one over the whole range."""
     cosine = cosines(n)
-    blinn = reflect("blinn", cosine, n)
-    own, refitted = (np.abs(reflect(name, cosine, n) - blinn) for name in ("cosquad_lin", "lyon1_refitted"))
+    blinn = REFLECTION_MODELS["blinn"].reflect(cosine, n)
+    own, refitted = (
+        np.abs(REFLECTION_MODELS[name].reflect(cosine, n) - blinn)
+        for name in ("cosquad_lin", "lyon1_refitted")
+    )
     assert own[blinn >= 0.5].max() < refitted[blinn >= 0.5].max() / 2
     assert refitted.max() < 0.56 * own.max()
 
@@ -50,9 +58,14 @@ def test_one_more_squaring():
     """lyon k = 1 is cosquad, and refitting pays at every k."""
     for n in (16, 64, 256):
         cosine = cosines(n)
-        blinn = reflect("blinn", cosine, n)
-        plain = [np.abs(reflect(name, cosine, n) - blinn).max() for name in ("cosquad", "lyon2", "lyon3")]
-        fitted = [np.abs(reflect(f"lyon{k}_refitted", cosine, n) - blinn).max() for k in (1, 2, 3)]
+        blinn = REFLECTION_MODELS["blinn"].reflect(cosine, n)
+        plain = [
+            np.abs(REFLECTION_MODELS[name].reflect(cosine, n) - blinn).max()
+            for name in ("cosquad", "lyon2", "lyon3")
+        ]
+        fitted = [
+            np.abs(REFLECTION_MODELS[f"lyon{k}_refitted"].reflect(cosine, n) - blinn).max() for k in (1, 2, 3)
+        ]
         assert plain == sorted(plain, reverse=True)
         assert all(better < 0.55 * worse for better, worse in zip(fitted, plain, strict=True))
 
@@ -64,7 +77,10 @@ def test_printed_maxima_of_the_line_models():
     """[C]: 0.162 for f2 and 0.128 for fQ2, n from 2 to 1000."""
     for model, shown, printed in (("cosquad", "0.1616", "0.162"), ("cosquad_lin", "0.1278", "0.128")):
         error = max(
-            np.abs(reflect(model, cosines(n), n) - reflect("blinn", cosines(n), n)).max()
+            np.abs(
+                REFLECTION_MODELS[model].reflect(cosines(n), n)
+                - REFLECTION_MODELS["blinn"].reflect(cosines(n), n)
+            ).max()
             for n in range(2, 1001, 2)
         )
         assert f"{error:.4f}" == shown
@@ -75,7 +91,10 @@ def test_zone_of_the_relative_errors():
     """[C] does not define its zone: 0.594 gives f2 7.90 %, and the lower bound 0.59363 the 7.92 % shown."""
     worst = {}
     for bound in (0.594, 0.59363):
-        worst[bound] = max(float(1 - reflect("cosquad", bound ** (1 / n), n) / bound) for n in range(2, 1001))
+        worst[bound] = max(
+            float(1 - REFLECTION_MODELS["cosquad"].reflect(bound ** (1 / n), n) / bound)
+            for n in range(2, 1001)
+        )
     assert [f"{value:.2%}" for value in worst.values()] == ["7.90%", "7.92%"]
 
 
@@ -95,8 +114,8 @@ def test_printed_energy_coefficients_are_not_the_factors():
     for n in (10, 100):
         printed_phong = (n + 2) / (2 * n)
         printed_blinn = (n + 2) * (n + 4) / (8 * n * (2 ** (n / 2) + n))
-        assert abs(printed_phong / energy_factor("phong", n) - 1) > 0.3
-        assert abs(printed_blinn / energy_factor("blinn", n) - 1) > 0.3
+        assert abs(printed_phong / REFLECTION_MODELS["phong"].energy_factor(n) - 1) > 0.3
+        assert abs(printed_blinn / REFLECTION_MODELS["blinn"].energy_factor(n) - 1) > 0.3
 
 
 def test_exponents_of_blinn_and_phong():

@@ -155,7 +155,7 @@ SCENES |= {
 def test_phong_against_ray_casting(name):
     scene = SCENES[name]
     raster = rasterise(scene)
-    frame = render(scene, "phong", "blinn", raster)
+    frame = render(scene, "phong", REFLECTION_MODELS["blinn"], raster)
     triangle, shares = cast(scene)
     exact, normal = phong_by_rays(scene, triangle, shares)
     # Corners are rounded to 1/256 pixel, so a pixel shows what lies up to 1/512 pixel away in x and y. Where
@@ -219,14 +219,14 @@ def test_near_plane_pieces_keep_the_order_of_spans():
 
 def test_flat():
     scene = SCENES["perspective"]
-    frame = render(scene, "flat", "phong")
+    frame = render(scene, "flat", REFLECTION_MODELS["phong"])
     triangle, _ = cast(scene)
     corners = scene.mesh.vertices[scene.mesh.faces]
     plane = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     flat = Mesh(
         corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), normalise(plane).repeat(3, 0)
     )
-    exact = render(replace(scene, mesh=flat), "phong", "phong")
+    exact = render(replace(scene, mesh=flat), "phong", REFLECTION_MODELS["phong"])
     assert frame.image == pytest.approx(exact.image, abs=1e-12)
     assert (frame.mask == exact.mask).all()
     assert len(np.unique(frame.image[frame.mask], axis=0)) <= len(np.unique(triangle))
@@ -267,7 +267,7 @@ def through_six_points(scene, face, turned, shares):
 def test_quadratic_gouraud_pixel_by_pixel(name):
     scene = SCENES[name]
     raster = rasterise(scene)
-    image = render(scene, "quadratic_gouraud", "blinn", raster).image.reshape(-1, 3)
+    image = render(scene, "quadratic_gouraud", REFLECTION_MODELS["blinn"], raster).image.reshape(-1, 3)
     visible = np.flatnonzero(raster.visible)
     shares = fragment_barycentrics(raster, visible)
     for fragment, share in zip(visible.tolist(), shares, strict=True):
@@ -327,7 +327,7 @@ def test_quadratic_gouraud_stays_in_range():
         Mesh(vertices, np.array([[0, 1, 2]]), normals), camera, 60, 60, material, (Light((0, 0, 1)),)
     )
     raster = rasterise(scene)
-    image = render(scene, "quadratic_gouraud", "blinn", raster).image.reshape(-1, 3)
+    image = render(scene, "quadratic_gouraud", REFLECTION_MODELS["blinn"], raster).image.reshape(-1, 3)
     visible = np.flatnonzero(raster.visible)
     share = fragment_barycentrics(raster, visible)[:, 0]
     raw = share * (2 * share - 1)
@@ -346,7 +346,7 @@ def test_middle_of_opposite_normals_is_the_face():
         scene = scene_of(turned, camera, 40, 40)
         raster = rasterise(scene)
         assert raster.back.all() == (direction == 1)
-        image = render(scene, "quadratic_gouraud", "blinn", raster).image.reshape(-1, 3)
+        image = render(scene, "quadratic_gouraud", REFLECTION_MODELS["blinn"], raster).image.reshape(-1, 3)
         visible = np.flatnonzero(raster.visible)
         share = fragment_barycentrics(raster, visible)[:, :: -1 if direction else 1]
         chosen = (share[:, 0] * share[:, 1]).argmax()
@@ -408,10 +408,16 @@ def test_thresholds_at_their_ends():
     for name in ("perspective", "crossing"):
         scene = SCENES[name]
         raster = rasterise(scene)
-        none = render(scene, "adaptive", "blinn", raster, Thresholds(0, 0, 0))
-        every = render(scene, "adaptive", "blinn", raster, Thresholds(math.inf, math.inf, math.inf))
-        assert none.image == pytest.approx(render(scene, "phong", "blinn", raster).image, abs=1e-14)
-        assert every.image == pytest.approx(render(scene, "gouraud", "blinn", raster).image, abs=1e-14)
+        none = render(scene, "adaptive", REFLECTION_MODELS["blinn"], raster, Thresholds(0, 0, 0))
+        every = render(
+            scene, "adaptive", REFLECTION_MODELS["blinn"], raster, Thresholds(math.inf, math.inf, math.inf)
+        )
+        assert none.image == pytest.approx(
+            render(scene, "phong", REFLECTION_MODELS["blinn"], raster).image, abs=1e-14
+        )
+        assert every.image == pytest.approx(
+            render(scene, "gouraud", REFLECTION_MODELS["blinn"], raster).image, abs=1e-14
+        )
         assert not gouraud_triangles(scene, Thresholds(0, 0, 0)).any()
         assert gouraud_triangles(scene, Thresholds(math.inf, math.inf, math.inf)).all()
 
@@ -424,7 +430,7 @@ def test_adaptive_takes_each_triangle_from_one_method():
     assert 0.1 < linear.mean() < 0.9
     pixel = raster.pixel[raster.visible]
     gouraud, phong, adaptive = (
-        render(scene, name, "blinn", raster, thresholds).image.reshape(-1, 3)[pixel]
+        render(scene, name, REFLECTION_MODELS["blinn"], raster, thresholds).image.reshape(-1, 3)[pixel]
         for name in ("gouraud", "phong", "adaptive")
     )
     assert adaptive == pytest.approx(np.where(linear[:, np.newaxis], gouraud, phong), abs=1e-14)
@@ -439,7 +445,9 @@ def test_default_thresholds_are_narrow():
     raster = rasterise(scene)
     linear = gouraud_triangles(scene)
     assert linear[raster.triangle[raster.span[raster.visible]]].mean() > 0.03
-    adaptive, phong = (render(scene, name, "blinn", raster) for name in ("adaptive", "phong"))
+    adaptive, phong = (
+        render(scene, name, REFLECTION_MODELS["blinn"], raster) for name in ("adaptive", "phong")
+    )
     diffuse, specular = 0.008 + 1e-4, (0.004 + 1e-4) * MATERIAL.exponent
     worst = max(
         sum(light.color[c] for light in LIGHTS)
@@ -465,13 +473,17 @@ def test_turned_back_faces_are_those_of_a_turned_mesh(shading):
         scene.mesh.normals[corners.ravel()] * turn,
     )
     thresholds = Thresholds(0.6, 0.2, 0.4)
-    flipped = render(scene, shading, "blinn", None, thresholds).image
-    same = render(replace(scene, mesh=mesh, back_faces="show"), shading, "blinn", None, thresholds).image
+    flipped = render(scene, shading, REFLECTION_MODELS["blinn"], None, thresholds).image
+    same = render(
+        replace(scene, mesh=mesh, back_faces="show"), shading, REFLECTION_MODELS["blinn"], None, thresholds
+    ).image
     assert flipped == pytest.approx(same, abs=1e-10)
-    shown = render(replace(scene, back_faces="show"), shading, "blinn", None, thresholds).image
+    shown = render(
+        replace(scene, back_faces="show"), shading, REFLECTION_MODELS["blinn"], None, thresholds
+    ).image
     assert np.abs(shown - flipped).max() > 0.05
     # Without its back faces the picture has holes where they showed.
-    culled = render(replace(scene, back_faces="cull"), shading, "blinn", None, thresholds)
+    culled = render(replace(scene, back_faces="cull"), shading, REFLECTION_MODELS["blinn"], None, thresholds)
     front = np.zeros(culled.mask.size, dtype=bool)
     front[raster.pixel[raster.visible & ~raster.back[raster.span]]] = True
     assert culled.image[front.reshape(culled.mask.shape)] == pytest.approx(
@@ -481,7 +493,7 @@ def test_turned_back_faces_are_those_of_a_turned_mesh(shading):
 
 def test_gouraud():
     scene = SCENES["perspective"]
-    frame = render(scene, "gouraud", "blinn")
+    frame = render(scene, "gouraud", REFLECTION_MODELS["blinn"])
     raster = rasterise(scene)
     visible = np.flatnonzero(raster.visible)
     face = scene.mesh.faces[raster.triangle[raster.span[visible]]]
@@ -505,16 +517,16 @@ def test_gouraud():
 def test_slerp_and_span_curves():
     scene = SCENES["orthographic"]
     raster = rasterise(scene)
-    phong = render(scene, "phong", "blinn", raster)
+    phong = render(scene, "phong", REFLECTION_MODELS["blinn"], raster)
     # In the orthographic projection vertex normals are linear along a span, but the ends were normalised.
-    normalised = shade_spans(scene, raster, "normalised", "blinn")
-    slerp = render(scene, "slerp", "blinn", raster)
-    assert (slerp.image == shade_spans(scene, raster, "slerp", "blinn")).all()
+    normalised = shade_spans(scene, raster, "normalised", REFLECTION_MODELS["blinn"])
+    slerp = render(scene, "slerp", REFLECTION_MODELS["blinn"], raster)
+    assert (slerp.image == shade_spans(scene, raster, "slerp", REFLECTION_MODELS["blinn"])).all()
     assert (slerp.mask == phong.mask).all()
     assert 0 < np.abs(normalised - phong.image).max() < 0.05
     assert 0 < np.abs(slerp.image - normalised).max() < 0.02
     for curve in CURVES:
-        image = shade_spans(scene, raster, curve, "cosquad")
+        image = shade_spans(scene, raster, curve, REFLECTION_MODELS["cosquad"])
         chosen = np.flatnonzero(raster.visible)[::37]
         for fragment in chosen.tolist():
             span = raster.span[fragment]
@@ -570,7 +582,7 @@ def test_stiff_spans_of_every_angle_and_length(degrees, curve):
     lengths = [1, 2, 3, 16, 4095]
     left, right = about_the_peak(degrees, 0.1)
     scene, raster = one_span_a_line(left, right, lengths)
-    image = shade_spans(scene, raster, curve, "blinn")
+    image = shade_spans(scene, raster, curve, REFLECTION_MODELS["blinn"])
     for line, length in enumerate(lengths):
         t = np.arange(length) / max(length - 1, 1)
         c = interpolate(curve, left, right, t)[:, 2]
@@ -587,7 +599,7 @@ def test_stiff_peak_and_pixels(n):
     lengths = [2, 3, 16, 17, 4095]
     scene, raster = one_span_a_line(left, right, lengths, n=n)
     for model in ("blinn", "cosquad"):
-        image = shade_spans(scene, raster, "slerp", model)[..., 0]
+        image = shade_spans(scene, raster, "slerp", REFLECTION_MODELS[model])[..., 0]
         for line, length in enumerate(lengths):
             step = np.radians(degrees) / (length - 1)
             row = image[line, :length]
@@ -608,7 +620,7 @@ def test_stiff_peak_and_pixels(n):
 def test_stiff_opposite_normals_have_no_middle():
     scene, raster = one_span_a_line((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), [3])
     for curve in CURVES:
-        image = shade_spans(scene, raster, curve, "blinn")
+        image = shade_spans(scene, raster, curve, REFLECTION_MODELS["blinn"])
         # 90 degrees at the ends; 0 in the middle but for the great circle, which goes round.
         assert image[0, [0, 2]] == pytest.approx(np.zeros((2, 3)), abs=1e-300)
         if curve != "slerp":
@@ -626,7 +638,9 @@ def test_stiff_normals_of_no_length(shading):
     mesh = ball()
     scene = scene_of(replace(mesh, normals=np.zeros_like(mesh.normals)), SCENES["perspective"].camera)
     raster = rasterise(scene)
-    frame, flat = (render(scene, name, "blinn", raster).image for name in (shading, "flat"))
+    frame, flat = (
+        render(scene, name, REFLECTION_MODELS["blinn"], raster).image for name in (shading, "flat")
+    )
     visible = np.flatnonzero(raster.visible)
     pixel = raster.pixel[visible]
     found, face = frame.reshape(-1, 3)[pixel], flat.reshape(-1, 3)[pixel]
@@ -645,7 +659,9 @@ def test_replaced_spans_are_used():
     scene = SCENES["orthographic"]
     raster = rasterise(scene)
     viewer = np.tile(scene.camera.viewer, (len(raster.x), 1))
-    image = shade_spans(scene, replace(raster, normal_left=viewer, normal_right=viewer), "linear", "blinn")
+    image = shade_spans(
+        scene, replace(raster, normal_left=viewer, normal_right=viewer), "linear", REFLECTION_MODELS["blinn"]
+    )
     shown = image.reshape(-1, 3)[raster.pixel[raster.visible]]
     assert np.ptp(shown, axis=0) == pytest.approx((0, 0, 0), abs=1e-12)
 
@@ -654,7 +670,7 @@ def test_replaced_spans_are_used():
 def test_every_shading_and_model(shading):
     scene = SCENES["perspective"]
     raster = rasterise(scene)
-    images = {model: render(scene, shading, model, raster) for model in REFLECTION_MODELS}
+    images = {model: render(scene, shading, REFLECTION_MODELS[model], raster) for model in REFLECTION_MODELS}
     for frame in images.values():
         assert frame.image.shape == (33, 44, 3)
         assert 0 <= frame.image.min() <= frame.image.max() <= 1
@@ -665,7 +681,7 @@ def test_every_shading_and_model(shading):
     if shading == "quadratic_gouraud":
         # The six weights add up to at most 5/3 in magnitude, in the middle of the triangle.
         bound *= 5 / 3
-    for model in REFLECTION_MODELS[2:]:
+    for model in list(REFLECTION_MODELS)[2:]:
         difference = np.abs(images[model].image - images["blinn"].image).max()
         assert 0 < difference < bound
 
@@ -688,11 +704,8 @@ def test_empty_picture_and_refusals():
         assert (frame.image == BACKGROUND).all()
     with pytest.raises(ValueError, match=r"shading must be one of flat, .* not 'toon'"):
         render(empty, "toon")
-    for shading in SHADINGS:
-        with pytest.raises(ValueError, match=r"model must be one of phong, .* not 'gauss'"):
-            render(empty, shading, "gauss")
     with pytest.raises(ValueError, match=r"curve must be one of linear, .* not 'cubic'"):
-        shade_spans(empty, rasterise(empty), "cubic", "blinn")
+        shade_spans(empty, rasterise(empty), "cubic", REFLECTION_MODELS["blinn"])
     for name in ("normal", "highlight", "diffuse"):
         for value in (-0.1, math.nan):
             with pytest.raises(ValueError, match=f"^the {name} threshold must be at least 0, not {value}$"):
@@ -742,7 +755,9 @@ def test_far_lamps_and_a_far_camera_are_distant(shading, far):
     local = replace(scene, lights=lamps, viewer="near")
     assert local.local
     assert not scene.local
-    images = [render(s, shading, "blinn", raster, thresholds).image for s in (scene, local)]
+    images = [
+        render(s, shading, REFLECTION_MODELS["blinn"], raster, thresholds).image for s in (scene, local)
+    ]
     difference = np.abs(images[0] - images[1])
     if shading == "adaptive":
         # A triangle at a threshold may change its method.
@@ -756,10 +771,15 @@ def test_every_shading_of_point_lights(shading):
     """At the middle of the triangle, at its vertices, at every fragment: as `intensity` has it there."""
     scene = SCENES["point light and near viewer"]
     raster = rasterise(scene)
-    image = render(scene, shading, "cosquad", raster, Thresholds(9, 9, 9)).image
+    image = render(scene, shading, REFLECTION_MODELS["cosquad"], raster, Thresholds(9, 9, 9)).image
     assert 0 <= image.min() <= image.max() <= 1
     distant = replace(scene, lights=LIGHTS, viewer="distant")
-    assert np.abs(image - render(distant, shading, "cosquad", raster, Thresholds(9, 9, 9)).image).max() > 0.05
+    assert (
+        np.abs(
+            image - render(distant, shading, REFLECTION_MODELS["cosquad"], raster, Thresholds(9, 9, 9)).image
+        ).max()
+        > 0.05
+    )
     which = np.flatnonzero(raster.visible)
     triangle = raster.triangle[raster.span[which]]
     back = raster.back[raster.span[which]][:, np.newaxis, np.newaxis]
@@ -776,7 +796,13 @@ def test_every_shading_of_point_lights(shading):
     normals = np.where(back, -normals, normals)
     viewer = normalise(scene.camera.position - points)
     nodes = intensity(
-        normals, scene.material, scene.lights, scene.ambient_light, viewer, "cosquad", points=points
+        normals,
+        scene.material,
+        scene.lights,
+        scene.ambient_light,
+        viewer,
+        REFLECTION_MODELS["cosquad"],
+        points=points,
     )
     nodes = np.clip(nodes, 0, 1)
     shares = fragment_barycentrics(raster, which) if nodes.shape[1] == 3 else np.ones((len(which), 1))
@@ -797,8 +823,10 @@ def test_shade_operands():
     viewer = scene.camera.viewer
     halves = [normalise(light.direction + viewer) for light in scene.lights]
     highlight = np.stack([normals @ half for half in halves], axis=1)
-    found = shade_operands(scene, raster, cosine, highlight, "cosquad")
-    assert found == pytest.approx(shade_spans(scene, raster, "normalised", "cosquad"), abs=1e-13)
+    found = shade_operands(scene, raster, cosine, highlight, REFLECTION_MODELS["cosquad"])
+    assert found == pytest.approx(
+        shade_spans(scene, raster, "normalised", REFLECTION_MODELS["cosquad"]), abs=1e-13
+    )
 
 
 def test_local_refusals():
@@ -815,7 +843,7 @@ def test_local_refusals():
     raster = rasterise(scene)
     raster = replace(raster, weights_left=raster.weights_left[:0], weights_right=raster.weights_right[:0])
     with pytest.raises(ValueError, match=r"^point lights and a near viewer need the weights of the spans$"):
-        shade_spans(scene, raster, "normalised", "blinn")
+        shade_spans(scene, raster, "normalised", REFLECTION_MODELS["blinn"])
 
 
 def test_local_results_do_not_depend_on_the_chunks(monkeypatch):
@@ -861,9 +889,9 @@ def test_each_triangle_has_its_own_material(shading, model):
     owner = np.full(scene.width * scene.height, -1)
     owner[raster.pixel[raster.visible]] = mesh.material[raster.triangle[raster.span[raster.visible]]]
     assert np.bincount(owner[owner >= 0], minlength=3).min() > 50
-    given = render(scene, shading, model).image.reshape(-1, 3)
+    given = render(scene, shading, REFLECTION_MODELS[model]).image.reshape(-1, 3)
     for index, material in enumerate(SEVERAL):
-        alone = render(replace(one, material=material), shading, model)
+        alone = render(replace(one, material=material), shading, REFLECTION_MODELS[model])
         own = owner == index
         # The same sums in another order of the pixels: float64 rounding only.
         assert np.abs(given[own] - alone.image.reshape(-1, 3)[own]).max() < 1e-14

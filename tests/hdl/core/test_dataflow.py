@@ -30,7 +30,7 @@ class GraphUnit(PipelinedUnit):
             for name in INPUTS.members
         }
         self.results, shapes = describe(self.graph, **inputs)
-        latency = max(1, *(word.age for word in self.results.values()))
+        latency = max(1, *(word.stage for word in self.results.values()))
         super().__init__(INPUTS, data.StructLayout(shapes), latency=latency, initiation_interval=interval)
 
     def datapath(self, m, operands):
@@ -55,19 +55,19 @@ def test_earliest_ages(interval, first):
     """An input stands at its register, or at once; a register takes one clock, a multiplication five."""
     g = Dataflow(interval, 1)
     a, b = (g.input(name, lambda operands: operands) for name in "ab")
-    assert (a.age, b.age) == (first, first)
-    assert a.stands == interval
+    assert (a.stage, b.stage) == (first, first)
+    assert a.lifetime == interval
     late = g.register("late", lambda a: a, g.register("once", lambda a: a, a))
-    assert late.age == first + 2
+    assert late.stage == first + 2
     both = g.register("both", lambda a, b: a + b, b, late)
-    assert both.age == first + 3
+    assert both.stage == first + 3
     product = g.multiply("product", late, both)
-    assert (product.age, product.stands) == (first + 8, 1)
-    hurried = Dataflow(interval, 1, hurries=True)
+    assert (product.stage, product.lifetime) == (first + 8, 1)
+    hurried = Dataflow(interval, 1, low_latency=True)
     a = hurried.input("a", lambda operands: operands)
-    assert hurried.multiply("product", a, a).age == first + 2
+    assert hurried.multiply("product", a, a).stage == first + 2
     table = g.look_up("table", [0] * 4, 3, late)
-    assert (table.age, table.stands) == (first + 3, late.stands)
+    assert (table.stage, table.lifetime) == (first + 3, late.lifetime)
 
 
 def test_turns_by_hand():
@@ -75,13 +75,13 @@ def test_turns_by_hand():
     g = Dataflow(3, 3)
     assert g.multiplier.count == 1
     a = g.input("a", lambda operands: operands)
-    ages = [g.multiply(f"product_{k}", a, a).age for k in range(3)]
-    assert ages == [6, 7, 8]
-    # With two clocks there are two multipliers, and the third multiplication takes the first's next turn.
+    stages = [g.multiply(f"product_{k}", a, a).stage for k in range(3)]
+    assert stages == [6, 7, 8]
+    # With two cycles there are two multipliers, and the third multiplication takes the first's next turn.
     g = Dataflow(2, 3)
     assert g.multiplier.count == 2
     a = g.input("a", lambda operands: operands)
-    assert [g.multiply(f"product_{k}", a, a).age for k in range(3)] == [6, 6, 7]
+    assert [g.multiply(f"product_{k}", a, a).stage for k in range(3)] == [6, 6, 7]
 
 
 @pytest.mark.parametrize("interval", [1, 2, 3, 4, 5, 6, 7, 11])
@@ -92,22 +92,22 @@ def test_turns_never_collide(interval, latency):
     for _ in range(50):
         uses = int(rng.integers(1, 40))
         g = Dataflow(interval)
-        operator = g.share("operator", uses, (unsigned(1),), latency, lambda register, a: a)
-        assert operator.count == -(-uses // interval)
+        functional_unit = g.share("functional_unit", uses, (unsigned(1),), latency, lambda register, a: a)
+        assert functional_unit.count == -(-uses // interval)
         words = [g.input("a", lambda operands: operands)]
         turns = Counter()
         for k in range(uses):
             operand = words[rng.integers(len(words))]
             if rng.random() < 0.3:
                 operand = g.register(f"wait_{k}", lambda a: a, operand)
-            word = g.use(operator, f"use_{k}", (operand,), lambda a: (a,))
-            issued = word.age - 1 - latency
-            assert operand.age <= issued < operand.age + interval
+            word = g.use(functional_unit, f"use_{k}", (operand,), lambda a: (a,))
+            issued = word.stage - 1 - latency
+            assert operand.stage <= issued < operand.stage + interval
             turns[issued % interval] += 1
             words.append(word)
-        assert max(turns.values()) <= operator.count
+        assert max(turns.values()) <= functional_unit.count
         # Turns left over are those that the graph still has.
-        assert sum(sum(free) for free in operator.free) == operator.count * interval - uses
+        assert sum(sum(free) for free in functional_unit.free) == functional_unit.count * interval - uses
 
 
 # Hardware.
@@ -190,10 +190,10 @@ def shifts(g, a, b, n):
         shifted = register(coarse >> fine, "shifted")
         return register(Mux(shifted[-1], -1, shifted)[:18].as_signed(), "result")
 
-    operator = g.share("shifter", 4, (signed(18), unsigned(4)), 3, make)
+    functional_unit = g.share("shifter", 4, (signed(18), unsigned(4)), 3, make)
 
     def use(name, value):
-        return g.use(operator, name, (value, n), lambda value, n: (Value.cast(value), n[:4]))
+        return g.use(functional_unit, name, (value, n), lambda value, n: (Value.cast(value), n[:4]))
 
     first, second = use("first", a), use("second", b)
     return {"twice": use("twice", first), "again": use("again", second)}, {
@@ -266,16 +266,16 @@ def test_multiplier_bits():
 def test_words_stand_no_earlier_than_asked(interval):
     g = Dataflow(interval, 2 * interval)
     a = g.input("a", lambda operands: operands)
-    assert g.register("late", lambda a: a, a, since=9).age == 9
-    assert g.register("soon", lambda a: a, a, since=1).age == a.age + 1
-    assert g.multiply("late", a, a, since=9).age == 9
-    assert g.multiply("soon", a, a, since=1).age == a.age + 5
+    assert g.register("late", lambda a: a, a, since=9).stage == 9
+    assert g.register("soon", lambda a: a, a, since=1).stage == a.stage + 1
+    assert g.multiply("late", a, a, since=9).stage == 9
+    assert g.multiply("soon", a, a, since=1).stage == a.stage + 5
     # An age whose turn is taken is passed over.
-    operator = g.share("operator", 2, (unsigned(1),), 3, lambda register, a: a)
-    first, second = (g.use(operator, "use", (a,), lambda a: (a,), since=12).age for _ in range(2))
-    assert (first, second) == ((12, 12) if operator.count == 2 else (12, 13))
+    functional_unit = g.share("functional_unit", 2, (unsigned(1),), 3, lambda register, a: a)
+    first, second = (g.use(functional_unit, "use", (a,), lambda a: (a,), since=12).stage for _ in range(2))
+    assert (first, second) == ((12, 12) if functional_unit.count == 2 else (12, 13))
     wire = g.wire("wire", lambda a: a, a)
-    assert (wire.age, wire.stands) == (a.age, a.stands)
+    assert (wire.stage, wire.lifetime) == (a.stage, a.lifetime)
 
 
 def late_and_early(g, a, b, n):
@@ -285,11 +285,13 @@ def late_and_early(g, a, b, n):
         first = register(x + y, "first")
         return first, register((first + x).wrap(SQ(3, 17)), "second")
 
-    operator = g.share("adder", 3, (FixedShape(OPERAND), FixedShape(OPERAND)), 2, make)
-    early = g.use(operator, "early", (a, b), lambda *ab: ab, lambda results: results[0], latency=1)
+    functional_unit = g.share("adder", 3, (FixedShape(OPERAND), FixedShape(OPERAND)), 2, make)
+    early = g.use(functional_unit, "early", (a, b), lambda *ab: ab, lambda results: results[0], latency=1)
     low = g.wire("low", lambda a: Value.cast(a)[:5], a)
-    late = g.register("late", lambda low, n: low ^ n, low, n, since=early.age + 6)
-    again = g.use(operator, "again", (a, b), lambda *ab: ab, lambda results: results[0], latency=1, since=11)
+    late = g.register("late", lambda low, n: low ^ n, low, n, since=early.stage + 6)
+    again = g.use(
+        functional_unit, "again", (a, b), lambda *ab: ab, lambda results: results[0], latency=1, since=11
+    )
     return {"early": early, "late": late, "again": again}, {
         "early": FixedShape(SQ(2, 17)),
         "late": unsigned(5),

@@ -12,7 +12,7 @@ from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
 from blysk.hdl.core.fixed import SQ, UQ, FixedShape
-from blysk.hdl.core.stream import PipelinedUnit, connect, connect_registered, count_down, require_same_shape
+from blysk.hdl.core.stream import PipelinedUnit, connect, connect_slice, count_down, require_same_shape
 from blysk.sim.engines.simulate import simulate
 
 
@@ -157,19 +157,19 @@ class Registers(wiring.Component):
         streams = [stream.Signature(unsigned(16)).create(path=(str(k),)) for k in range(self.latency - 1)]
         streams = [wiring.flipped(self.i), *streams, wiring.flipped(self.o)]
         for source, sink in itertools.pairwise(streams):
-            connect_registered(m, source, sink)
+            connect_slice(m, source, sink)
         return m
 
 
 def test_registers_refuse_a_moved_binary_point():
     with pytest.raises(TypeError, match=r"^payload is SQ\(1, 17\) on one side, SQ\(2, 16\) on the other$"):
-        connect_registered(Module(), *streams(SQ(1, 17), SQ(2, 16)))
+        connect_slice(Module(), *streams(SQ(1, 17), SQ(2, 16)))
 
 
-@pytest.mark.parametrize("clocks", [1, 3])
-def test_counter_follows_the_span(clocks):
-    """Against a plain count of spans of 0 to 5 pixels, on enabled clocks alone."""
-    rng = np.random.default_rng(clocks)
+@pytest.mark.parametrize("cycles", [1, 3])
+def test_counter_follows_the_span(cycles):
+    """Against a plain count of spans of 0 to 5 pixels, on enabled cycles alone."""
+    rng = np.random.default_rng(cycles)
     m, valid, length, advance = Module(), Signal(), Signal(3), Signal()
     active, ends = count_down(m, valid, length, advance)
     seen = []
@@ -178,7 +178,7 @@ def test_counter_follows_the_span(clocks):
         left = 0
         for _ in range(400):
             assert (ctx.get(active), ctx.get(ends)) == (left > 0, left <= 1)
-            moves, given = bool(rng.random() < 1 / clocks), int(rng.integers(6))
+            moves, given = bool(rng.random() < 1 / cycles), int(rng.integers(6))
             offered = bool(rng.random() < 0.7)
             begins = moves and left <= 1 and offered
             ctx.set(advance, moves)
@@ -217,7 +217,7 @@ class Delay(PipelinedUnit):
 
 
 class Ages(PipelinedUnit):
-    """How many enabled clocks ago each age of the beat that leaves was, 4 bits an age; one beat at a time."""
+    """How many enabled cycles ago each age of the beat that leaves was, 4 bits an age; one beat at a time."""
 
     def __init__(self):
         super().__init__(unsigned(1), unsigned(12), latency=4, initiation_interval=4)
@@ -225,7 +225,7 @@ class Ages(PipelinedUnit):
     def datapath(self, m, operands):
         clock = Signal(4)
         m.d.sync += clock.eq(clock + 1)
-        caught = [self.register(m, clock, f"clock_{age}", when=self.at(age)) for age in (1, 2, 3)]
+        caught = [self.register(m, clock, f"clock_{stage}", when=self.at(stage)) for stage in (1, 2, 3)]
         return Cat((clock - register)[:4] for register in caught)
 
 
@@ -272,10 +272,10 @@ def test_stalls_and_distance(make, input_share, output_share):
     run = simulate(unit, codes, count=60, engine="pysim", **stalls)
     np.testing.assert_array_equal(run.beats, codes + unit.added)
     if not input_share:
-        np.testing.assert_array_equal(run.input_clocks, np.arange(60) * interval)
+        np.testing.assert_array_equal(run.input_cycles, np.arange(60) * interval)
     if not output_share:
-        np.testing.assert_array_equal(run.clocks, run.input_clocks + latency)
-    assert (run.clocks - run.input_clocks >= latency).all()
+        np.testing.assert_array_equal(run.cycles, run.input_cycles + latency)
+    assert (run.cycles - run.input_cycles >= latency).all()
 
 
 @pytest.mark.parametrize("make", UNITS)
@@ -285,9 +285,9 @@ def test_a_stall_costs_its_own_clock(make):
     codes = np.arange(60)
     stalled = simulate(unit, codes, count=60, engine="pysim", output_stalls=np.arange(1000) % 40 == 20)
     free = simulate(unit, codes, count=60, engine="pysim")
-    lost = stalled.clocks - free.clocks
+    lost = stalled.cycles - free.cycles
     assert np.all(np.diff(lost) >= 0)
-    assert lost[-1] <= np.count_nonzero(np.arange(stalled.clocks[-1]) % 40 == 20)
+    assert lost[-1] <= np.count_nonzero(np.arange(stalled.cycles[-1]) % 40 == 20)
 
 
 @pytest.mark.parametrize("make", UNITS)
@@ -326,7 +326,7 @@ def test_beats_are_whole_turns_apart(interval):
     rng = np.random.default_rng(interval)
     codes = rng.integers(0, 2**15, 200)
     run = simulate(unit, codes, count=200, engine="pysim", input_stalls=rng.random(997) < 0.8)
-    distance = np.diff(run.input_clocks)
+    distance = np.diff(run.input_cycles)
     inside = distance < unit.latency
     assert (distance[inside] % interval == 0).all()
     assert inside.any()
@@ -344,9 +344,9 @@ def drive(unit, codes, stalls, reset_at=None):
     m.submodules.unit = ResetInserter(reset)(unit)
     runs = []
 
-    async def run(ctx, clocks):
+    async def run(ctx, cycles):
         taken, sent, held = [], 0, None
-        for clock in range(clocks):
+        for clock in range(cycles):
             offered = sent < len(codes)
             ready = not stalls[clock % len(stalls)]
             ctx.set(unit.i.valid, offered)
@@ -391,10 +391,10 @@ def test_reset_in_mid_stream_leaves_nothing_behind(latency, interval, reset_at):
     assert after == fresh
 
 
-def test_at_counts_enabled_clocks():
-    """Age 1 is 3 clocks before a beat leaves at age 4, and so on; clocks of standing still do not count."""
+def test_at_counts_enabled_cycles():
+    """Age 1 is 3 cycles before a beat leaves at age 4, and so on; cycles of standing still do not count."""
     rng = np.random.default_rng(1)
     stalls = {"input_stalls": rng.random(97) < 0.3, "output_stalls": rng.random(89) < 0.5}
     run = simulate(Ages(), np.zeros(100, int), count=100, engine="pysim", **stalls)
-    assert (run.clocks - run.input_clocks > 4).any()
+    assert (run.cycles - run.input_cycles > 4).any()
     np.testing.assert_array_equal(run.beats, 3 | 2 << 4 | 1 << 8)

@@ -22,13 +22,13 @@ from blysk.sim.engines.simulate import simulate
 VARIANTS = {
     "half_chord": AngularSetup(),
     "arccos": AngularSetup("arccos"),
-    "arccos_printed": AngularSetup("arccos", Arccos("printed")),
+    "arccos_printed": AngularSetup("arccos", Arccos("as_published")),
 }
 
 
 def beats_of(left, right, vector, length, parameters=VARIANTS["half_chord"]):
     operands = (Fixed(COMPONENT, codes) for codes in (left, right, vector))
-    angle, phase, step, cos_beta, wide = parameters.compute(*operands, length)
+    angle, phase, step, cos_beta, out_of_range = parameters.compute(*operands, length)
     return (
         {"normal_left": left, "normal_right": right, "vector": vector, "length": length},
         {
@@ -37,7 +37,7 @@ def beats_of(left, right, vector, length, parameters=VARIANTS["half_chord"]):
             "step": step.codes,
             "cos_beta": cos_beta.codes,
             "length": length,
-            "wide": wide,
+            "out_of_range": out_of_range,
         },
     )
 
@@ -80,7 +80,7 @@ def check(verify, normal_pairs, parameters, interval):
     length = rng.integers(1, 4096, len(left))
     length[:40] = np.tile([1, 2, 3, 4, 5, 2048, 2049, 2050, 4094, 4095], 4)
     beats, expected = beats_of(left, right, vector, length, parameters)
-    assert 100 < expected["wide"].sum() < 500
+    assert 100 < expected["out_of_range"].sum() < 500
     verify(AngularSetupUnit(parameters, interval), beats, expected)
 
 

@@ -22,7 +22,7 @@ def assert_equals_twin(table, form, x):
 
 
 @pytest.mark.parametrize("form", ["pipelined", "sequential"])
-@pytest.mark.parametrize("table", ["printed", "corrected"])
+@pytest.mark.parametrize("table", ["as_published", "corrected"])
 def test_documented_table_equals_twin(table, form):
     # 13 has no factor in common with a binary word, so every segment meets every low bit.
     assert_equals_twin(table, form, np.arange(FORMAT.min_code, FORMAT.max_code + 1, 13))
@@ -35,7 +35,7 @@ def test_documented_table_equals_twin(table, form):
         pytest.param("refitted", "sequential", marks=pytest.mark.long),
         *(
             pytest.param(table, form, marks=pytest.mark.long)
-            for table in ("printed", "corrected")
+            for table in ("as_published", "corrected")
             for form in ("pipelined", "sequential")
         ),
     ],

@@ -39,12 +39,12 @@ def expected_of(unit, beats, vectors):
     left, right, *vectors = (
         Fixed(COMPONENT, codes) for codes in (beats["normal_left"], beats["normal_right"], *vectors)
     )
-    diffuse, highlight, wide = unit.parameters.compute(left, right, *vectors, beats["length"])
-    expected = np.zeros(len(wide), dtype_of(unit.o.payload.shape()))
+    diffuse, highlight, out_of_range = unit.parameters.compute(left, right, *vectors, beats["length"])
+    expected = np.zeros(len(out_of_range), dtype_of(unit.o.payload.shape()))
     for name, differences in (("diffuse", diffuse), ("highlight", highlight)):
         for field in ("start", "first", "second"):
             expected["lights"][name][field] = getattr(differences, field).codes
-    expected["length"], expected["wide"] = beats["length"], wide
+    expected["length"], expected["out_of_range"] = beats["length"], out_of_range
     return expected
 
 
@@ -67,7 +67,7 @@ def test_equals_twin(verify, normal_pairs, lights, interval):
     less = np.repeat(np.vstack([np.eye(3, dtype=np.int64), [1, 1, 1]]) << 17, 10, axis=0)
     beats["normal_left"][50:90] = beats["normal_right"][60:100] = vectors[1][0] - less
     expected = expected_of(unit, beats, vectors)
-    assert 50 < np.count_nonzero(expected["wide"]) < 200
+    assert 50 < np.count_nonzero(expected["out_of_range"]) < 200
     verify(unit, beats, expected, constants=constants_of(unit, vectors))
 
 

@@ -43,11 +43,11 @@ def test_one_value_a_clock_without_gaps():
     beats, expected = spans(lengths, 1)
     run = simulate(HighlightCosineUnit(), beats, count=len(expected), engine="auto")
     np.testing.assert_array_equal(run.beats, expected)
-    clocks_taken = np.maximum(lengths, 1)
-    np.testing.assert_array_equal(run.input_clocks, np.cumsum(clocks_taken) - clocks_taken)
-    first_pixel = np.repeat(run.input_clocks, lengths) + HighlightCosineUnit.latency
+    cycles_taken = np.maximum(lengths, 1)
+    np.testing.assert_array_equal(run.input_cycles, np.cumsum(cycles_taken) - cycles_taken)
+    first_pixel = np.repeat(run.input_cycles, lengths) + HighlightCosineUnit.latency
     step = np.arange(len(expected)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    np.testing.assert_array_equal(run.clocks, first_pixel + step)
+    np.testing.assert_array_equal(run.cycles, first_pixel + step)
 
 
 def test_every_bit_counts():
@@ -86,5 +86,5 @@ def test_engines_agree():
     )
     np.testing.assert_array_equal(slow.beats, expected)
     np.testing.assert_array_equal(fast.beats, expected)
-    np.testing.assert_array_equal(slow.clocks, fast.clocks)
-    np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+    np.testing.assert_array_equal(slow.cycles, fast.cycles)
+    np.testing.assert_array_equal(slow.input_cycles, fast.input_cycles)

@@ -55,13 +55,13 @@ def expected_of(unit, values, length):
     )
     if not unit.highlights:
         highlight = Fixed(p.HIGHLIGHT_FORMAT, 0 * values["highlight"])
-    diffuse, highlight, wide = p().compute(diffuse, highlight, length)
-    expected = np.zeros(len(wide), dtype_of(unit.o.payload.shape()))
+    diffuse, highlight, out_of_range = p().compute(diffuse, highlight, length)
+    expected = np.zeros(len(out_of_range), dtype_of(unit.o.payload.shape()))
     for name, differences in (("diffuse", diffuse), ("highlight", highlight)):
         if name in expected["lights"].dtype.names:
             for field in ("start", "first", "second"):
                 expected["lights"][name][field] = getattr(differences, field).codes
-    expected["length"], expected["wide"] = length, wide
+    expected["length"], expected["out_of_range"] = length, out_of_range
     return expected
 
 
@@ -70,7 +70,7 @@ def test_equals_twin(verify, lights, interval):
     unit = LocalChordSetupUnit(lights, interval)
     values, length = spans(np.random.default_rng(interval), lights)
     expected = expected_of(unit, values, length)
-    assert 50 < np.count_nonzero(expected["wide"]) < 300
+    assert 50 < np.count_nonzero(expected["out_of_range"]) < 300
     verify(unit, beats_of(unit, values, length), expected)
 
 
@@ -138,8 +138,8 @@ def test_beats_after_a_pause(verify_pauses):
     stalls = {"input_stalls": np.arange(60) != 0, "output_stalls": np.arange(120) < 65}
     run = simulate(unit, beats, count=len(beats), engine="auto", **stalls)
     np.testing.assert_array_equal(run.beats, expected)
-    np.testing.assert_array_equal(run.input_clocks[1::2], run.clocks[::2] + 1)
-    np.testing.assert_array_equal(run.clocks[1::2], run.input_clocks[1::2] + unit.latency)
+    np.testing.assert_array_equal(run.input_cycles[1::2], run.cycles[::2] + 1)
+    np.testing.assert_array_equal(run.cycles[1::2], run.input_cycles[1::2] + unit.latency)
 
 
 @pytest.mark.parametrize("interval", [1, 4])

@@ -61,17 +61,17 @@ def assert_equal(run, expected):
 
 
 @pytest.mark.parametrize("recurrence", VARIANTS, ids=str)
-def test_clocks(recurrence):
+def test_cycles(recurrence):
     unit = RecurrenceUnit(recurrence)
     lengths = np.r_[1, 2, 3, 16, 1, 1, 400, 0, 5, 0, 0, 1]
     beats, expected = spans(recurrence, lengths, 1)
     run = simulate(unit, beats, count=lengths.sum(), engine="auto")
     assert_equal(run, expected)
-    taken = np.where(lengths > 0, unit.clocks_per_pixel * (lengths - 1) + 1, 1)
-    np.testing.assert_array_equal(run.input_clocks, np.cumsum(taken) - taken)
+    taken = np.where(lengths > 0, unit.cycles_per_pixel * (lengths - 1) + 1, 1)
+    np.testing.assert_array_equal(run.input_cycles, np.cumsum(taken) - taken)
     index = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    first = np.repeat(run.input_clocks, lengths) + unit.latency
-    np.testing.assert_array_equal(run.clocks, first + unit.clocks_per_pixel * index)
+    first = np.repeat(run.input_cycles, lengths) + unit.latency
+    np.testing.assert_array_equal(run.cycles, first + unit.cycles_per_pixel * index)
 
 
 @pytest.mark.parametrize("recurrence", VARIANTS, ids=str)
@@ -132,8 +132,8 @@ def test_engines_agree(recurrence):
     )
     assert_equal(slow, expected)
     assert_equal(fast, expected)
-    np.testing.assert_array_equal(slow.clocks, fast.clocks)
-    np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+    np.testing.assert_array_equal(slow.cycles, fast.cycles)
+    np.testing.assert_array_equal(slow.input_cycles, fast.input_cycles)
 
 
 @pytest.mark.parametrize("recurrence", FORMS, ids=str)
@@ -152,7 +152,7 @@ def test_reset_in_mid_span_leaves_nothing(recurrence, clock):
         return sum((int(word) & ((1 << width) - 1)) << (width * place) for place, word in enumerate(value))
 
     async def drive(context):
-        def offer(span):
+        def skid_buffer(span):
             payload = unit.i.payload
             context.set(unit.i.valid, 1)
             for copy in COPIES:
@@ -163,7 +163,7 @@ def test_reset_in_mid_span_leaves_nothing(recurrence, clock):
                 context.set(Value.cast(payload[name]), int(beats[name][span]))
 
         context.set(unit.o.ready, 1)
-        offer(0)
+        skid_buffer(0)
         await context.tick()
         context.set(unit.i.valid, 0)
         await context.tick().repeat(clock)
@@ -172,7 +172,7 @@ def test_reset_in_mid_span_leaves_nothing(recurrence, clock):
         context.set(reset, 0)
         assert not context.get(unit.o.valid)
         assert context.get(unit.i.ready)
-        offer(1)
+        skid_buffer(1)
         for _ in range(40):
             if context.get(unit.o.valid):
                 for name, values in found.items():

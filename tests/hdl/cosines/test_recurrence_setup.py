@@ -34,12 +34,16 @@ def expected_of(unit, beats, vectors):
     expected = np.zeros(len(left.codes), dtype_of(unit.o.payload.shape()))
     for copy, of_lights in zip(COPIES, vectors, strict=True):
         for light, vector in enumerate(of_lights):
-            first, second, coefficient, shift, wide = unit.parameters.compute(
+            first, second, coefficient, shift, out_of_range = unit.parameters.compute(
                 left, right, Fixed(COMPONENT, vector), beats["length"]
             )
             expected["lights"][copy]["first"][:, light] = first.codes
             expected["lights"][copy]["second"][:, light] = second.codes
-    expected["coefficient"], expected["length"], expected["wide"] = coefficient.codes, beats["length"], wide
+    expected["coefficient"], expected["length"], expected["out_of_range"] = (
+        coefficient.codes,
+        beats["length"],
+        out_of_range,
+    )
     if unit.parameters.recurrence.form == "reinsch":
         expected["shift"] = shift
     return expected
@@ -55,7 +59,7 @@ def test_equals_twin(verify, normal_pairs, setup_spans, light_constants, paramet
     beats["normal_left"][:50] = vectors[1][0]
     beats["normal_right"][:10] = vectors[1][0]
     expected = expected_of(unit, beats, vectors)
-    assert 50 < np.count_nonzero(expected["wide"]) < 200
+    assert 50 < np.count_nonzero(expected["out_of_range"]) < 200
     verify(unit, beats, expected, constants=light_constants(unit, *vectors))
 
 

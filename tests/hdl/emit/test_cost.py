@@ -10,7 +10,8 @@ from amaranth.lib.wiring import Component, In, Out
 
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.pipeline import METHODS, ShadingPipeline
+from blysk.golden.presets import METHODS, preset
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.emit.cost import Cost, cost_of
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.intensity import IntensityUnit
@@ -48,13 +49,13 @@ class Sample(Component):
             self.i.ready.eq(1),
             self.o.valid.eq(1),
         ]
-        wide = Signal(16)
+        out_of_range = Signal(16)
         product = Signal(80)
         m.d.comb += [
             product.eq(Cat(extended * self.i.payload, self.i.payload * low * 5, read.data, look.data)),
-            wide.eq(product.xor()),
+            out_of_range.eq(product.xor()),
         ]
-        m.d.sync += self.o.payload.eq(Cat(product[:15], wide[0]))
+        m.d.sync += self.o.payload.eq(Cat(product[:15], out_of_range[0]))
         return m
 
 
@@ -87,7 +88,7 @@ def test_devices_cost_what_the_readme_states(name):
     unit = make()
     cost = cost_of(unit)
     assert cost.multiplier_count == multipliers
-    assert all(wide <= 18 for wide, _ in cost.multipliers)
+    assert all(out_of_range <= 18 for out_of_range, _ in cost.multipliers)
     row = re.search(rf"^\| `?{name}\b.*", README, re.MULTILINE)[0]
     latency, interval, stated = (int(re.search(r"\d+", cell)[0]) for cell in row.split("|")[3:6])
     assert (latency, stated) == (unit.latency, multipliers)
@@ -101,9 +102,9 @@ def test_devices_cost_what_the_readme_states(name):
     [m if m in ("quadratic", "chord") else pytest.param(m, marks=pytest.mark.long) for m in METHODS],
 )
 def test_methods_cost_what_the_readme_states(method):
-    unit = ShadingPipelineUnit(ShadingPipeline(method))
+    unit = ShadingPipelineUnit(preset(method))
     cost = cost_of(unit)
-    assert all(wide <= 18 for wide, _ in cost.multipliers)
+    assert all(out_of_range <= 18 for out_of_range, _ in cost.multipliers)
     row = re.search(rf"^\| `{method}` .*", README, re.MULTILINE)[0]
     stated = [int(cell) for cell in row.split("|")[4:7]]
     assert stated == [unit.latency, unit.setup_interval, cost.multiplier_count]
@@ -111,12 +112,12 @@ def test_methods_cost_what_the_readme_states(method):
 
 @pytest.mark.parametrize("lights", [2, 3])
 def test_lights_cost_fourteen_multipliers_each(lights):
-    assert cost_of(ShadingPipelineUnit(ShadingPipeline(lights=lights))).multiplier_count == 5 + 14 * lights
+    assert cost_of(ShadingPipelineUnit(preset(lights=lights))).multiplier_count == 5 + 14 * lights
     assert cost_of(IntensityUnit(Intensity(lights))).multiplier_count == 6 * lights
 
 
 def test_memories_are_as_stated():
     assert cost_of(DifferenceSetupUnit()).rom_bits == 2048 * 17
     for model, constant in (("cosquad", 0), ("cosquad7", 1), ("cosquad_lin", 1)):
-        cost = cost_of(SpecularUnit(Specular(model)))
+        cost = cost_of(SpecularUnit(Specular(REFLECTION_MODELS[model])))
         assert (cost.rom_bits, cost.constant_multipliers) == (1024 * 17, constant)

@@ -18,7 +18,8 @@ from amaranth.sim import Simulator
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
-from blysk.golden.pipeline import METHODS, ShadingPipeline
+from blysk.golden.presets import METHODS, preset
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.core.fixed import SQ, UQ
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.arccos import ArccosUnit, HalfChordUnit
@@ -198,10 +199,10 @@ CORES = {
     "gpq": GPQUnit,
     "difference_setup": DifferenceSetupUnit,
     "difference_accumulator": DifferenceAccumulatorUnit,
-    "specular": lambda: SpecularUnit(Specular("cosquad_lin", "one_minus_cosine")),
+    "specular": lambda: SpecularUnit(Specular(REFLECTION_MODELS["cosquad_lin"], "one_minus_cosine")),
     "diffuse": DiffuseUnit,
     "intensity": IntensityUnit,
-    "light": lambda: LightUnit(Specular("cosquad7")),
+    "light": lambda: LightUnit(Specular(REFLECTION_MODELS["cosquad7"])),
     "evaluator": lambda: QuadraticEvaluatorUnit(QuadraticEvaluator("horner")),
     "recurrence": RecurrenceUnit,
     "renormaliser": RenormaliserUnit,
@@ -215,7 +216,7 @@ CORES = {
     "bisection_chain": BisectionChainUnit,
     "adaptive_normaliser": AdaptiveNormaliserUnit,
     "pipeline": ShadingPipelineUnit,
-    "pipeline_lin": lambda: ShadingPipelineUnit(ShadingPipeline(model="cosquad_lin", lights=3)),
+    "pipeline_lin": lambda: ShadingPipelineUnit(preset(model="cosquad_lin", lights=3)),
     "chord": ChordUnit,
     "chord_setup": ChordSetupUnit,
     "chord_setup_of_two_lights": lambda: ChordSetupUnit(lights=2, initiation_interval=1),
@@ -223,21 +224,17 @@ CORES = {
     "local_chord_of_two_lights": lambda: LocalChordInterpolatorUnit(LocalChordInterpolator(), 2, 3),
     # One of each method; `quadratic` is above.
     **{
-        f"pipeline_{method.replace('-', '_')}": lambda method=method: ShadingPipelineUnit(
-            ShadingPipeline(method)
-        )
+        f"pipeline_{method.replace('-', '_')}": lambda method=method: ShadingPipelineUnit(preset(method))
         for method in METHODS
         if method != "quadratic"
     },
-    "pipeline_gated": lambda: ShadingPipelineUnit(ShadingPipeline("chord", "coscos2", gate=True)),
+    "pipeline_gated": lambda: ShadingPipelineUnit(preset("chord", "coscos2", gate=True)),
     "pipeline_of_little": lambda: ShadingPipelineUnit(
-        ShadingPipeline("chord", None, lights=2, grey=True, x_bits=9, y_bits=8, length_bits=5)
+        preset("chord", None, lights=2, grey=True, x_bits=9, y_bits=8, length_bits=5)
     ),
-    "pipeline_without_lights": lambda: ShadingPipelineUnit(ShadingPipeline(lights=0, materials=2)),
-    "pipeline_compact": lambda: ShadingPipelineUnit(ShadingPipeline("chord"), style="compact"),
-    "pipeline_by_chord": lambda: ShadingPipelineUnit(
-        ShadingPipeline("linear", "blinn", operand="one_minus_cosine")
-    ),
+    "pipeline_without_lights": lambda: ShadingPipelineUnit(preset(lights=0, materials=2)),
+    "pipeline_compact": lambda: ShadingPipelineUnit(preset("chord", style="compact")),
+    "pipeline_by_chord": lambda: ShadingPipelineUnit(preset("linear", "blinn", operand="one_minus_cosine")),
 }
 
 
@@ -453,15 +450,15 @@ def test_same_text_in_another_process_and_folder(texts, tmp_path):
 
 
 def test_simulation_equals_amaranth(texts, tmp_path):
-    """Icarus and Amaranth's simulator give the same outputs at the same clocks, with stalls and a reset."""
+    """Icarus and Amaranth's simulator give the same outputs at the same cycles, with stalls and a reset."""
     needs_icarus()
     inputs = {"rst": 1, "i_x": 12, "i_normal_0": 18, "i_normal_1": 18, "i_normal_2": 18, "i_last": 1}
     inputs |= {"i_valid": 1, "o_ready": 1, "constants_gain": 9, "constants_on": 1}
     inputs |= {"write_address": 4, "write_data": 8, "write_valid": 1}
     outputs = ["i_ready", "o_valid", "status_busy", "status_count", "o_x", "o_r", "o_total"]
     rng = random.Random(20)
-    clocks = 600
-    vectors = [{port: rng.getrandbits(width) for port, width in inputs.items()} for _ in range(clocks)]
+    cycles = 600
+    vectors = [{port: rng.getrandbits(width) for port, width in inputs.items()} for _ in range(cycles)]
     for k, vector in enumerate(vectors):
         vector["rst"] = int(k in (300, 301))
         vector["write_valid"] &= rng.getrandbits(1)
@@ -515,10 +512,10 @@ def test_simulation_equals_amaranth(texts, tmp_path):
     declarations += "".join(f"  wire [{width - 1}:0] {port};\n" for port, width in widths.items())
     (tmp_path / "bench.v").write_text(
         f"module bench;\n  reg clk;\n{declarations}"
-        f"  reg [{words - 1}:0] vectors [0:{clocks - 1}];\n  integer k;\n"
+        f"  reg [{words - 1}:0] vectors [0:{cycles - 1}];\n  integer k;\n"
         f"  everything dut (.clk(clk), {', '.join(f'.{p}({p})' for p in [*inputs, *outputs])});\n"
         f'  initial begin\n    clk = 0;\n    $readmemh("{tmp_path}/vectors.hex", vectors);\n'
-        f"    for (k = 0; k < {clocks}; k = k + 1) begin\n"
+        f"    for (k = 0; k < {cycles}; k = k + 1) begin\n"
         f"      {{{', '.join(inputs)}}} = vectors[k];\n      #1\n"
         f'      $display("{" ".join(["%0d"] * len(outputs))}", {", ".join(outputs)});\n'
         "      clk = 1; #1 clk = 0; #1 ;\n    end\n    $finish(0);\n  end\nendmodule\n"
@@ -530,14 +527,14 @@ def test_simulation_equals_amaranth(texts, tmp_path):
     )
     assert built.stdout == ""
     rows = [line.split() for line in run("vvp", "-n", tmp_path / "bench.vvp").stdout.splitlines()]
-    assert len(rows) == len(expected) == clocks
+    assert len(rows) == len(expected) == cycles
     beats = 0
     for clock, (row, wanted) in enumerate(zip(rows, expected, strict=True)):
         beats += wanted[1]
         # The payload is undefined in Verilog while it is not valid.
         seen = len(row) if wanted[1] else 4
         assert row[:seen] == [str(value) for value in wanted[:seen]], f"clock {clock}"
-    assert 100 < beats < clocks
+    assert 100 < beats < cycles
 
 
 class TwoClocks(wiring.Component):

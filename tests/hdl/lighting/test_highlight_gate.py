@@ -9,6 +9,7 @@ from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, quantise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.sim.engines.simulate import simulate
@@ -39,7 +40,7 @@ def spans(rng, normal_pairs, count, halfway, cosine, spread=1e-3, angles=ANGLES)
     ("model", "interval"), [("cosquad", None), ("lyon2", 4), *(("cosquad", k) for k in (1, 2, 3, 5, 8, 15))]
 )
 def test_equals_twin(verify, normal_pairs, model, interval):
-    parameters = HighlightGate(Specular(model))
+    parameters = HighlightGate(Specular(REFLECTION_MODELS[model]))
     unit = HighlightGateUnit(parameters, interval)
     rng = np.random.default_rng(11)
     halfway = np.array([1.0, 2.0, 2.0]) / 3
@@ -73,7 +74,7 @@ def test_every_bit_counts(normal_pairs):
 
     Spans of all angles, of which the maximum is the threshold but for the rounding of the normals.
     """
-    parameters = HighlightGate(Specular("cosquad"))
+    parameters = HighlightGate(Specular(REFLECTION_MODELS["cosquad"]))
     unit = HighlightGateUnit(parameters)
     rng = np.random.default_rng(12)
     for exponent in [*1 << np.arange(10), *rng.integers(1, 1001, 20)]:

@@ -99,9 +99,9 @@ def test_compact_equals_twin_in_the_clocks_stated(lights):
     for brightness in (1, 8):
         terms = sparse_terms(rng, lights, 300)
         beats, constants, expected = case(rng, lights, brightness, terms)
-        clocks = 3 * np.maximum((terms != 0).sum(axis=(0, 2)), 1)
-        assert clocks.min() == 3
-        assert clocks.max() == 6 * lights == unit.initiation_interval
+        cycles = 3 * np.maximum((terms != 0).sum(axis=(0, 2)), 1)
+        assert cycles.min() == 3
+        assert cycles.max() == 6 * lights == unit.initiation_interval
         for engine in ("pysim", "auto"):
             few = 100 if engine == "pysim" else 300
             run = simulate(
@@ -113,13 +113,13 @@ def test_compact_equals_twin_in_the_clocks_stated(lights):
             )
             for name in "rgb":
                 np.testing.assert_array_equal(run.beats[name], expected[name][:few])
-            np.testing.assert_array_equal(run.input_clocks, np.r_[0, np.cumsum(clocks[: few - 1])])
-            np.testing.assert_array_equal(run.clocks, run.input_clocks + clocks[:few] + 5)
+            np.testing.assert_array_equal(run.input_cycles, np.r_[0, np.cumsum(cycles[: few - 1])])
+            np.testing.assert_array_equal(run.cycles, run.input_cycles + cycles[:few] + 5)
 
 
 @pytest.mark.parametrize("lights", [1, 3])
 def test_compact_equals_twin_under_stalls(lights):
-    """Pixels are lost, repeated and changed by no pattern of stalls, in both engines on the same clocks."""
+    """Pixels are lost, repeated and changed by no pattern of stalls, in both engines on the same cycles."""
     rng = np.random.default_rng(lights)
     unit = IntensityUnit(Intensity(lights), "compact")
     beats, constants, expected = case(rng, lights, 2, sparse_terms(rng, lights, 400))
@@ -135,13 +135,13 @@ def test_compact_equals_twin_under_stalls(lights):
             for name in "rgb":
                 np.testing.assert_array_equal(run.beats[name], expected[name][:count])
             runs.append(run)
-        np.testing.assert_array_equal(runs[1].clocks, runs[2].clocks)
-        np.testing.assert_array_equal(runs[1].input_clocks, runs[2].input_clocks)
+        np.testing.assert_array_equal(runs[1].cycles, runs[2].cycles)
+        np.testing.assert_array_equal(runs[1].input_cycles, runs[2].input_cycles)
 
 
 @pytest.mark.parametrize("clock", range(14))
 def test_compact_reset_in_mid_pixel(clock):
-    """Reset so many clocks after a pixel was taken: the next comes as from power-up, and alone."""
+    """Reset so many cycles after a pixel was taken: the next comes as from power-up, and alone."""
     terms = np.full((2, 1, 1), TERM.max_code)
     _, constants, expected = case(np.random.default_rng(1), 1, 1, terms)
     unit = IntensityUnit(Intensity(), "compact")

@@ -11,6 +11,7 @@ from blysk.golden.lighting.specular import Specular
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.lighting.light import LightUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SpecularUnit
@@ -65,7 +66,7 @@ DIFFUSE = {"cosine": Diffuse(), "one_minus_cosine": Diffuse(SQ(2, 25))}
 )
 def test_equals_twins(verify, normal_pairs, model, operand, exponent):
     rng = np.random.default_rng(exponent)
-    parameters = Power(operand) if model == "blinn" else Specular(model, operand)
+    parameters = Power(operand) if model == "blinn" else Specular(REFLECTION_MODELS[model], operand)
     light, viewer = normal_pairs(rng, 1, 70.0)
     halfway = (light + viewer) / np.linalg.norm(light + viewer)
     direction, halfway = quantise(light)[0], quantise(halfway)[0]
@@ -127,7 +128,7 @@ def test_black_light(verify, normal_pairs):
 def test_dark_beats_pass_the_specular_unit_by(model, operand, interval, gated, normal_pairs):
     """In order, with a specular term of 0; a run of them takes a clock each."""
     rng = np.random.default_rng(interval)
-    parameters = Power(operand) if model == "blinn" else Specular(model, operand)
+    parameters = Power(operand) if model == "blinn" else Specular(REFLECTION_MODELS[model], operand)
     diffuse = DIFFUSE[operand]
     light, viewer = normal_pairs(rng, 1, 70.0)
     direction = quantise(light)[0]
@@ -164,20 +165,20 @@ def test_dark_beats_pass_the_specular_unit_by(model, operand, interval, gated, n
         for name, codes in expected.items():
             np.testing.assert_array_equal(runs[-1].beats[name], codes)
     lit = np.count_nonzero(~dark)
-    clocks = runs[0].clocks
+    cycles = runs[0].cycles
     # After a run of dark beats, which take a clock each, a lit one waits for the unit's turn.
     runs_of_dark = np.count_nonzero(np.diff(dark.astype(int)) == 1)
-    assert interval * (lit - 1) <= clocks[-1] - clocks[0] <= interval * (lit + runs_of_dark) + (count - lit)
+    assert interval * (lit - 1) <= cycles[-1] - cycles[0] <= interval * (lit + runs_of_dark) + (count - lit)
     if gated:
         # The last of a long run of dark beats.
-        assert clocks[249] - clocks[230] == 19
+        assert cycles[249] - cycles[230] == 19
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("model", ["cosquad", "blinn"])
 def test_exponent_for_good(verify, model, normal_pairs):
     rng = np.random.default_rng(1)
-    parameters = Power() if model == "blinn" else Specular(model)
+    parameters = Power() if model == "blinn" else Specular(REFLECTION_MODELS[model])
     direction, halfway = (quantise(vector)[0] for vector in normal_pairs(rng, 1, 20.0))
     operands = operands_of(
         parameters, Diffuse(), normals_about(rng, direction, halfway, 77), direction, halfway

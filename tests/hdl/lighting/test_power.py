@@ -92,7 +92,7 @@ def test_stiff_largest_and_smallest_codes(form):
 
 @pytest.mark.parametrize("clock", [0, 1, 2, 6, 23, 41, 42, 43, 44])
 def test_stiff_reset_in_mid_power(clock):
-    """The sequential form, so many clocks after it took a cosine: the next is raised as from power-up."""
+    """The sequential form, so many cycles after it took a cosine: the next is raised as from power-up."""
     parameters = Power("one_minus_cosine")
     unit, exponent = PowerUnit(parameters, "sequential"), 1000
     codes = np.array([1 << 14, 1 << 15])

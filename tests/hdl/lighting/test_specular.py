@@ -6,12 +6,15 @@ import pytest
 from amaranth.hdl import Value
 from amaranth.sim import Simulator
 
-from blysk.golden.lighting.specular import FURTHER_MODELS, SPECULAR_MODELS, Specular
+from blysk.golden.lighting.specular import Specular
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.specular import SlopeUnit, SpecularUnit
 from blysk.sim.engines.simulate import simulate
+
+from ...lists import FURTHER_MODELS, SPECULAR_MODELS
 
 MODELS = SPECULAR_MODELS + FURTHER_MODELS
 EXPONENTS = [1, 2, 3, 7, 10, 64, 100, 255, 256, 500, 511, 512, 999, 1000]
@@ -29,7 +32,7 @@ TIMING = {
     "exp": (2, 9, 19, 19, 18, 19),
     "coscos2": (5, 11, 28, 29, 28, 31),
     "coscos4": (6, 12, 33, 35, 33, 38),
-    "as_documented": (1, 8, 13, 13, 13, 13),
+    "as_published": (1, 8, 13, 13, 13, 13),
 }
 
 
@@ -37,7 +40,7 @@ def operands(parameters, exponent, seed, count=800):
     """Every part of the range, most of it where the term is not 0, and the ends of the word."""
     rng = np.random.default_rng(seed)
     format = parameters.operand_format
-    reach = min((4.0 if parameters.model in SPECULAR_MODELS else 12.0) / exponent, 2.0)
+    reach = min((4.0 if parameters.name in SPECULAR_MODELS else 12.0) / exponent, 2.0)
     few = count // 4
     argument = np.r_[rng.uniform(0, reach, count), rng.uniform(0, 2, few), 10.0 ** rng.uniform(-9, 0.3, few)]
     if parameters.operand == "cosine":
@@ -66,7 +69,7 @@ def check(unit, exponent, beats, expected, **options):
 @pytest.mark.parametrize("operand", ["cosine", "one_minus_cosine"])
 @pytest.mark.parametrize("model", MODELS)
 def test_equals_twin(verify, model, operand):
-    parameters = Specular(model, operand)
+    parameters = Specular(REFLECTION_MODELS[model], operand)
     unit = SpecularUnit(parameters)
     assert unit.latency == LATENCY.get(model, 7)
     stalled = 1000 if operand == "cosine" else 1
@@ -97,14 +100,14 @@ def test_every_bit_counts():
 @pytest.mark.parametrize("model", SPECULAR_MODELS)
 def test_documented_comparator_equals_twin(verify, model, operand):
     """The second lobe comes through as the twin says, and the highlight as by default."""
-    parameters = Specular(model, operand, as_documented=True)
+    parameters = Specular(REFLECTION_MODELS[model], operand, as_published=True)
     unit = SpecularUnit(parameters)
     assert unit.latency == 8
     for seed, exponent in enumerate(STIFF_EXPONENTS):
         codes = operands(parameters, exponent, seed)
         dark = np.random.default_rng(seed).random(len(codes)) < 0.1
         beats, expected = beats_of(parameters, exponent, codes, dark)
-        gated = beats_of(Specular(model, operand), exponent, codes, dark)[1]
+        gated = beats_of(Specular(REFLECTION_MODELS[model], operand), exponent, codes, dark)[1]
         if exponent > 3:
             assert (expected > gated).any()
         if exponent == 10:
@@ -117,7 +120,7 @@ def test_documented_comparator_equals_twin(verify, model, operand):
 @pytest.mark.parametrize("model", MODELS)
 def test_stiff_largest_and_smallest_codes(model):
     """The ends of the operand's word and of the sphere, in turn, lit and dark, at every stiff exponent."""
-    parameters = Specular(model)
+    parameters = Specular(REFLECTION_MODELS[model])
     unit, format, one = SpecularUnit(parameters), parameters.operand_format, ONE_SQUARED.codes.item()
     codes = np.tile([format.min_code, format.max_code, -one, one, 0, -1], 20)
     dark = np.arange(120) % 7 == 0
@@ -128,7 +131,7 @@ def test_stiff_largest_and_smallest_codes(model):
 def test_cost_of_coscos():
     """Two products of 17 bits, two of chords, and the squarers; PROM, two tables, and one of slopes."""
     for model, squarers, slopes in (("coscos2", 1, 0), ("coscos4", 2, 0), ("coscos4_integral", 2, 1)):
-        cost = cost_of(SpecularUnit(Specular(model)))
+        cost = cost_of(SpecularUnit(Specular(REFLECTION_MODELS[model])))
         assert cost.multipliers == {(17, 17): 2 + squarers, (17, 11): 1, (14, 11): 1}
         assert cost.rom_bits == 1024 * (17 + 27 * slopes) + 128 * 36 + 64 * 33
 
@@ -136,30 +139,34 @@ def test_cost_of_coscos():
 @pytest.mark.parametrize("model", TIMING)
 def test_timing_and_multipliers_at_every_interval(model):
     products, *latencies = TIMING[model]
-    as_documented = model == "as_documented"
-    parameters = Specular("cosquad", as_documented=True) if as_documented else Specular(model)
+    as_published = model == "as_published"
+    parameters = (
+        Specular(REFLECTION_MODELS["cosquad"], as_published=True)
+        if as_published
+        else Specular(REFLECTION_MODELS[model])
+    )
     for interval, latency in zip((1, 2, 3, 4, 6), latencies, strict=True):
         unit = SpecularUnit(parameters, interval)
         assert (unit.latency, unit.initiation_interval) == (latency, interval)
         if interval > 2:
             continue
         cost = cost_of(unit)
-        assert cost.multiplier_count == -(-products // interval) + as_documented
+        assert cost.multiplier_count == -(-products // interval) + as_published
         if interval == 2:
-            shared = {(18, 18): cost.multiplier_count - as_documented}
-            assert cost.multipliers == ({(18, 17): 1} | shared if as_documented else shared)
+            shared = {(18, 18): cost.multiplier_count - as_published}
+            assert cost.multipliers == ({(18, 17): 1} | shared if as_published else shared)
 
 
 @pytest.mark.parametrize(
     ("model", "interval"),
     [
         *(("cosquad", 2), ("cosquad", 3), ("cosquad_lin", 6)),
-        *(("lyon3", 3), ("exp", 4), ("coscos4", 2), ("as_documented", 2)),
+        *(("lyon3", 3), ("exp", 4), ("coscos4", 2), ("as_published", 2)),
     ],
 )
 def test_equals_twin_at_longer_intervals(verify, model, interval):
-    as_documented = model == "as_documented"
-    parameters = Specular("cosquad" if as_documented else model, as_documented=as_documented)
+    as_published = model == "as_published"
+    parameters = Specular(REFLECTION_MODELS["cosquad" if as_published else model], as_published=as_published)
     unit = SpecularUnit(parameters, interval)
     for exponent in STIFF_EXPONENTS:
         codes = operands(parameters, exponent, exponent, 400)
@@ -175,8 +182,8 @@ def test_equals_twin_at_longer_intervals(verify, model, interval):
     "model", [*SPECULAR_MODELS, "cosquad_q", "lyon3", "exp", "coscos4", "coscos2_integral"]
 )
 def test_slopes_of_every_exponent(model):
-    """All that a unit needs of an exponent, two clocks after it, against the twin's tables."""
-    parameters = Specular(model)
+    """All that a unit needs of an exponent, two cycles after it, against the twin's tables."""
+    parameters = Specular(REFLECTION_MODELS[model])
     unit = SlopeUnit(parameters)
     simulator = Simulator(unit)
     simulator.add_clock(1e-6)
@@ -200,8 +207,8 @@ def test_slopes_of_every_exponent(model):
 @pytest.mark.parametrize("interval", [1, 3])
 @pytest.mark.parametrize("model", ["cosquad", "coscos4"])
 def test_shared_slope_equals_twin(verify, model, interval):
-    """The slope from outside: the same terms at the same clocks, and no PROM in the unit."""
-    parameters = Specular(model)
+    """The slope from outside: the same terms at the same cycles, and no PROM in the unit."""
+    parameters = Specular(REFLECTION_MODELS[model])
     unit = SpecularUnit(parameters, interval, shares_slope=True)
     assert unit.latency == SpecularUnit(parameters, interval).latency
     tables = 128 * 36 + 64 * 33 if model == "coscos4" else 0
@@ -224,7 +231,7 @@ def test_shared_slope_equals_twin(verify, model, interval):
     [("cosquad", 20, 1), ("cosquad", 1, 2), ("cosquad_lin", 1000, 1), ("exp", 57, 1), ("coscos2", 300, 4)],
 )
 def test_exponent_for_good_equals_twin(verify, model, exponent, interval):
-    parameters = Specular(model)
+    parameters = Specular(REFLECTION_MODELS[model])
     unit = SpecularUnit(parameters, interval, exponent=exponent)
     assert not hasattr(unit, "constants")
     codes = operands(parameters, exponent, exponent)
@@ -235,7 +242,7 @@ def test_exponent_for_good_equals_twin(verify, model, exponent, interval):
 def test_exponent_for_good_costs_less():
     """No PROM, and one multiplier less: that of the slope is by a constant. No clock more."""
     for model, tables in (("cosquad", 0), ("cosquad_q", 0), ("lyon3", 0), ("exp", 64 * 32)):
-        parameters = Specular(model)
+        parameters = Specular(REFLECTION_MODELS[model])
         unit, fixed = SpecularUnit(parameters), SpecularUnit(parameters, exponent=37)
         assert fixed.latency == unit.latency
         cost, full = cost_of(fixed), cost_of(unit)
@@ -268,7 +275,7 @@ def test_every_exponent_of_further_models(model):
 
 
 def every_exponent(model):
-    parameters = Specular(model)
+    parameters = Specular(REFLECTION_MODELS[model])
     unit = SpecularUnit(parameters)
     for exponent in range(1, 1001):
         codes = operands(parameters, exponent, exponent)[::40]

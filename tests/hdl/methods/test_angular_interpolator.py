@@ -9,7 +9,8 @@ from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
-from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.pipeline import Spans
+from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.pipeline import ShadingPipelineUnit
 
@@ -19,7 +20,7 @@ from ..pixels import assert_equals_twin
 
 @pytest.fixture(scope="module")
 def unit():
-    return ShadingPipelineUnit(ShadingPipeline("angular"))
+    return ShadingPipelineUnit(preset("angular"))
 
 
 def test_last_bits_count(unit):

@@ -8,7 +8,8 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
-from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.pipeline import Spans
+from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 
@@ -36,8 +37,8 @@ def spans_of_every_kind(rng, normal_pairs, count):
 def test_stiff_flags_under_stalls(normal_pairs, method, interval):
     """As many as the twin has, whichever spans come together; runs of one kind, and all mixed."""
     rng = np.random.default_rng(interval)
-    design = ShadingPipeline(method, "cosquad")
-    unit = ShadingPipelineUnit(design, interval)
+    design = preset(method, "cosquad")
+    unit = ShadingPipelineUnit(design.built(setup_interval=interval))
     left, right, length = spans_of_every_kind(rng, normal_pairs, 400)
     renormalised = method == "renormalise"
     kept = np.maximum(length, 1)
@@ -51,7 +52,7 @@ def test_stiff_flags_under_stalls(normal_pairs, method, interval):
         zeros = np.zeros(len(chosen), dtype=np.int64)
         spans = Spans(zeros, zeros, length[chosen], left[chosen], right[chosen])
         pixels = design.compute(spans, constants)
-        assert pixels.wide_spans == np.count_nonzero(shown[chosen] & (length[chosen] > 0))
+        assert pixels.out_of_range_spans == np.count_nonzero(shown[chosen] & (length[chosen] > 0))
         beats = {name: getattr(spans, name) for name in ("x", "y", "length", "normal_left", "normal_right")}
         for input_share, output_share in ((0, 0), (0.5, 0.5), (0.95, 0), (0, 0.7)):
             result = simulate(
@@ -64,4 +65,4 @@ def test_stiff_flags_under_stalls(normal_pairs, method, interval):
                 output_stalls=rng.random(1009) < output_share,
             )
             np.testing.assert_array_equal(np.stack([result.beats[c] for c in "rgb"], axis=1), pixels.color)
-            assert result.status["wide_spans"] == pixels.wide_spans
+            assert result.status["out_of_range_spans"] == pixels.out_of_range_spans

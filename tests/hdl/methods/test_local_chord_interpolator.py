@@ -56,26 +56,26 @@ def expected_of(unit, values, length):
     expected["cosine"] = operands.cosine.codes
     if unit.highlights:
         expected["highlight"] = operands.highlight.codes
-    return expected, operands.wide
+    return expected, operands.out_of_range
 
 
 @pytest.mark.parametrize(("lights", "interval"), VARIANTS)
 def test_equals_twin(lights, interval):
-    """Every operand; the clocks of every pixel; random stalls on both sides, on both engines."""
+    """Every operand; the cycles of every pixel; random stalls on both sides, on both engines."""
     rng = np.random.default_rng(lights + 10 * interval)
     unit = LocalChordInterpolatorUnit(METHOD, lights, interval)
     values, length = spans(rng, lights, 300)
     beats = beats_of(unit, values, length)
-    expected, wide = expected_of(unit, values, length)
-    assert 10 < np.count_nonzero(wide) < 150
+    expected, out_of_range = expected_of(unit, values, length)
+    assert 10 < np.count_nonzero(out_of_range) < 150
     run = simulate(unit, beats, count=len(expected), engine="auto")
     np.testing.assert_array_equal(run.beats, expected)
     _, step = pixels_of(length)
     first = np.flatnonzero(step == 0)
-    # The first span comes out `latency` after it went in, its pixels on the clocks after.
-    assert run.clocks[0] == run.input_clocks[0] + unit.latency
-    np.testing.assert_array_equal(np.diff(run.clocks)[step[1:] > 0], 1)
-    assert np.all(run.clocks[first] >= run.input_clocks + unit.latency)
+    # The first span comes out `latency` after it went in, its pixels on the cycles after.
+    assert run.cycles[0] == run.input_cycles[0] + unit.latency
+    np.testing.assert_array_equal(np.diff(run.cycles)[step[1:] > 0], 1)
+    assert np.all(run.cycles[first] >= run.input_cycles + unit.latency)
     for input_share, output_share in ((0.4, 0.4), (0.9, 0.1), (0.1, 0.9)):
         stalls = {
             "input_stalls": rng.random(997) < input_share,
@@ -89,8 +89,8 @@ def test_equals_twin(lights, interval):
             simulate(unit, beats[:few], count=count, engine=engine, **stalls) for engine in ("pysim", "auto")
         )
         np.testing.assert_array_equal(slow.beats, expected[:count])
-        np.testing.assert_array_equal(slow.clocks, fast.clocks)
-        np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+        np.testing.assert_array_equal(slow.cycles, fast.cycles)
+        np.testing.assert_array_equal(slow.input_cycles, fast.input_cycles)
 
 
 def test_long_spans_leave_no_gap():
@@ -102,7 +102,7 @@ def test_long_spans_leave_no_gap():
     expected, _ = expected_of(unit, values, length)
     run = simulate(unit, beats_of(unit, values, length), count=len(expected), engine="auto")
     np.testing.assert_array_equal(run.beats, expected)
-    np.testing.assert_array_equal(run.clocks, unit.latency + np.arange(len(expected)))
+    np.testing.assert_array_equal(run.cycles, unit.latency + np.arange(len(expected)))
 
 
 def test_every_bit_counts():
@@ -131,11 +131,11 @@ def words_of(unit, beats):
 
 
 def test_wide_is_high_once_a_span():
-    """As many clocks as the twin flags spans, while the output waits now and then."""
+    """As many cycles as the twin flags spans, while the output waits now and then."""
     rng = np.random.default_rng(7)
     unit = LocalChordInterpolatorUnit(METHOD, 1, 2)
     values, length = spans(rng, 1, 60, 6)
-    expected, wide = expected_of(unit, values, length)
+    expected, out_of_range = expected_of(unit, values, length)
     words = words_of(unit, beats_of(unit, values, length))
     high = []
 
@@ -147,14 +147,14 @@ def test_wide_is_high_once_a_span():
             context.set(unit.o.ready, int(rng.random() < 0.6))
             sent += context.get(unit.i.valid & unit.i.ready)
             pixels += context.get(unit.o.valid & unit.o.ready)
-            high.append(context.get(unit.wide))
+            high.append(context.get(unit.out_of_range))
             await context.tick()
 
     simulator = Simulator(unit)
     simulator.add_clock(1e-6)
     simulator.add_testbench(bench)
     simulator.run()
-    assert 0 < wide.sum() == sum(high) < 60
+    assert 0 < out_of_range.sum() == sum(high) < 60
 
 
 def test_reset_leaves_nothing_behind(verify_reset):
@@ -177,7 +177,7 @@ def test_multipliers(lights, interval):
 def test_is_an_interpolator_but_for_its_input():
     """The shell finds what it reads of an interpolator unit."""
     unit = LocalChordInterpolatorUnit(METHOD, 2, 3)
-    assert (unit.lights, unit.setup_interval, unit.clocks_per_pixel) == (2, 3, 1)
+    assert (unit.lights, unit.setup_interval, unit.cycles_per_pixel) == (2, 3, 1)
     assert list(type(unit).setup_intervals(METHOD)) == [1, 2, 3, 4, 5, 6]
     theirs = InterpolatorUnit(METHOD, 2)
     assert unit.o.payload.shape() == theirs.o.payload.shape()

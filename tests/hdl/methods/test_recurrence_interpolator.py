@@ -10,7 +10,8 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, quantise
-from blysk.golden.pipeline import METHODS, ShadingPipeline, Spans
+from blysk.golden.pipeline import Spans
+from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.pipeline import ShadingPipelineUnit
 
@@ -43,7 +44,7 @@ def make_constants(rng, lights, exponent, halfway):
 @functools.cache
 def unit_of(method, model, lights, interval):
     """One for all tests, as it is made and compiled but once."""
-    return ShadingPipelineUnit(ShadingPipeline(method, model, lights), interval)
+    return ShadingPipelineUnit(preset(method, model, lights, setup_interval=interval))
 
 
 @pytest.mark.parametrize(
@@ -62,22 +63,22 @@ def test_equals_twin(normal_pairs, monkeypatch, method, model, lights, interval)
     rng = np.random.default_rng(lights)
     unit = unit_of(method, model, lights, interval)
     parameters = unit.parameters
-    assert (unit.setup_interval, unit.clocks_per_pixel) == (interval, 1)
+    assert (unit.setup_interval, unit.cycles_per_pixel) == (interval, 1)
     lengths = np.r_[rng.integers(0, 40, 150), np.full(30, 1), np.full(30, 7), [4095, 1, 1], np.arange(1, 10)]
     for exponent in (1, 1000):
         spans = make_spans(rng, lengths, normal_pairs, 10.0 ** rng.uniform(-2, 2, len(lengths)))
         constants = make_constants(rng, lights, exponent, spans.normal_left[:lights])
         pixels = parameters.compute(spans, constants)
         assert len(np.unique(pixels.color)) > 100
-        assert 0 < pixels.wide_spans < 20
+        assert 0 < pixels.out_of_range_spans < 20
         result = assert_equals_twin(unit, spans, constants, pixels)
         shown = lengths[lengths > 0]
         starts = np.cumsum(shown) - shown
-        first = result.clocks[starts]
+        first = result.cycles[starts]
         assert np.all(np.diff(first) <= np.maximum(shown[:-1], interval))
-        assert np.all(np.delete(np.diff(result.clocks), starts[1:] - 1) == 1)
+        assert np.all(np.delete(np.diff(result.cycles), starts[1:] - 1) == 1)
         if lengths[0]:
-            assert first[0] == result.input_clocks[0] + unit.latency
+            assert first[0] == result.input_cycles[0] + unit.latency
         for input_share, output_share in ((0.4, 0.4), (0.95, 0), (0, 0.7)):
             stalls = {
                 "input_stalls": rng.random(997) < input_share,

@@ -18,14 +18,14 @@ def spans(normal_pairs, parameters, angles, lengths, seed=1):
     rng = np.random.default_rng(seed)
     left, right = (quantise(normals) for normals in normal_pairs(rng, len(lengths), angles))
     length = np.asarray(lengths)
-    normal, wide, levels = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right), length)
+    normal, out_of_range, levels = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right), length)
     beats = {"normal_left": left, "normal_right": right, "length": length}
-    return beats, {"normal": normal.codes, "wide": np.repeat(wide, length)}, levels
+    return beats, {"normal": normal.codes, "out_of_range": np.repeat(out_of_range, length)}, levels
 
 
 def assert_equal(run, expected):
     np.testing.assert_array_equal(run.beats["normal"], expected["normal"])
-    np.testing.assert_array_equal(run.beats["wide"], expected["wide"])
+    np.testing.assert_array_equal(run.beats["out_of_range"], expected["out_of_range"])
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def assert_equal(run, expected):
         AdaptiveNormaliser(),
         AdaptiveNormaliser(2.0**-14, Bisection(1, 45)),
         AdaptiveNormaliser(1 / 8),
-        AdaptiveNormaliser(bisection=Bisection(as_documented=True)),
+        AdaptiveNormaliser(bisection=Bisection(as_published=True)),
     ],
     ids=str,
 )
@@ -56,8 +56,8 @@ def test_equals_twin_without_gaps(normal_pairs, parameters):
     # One normal a clock from the first of a span to its last.
     starts = np.cumsum(lengths) - lengths
     step = np.arange(count) - np.repeat(starts, lengths)
-    first = run.clocks[np.minimum(starts, count - 1)]
-    np.testing.assert_array_equal(run.clocks, np.repeat(first, lengths) + step)
+    first = run.cycles[np.minimum(starts, count - 1)]
+    np.testing.assert_array_equal(run.cycles, np.repeat(first, lengths) + step)
 
 
 def test_preparation_as_stated(normal_pairs):
@@ -70,12 +70,12 @@ def test_preparation_as_stated(normal_pairs):
     np.testing.assert_array_equal(levels, [0, 0, 1, 2, 3, 4, 4, 0, 0, 0, 0])
     run = simulate(unit, beats, count=lengths.sum(), engine="auto")
     assert_equal(run, expected)
-    first = run.clocks[np.cumsum(lengths) - lengths] - run.input_clocks
+    first = run.cycles[np.cumsum(lengths) - lengths] - run.input_cycles
     stated = np.array([unit.preparation(k) for k in levels.tolist()])
     np.testing.assert_array_equal(first, np.where(lengths == 1, 56, stated))
     assert [unit.preparation(k) for k in range(3)] == [69, 83, 148]
     longer = lengths[:-1] > 1
-    taken = np.diff(run.input_clocks)[longer]
+    taken = np.diff(run.input_cycles)[longer]
     np.testing.assert_array_equal(taken, (stated[:-1] - 2)[longer])
 
 
@@ -84,7 +84,7 @@ def test_long_spans_follow_without_a_gap(normal_pairs):
     beats, expected, _ = spans(normal_pairs, parameters, [3.0, 5, 44, 20, 2], [1000, 500, 600, 300, 200])
     run = simulate(AdaptiveNormaliserUnit(parameters), beats, count=2600, engine="auto")
     assert_equal(run, expected)
-    np.testing.assert_array_equal(np.diff(run.clocks), 1)
+    np.testing.assert_array_equal(np.diff(run.cycles), 1)
 
 
 def test_equals_twin_under_stalls(normal_pairs):
@@ -105,8 +105,8 @@ def test_equals_twin_under_stalls(normal_pairs):
     count = lengths[:6].sum()
     slow, fast = (simulate(unit, few, count=count, engine=engine, **stalls) for engine in ("pysim", "auto"))
     np.testing.assert_array_equal(slow.beats["normal"], expected["normal"][:count])
-    np.testing.assert_array_equal(slow.clocks, fast.clocks)
-    np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+    np.testing.assert_array_equal(slow.cycles, fast.cycles)
+    np.testing.assert_array_equal(slow.input_cycles, fast.input_cycles)
 
 
 def test_front_runs_ahead_until_the_fifo_is_full(normal_pairs):
@@ -118,7 +118,7 @@ def test_front_runs_ahead_until_the_fifo_is_full(normal_pairs):
     run = simulate(AdaptiveNormaliserUnit(), beats, count=100, engine="auto", output_stalls=stalls)
     assert_equal(run, expected)
     # One span more is in the front, and one in the back.
-    assert (run.input_clocks < wait).sum() == (2 << parameters.depth) + 2
+    assert (run.input_cycles < wait).sum() == (2 << parameters.depth) + 2
 
 
 def test_every_bit_counts(normal_pairs, one_minus_cosines):
@@ -156,7 +156,7 @@ def test_reset_leaves_nothing(normal_pairs, clock):
     seen = []
 
     async def bench(context):
-        def offer(span):
+        def skid_buffer(span):
             context.set(unit.i.valid, 1)
             for name in ("normal_left", "normal_right"):
                 code = sum((int(x) & 0x3FFFF) << (18 * c) for c, x in enumerate(beats[name][span]))
@@ -164,14 +164,14 @@ def test_reset_leaves_nothing(normal_pairs, clock):
             context.set(unit.i.payload.length, int(beats["length"][span]))
 
         context.set(unit.o.ready, 1)
-        offer(0)
+        skid_buffer(0)
         await context.tick()
         context.set(unit.i.valid, 0)
         await context.tick().repeat(clock)
         context.set(reset, 1)
         await context.tick()
         context.set(reset, 0)
-        offer(1)
+        skid_buffer(1)
         for _ in range(100):
             taken = context.get(unit.i.valid & unit.i.ready)
             if context.get(unit.o.valid):

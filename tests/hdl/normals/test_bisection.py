@@ -20,12 +20,12 @@ STATED = {
 }
 VARIANTS = [
     (WIDE, 6),
-    (Bisection(2, as_documented=True), 6),
-    (Bisection(1, as_documented=True), 6),
+    (Bisection(2, as_published=True), 6),
+    (Bisection(1, as_published=True), 6),
     (NARROW_2, 5),
     (NARROW_1, 4),
     *((WIDE, interval) for interval in (1, 2, 3, 4, 5, 7, 9)),
-    (Bisection(2, as_documented=True), 1),
+    (Bisection(2, as_published=True), 1),
     *((NARROW_2, interval) for interval in (1, 3, 8)),
     *((NARROW_1, interval) for interval in (1, 2, 7)),
 ]
@@ -40,7 +40,7 @@ def test_intervals_and_what_they_cost():
             assert (unit.initiation_interval, unit.latency) == (interval, latency)
             cost = cost_of(unit)
             assert cost.multiplier_count == multipliers
-            assert all(wide <= 18 for wide, _ in cost.multipliers)
+            assert all(out_of_range <= 18 for out_of_range, _ in cost.multipliers)
 
 
 @pytest.mark.parametrize(
@@ -66,13 +66,13 @@ def test_equals_twin(verify, normal_pairs, parameters, interval):
     left, right = left[order], right[order]
     # 1 - cosine is halfway between two words: 180994.5.
     left[0], right[0] = (35421, 119829, 39572), (-5993, -85566, 99107)
-    middle, u, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
-    assert wide.any()
-    assert not wide.all()
+    middle, u, out_of_range = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    assert out_of_range.any()
+    assert not out_of_range.all()
     verify(
         BisectionUnit(parameters, interval),
         {"normal_a": left, "normal_b": right},
-        {"normal_middle": middle.codes, "one_minus_cosine": u.codes, "wide": wide},
+        {"normal_middle": middle.codes, "one_minus_cosine": u.codes, "out_of_range": out_of_range},
     )
 
 
@@ -85,10 +85,10 @@ def test_every_bit_counts(normal_pairs):
     below = (ONE_SQUARED.codes - np.einsum("ij,ij->i", left, right)) % (1 << 17) - (1 << 16)
     chosen = np.r_[:20_000, 20_000 + np.flatnonzero(abs(below[20_000:]) < 1 << 13)]
     left, right = left[chosen], right[chosen]
-    middle, u, wide = WIDE.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    middle, u, out_of_range = WIDE.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
     run = simulate(
         BisectionUnit(WIDE), {"normal_a": left, "normal_b": right}, count=len(chosen), engine="auto"
     )
     np.testing.assert_array_equal(run.beats["normal_middle"], middle.codes)
     np.testing.assert_array_equal(run.beats["one_minus_cosine"], u.codes)
-    np.testing.assert_array_equal(run.beats["wide"], wide)
+    np.testing.assert_array_equal(run.beats["out_of_range"], out_of_range)

@@ -23,26 +23,26 @@ def spans(normal_pairs, parameters, seed, count):
     order = rng.permutation(len(left))
     left, right = left[order], right[order]
     level = rng.integers(1, 16, len(left))
-    normal, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right), level)
-    assert wide.any()
-    assert not wide.all()
-    return {"normal_left": left, "normal_right": right, "level": level}, normal.codes, wide
+    normal, out_of_range = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right), level)
+    assert out_of_range.any()
+    assert not out_of_range.all()
+    return {"normal_left": left, "normal_right": right, "level": level}, normal.codes, out_of_range
 
 
 @pytest.mark.parametrize(
-    "bisection", [Bisection(), Bisection(1, 45), Bisection(2, as_documented=True)], ids=str
+    "bisection", [Bisection(), Bisection(1, 45), Bisection(2, as_published=True)], ids=str
 )
 def test_equals_twin(normal_pairs, bisection):
     parameters = BisectionChain(bisection)
     unit = BisectionChainUnit(parameters)
-    beats, normal, wide = spans(normal_pairs, parameters, 3, 400)
-    count = len(wide)
+    beats, normal, out_of_range = spans(normal_pairs, parameters, 3, 400)
+    count = len(out_of_range)
     run = simulate(unit, beats, count=count, engine="auto")
     np.testing.assert_array_equal(run.beats["normal"], normal)
-    np.testing.assert_array_equal(run.beats["wide"], wide)
+    np.testing.assert_array_equal(run.beats["out_of_range"], out_of_range)
     latency = np.array([unit.latency(k) for k in beats["level"].tolist()])
-    np.testing.assert_array_equal(run.clocks - run.input_clocks, latency)
-    np.testing.assert_array_equal(run.input_clocks[1:], run.clocks[:-1] + 1)
+    np.testing.assert_array_equal(run.cycles - run.input_cycles, latency)
+    np.testing.assert_array_equal(run.input_cycles[1:], run.cycles[:-1] + 1)
 
     rng = np.random.default_rng(4)
     stalls = {"input_stalls": rng.random(997) < 0.4, "output_stalls": rng.random(1009) < 0.7}
@@ -51,20 +51,20 @@ def test_equals_twin(normal_pairs, bisection):
     few = {name: value[:8] for name, value in beats.items()}
     slow, fast = (simulate(unit, few, count=8, engine=engine, **stalls) for engine in ("pysim", "auto"))
     np.testing.assert_array_equal(slow.beats["normal"], normal[:8])
-    np.testing.assert_array_equal(slow.clocks, fast.clocks)
-    np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+    np.testing.assert_array_equal(slow.cycles, fast.cycles)
+    np.testing.assert_array_equal(slow.input_cycles, fast.input_cycles)
     # A 4-bit counter that starts at 0 goes round.
     zero = {name: value[:1] for name, value in beats.items()} | {"level": [0]}
     run = simulate(unit, zero, count=1, engine="auto")
-    assert run.clocks[0] - run.input_clocks[0] == unit.latency(16)
+    assert run.cycles[0] - run.input_cycles[0] == unit.latency(16)
 
 
 def test_every_bit_counts(normal_pairs):
     """The last bits of the products and of the sums are rounded off: each decides once in thousands."""
-    beats, normal, wide = spans(normal_pairs, BisectionChain(), 5, 2000)
-    run = simulate(BisectionChainUnit(), beats, count=len(wide), engine="auto")
+    beats, normal, out_of_range = spans(normal_pairs, BisectionChain(), 5, 2000)
+    run = simulate(BisectionChainUnit(), beats, count=len(out_of_range), engine="auto")
     np.testing.assert_array_equal(run.beats["normal"], normal)
-    np.testing.assert_array_equal(run.beats["wide"], wide)
+    np.testing.assert_array_equal(run.beats["out_of_range"], out_of_range)
 
 
 def test_last_bits_of_all_count(normal_pairs, one_minus_cosines):
@@ -102,7 +102,7 @@ def test_reset_in_mid_span_leaves_nothing(normal_pairs, clock):
     simulator.add_clock(1e-6)
     found = []
 
-    def offer(context, index):
+    def skid_buffer(context, index):
         span = unit.i.payload
         context.set(span.level, level[index])
         for c in range(3):
@@ -111,7 +111,7 @@ def test_reset_in_mid_span_leaves_nothing(normal_pairs, clock):
         context.set(unit.i.valid, 1)
 
     async def drive(context):
-        offer(context, 0)
+        skid_buffer(context, 0)
         await context.tick().repeat(1 + clock)
         assert context.get(unit.o.valid) == (clock >= 50)
         context.set(unit.i.valid, 0)
@@ -124,14 +124,14 @@ def test_reset_in_mid_span_leaves_nothing(normal_pairs, clock):
             assert not context.get(unit.o.valid)
             assert context.get(unit.i.ready)
             await context.tick()
-        offer(context, 1)
+        skid_buffer(context, 1)
         await context.tick()
         context.set(unit.i.valid, 0)
-        clocks = 1
+        cycles = 1
         while not context.get(unit.o.valid):
             await context.tick()
-            clocks += 1
-        found.append((clocks, [context.get(Value.cast(unit.o.payload.normal[c])) for c in range(3)]))
+            cycles += 1
+        found.append((cycles, [context.get(Value.cast(unit.o.payload.normal[c])) for c in range(3)]))
 
     simulator.add_testbench(drive)
     simulator.run()

@@ -43,11 +43,11 @@ def test_one_normal_a_clock_without_gaps():
     beats, expected = spans(lengths, 1)
     run = simulate(DifferenceAccumulatorUnit(), beats, count=len(expected), engine="auto")
     np.testing.assert_array_equal(run.beats, expected)
-    clocks_taken = np.maximum(lengths, 1)
-    np.testing.assert_array_equal(run.input_clocks, np.cumsum(clocks_taken) - clocks_taken)
-    first_pixel = np.repeat(run.input_clocks, lengths) + DifferenceAccumulatorUnit.latency
+    cycles_taken = np.maximum(lengths, 1)
+    np.testing.assert_array_equal(run.input_cycles, np.cumsum(cycles_taken) - cycles_taken)
+    first_pixel = np.repeat(run.input_cycles, lengths) + DifferenceAccumulatorUnit.latency
     step = np.arange(len(expected)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    np.testing.assert_array_equal(run.clocks, first_pixel + step)
+    np.testing.assert_array_equal(run.cycles, first_pixel + step)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -79,8 +79,8 @@ def test_engines_agree():
     )
     np.testing.assert_array_equal(slow.beats, expected)
     np.testing.assert_array_equal(fast.beats, expected)
-    np.testing.assert_array_equal(slow.clocks, fast.clocks)
-    np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+    np.testing.assert_array_equal(slow.cycles, fast.cycles)
+    np.testing.assert_array_equal(slow.input_cycles, fast.input_cycles)
 
 
 @pytest.mark.parametrize("clock", [1, 2, 3, 30, 58, 59, 60])
@@ -93,7 +93,7 @@ def test_reset_in_mid_span_leaves_nothing(clock, ready):
     simulator.add_clock(1e-6)
     found = []
 
-    def offer(context, index):
+    def skid_buffer(context, index):
         span = unit.i.payload
         context.set(span.length, beats["length"][index].item())
         for name in ("start", "first", "second"):
@@ -102,7 +102,7 @@ def test_reset_in_mid_span_leaves_nothing(clock, ready):
         context.set(unit.i.valid, 1)
 
     async def drive(context):
-        offer(context, 0)
+        skid_buffer(context, 0)
         context.set(unit.o.ready, ready)
         await context.tick()
         context.set(unit.i.valid, 0)
@@ -116,7 +116,7 @@ def test_reset_in_mid_span_leaves_nothing(clock, ready):
             assert not context.get(unit.o.valid)
             assert context.get(unit.i.ready)
             await context.tick()
-        offer(context, 1)
+        skid_buffer(context, 1)
         for _ in range(8):
             await context.tick()
             context.set(unit.i.valid, 0)

@@ -12,7 +12,7 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
 from blysk.sim.engines.simulate import simulate
 
-OWN, DOCUMENTED = DifferenceSetup(), DifferenceSetup(as_documented=True)
+OWN, DOCUMENTED = DifferenceSetup(), DifferenceSetup(as_published=True)
 # Latency and multipliers for the initiation intervals 1, 2, ..., as the unit's text states them.
 STATED = {
     OWN: [(21, 7), (22, 4), (23, 3), (25, 2), (23, 2), (24, 2), (28, 1)],
@@ -31,7 +31,7 @@ def test_intervals_and_what_they_cost(parameters, interval):
     assert (unit.latency, unit.initiation_interval) == (latency, interval)
     cost = cost_of(unit)
     assert cost.multiplier_count == multipliers
-    assert all(wide <= 18 for wide, _ in cost.multipliers)
+    assert all(out_of_range <= 18 for out_of_range, _ in cost.multipliers)
     assert cost.rom_bits == 2048 * 17
 
 

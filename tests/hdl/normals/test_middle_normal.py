@@ -21,7 +21,7 @@ def test_intervals_and_what_they_cost(interval):
     assert (unit.latency, unit.initiation_interval) == (STATED[interval - 1][0], interval)
     cost = cost_of(unit)
     assert cost.multiplier_count == STATED[interval - 1][1]
-    assert all(wide <= 18 for wide, _ in cost.multipliers)
+    assert all(out_of_range <= 18 for out_of_range, _ in cost.multipliers)
 
 
 def test_default_interval():
@@ -39,7 +39,7 @@ def test_refuses_an_interval(interval):
     ("interval", "fit"),
     [
         *((interval, "exact") for interval in range(1, 10)),
-        (6, "as_documented"),
+        (6, "as_published"),
         (6, "minimax_2"),
         (6, "minimax_3"),
         (1, "minimax_3"),
@@ -53,11 +53,16 @@ def test_equals_twin(verify, normal_pairs, interval, fit):
     # Not only unit vectors: every word at its ends must not upset what follows.
     corners = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (400, 6))
     left, right = np.vstack([left, corners[:, :3]]), np.vstack([right, corners[:, 3:]])
-    middle, wide = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    middle, out_of_range = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
     verify(
         MiddleNormalUnit(parameters, interval),
         {"normal_left": left, "normal_right": right},
-        {"normal_left": left, "normal_right": right, "normal_middle": middle.codes, "wide": wide},
+        {
+            "normal_left": left,
+            "normal_right": right,
+            "normal_middle": middle.codes,
+            "out_of_range": out_of_range,
+        },
     )
 
 
@@ -69,8 +74,8 @@ def test_every_bit_counts(normal_pairs, one_minus_cosines):
     u = one_minus_cosines(left[:1500], right[:1500])
     first, second = np.nonzero((u < ONE_SQUARED.codes // 2) & ((u + 8) % (1 << 16) < 16))
     left, right = np.vstack([left, left[first]]), np.vstack([right, right[second]])
-    middle, wide = MiddleNormal().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    middle, out_of_range = MiddleNormal().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
     beats = {"normal_left": left, "normal_right": right}
     run = simulate(MiddleNormalUnit(), beats, count=len(left), engine="auto")
     np.testing.assert_array_equal(run.beats["normal_middle"], middle.codes)
-    np.testing.assert_array_equal(run.beats["wide"], wide)
+    np.testing.assert_array_equal(run.beats["out_of_range"], out_of_range)

@@ -43,8 +43,8 @@ def test_no_gap_between_spans(form):
     beats, expected = spans(parameters, lengths, 2)
     run = simulate(unit, beats, count=len(expected), engine="auto")
     np.testing.assert_array_equal(run.beats, expected)
-    assert run.input_clocks[0] == 0
-    np.testing.assert_array_equal(run.clocks, unit.latency + unit.clocks_per_pixel * np.arange(len(expected)))
+    assert run.input_cycles[0] == 0
+    np.testing.assert_array_equal(run.cycles, unit.latency + unit.cycles_per_pixel * np.arange(len(expected)))
 
 
 @pytest.mark.parametrize("form", QUADRATIC_FORMS)
@@ -55,12 +55,12 @@ def test_stiff_short_spans_come_seven_clocks_apart(form):
     beats, expected = spans(parameters, lengths, 3)
     run = simulate(unit, beats, count=len(expected), engine="auto")
     np.testing.assert_array_equal(run.beats, expected)
-    np.testing.assert_array_equal(run.input_clocks, 7 * np.arange(len(lengths)))
-    starts = np.repeat(run.input_clocks, lengths) + unit.latency
+    np.testing.assert_array_equal(run.input_cycles, 7 * np.arange(len(lengths)))
+    starts = np.repeat(run.input_cycles, lengths) + unit.latency
     index = np.arange(len(expected)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
     # The polynomial takes pixels in on every clock (horner: on every second, counted from a pixel inside).
-    late = run.clocks - (starts + unit.clocks_per_pixel * index)
-    assert np.all((late >= 0) & (late < unit.clocks_per_pixel))
+    late = run.cycles - (starts + unit.cycles_per_pixel * index)
+    assert np.all((late >= 0) & (late < unit.cycles_per_pixel))
 
 
 @pytest.mark.parametrize("form", QUADRATIC_FORMS)
@@ -92,8 +92,8 @@ def test_engines_agree(form):
     )
     np.testing.assert_array_equal(slow.beats, expected)
     np.testing.assert_array_equal(fast.beats, expected)
-    np.testing.assert_array_equal(slow.clocks, fast.clocks)
-    np.testing.assert_array_equal(slow.input_clocks, fast.input_clocks)
+    np.testing.assert_array_equal(slow.cycles, fast.cycles)
+    np.testing.assert_array_equal(slow.input_cycles, fast.input_cycles)
 
 
 @pytest.mark.parametrize("form", QUADRATIC_FORMS)
@@ -150,7 +150,7 @@ def test_stiff_reset_in_mid_span_leaves_nothing(form):
 
     async def drive(context):
         context.set(unit.o.ready, 1)
-        for start, slope, length, clocks in ((0.75, 0.125, 60, 40), (0.25, -0.5, 3, 40)):
+        for start, slope, length, cycles in ((0.75, 0.125, 60, 40), (0.25, -0.5, 3, 40)):
             context.set(span.length, length)
             for c in range(3):
                 context.set(span.q[c], start)
@@ -158,7 +158,7 @@ def test_stiff_reset_in_mid_span_leaves_nothing(form):
             context.set(unit.i.valid, 1)
             await context.tick()
             context.set(unit.i.valid, 0)
-            for _ in range(clocks):
+            for _ in range(cycles):
                 if context.get(unit.o.valid) and length == 3:
                     found.append(context.get(Value.cast(unit.o.payload[2])))
                 await context.tick()

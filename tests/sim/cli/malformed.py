@@ -32,7 +32,7 @@ import numpy as np
 import trimesh
 
 import blysk.sim.cli.main
-from blysk.sim.frames.frame import twin_frame
+from blysk.sim.frames.frame import model_frame
 
 MEMORY = 1 << 30
 SECONDS = 10
@@ -673,7 +673,7 @@ def _simulate_by_twin() -> None:
             self.design = design
 
         def render(self, scene, progress=None, vcd=None):
-            return twin_frame(scene, self.design)
+            return model_frame(scene, self.design)
 
     blysk.sim.cli.main.FrameSimulator = Twin
 

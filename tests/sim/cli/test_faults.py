@@ -115,10 +115,10 @@ def test_killed_while_compiling(cache, temporary, tmp_path):
     started = tmp_path / "started"
     program = "print(simulate(Triple(), np.arange(5), count=5).beats.tolist())"
     process = start(program, CXX=script(tmp_path, "slow", text), STARTED=str(started))
-    patience = time.monotonic() + 60
+    idle_timeout = time.monotonic() + 60
     while not (started.exists() and started.read_text().endswith("\n")):
         assert process.poll() is None, process.communicate()
-        assert time.monotonic() < patience
+        assert time.monotonic() < idle_timeout
         time.sleep(0.02)
     process.kill()
     os.kill(int(started.read_text()), signal.SIGKILL)
@@ -323,10 +323,10 @@ def test_termination_of_a_turntable(cache, temporary, tmp_path):
         start_new_session=True,
     )
     try:
-        patience = time.monotonic() + 120
+        idle_timeout = time.monotonic() + 120
         while not (tmp_path / "a-0001.png").exists():
             assert process.poll() is None
-            assert time.monotonic() < patience
+            assert time.monotonic() < idle_timeout
             time.sleep(0.02)
         process.terminate()
         # Returns when nobody holds the pipes any more: neither the program nor one of its workers.
@@ -353,10 +353,10 @@ def test_killed_worker_of_a_command(cache):
     """One line, status 2; what was measured is kept, and the next run goes on from there."""
     arguments = [*PROGRAM, *SWEEP, "--jobs", "2"]
     process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    patience = time.monotonic() + 120
+    idle_timeout = time.monotonic() + 120
     while not left_in(cache / "results"):
         assert process.poll() is None, process.communicate()
-        assert time.monotonic() < patience
+        assert time.monotonic() < idle_timeout
         time.sleep(0.02)
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
     worker = next(pid for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes())

@@ -20,7 +20,7 @@ import trimesh
 from PIL import Image
 
 import blysk.sim.meshes.mesh
-from blysk.golden.pipeline import METHODS, PRINTED, ShadingPipeline
+from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
@@ -137,7 +137,7 @@ def test_no_mesh(refused):
 
 # Options.
 
-KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS | PRINTED)}"
+KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS | PUBLISHED)}"
 
 
 @pytest.mark.parametrize(
@@ -368,7 +368,7 @@ def test_place_of_the_camera(capsys):
             lights=[Light((-0.5, 0.8, 0.7))],
             background=(int("1a", 16) / 255, int("1c", 16) / 255, int("20", 16) / 255),
         )
-        assert np.array_equal(FrameSimulator(ShadingPipeline("linear")).render(scene).image, expected)
+        assert np.array_equal(FrameSimulator(preset("linear")).render(scene).image, expected)
     # --view takes the place of the file's position.
     options = ["--size", "64x48", "--method", "linear", "--view", "1,2,3"]
     assert main(["render", "middle.toml", "--view", "1,2,3", "-o", "again.png"]) == 0
@@ -472,7 +472,7 @@ def test_figures_of_a_turntable(turned):
     assert [Path(frame["picture"]).name for frame in frames] == [
         f"a-000{number}.png" for number in range(1, 6)
     ]
-    for name in ("pixels", "visible_pixels", "clocks"):
+    for name in ("pixels", "visible_pixels", "cycles"):
         assert figures[name] == sum(frame[name] for frame in frames)
         assert f"{figures[name]:,}" in output
     for name in ("arithmetic", "method", "total"):
@@ -505,10 +505,10 @@ def test_interrupt_of_a_turntable():
         start_new_session=True,
     )
     try:
-        patience = time.monotonic() + 120
+        idle_timeout = time.monotonic() + 120
         while not Path("a-0001.png").exists():
             assert process.poll() is None
-            assert time.monotonic() < patience
+            assert time.monotonic() < idle_timeout
             time.sleep(0.02)
         os.killpg(process.pid, signal.SIGINT)
         # Returns when nobody holds the pipes any more: neither the program nor one of its workers.
@@ -577,7 +577,7 @@ def test_fit_says_what_it_leaves_out(folder, capsys):
         r"^left out +no specular path: every k_s is 0; saves [\d,]+ cells, \d+ mult", output, re.M
     )
     assert re.search(r"^left out +x in 6 bits: 64 columns; saves ", output, re.M)
-    assert re.search(r"^fitted +[\d,]+ of [\d,]+ cells, \d+ of \d+ multipliers, .* clocks$", output, re.M)
+    assert re.search(r"^fitted +[\d,]+ of [\d,]+ cells, \d+ of \d+ multipliers, .* cycles$", output, re.M)
     assert re.search(r"^ +the frame is that of the full pipeline, to the bit$", output, re.M)
     fit = json.loads(Path("a.json").read_text())["fit"]
     assert (fit["largest_difference"], fit["different_pixels"]) == (0, 0)
@@ -676,7 +676,7 @@ def test_picture_is_the_simulated_frame(rendered):
         lights=[Light((-0.5, 0.8, 0.7))],
         background=gray,
     )
-    expected = FrameSimulator(ShadingPipeline()).render(scene).image
+    expected = FrameSimulator(preset()).render(scene).image
     folder, _ = rendered
     assert np.array_equal(picture(folder / "a.png"), expected)
     both = picture(folder / "both.png")
@@ -699,11 +699,11 @@ def test_figures(rendered):
         "height": 48,
     }
     assert {name: figures[name] for name in fixed} == fixed
-    whole = ["triangles", "spans", "pixels", "visible_pixels", "clocks"]
+    whole = ["triangles", "spans", "pixels", "visible_pixels", "cycles"]
     assert all(type(figures[name]) is int and figures[name] > 0 for name in whole)
     assert figures["triangles"] == len(load_mesh("teapot", triangles=500).mesh.faces)
-    assert figures["spans"] <= figures["visible_pixels"] <= figures["pixels"] <= figures["clocks"]
-    assert figures["clocks_per_pixel"] == figures["clocks"] / figures["pixels"]
+    assert figures["spans"] <= figures["visible_pixels"] <= figures["pixels"] <= figures["cycles"]
+    assert figures["cycles_per_pixel"] == figures["cycles"] / figures["pixels"]
     seconds = figures["seconds"]
     assert {"load", "raster", "golden", "simulate", "total"} <= set(seconds)
     assert figures["simulated_pixels_per_second"] == figures["pixels"] / seconds["simulate"]
@@ -717,12 +717,12 @@ def test_figures(rendered):
     # Half an LSB of rounding and as much of arithmetic; the model itself is off by tens of LSB.
     assert figures["arithmetic_error"]["max_lsb"] <= 1 < figures["total_error"]["max_lsb"]
     assert 0 < figures["nmse"] < 1
-    assert figures["mnse_printed"] > 0
+    assert figures["mnse_published"] > 0
 
     # Every figure is printed, and every printed file is there.
     for name in whole:
         assert f"{figures[name]:,}" in output
-    assert f"{figures['clocks_per_pixel']:.3f} a pixel" in output
+    assert f"{figures['cycles_per_pixel']:.3f} a pixel" in output
     for name in ("arithmetic", "method", "total"):
         values = [figures[f"{name}_error"][key] for key in ERROR_NAMES]
         (row,) = re.findall(rf"^  {name} +([\d. ]+?)   [a-z]", output, re.MULTILINE)
@@ -765,7 +765,7 @@ def test_no_pixel_shows_the_surface(capsys):
     assert "nan" not in output
     assert "no pixel shows the surface" in output
     figures = json.loads(Path("a.json").read_text())
-    assert (figures["spans"], figures["pixels"], figures["clocks_per_pixel"]) == (0, 0, None)
+    assert (figures["spans"], figures["pixels"], figures["cycles_per_pixel"]) == (0, 0, None)
     assert figures["arithmetic_error"] == dict.fromkeys(ERROR_NAMES)
     assert figures["nmse"] is None
 
@@ -794,8 +794,8 @@ def test_waveforms(capsys):
     clock = set(re.findall(r"\$var wire 1 (\S+) clk \$end", head))
     assert len(clock) == 1
     ticks = changes.splitlines().count(f"1{clock.pop()}")
-    # To the last pixel, and 64 clocks more to see that no other comes.
-    assert figures["clocks"] <= ticks <= figures["clocks"] + 70
+    # To the last pixel, and 64 cycles more to see that no other comes.
+    assert figures["cycles"] <= ticks <= figures["cycles"] + 70
     assert set(files()) == {Path("a.vcd"), Path("a.json"), Path("teapot-blysk.png")}
 
 
@@ -878,11 +878,11 @@ def test_interrupt():
         [*PROGRAM, "render", "teapot", *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     try:
-        patience = time.monotonic() + 60
+        idle_timeout = time.monotonic() + 60
         # The simulation has begun when its waveforms grow.
         while not any(path.stat().st_size for path in Path().iterdir()):
             assert process.poll() is None
-            assert time.monotonic() < patience
+            assert time.monotonic() < idle_timeout
             time.sleep(0.02)
         process.send_signal(signal.SIGINT)
         output, errors = process.communicate(timeout=60)

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from blysk.golden.lighting.intensity import MAX_LIGHTS
-from blysk.golden.pipeline import METHODS, MODELS
+from blysk.golden.presets import METHODS, MODELS
 from blysk.sim.cli.scene_file import MAX_BYTES, read_scene_file
 from blysk.sim.errors import InputError
 

@@ -626,12 +626,12 @@ def test_batches_leave_no_trace(filled, monkeypatch):
     seen = []
     for count in (300, None):
         parts = simulate(
-            component, beats, **arguments | {"count": count, "progress": seen.append, "patience": 90}
+            component, beats, **arguments | {"count": count, "progress": seen.append, "idle_timeout": 90}
         )
         np.testing.assert_array_equal(parts.beats, whole.beats)
-        np.testing.assert_array_equal(parts.clocks, whole.clocks)
-        np.testing.assert_array_equal(parts.input_clocks, whole.input_clocks)
-        assert parts.total_clocks == whole.total_clocks
+        np.testing.assert_array_equal(parts.cycles, whole.cycles)
+        np.testing.assert_array_equal(parts.input_cycles, whole.input_cycles)
+        assert parts.total_cycles == whole.total_cycles
     assert seen[0] <= 7
     assert 300 in seen
 
@@ -652,10 +652,10 @@ def test_errors_are_the_same_in_batches(monkeypatch, end):
     for batch in (1000, 1, 61):
         monkeypatch.setattr(cxxrtl, "_BATCH", batch)
         with pytest.raises(SimulationError) as caught:
-            simulate(Faulty(), np.arange(500), count=500, output_stalls=stalls, patience=600)
+            simulate(Faulty(), np.arange(500), count=500, output_stalls=stalls, idle_timeout=600)
         messages.append(str(caught.value))
     with pytest.raises(SimulationError) as caught:
-        simulate(Faulty(), np.arange(500), count=500, output_stalls=stalls, patience=600, engine="pysim")
+        simulate(Faulty(), np.arange(500), count=500, output_stalls=stalls, idle_timeout=600, engine="pysim")
     assert messages == [str(caught.value)] * 3
 
 
@@ -666,14 +666,14 @@ def test_interrupt_between_batches(filled):
     component = Scale()
     simulate(component, BEATS, count=4)
     beats = np.zeros(100, dtype=int)
-    # One beat in 100 million clocks.
+    # One beat in 100 million cycles.
     stalls = np.ones(10**8, dtype=bool)
     stalls[5] = False
     started = time.monotonic()
     timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        simulate(component, beats, count=100, input_stalls=stalls, patience=10**10)
+        simulate(component, beats, count=100, input_stalls=stalls, idle_timeout=10**10)
     assert time.monotonic() - started < 5
     timer.join()
     assert simulate(component, BEATS, count=4).beats.tolist() == (3 * BEATS).tolist()
@@ -717,9 +717,9 @@ def test_room_for_the_output_grows(filled, monkeypatch, count, batch, room):
     monkeypatch.setattr(cxxrtl, "_BATCH", batch)
     monkeypatch.setattr(cxxrtl, "_ROOM", room)
     beats = np.arange(-150, 150)
-    run = simulate(Scale(), beats, count=count, patience=100)
+    run = simulate(Scale(), beats, count=count, idle_timeout=100)
     assert run.beats.tolist() == (3 * beats).tolist()
-    assert run.clocks.tolist() == list(range(1, 301))
+    assert run.cycles.tolist() == list(range(1, 301))
 
 
 @pytest.mark.parametrize("piece", [1, 7, 300, 301])

@@ -28,7 +28,7 @@ class Tangle(Component):
         m.d.comb += [advance.eq(~self.o.valid | self.o.ready), self.i.ready.eq(advance)]
         swap = [Signal(16, init=k, name=f"swap_{k}") for k in range(6)]
         ring = [Signal(32, init=3 * k + 1, name=f"ring_{k}") for k in range(6)]
-        wide = Signal(100, init=1)
+        out_of_range = Signal(100, init=1)
         free = Signal(8)
         m.submodules.memory = memory = Memory(shape=16, depth=8, init=range(8))
         read, write = memory.read_port(), memory.write_port()
@@ -51,7 +51,11 @@ class Tangle(Component):
                         to.eq(source + x) for to, source in zip(ring, ring[1:] + ring[:1], strict=True)
                     ]
                 with m.Else():
-                    m.d.sync += [ring[0].eq(ring[3]), ring[1].eq(ring[0] ^ free), wide.eq(wide * 5 + x)]
+                    m.d.sync += [
+                        ring[0].eq(ring[3]),
+                        ring[1].eq(ring[0] ^ free),
+                        out_of_range.eq(out_of_range * 5 + x),
+                    ]
             with m.Elif(on[2]):
                 # Registers in both branches, and a part of one.
                 m.d.sync += [ring[4].eq(Mux(on[1], ring[5], ring[4])), ring[5][4:9].eq(x)]
@@ -60,11 +64,11 @@ class Tangle(Component):
                 with m.Case(1, 5):
                     m.d.sync += [word.eq(word + 1) for word in ring[2:]]
                 with m.Case(7):
-                    m.d.sync += wide.eq(0)
+                    m.d.sync += out_of_range.eq(0)
             m.d.sync += [
                 self.o.payload[0].eq(ring[0] ^ ring[4]),
                 self.o.payload[1].eq(sum(ring)),
-                self.o.payload[2].eq(wide >> 50),
+                self.o.payload[2].eq(out_of_range >> 50),
                 self.o.payload[3].eq(sum(swap) + read.data),
             ]
         return m
@@ -83,7 +87,7 @@ def _cache(tmp_path, monkeypatch):
 
 
 def test_the_machine_is_the_same(monkeypatch):
-    """Against pysim, over ten times the clocks that a new model is checked with, with stalls."""
+    """Against pysim, over ten times the cycles that a new model is checked with, with stalls."""
     rng = np.random.default_rng(4)
     beats = {"x": rng.integers(0, 1 << 16, 4000), "on": rng.integers(0, 8, 4000)}
     component = Tangle()
@@ -93,7 +97,7 @@ def test_the_machine_is_the_same(monkeypatch):
         simulate(component, beats, count=4000, engine=name, **stalls) for name in ("cxxrtl", "pysim")
     )
     assert np.array_equal(fast.beats, slow.beats)
-    assert np.array_equal(fast.clocks, slow.clocks)
+    assert np.array_equal(fast.cycles, slow.cycles)
 
 
 def test_every_register_is_copied_once(monkeypatch):

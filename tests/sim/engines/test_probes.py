@@ -10,7 +10,8 @@ from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, quantise
-from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.pipeline import Spans
+from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -19,7 +20,7 @@ from blysk.sim.engines.probes import ObservedPipeline, probes_of
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import beats_of
 
-DESIGN = ShadingPipeline("chord", "cosquad", gate=True)
+DESIGN = preset("chord", "cosquad", gate=True)
 
 
 def spans_near(rng, count):
@@ -43,7 +44,7 @@ def observed():
     return component
 
 
-def rows_of(component, spans, constants, clocks):
+def rows_of(component, spans, constants, cycles):
     """Status on every clock, as its registers stand before the edge."""
     queue = []
     for stream, beats in (
@@ -57,7 +58,7 @@ def rows_of(component, spans, constants, clocks):
 
     async def bench(context):
         context.set(component.o.ready, 1)
-        for _ in range(clocks):
+        for _ in range(cycles):
             stream, word = queue[0] if queue else (component.i, 0)
             context.set(Value.cast(stream.payload).as_unsigned(), word)
             context.set(stream.valid, bool(queue))
@@ -74,7 +75,7 @@ def rows_of(component, spans, constants, clocks):
     simulator.run()
     size = 4 * word_count(component.status.shape())
     raw = b"".join(code.to_bytes(size, "little") for code in codes)
-    return unpack(component.status.shape(), np.frombuffer(raw, "<u4").reshape(clocks, -1).astype(np.uint32))
+    return unpack(component.status.shape(), np.frombuffer(raw, "<u4").reshape(cycles, -1).astype(np.uint32))
 
 
 def test_beats_are_those_without_probes(observed):
@@ -83,14 +84,14 @@ def test_beats_are_those_without_probes(observed):
     plain = ShadingPipelineUnit(DESIGN)
     runs = [simulate(component, beats_of(plain, spans), **options) for component in (observed, plain)]
     np.testing.assert_array_equal(runs[0].beats, runs[1].beats)
-    np.testing.assert_array_equal(runs[0].clocks, runs[1].clocks)
+    np.testing.assert_array_equal(runs[0].cycles, runs[1].cycles)
     for name in runs[1].status.dtype.names:
         assert runs[0].status[name] == runs[1].status[name]
     assert runs[0].status["gated_spans"] == np.count_nonzero(~DESIGN.lit_spans(spans, constants))
 
 
 def test_needs_a_light_and_a_gate():
-    for design in (ShadingPipeline("chord"), ShadingPipeline("chord", lights=2, gate=True)):
+    for design in (preset("chord"), preset("chord", lights=2, gate=True)):
         with pytest.raises(ValueError, match="one light and a gate"):
             ObservedPipeline(design)
 
@@ -103,7 +104,7 @@ def test_needs_a_light_and_a_gate():
     ],
 )
 def test_formats_fit(method, model):
-    unit = ShadingPipelineUnit(ShadingPipeline(method, model, gate=True))
+    unit = ShadingPipelineUnit(preset(method, model, gate=True))
     probes = {probe.name: probe for probe in probes_of(unit)}
     assert {"cosine", "highlight", "gated", "diffuse", "specular", "red", "r", "x", "last"} <= set(probes)
     assert isinstance(probes["specular"].shape, FixedShape)
@@ -129,7 +130,7 @@ def test_words_are_those_of_the_twin(observed):
     lit = np.repeat(DESIGN.lit_spans(spans, constants)[:, 0], spans.length)
     cosine, u = operands.cosine.codes[:, 0], operands.highlight.codes[:, 0]
     dark = (cosine <= 0) | ~lit
-    specular = DESIGN.highlight.compute(operands.highlight[:, 0], dark, constants.exponent)
+    specular = DESIGN.specular.compute(operands.highlight[:, 0], dark, constants.exponent)
     pixels = DESIGN.compute(spans, constants)
     expected = {
         "cosine": cosine,

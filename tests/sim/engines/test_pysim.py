@@ -48,9 +48,9 @@ def test_waveforms(tmp_path):
 def test_progress():
     seen = []
     run = simulate(Negate(), np.zeros(2500, dtype=int), count=2500, engine="pysim", progress=seen.append)
-    # Every 1000 clocks; the first beat leaves at clock 1.
+    # Every 1000 cycles; the first beat leaves at clock 1.
     assert seen == [999, 1999]
-    assert run.total_clocks == 2501
+    assert run.total_cycles == 2501
     with pytest.raises(KeyboardInterrupt):
         simulate(Negate(), np.zeros(2500, dtype=int), count=2500, engine="pysim", progress=_interrupt)
 

@@ -223,9 +223,9 @@ ALL = [Register, Pipeline, Queue, Expander, Lookup]
 def assert_equal(first, second):
     assert first.beats.dtype == second.beats.dtype
     np.testing.assert_array_equal(first.beats, second.beats)
-    np.testing.assert_array_equal(first.clocks, second.clocks)
-    np.testing.assert_array_equal(first.input_clocks, second.input_clocks)
-    assert first.total_clocks == second.total_clocks
+    np.testing.assert_array_equal(first.cycles, second.cycles)
+    np.testing.assert_array_equal(first.input_cycles, second.input_cycles)
+    assert first.total_cycles == second.total_cycles
     assert first.status == second.status
 
 
@@ -255,22 +255,22 @@ def test_engines_agree_with_each_other_and_with_arithmetic(kind, stalls):
     assert [run.engine for run in runs] == ["pysim", "cxxrtl"]
     beats = runs[0].beats
     assert beats.tolist() == expected.tolist()
-    assert len(runs[0].clocks) == len(expected)
-    assert len(runs[0].input_clocks) == 120
+    assert len(runs[0].cycles) == len(expected)
+    assert len(runs[0].input_cycles) == 120
 
 
 def test_clocks_of_a_register():
     """A beat taken at clock k comes out at k + 1 when nobody stalls, and clock 0 is the first."""
     for engine in ("pysim", "cxxrtl"):
         run = simulate(Register(), pairs(9), count=9, engine=engine)
-        np.testing.assert_array_equal(run.input_clocks, np.arange(9))
-        np.testing.assert_array_equal(run.clocks, np.arange(1, 10))
-        assert run.total_clocks == 10
+        np.testing.assert_array_equal(run.input_cycles, np.arange(9))
+        np.testing.assert_array_equal(run.cycles, np.arange(1, 10))
+        assert run.total_cycles == 10
 
 
 @pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])
 def test_stall_patterns_are_by_clock_and_an_offer_is_held(engine):
-    # Offers start at clocks 1, 4, 7 ... (stall 1, 0, 1); the sink is ready at clocks 0, 5, 10, 15 ...
+    # Offers start at cycles 1, 4, 7 ... (stall 1, 0, 1); the sink is ready at cycles 0, 5, 10, 15 ...
     run = simulate(
         Register(),
         pairs(3),
@@ -281,8 +281,8 @@ def test_stall_patterns_are_by_clock_and_an_offer_is_held(engine):
     )
     # Offered at 1 and taken, out from 2, taken at 5. Offered at 4, taken at 5 when the register is freed, out
     # at 10. Offered at 7, held until 10, out at 15.
-    np.testing.assert_array_equal(run.input_clocks, [1, 5, 10])
-    np.testing.assert_array_equal(run.clocks, [5, 10, 15])
+    np.testing.assert_array_equal(run.input_cycles, [1, 5, 10])
+    np.testing.assert_array_equal(run.cycles, [5, 10, 15])
 
 
 @pytest.mark.parametrize("stalls", stall_patterns(6).values(), ids=stall_patterns(6).keys())
@@ -311,8 +311,8 @@ def test_constants_writes_and_status(stalls):
     assert runs[1].status["writes"] == 5
     assert runs[1].status["total"] == beats["y"].sum()
     assert runs[1].status["busy"] == 0
-    # Writes go at clocks 1, 3, 5, 7, 9, before any input beat.
-    assert runs[1].input_clocks[0] > 9
+    # Writes go at cycles 1, 3, 5, 7, 9, before any input beat.
+    assert runs[1].input_cycles[0] > 9
 
 
 class Plain(Component):
@@ -363,7 +363,8 @@ def test_members_without_bits():
 def test_count_none_takes_what_comes():
     beats = pairs(40)
     runs = [
-        simulate(Expander(), beats, count=None, engine=engine, patience=50) for engine in ("pysim", "cxxrtl")
+        simulate(Expander(), beats, count=None, engine=engine, idle_timeout=50)
+        for engine in ("pysim", "cxxrtl")
     ]
     assert_equal(*runs)
     assert runs[0].beats.tolist() == Expander.model(beats).tolist()
@@ -372,7 +373,7 @@ def test_count_none_takes_what_comes():
 @pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])
 def test_no_beats(engine):
     run = simulate(Register(), pairs(0), count=0, engine=engine)
-    assert (len(run.beats), len(run.clocks), run.total_clocks, run.status) == (0, 0, 0, None)
+    assert (len(run.beats), len(run.cycles), run.total_cycles, run.status) == (0, 0, 0, None)
 
 
 def test_one_component_many_runs():
@@ -429,9 +430,9 @@ FAULTS = {
     # Beat k waits in the register from clock k + 1 on; the sink stalls at clock 13.
     "drops": "at clock 14, output beat 12: valid went low while the beat waited for ready",
     "changes": "at clock 14, output beat 12: the payload changed while the beat waited for ready",
-    "loses": "nothing moved for 100 clocks up to clock 122: 19 of 20 output beats came, "
+    "loses": "nothing moved for 100 cycles up to clock 122: 19 of 20 output beats came, "
     "20 of 20 input beats and 0 of 0 writes were taken",
-    "deadlocks": "nothing moved for 100 clocks up to clock 108: 7 of 20 output beats came, "
+    "deadlocks": "nothing moved for 100 cycles up to clock 108: 7 of 20 output beats came, "
     "7 of 20 input beats and 0 of 0 writes were taken",
     "invents": "at clock 22, output beat 20: a beat more than the 20 expected",
 }
@@ -441,20 +442,20 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_are_caught(fault, engine):
     with pytest.raises(SimulationError) as caught:
-        simulate(Faulty(fault), pairs(20), count=20, engine=engine, output_stalls=ONE_STALL, patience=100)
+        simulate(Faulty(fault), pairs(20), count=20, engine=engine, output_stalls=ONE_STALL, idle_timeout=100)
     assert str(caught.value) == FAULTS[fault]
 
 
 def test_no_fault_is_no_error():
     for engine in ("pysim", "cxxrtl"):
         run = simulate(
-            Faulty(None), pairs(20), count=20, engine=engine, output_stalls=ONE_STALL, patience=100
+            Faulty(None), pairs(20), count=20, engine=engine, output_stalls=ONE_STALL, idle_timeout=100
         )
         np.testing.assert_array_equal(run.beats, pairs(20)["y"])
 
 
 @pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])
-def test_a_late_extra_beat_needs_enough_settle_clocks(engine):
+def test_a_late_extra_beat_needs_enough_settle_cycles(engine):
     """The invented beat shows at clock 22, one clock after the last of the 20."""
     arguments = {"count": 20, "engine": engine, "output_stalls": ONE_STALL}
     assert len(simulate(Faulty("invents"), pairs(20), settle=0, **arguments).beats) == 20
@@ -516,7 +517,7 @@ def test_arguments():
             {"output_stalls": np.array([0, 1])},
             r"output_stalls must be a bool array of one dimension, not int64 \(2,\)",
         ),
-        ({"patience": 0}, "patience must be at least 1, not 0"),
+        ({"idle_timeout": 0}, "idle_timeout must be at least 1, not 0"),
         ({"settle": -1}, "settle must be at least 0, not -1"),
         ({"count": -1}, "count must be at least 0, not -1"),
         ({"constants": {}}, "the component has no constants"),

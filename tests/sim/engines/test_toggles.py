@@ -119,7 +119,7 @@ def test_many_wide_registers(engine):
 def test_dark_beats_toggle_only_their_input(interval):
     """Operand isolation: 200 dark beats add nothing to the data path but to its first registers.
 
-    These are that of one minus the cosine and, where one part serves several clocks, that of the input, which
+    These are that of one minus the cosine and, where one part serves several cycles, that of the input, which
     takes what stands at the port after the last beat, too: all ones.
     """
     rng = np.random.default_rng(2)

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""WebAssembly modules: the same beats on the same clocks as the other engines."""
+"""WebAssembly modules: the same beats on the same cycles as the other engines."""
 
 import importlib.util
 from dataclasses import replace
@@ -12,12 +12,13 @@ from amaranth.lib.wiring import Component, In, Out
 
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.number.fixed import Format
-from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.pipeline import Spans
+from blysk.golden.presets import preset
 from blysk.hdl.core.fixed import SQ, UQ
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines import wasm
 from blysk.sim.engines.beats import pack, unpack
-from blysk.sim.engines.engine import CompilerMissing, End, SimulationError, Stimulus
+from blysk.sim.engines.engine import CompilerMissing, SimulationError, Stimulus, StopReason
 from blysk.sim.engines.pysim import Model
 from blysk.sim.frames.frame import beats_of
 
@@ -25,7 +26,7 @@ wasmtime = pytest.importorskip("wasmtime", reason="wasmtime is not installed")
 
 NONE = np.zeros(1, dtype=bool)
 # Spans through the place counters and the ambient colour: all of the driver, and little to compile.
-DESIGN = ShadingPipeline(model=None, lights=0)
+DESIGN = preset(model=None, lights=0)
 
 
 def spans_of(length):
@@ -44,7 +45,7 @@ def stimulus_of(component, spans, exponent=5):
         input_stalls=NONE,
         output_stalls=NONE,
         count=int(spans.length.sum()),
-        patience=10_000,
+        idle_timeout=10_000,
         settle=64,
     )
 
@@ -78,21 +79,21 @@ class Browser:
         self.count, self.inputs, self.words = stimulus.count, len(stimulus.input), words
         written, given = self.write(stimulus.write), self.write(stimulus.input)
         self.output = self.call("reserve", 4 * words * stimulus.count + 4)
-        self.clocks = self.call("reserve", 8 * stimulus.count + 8)
-        self.input_clocks = self.call("reserve", 8 * self.inputs + 8)
+        self.cycles = self.call("reserve", 8 * stimulus.count + 8)
+        self.input_cycles = self.call("reserve", 8 * self.inputs + 8)
         self.arguments = (
             *(written, len(stimulus.write), given, self.inputs),
-            *(self.output, stimulus.count, self.clocks, self.input_clocks),
+            *(self.output, stimulus.count, self.cycles, self.input_cycles),
         )
         self.call("prepare", *self.arguments)
 
     def results(self):
-        """Output words, their clocks, those of the input."""
+        """Output words, their cycles, those of the input."""
         output = self.read(self.output, self.count * self.words, "<u4").reshape(self.count, self.words)
         return (
             output,
-            self.read(self.clocks, self.count, "<i8"),
-            self.read(self.input_clocks, self.inputs, "<i8"),
+            self.read(self.cycles, self.count, "<i8"),
+            self.read(self.input_cycles, self.inputs, "<i8"),
         )
 
 
@@ -115,7 +116,7 @@ def status_of(browser, ports):
     return browser.read(browser.call("status"), ports["status"]["words"], "<u4")[np.newaxis]
 
 
-def test_same_beats_on_the_same_clocks(component, browser):
+def test_same_beats_on_the_same_cycles(component, browser):
     ports = wasm.ports_of(component)
     rng = np.random.default_rng(1)
     for spans in (spans_of([3, 1, 0, 2, 4095]), spans_of(rng.integers(0, 6, 40))):
@@ -125,12 +126,12 @@ def test_same_beats_on_the_same_clocks(component, browser):
         # Again from power-up, in the same memory.
         for _ in range(3):
             browser.call("prepare", *browser.arguments)
-            assert browser.call("run") == End.DONE
+            assert browser.call("run") == StopReason.DONE
             for found, wanted in zip(
-                browser.results(), (expected.output, expected.clocks, expected.input_clocks), strict=True
+                browser.results(), (expected.output, expected.cycles, expected.input_cycles), strict=True
             ):
                 np.testing.assert_array_equal(found, wanted)
-            assert browser.call("clocks") == expected.total_clocks
+            assert browser.call("cycles") == expected.total_cycles
             np.testing.assert_array_equal(status_of(browser, ports), expected.status)
 
 
@@ -154,19 +155,19 @@ def test_trace_is_the_status_of_every_clock(component, browser):
     words = ports["status"]["words"]
     rows, ended = browser.call("reserve", 4 * words * 400), browser.call("reserve", 4)
     count = browser.call("trace", rows, 400, ended)
-    assert browser.read(ended, 1, "<i4")[0] == End.DONE
-    assert count == expected.total_clocks + stimulus.settle
+    assert browser.read(ended, 1, "<i4")[0] == StopReason.DONE
+    assert count == expected.total_cycles + stimulus.settle
     for found, wanted in zip(
-        browser.results(), (expected.output, expected.clocks, expected.input_clocks), strict=True
+        browser.results(), (expected.output, expected.cycles, expected.input_cycles), strict=True
     ):
         np.testing.assert_array_equal(found, wanted)
     trace = browser.read(rows, count * words, "<u4").reshape(count, words)
-    for clock in (1, 5, *expected.input_clocks[:2] + 2, expected.total_clocks):
+    for clock in (1, 5, *expected.input_cycles[:2] + 2, expected.total_cycles):
         status = Model(component).run(replace(stimulus, limit=int(clock))).status
         np.testing.assert_array_equal(trace[clock - 1 : clock], status)
     browser.call("prepare", *browser.arguments)
     assert browser.call("trace", rows, 7, ended) == 7
-    assert browser.read(ended, 1, "<i4")[0] == End.LIMIT
+    assert browser.read(ended, 1, "<i4")[0] == StopReason.LIMIT
 
 
 def test_fields():

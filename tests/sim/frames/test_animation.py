@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
@@ -150,7 +150,7 @@ def film():
         material=Material((0.1, 0.1, 0.1), (0.6, 0.5, 0.4), (0.5, 0.5, 0.5), 30),
         lights=[Light((-0.5, 0.8, 0.7))],
     )
-    return Film(scene, ShadingPipeline())
+    return Film(scene, preset())
 
 
 @pytest.fixture(scope="module")
@@ -166,15 +166,15 @@ def singly(film, cameras):
     for camera in cameras:
         scene = replace(film.scene, camera=camera)
         frame = simulator.render(scene)
-        frames.append((frame.image, frame.clocks, compare(scene, film.design, frame)))
+        frames.append((frame.image, frame.cycles, compare(scene, film.design, frame)))
     assert len({image.tobytes() for image, *_ in frames}) == COUNT
     return frames
 
 
 def assert_the_same(frame, expected):
-    image, clocks, comparison = expected
+    image, cycles, comparison = expected
     assert np.array_equal(frame.image, image)
-    assert frame.figures["clocks"] == clocks
+    assert frame.figures["cycles"] == cycles
     for name in ("arithmetic_error", "method_error", "total_error"):
         assert frame.figures[name]["max_lsb"] == getattr(comparison, name).max_lsb
         assert frame.figures[name]["rmse_lsb"] == getattr(comparison, name).rmse_lsb

@@ -12,13 +12,13 @@ from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.raster import Raster, fragment_normals, rasterise
-from blysk.golden.reference.reflection import reflect
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import fragment_positions, shade_spans
 from blysk.golden.reference.scene import Scene
 from blysk.sim.frames.spans import (
@@ -83,7 +83,7 @@ def origins(raster, cut):
 
 
 @pytest.fixture
-def wide(normal_pairs):
+def out_of_range(normal_pairs):
     """Spans of 0 to 179.9 degrees and 1 to 60 pixels, and what they are cut to."""
     rng = np.random.default_rng(11)
     left, right = map(normalise, normal_pairs(rng, 5000, rng.uniform(0, 179.9, 5000)))
@@ -91,8 +91,8 @@ def wide(normal_pairs):
     return raster, *cut_wide_spans(raster, MAX_SPAN_ANGLE)
 
 
-def test_fragments_and_pixels_stay(wide):
-    raster, cut, _ = wide
+def test_fragments_and_pixels_stay(out_of_range):
+    raster, cut, _ = out_of_range
     assert np.array_equal(cut.pixel, raster.pixel)
     assert np.array_equal(cut.visible, raster.visible)
     assert np.array_equal(cut.y[cut.span] * WIDTH + cut.x[cut.span] + cut.offset, raster.pixel)
@@ -108,14 +108,14 @@ def test_fragments_and_pixels_stay(wide):
     assert len(cut.magnitude_left) == len(cut.weights_right) == 0
 
 
-def test_every_part_is_narrow_or_one_pixel(wide):
-    _, cut, _ = wide
+def test_every_part_is_narrow_or_one_pixel(out_of_range):
+    _, cut, _ = out_of_range
     # The comparison of cosines is exact to 2**-52, an angle of 45 degrees to 2**-52 / sin 45 radians.
     assert (angles(cut)[cut.length > 1] <= MAX_SPAN_ANGLE + 1e-12).all()
 
 
-def test_normals_at_cuts_are_on_the_curve(wide):
-    raster, cut, _ = wide
+def test_normals_at_cuts_are_on_the_curve(out_of_range):
+    raster, cut, _ = out_of_range
     origin, first = origins(raster, cut)
     for offset, normal in ((first, cut.normal_left), (first + cut.length - 1, cut.normal_right)):
         t = offset / np.maximum(raster.length[origin] - 1, 1)
@@ -126,8 +126,8 @@ def test_normals_at_cuts_are_on_the_curve(wide):
         assert (np.abs(normal - curve / size) <= 8 * EPSILON / size + 8 * EPSILON).all()
 
 
-def test_counts(wide):
-    raster, cut, count = wide
+def test_counts(out_of_range):
+    raster, cut, count = out_of_range
     assert count == np.count_nonzero((angles(raster) > MAX_SPAN_ANGLE) & (raster.length > 1))
     origin, _ = origins(raster, cut)
     assert count == np.count_nonzero(np.bincount(origin) > 1)
@@ -187,17 +187,17 @@ def test_the_pipeline_flags_no_span_after_the_cut(normal_pairs):
 
     def flagged(raster):
         spans = quantised(raster)
-        _, wide = MiddleNormal().compute(
+        _, out_of_range = MiddleNormal().compute(
             Fixed(COMPONENT, spans.normal_left), Fixed(COMPONENT, spans.normal_right)
         )
-        return np.count_nonzero(wide)
+        return np.count_nonzero(out_of_range)
 
     cut, _ = cut_wide_spans(raster, MAX_SPAN_ANGLE)
     assert flagged(cut) == 0
     assert flagged(raster) > 30_000
     vector = np.array([[0, 0, ONE]])
     constants = FrameConstants(10, np.zeros(3, int), vector, vector, np.zeros((1, 3), int), vector * 0)
-    assert ShadingPipeline().compute(quantised(cut), constants).wide_spans == 0
+    assert preset().compute(quantised(cut), constants).out_of_range_spans == 0
 
 
 def test_quantised_ends():
@@ -358,7 +358,7 @@ def local_errors(scene, by_material=False):
         cut = sort_by_material(cut, scene.mesh.material)
     values = local_values(scene, cut)
     operands = METHOD.compute_values(values, cut.length)
-    assert not operands.wide.any()
+    assert not operands.out_of_range.any()
     # Every fragment by its triangle and pixel.
     key, wanted = (
         r.triangle[r.span].astype(np.int64) * scene.width * scene.height + r.pixel for r in (cut, raster)
@@ -369,12 +369,14 @@ def local_errors(scene, by_material=False):
     cosine, u = exact_operands(scene, raster)
     diffuse = Diffuse(found.format).compute(found).values
     specular, expected = np.zeros((2, *u.shape))
-    unit = Specular("cosquad", "one_minus_cosine")
+    unit = Specular(REFLECTION_MODELS["cosquad"], "one_minus_cosine")
     material = scene.mesh.material[raster.triangle[raster.span]]
     for index, coefficients in enumerate(scene.materials):
         which, n = material == index, coefficients.exponent
         specular[which] = unit.compute(highlight[which], Diffuse.dark(found[which]), n).values
-        expected[which] = np.where(cosine[which] > 0, reflect("cosquad", 1 - u[which], n), 0)
+        expected[which] = np.where(
+            cosine[which] > 0, REFLECTION_MODELS["cosquad"].reflect(1 - u[which], n), 0
+        )
     # At a step of the words from 0 the sign of N·L, and with it the highlight, may be the other.
     sure = np.abs(cosine) > 2.0**-25
     return (
@@ -432,8 +434,8 @@ def test_stiff_lamps_over_a_floor(lamps, viewer, exponent):
     assert specular <= METHOD.HIGHLIGHT_BUDGET + 0.05
     # What the float64 renderer shows of the parts is what it shows of the whole spans.
     raster = rasterise(scene)
-    whole = shade_spans(scene, raster, "normalised", "cosquad")
-    parts = shade_spans(scene, cut, "normalised", "cosquad")
+    whole = shade_spans(scene, raster, "normalised", REFLECTION_MODELS["cosquad"])
+    parts = shade_spans(scene, cut, "normalised", REFLECTION_MODELS["cosquad"])
     assert np.isfinite(whole).all()
     lit = np.abs(exact_operands(scene, raster)[0]).min(axis=1) > 1e-9
     pixel = raster.pixel[lit & raster.visible]

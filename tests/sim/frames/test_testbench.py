@@ -13,7 +13,7 @@ from shutil import copytree, which
 import numpy as np
 import pytest
 
-from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import preset
 from blysk.hdl.emit.verilog import emit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import main
@@ -80,9 +80,9 @@ def rows(path):
 @pytest.mark.parametrize(
     "design",
     [
-        ShadingPipeline("chord-local", lights=2, materials=3),
-        ShadingPipeline("linear", None, grey=True, exponent=9),
-        ShadingPipeline(lights=0),
+        preset("chord-local", lights=2, materials=3),
+        preset("linear", None, grey=True, exponent=9),
+        preset(lights=0),
     ],
     ids=str,
 )
@@ -101,11 +101,11 @@ def test_columns_are_the_ports(design):
 
 def test_frame_shows_every_light_and_material():
     """Pixels change with each; one span is empty."""
-    design = ShadingPipeline("chord", lights=3, materials=4)
+    design = preset("chord", lights=3, materials=4)
     spans, constants, pixels = teapot_frame(design)
     assert np.flatnonzero(spans.length == 0).tolist() == [0]
     assert set(spans.material) == set(range(4))
-    assert pixels.wide_spans == 0
+    assert pixels.out_of_range_spans == 0
     assert len(np.unique(pixels.color)) > 100
     assert pixels.color.max() > 100
     for light in range(3):
@@ -128,7 +128,7 @@ def test_what_is_in_the_folder(made):
     ):
         assert f"| `{table}.csv` | {len(rows(made / 'vectors' / f'{table}.csv'))} {counted}" in readme
     status = rows(made / "vectors" / "status.csv")
-    assert status == [{"status_wide_spans": 0, "status_empty_spans": 1, "status_overrun": 0}]
+    assert status == [{"status_out_of_range_spans": 0, "status_empty_spans": 1, "status_overrun": 0}]
 
 
 def test_imports_nothing_of_the_project(made):
@@ -208,10 +208,10 @@ def test_finds_one_bit_of_an_expected_pixel(run, folder):
 # Output, what stands in its place, and what the bench says. ``given`` is what the pipeline gives.
 PLANTS = {
     "changed": ("o_b", "given ^ waits", "pixel [0-9]+: changed while"),
-    "withdrawn": ("o_valid", "given && clocks[3:0] != 0", "pixel [0-9]+: o_valid went low while"),
+    "withdrawn": ("o_valid", "given && cycles[3:0] != 0", "pixel [0-9]+: o_valid went low while"),
     "undefined": ("o_r", "{given[7:1], 1'bx}", "o_r is undefined: "),
     "extra": ("o_valid", "given || taken == COUNT", "pixel COUNT: one more than the COUNT expected"),
-    "lost": ("o_valid", "given && taken != 40", "stuck: nothing moved for 10000 clocks"),
+    "lost": ("o_valid", "given && taken != 40", "stuck: nothing moved for 10000 cycles"),
     "miscounted": ("status_empty_spans", "given + 1", "status_empty_spans is 2, expected 1"),
 }
 
@@ -219,10 +219,10 @@ WRAPPER = """\
 module blysk (PORTS);
 DECLARATIONS
   wire [WIDTH:0] given;
-  reg [15:0] clocks = 0, taken = 0;
+  reg [15:0] cycles = 0, taken = 0;
   reg waits = 0;
   always @(posedge clk) begin
-    clocks <= clocks + 1;
+    cycles <= cycles + 1;
     waits <= o_valid && !o_ready;
     taken <= rst ? 0 : taken + (o_valid && o_ready);
   end

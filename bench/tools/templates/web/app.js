@@ -196,8 +196,8 @@ const blysk = (() => {
     const texts = {
       largest: `${shown(figures.largest, 3)} LSB`,
       p999: `${shown(figures.p999, 3)} LSB`,
-      clocks: shown(figures.clocks),
-      each: shown(figures.clocks / figures.pixels, 3),
+      cycles: shown(figures.cycles),
+      each: shown(figures.cycles / figures.pixels, 3),
       gated: `≥ ${shown((100 * figures.gated) / figures.spans, 3)} %`,
       speed: shown(Math.round(figures.pixels / figures.seconds / 1000) * 1000),
       rate: shown(1000 / pause, 2),
@@ -205,7 +205,7 @@ const blysk = (() => {
     for (const [name, text] of Object.entries(texts)) {
       const cell = document.querySelector(`[data-figure=${name}]`);
       cell.textContent = text;
-      cell.dataset.value = { ...figures, each: figures.clocks / figures.pixels }[name] ?? "";
+      cell.dataset.value = { ...figures, each: figures.cycles / figures.pixels }[name] ?? "";
     }
   }
 
@@ -321,7 +321,7 @@ const blysk = (() => {
   function watch() {
     if (slow) return stopSlow();
     setOrbit(false);
-    const { frame, order, clocks, figures } = pageState.latest;
+    const { frame, order, cycles, figures } = pageState.latest;
     const background = hexChannels(site.background).map((c) => c * 255);
     const pixels = new Uint8ClampedArray(frame.length);
     for (let k = 0; k < pixels.length; k++) pixels[k] = k % 4 < 3 ? background[k % 4] : 255;
@@ -329,12 +329,12 @@ const blysk = (() => {
     const start = performance.now();
     let at = 0;
     const show = (now) => {
-      const clock = (figures.clocks * (now - start)) / 6000;
-      for (; at < clocks.length && clocks[at] <= clock; at++)
+      const clock = (figures.cycles * (now - start)) / 6000;
+      for (; at < cycles.length && cycles[at] <= clock; at++)
         for (let c = 0; order[at] >= 0 && c < 3; c++) pixels[order[at] + c] = frame[order[at] + c];
       draw("frame", pixels);
-      byId("light-text").textContent = `clock ${shown(Math.min(Math.floor(clock), figures.clocks))}`;
-      if (at < clocks.length) slow = requestAnimationFrame(show);
+      byId("light-text").textContent = `clock ${shown(Math.min(Math.floor(clock), figures.cycles))}`;
+      if (at < cycles.length) slow = requestAnimationFrame(show);
       else {
         stopSlow();
         showLight();
@@ -433,7 +433,7 @@ const blysk = (() => {
     inside.taken = new Map();
     for (let clock = 1, n = 0; clock <= trace.count; clock++) if (inside.code("taken", clock)) inside.taken.set(clock, n++);
     inside.firstClock = trace.inputClocks[span - from];
-    inside.lastClock = trace.clocks[inside.start + inside.length - 1];
+    inside.lastClock = trace.cycles[inside.start + inside.length - 1];
     inside.exact = exactValues(inside);
     pageState.inside = inside;
     const codesOf = [0, 1, 2].map((c) => [codes[`normal_left.${c}`][span], codes[`normal_right.${c}`][span]]);
@@ -442,7 +442,7 @@ const blysk = (() => {
     byId("inside-title").textContent =
       `Column ${x}, row ${y}: pixel ${x - codes.x[span] + 1} of a span of ${inside.length}, columns ${codes.x[span]} to ` +
       `${codes.x[span] + inside.length - 1}, whose normal turns by ${shown((Math.acos(Math.min(cosine, 1)) * 180) / Math.PI, 3)}°. ` +
-      `It goes in on clock ${inside.firstClock}; its pixels come out on clocks ${trace.clocks[inside.start]} to ${inside.lastClock}.`;
+      `It goes in on clock ${inside.firstClock}; its pixels come out on cycles ${trace.cycles[inside.start]} to ${inside.lastClock}.`;
     const clock = byId("clock");
     clock.min = inside.firstClock;
     clock.max = inside.lastClock;
@@ -556,8 +556,8 @@ const blysk = (() => {
 
   function drawWave(inside) {
     const { design, firstClock, lastClock, trace, from } = inside;
-    const clocks = Array.from({ length: lastClock - firstClock + 1 }, (_, k) => firstClock + k);
-    const cells = new Map(clocks.map((clock) => [clock, []]));
+    const cycles = Array.from({ length: lastClock - firstClock + 1 }, (_, k) => firstClock + k);
+    const cells = new Map(cycles.map((clock) => [clock, []]));
     const add = (row, clock, text, attributes = {}) => {
       const cell = make("td", { "data-clock": clock, ...attributes }, text);
       cells.get(clock).push(cell);
@@ -565,7 +565,7 @@ const blysk = (() => {
       return cell;
     };
     const head = make("tr", {}, make("th", { scope: "col" }, "clock"));
-    for (const clock of clocks) {
+    for (const clock of cycles) {
       const button = make("button", { type: "button", tabindex: "-1", "data-clock": clock }, String(clock));
       const heading = make("th", { scope: "col" }, button);
       cells.get(clock).push(heading);
@@ -573,7 +573,7 @@ const blysk = (() => {
     }
     const body = make("tbody");
     const into = make("tr", { "data-word": "span" }, make("th", { scope: "row" }, "span taken in"));
-    for (const clock of clocks) {
+    for (const clock of cycles) {
       const k = trace.inputClocks.indexOf(clock);
       const cell = add(into, clock, k < 0 ? "" : k + from === inside.span ? "this" : "next");
       if (k + from === inside.span && k >= 0) hue(inside, inside.start, cell);
@@ -584,7 +584,7 @@ const blysk = (() => {
       const kind = format.fraction ? `${format.signed ? "SQ" : "UQ"}(${format.width - format.fraction}, ${format.fraction})` : "";
       const title = make("th", { scope: "row" }, probe.title, make("small", {}, kind || `${format.width} bit`));
       const row = make("tr", { "data-word": probe.name }, title);
-      for (const clock of clocks) {
+      for (const clock of cycles) {
         const word = wordAt(inside, probe, clock);
         const text = word.field.fraction ? shown(word.value, 4) : String(word.code);
         const cell = add(row, clock, text, { "data-code": word.code });
@@ -593,8 +593,8 @@ const blysk = (() => {
       body.append(row);
     }
     const out = make("tr", { "data-word": "pixel" }, make("th", { scope: "row" }, "pixel given"));
-    for (const clock of clocks) {
-      const n = trace.clocks.indexOf(clock);
+    for (const clock of cycles) {
+      const n = trace.cycles.indexOf(clock);
       const cell = add(out, clock, n < 0 ? "" : "●");
       hue(inside, n < 0 ? undefined : n, cell);
     }

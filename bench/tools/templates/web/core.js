@@ -293,7 +293,7 @@ const blyskCore = () => {
       this.fragments = spans.first[to] - spans.first[from];
       this.input = this.reserve(this.count * port.words * 4);
       this.output = this.reserve(this.fragments * this.design.ports.o.words * 4);
-      this.clocks = this.reserve(this.fragments * 8);
+      this.cycles = this.reserve(this.fragments * 8);
       this.inputClocks = this.reserve(this.count * 8);
       this.writes = this.reserve(4096);
       const words = this.words(this.input, this.count * port.words).fill(0);
@@ -305,7 +305,7 @@ const blyskCore = () => {
       const { words, count } = writesOf(constantsOf(settings, viewer, this.tables), this.tables, this.design.ports.write);
       this.words(this.writes, words.length).set(words);
       this.exports.prepare(
-        ...[this.writes, count, this.input, this.count, this.output, this.fragments, this.clocks, this.inputClocks],
+        ...[this.writes, count, this.input, this.count, this.output, this.fragments, this.cycles, this.inputClocks],
       );
     }
 
@@ -319,14 +319,14 @@ const blyskCore = () => {
       const figure = (name) => get(status, 0, this.design.ports.status.fields[name]);
       return {
         words,
-        clocks: this.exports.clocks(),
+        cycles: this.exports.cycles(),
         gated: figure("gated_spans"),
-        wide: figure("wide_spans"),
-        each: this.words(this.clocks, 2 * this.fragments),
+        wide: figure("out_of_range_spans"),
+        each: this.words(this.cycles, 2 * this.fragments),
       };
     }
 
-    // The same with the status after each clock, and the clocks on which spans went in and pixels came out.
+    // The same with the status after each clock, and the cycles on which spans went in and pixels came out.
     trace(settings, viewer) {
       const size = this.design.ports.status.words;
       const limit = 4096;
@@ -341,7 +341,7 @@ const blyskCore = () => {
         size,
         count,
         inputClocks: low(this.inputClocks, this.count),
-        clocks: low(this.clocks, this.fragments),
+        cycles: low(this.cycles, this.fragments),
         output: this.words(this.output, this.fragments * this.design.ports.o.words).slice(),
       };
     }

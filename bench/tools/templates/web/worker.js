@@ -84,17 +84,17 @@ const blyskWorker = (core) => {
       const run = simulation.run(settings, settings.viewer);
       const seconds = (performance.now() - before) / 1000;
       const { frame, golden, map, order, shown, figures } = errorsOf(run.words, settings, entry, model);
-      const clocks = new Int32Array(order.length);
-      for (let k = 0; k < clocks.length; k++) clocks[k] = run.each[2 * k];
+      const cycles = new Int32Array(order.length);
+      for (let k = 0; k < cycles.length; k++) cycles[k] = run.each[2 * k];
       const result = {
-        ...{ frame, golden, map, order, clocks },
+        ...{ frame, golden, map, order, cycles },
         figures: {
           ...figures,
-          ...{ shown, seconds, clocks: run.clocks, pixels: entry.spans.fragments, spans: entry.spans.count },
+          ...{ shown, seconds, cycles: run.cycles, pixels: entry.spans.fragments, spans: entry.spans.count },
           ...{ gated: run.gated, wide: run.wide, milliseconds: performance.now() - before },
         },
       };
-      return [result, [frame.buffer, golden.buffer, map.buffer, order.buffer, clocks.buffer]];
+      return [result, [frame.buffer, golden.buffer, map.buffer, order.buffer, cycles.buffer]];
     },
     trace: ({ settings, from, to }) => {
       const { spans, design } = load(settings);
