@@ -1242,7 +1242,7 @@ def _blocks() -> Iterator[Block]:
             "chord_setup",
             f"interval {interval}",
             "chord.md",
-            partial(ChordSetupUnit, 1, interval),
+            partial(ChordSetupUnit, initiation_interval=interval),
             _chord_setup,
             f"spans to 22.5 degrees, {_LONG}",
             note="of N.L and u at any pixel that the differences lead to; exact: the quadratic",

@@ -82,6 +82,8 @@ class ChordSetupUnit(ChordDifferencesUnit):
 
     Parameters
     ----------
+    parameters : ChordSetup
+        Terms of the polynomial, each of which is a product of a span, and bits of the differences.
     lights : int
         Number of lights, 1 or more.
     initiation_interval : int
@@ -90,8 +92,6 @@ class ChordSetupUnit(ChordDifferencesUnit):
         Bits of the length, 2 to 12: spans have at most ``2^length_bits - 1`` pixels.
     highlights : bool
         Whether there is u.
-    parameters : ChordSetup
-        Terms of the polynomial, each of which is a product of a span, and bits of the differences.
 
     Raises
     ------
@@ -113,11 +113,12 @@ class ChordSetupUnit(ChordDifferencesUnit):
 
     def __init__(
         self,
+        parameters: ChordSetup | None = None,
         lights: int = 1,
+        *,
         initiation_interval: int = 4,
         length_bits: int = LENGTH_BITS,
         highlights: bool = True,
-        parameters: ChordSetup | None = None,
     ):
         self.parameters = p = parameters or ChordSetup()
         self.highlights = highlights

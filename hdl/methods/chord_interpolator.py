@@ -72,7 +72,11 @@ class ChordInterpolatorUnit(InterpolatorUnit):
         super().__init__(parameters, lights, **options)
         self.setup_interval = setup_interval
         self._setup = ChordSetupUnit(
-            lights, setup_interval, self.length_bits, self.highlights, parameters.setup
+            parameters.setup,
+            lights,
+            initiation_interval=setup_interval,
+            length_bits=self.length_bits,
+            highlights=self.highlights,
         )
         self._accumulator = ChordAccumulatorUnit(lights, self.highlights, parameters)
         self.latency = self._setup.latency + SLICE_LATENCY + self._accumulator.latency

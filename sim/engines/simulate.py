@@ -21,7 +21,7 @@ from blysk.sim.engines.engine import (
     Trace,
 )
 
-__all__ = ["Run", "simulate"]
+__all__ = ["Run", "simulate", "stimulus_of"]
 
 _PIECE = 1 << 15
 """Beats unpacked at once."""
@@ -106,6 +106,38 @@ def _writes(shape, write) -> np.ndarray:
     return np.zeros((0, 0), dtype=np.uint32) if write is None else pack(shape, write)
 
 
+def stimulus_of(
+    component: Component,
+    beats: np.ndarray | Mapping,
+    *,
+    count: int | None,
+    constants: np.ndarray | Mapping | None = None,
+    write: np.ndarray | Mapping | None = None,
+    input_stalls: np.ndarray | None = None,
+    output_stalls: np.ndarray | None = None,
+    idle_timeout: int = 10_000,
+    settle: int = 64,
+) -> Stimulus:
+    """Beats and stalls as an engine takes them; the arguments are those of `simulate`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If the component's members or an argument do not fit.
+    """
+    ports = Ports(component)
+    return Stimulus(
+        input=pack(ports.i, beats),
+        write=_writes(ports.write, write),
+        constants=_constants(ports.constants, constants),
+        input_stalls=_pattern("input_stalls", input_stalls),
+        output_stalls=_pattern("output_stalls", output_stalls),
+        count=None if count is None else _whole("count", count, 0),
+        idle_timeout=_whole("idle_timeout", idle_timeout, 1),
+        settle=_whole("settle", settle, 0),
+    )
+
+
 def simulate(
     component: Component,
     beats: np.ndarray | Mapping,
@@ -174,15 +206,16 @@ def simulate(
     if vcd is not None and engine != "pysim":
         raise ValueError(f"waveforms need engine 'pysim', not {engine!r}")
     ports = Ports(component)
-    stimulus = Stimulus(
-        input=pack(ports.i, beats),
-        write=_writes(ports.write, write),
-        constants=_constants(ports.constants, constants),
-        input_stalls=_pattern("input_stalls", input_stalls),
-        output_stalls=_pattern("output_stalls", output_stalls),
-        count=None if count is None else _whole("count", count, 0),
-        idle_timeout=_whole("idle_timeout", idle_timeout, 1),
-        settle=_whole("settle", settle, 0),
+    stimulus = stimulus_of(
+        component,
+        beats,
+        count=count,
+        constants=constants,
+        write=write,
+        input_stalls=input_stalls,
+        output_stalls=output_stalls,
+        idle_timeout=idle_timeout,
+        settle=settle,
     )
     model: Model
     if engine == "pysim":

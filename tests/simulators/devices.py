@@ -377,7 +377,7 @@ def _differences(unit, words, length, out_of_range) -> np.ndarray:
 
 
 def _chord_setup(rng, count, interval):
-    unit = ChordSetupUnit(_LIGHTS, interval)
+    unit = ChordSetupUnit(None, _LIGHTS, initiation_interval=interval)
     (left, right), length = _normals(rng, count), _any_lengths(rng, count)
     vectors = [_vectors(rng, _LIGHTS) for _ in range(2)]
     *words, out_of_range = ChordSetup().compute(*_fixed(left, right, *vectors), length)

@@ -1,0 +1,209 @@
+"""Equivalent mutants: those that no stimulus could tell from the unit, as ABC proves."""
+
+import itertools
+import re
+import subprocess
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Set
+from importlib.util import find_spec
+from pathlib import Path
+
+from blysk.bench.tools.fpga import _YOSYS, ToolError
+
+__all__ = ["Miter", "yosys"]
+
+_SECONDS = 10
+"""After which a proof that a mutant is equivalent is given up."""
+
+
+def yosys(script: str, folder: Path) -> None:
+    """Run a script of Yosys (package pyosys) in a folder.
+
+    Raises
+    ------
+    ToolError
+        If it fails.
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", _YOSYS], input=script, capture_output=True, encoding="utf-8", cwd=folder
+    )
+    if done.returncode:
+        raise ToolError(f"Yosys failed: {(done.stderr or done.stdout).strip().splitlines()[-1]}")
+
+
+_AIGER = """\
+read_rtlil whole.il
+memory_collect
+memory_map
+async2sync
+dffunmap
+opt_expr
+opt_merge
+opt_clean
+setundef -undriven -zero
+zinit -all
+techmap
+aigmap
+write_aiger -zinit -map unit.map unit.aig"""
+
+_ROUNDS = 20
+_NARROW = 12
+
+
+def _numbers(data: bytes) -> Iterator[int]:
+    """Those of AIGER's binary format: seven bits a byte, lowest first, and whether there are more."""
+    value = shift = 0
+    for byte in data:
+        value |= (byte & 127) << shift
+        shift += 7
+        if byte < 128:
+            yield value
+            value = shift = 0
+
+
+def _coded(number: int) -> bytes:
+    code = bytearray()
+    while number > 127:
+        code.append(number & 127 | 128)
+        number >>= 7
+    return bytes([*code, number])
+
+
+class Miter:
+    """A unit and a mutant of it, and whether any output ever differs: AND gates and one-bit registers.
+
+    Products are too much for a proof. So first, the two share their registers, and what either would put into
+    them must be the same: if so, they stay the same by induction. Those that are narrow, or tell where beats
+    are, go on as in the unit, for these control; the others are inputs: whatever they hold. Not shared are
+    the mutant's own, and those bits that do differ.
+
+    Parameters
+    ----------
+    folder : path
+        With the netlist of all mutants that `mutation.mutate` wrote; without any, it is the unit.
+    """
+
+    def __init__(self, folder: Path):
+        self._folder = folder
+        yosys(_AIGER, folder)
+        header, rest = (folder / "unit.aig").read_bytes().split(b"\n", 1)
+        self._inputs, latches, outputs, gates = map(int, header.split()[2:6])
+        *lines, rest = rest.split(b"\n", latches + outputs)
+        literals = [int(line.split()[0]) for line in lines]
+        self._next, self._outputs = literals[:latches], literals[latches:]
+        deltas = list(itertools.islice(_numbers(rest), 2 * gates))
+        first = 2 * (1 + self._inputs + latches)
+        left = [first + 2 * k - delta for k, delta in enumerate(deltas[::2])]
+        self._gates = [(a, a - delta) for a, delta in zip(left, deltas[1::2], strict=True)]
+        named = re.findall(r"^(input|latch) (\d+) (\d+) (\S+)$", (folder / "unit.map").read_text(), re.M)
+        self._mutant = {
+            int(i): int(bit) for kind, i, bit, name in named if (kind, name) == ("input", "mutant")
+        }
+        widths = Counter(name for kind, _, _, name in named if kind == "latch")
+        self._names, self._free = defaultdict(set), set()
+        for kind, index, _, name in named:
+            if kind == "latch":
+                self._names[int(index)].add(name)
+                if widths[name] > _NARROW and not re.search(r"\b(ages|valid)$", name):
+                    self._free.add(int(index))
+
+    def is_equivalent(self, mutant: int, register: str = "") -> bool:
+        """Whether a mutant, of whatever comes to a register, is proved to do what the unit does."""
+        shared = set(range(len(self._next)))
+        # What changes nothing is seen before a register is taken apart, and then hardly.
+        if not self._write(mutant, shared):
+            return True
+        if register:
+            whole = re.compile(re.escape(register) + r"(\W|$)")
+            shared = {latch for latch in shared if not any(map(whole.match, self._names[latch]))}
+        for _ in range(_ROUNDS):
+            proved, differing = self._prove(mutant, shared)
+            if proved or not differing:
+                return proved
+            shared -= differing
+        return False
+
+    def _prove(self, mutant: int, shared: Set[int]) -> tuple[bool, set[int]]:
+        """Whether nothing differs while registers are ``shared``, and which of them do."""
+        compared = self._write(mutant, shared)
+        if not compared:
+            return True, set()
+        script = f"read_aiger mutant.aig; strash; scleanup; scorr; pdr -a -v -T {_SECONDS}"
+        abc = Path(find_spec("pyosys").origin).parent / "yosys-abc"
+        try:
+            done = subprocess.run(
+                [abc, "-c", script],
+                capture_output=True,
+                encoding="utf-8",
+                cwd=self._folder,
+                timeout=6 * _SECONDS,
+            )
+        except subprocess.TimeoutExpired:
+            return False, set()
+        found = re.search(r"Properties: +All = (\d+). +Proved = (\d+)", done.stdout)
+        if done.returncode or found is None:
+            raise ToolError(f"ABC failed: {(done.stderr or done.stdout).strip().splitlines()[-1]}")
+        asserted = (int(k) for k in re.findall(r"Output +(\d+) was (?:trivially )?asserted", done.stdout))
+        return found[1] == found[2], {compared[k] for k in asserted} - {-1}
+
+    def _write(self, mutant: int, shared: Set[int]) -> list[int]:
+        """Write ``mutant.aig``; of each of its outputs, the register that it compares, or -1."""
+        known, gates = {}, []
+        places = itertools.count(1 + self._inputs)
+        units = [[0, *range(2, 2 * self._inputs + 2, 2)] for _ in range(2)]
+        for latch in range(len(self._next)):
+            literal = 2 * next(places)
+            units[0].append(literal)
+            units[1].append(literal if latch in shared else 2 * next(places))
+        first = next(places)
+
+        def both(a: int, b: int) -> int:
+            a, b = max(a, b), min(a, b)
+            if b < 2 or a ^ b < 2:
+                return a * b if b < 2 else b * (a == b)
+            if (a, b) not in known:
+                known[a, b] = 2 * (first + len(gates))
+                gates.append((a, b))
+            return known[a, b]
+
+        for unit, chosen in zip(units, (0, mutant), strict=True):
+            for place, bit in self._mutant.items():
+                unit[1 + place] = chosen >> bit & 1
+            for a, b in self._gates:
+                unit.append(both(unit[a >> 1] ^ a & 1, unit[b >> 1] ^ b & 1))
+        outputs, compared, following = [], [], {}
+        for latch, end in [*((-1, end) for end in self._outputs), *enumerate(self._next)]:
+            a, b = (unit[end >> 1] ^ end & 1 for unit in units)
+            if latch >= 0 and not (latch in shared and latch in self._free):
+                now = (unit[1 + self._inputs + latch] >> 1 for unit in units)
+                # Of a register that is shared the unit's comes last.
+                following |= dict(zip(now, (a, a if latch in shared else b), strict=True))
+            if a != b and (latch < 0 or latch in shared):
+                outputs.append(both(both(a, b) ^ 1, both(a ^ 1, b ^ 1) ^ 1))
+                compared.append(latch)
+        # What these depend on, through the registers.
+        needed, open_ = {0}, [end >> 1 for end in outputs]
+        while open_:
+            node = open_.pop()
+            if node not in needed:
+                needed.add(node)
+                ends = gates[node - first] if node >= first else (following.get(node, 0),)
+                open_ += [end >> 1 for end in ends]
+        order = sorted(needed, key=lambda node: (node >= first, node in following, node))
+        place = {node: k for k, node in enumerate(order)}
+
+        def new(literal: int) -> int:
+            return 2 * place[literal >> 1] ^ literal & 1
+
+        latches = [node for node in order if node in following]
+        codes = []
+        for node in order:
+            if node >= first:
+                b, a = sorted(map(new, gates[node - first]))
+                codes.append(_coded(2 * place[node] - a) + _coded(a - b))
+        inputs = len(order) - 1 - len(latches) - len(codes)
+        lines = [f"aig {len(order) - 1} {inputs} {len(latches)} {len(outputs)} {len(codes)}"]
+        lines += map(str, [*(new(following[node]) for node in latches), *map(new, outputs), ""])
+        (self._folder / "mutant.aig").write_bytes("\n".join(lines).encode() + b"".join(codes))
+        return compared

@@ -1,0 +1,270 @@
+"""Mutants of a unit: small faults in its netlist, all in one model, and the vectors that look for them."""
+
+import ctypes
+import json
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from amaranth.back import rtlil
+from amaranth.hdl import Module, Mux, Value, unsigned
+from amaranth.lib.wiring import Component, In, Member, Out
+
+from blysk.bench.quality.equivalence import yosys
+from blysk.bench.tools.fpga import ToolError
+from blysk.sim.engines import cxxrtl
+from blysk.sim.engines.engine import CompilerMissing, Ports, Stimulus, Trace
+from blysk.sim.engines.simulate import stimulus_of
+from blysk.sim.units.record import Record
+
+__all__ = ["Mutants", "Wrapped", "killed", "mutate", "vectors_of"]
+
+
+def vectors_of(record: Record) -> list[tuple[Stimulus, Trace]]:
+    """Input and answer of every run of a record's default variant, shortest first.
+
+    Parameters
+    ----------
+    record : Record
+        The unit.
+    """
+    unit = record.variants[record.default].unit()
+    model = cxxrtl.Model(unit)
+    found = []
+    for name, stimulus in record.stimuli_of(record.default).items():
+        if stimulus.long:
+            continue
+        for run in record.runs(unit, name):
+            case = run.case
+            sent = stimulus_of(
+                unit,
+                case.beats,
+                count=run.count,
+                constants=case.constants,
+                write=case.write,
+                **run.stalls,
+            )
+            found.append((sent, model.run(sent)))
+    return sorted(found, key=lambda run: len(run[0].input))
+
+
+class Wrapped(Component):
+    """A unit inside another component.
+
+    Parameters
+    ----------
+    unit : Component
+        The unit.
+    **members : Member
+        Members beside those of the unit, or in place of its ``status``.
+    """
+
+    def __init__(self, unit: Component, **members: Member):
+        self.unit = unit
+        super().__init__({**unit.signature.members, **members})
+
+    def elaborate(self, platform) -> Module:
+        """Connect the unit's members; the unit itself is for those to add who wrap it."""
+        m = Module()
+        for name, member in self.unit.signature.members.items():
+            inner, outer = getattr(self.unit, name), getattr(self, name)
+            if not member.is_port:
+                source, sink = (inner, outer) if name == "o" else (outer, inner)
+                m.d.comb += [
+                    Value.cast(sink.payload).eq(Value.cast(source.payload)),
+                    sink.valid.eq(source.valid),
+                    source.ready.eq(sink.ready),
+                ]
+            elif member.flow is In:
+                m.d.comb += Value.cast(inner).eq(Value.cast(outer))
+            elif self.signature.members[name] == member:
+                m.d.comb += Value.cast(outer).eq(Value.cast(inner))
+        return m
+
+
+class _Observed(Wrapped):
+    """A unit, an input that chooses a mutant, and outputs that are 0 where no partner of a stream looks.
+
+    A ``ready`` is seen while ``valid`` is high, a payload likewise. The cycles on which a unit's
+    ``out_of_range`` is high are its status, as in a pipeline.
+
+    Parameters
+    ----------
+    unit : Component
+        The unit.
+    width : int
+        Bits of that input, ``mutant``.
+    """
+
+    def __init__(self, unit: Component, width: int):
+        members = {"mutant": In(width)}
+        if _flags(unit):
+            members["status"] = Out(32)
+        super().__init__(unit, **members)
+
+    def elaborate(self, platform):
+        """Add the unit."""
+        m = super().elaborate(platform)
+        m.submodules.unit = self.unit
+        if _flags(self.unit):
+            m.d.sync += self.status.eq(self.status + self.unit.out_of_range)
+        payload = Value.cast(self.o.payload)
+        m.d.comb += payload.eq(Mux(self.o.valid, Value.cast(self.unit.o.payload).as_unsigned(), 0))
+        for name in ("i", "write"):
+            if name in self.signature.members:
+                outer = getattr(self, name)
+                m.d.comb += outer.ready.eq(getattr(self.unit, name).ready & outer.valid)
+        return m
+
+
+def _flags(unit: Component) -> bool:
+    """Whether a unit has a flag that no run of its own shows."""
+    return "out_of_range" in unit.signature.members and "status" not in unit.signature.members
+
+
+# Reset is held low, so that it goes.
+_LIST = """\
+read_rtlil top.il
+hierarchy -auto-top
+proc
+flatten
+delete -input w:rst
+setundef -undriven -zero
+opt_expr
+opt_merge
+zinit -all
+opt_clean
+write_rtlil flat.il
+write_json flat.json
+mutate -list {count} -seed {seed} -ctrl mutant {width} 1 -o list.txt c:*unit.*"""
+
+# What has several drivers is split: a word whose bits depend on each other would be evaluated several times.
+_MUTATE = """\
+read_rtlil flat.il
+script mutants.txt
+setundef -zero -init
+opt_clean
+write_rtlil whole.il
+splitnets -driver
+write_rtlil mutated.il"""
+
+
+def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, str]:
+    """Write ``flat.il``, the unit, and ``whole.il`` and ``mutated.il``, with all its mutants.
+
+    Returns what each is, by number.
+    """
+    width = count.bit_length()
+    netlist = rtlil.convert(_Observed(unit, width), name="top", emit_src=False)
+    (folder / "top.il").write_text(netlist)
+    yosys(_LIST.format(count=count, seed=seed, width=width), folder)
+    top = json.loads((folder / "flat.json").read_text())["modules"]["top"]
+    behind = _registers_behind(top)
+    kept, known = [], {}
+    for number, text in enumerate((folder / "list.txt").read_text().splitlines(), 1):
+        mutant = _described(text, top["cells"], behind)
+        # Another clock is no small fault, and a table's words must be constant.
+        if not re.search(r"^\w+ (\$meminit|\S+ [A-Z_]*CLK\[)", mutant):
+            kept.append(text)
+            known[number] = mutant
+    (folder / "mutants.txt").write_text("\n".join(kept))
+    yosys(_MUTATE, folder)
+    return known
+
+
+def _described(command: str, cells: Mapping[str, Any], behind: Callable[[str], str]) -> str:
+    """Name of a mutant that does not depend on the netlist's numbers."""
+    found = re.search(r"-mode (\S+) .*-cell (\S+) -port (\S+) -portbit (\d+)(?: -ctrlbit (\d+))?", command)
+    mode, cell, port, bit, by = found.groups()
+    cell = cell.removeprefix("\\")
+    return f"{mode} {cells[cell]['type']} {port}[{bit}]{f' by [{by}]' if by else ''} -> {behind(cell)}"
+
+
+def _registers_behind(module: Mapping[str, Any]) -> Callable[[str], str]:
+    """Name, by a cell's name, of the first register or output that its results come to."""
+    cells, readers, names = module["cells"], defaultdict(list), {}
+    for name, net in sorted(module["netnames"].items(), key=lambda item: item[1]["hide_name"]):
+        names.update({bit: name for bit in net["bits"] if bit not in names})
+    for name, cell in cells.items():
+        for port, bits in cell["connections"].items():
+            if cell["port_directions"][port] == "input":
+                for bit in bits:
+                    readers[bit].append(name)
+    ports = {
+        bit for port in module["ports"].values() if port["direction"] == "output" for bit in port["bits"]
+    }
+
+    def behind(start: str) -> str:
+        seen, open_ = {start}, [start]
+        for name in open_:
+            cell = cells[name]
+            outputs = [p for p, direction in cell["port_directions"].items() if direction == "output"]
+            bits = [bit for port in outputs for bit in cell["connections"][port]]
+            shown = bits if cell["type"] == "$dff" else [bit for bit in bits if bit in ports]
+            if shown:
+                return names[shown[0]]
+            following = [reader for bit in bits for reader in readers[bit] if reader not in seen]
+            seen.update(following)
+            open_ += dict.fromkeys(following)
+        return "nothing"
+
+    return behind
+
+
+class Mutants(cxxrtl.Model):
+    """All mutants of a unit, compiled."""
+
+    def __init__(self, unit: Component, folder: Path):
+        self.ports = Ports(unit)
+        if _flags(unit):
+            self.ports.status = unsigned(32)
+        source = resources.files(__package__).joinpath("mutants.cc").read_text(encoding="utf-8")
+        driver = cxxrtl._members(self.ports) + cxxrtl._source("cxxrtl_driver.cc") + source
+        compiler = next(cxxrtl.find_compilers(), None)
+        if compiler is None:
+            raise CompilerMissing("no C++ compiler")
+        # Compiling takes longer than running.
+        compiler = replace(compiler, compile=(*compiler.compile, "-O1"))
+        failure = cxxrtl._build((folder / "mutated.il").read_text(), driver, compiler, "mutants", folder)
+        if failure:
+            raise ToolError(failure)
+        self._library = library = cxxrtl._load(folder / "model", "mutants")
+        library.blysk_open_mutant.restype = ctypes.c_void_p
+        library.blysk_open = library.blysk_open_mutant
+
+    def choose(self, mutant: int) -> None:
+        """Which mutant runs from now on; 0 for the unit."""
+        ctypes.c_uint64.in_dll(self._library, "blysk_mutant").value = mutant
+
+    def trace(self, stimulus: Stimulus) -> Trace:
+        """A run of so many cycles as the stimulus says."""
+        return self._run(stimulus, None)
+
+
+def killed(model: Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants: Iterable[int]) -> set[int]:
+    """Those of the mutants that the vectors kill."""
+    alive = set(mutants)
+    for stimulus, trace in vectors:
+        model.choose(0)
+        found = model.trace(stimulus)
+        if difference := found.differs(trace if trace.status.size else replace(trace, status=found.status)):
+            raise ToolError(f"the unit among its mutants is not the unit: {difference} differs")
+        limited = replace(stimulus, limit=trace.clock)
+        expected = _seen(limited, model.trace(limited))
+        for mutant in sorted(alive):
+            model.choose(mutant)
+            if not all(map(np.array_equal, _seen(limited, model.trace(limited)), expected)):
+                alive.remove(mutant)
+    return set(mutants) - alive
+
+
+def _seen(stimulus: Stimulus, trace: Trace) -> tuple:
+    """What a test sees of a run. Clocks of the inputs follow from those of the outputs, but under stalls."""
+    free = not (stimulus.input_stalls.any() or stimulus.output_stalls.any())
+    cycles = (trace.input_cycles,) if free else ()
+    return trace.end, trace.clock, trace.output, trace.cycles, trace.status, *cycles

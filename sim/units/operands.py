@@ -1,0 +1,217 @@
+"""Operands for units: codes, unit vectors, spans and lengths, at random with their corner cases."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from amaranth.lib.wiring import Component
+
+from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.number.fixed import Fixed, Format
+from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.golden.reference.geometry import normalise
+from blysk.sim.engines.beats import dtype_of
+
+__all__ = [
+    "AXIS",
+    "LONG",
+    "SPANS_45",
+    "any_codes",
+    "any_lengths",
+    "any_pairs",
+    "component_words",
+    "degrees_between",
+    "dot",
+    "exponents",
+    "light_constants",
+    "log_lengths",
+    "pixel_of",
+    "setup_spans",
+    "short_lengths",
+    "span_ends",
+    "span_lengths",
+    "sphere",
+    "spread_angles",
+    "turned",
+    "unit_codes",
+    "vectors_near",
+    "word_ends",
+]
+
+SPANS_45 = "spans to 45 degrees"
+LONG = "2 to 4095 pixels"
+AXIS = (0, 0, ONE)
+"""Codes of the unit vector along z."""
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Dot products along the last axis."""
+    return np.einsum("...i,...i->...", a, b)
+
+
+def component_words(*codes: np.ndarray) -> tuple[Fixed, ...]:
+    """Vectors of codes as numbers of ``SQ(1, 17)``."""
+    return tuple(Fixed(COMPONENT, code) for code in codes)
+
+
+# Words.
+
+
+def any_codes(rng: np.random.Generator, format: Format, *shape: int) -> np.ndarray:
+    """Codes anywhere in a word; a third of every size; of each 16th row the ends of the word, 0 or 1."""
+    codes = rng.integers(format.min_code, format.max_code, shape, endpoint=True)
+    codes[1::3] >>= rng.integers(0, format.width, codes[1::3].shape)
+    ends = [format.min_code, format.max_code, 0, 1]
+    codes[::16] = rng.choice(ends, codes[::16].shape)
+    return rng.permutation(codes)
+
+
+def word_ends(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    """Components that are the smallest or largest code, 0, 1 or -1."""
+    return rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], shape)
+
+
+# Unit vectors.
+
+
+def sphere(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Unit vectors, uniform over the sphere."""
+    return normalise(rng.normal(size=(count, 3)))
+
+
+def unit_codes(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Codes of unit vectors, uniform over the sphere."""
+    return quantise(sphere(rng, count))
+
+
+def turned(rng: np.random.Generator, vectors: np.ndarray, degrees: np.ndarray) -> np.ndarray:
+    """Unit vectors at given angles from others, in any direction."""
+    across = rng.normal(size=vectors.shape)
+    across = normalise(across - dot(across, vectors)[:, np.newaxis] * vectors)
+    angle = np.radians(np.broadcast_to(degrees, len(vectors)))[:, np.newaxis]
+    return vectors * np.cos(angle) + across * np.sin(angle)
+
+
+def spread_angles(rng: np.random.Generator, count: int, widest: float) -> np.ndarray:
+    """Degrees: both ends, half spread evenly, half by their logarithm."""
+    angles = rng.uniform(0, widest, count)
+    angles[::2] = widest * 10.0 ** rng.uniform(-6, 0, len(angles[::2]))
+    angles[: count // 20] = 0
+    angles[count // 20 : count // 10] = widest
+    return angles
+
+
+def span_ends(rng: np.random.Generator, count: int, widest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Codes of the end normals of spans up to ``widest`` degrees, some along an axis."""
+    left = sphere(rng, count)
+    left[: count // 20] = np.eye(3)[np.arange(count // 20) % 3]
+    right = turned(rng, left, rng.permutation(spread_angles(rng, count, widest)))
+    return quantise(left), quantise(right)
+
+
+def any_pairs(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Codes of pairs of unit normals at any angle, of any size; of every sixteenth any words."""
+    left = sphere(rng, count)
+    right = normalise(left + 10.0 ** rng.uniform(-5, 1, (count, 1)) * rng.normal(size=(count, 3)))
+    left, right = quantise(left), quantise(right)
+    for ends in (left, right):
+        ends[::16] = any_codes(rng, COMPONENT, *ends[::16].shape)
+    return left, right
+
+
+def vectors_near(rng: np.random.Generator, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Codes of a unit vector for each span: anywhere, and for every second near the span's normals."""
+    vector = sphere(rng, len(left))
+    vector[::2] = normalise((0.7 * left + 0.3 * right)[::2] / ONE + vector[::2] * 1e-3)
+    return quantise(vector)
+
+
+def degrees_between(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Angles between vectors of codes, as a column."""
+    sine = np.linalg.norm(np.cross(left / ONE, right / ONE), axis=1)
+    return np.degrees(np.arctan2(sine, dot(left, right) / ONE**2))[:, np.newaxis]
+
+
+def light_constants(unit: Component, direction: np.ndarray, halfway: np.ndarray) -> np.ndarray:
+    """Constants of a unit with the codes of L and H of each light."""
+    constants = np.zeros(len(direction), dtype_of(unit.constants.shape().elem_shape))
+    constants["direction"], constants["halfway"] = direction, halfway
+    return constants
+
+
+# Spans.
+
+
+def log_lengths(rng: np.random.Generator, count: int, least: int = 1) -> np.ndarray:
+    """Lengths of so many spans by their logarithm, the shortest and the longest two among them."""
+    lengths = np.floor(least * (4096 / least) ** rng.random(count)).astype(np.int64)
+    edges = [least, least + 1, 4094, 4095]
+    lengths[: len(edges)] = edges[:count]
+    return lengths
+
+
+def span_lengths(rng: np.random.Generator, pixels: int, least: int = 1) -> np.ndarray:
+    """Lengths of spans that have about so many pixels or a few more, in any order."""
+    return rng.permutation(log_lengths(rng, max(pixels // 450, 16), least))
+
+
+def any_lengths(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Lengths of so many spans, short ones as often as long ones."""
+    lengths = np.floor(4096 ** rng.random(count)).astype(np.int64)
+    lengths[:: max(count // 4, 1)] = 4095
+    return lengths
+
+
+def short_lengths(rng: np.random.Generator, pixels: int, least: int = 0) -> np.ndarray:
+    """Lengths of spans that have exactly so many pixels; most are short."""
+    longest = min(4096, 2 + pixels // 16)
+    lengths = np.floor(longest ** rng.random(max(pixels // 8, 8)) ** 3).astype(np.int64)
+    lengths = np.maximum(lengths - (1 - least), least)
+    lengths = lengths[np.cumsum(lengths) <= pixels]
+    rest = pixels - int(lengths.sum())
+    return np.r_[lengths, [4095] * (rest // 4095), [rest % 4095] if rest % 4095 else []].astype(np.int64)
+
+
+def pixel_of(rng: np.random.Generator, length: np.ndarray) -> np.ndarray:
+    """Offset of a pixel of each span; of every fourth the last."""
+    pixel = np.floor(rng.random(len(length)) * length).astype(np.int64)
+    pixel[::4] = length[::4] - 1
+    return pixel
+
+
+def setup_spans(
+    rng: np.random.Generator, count: int, widest: float, out_of_range: float
+) -> dict[str, np.ndarray]:
+    """Spans for a setup: equal normals, every angle, some out of range, ends of the words; all lengths.
+
+    Parameters
+    ----------
+    rng : Generator
+        Of the random numbers.
+    count : int
+        Spans, 200 or more.
+    widest : float
+        Largest angle in degrees of those that are in range.
+    out_of_range : float
+        Least angle of those that are not, of which there are 60; opposite normals among them.
+    """
+    angles = np.r_[np.zeros(20), 10.0 ** rng.uniform(-4, 0, 80), rng.uniform(0, widest, count - 200)]
+    angles = np.r_[angles, rng.uniform(out_of_range, 180, 59), 180]
+    left = sphere(rng, len(angles))
+    left, right = quantise(left), quantise(turned(rng, left, angles))
+    left, right = np.vstack([left, word_ends(rng, 40, 3)]), np.vstack([right, word_ends(rng, 40, 3)])
+    length = rng.integers(1, 4096, len(left))
+    length[::2] = rng.integers(1, 20, len(length[::2]))
+    length[:12] = [1, 2, 3, 4, 5, 16, 17, 2048, 2049, 2050, 4094, 4095]
+    order = rng.permutation(len(left))
+    return {"normal_left": left[order], "normal_right": right[order], "length": length[order]}
+
+
+# Highlights.
+
+
+def exponents(rng: np.random.Generator, count: int) -> Iterator[tuple[int, int]]:
+    """Exponents, and how many of so many samples each has."""
+    chosen = [1, 2, 3, 10, 100, 500, 999, MAX_EXPONENT]
+    chosen += rng.integers(1, MAX_EXPONENT + 1, 32).tolist()
+    for exponent in chosen:
+        yield exponent, max(count // len(chosen), 16)

@@ -1,0 +1,347 @@
+"""What a record of a unit holds, and the runs that tests and tools make of it.
+
+A record stands in the file of the unit's name in `blysk.sim.units`. Tables, pages, tests of the RTL,
+mutants, toggle coverage, other simulators and baselines iterate over `registry.RECORDS`; no other list of
+units exists. To add a unit: its model in `golden`, its component in `hdl`, its record, and a test of what is
+special about it.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from amaranth.lib.wiring import Component
+
+__all__ = [
+    "STALLS",
+    "Beats",
+    "Case",
+    "Decisions",
+    "Record",
+    "Sample",
+    "Stimulus",
+    "UnitRun",
+    "Variant",
+    "first",
+    "length_of",
+]
+
+Beats = np.ndarray | Mapping[str, Any]
+"""Beats of a stream: a structured array, or (nested) mappings of field names to arrays of codes."""
+
+PAUSE, PAUSED = 61, 40
+"""Cycles from a beat to the next, and how many beats come so, in a run that ends each stimulus."""
+
+STALLS = ((0.0, 0.0), (0.4, 0.4), (0.9, 0.1), (0.1, 0.9))
+"""Shares of the cycles on which the input and the output are stalled, a run each."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Results of a unit, and what they should have been.
+
+    Parameters
+    ----------
+    found : array
+        Values of the bit-accurate model.
+    exact : array, same shape
+        The exact function of the same operands in float64.
+    formula : array, same shape, optional
+        The formula that the unit approximates it by, in float64; ``None`` where its tables cannot be told
+        from its arithmetic.
+    at : array, broadcast to the same shape, optional
+        The operand that an error is drawn against, named by the variant's ``axis``.
+    """
+
+    found: np.ndarray
+    exact: np.ndarray
+    formula: np.ndarray | None = None
+    at: np.ndarray | None = None
+
+    @property
+    def errors(self) -> tuple[float | None, float | None, float]:
+        """Largest model, arithmetic and total error."""
+        total = self._size(self.found, self.exact)
+        if self.formula is None:
+            return None, None, total
+        return self._size(self.formula, self.exact), self._size(self.found, self.formula), total
+
+    @staticmethod
+    def _size(a, b) -> float:
+        return float(np.abs(np.subtract(a, b)).max())
+
+    @property
+    def extremes(self) -> "Sample":
+        """The three results or fewer that `errors` come from."""
+        pairs = [(self.found, self.exact)]
+        if self.formula is not None:
+            pairs += [(self.formula, self.exact), (self.found, self.formula)]
+        worst = [int(np.abs(np.subtract(a, b)).argmax()) for a, b in pairs]
+        parts = (self.found, self.exact, self.formula)
+        return Sample(*(None if part is None else np.ravel(part)[worst] for part in parts))
+
+    @classmethod
+    def joined(cls, samples: "Iterator[Sample]") -> "Sample":
+        """Several samples as one; each may have a shape of its own."""
+        samples = [
+            s if s.at is None else replace(s, at=np.broadcast_to(s.at, np.shape(s.found))) for s in samples
+        ]
+        parts = [
+            None
+            if any(getattr(s, name) is None for s in samples)
+            else np.concatenate([np.ravel(getattr(s, name)) for s in samples])
+            for name in ("found", "exact", "formula", "at")
+        ]
+        return type(samples[0])(*parts)
+
+
+class Decisions(Sample):
+    """Decisions, 1 for yes and 0 for no, and what they should have been. Errors are their share of all.
+
+    The formula is yes where either is: a model error is a yes for nothing, a waste; an arithmetic one a no
+    by mistake.
+    """
+
+    @classmethod
+    def of(cls, found: np.ndarray, exact: np.ndarray, at: np.ndarray | None = None) -> "Decisions":
+        """Decisions and what they should have been, as booleans."""
+        found, exact = (np.asarray(decision, dtype=np.int8) for decision in (found, exact))
+        return cls(found, exact, np.maximum(found, exact), at)
+
+    @staticmethod
+    def _size(a, b):
+        return float(np.abs(np.subtract(a, b)).mean())
+
+    @property
+    def extremes(self) -> "Decisions":
+        """All of them."""
+        return replace(self, at=None)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A structure of a unit: how it is made, and what it errs by.
+
+    Parameters
+    ----------
+    unit : callable
+        Makes the component; its ``parameters`` are the bit-accurate model.
+    measure : callable, optional
+        Takes a random generator and a number of samples, gives a `Sample`. For units of whole spans a sample
+        is a pixel. ``None``: the variant is in no table of errors.
+    domain : str
+        Operands over which errors are measured.
+    scale : str
+        Unit of the errors: nothing (1 is a full term or the length of a vector), ``rad``, ``turn``, ``LSB``
+        or ``rate``, a share of the decisions.
+    exhaustive : bool
+        Every operand of the domain is measured, whatever the number of samples.
+    beat : dict
+        Fields of the input beats of the simulation that finds the times, where the unit does not state
+        them; others are 0.
+    note : str
+        What else there is to say.
+    source : str
+        Where it differs from the record's.
+    as_published : bool
+        With the constants or in the form that a document prints.
+    long : bool
+        Its RTL is simulated in the long run only.
+    """
+
+    unit: Callable[[], Component]
+    measure: Callable[[np.random.Generator, int], Sample] | None = None
+    domain: str = ""
+    scale: str = ""
+    exhaustive: bool = False
+    beat: dict[str, Any] = field(default_factory=dict)
+    note: str = ""
+    source: str = ""
+    as_published: bool = False
+    long: bool = False
+
+
+@dataclass(frozen=True)
+class Case:
+    """Input of a unit for one run.
+
+    Parameters
+    ----------
+    beats : Beats
+        Input beats.
+    constants : Beats, optional
+        Driven for the whole run, where the unit has a port ``constants``.
+    write : Beats, optional
+        Beats of the stream ``write``, before the first input beat.
+    """
+
+    beats: Beats
+    constants: Beats | None = None
+    write: Beats | None = None
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """A kind of input for a unit. Its docstring in the record says what it covers.
+
+    Parameters
+    ----------
+    make : callable
+        Takes the component, a random generator and a number of beats or pixels, gives a `Case`. Its
+        docstring is one sentence: what is covered.
+    count : int
+        Beats or pixels of a test.
+    stalled : bool
+        Whether it is also sent under the patterns of `STALLS`; else without stalls alone.
+    long : bool
+        Whether it belongs to the long run.
+    repeats : int
+        How often it is made, each time by another seed.
+    variants : tuple of str
+        Names of the variants for which it is made; empty for all.
+    """
+
+    make: Callable[[Component, np.random.Generator, int], Case]
+    count: int = 1000
+    stalled: bool = True
+    long: bool = False
+    repeats: int = 1
+    variants: tuple[str, ...] = ()
+
+    @property
+    def covers(self) -> str:
+        """One sentence: what is covered."""
+        make = getattr(self.make, "func", self.make)
+        return (make.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
+
+
+@dataclass(frozen=True)
+class UnitRun:
+    """A run of a unit: its input, what is to come of it, and the stalls.
+
+    Parameters
+    ----------
+    case : Case
+        Input.
+    expected : Beats
+        Output beats of the bit-accurate model.
+    stalls : dict
+        Arguments ``input_stalls`` and ``output_stalls`` of `simulate`; empty for none.
+    """
+
+    case: Case
+    expected: Beats
+    stalls: dict[str, np.ndarray]
+
+    @property
+    def count(self) -> int:
+        """Number of output beats."""
+        return length_of(self.expected)
+
+
+@dataclass(frozen=True)
+class Record:
+    """A unit.
+
+    Parameters
+    ----------
+    name : str
+        Of its files in `golden` and `hdl`.
+    title : str
+        What it computes, in some words.
+    source : str
+        Document and figure.
+    variants : dict
+        Structures by name; the first is the default, which mutants and toggle coverage take.
+    expect : callable
+        Takes the component and a `Case`; gives the output beats by the bit-accurate model.
+    stimuli : dict
+        By name; the first serves for any number of beats, in other simulators too.
+    axis : str
+        What errors are drawn against; empty for nothing.
+    logarithmic : bool
+        That axis is logarithmic.
+    waivers : dict
+        Signals of the default variant, reason by name: a fault there may survive.
+    still : dict
+        Register bits of the default variant that cannot toggle: signals with their bits by reason.
+    """
+
+    name: str
+    title: str
+    source: str
+    variants: Mapping[str, Variant]
+    expect: Callable[[Component, Case], Beats]
+    stimuli: Mapping[str, Stimulus]
+    axis: str = "angle of the span, degrees"
+    logarithmic: bool = False
+    waivers: Mapping[str, str] = field(default_factory=dict)
+    still: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def default(self) -> str:
+        """Name of the default variant."""
+        return next(iter(self.variants))
+
+    @cached_property
+    def kind(self) -> type[Component]:
+        """Class of the component."""
+        unit = self.variants[self.default].unit
+        return getattr(unit, "func", unit)
+
+    def source_of(self, variant: str) -> str:
+        """Document and figure of a variant."""
+        return self.variants[variant].source or self.source
+
+    def stimuli_of(self, variant: str) -> dict[str, Stimulus]:
+        """Stimuli that are made for a variant."""
+        return {
+            name: stimulus
+            for name, stimulus in self.stimuli.items()
+            if not stimulus.variants or variant in stimulus.variants
+        }
+
+    def runs(self, unit: Component, stimulus: str, seed: int = 2026) -> Iterator[UnitRun]:
+        """The runs of a stimulus, always the same ones: without stalls, with them, and with pauses.
+
+        Parameters
+        ----------
+        unit : Component
+            Of one of the variants.
+        stimulus : str
+            Its name.
+        seed : int
+            Of the random generator.
+        """
+        given = self.stimuli[stimulus]
+        for repeat in range(given.repeats):
+            rng = np.random.default_rng([seed, *stimulus.encode(), repeat])
+            case = given.make(unit, rng, given.count)
+            expected = self.expect(unit, case)
+            for shares in STALLS if given.stalled else STALLS[:1]:
+                names = ("input_stalls", "output_stalls")
+                periods = (997, 1009)
+                stalls = {
+                    name: rng.random(period) < share
+                    for name, period, share in zip(names, periods, shares, strict=True)
+                    if share
+                }
+                yield UnitRun(case, expected, stalls)
+            if given.stalled:
+                few = Case(first(case.beats, PAUSED), case.constants, case.write)
+                pauses = np.arange(PAUSE * PAUSED) % PAUSE != 0
+                yield UnitRun(few, self.expect(unit, few), {"input_stalls": pauses})
+
+
+def first(beats: Beats, count: int) -> Beats:
+    """The first beats of a (nested) mapping of arrays."""
+    if isinstance(beats, Mapping):
+        return {name: first(value, count) for name, value in beats.items()}
+    return beats[:count]
+
+
+def length_of(beats: Beats) -> int:
+    """Number of beats."""
+    return length_of(next(iter(beats.values()))) if isinstance(beats, Mapping) else len(beats)

@@ -1,0 +1,26 @@
+"""Every record, found in its file: in the order of the rooms, within a room by name."""
+
+import pkgutil
+from importlib import import_module
+
+from blysk.sim.units.record import Record
+
+__all__ = ["RECORDS", "ROOMS"]
+
+ROOMS = ("normals", "cosines", "methods", "lighting", "")
+"""Rooms on the data's way; last those that stand in none."""
+
+
+def _found() -> dict[str, Record]:
+    records = {}
+    for room in ROOMS:
+        package = import_module(".".join(part for part in ("blysk.sim.units", room) if part))
+        for module in pkgutil.iter_modules(package.__path__):
+            if not module.ispkg and (room or module.name not in ("operands", "record", "registry")):
+                record = import_module(f"{package.__name__}.{module.name}").RECORD
+                records[record.name] = record
+    return records
+
+
+RECORDS: dict[str, Record] = _found()
+"""Records by the units' names."""
