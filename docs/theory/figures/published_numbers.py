@@ -1,0 +1,120 @@
+"""Numbers of errata.md and figures.md."""
+
+import math
+from collections.abc import Callable
+
+from markdown import table
+
+from blysk.bench.report import phong_blinn
+from blysk.bench.report.cosine_quadratic import PUBLISHED, coefficients, errors, slopes
+from blysk.bench.report.errata import ERRATA, evidence
+from blysk.bench.report.thesis import CLAIMS, software
+from blysk.golden.reference.reflection import exponent_ratio
+
+
+def _number(value: float) -> str:
+    if value == 0 or 1e-3 <= abs(value) < 1e4:
+        return f"{value:.4g}"
+    return "under 1e-12" if abs(value) < 1e-12 else f"{value:.1e}"
+
+
+def _errata(document: str) -> Callable[[], str]:
+    def made() -> str:
+        found = evidence(own=False)
+        rows = []
+        for name, erratum in ERRATA.items():
+            if erratum.place.startswith(f"[{document}]"):
+                place = erratum.place.removeprefix(f"[{document}]").lstrip(", ")
+                numbers = (_number(value) for value in found[name])
+                rows.append([place, erratum.printed, erratum.right, erratum.quantity, *numbers])
+        head = ["place", "printed", "right", "computed quantity", "as printed", "as it should be"]
+        return table(head, rows, 4)
+
+    return made
+
+
+def _cosine_quadratic() -> str:
+    found = {model: errors(model) for model in ("cosquad", "cosquad_q", "cosquad_lin")}
+    found |= {"slopes": slopes(), "coefficients": coefficients()}
+    rows = []
+    for figure in PUBLISHED:
+        value = found[figure.key[0]][figure.key[1]] * (100 if figure.percent else 1)
+        digits = len(figure.printed.partition(".")[2])
+        same = "yes" if f"{value:.{digits}f}" == figure.printed else "no"
+        rows.append([figure.what, figure.printed, f"{value:.{digits + 1}f}", same])
+    return table(["figure", "printed", "computed", "to the digits printed"], rows)
+
+
+def _line_models() -> str:
+    rows = []
+    for model in ("cosquad", "cosquad7", "cosquad_q", "cosquad_lin", "coscos2", "coscos4"):
+        found = errors(model)
+        rows.append([f"`{model}`", f"{found['absolute']:.4f}", f"{100 * found['relative']:.2f} %"])
+    return table(["model", "largest absolute error", "largest relative error in the zone"], rows)
+
+
+_KINDS = ("multiplications", "additions", "divisions", "roots", "functions")
+
+
+def _operations() -> str:
+    """Operations of a normal or of a pixel's N·L and N·H, counted while the ways of [T] run."""
+    rows = []
+    for claim in CLAIMS:
+        for rival in claim.rivals:
+            for way in claim.ways:
+                counted = software(way, rival, 32, 1)
+                totals = [sum(counted[of].values()) for of in ("operations", "rival_operations")]
+                dear = [_dear(counted[of]) for of in ("operations", "rival_operations")]
+                shown = (f"{total:.1f} ({cost:.1f})" for total, cost in zip(totals, dear, strict=True))
+                rows.append([claim.name, f"{claim.printed}", way, rival, *shown])
+    return table(
+        ["claim", "printed", "way", "compared with", "operations of the way", "of the other"], rows, 4
+    )
+
+
+def _dear(counts: dict[str, float]) -> float:
+    """Divisions, roots and functions."""
+    return sum(counts.get(kind, 0.0) for kind in ("divisions", "roots", "functions"))
+
+
+def _phong_blinn() -> str:
+    rows = []
+    for local in (False, True):
+        totals = {}
+        for way in phong_blinn.WAYS:
+            counts = phong_blinn.operations(way, local)
+            totals[way] = sum(counts.values())
+            fewer = 1 - totals[way] / next(iter(totals.values()))
+            of = "each pixel's" if local else "the frame's"
+            rows.append([of, way, f"{totals[way]:.1f}", f"{fewer:.0%}" if len(totals) > 1 else ""])
+    return table(["L and V are", "way", "operations", "fewer than the first"], rows, 2)
+
+
+def _errata_sentences() -> list[str]:
+    ratio = float(exponent_ratio(math.cos(math.radians(40))))
+    return [f"{len(ERRATA)} entries", f"{ratio:.2f} at 40°"]
+
+
+def _figure_sentences() -> list[str]:
+    found = [errors(model) for model in ("cosquad", "cosquad_q", "cosquad_lin")]
+    values = dict(zip(("f2", "fQ", "fQ2"), found, strict=True))
+    ratios = {claim.name: claim.printed for claim in CLAIMS}
+    return [
+        f"f2 is off by {values['f2']['absolute']:.4f} at most, fQ2 by {values['fQ2']['absolute']:.4f}",
+        ", ".join(f"{name}: {value} times" for name, value in ratios.items()),
+    ]
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "errata-thesis": _errata("T"),
+    "errata-cosine-quadratic": _errata("C"),
+    "errata-phong-blinn": _errata("P"),
+    "cosine-quadratic": _cosine_quadratic,
+    "line-models": _line_models,
+    "operations": _operations,
+    "phong-blinn": _phong_blinn,
+}
+SENTENCES: dict[str, Callable[[], list[str]]] = {
+    "errata.md": _errata_sentences,
+    "figures.md": _figure_sentences,
+}
