@@ -13,16 +13,11 @@ from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
-from blysk.golden.methods.interpolator import (
-    Interpolator,
-    Operands,
-    pixels_of,
-    runs_of,
-)
+from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
-from blysk.golden.normals.difference_setup import LENGTH_BITS
 from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
 from blysk.golden.number.unit_vector import COMPONENT
 
 __all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]

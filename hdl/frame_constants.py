@@ -13,8 +13,8 @@ from blysk.golden.frame_constants import (
     MAX_MATERIALS,
 )
 from blysk.golden.lighting.specular import Specular
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.lighting.intensity import color_shape
-from blysk.hdl.normals.middle_normal import normal_shape
 
 __all__ = ["FrameConstantsUnit", "frame_constants_shape", "write_shape"]
 

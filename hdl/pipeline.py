@@ -19,12 +19,13 @@ from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.pipeline import Design
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
 from blysk.hdl.cosines.local_chord_setup import span_values_shape
 from blysk.hdl.frame_constants import FrameConstantsUnit, write_shape
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
-from blysk.hdl.lighting.intensity import IntensityUnit
+from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.hdl.lighting.light import LightUnit
 from blysk.hdl.lighting.specular import SlopeUnit, SpecularUnit
 from blysk.hdl.methods.angular_interpolator import AngularInterpolatorUnit
@@ -35,7 +36,6 @@ from blysk.hdl.methods.linear_interpolator import LinearInterpolatorUnit
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
 from blysk.hdl.methods.quadratic_interpolator import QuadraticInterpolatorUnit
 from blysk.hdl.methods.recurrence_interpolator import RecurrenceInterpolatorUnit
-from blysk.hdl.normals.middle_normal import normal_shape
 from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
 
 __all__ = [
@@ -210,10 +210,12 @@ class ShadingPipelineUnit(wiring.Component):
         )
         self.setup_interval = self._interpolator.setup_interval
         self._lights = self._light_units()
-        self._intensity = IntensityUnit(p.intensity, style)
+        self._intensity = (CompactIntensityUnit if style == "compact" else IntensityUnit)(p.intensity)
         if p.gate:
             interval = min(self.setup_interval, 3 + 12 * p.lights)
-            self._gate = HighlightGateUnit(p.highlight_gate, interval, p.lights, p.build.exponent)
+            self._gate = HighlightGateUnit(
+                p.highlight_gate, p.lights, initiation_interval=interval, exponent=p.build.exponent
+            )
         self.cycles_per_pixel = max(
             self._interpolator.cycles_per_pixel,
             options.get("product_interval", 1),
@@ -241,7 +243,7 @@ class ShadingPipelineUnit(wiring.Component):
         compact, exponent = p.build.style == "compact", p.build.exponent
         diffuse = Diffuse(p.interpolator.COSINE_FORMAT)
         if p.specular is None:
-            return [DiffuseUnit(parameters=diffuse) for _ in range(p.lights)]
+            return [DiffuseUnit(diffuse) for _ in range(p.lights)]
         interval, shares_slope = 1, False
         if isinstance(p.specular, Power):
             interval = 42 if compact else 1
@@ -255,7 +257,7 @@ class ShadingPipelineUnit(wiring.Component):
             LightUnit(
                 p.specular,
                 diffuse,
-                interval,
+                initiation_interval=interval,
                 exponent=exponent,
                 shares_slope=shares_slope,
                 gated=p.gate,

@@ -25,8 +25,8 @@ from blysk.bench.command import run
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.golden.pipeline import Design, Pixels, Spans
 from blysk.golden.presets import MODELS as ALL_MODELS

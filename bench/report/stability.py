@@ -25,13 +25,13 @@ from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.methods.interpolator import Operands, pixels_of
+from blysk.golden.methods.interpolator import Operands
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
-from blysk.golden.normals.difference_setup import LENGTH_BITS
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.spans import LENGTH_BITS, pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import METHODS, preset

@@ -30,7 +30,6 @@ from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
-from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
@@ -44,6 +43,7 @@ from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FIT
 from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.pipeline import Spans
 from blysk.golden.presets import METHODS, MODELS, preset
@@ -61,7 +61,7 @@ from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
 from blysk.hdl.emit.cost import Cost, cost_of
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
-from blysk.hdl.lighting.intensity import IntensityUnit
+from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.hdl.lighting.light import LightUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SpecularUnit
@@ -1226,12 +1226,12 @@ def _blocks() -> Iterator[Block]:
         "rate",
         note="of all spans; model: let through for nothing; arithmetic: stopped though a pixel has a term",
     )
-    for style in ("throughput", "compact"):
+    for style, unit in (("throughput", IntensityUnit), ("compact", CompactIntensityUnit)):
         yield Block(
             "intensity",
             f"1 light, {style}",
             "[T] 4.10",
-            partial(IntensityUnit, style=style),
+            unit,
             _intensity,
             "all terms",
             "LSB",

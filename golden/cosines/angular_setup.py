@@ -9,9 +9,10 @@ import numpy as np
 
 from blysk.golden.cosines.arccos import SEGMENT_BOUNDS, Arccos, HalfChord
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
-from blysk.golden.normals.difference_setup import DifferenceSetup, checked_lengths, reciprocal_place
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
+from blysk.golden.number.reciprocal import reciprocal_address, reciprocal_table
+from blysk.golden.number.spans import checked_lengths
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 
 __all__ = ["SPAN_ANGLES", "AngularSetup"]
@@ -57,7 +58,7 @@ class AngularSetup:
     atan2        SQ(0, 28)    turns
     psi          UQ(0, 36)    turns
     lambda       SQ(0, 40)    turns
-    psi/(m-1)    UQ(0, 40)    turns; psi by its leading 17 bits times `DifferenceSetup`'s reciprocal
+    psi/(m-1)    UQ(0, 40)    turns; psi by its leading 17 bits times the reciprocal
     cos beta     UQ(1, 25)    over 1 only where normals of unequal length are few steps apart
     ============ ============ ====================================================================
 
@@ -341,9 +342,9 @@ class AngularSetup:
         return x, Fixed(SQ(3, 28), direction).wrap(self.DIRECTION_FORMAT)
 
     def _step(self, angle: Fixed, shift: np.ndarray, length: np.ndarray) -> Fixed:
-        """``psi/(m-1)``, cut to 40 fraction bits; the reciprocal is that of `DifferenceSetup`."""
-        address, halvings = reciprocal_place(length - 1)
+        """``psi/(m-1)``, cut to 40 fraction bits; the reciprocal is that of `reciprocal_table`."""
+        address, halvings = reciprocal_address(length - 1)
         leading = Fixed(UQ(18, 36), angle.codes << shift).round_half_up(18).saturate(self.MANTISSA_FORMAT)
-        product = leading * DifferenceSetup().reciprocals[address]
+        product = leading * reciprocal_table()[address]
         # The table holds half of 1/f, and the product has 35 fraction bits.
         return Fixed(self.STEP_FORMAT, product.codes << 6 >> (shift + halvings))

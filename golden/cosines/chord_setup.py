@@ -7,10 +7,11 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from blysk.golden.cosines.chord import Chord
-from blysk.golden.normals.difference_setup import DifferenceSetup, checked_lengths
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
 from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax_quantised
+from blysk.golden.number.reciprocal import step_words
+from blysk.golden.number.spans import LENGTH_BITS, checked_lengths
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 
 __all__ = ["ChordSetup", "Differences", "largest_span_angle"]
@@ -50,7 +51,7 @@ class ChordSetup:
     - ``f = f_l + P t + G t^2`` with ``G = -4 e (f_l + f_r)`` and ``P = (f_r - f_l) - G``.
 
     The first difference is ``P dt + G dt^2``, the second ``2 G dt^2``, with dt and dt^2 of
-    `DifferenceSetup`. A light costs 19 products a span, all of 18 bits or less; the
+    `step_words`. A light costs 19 products a span, all of 18 bits or less; the
     rest of a span 7. ``e = w (c1 + w (c2 + w c3))`` is exact at angle 0 and fitted to `MAX_ANGLE`; with fewer
     terms, for scenes of narrow spans, it is fitted as well to an angle of their own (`ANGLES`), and a product
     falls away with each.
@@ -127,7 +128,7 @@ class ChordSetup:
     @property
     def longest(self) -> int:
         """Longest span for which the error bounds hold: the drift over it is under 1.3e-7."""
-        return (1 << DifferenceSetup.LENGTH_BITS - (46 - self.fraction_bits) // 2) - 1
+        return (1 << LENGTH_BITS - (46 - self.fraction_bits) // 2) - 1
 
     @property
     def shifted_format(self) -> Format:
@@ -296,9 +297,9 @@ class ChordSetup:
         shift : int64 array
         square : Fixed
         square_shift : int64 array
-            Of `DifferenceSetup.steps`, in shape (spans, 1).
+            Of `step_words`, in shape (spans, 1).
         """
-        reciprocal, shift, square, square_shift = DifferenceSetup().steps(length)
+        reciprocal, shift, square, square_shift = step_words(length)
         return (
             Fixed(reciprocal.format, reciprocal.codes[:, np.newaxis]),
             shift[:, np.newaxis],

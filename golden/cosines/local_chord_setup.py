@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from blysk.golden.cosines.chord_setup import ChordSetup, Differences
-from blysk.golden.normals.difference_setup import checked_lengths
 from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.spans import checked_lengths
 
 __all__ = ["LocalChordSetup"]
 

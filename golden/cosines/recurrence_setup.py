@@ -8,14 +8,10 @@ import numpy as np
 
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.cosines.recurrence import Recurrence
-from blysk.golden.normals.difference_setup import (
-    LENGTH_BITS,
-    checked_lengths,
-    reciprocal_place,
-    reciprocal_table,
-)
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.reciprocal import reciprocal_address, reciprocal_table
+from blysk.golden.number.spans import LENGTH_BITS, checked_lengths
 from blysk.golden.number.unit_vector import COMPONENT
 
 __all__ = ["RecurrenceSetup"]
@@ -245,7 +241,7 @@ class RecurrenceSetup:
         chord = chord.saturate(self.CHORD_FORMAT)
         q, q_shift = self._normalised(chord)
         square, inverse = (self._looked_up(t, chord.codes, 35) for t in self.chord_tables)
-        address, step_shift = reciprocal_place(length - 1)
+        address, step_shift = reciprocal_address(length - 1)
         reciprocal, reciprocal_square, small = (word[address] for word in self.reciprocals)
 
         # Half of psi^2; an eighth of Q.

@@ -1,4 +1,4 @@
-"""The angular method ([T] 3.1, 3.2): cosines of angles that grow evenly along the great circle."""
+"""The angular method ([T] 3.1, 3.2): cosines of angles in equal steps on the great circle."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -6,34 +6,36 @@ from typing import ClassVar
 import numpy as np
 
 from blysk.golden.cosines.angular_setup import AngularSetup
+from blysk.golden.cosines.arccos import Arccos
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
-from blysk.golden.methods.interpolator import Interpolator, Operands, pixels_of
+from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT
 
-__all__ = ["AngularInterpolator"]
+__all__ = ["METHODS", "PUBLISHED", "AngularInterpolator"]
 
 
 @dataclass(frozen=True)
 class AngularInterpolator(Interpolator):
     """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, for L and H of each light.
 
-    Formats and error bounds are those of `AngularSetup` and
-    `HighlightCosine`. N·L is 1 less the result, ``SQ(2, 25)``. Spans over 150
-    degrees are flagged.
+    Formats and error bounds are those of `AngularSetup` and `HighlightCosine`. N·L is 1 less the result,
+    ``SQ(2, 25)``. Spans over 150 degrees are flagged.
 
     Parameters
     ----------
     setup : AngularSetup
-        The unit that finds the angles.
+        Model of the unit that finds the angles.
 
-    Source: [T] 3.1, 3.2.
+    Source: docs/theory/interpolation.md#angular-method; [T] 3.1, 3.2.
     """
 
     setup: AngularSetup = field(default_factory=AngularSetup)
 
     operand: ClassVar = "one_minus_cosine"
     COSINE_FORMAT = SQ(2, 25)
+    COSINE_OF_ZERO = 1.0
     MAX_ANGLE = AngularSetup.MAX_ANGLE
     CURVE = "slerp"
 
@@ -58,21 +60,36 @@ class AngularInterpolator(Interpolator):
         setup = AngularSetup.error(angles).max()
         return float(setup) + HighlightCosine.ERROR + HighlightCosine.RESULT_FORMAT.step
 
-    def compute(self, normal_left, normal_right, length, direction, halfway):
-        """Bit-true operands."""
-        place = pixels_of(length)
+    def operand_error(self, length, degrees):
+        """Errors of setup and cosine; the code of length 1, where the setup has 1; half a last step."""
+        return float(AngularSetup.error(degrees)) + HighlightCosine.ERROR + 2.0**-16 + 2.0**-26
 
-        def along(vector):
+    def compute(self, normal_left, normal_right, length, direction, halfway):
+        """Bit-accurate operands."""
+        pixels = pixels_of(length)
+
+        def complement(vector):
+            """1 - cosine of a vector at every pixel, and the flags."""
             vector = Fixed(COMPONENT, np.broadcast_to(vector, normal_left.codes.shape))
             _, phase, step, cos_beta, out_of_range = self.setup.compute(
                 normal_left, normal_right, vector, length
             )
-            return HighlightCosine().compute(phase, step, cos_beta, *place).codes, out_of_range
+            return HighlightCosine().compute(phase, step, cos_beta, *pixels).codes, out_of_range
 
         one = Fixed(UQ(1, 25), 1 << 25)
-        results = [[along(vector) for vector in vectors.codes] for vectors in (direction, halfway)]
+        results = [[complement(vector) for vector in vectors.codes] for vectors in (direction, halfway)]
         cosine, highlight = (
             Fixed(HighlightCosine.RESULT_FORMAT, np.stack([codes for codes, _ in light], axis=-1))
             for light in results
         )
         return Operands(one - cosine, highlight, results[0][0][1])
+
+
+METHODS = (AngularInterpolator(),)
+"""Its method."""
+
+PUBLISHED = (
+    AngularInterpolator(AngularSetup("arccos", Arccos("as_published"))),
+    AngularInterpolator(AngularSetup("arccos", Arccos("corrected"))),
+)
+"""The arccosine of table 3.1, with its misprint and without."""

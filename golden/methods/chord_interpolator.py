@@ -1,4 +1,4 @@
-"""The chord method: scalar forward differences of N·L and of the squared chord from N to H (chord.md)."""
+"""The chord method: forward differences of N·L and of half the squared chord from N to H."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,23 +8,24 @@ import numpy as np
 
 from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.interpolator import Interpolator, Operands, pixels_of
+from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import SQ
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR
 
-__all__ = ["ChordInterpolator"]
+__all__ = ["METHODS", "ChordInterpolator"]
 
 
 @dataclass(frozen=True)
 class ChordInterpolator(Interpolator):
     """``N . L`` and ``u = |N - H|^2 / 2`` of each pixel by two additions each, without a normal.
 
-    `ChordSetup` fits both through their exact values at t = 0, 1/2 and 1; sums in 49 bits
-    follow, whose drift is bounded there. The specular unit takes u as its ``1 - cos gamma``.
+    `ChordSetup` fits both through their exact values at t = 0, 1/2 and 1; sums of 49 bits follow, with the
+    drift that is bounded there. The specular unit takes u as its ``1 - cos gamma``.
 
-    Spans should be no wider than `largest_span_angle` of the exponent, where the fit is
-    within a quarter of an LSB of exactly normalised interpolation; they are flagged over 22.5 degrees.
+    Spans should be at most `largest_span_angle` of the exponent, where the fit is within a quarter of an LSB
+    of exactly normalised interpolation; they are flagged over 22.5 degrees.
 
     ========== ========== ========================================
     word       format     why
@@ -44,7 +45,7 @@ class ChordInterpolator(Interpolator):
     ValueError
         If one is out of range.
 
-    Source: chord.md.
+    Source: docs/theory/chord.md#differences.
     """
 
     terms: int = 3
@@ -64,17 +65,17 @@ class ChordInterpolator(Interpolator):
 
     @cached_property
     def setup(self) -> ChordSetup:
-        """Twin of the setup."""
+        """Model of the setup."""
         return ChordSetup(self.terms, self.fraction_bits)
 
     @property
     def MAX_ANGLE(self) -> float:
-        """Widest span in degrees that is not flagged."""
+        """Largest angle in degrees of a span that is not flagged."""
         return self.setup.max_angle
 
     @property
     def accumulators(self) -> dict[str, DifferenceAccumulator]:
-        """Twins of the accumulators, ``diffuse`` of N·L and ``highlight`` of u."""
+        """Models of the accumulators, ``diffuse`` of N·L and ``highlight`` of u."""
         format, difference = SQ(3, self.fraction_bits), self.setup.format
         starts = {"diffuse": ChordSetup.COSINE_FORMAT, "highlight": ChordSetup.CHORD_FORMAT}
         results = {"diffuse": self.COSINE_FORMAT, "highlight": Specular.ARGUMENT_FORMAT}
@@ -84,26 +85,35 @@ class ChordInterpolator(Interpolator):
         }
 
     def widest_span(self, exponent):
-        """Widest span, in degrees, that the fit shades well."""
+        """Largest angle of a span, in degrees, for which the fit is good."""
         return largest_span_angle(exponent)
 
     @property
     def highlight_excess(self):
-        """Error of u at the widest span and any ends, its cut, and the lengths of N and H as codes.
+        """Error of u at the largest angle and any ends, its cut, and the lengths of N and H as codes.
 
         The quadratic through the exact values is ``1 - N·H`` of the quadratic curve of normals.
         """
         error = self.setup.highlight_error(self.gate_angle, np.array(2.0))
         return float(error) + 2 * CODE_LENGTH_ERROR + Specular.ARGUMENT_FORMAT.step
 
+    def operand_error(self, length, degrees):
+        """That of the setup, and the cut of the results."""
+        errors = self.setup.highlight_error(degrees), self.setup.diffuse_error(degrees)
+        return float(max(errors)) + Specular.ARGUMENT_FORMAT.step
+
     def compute(self, normal_left, normal_right, length, direction, halfway):
-        """Bit-true operands."""
+        """Bit-accurate operands."""
         diffuse, highlight, out_of_range = self.setup.compute(
             normal_left, normal_right, direction, halfway, length
         )
-        place = pixels_of(length)
+        pixels = pixels_of(length)
         return Operands(
-            self.accumulators["diffuse"].compute(*diffuse, *place),
-            self.accumulators["highlight"].compute(*highlight, *place),
+            self.accumulators["diffuse"].compute(*diffuse, *pixels),
+            self.accumulators["highlight"].compute(*highlight, *pixels),
             out_of_range,
         )
+
+
+METHODS = (ChordInterpolator(),)
+"""Its method."""

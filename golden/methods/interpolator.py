@@ -1,6 +1,5 @@
-"""Interpolators: what shading needs of a span at every pixel, whatever the method that finds it."""
+"""Interpolators: models of the methods that take a span to the operands of its pixels."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple
 
@@ -11,17 +10,30 @@ from blysk.golden.lighting.specular import Specular
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE
 from blysk.golden.number.fixed import Fixed, Format
-from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT
+from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT, ONE_SQUARED
 from blysk.golden.reference.curves import interpolate
 
-__all__ = ["Interpolator", "NormalInterpolator", "Operand", "Operands", "pixels_of", "runs_of"]
+__all__ = ["Interpolator", "NormalInterpolator", "Operand", "Operands", "difference_rounding"]
 
 Operand = Literal["cosine", "one_minus_cosine"]
-"""What the specular unit may be given."""
+"""Kind of the operand of a specular unit: N·H, or 1 - N·H."""
+
+
+def difference_rounding(pixel: int) -> float:
+    """Bound of the rounding of a normal by forward differences: that of the result, and of both differences.
+
+    ``sqrt(3) (2^-18 + 2^-42 (k + k^2/2))`` at pixel k, as derived in `DifferenceSetup`.
+
+    Parameters
+    ----------
+    pixel : int
+        k, 0 for the first.
+    """
+    return float(np.sqrt(3) * (2.0**-18 + 2.0**-42 * (pixel + pixel**2 / 2)))
 
 
 class Operands(NamedTuple):
-    """What the shading of a light starts from.
+    """Operands of the diffuse and the specular unit of each light, for every pixel.
 
     Parameters
     ----------
@@ -29,8 +41,8 @@ class Operands(NamedTuple):
         N·L.
     highlight : Fixed, shape (pixels, lights)
         N·H, or 1 - N·H.
-    wide : bool array, shape (spans,)
-        Whether the span is wider than the method can shade: its operands mean nothing.
+    out_of_range : bool array, shape (spans,)
+        Whether the angle of the span is larger than the method serves: its operands mean nothing.
     """
 
     cosine: Fixed
@@ -38,55 +50,38 @@ class Operands(NamedTuple):
     out_of_range: np.ndarray
 
 
-def pixels_of(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Span of each pixel, and its place in the span, for spans of so many pixels each."""
-    span = np.repeat(np.arange(len(length)), length)
-    return span, np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)
-
-
-def runs_of(length: np.ndarray, most: int = 1 << 18) -> Iterator[slice]:
-    """Runs of spans with so many pixels or fewer, or of one span: bounds the memory of what is done at once.
-
-    Parameters
-    ----------
-    length : int array, shape (spans,)
-        Pixels of each.
-    most : int
-        Pixels of a run.
-    """
-    ends = np.cumsum(length)
-    start = 0
-    while start < len(length):
-        before = ends[start - 1] if start else 0
-        stop = max(int(np.searchsorted(ends, before + most, side="right")), start + 1)
-        yield slice(start, stop)
-        start = stop
-
-
 @dataclass(frozen=True)
 class Interpolator:
-    """A method that takes spans to the operands of their pixels, one subclass a method.
+    """A method that takes spans to the operands of their pixels; each method is a subclass.
 
-    A subclass states its formats, and has the bit-true `compute` and, in float64, what it stands for.
+    A subclass states its formats; `compute` is its bit-accurate model, `exact_normals` its curve in float64.
 
     Attributes
     ----------
     operand : str
-        ``"cosine"`` or ``"one_minus_cosine"``: what the specular unit is given.
+        ``"cosine"`` or ``"one_minus_cosine"``: operand of the specular unit.
     COSINE_FORMAT : Format
         Of N·L.
+    COSINE_OF_ZERO : float
+        N·L of equal unit vectors in exact arithmetic: 1, or `ONE_SQUARED`, the product of the codes of length
+        1.
     MAX_ANGLE : float
-        Widest span in degrees for which the method is meant. It flags wider ones as far as it can tell them:
-        most from there on; straight lines where a component of ``N_r - N_l`` is 1 or more, which takes 60
+        Largest angle in degrees of the spans that the method serves. It flags those of a larger angle, most
+        of them from there on; straight lines where a component of ``N_r - N_l`` is 1 or more, which takes 60
         degrees and happens to half of the spans at 75; ``renormalise`` besides every span with a normal that
-        its unit does not serve (unit normals: over 94 degrees).
+        its renormaliser does not serve (unit normals: over 94 degrees).
     CURVE : str
         The curve of `CURVES` on which the method's normals lie in exact arithmetic.
+    TAKES_VALUES : bool
+        Whether spans carry values of N·L and 1 - N·H of each light in place of normals, so that L and H may
+        differ from pixel to pixel.
     """
 
     COSINE_FORMAT: ClassVar[Format] = DotProduct().result_format
+    COSINE_OF_ZERO: ClassVar[float] = float(ONE_SQUARED.values)
     MAX_ANGLE: ClassVar[float] = MAX_SPAN_ANGLE
     CURVE: ClassVar[str] = "normalised"
+    TAKES_VALUES: ClassVar[bool] = False
 
     @property
     def name(self) -> str:
@@ -95,46 +90,62 @@ class Interpolator:
 
     @property
     def serves_gate(self) -> bool:
-        """Whether a highlight gate can tell what the method's pixels will be: it has normals and a bound."""
+        """Whether a highlight gate can foresee the method's highlights: it has normals and an error bound."""
         return True
 
     @property
     def gate_angle(self) -> float:
-        """Widest span, in degrees, for which `highlight_excess` is stated: 45, or `MAX_ANGLE` if less."""
+        """Largest angle of a span, in degrees, for `highlight_excess`: 45, or `MAX_ANGLE` if less."""
         return min(self.MAX_ANGLE, MAX_SPAN_ANGLE)
 
     @property
     def highlight_excess(self) -> float:
-        """How far a highlight may be brighter than the great circle says, for spans to `gate_angle`.
+        """Bound of how much brighter a highlight is than the great circle's, for spans to `gate_angle`.
 
         With c the largest cosine to H on the arc of the great circle from N_l to N_r, in units of
-        `ONE_SQUARED`, no pixel has an N·H over ``c + highlight_excess``, or a 1 - N·H under
-        ``shortest_normal (1 - c) - highlight_excess``. A highlight gate counts on it.
+        `ONE_SQUARED`, no pixel has an N·H over ``c + highlight_excess``, or a 1 - N·H under ``shortest_normal
+        (1 - c) - highlight_excess``. A highlight gate relies on it.
         """
         raise NotImplementedError
 
     @property
     def shortest_normal(self) -> float:
-        """Least length of a normal on the way, for spans to `gate_angle`, where the chord is taken to it."""
+        """Least length of a normal of the curve, for spans to `gate_angle`, where its chord to H is taken."""
         return 1.0
 
     @property
     def uses_chord(self) -> bool:
-        """Whether, in exact arithmetic, the specular operand is ``|N - H|^2 / 2`` of its normals."""
+        """Whether, in exact arithmetic, the specular operand is ``|N - H|^2 / 2`` of the curve's normals."""
         return False
 
     def widest_span(self, exponent: int) -> float:
-        """Widest span, in degrees, that should be given to the method at a specular exponent."""
+        """Largest angle of a span, in degrees, for good highlights at a specular exponent."""
         return self.MAX_ANGLE
 
-    def largest_bend(self, exponent: int) -> float:
-        """How far, in radians, the middle of a part of a span may lie from the middle normal of its ends.
+    def largest_deviation(self, exponent: int) -> float:
+        """Largest angle, in radians, between the middle normal of a span and the bisector of its ends.
 
-        Wider parts should be cut again before they are given to the method, which takes every span to bend
-        evenly. It is what costs 0.15 LSB: the cosine-quadratic model changes by ``0.77 sqrt(n)`` a radian at
-        most.
+        The method assumes an angle of 0, so spans are cut until the angle is at most this. It costs 0.15 LSB:
+        the cosine-quadratic model changes by ``0.77 sqrt(n)`` a radian at most.
+
+        Parameters
+        ----------
+        exponent : int
+            Specular exponent n.
         """
         return 0.15 / (255 * 0.77 * exponent**0.5)
+
+    def operand_error(self, length: int, degrees: float) -> float:
+        """Bound of the error of N·L and of N·H against the method's own curve in float64.
+
+        Parameters
+        ----------
+        length : int
+            Pixels of the span.
+        degrees : float
+            Angle of the span, up to `MAX_ANGLE`.
+        """
+        raise NotImplementedError
 
     def compute(
         self,
@@ -144,7 +155,7 @@ class Interpolator:
         direction: Fixed,
         halfway: Fixed,
     ) -> Operands:
-        """Bit-true operands of every pixel, in the order of the spans.
+        """Bit-accurate operands of every pixel, in the order of the spans.
 
         Parameters
         ----------
@@ -158,32 +169,32 @@ class Interpolator:
         raise NotImplementedError
 
     def exact_normals(self, normal_left: np.ndarray, normal_right: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Normals that the method stands for, in float64, as `interpolate` gives them.
+        """Normals of the method's curve in float64, as `interpolate` gives them.
 
         Parameters
         ----------
         normal_left, normal_right : arrays, shape (..., 3)
             Unit normals of the span of each pixel.
         t : array, shape (...)
-            Place of the pixel in its span, 0 to 1.
+            Position of the pixel in its span, 0 to 1.
         """
         return interpolate(self.CURVE, normal_left, normal_right, t)
 
 
 @dataclass(frozen=True)
 class NormalInterpolator(Interpolator):
-    """A method that finds normals; products with L and H follow.
+    """A method that finds normals; their products with L and H follow.
 
     Parameters
     ----------
     operand : str
-        ``"cosine"``: the specular unit is given N·H. ``"one_minus_cosine"``: it is given the chord
-        ``|N - H|^2 / 2`` of `Chord`, which feels the length of N only at second order.
+        ``"cosine"``: the operand of the specular unit is N·H. ``"one_minus_cosine"``: it is half the squared
+        chord, ``|N - H|^2 / 2`` of `Chord`, in which the length of N counts only at second order.
 
     Raises
     ------
     ValueError
-        If the operand is none of those.
+        If the operand is neither.
     """
 
     operand: Operand = "cosine"
@@ -199,7 +210,7 @@ class NormalInterpolator(Interpolator):
 
     @property
     def normal_error(self) -> float:
-        """Largest distance of a normal from the method's curve, which keeps inside the unit circle."""
+        """Largest distance of a normal from the method's curve, which stays inside the unit circle."""
         raise NotImplementedError
 
     @property
@@ -209,10 +220,10 @@ class NormalInterpolator(Interpolator):
 
     @property
     def highlight_excess(self):
-        """`normal_error` along H; of the chord, ``|N - H| <= 2``, twice that and its cut.
+        """`normal_error` towards H; of the chord, ``|N - H| <= 2``, twice that and its cut.
 
-        On a curve of length r, c away from H, half the squared chord is ``(1 - r)^2/2 + r (1 - c)``, which is
-        at least ``r (1 - c)``. The directions of N_l and H differ from their codes in length.
+        On a curve of length r, where c is the cosine to H, half the squared chord is ``(1 - r)^2/2 + r (1 -
+        c)``, which is at least ``r (1 - c)``. The lengths of the codes of N_l and H differ from 1.
         """
         if not self.uses_chord:
             return self.normal_error
@@ -226,12 +237,39 @@ class NormalInterpolator(Interpolator):
     def normals(
         self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
     ) -> tuple[Fixed, np.ndarray]:
-        """Bit-true normals of every pixel, shape (pixels, 3), SQ(1, 17), and which spans are too wide."""
+        """Bit-accurate normals of every pixel, and which spans are out of range.
+
+        Parameters
+        ----------
+        normal_left, normal_right, length
+            As for `compute`.
+
+        Returns
+        -------
+        normals : Fixed, shape (pixels, 3), SQ(1, 17)
+        out_of_range : bool array, shape (spans,)
+        """
         raise NotImplementedError
 
-    def compute(self, normal_left, normal_right, length, direction, halfway) -> Operands:
-        """Bit-true operands: exact products of the normals."""
-        normals, out_of_range = self.normals(normal_left, normal_right, length)
+    def products(self, normals: Fixed, direction: Fixed, halfway: Fixed) -> tuple[Fixed, Fixed]:
+        """N·L, exact, and N·H, exact, or half the squared chord, cut to 25 fraction bits.
+
+        Parameters
+        ----------
+        normals : Fixed, shape (pixels, 3), SQ(1, 17)
+            Normal of each pixel.
+        direction, halfway : Fixed, shape (lights, 3), SQ(1, 17)
+            L and H of each light.
+
+        Returns
+        -------
+        cosine, highlight : Fixed, shape (pixels, lights)
+        """
         normals = Fixed(COMPONENT, normals.codes[:, np.newaxis])
-        product = DotProduct().compute if self.operand == "cosine" else Chord().operand
-        return Operands(DotProduct().compute(normals, direction), product(normals, halfway), out_of_range)
+        product = Chord().operand if self.uses_chord else DotProduct().compute
+        return DotProduct().compute(normals, direction), product(normals, halfway)
+
+    def compute(self, normal_left, normal_right, length, direction, halfway) -> Operands:
+        """Bit-accurate operands: products of the normals."""
+        normals, out_of_range = self.normals(normal_left, normal_right, length)
+        return Operands(*self.products(normals, direction, halfway), out_of_range)

@@ -1,32 +1,36 @@
-"""Linear interpolation of normals, as it comes (``linear``) or brought to unit length (``renormalise``)."""
+"""Linear interpolation of normals, as it is (``linear``) or brought to unit length (``renormalise``)."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from blysk.golden.methods.interpolator import NormalInterpolator, pixels_of
+from blysk.golden.methods.interpolator import NormalInterpolator, difference_rounding
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
-from blysk.golden.normals.difference_setup import LENGTH_BITS, DifferenceSetup
+from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
-from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR
+from blysk.golden.number.spans import LENGTH_BITS, pixels_of
+from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT
 
-__all__ = ["LinearInterpolator"]
+__all__ = ["METHODS", "LinearInterpolator"]
 
 
 @dataclass(frozen=True)
 class LinearInterpolator(NormalInterpolator):
     """``(1-t) N_l + t N_r`` by a first difference; with ``renormalised``, divided by its length.
 
-    The first is what is left when a normal is not brought to unit length: too short by ``1 - cos(psi/2)`` in
-    the middle. The second is the rival without the documents, with the direct renormaliser at every pixel.
+    Without the division a normal is too short, by ``1 - cos(psi/2)`` in the middle of the span. With it, by
+    the direct renormaliser at every pixel, the method is the baseline with which the others are compared.
+
     ``N_r - N_l`` saturates at 1 in a component, over 60 degrees; such a span is flagged. With
-    ``renormalised``, so is one with a pixel of which the renormaliser says that it is too short or too long,
-    which passes as it is: of unit normals, those over 94 degrees with a pixel near the middle.
+    ``renormalised``, so is a span with a pixel of which the renormaliser says that it is too short or too
+    long, which passes as it is: of unit normals, those over 94 degrees with a pixel near the middle.
 
     Parameters
     ----------
+    operand : str
+        See `NormalInterpolator`.
     renormalised : bool
         Whether the normals are brought to unit length.
 
@@ -35,7 +39,7 @@ class LinearInterpolator(NormalInterpolator):
     ValueError
         If the operand is unknown.
 
-    Source: [T] 2.1; numbers.md, "Rivals to measure against".
+    Source: docs/theory/interpolation.md#spans, docs/theory/interpolation.md#renormaliser; [T] 2.1.
     """
 
     renormalised: bool = False
@@ -52,22 +56,27 @@ class LinearInterpolator(NormalInterpolator):
 
     @property
     def normal_error(self):
-        """That of the differences, with |P| <= 0.766; renormalised, of a length of 0.92, and of the rest."""
-        k = (1 << LENGTH_BITS) - 2
+        """Error of the differences, ``|P| <= 0.766``; renormalised: at a length of 0.92, and of that unit."""
         chord = 2 * np.sin(np.radians(self.gate_angle / 2)) + 4 * CODE_LENGTH_ERROR
-        error = 2.0**-17 * chord + np.sqrt(3) * (2.0**-42 * (k + k * k / 2) + 2.0**-18)
+        error = COMPONENT.step * chord + difference_rounding((1 << LENGTH_BITS) - 2)
         if self.renormalised:
             return float(error / 0.92 + Renormaliser.ERROR + 2 * CODE_LENGTH_ERROR)
         return float(error)
 
     @property
     def shortest_length(self):
-        """In the middle of the widest span."""
+        """In the middle of a span of the largest angle."""
         middle = float(np.cos(np.radians(self.gate_angle / 2))) - CODE_LENGTH_ERROR
         return 1.0 if self.renormalised else middle
 
+    def operand_error(self, length, degrees):
+        """`difference_rounding`; P times 2^-17 for ``1/(m-1)``; error of the renormaliser."""
+        half = np.radians(degrees) / 2
+        error = difference_rounding(length) + COMPONENT.step * (2 * np.sin(half) + COMPONENT.step)
+        return float(error / np.cos(half) + Renormaliser.ERROR if self.renormalised else error)
+
     def normals(self, normal_left, normal_right, length):
-        """Bit-true normals."""
+        """Bit-accurate normals."""
         difference = normal_right - normal_left
         p = difference.saturate(GPQ.P_FORMAT)
         out_of_range = np.any(p.codes != difference.codes, axis=-1)
@@ -79,3 +88,7 @@ class LinearInterpolator(NormalInterpolator):
             normals, outside = Renormaliser().compute(normals)
             out_of_range[span[outside]] = True
         return normals, out_of_range
+
+
+METHODS = (LinearInterpolator(), LinearInterpolator(renormalised=True))
+"""Its methods."""

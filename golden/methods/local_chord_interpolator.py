@@ -6,22 +6,24 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
+from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
-from blysk.golden.methods.interpolator import Interpolator, Operands, pixels_of
+from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE_SQUARED
 
-__all__ = ["LocalChordInterpolator", "SpanValues"]
+__all__ = ["METHODS", "LocalChordInterpolator", "SpanValues"]
 
 
 class SpanValues(NamedTuple):
-    """What a span carries of each light: values at its first pixel centre, its middle and its last.
+    """Values of each light that a span carries: at its first pixel centre, its middle and its last.
 
     Parameters
     ----------
     diffuse, highlight : int64 arrays, shape (spans, lights, 3)
         Codes of N·L and of ``u = |N - H|^2 / 2`` in the formats of `LocalChordSetup`, in units of
-        `ONE_SQUARED`, as all devices have them.
+        `ONE_SQUARED`, as in all units.
     """
 
     diffuse: np.ndarray
@@ -52,43 +54,43 @@ class SpanValues(NamedTuple):
 class LocalChordInterpolator(Interpolator):
     """``N . L`` and ``u = |N - H|^2 / 2`` of each pixel by two additions each, L and H of the pixel's own.
 
-    `LocalChordSetup` takes the quadratics through three values of each that come
-    with the span, worked out where positions are known; the sums and the formats of the pixels are those of
-    `ChordInterpolator`.
+    A span carries three values of each, computed where positions are known. `LocalChordSetup` takes the
+    quadratics through them; the sums and the formats of the pixels are those of `ChordInterpolator`.
 
-    The quadratic is as good as the span is short. Spans should be cut until
+    The quadratic is good for short spans only. Spans should be cut until
 
-    - N, V and each light's L turn by at most `LARGEST_TURN` degrees, and ``|dV| + |dL|`` from end to end is
-      at most `LARGEST_MOVE` of ``|L + V|``: where L is nearly -V, H turns fast;
+    - N, V and each light's L change by at most `MAX_VECTOR_ANGLE` degrees from end to end, and ``|dV| +
+      |dL|`` is at most `MAX_HALFWAY_CHANGE` of ``|L + V|``: where L is nearly -V, H changes fast;
     - the quadratics are as near to the values at t = 1/4 and 3/4 as `highlight_tolerance` and
-      `diffuse_tolerance` allow: `MARGIN` of the distance, for what lies between, and the bounds of the
-      arithmetic.
+      `diffuse_tolerance` allow, less the bounds of the arithmetic; an error there counts `MARGIN` times, for
+      the positions between. That factor is found by search: the largest distance at any t was 1.31 times that
+      at 1/4 and 3/4.
 
     Fit and arithmetic then are within 0.4 LSB of exactly normalised interpolation in the specular term and
-    0.12 in the diffuse one, at full reflection. The margin is found by search: the largest distance at any t
-    was 1.31 times that at 1/4 and 3/4.
+    0.12 in the diffuse one, at full reflection.
 
     Where N·L changes its sign the highlight ends, however bright it is. A pixel whose N·L is within the error
-    of 0 has it or has it not; a span with such pixels, where `is_lit`, should be cut further.
+    of 0 may have it or not; a span with such pixels, where `is_lit`, should be cut further.
 
-    Source: chord.md.
+    Source: docs/theory/chord.md#local-lights.
     """
 
     operand: ClassVar = "one_minus_cosine"
     COSINE_FORMAT = ChordInterpolator.COSINE_FORMAT
     CURVE = "quadratic"
+    TAKES_VALUES = True
     HIGHLIGHT_BUDGET: ClassVar[float] = 0.4
     DIFFUSE_BUDGET: ClassVar[float] = 0.12
-    LARGEST_TURN: ClassVar[float] = 30.0
-    LARGEST_MOVE: ClassVar[float] = 0.5
+    MAX_VECTOR_ANGLE: ClassVar[float] = 30.0
+    MAX_HALFWAY_CHANGE: ClassVar[float] = 0.5
     MARGIN: ClassVar[float] = 4 / 3
 
     def compute(self, normal_left, normal_right, length, direction, halfway):
-        """Refused: the normals of a span do not tell where it is."""
+        """Refused: the normals of a span do not give its position."""
         raise ValueError("the local chord method takes values of its spans, not normals; see compute_values")
 
     def compute_values(self, values: SpanValues, length: np.ndarray) -> Operands:
-        """Bit-true operands of every pixel, in the order of the spans.
+        """Bit-accurate operands of every pixel, in the order of the spans.
 
         Parameters
         ----------
@@ -107,15 +109,15 @@ class LocalChordInterpolator(Interpolator):
             Fixed(LocalChordSetup.HIGHLIGHT_FORMAT, values.highlight),
             length,
         )
-        place, accumulators = pixels_of(length), ChordInterpolator().accumulators
+        pixels, accumulators = pixels_of(length), ChordInterpolator().accumulators
         return Operands(
-            accumulators["diffuse"].compute(*diffuse, *place),
-            accumulators["highlight"].compute(*highlight, *place),
+            accumulators["diffuse"].compute(*diffuse, *pixels),
+            accumulators["highlight"].compute(*highlight, *pixels),
             out_of_range,
         )
 
     def exact_operands(self, values: SpanValues, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the method stands for: the quadratics through the values, in float64, in units of 1.
+        """The quadratics through the values in float64, in units of 1.
 
         Parameters
         ----------
@@ -134,42 +136,42 @@ class LocalChordInterpolator(Interpolator):
         results = []
         for codes, format in zip(values, formats, strict=True):
             left, middle, right = np.moveaxis(codes * (format.step / float(ONE_SQUARED.values)), 2, 0)
-            bend = 2 * (left + right - 2 * middle)
-            slope = right - left - bend
-            results.append(left[span] + t * (slope[span] + t * bend[span]))
+            square = 2 * (left + right - 2 * middle)
+            slope = right - left - square
+            results.append(left[span] + t * (slope[span] + t * square[span]))
         return tuple(results)
 
     def highlight_tolerance(self, exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """How far u may be off for `HIGHLIGHT_BUDGET`, where it is at least u.
+        """Largest error of u that keeps `HIGHLIGHT_BUDGET`, where no smaller u occurs.
 
-        A term changes by about n a unit of u at the peak, and by less further off: the cosine-quadratic one
-        by ``n (1 - n u/2)``, Blinn's power by ``n (1 - u)^(n-1)``. With ``x = (n - 1) u`` neither changes by
-        more than ``n / (1 + x/2 + x^2/4 + x^3/8)``, nor do the pipeline's others by more than 1.25 of it,
-        for n = 1 by 1.6.
+        The derivative of a term to u is about n at the peak, and smaller farther off: ``n (1 - n u/2)`` of
+        the cosine-quadratic one, ``n (1 - u)^(n-1)`` of Blinn's power. With ``x = (n - 1) u`` neither is more
+        than ``n / (1 + x/2 + x^2/4 + x^3/8)``, and those of the pipeline's other models not more than 1.25 of
+        it, for n = 1 1.6.
 
         Parameters
         ----------
         exponent : int array
             n, 1 to 1000.
         u : array
-            At least 0.
+            Least value of u, at least 0.
         """
         x = (np.asarray(exponent) - 1) * u / 2
         return self.HIGHLIGHT_BUDGET / (255 * np.asarray(exponent)) * (1 + x * (1 + x * (1 + x)))
 
     @staticmethod
     def is_lit(exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Whether a highlight may be over a quarter of an LSB where u is at least so much.
+        """Whether a highlight may be over a quarter of an LSB, where no smaller u occurs.
 
         Blinn's power, at most ``e^-x`` with ``x = (n - 1) u``, is not from ``x = 7`` on; the others reach 0
-        earlier, or fall as fast.
+        earlier, or decrease as fast.
 
         Parameters
         ----------
         exponent : int array
             n, 1 to 1000.
         u : array
-            At least 0.
+            Least value of u, at least 0.
         """
         return (np.asarray(exponent) - 1) * u < 7
 
@@ -185,5 +187,14 @@ class LocalChordInterpolator(Interpolator):
 
     @property
     def diffuse_tolerance(self) -> float:
-        """How far N·L may be off for `DIFFUSE_BUDGET`."""
+        """Largest error of N·L that keeps `DIFFUSE_BUDGET`."""
         return self.DIFFUSE_BUDGET / 255
+
+    def operand_error(self, length, degrees):
+        """That of the setup, for slopes up to 1/2 and squares up to 1/8, and the cut of the results."""
+        errors = (f(0.5, 0.125) for f in (LocalChordSetup.highlight_error, LocalChordSetup.diffuse_error))
+        return float(max(errors)) + Specular.ARGUMENT_FORMAT.step
+
+
+METHODS = (LocalChordInterpolator(),)
+"""Its method."""

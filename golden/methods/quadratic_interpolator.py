@@ -5,14 +5,15 @@ from typing import Literal
 
 import numpy as np
 
-from blysk.golden.methods.interpolator import NormalInterpolator, pixels_of
+from blysk.golden.methods.interpolator import NormalInterpolator, difference_rounding
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
+from blysk.golden.number.spans import LENGTH_BITS, pixels_of
 
-__all__ = ["QuadraticInterpolator"]
+__all__ = ["METHODS", "PUBLISHED", "QuadraticInterpolator"]
 
 
 @dataclass(frozen=True)
@@ -21,29 +22,33 @@ class QuadraticInterpolator(NormalInterpolator):
 
     Middle normal, G/P/Q, and then by ``form``: forward differences (setup and accumulator, figures 2.11 and
     2.10), or the evaluator of figure 2.9 a (``direct``) or b (``horner``). Formats and error bounds are those
-    of the devices; nothing is rounded in between.
+    of the units; nothing is rounded in between.
+
+    Ends must be of unit length to 1/256; longer ones may saturate without a flag.
 
     Parameters
     ----------
+    operand : str
+        See `NormalInterpolator`.
     form : str
         ``"differences"``, ``"direct"`` or ``"horner"``.
     middle_normal : MiddleNormal
-        The unit that finds it.
+        Model of the middle normal unit.
 
     Raises
     ------
     ValueError
         If the form or the operand is unknown.
 
-    Ends must be of unit length to 1/256; longer ones may saturate without a flag.
-
-    Source: [T] 2.2, 2.3, figures 2.8 to 2.11.
+    Source: docs/theory/interpolation.md#quadratic-normals; [T] 2.2, 2.3, figures 2.8 to 2.11.
     """
 
     form: Literal["differences", "direct", "horner"] = "differences"
     middle_normal: MiddleNormal = field(default_factory=MiddleNormal)
 
     CURVE = "quadratic"
+    LARGEST_G = 0.305
+    LARGEST_P = 0.83
 
     def __post_init__(self):
         super().__post_init__()
@@ -67,24 +72,36 @@ class QuadraticInterpolator(NormalInterpolator):
         """Errors of the middle normal, of the form that evaluates the curve, and of the last rounding.
 
         For differences: ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|`` for the reciprocal of the length, with
-        |P| <= 0.83 and |G| <= 0.305; ``sqrt(3) 2^-42 (k + k^2/2)`` for the rounding of the differences at
-        pixel k, to 4094; ``sqrt(3) 2^-18``. 4.4 steps of 2^-17 in all with the default middle normal.
+        |P| <= 0.83 and |G| <= 0.305, and `difference_rounding` at pixel 4094. 4.4 steps of 2^-17 in all with
+        the default middle normal.
         """
         middle = np.sqrt(3) * self.middle_normal.error
         if self.form != "differences":
             return float(middle + np.sqrt(3) * QuadraticEvaluator(self.form).error)
         # G and P have four times the middle normal.
-        k, p, g = 4094, 0.83 + 4 * middle, 0.305 + 4 * middle
-        reciprocal = 2.0**-17 * p + (2.0**-16 + 2.0**-17 + 2.0**-34) * g
-        return float(middle + reciprocal + np.sqrt(3) * (2.0**-42 * (k + k * k / 2) + 2.0**-18))
+        p, g = self.LARGEST_P + 4 * middle, self.LARGEST_G + 4 * middle
+        return float(middle + self._reciprocal_error(p, g) + difference_rounding((1 << LENGTH_BITS) - 2))
+
+    @staticmethod
+    def _reciprocal_error(p: float, g: float) -> float:
+        """Error from that of ``1/(m-1)``, with P and G of such lengths."""
+        return 2.0**-17 * p + (2.0**-16 + 2.0**-17 + 2.0**-34) * g
 
     @property
     def shortest_length(self):
         """``1 - (1-c)^2 s^2 (1 - s^2)`` squared, ``c = cos(psi/2)``: least at ``s^2 = 1/2``."""
         return float(np.sqrt(1 - (1 - np.cos(np.radians(self.gate_angle / 2))) ** 2 / 4))
 
+    def operand_error(self, length, degrees):
+        """As `normal_error`, at the last pixel of the span."""
+        middle = np.sqrt(3) * self.middle_normal.error
+        if self.form != "differences":
+            return float(middle + np.sqrt(3) * QuadraticEvaluator(self.form).error)
+        reciprocal = self._reciprocal_error(self.LARGEST_P, self.LARGEST_G)
+        return float(middle + reciprocal + difference_rounding(length))
+
     def normals(self, normal_left, normal_right, length):
-        """Bit-true normals."""
+        """Bit-accurate normals."""
         middle, out_of_range = self.middle_normal.compute(normal_left, normal_right)
         g, p, q = GPQ().compute(normal_left, middle, normal_right)
         span, step = pixels_of(length)
@@ -92,3 +109,14 @@ class QuadraticInterpolator(NormalInterpolator):
             first, second = DifferenceSetup().compute(g, p, length)
             return DifferenceAccumulator().compute(q, first, second, span, step), out_of_range
         return QuadraticEvaluator(self.form).compute(g, p, q, length, span, step), out_of_range
+
+
+METHODS = (
+    QuadraticInterpolator(),
+    QuadraticInterpolator(form="direct"),
+    QuadraticInterpolator(form="horner"),
+)
+"""Its methods."""
+
+PUBLISHED = (QuadraticInterpolator(middle_normal=MiddleNormal("as_published")),)
+"""The polynomial of [T] 2.2."""

@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.normals.bisection import Bisection
-from blysk.golden.normals.difference_setup import DifferenceSetup, checked_lengths, reciprocal_place
 from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.number.reciprocal import reciprocal_address, reciprocal_table
+from blysk.golden.number.spans import LENGTH_BITS, checked_lengths, pixels_of
 from blysk.golden.number.unit_vector import COMPONENT
 
 __all__ = ["AdaptiveNormaliser"]
@@ -51,7 +51,7 @@ class AdaptiveNormaliser:
     q + q^2          SQ(2, 20)  a threshold of 2^-14 has 6 bits
     E_j              SQ(1, 17)  the bisection's results
     E_(j+1) - E_j    SQ(1, 17)  operand; saturates, which a threshold up to 1/8 keeps from happening
-    1/(m - 1)        UQ(0, 17)  table, with the shift of `DifferenceSetup`
+    1/(m - 1)        UQ(0, 17)  table, with the shift of `reciprocal_address`
     phi              UQ(0, 17)  operand; cut
     N                SQ(2, 32)  cut; half a step of the result is added at the start; never wraps
     step             SQ(1, 32)  cut: 2^-32 a pixel, 9.5e-7 after 4095
@@ -91,7 +91,7 @@ class AdaptiveNormaliser:
     ACCUMULATOR_FORMAT = SQ(2, 32)
     STEP_FORMAT = SQ(1, 32)
     RESULT_FORMAT = COMPONENT
-    LENGTH_BITS = DifferenceSetup.LENGTH_BITS
+    LENGTH_BITS = LENGTH_BITS
 
     def __post_init__(self):
         if not 2.0**-14 <= self.threshold <= 1 / 8:
@@ -260,5 +260,5 @@ class AdaptiveNormaliser:
 
     def reciprocal(self, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Code of the table and shift s of ``1/steps = 2 reciprocal 2^-s``, for 1 to 4094 steps."""
-        address, shift = reciprocal_place(steps)
-        return DifferenceSetup().reciprocals.codes[address], shift
+        address, shift = reciprocal_address(steps)
+        return reciprocal_table().codes[address], shift

@@ -1,68 +1,16 @@
 """First values of the forward differences of a quadratic normal curve ([T] figure 2.11)."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from blysk.golden.normals.gpq import GPQ
-from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
+from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.number.reciprocal import step_words
+from blysk.golden.number.spans import checked_lengths
 from blysk.golden.number.unit_vector import COMPONENT
 
-__all__ = ["LENGTH_BITS", "DifferenceSetup", "reciprocal_place", "reciprocal_table"]
-
-LENGTH_BITS = 12
-"""Bits of a span's length."""
-
-
-def checked_lengths(length: np.ndarray, least: int = 1) -> np.ndarray:
-    """Lengths of spans as int64.
-
-    Parameters
-    ----------
-    length : int array
-        Pixels of each span.
-    least : int
-        Least length that a device takes.
-
-    Raises
-    ------
-    ValueError
-        If one is out of range.
-    """
-    length = np.asarray(length, dtype=np.int64)
-    if length.size and not least <= length.min() <= length.max() < 1 << LENGTH_BITS:
-        raise ValueError(f"lengths must be {least} to {(1 << LENGTH_BITS) - 1}")
-    return length
-
-
-def reciprocal_table(format: Format) -> Fixed:
-    """``1/(1 + k/2048)`` at address k, rounded half up, and 1/2 at address 0, as no format here holds 1."""
-    size = 1 << (LENGTH_BITS - 1)
-    values = 1 / (1 + np.arange(size) / size)
-    values[0] = 0.5
-    return Fixed.round(format, values)
-
-
-def reciprocal_place(steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Address in the reciprocal table, and the shift s of ``1/steps = 2 reciprocal 2^-s``.
-
-    Parameters
-    ----------
-    steps : int64 array
-        0 to 4094; 0 counts as 1.
-
-    Returns
-    -------
-    address, shift : int64 arrays
-        0 to 2047, and 0 to 12.
-    """
-    top = LENGTH_BITS - 1
-    position = np.zeros_like(steps)
-    for bit in range(1, LENGTH_BITS):
-        position[steps >> bit > 0] = bit
-    address = (steps << (top - position)) & ((1 << top) - 1)
-    return address, position + (address > 0)
+__all__ = ["DifferenceSetup"]
 
 
 @dataclass(frozen=True)
@@ -106,15 +54,8 @@ class DifferenceSetup:
 
     as_published: bool = False
 
-    RECIPROCAL_FORMAT = UQ(0, 17)
     SLOPE_FORMAT = SQ(0, 18)
     FORMAT = SQ(2, 42)
-    LENGTH_BITS = LENGTH_BITS
-
-    @cached_property
-    def reciprocals(self) -> Fixed:
-        """The table: ``1/(1 + k/2048)`` at address k; 1/2 at address 0."""
-        return reciprocal_table(self.RECIPROCAL_FORMAT)
 
     def compute(self, g: Fixed, p: Fixed, length: np.ndarray) -> tuple[Fixed, Fixed]:
         """Bit-true first and second difference.
@@ -141,7 +82,7 @@ class DifferenceSetup:
             raise ValueError(
                 f"operands must be {GPQ.G_FORMAT} and {GPQ.P_FORMAT}, not {g.format}, {p.format}"
             )
-        reciprocal, shift, square, square_shift = self.steps(length)
+        reciprocal, shift, square, square_shift = step_words(length)
         if self.as_published:
             bend = g.extend(COMPONENT) * Fixed(reciprocal.format, reciprocal.codes[:, np.newaxis])
             bend = bend.round_half_up(18).wrap(self.SLOPE_FORMAT)
@@ -158,30 +99,6 @@ class DifferenceSetup:
             (first_order + second_order).wrap(self.FORMAT),
             second_order.scale(1).extend(SQ(3, 42)).wrap(self.FORMAT),
         )
-
-    def steps(self, length: np.ndarray) -> tuple[Fixed, np.ndarray, Fixed, np.ndarray]:
-        """Bit-true ``dt = 2 reciprocal 2^-shift`` and ``dt^2 = 4 square 2^-square_shift``.
-
-        Parameters
-        ----------
-        length : int64 array, any shape
-            Pixels, 1 to 4095.
-
-        Returns
-        -------
-        reciprocal : Fixed, same shape, UQ(0, 17)
-        shift : int64 array, same shape
-            0 to 12.
-        square : Fixed, same shape, UQ(0, 17)
-        square_shift : int64 array, same shape
-            0 to 25.
-        """
-        address, shift = reciprocal_place(length - 1)
-        reciprocal = self.reciprocals[address]
-        square = reciprocal * reciprocal
-        small = square < Fixed(UQ(0, 1), 1)
-        square = Fixed(square.format, square.codes << small).round_half_up(17)
-        return reciprocal, shift, square.saturate(self.RECIPROCAL_FORMAT), 2 * shift + small
 
     def _shifted(self, operand: Fixed, factor: Fixed, shift: np.ndarray) -> Fixed:
         """``4 * operand * factor * 2**-shift``, rounded half up to 42 fraction bits."""

@@ -1,14 +1,14 @@
 """Quadratic evaluators: the normals of a span by multiplication ([T] figures 2.9 a and b)."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from blysk.golden.normals.difference_setup import checked_lengths, reciprocal_place, reciprocal_table
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.reciprocal import reciprocal_address, reciprocal_table
+from blysk.golden.number.spans import checked_lengths
 from blysk.golden.number.unit_vector import COMPONENT
 
 __all__ = ["QUADRATIC_FORMS", "QuadraticEvaluator"]
@@ -79,11 +79,6 @@ class QuadraticEvaluator:
         """Bound of the error of a component against the exact polynomial, to 45 degrees."""
         return 2.0**-18 * (2 * 0.83 + (0.305 if self.form == "direct" else 1.0) + 1)
 
-    @cached_property
-    def reciprocals(self) -> Fixed:
-        """The table: ``1/(1 + k/2048)`` at address k; 1/2 at address 0."""
-        return reciprocal_table(self.RECIPROCAL_FORMAT)
-
     def step(self, length: np.ndarray) -> Fixed:
         """Bit-true ``dt = 1/(m - 1)``; 1 for a span of one pixel, which has no dt and reads none.
 
@@ -102,8 +97,8 @@ class QuadraticEvaluator:
             If a length is out of range.
         """
         length = checked_lengths(length)
-        address, shift = reciprocal_place(length - 1)
-        scaled = self.reciprocals[address].scale(1).extend(self.STEP_FORMAT)
+        address, shift = reciprocal_address(length - 1)
+        scaled = reciprocal_table(self.RECIPROCAL_FORMAT)[address].scale(1).extend(self.STEP_FORMAT)
         return Fixed(self.STEP_FORMAT, scaled.codes >> shift)
 
     def parameter(self, step: Fixed, index: np.ndarray) -> Fixed:

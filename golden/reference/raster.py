@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blysk.golden.methods.interpolator import runs_of
+from blysk.golden.number.spans import runs_of
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.scene import Scene
 

@@ -7,15 +7,15 @@ from amaranth.lib import data
 
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.cosines.arccos import Arccos, HalfChord
-from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.number.fixed import SQ, UQ
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.dataflow import Dataflow, Word, checked_interval, dot, shared_sums
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.reciprocal import reciprocal_words
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.cosines.arccos import ArccosUnit, half_chord_words, normalised_words
-from blysk.hdl.normals.difference_setup import reciprocal_words
-from blysk.hdl.normals.middle_normal import normal_shape
 
 __all__ = ["AngularSetupUnit"]
 
@@ -79,7 +79,7 @@ class AngularSetupUnit(PipelinedUnit):
                     "normal_left": normal_shape(),
                     "normal_right": normal_shape(),
                     "vector": normal_shape(),
-                    "length": unsigned(DifferenceSetup.LENGTH_BITS),
+                    "length": unsigned(LENGTH_BITS),
                 }
             ),
             data.StructLayout(
@@ -88,7 +88,7 @@ class AngularSetupUnit(PipelinedUnit):
                     "phase": FixedShape(AngularSetup.PHASE_FORMAT),
                     "step": FixedShape(AngularSetup.STEP_FORMAT),
                     "cos_beta": FixedShape(AngularSetup.COS_BETA_FORMAT),
-                    "length": unsigned(DifferenceSetup.LENGTH_BITS),
+                    "length": unsigned(LENGTH_BITS),
                     "out_of_range": unsigned(1),
                 }
             ),

@@ -10,8 +10,8 @@ from blysk.golden.number.fixed import SQ
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.dataflow import Dataflow, Word, dot
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
-from blysk.hdl.normals.middle_normal import normal_shape
 
 __all__ = ["ChordUnit", "chord"]
 

@@ -6,15 +6,15 @@ from amaranth.hdl import Cat, Const, Signal, Value, unsigned
 from amaranth.lib import data
 
 from blysk.golden.cosines.chord_setup import ChordSetup
-from blysk.golden.normals.difference_setup import LENGTH_BITS
 from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit, Word, dot, shared_sums
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.reciprocal import checked_length_bits, reciprocal_words, square_words
+from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.cosines.chord import chord
-from blysk.hdl.methods.interpolator import light_vectors_shape, span_normals_shape
-from blysk.hdl.normals.difference_setup import checked_length_bits, reciprocal_words, square_words
 
 __all__ = [
     "ChordDifferencesUnit",

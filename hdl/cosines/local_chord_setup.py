@@ -5,10 +5,11 @@ from amaranth.lib import data
 
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
-from blysk.golden.normals.difference_setup import LENGTH_BITS
 from blysk.golden.number.fixed import Format
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.dataflow import Dataflow, Word
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.reciprocal import checked_length_bits
 from blysk.hdl.cosines.chord_setup import (
     ChordDifferencesUnit,
     chord_differences_shape,
@@ -16,7 +17,6 @@ from blysk.hdl.cosines.chord_setup import (
     shared_shifters,
     step_words,
 )
-from blysk.hdl.normals.difference_setup import checked_length_bits
 
 __all__ = ["LocalChordSetupUnit", "span_values_shape"]
 

@@ -4,13 +4,13 @@ from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
 from amaranth.lib import data
 
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
-from blysk.golden.normals.difference_setup import LENGTH_BITS
 from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.dataflow import Dataflow, Word
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.cosines.chord import chord, dot
-from blysk.hdl.methods.interpolator import light_vectors_shape, span_normals_shape
 
 __all__ = ["RecurrenceSetupUnit", "recurrence_starts_shape"]
 

@@ -3,9 +3,9 @@
 from amaranth.lib import stream
 
 from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit, span_words
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
-from blysk.hdl.normals.middle_normal import normal_shape
 
 __all__ = ["BisectionInterpolatorUnit"]
 

@@ -1,40 +1,25 @@
 """Interpolators: from spans to what shading needs at every pixel, whatever the method."""
 
-from amaranth.hdl import Module, Signal, Value, unsigned
+from amaranth.hdl import Module, Signal, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
-from blysk.golden.normals.difference_setup import LENGTH_BITS
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.dataflow import Dataflow, dot
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.shapes import light_vectors_shape, normal_shape, span_normals_shape
 from blysk.hdl.core.stream import PipelinedUnit, connect
 from blysk.hdl.cosines.chord import chord
-from blysk.hdl.normals.middle_normal import normal_shape
 
 __all__ = [
     "InterpolatorUnit",
     "LightProductsUnit",
     "NormalInterpolatorUnit",
-    "light_vectors_shape",
     "operands_shape",
-    "span_normals_shape",
     "span_words",
 ]
-
-
-def light_vectors_shape(lights: int) -> data.ArrayLayout:
-    """Shape of the vectors of each light: direction L and half-way vector H."""
-    vectors = data.StructLayout({"direction": normal_shape(), "halfway": normal_shape()})
-    return data.ArrayLayout(vectors, lights)
-
-
-def span_normals_shape(length_bits: int = LENGTH_BITS) -> data.StructLayout:
-    """Shape of what an interpolator needs of a span: the normals at its ends, and its length in pixels."""
-    return data.StructLayout(
-        {"normal_left": normal_shape(), "normal_right": normal_shape(), "length": unsigned(length_bits)}
-    )
 
 
 def span_words(span: data.View) -> list[tuple[str, Value]]:

@@ -5,11 +5,11 @@ from amaranth.lib import fifo, stream
 
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.normals.gpq import GPQ
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import SLICE_LATENCY, connect, connect_slice, skid_buffer
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
 from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
-from blysk.hdl.normals.middle_normal import normal_shape
 from blysk.hdl.normals.renormaliser import RenormaliserUnit
 
 __all__ = ["LinearInterpolatorUnit"]

@@ -5,7 +5,7 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
-from blysk.golden.normals.difference_setup import LENGTH_BITS
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import SLICE_LATENCY, connect, connect_slice
 from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit, span_values_shape
 from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit

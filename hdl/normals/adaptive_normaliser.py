@@ -7,13 +7,14 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
-from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.number.fixed import SQ
+from blysk.golden.number.reciprocal import RECIPROCAL_FORMAT
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.reciprocal import reciprocal_codes
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import count_down, skid_buffer
 from blysk.hdl.normals.bisection import BisectionUnit
-from blysk.hdl.normals.middle_normal import normal_shape
 
 __all__ = ["AdaptiveNormaliserUnit"]
 
@@ -138,16 +139,15 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 m.d.sync += [position.eq(bit), below_top.eq(bits - 1 - bit)]
         address = Signal(bits - 1)
         m.d.sync += address.eq((steps << below_top)[: bits - 1])
-        setup = DifferenceSetup()
         m.submodules.reciprocals = table = Memory(
-            shape=setup.RECIPROCAL_FORMAT.width, depth=1 << (bits - 1), init=setup.reciprocals.codes.tolist()
+            shape=RECIPROCAL_FORMAT.width, depth=1 << (bits - 1), init=reciprocal_codes(bits)
         )
         table_port = table.read_port()
         m.d.comb += table_port.addr.eq(address)
         reciprocal = Signal(FixedShape(COMPONENT))
         shift = Signal(range(bits + 1))
         m.d.sync += [
-            reciprocal.eq(FixedValue(setup.RECIPROCAL_FORMAT, table_port.data)),
+            reciprocal.eq(FixedValue(RECIPROCAL_FORMAT, table_port.data)),
             shift.eq(position + address.any()),
         ]
 

@@ -7,9 +7,9 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.normals.bisection_chain import BisectionChain
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.normals.bisection import coefficient
 from blysk.hdl.normals.dot_product import DotProductUnit
-from blysk.hdl.normals.middle_normal import normal_shape
 
 __all__ = ["BisectionChainUnit"]
 

@@ -8,9 +8,9 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import count_down, skid_buffer
 from blysk.hdl.normals.difference_setup import difference_shape
-from blysk.hdl.normals.middle_normal import normal_shape
 
 __all__ = ["AccumulatorUnit", "DifferenceAccumulatorUnit"]
 

@@ -3,120 +3,22 @@
 from collections.abc import Sequence
 from typing import Literal
 
-from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
+from amaranth.hdl import Cat, Const, Signal, Value, unsigned
 from amaranth.lib import data
 
-from blysk.golden.normals.difference_setup import LENGTH_BITS, DifferenceSetup
+from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.gpq import GPQ
-from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.fixed import SQ
+from blysk.golden.number.reciprocal import RECIPROCAL_FORMAT
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.dataflow import MULTIPLIER_LATENCY, Dataflow, Word, checked_interval, registered_product
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.reciprocal import checked_length_bits, reciprocal_words, square_words
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
-from blysk.hdl.normals.middle_normal import normal_shape
 
-__all__ = [
-    "DifferenceSetupUnit",
-    "checked_length_bits",
-    "difference_shape",
-    "reciprocal_words",
-    "square_words",
-]
-
-
-def checked_length_bits(length_bits: int) -> int:
-    """Bits of the lengths that a unit takes.
-
-    Raises
-    ------
-    ValueError
-        If they are not 2 to 12.
-    """
-    if length_bits not in range(2, LENGTH_BITS + 1):
-        raise ValueError(f"length_bits must be 2 to {LENGTH_BITS}, not {length_bits!r}")
-    return length_bits
-
-
-def reciprocal_words(
-    graph: Dataflow,
-    length: Word,
-    table: Fixed | None = None,
-    length_bits: int = LENGTH_BITS,
-    since: int = 0,
-) -> tuple[Word, Word]:
-    """``dt = 1/(m - 1) = 2 reciprocal 2^-shift``, as `reciprocal_place` finds it.
-
-    Five cycles: m - 1, its leading one, the address, the table, a register. With fewer bits of the length the
-    table has ``2^(length_bits - 1)`` words, those that shorter spans read of the whole.
-
-    Parameters
-    ----------
-    graph : Dataflow
-        Graph that gets the words.
-    length : Word
-        m, 1 to ``2^length_bits - 1``; 1 counts as 2.
-    table : Fixed or None
-        Table of `reciprocal_table`; ``None``: that of `DifferenceSetup`.
-    length_bits : int
-        Bits of the length, 2 to 12.
-    since : int
-        Age at which m - 1 stands at the earliest.
-
-    Returns
-    -------
-    reciprocal, shift : Word
-        In the table's format; 0 to ``length_bits``.
-    """
-    table = DifferenceSetup().reciprocals if table is None else table
-    top = length_bits - 1
-
-    def leading(steps):
-        # Of a span of one pixel there is none.
-        place, below_top = Const(0, range(length_bits)), Const(top, range(length_bits))
-        for bit in range(length_bits):
-            place = Mux(steps[bit], Const(bit, range(length_bits)), place)
-            below_top = Mux(steps[bit], Const(top - bit, range(length_bits)), below_top)
-        return Cat(place, below_top)
-
-    half = len(Const(0, range(length_bits)))
-    steps = graph.register("steps", lambda length: (length - 1)[:length_bits], length, since=since)
-    places = graph.register("places", leading, steps)
-    address = graph.register("address", lambda steps, both: (steps << both[half:])[:top], steps, places)
-    codes = table.codes[:: len(table.codes) >> top].tolist()
-    word = graph.look_up("reciprocals", codes, table.format.width, address)
-    reciprocal = graph.register("reciprocal", lambda word: FixedValue(table.format, word), word)
-    shift = graph.register("shift", lambda both, address: both[:half] + address.any(), places, address)
-    return reciprocal, shift
-
-
-def square_words(graph: Dataflow, product: Word, shift: Word) -> tuple[Word, Word]:
-    """``dt^2 = 4 square 2^-square_shift``: two cycles.
-
-    Parameters
-    ----------
-    graph : Dataflow
-        Graph that gets the words.
-    product : Word
-        Exact square of the reciprocal of `DifferenceSetup`.
-    shift : Word
-        Its shift.
-
-    Returns
-    -------
-    square, square_shift : Word
-        ``UQ(0, 17)``; 0 to 25.
-    """
-    exact = UQ(0, 34)
-
-    def normalised(product):
-        code = Value.cast(product)[: exact.width]
-        code = Mux(code[-1], code, Cat(Const(0, 1), code[:-1]))
-        return FixedValue(exact, code).round_half_up(17)
-
-    small = graph.register("square_small", lambda product: ~Value.cast(product)[exact.width - 1], product)
-    rounded = graph.register("square_rounded", normalised, product)
-    square = graph.register("square", lambda x: x.saturate(DifferenceSetup.RECIPROCAL_FORMAT), rounded)
-    return square, graph.register("square_shift", lambda small, shift: Cat(small, shift), small, shift)
+__all__ = ["DifferenceSetupUnit", "difference_shape"]
 
 
 def difference_shape() -> data.StructLayout:
@@ -206,7 +108,7 @@ class DifferenceSetupUnit(PipelinedUnit):
         uses = longest if order == 2 else 3
         interval = checked_interval(initiation_interval, longest, uses)
         self._graph = Dataflow(interval)
-        shapes = FixedShape(DifferenceSetup.RECIPROCAL_FORMAT), FixedShape(COMPONENT), unsigned(5)
+        shapes = FixedShape(RECIPROCAL_FORMAT), FixedShape(COMPONENT), unsigned(5)
         self._multiplier = self._graph.share("multiplier", uses, shapes, MULTIPLIER_LATENCY + 3, _multiply)
         self._words = self._describe()
         coefficients = {

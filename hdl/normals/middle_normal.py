@@ -7,15 +7,10 @@ from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 from blysk.hdl.core.dataflow import Dataflow, checked_interval, dot
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
 
-__all__ = ["MiddleNormalUnit", "normal_shape"]
-
-
-def normal_shape() -> data.ArrayLayout:
-    """Shape of a unit normal: three components ``SQ(1, 17)``."""
-    return data.ArrayLayout(FixedShape(COMPONENT), 3)
-
+__all__ = ["MiddleNormalUnit"]
 
 _MULTIPLICATIONS = 9
 """Three of the dot product, three Horner steps, three scalings by e."""

@@ -7,12 +7,13 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
 from blysk.golden.number.fixed import SQ, UQ
+from blysk.golden.number.reciprocal import reciprocal_table
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.reciprocal import reciprocal_words
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit, connect
-from blysk.hdl.normals.difference_setup import reciprocal_words
-from blysk.hdl.normals.middle_normal import normal_shape
 
 __all__ = ["QuadraticEvaluatorUnit"]
 
@@ -136,7 +137,7 @@ class _StepUnit(PipelinedUnit):
         """Words of the results: the reciprocal, shifted in two stages, and the operands."""
         g, p = self._graph, self.parameters
         words = {name: g.input(name, lambda operands, name=name: operands[name]) for name in span}
-        reciprocal, shift = reciprocal_words(g, words["length"], p.reciprocals)
+        reciprocal, shift = reciprocal_words(g, words["length"], reciprocal_table(p.RECIPROCAL_FORMAT))
         coarse = g.register(
             "coarse",
             lambda x, shift: Value.cast(x.scale(1).extend(p.STEP_FORMAT)) >> Cat(Const(0, 2), shift[2:]),

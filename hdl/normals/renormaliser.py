@@ -8,9 +8,9 @@ from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.normals.dot_product import DotProductUnit
-from blysk.hdl.normals.middle_normal import normal_shape
 
 __all__ = ["RenormaliserUnit"]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
-from blysk.golden.methods.interpolator import pixels_of, runs_of
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
+from blysk.golden.number.spans import pixels_of, runs_of
 from blysk.golden.number.unit_vector import ONE_SQUARED, quantise
 from blysk.golden.pipeline import Spans
 from blysk.golden.reference.curves import interpolate

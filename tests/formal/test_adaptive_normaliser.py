@@ -17,7 +17,6 @@ from amaranth.lib.fifo import FIFOInterface
 
 import blysk.hdl.normals.adaptive_normaliser
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
-from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 from blysk.hdl.normals.bisection import BisectionUnit
 
@@ -53,9 +52,6 @@ def harness(monkeypatch):
         return queues[-1]
 
     monkeypatch.setattr(AdaptiveNormaliser, "LENGTH_BITS", LENGTH_BITS)
-    # Tables are cut: of this one only the size counts.
-    table = DifferenceSetup().reciprocals[: 1 << LENGTH_BITS - 1]
-    monkeypatch.setattr(DifferenceSetup, "reciprocals", table)
     unit = blysk.hdl.normals.adaptive_normaliser
     monkeypatch.setattr(unit, "SyncFIFOBuffered", queue)
     monkeypatch.setattr(unit, "SEGMENT_CLOCKS", 6)
@@ -159,7 +155,11 @@ BUGS = {
     "the last is not marked": (of_segments, ">= remaining)", "> remaining)"),
     "a segment that finds no room is lost": (of_segments, "m.If(fifo.w_rdy)", "m.If(1)"),
     "segments are not given": (of_progress, "fifo.w_en.eq(1)", "fifo.w_en.eq(0)"),
-    "a pixel that waits is lost": (of_pixels, "advance.eq(offer(m, self.o, valid, pixel))", "advance.eq(1)"),
+    "a pixel that waits is lost": (
+        of_pixels,
+        "advance.eq(skid_buffer(m, self.o, valid, pixel))",
+        "advance.eq(1)",
+    ),
     "segments are taken while pixels wait": (of_pixels, "fifo.r_en.eq(load)", "fifo.r_en.eq(ends & given)"),
     "the last of every segment is marked": (of_pixels, "active & ends & ~inside", "active & ends"),
     "a span begins before it is complete": (of_pixels, "(inside | (ready_spans != 0))", "1"),

@@ -10,9 +10,10 @@ import blysk.hdl.cosines.angular_setup
 from blysk.golden.cosines.angular_setup import SPAN_ANGLES, AngularSetup
 from blysk.golden.cosines.arccos import Arccos, HalfChord
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
-from blysk.golden.normals.difference_setup import DifferenceSetup, reciprocal_place
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
+from blysk.golden.number.reciprocal import reciprocal_address
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.arccos import HalfChordUnit
@@ -149,8 +150,8 @@ def of_results(monkeypatch, largest):
 def of_step():
     """The largest psi of every shift, and every length."""
     unit = AngularSetup()
-    length = np.arange(1, 1 << DifferenceSetup.LENGTH_BITS)
-    _, halvings = reciprocal_place(length - 1)
+    length = np.arange(1, 1 << LENGTH_BITS)
+    _, halvings = reciprocal_address(length - 1)
     for shift in range(18):
         # Of the half chord. By arccos, and beyond 90 degrees, nothing is shifted.
         most = HalfChord.ROOT_FORMAT.max_code * HalfChord.FACTOR_FORMAT.max_code << 1 >> shift
@@ -196,7 +197,7 @@ SIZE_FORMAT, GAIN_FORMAT = SQ(5, 34), SQ(4, AngularSetup.GAIN_BITS)
 
 CUTS = {
     "blysk.hdl.cosines.arccos.normalised_words",
-    "blysk.hdl.normals.difference_setup.reciprocal_words",
+    "blysk.hdl.core.reciprocal.reciprocal_words",
     *(
         f"blysk.hdl.cosines.angular_setup.{name}"
         for name in ("_sum", "AngularSetupUnit._minor", "AngularSetupUnit._polar")

@@ -15,18 +15,19 @@ from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
-from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.normals.bisection_chain import BisectionChain
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
-from blysk.golden.normals.difference_setup import DifferenceSetup, reciprocal_place
+from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
 from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.reciprocal import reciprocal_address
+from blysk.golden.number.spans import LENGTH_BITS, pixels_of
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT, ONE_SQUARED
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.cosines.arccos import HalfChordUnit
@@ -49,7 +50,7 @@ from .bounds import Bounds, cut_by, registers_of, unknown, word, wrapped_by
 
 pytestmark = [pytest.mark.prove, pytest.mark.usefixtures("wraps")]
 
-LENGTHS = np.arange(1, 1 << DifferenceSetup.LENGTH_BITS)
+LENGTHS = np.arange(1, 1 << LENGTH_BITS)
 
 
 def of_middle_normal(fit):
@@ -326,7 +327,7 @@ def of_recurrence_shifts(bits=6, bits_of_length=4):
         vectors = [Fixed(COMPONENT, np.zeros((1, 3), dtype=np.int64)) for _ in range(3)]
         RecurrenceSetup().compute(*vectors, length)
     (step_shift,), (over, under, rho_over) = shifts, decided
-    _, halvings = reciprocal_place(length - 1)
+    _, halvings = reciprocal_address(length - 1)
     exponent = step_shift + 1
     for places in (exponent - under, exponent, step_shift, np.maximum(exponent - 5, 0)):
         Fixed(UQ(bits, 0), Bounds.of(places))
@@ -425,7 +426,7 @@ def test_shifts_of_the_recurrence_a_bit_too_short_are_found(bits):
 
 
 CUTS = {
-    "blysk.hdl.normals.difference_setup.reciprocal_words": "the leading one of m - 1; m is 1 or more",
+    "blysk.hdl.core.reciprocal.reciprocal_words": "the leading one of m - 1; m is 1 or more",
     "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._front": "2^levels - 1",
     "blysk.hdl.cosines.arccos.normalised_words": "v: `test_angular_setup`",
     "blysk.hdl.cosines.arccos.half_chord_words": "half a turn less psi, as the twin wraps it",

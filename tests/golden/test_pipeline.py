@@ -7,10 +7,10 @@ from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.pipeline import Spans
 from blysk.golden.presets import METHODS, PUBLISHED, preset

@@ -20,7 +20,6 @@ from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
@@ -33,6 +32,7 @@ from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed, Format
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED, quantise
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.geometry import normalise
@@ -47,7 +47,7 @@ from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
-from blysk.hdl.lighting.intensity import IntensityUnit
+from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.hdl.lighting.light import LightUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SpecularUnit
@@ -338,7 +338,7 @@ def _highlight_gate(rng, count):
     )
 
 
-def _intensity(rng, count, style):
+def _intensity(rng, count, unit):
     twin = Intensity(_LIGHTS)
     terms = rng.integers(0, twin.TERM_FORMAT.max_code, (2, count, _LIGHTS), endpoint=True)
     terms *= rng.random(terms.shape) < rng.random((1, count, 1))
@@ -348,7 +348,7 @@ def _intensity(rng, count, style):
         *(Fixed(twin.TERM_FORMAT, term) for term in terms),
     )
     return Case(
-        IntensityUnit(twin, style),
+        unit(twin),
         {"diffuse": terms[0], "specular": terms[1]},
         dict(zip("rgb", channels.T, strict=True)),
         {"ambient": ambient, "diffuse": colors[0], "specular": colors[1]},
@@ -501,8 +501,8 @@ DEVICES: dict[str, Callable[[np.random.Generator, int], Case]] = {
     "power, sequential": partial(_specular, twin=Power(), unit=partial(PowerUnit, form="sequential")),
     "light": _light,
     "highlight_gate": _highlight_gate,
-    "intensity": partial(_intensity, style="throughput"),
-    "intensity, compact": partial(_intensity, style="compact"),
+    "intensity": partial(_intensity, unit=IntensityUnit),
+    "intensity, compact": partial(_intensity, unit=CompactIntensityUnit),
     "chord": _chord,
     "chord_setup": partial(_chord_setup, interval=4),
     "chord_setup, interval 1": partial(_chord_setup, interval=1),

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
-from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.number.reciprocal import step_words
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
@@ -196,7 +196,7 @@ def test_stiff_drift_over_4095_pixels(bend):
     differences = p.differences(
         start, Fixed(p.SLOPE_FORMAT, slopes), Fixed(p.BEND_FORMAT, bends), *p.steps(length)
     )
-    reciprocal, shift, square, square_shift = DifferenceSetup().steps(np.array([4095]))
+    reciprocal, shift, square, square_shift = step_words(np.array([4095]))
     k = 4094
     # In codes of 80 fraction bits, exact with the words of dt and dt^2.
     along = slopes[:, 0].astype(object) * int(reciprocal.codes[0]) << 29 - int(shift[0])

@@ -5,8 +5,8 @@ import pytest
 
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
-from blysk.golden.normals.difference_setup import reciprocal_place
 from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.number.reciprocal import reciprocal_address
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise, values
 from blysk.golden.reference.curves import interpolate
 
@@ -182,7 +182,7 @@ def test_reciprocals():
     """Of every length: a relative 2^-17, and the square as exact."""
     setup = RecurrenceSetup()
     steps = np.arange(1, 4095)
-    address, shift = reciprocal_place(steps)
+    address, shift = reciprocal_address(steps)
     reciprocal, square, small = (word[address] for word in setup.reciprocals)
     assert np.abs(reciprocal.values * 2.0 ** (1 - shift) * steps - 1).max() <= 2.0**-17
     assert np.abs(square.values * 2.0 ** (2 - 2 * shift - small) * steps**2 - 1).max() <= 2.0**-17

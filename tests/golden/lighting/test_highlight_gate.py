@@ -6,7 +6,7 @@ import pytest
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.interpolator import NormalInterpolator, pixels_of
+from blysk.golden.methods.interpolator import NormalInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.difference_setup import DifferenceSetup
@@ -14,6 +14,7 @@ from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
 from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import normalise

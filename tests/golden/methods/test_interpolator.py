@@ -8,10 +8,11 @@ from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
-from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator, pixels_of
+from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.curves import CURVES, interpolate
@@ -55,13 +56,6 @@ def compute(interpolator, left, right, length, direction, halfway):
 def places(length):
     span, step = pixels_of(length)
     return span, step / np.maximum(length - 1, 1)[span]
-
-
-def test_pixels_of():
-    span, step = pixels_of(np.array([2, 1, 3]))
-    assert span.tolist() == [0, 0, 1, 2, 2, 2]
-    assert step.tolist() == [0, 1, 0, 0, 1, 2]
-    assert [len(a) for a in pixels_of(np.array([], dtype=int))] == [0, 0]
 
 
 @pytest.mark.parametrize("method", FROM_NORMALS)

@@ -5,9 +5,9 @@ import pytest
 
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
 from blysk.golden.number.fixed import SQ
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE, ONE_SQUARED
 from blysk.golden.presets import MODELS
 from blysk.golden.reference.geometry import normalise

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from blysk.golden.methods.angular_interpolator import AngularInterpolator
-from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, quantise, values
 
 

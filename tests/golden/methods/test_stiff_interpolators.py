@@ -11,9 +11,9 @@ import pytest
 from blysk.bench.report.stability import operand_error as bound
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.curves import interpolate

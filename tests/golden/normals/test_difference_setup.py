@@ -25,19 +25,6 @@ def coefficients(rng, count, share=1.0):
     )
 
 
-def test_table():
-    """Every word is the nearest to 1/f, off by a relative 2^-17 at most."""
-    exact = 1 / (1 + np.arange(2048) / 2048)
-    exact[0] = 0.5
-    words = UNIT.reciprocals
-    assert words.shape == (2048,)
-    off = np.abs(words.values - exact)
-    assert 0.9 * 2.0**-18 < off.max() <= 2.0**-18
-    assert 2.0**-19 < (off / exact).max() <= 2.0**-17
-    assert words.codes[0] == 2**16
-    assert words.codes.max() < 2**17
-
-
 def test_stiff_every_length_to_its_last_pixel():
     """The curve's end, with the largest coefficients of both signs: errors are as derived in the docstring.
 

@@ -7,8 +7,8 @@ from amaranth.hdl import Value
 from amaranth.sim import Simulator
 
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
-from blysk.golden.methods.interpolator import pixels_of
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
+from blysk.golden.number.spans import pixels_of
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit

@@ -1,0 +1,67 @@
+"""Spans: how long they are, and which pixel belongs to which."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+__all__ = ["LENGTH_BITS", "checked_lengths", "pixels_of", "runs_of"]
+
+LENGTH_BITS = 12
+"""Bits of a span's length in pixels."""
+
+
+def checked_lengths(length: np.ndarray, least: int = 1) -> np.ndarray:
+    """Lengths of spans as int64.
+
+    Parameters
+    ----------
+    length : int array
+        Pixels of each span.
+    least : int
+        Least length that a unit takes.
+
+    Raises
+    ------
+    ValueError
+        If one is out of range.
+    """
+    length = np.asarray(length, dtype=np.int64)
+    if length.size and not least <= length.min() <= length.max() < 1 << LENGTH_BITS:
+        raise ValueError(f"lengths must be {least} to {(1 << LENGTH_BITS) - 1}")
+    return length
+
+
+def pixels_of(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Span of each pixel, and its index in the span from 0 on, for spans of so many pixels each.
+
+    Parameters
+    ----------
+    length : int array, shape (spans,)
+        Pixels of each span, 0 or more.
+
+    Returns
+    -------
+    span, index : int64 arrays, shape (pixels,)
+        In raster order.
+    """
+    span = np.repeat(np.arange(len(length)), length)
+    return span, np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)
+
+
+def runs_of(length: np.ndarray, most: int = 1 << 18) -> Iterator[slice]:
+    """Runs of spans with so many pixels or fewer, or of one span: a bound for the memory of a step.
+
+    Parameters
+    ----------
+    length : int array, shape (spans,)
+        Pixels of each.
+    most : int
+        Pixels of a run.
+    """
+    ends = np.cumsum(length)
+    start = 0
+    while start < len(length):
+        before = ends[start - 1] if start else 0
+        stop = max(int(np.searchsorted(ends, before + most, side="right")), start + 1)
+        yield slice(start, stop)
+        start = stop
