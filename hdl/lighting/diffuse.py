@@ -17,10 +17,10 @@ class DiffuseUnit(PipelinedUnit):
 
     Parameters
     ----------
+    parameters : Diffuse
+        Bit-accurate model, which knows the format of the operand.
     latency : int or None
         At least 2, or 3 where the initiation interval is over 1; ``None``: that.
-    parameters : Diffuse
-        Format of the operand.
     initiation_interval : int
         Distance in cycles of two inputs, at least 1.
 
@@ -41,8 +41,9 @@ class DiffuseUnit(PipelinedUnit):
 
     def __init__(
         self,
-        latency: int | None = None,
         parameters: Diffuse | None = None,
+        *,
+        latency: int | None = None,
         initiation_interval: int = 1,
     ):
         self.parameters = parameters or Diffuse()

@@ -37,11 +37,11 @@ class HighlightGateUnit(PipelinedUnit):
     Parameters
     ----------
     parameters : HighlightGate
-        Reflection model and width.
-    initiation_interval : int or None
-        Distance in cycles of two inputs, from 1 to the number of multiplications. ``None``: 6.
+        Bit-accurate model: reflection model, method and width.
     lights : int
         Number of lights, at least 1.
+    initiation_interval : int or None
+        Distance in cycles of two inputs, from 1 to the number of multiplications. ``None``: 6.
     exponent : int or None
         An exponent for good, 1 to 1000: no PROM. ``None``: the exponent is a port.
 
@@ -65,8 +65,9 @@ class HighlightGateUnit(PipelinedUnit):
     def __init__(
         self,
         parameters: HighlightGate | None = None,
-        initiation_interval: int | None = None,
         lights: int = 1,
+        *,
+        initiation_interval: int | None = None,
         exponent: int | None = None,
     ):
         self.parameters = p = parameters or HighlightGate()

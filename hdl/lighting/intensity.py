@@ -1,23 +1,26 @@
-"""Intensity unit ([T] figure 4.10): ambient, diffuse and specular light of a pixel, in three channels."""
+"""Intensity units: ambient, diffuse and specular light of a pixel in three channels; [T] figure 4.10."""
 
+from collections.abc import Sequence
 from functools import reduce
 from operator import or_
-from typing import Literal
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
-from amaranth.lib import data
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
 
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.number.fixed import UQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit, skid_buffer
 
-__all__ = ["IntensityUnit", "color_shape", "pixel_color_shape"]
+__all__ = ["CompactIntensityUnit", "IntensityUnit", "color_shape", "pixel_color_shape"]
+
+_COLOR, _TERM = Intensity.COLOR_FORMAT, Intensity.TERM_FORMAT
 
 
 def color_shape() -> data.ArrayLayout:
     """Shape of a colour operand: red, green, blue in ``UQ(11, 6)``, in LSB of the 8-bit channel."""
-    return data.ArrayLayout(FixedShape(Intensity.COLOR_FORMAT), 3)
+    return data.ArrayLayout(FixedShape(_COLOR), 3)
 
 
 def pixel_color_shape() -> data.StructLayout:
@@ -25,33 +28,40 @@ def pixel_color_shape() -> data.StructLayout:
     return data.StructLayout({"r": unsigned(8), "g": unsigned(8), "b": unsigned(8)})
 
 
+def _kinds(parameters: Intensity) -> tuple[str, ...]:
+    """Kinds of terms."""
+    return ("diffuse", "specular") if parameters.has_specular else ("diffuse",)
+
+
+def _term_shape(parameters: Intensity) -> data.StructLayout:
+    """Shape of an input beat."""
+    terms = data.ArrayLayout(FixedShape(_TERM), parameters.lights)
+    return data.StructLayout(dict.fromkeys(_kinds(parameters), terms))
+
+
+def _constants_shape(parameters: Intensity) -> data.StructLayout:
+    """Shape of the colour operands."""
+    colors = data.ArrayLayout(color_shape(), parameters.lights)
+    return data.StructLayout({"ambient": color_shape(), "diffuse": colors, "specular": colors})
+
+
 class IntensityUnit(PipelinedUnit):
-    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` a channel, saturated to 255 and rounded half up.
+    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, saturated to 255, rounded half up.
 
-    Formats and error are those of `Intensity`, the bit-true twin. Nothing wraps: the sum
-    grows by a bit at each level of the adder tree.
+    Formats and error are those of the bit-accurate model `Intensity`. Nothing wraps: the sum grows by a bit
+    at each level of the adder tree.
 
-    In the throughput style the latency is ``9 + ceil(log2(2 lights + 1))`` cycles (terms, two for the
-    factors, two for the products, two that the channels are apart, adder tree, rounding, saturation) and the
-    initiation interval is 1. The channels follow each other by a clock: each multiplier has registers of its
-    own, two in a row for its factor and for its product, as in `registered_product`. Six
-    multipliers a light. Without specular terms there are ``lights`` in place of ``2 lights``, with one
-    channel a third of the multipliers and two cycles less.
-
-    In the compact style there is one multiplier of 17 by 17 bits, and no product of a term that is 0. A pixel
-    takes ``c = 3 max(1, T)`` cycles, T the number of its diffuse and specular terms that are not 0
-    (`Intensity.cycles`): 3 for one light without and 6 with a highlight, 3 in the dark. The
-    next pixel is taken in c cycles after it, and the pixel leaves after ``c + 5`` (input, operands, product,
-    sum, rounding, saturation), cycles of standing still not counted. ``latency`` and ``initiation_interval``
-    are those of a pixel with every term. One light has 230 register bits, against 1335; 16 have 808, against
-    18769.
+    The latency is ``9 + ceil(log2(2 lights + 1))`` cycles (terms, two for the factors, two for the products,
+    two by which the channels follow each other, adder tree, rounding, saturation); the initiation interval is
+    1. The channels follow each other by a cycle: each multiplier has registers of its own, two in a row for
+    its factor and for its product, as in `registered_product`. There are six multipliers of 17 by 17 bits for
+    each light. Without specular terms there are three for each light, and ``lights`` stands for ``2 lights``
+    in the latency; with one channel there is a third of the multipliers, and the latency is two cycles less.
 
     Parameters
     ----------
     parameters : Intensity
-        Number of lights, at least 1; whether there are specular terms; channels.
-    style : str
-        ``"throughput"`` or ``"compact"``.
+        Bit-accurate model: number of lights, at least 1; whether there are specular terms; channels.
 
     Members
     -------
@@ -60,43 +70,21 @@ class IntensityUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(pixel_color_shape()))`
         Channels.
     constants : :py:`In(StructLayout({"ambient", "diffuse", "specular"}))`
-        Colour operands, the latter two one a light; stay while beats are inside.
+        Colour operands, the latter two one a light; constant while beats are inside.
 
-    Raises
-    ------
-    ValueError
-        If the style is unknown.
-
-    Source: [T] figure 4.10; [B] 4 and 5; pipeline.md, "Composition".
+    Source: docs/theory/units.md#intensity; [T] figure 4.10; [B] 4 and 5.
     """
 
-    def __init__(
-        self,
-        parameters: Intensity | None = None,
-        style: Literal["throughput", "compact"] = "throughput",
-    ):
-        if style not in ("throughput", "compact"):
-            raise ValueError(f"style must be 'throughput' or 'compact', not {style!r}")
-        self.style = style
-        self.parameters = parameters or Intensity()
-        lights = self.parameters.lights
-        self.kinds = ("diffuse", "specular") if self.parameters.has_specular else ("diffuse",)
-        self._terms = len(self.kinds) * lights
-        channels = self.parameters.channels
-        cycles = channels * self._terms if style == "compact" else 1
-        terms = data.ArrayLayout(FixedShape(Intensity.TERM_FORMAT), lights)
-        colors = data.ArrayLayout(color_shape(), lights)
+    def __init__(self, parameters: Intensity | None = None):
+        self.parameters = p = parameters or Intensity()
+        self.kinds = _kinds(p)
+        terms = len(self.kinds) * p.lights
         super().__init__(
-            data.StructLayout(dict.fromkeys(self.kinds, terms)),
+            _term_shape(p),
             pixel_color_shape(),
-            latency=cycles + 5 if style == "compact" else 6 + channels + self._terms.bit_length(),
-            initiation_interval=cycles,
-            constants=data.StructLayout({"ambient": color_shape(), "diffuse": colors, "specular": colors}),
+            latency=6 + p.channels + terms.bit_length(),
+            constants=_constants_shape(p),
         )
-
-    def elaborate(self, platform):
-        """The base's control in the throughput style; in the compact style one that counts products."""
-        return self._compact() if self.style == "compact" else super().elaborate(platform)
 
     def datapath(self, m, operands):
         """Terms, products, a binary tree of sums, rounding, saturation."""
@@ -112,8 +100,8 @@ class IntensityUnit(PipelinedUnit):
                     for step in range(2):
                         factor = register(m, factor, f"factor_{kind}_{light}_{name}_{step}")
                     term = factor * self.constants[kind][light][channel]
-                    for clock in range(channel, len(channels) + 1):
-                        term = register(m, term, f"{kind}_{light}_{name}_{clock}")
+                    for cycle in range(channel, len(channels) + 1):
+                        term = register(m, term, f"{kind}_{light}_{name}_{cycle}")
                     terms.append(term)
             level = 0
             while len(terms) > 1:
@@ -124,63 +112,67 @@ class IntensityUnit(PipelinedUnit):
                 ]
                 level += 1
             rounded = register(m, terms[0].round_half_up(0), f"rounded_{name}")
-            level = register(m, rounded.saturate(Intensity.RESULT_FORMAT), name).as_value()
+            code = register(m, rounded.saturate(Intensity.RESULT_FORMAT), name).as_value()
             of_channel = name if len(channels) > 1 else "rgb"
-            m.d.comb += [result[each].eq(level) for each in of_channel]
+            m.d.comb += [result[each].eq(code) for each in of_channel]
         return result
 
-    def _compact(self) -> Module:
-        """Channel by channel, a clock for each term that is not 0; then product, sum, rounding."""
+
+class CompactIntensityUnit(wiring.Component):
+    """The sum of an `IntensityUnit` on one multiplier of 17 by 17 bits, which skips the terms that are 0.
+
+    The results are those of `IntensityUnit`. A pixel takes ``c = 3 max(1, T)`` cycles, T the number of its
+    diffuse and specular terms that are not 0 (`Intensity.cycles`): with one light 3 cycles without and 6 with
+    a highlight, 3 in the dark. The next pixel is taken c cycles after it, and the pixel leaves after
+    ``c + 5`` (input, operands, product, sum, rounding, saturation), cycles of stall not counted. With one
+    light the unit has 230 register bits, against 1335 of `IntensityUnit`; with 16 lights 808, against 18769.
+
+    Parameters
+    ----------
+    parameters : Intensity
+        As for `IntensityUnit`.
+
+    Attributes
+    ----------
+    latency, initiation_interval : int
+        Cycles of a pixel all of whose terms are not 0.
+
+    Members
+    -------
+    i, o, constants
+        Those of `IntensityUnit`.
+
+    Source: docs/theory/units.md#intensity; [T] figure 4.10; [B] 4 and 5.
+    """
+
+    def __init__(self, parameters: Intensity | None = None):
+        self.parameters = p = parameters or Intensity()
+        self.kinds = _kinds(p)
+        self._terms = len(self.kinds) * p.lights
+        self.initiation_interval = p.channels * self._terms
+        self.latency = self.initiation_interval + 5
+        super().__init__(
+            {
+                "i": In(stream.Signature(_term_shape(p))),
+                "o": Out(stream.Signature(pixel_color_shape())),
+                "constants": In(_constants_shape(p)),
+            }
+        )
+
+    def elaborate(self, platform):
+        """Products channel by channel, then sum, rounding, saturation."""
         m = Module()
-        terms = [term for kind in self.kinds for term in self.i.payload[kind]]
-        colors = [color for kind in self.kinds for color in self.constants[kind]]
-        last_channel = self.parameters.channels - 1
-        held = [Signal.like(Value.cast(term), name=f"term_{k}") for k, term in enumerate(terms)]
-        used, left = Signal(len(terms)), Signal(len(terms))
-        busy, valid = Signal(), Signal()
-        channel = Signal(2)
-        advance, accept = Signal(), Signal()
-
-        # The lowest term that is left is multiplied; a channel without any takes a clock too.
-        turn, rest = Signal(len(terms)), Signal(len(terms))
-        ends_channel, ends_pixel = Signal(), Signal()
-        m.d.comb += [
-            turn.eq(left & -left),
-            rest.eq(left & ~turn),
-            ends_channel.eq(~rest.any()),
-            ends_pixel.eq(ends_channel & (channel == last_channel)),
-            self.i.ready.eq(advance & (~busy | ends_pixel)),
-            accept.eq(self.i.valid & self.i.ready),
-        ]
-        nonzero = Cat(Value.cast(term).any() for term in terms)
-        with m.If(accept):
-            m.d.sync += [busy.eq(1), channel.eq(0), used.eq(nonzero), left.eq(nonzero)]
-            m.d.sync += [register.eq(Value.cast(term)) for register, term in zip(held, terms, strict=True)]
-        with m.Elif(advance & busy):
-            m.d.sync += left.eq(Mux(ends_channel, used, rest))
-            with m.If(ends_channel):
-                m.d.sync += channel.eq(channel + 1)
-            with m.If(ends_pixel):
-                m.d.sync += busy.eq(0)
-
-        def chosen(words):
-            """The word of this turn, 0 if there is none."""
-            return reduce(or_, (Mux(turn[k], Value.cast(word), 0) for k, word in enumerate(words)))
-
-        def of_channel(color, channel):
-            red, green, blue = (Value.cast(part) for part in color)
-            return Mux(channel[1], blue, Mux(channel[0], green, red))
-
-        # What goes with an operand, a product, a sum and a rounded sum.
+        advance = Signal()
+        busy, channel, term, first, ends_channel = self._issue(m, advance)
         note = data.StructLayout({"live": 1, "first": 1, "last": 1, "channel": 2})
         notes = [Signal(note, name=f"note_{stage}") for stage in range(4)]
         issued, multiplied, added, rounding = notes
-        first = Signal(init=1)
-        format, one = Intensity.COLOR_FORMAT, Intensity.TERM_FORMAT
+        valid = Signal()
+        last_channel = self.parameters.channels - 1
+        factors = [Signal(FixedShape(of), name=name) for of, name in ((_TERM, "term"), (_COLOR, "color"))]
+        product = Signal(FixedShape(_TERM * _COLOR))
         total = Signal(FixedShape(UQ(11 + self._terms.bit_length(), 23)))
-        factors = [Signal(FixedShape(of), name=name) for of, name in ((one, "term"), (format, "color"))]
-        product = Signal(FixedShape(one * format))
-        start = FixedValue(format, of_channel(self.constants.ambient, multiplied.channel))
+        start = FixedValue(_COLOR, _of_channel(self.constants.ambient, multiplied.channel))
         before = Mux(multiplied.first, Value.cast(start.extend(total.format)), Value.cast(total))
         rounded = Signal.like(Value.cast(total.round_half_up(0)))
         channels = [Signal(8, name=name) for name in "rgb"[: last_channel + 1]]
@@ -194,8 +186,8 @@ class IntensityUnit(PipelinedUnit):
             with m.If(busy):
                 m.d.sync += [
                     first.eq(ends_channel),
-                    Value.cast(factors[0]).eq(chosen(held)),
-                    Value.cast(factors[1]).eq(chosen([of_channel(color, channel) for color in colors])),
+                    Value.cast(factors[0]).eq(term[0]),
+                    Value.cast(factors[1]).eq(term[1]),
                 ]
             with m.If(issued.live):
                 m.d.sync += product.eq(factors[0] * factors[1])
@@ -209,3 +201,59 @@ class IntensityUnit(PipelinedUnit):
                     code = FixedValue(UQ(len(rounded), 0), rounded).saturate(Intensity.RESULT_FORMAT)
                     m.d.sync += result.eq(code.as_value())
         return m
+
+    def _issue(self, m: Module, advance: Value) -> tuple[Signal, Signal, Sequence[Value], Signal, Signal]:
+        """Take pixels in, and give one product after the other to the multiplier.
+
+        Returns
+        -------
+        busy : Signal
+            Whether there is a product on this cycle.
+        channel : Signal
+            Its channel.
+        term : sequence of Value
+            Its operands, the term and its colour.
+        first, ends_channel : Signal
+            Whether it is the first and the last of its channel.
+        """
+        terms = [term for kind in self.kinds for term in self.i.payload[kind]]
+        colors = [color for kind in self.kinds for color in self.constants[kind]]
+        held = [Signal.like(Value.cast(term), name=f"term_{k}") for k, term in enumerate(terms)]
+        used, left = Signal(len(terms), name="used"), Signal(len(terms), name="left")
+        busy, first = Signal(name="busy"), Signal(name="first", init=1)
+        channel, accept = Signal(2, name="channel"), Signal(name="accept")
+
+        # The lowest term that is left is multiplied; a channel without any takes a cycle, too.
+        chosen, rest = Signal(len(terms), name="chosen"), Signal(len(terms), name="rest")
+        ends_channel, ends_pixel = Signal(name="ends_channel"), Signal(name="ends_pixel")
+        m.d.comb += [
+            chosen.eq(left & -left),
+            rest.eq(left & ~chosen),
+            ends_channel.eq(~rest.any()),
+            ends_pixel.eq(ends_channel & (channel == self.parameters.channels - 1)),
+            self.i.ready.eq(advance & (~busy | ends_pixel)),
+            accept.eq(self.i.valid & self.i.ready),
+        ]
+        nonzero = Cat(Value.cast(term).any() for term in terms)
+        with m.If(accept):
+            m.d.sync += [busy.eq(1), channel.eq(0), used.eq(nonzero), left.eq(nonzero)]
+            m.d.sync += [register.eq(Value.cast(term)) for register, term in zip(held, terms, strict=True)]
+        with m.Elif(advance & busy):
+            m.d.sync += left.eq(Mux(ends_channel, used, rest))
+            with m.If(ends_channel):
+                m.d.sync += channel.eq(channel + 1)
+            with m.If(ends_pixel):
+                m.d.sync += busy.eq(0)
+        of_channel = [_of_channel(color, channel) for color in colors]
+        return busy, channel, (_selected(chosen, held), _selected(chosen, of_channel)), first, ends_channel
+
+
+def _selected(one_hot: Value, words: Sequence[Value]) -> Value:
+    """The word whose bit is set; 0 if none is."""
+    return reduce(or_, (Mux(one_hot[k], Value.cast(word), 0) for k, word in enumerate(words)))
+
+
+def _of_channel(color: data.View, channel: Value) -> Value:
+    """Red, green or blue."""
+    red, green, blue = (Value.cast(part) for part in color)
+    return Mux(channel[1], blue, Mux(channel[0], green, red))

@@ -62,8 +62,8 @@ class LightUnit(wiring.Component):
         self,
         parameters: Specular | Power | None = None,
         diffuse: Diffuse | None = None,
-        initiation_interval: int = 1,
         *,
+        initiation_interval: int = 1,
         exponent: int | None = None,
         shares_slope: bool = False,
         gated: bool = False,
@@ -71,16 +71,16 @@ class LightUnit(wiring.Component):
         self.parameters = p = parameters or Specular()
         self._exponent = None
         if isinstance(p, Power):
-            self._specular = PowerUnit(p, "sequential" if initiation_interval >= 42 else "pipelined")
+            self._specular = PowerUnit(p, form="sequential" if initiation_interval >= 42 else "pipelined")
             self._exponent = exponent
         else:
             self._specular = SpecularUnit(
-                p, initiation_interval, exponent=exponent, shares_slope=shares_slope
+                p, initiation_interval=initiation_interval, exponent=exponent, shares_slope=shares_slope
             )
         self.latency = self._specular.latency
         self.initiation_interval = self._specular.initiation_interval
         self.skips_dark = self.initiation_interval > 1
-        self._diffuse = DiffuseUnit(2 if self.skips_dark else self.latency, diffuse)
+        self._diffuse = DiffuseUnit(diffuse, latency=2 if self.skips_dark else self.latency)
         operands = {
             "cosine": FixedShape(self._diffuse.parameters.operand_format),
             "highlight": FixedShape(self.parameters.operand_format),

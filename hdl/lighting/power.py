@@ -50,7 +50,7 @@ class PowerUnit(PipelinedUnit):
     """
 
     def __init__(
-        self, parameters: Power | None = None, form: Literal["pipelined", "sequential"] = "pipelined"
+        self, parameters: Power | None = None, *, form: Literal["pipelined", "sequential"] = "pipelined"
     ):
         if form not in ("pipelined", "sequential"):
             raise ValueError(f"form must be 'pipelined' or 'sequential', not {form!r}")

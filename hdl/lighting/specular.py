@@ -168,8 +168,8 @@ class SpecularUnit(PipelinedUnit):
     def __init__(
         self,
         parameters: Specular | None = None,
-        initiation_interval: int = 1,
         *,
+        initiation_interval: int = 1,
         exponent: int | None = None,
         shares_slope: bool = False,
     ):

@@ -86,7 +86,7 @@ def anywhere(gate):
 
 def stopped(gate, left, right, halfways):
     """Share of the spans that the unit stops, at every word of its PROM; none reaches that threshold."""
-    unit, beats = HighlightGateUnit(gate, 1), {"normal_left": left, "normal_right": right}
+    unit, beats = HighlightGateUnit(gate, initiation_interval=1), {"normal_left": left, "normal_right": right}
     words, exponents = np.unique(gate.thresholds.codes[1 : MAX_EXPONENT + 1], return_index=True)
     count = 0
     for halfway in halfways:

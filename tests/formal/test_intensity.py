@@ -5,7 +5,7 @@ from amaranth.hdl import Array, Cat, Mux, Signal, Value
 
 from blysk.golden.lighting.intensity import Intensity
 from blysk.hdl.core.fixed import FixedValue
-from blysk.hdl.lighting.intensity import IntensityUnit
+from blysk.hdl.lighting.intensity import CompactIntensityUnit
 
 from .prover import Harness
 from .rules import answers, follows, stays, taken
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.prove
 
 def of_sums(lights):
     """A sum with bits to spare moves beside the unit's; products may be any, constants and terms too."""
-    unit = IntensityUnit(Intensity(lights), "compact")
+    unit = CompactIntensityUnit(Intensity(lights))
     h = Harness(unit)
     total, product, note = (Value.cast(h.register(name)) for name in ("total", "product", "note_1"))
     live, first, channel = note[0], note[1], note[3:5]
@@ -45,7 +45,7 @@ def test_sums_do_not_wrap(prove, lights):
 
 def test_bug_is_found(refute, plant):
     """A bit less, planted in the unit."""
-    plant(IntensityUnit, "_compact", "UQ(11 + self._terms.bit_length(), 23)", "UQ(12, 23)")
+    plant(CompactIntensityUnit, "elaborate", "UQ(11 + self._terms.bit_length(), 23)", "UQ(12, 23)")
     refute(of_sums(1))
 
 
@@ -63,7 +63,7 @@ def choices(monkeypatch):
 
 def of_pixels(channels):
     """Each term is a half or nothing; half of its colour is a bit of its own in the channel."""
-    unit = IntensityUnit(Intensity(channels=channels), "compact")
+    unit = CompactIntensityUnit(Intensity(channels=channels))
     h = Harness(unit)
     terms = [Value.cast(term) for kind in unit.kinds for term in unit.i.payload[kind]]
     colors = [color for kind in unit.kinds for color in unit.constants[kind]]
@@ -99,16 +99,24 @@ def test_pixels(prove, choices, channels):
 
 
 PIXEL_BUGS = {
-    "a pixel is taken while it stands": ("advance & (~busy | ends_pixel)", "~busy | ends_pixel"),
-    "it moves while it stands": ("m.If(advance)", "m.If(1)"),
-    "a pixel ends with a channel": ("ends_channel & (channel == last_channel)", "ends_channel"),
-    "a term is left out": ("left.eq(Mux(ends_channel, used, rest))", "left.eq(Mux(ends_channel, used, 0))"),
-    "a sum goes on": ("Mux(multiplied.first, ", "Mux(multiplied.first & ~valid, "),
+    "a pixel is taken while it stands": ("_issue", "advance & (~busy | ends_pixel)", "~busy | ends_pixel"),
+    "it moves while it stands": ("elaborate", "m.If(advance)", "m.If(1)"),
+    "a pixel ends with a channel": (
+        "_issue",
+        "ends_channel & (channel == self.parameters.channels - 1)",
+        "ends_channel",
+    ),
+    "a term is left out": (
+        "_issue",
+        "left.eq(Mux(ends_channel, used, rest))",
+        "left.eq(Mux(ends_channel, used, 0))",
+    ),
+    "a sum goes on": ("elaborate", "Mux(multiplied.first, ", "Mux(multiplied.first & ~valid, "),
 }
 
 
 @pytest.mark.parametrize("bug", PIXEL_BUGS)
 def test_bugs_of_pixels_are_found(refute, plant, choices, bug):
     """Planted in the unit, each refutes the claims on pixels."""
-    plant(IntensityUnit, "_compact", *PIXEL_BUGS[bug])
+    plant(CompactIntensityUnit, *PIXEL_BUGS[bug])
     refute(of_pixels(3), 24)

@@ -86,6 +86,8 @@ def stand_ins(monkeypatch):
             (blysk.hdl.pipeline, IntensityUnit, colors, interval, interval),
             (blysk.hdl.pipeline, HighlightGateUnit, decisions, 2, 2),
         )
+        compact = short(IntensityUnit, colors, interval, interval)
+        monkeypatch.setattr(blysk.hdl.pipeline, "CompactIntensityUnit", compact)
         for module, unit, *options in units:
             monkeypatch.setattr(module, unit.__name__, short(unit, *options))
         monkeypatch.setitem(blysk.hdl.pipeline.INTERPOLATORS, LinearInterpolator, Line)

@@ -27,7 +27,7 @@ from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
-from blysk.hdl.lighting.intensity import IntensityUnit
+from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.hdl.lighting.light import LightUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SpecularUnit
@@ -88,7 +88,7 @@ OTHERS = {
     "chord_interpolator": partial(ChordInterpolatorUnit, ChordInterpolator(), 1),
     "difference_accumulator": DifferenceAccumulatorUnit,
     "highlight_cosine": HighlightCosineUnit,
-    "intensity-compact": partial(IntensityUnit, style="compact"),
+    "intensity-compact": CompactIntensityUnit,
     "light": LightUnit,
     "light-3": partial(LightUnit, initiation_interval=3),
     "linear": partial(LinearInterpolatorUnit, LinearInterpolator(), 1),

@@ -18,7 +18,7 @@ def test_equals_twin(verify, latency, interval):
     edges = [0, 1, -1, one, one + 1, one - 1, 1 << 34, (1 << 34) - 1, (1 << 34) - (1 << 16), 1 << 16]
     edges += [(1 << 16) - 1, format.min_code, format.max_code]
     codes = np.r_[edges, rng.integers(-one, one, 1500), rng.integers(format.min_code, format.max_code, 100)]
-    unit = DiffuseUnit(latency, initiation_interval=interval)
+    unit = DiffuseUnit(latency=latency, initiation_interval=interval)
     verify(unit, codes, Diffuse().compute(Fixed(format, codes)).codes)
 
 
@@ -30,7 +30,7 @@ def test_waits_in_a_register_an_interval():
     assert DiffuseUnit(initiation_interval=4).latency == 3
     width, rounded = Diffuse().operand_format.width, 22
     for latency, interval, copies in ((7, 1, 5), (11, 2, 4), (11, 3, 2), (11, 6, 1)):
-        cost = cost_of(DiffuseUnit(latency, initiation_interval=interval))
+        cost = cost_of(DiffuseUnit(latency=latency, initiation_interval=interval))
         control = latency + 1 + (0 if interval == 1 else width + 2 + (interval - 1).bit_length())
         assert cost.register_bits == control + rounded + 17 * (2 + copies)
         assert cost.multiplier_count == 0
@@ -39,4 +39,4 @@ def test_waits_in_a_register_an_interval():
 @pytest.mark.parametrize(("interval", "least"), [(1, 2), (2, 3)])
 def test_latency_must_hold_the_work(interval, least):
     with pytest.raises(ValueError, match=rf"^latency must be at least {least}, not {least - 1}$"):
-        DiffuseUnit(least - 1, initiation_interval=interval)
+        DiffuseUnit(latency=least - 1, initiation_interval=interval)

@@ -41,7 +41,7 @@ def spans(rng, normal_pairs, count, halfway, cosine, spread=1e-3, angles=ANGLES)
 )
 def test_equals_twin(verify, normal_pairs, model, interval):
     parameters = HighlightGate(Specular(REFLECTION_MODELS[model]))
-    unit = HighlightGateUnit(parameters, interval)
+    unit = HighlightGateUnit(parameters, initiation_interval=interval)
     rng = np.random.default_rng(11)
     halfway = np.array([1.0, 2.0, 2.0]) / 3
     code = quantise(halfway)
@@ -130,7 +130,7 @@ def test_times_and_multipliers_as_stated():
 )
 def test_several_lights_or_an_exponent_for_good(verify, normal_pairs, lights, exponent, interval):
     parameters = HighlightGate()
-    unit = HighlightGateUnit(parameters, interval, lights, exponent)
+    unit = HighlightGateUnit(parameters, lights, initiation_interval=interval, exponent=exponent)
     rng = np.random.default_rng(lights)
     halfway = rng.normal(size=(lights, 3)) * 0.3 + [0, 0, 1]
     halfway /= np.linalg.norm(halfway, axis=1, keepdims=True)

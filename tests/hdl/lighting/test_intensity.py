@@ -9,7 +9,7 @@ from amaranth.sim import Simulator
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.number.fixed import Fixed
 from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.lighting.intensity import IntensityUnit
+from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.sim.engines.simulate import simulate
 
 COLOR, TERM = Intensity.COLOR_FORMAT, Intensity.TERM_FORMAT
@@ -57,8 +57,8 @@ def test_every_bit_counts(brightness):
             np.testing.assert_array_equal(run.beats[name], expected[name])
 
 
-@pytest.mark.parametrize("style", ["throughput", "compact"])
-def test_halves_round_up(style):
+@pytest.mark.parametrize("unit", [IntensityUnit, CompactIntensityUnit])
+def test_halves_round_up(unit):
     """Channels of a half, and of the least step less: there every bit of a product and of a sum counts."""
     rng = np.random.default_rng(9)
     colors = np.repeat([[[8191]], [[6003]]], 3, axis=-1)
@@ -73,9 +73,8 @@ def test_halves_round_up(style):
     lit = (total[chosen] + (1 << 22) >> 23)[:, np.newaxis] + [3, 100, 40]
     beats = {"diffuse": diffuse[chosen][:, np.newaxis], "specular": specular[chosen][:, np.newaxis]}
     constants = {"ambient": ambient, "diffuse": colors[0], "specular": colors[1]}
-    unit = IntensityUnit(Intensity(), style)
     stalls = rng.random(1009) < 0.3
-    run = simulate(unit, beats, count=len(lit), constants=constants, engine="auto", output_stalls=stalls)
+    run = simulate(unit(), beats, count=len(lit), constants=constants, engine="auto", output_stalls=stalls)
     for channel, name in enumerate("rgb"):
         np.testing.assert_array_equal(run.beats[name], np.minimum(lit[:, channel], 255))
 
@@ -94,7 +93,7 @@ def sparse_terms(rng, lights, count):
 def test_compact_equals_twin_in_the_clocks_stated(lights):
     """Every clock of every pixel: three for each term that is not 0, and three where there is none."""
     rng = np.random.default_rng(lights)
-    unit = IntensityUnit(Intensity(lights), "compact")
+    unit = CompactIntensityUnit(Intensity(lights))
     assert unit.latency == 6 * lights + 5
     for brightness in (1, 8):
         terms = sparse_terms(rng, lights, 300)
@@ -121,7 +120,7 @@ def test_compact_equals_twin_in_the_clocks_stated(lights):
 def test_compact_equals_twin_under_stalls(lights):
     """Pixels are lost, repeated and changed by no pattern of stalls, in both engines on the same cycles."""
     rng = np.random.default_rng(lights)
-    unit = IntensityUnit(Intensity(lights), "compact")
+    unit = CompactIntensityUnit(Intensity(lights))
     beats, constants, expected = case(rng, lights, 2, sparse_terms(rng, lights, 400))
     for input_share, output_share in ((0.4, 0.4), (0.9, 0.1), (0.1, 0.9), (0.0, 0.97), (0.97, 0.0)):
         stalls = {
@@ -144,7 +143,7 @@ def test_compact_reset_in_mid_pixel(clock):
     """Reset so many cycles after a pixel was taken: the next comes as from power-up, and alone."""
     terms = np.full((2, 1, 1), TERM.max_code)
     _, constants, expected = case(np.random.default_rng(1), 1, 1, terms)
-    unit = IntensityUnit(Intensity(), "compact")
+    unit = CompactIntensityUnit()
     reset = Signal()
     simulator = Simulator(ResetInserter(reset)(unit))
     simulator.add_clock(1e-6)
@@ -182,7 +181,7 @@ def test_compact_reset_in_mid_pixel(clock):
 
 @pytest.mark.parametrize("lights", [1, 2, 16])
 def test_compact_costs_one_multiplier(lights):
-    cost = cost_of(IntensityUnit(Intensity(lights), "compact"))
+    cost = cost_of(CompactIntensityUnit(Intensity(lights)))
     assert cost.multipliers == {(17, 17): 1}
     # As the docstring states.
     stated = {1: (230, 1335), 16: (808, 18769)}
@@ -192,8 +191,3 @@ def test_compact_costs_one_multiplier(lights):
     # four notes; the rest.
     growth = (2 * lights).bit_length()
     assert cost.register_bits == 38 * lights + 34 + 34 + (12 + growth) + (34 + growth) + 2 * 24 + 20 + 6
-
-
-def test_unknown_style_is_refused():
-    with pytest.raises(ValueError, match=r"^style must be 'throughput' or 'compact', not 'fast'$"):
-        IntensityUnit(style="fast")

@@ -147,7 +147,7 @@ def test_dark_beats_pass_the_specular_unit_by(model, operand, interval, gated, n
         "specular": parameters.compute(operands["highlight"], dark, 30).codes,
     }
     assert 0.2 < dark.mean() < 0.9
-    unit = LightUnit(parameters, diffuse, interval, gated=gated)
+    unit = LightUnit(parameters, diffuse, initiation_interval=interval, gated=gated)
     assert unit.initiation_interval == interval
     runs = []
     for share in (0, 0.3, 0.8):

@@ -33,7 +33,7 @@ def operands(parameters, exponent, count):
 @pytest.mark.parametrize("operand", ["cosine", "one_minus_cosine"])
 def test_equals_twin(verify, operand, form):
     parameters = Power(operand)
-    unit = PowerUnit(parameters, form)
+    unit = PowerUnit(parameters, form=form)
     assert (unit.latency, unit.initiation_interval) == ((32, 1) if form == "pipelined" else (44, 42))
     # A bit of the exponent alone, too: its square is large where the term is not 0.
     for exponent in (*(1 << np.arange(10)).tolist(), 3, 511, 682, 341, 1000):
@@ -79,7 +79,7 @@ def test_every_exponent():
 def test_stiff_largest_and_smallest_codes(form):
     """The ends of the word and of the sphere in turn, lit and dark: no beat sees anything of the last."""
     parameters = Power()
-    unit, format, one = PowerUnit(parameters, form), parameters.operand_format, ONE_SQUARED.codes.item()
+    unit, format, one = PowerUnit(parameters, form=form), parameters.operand_format, ONE_SQUARED.codes.item()
     codes = np.tile([format.min_code, format.max_code, -one, one, 0, one // 2], 10)
     dark = np.arange(60) % 7 == 0
     beats = {"operand": codes, "dark": dark.astype(np.uint8)}
@@ -94,7 +94,7 @@ def test_stiff_largest_and_smallest_codes(form):
 def test_stiff_reset_in_mid_power(clock):
     """The sequential form, so many cycles after it took a cosine: the next is raised as from power-up."""
     parameters = Power("one_minus_cosine")
-    unit, exponent = PowerUnit(parameters, "sequential"), 1000
+    unit, exponent = PowerUnit(parameters, form="sequential"), 1000
     codes = np.array([1 << 14, 1 << 15])
     expected = parameters.compute(Fixed(parameters.operand_format, codes), np.zeros(2, bool), exponent).codes
     assert 0 < expected[1] < expected[0]

@@ -146,7 +146,7 @@ def test_timing_and_multipliers_at_every_interval(model):
         else Specular(REFLECTION_MODELS[model])
     )
     for interval, latency in zip((1, 2, 3, 4, 6), latencies, strict=True):
-        unit = SpecularUnit(parameters, interval)
+        unit = SpecularUnit(parameters, initiation_interval=interval)
         assert (unit.latency, unit.initiation_interval) == (latency, interval)
         if interval > 2:
             continue
@@ -167,7 +167,7 @@ def test_timing_and_multipliers_at_every_interval(model):
 def test_equals_twin_at_longer_intervals(verify, model, interval):
     as_published = model == "as_published"
     parameters = Specular(REFLECTION_MODELS["cosquad" if as_published else model], as_published=as_published)
-    unit = SpecularUnit(parameters, interval)
+    unit = SpecularUnit(parameters, initiation_interval=interval)
     for exponent in STIFF_EXPONENTS:
         codes = operands(parameters, exponent, exponent, 400)
         dark = np.random.default_rng(exponent).random(len(codes)) < 0.3
@@ -209,8 +209,8 @@ def test_slopes_of_every_exponent(model):
 def test_shared_slope_equals_twin(verify, model, interval):
     """The slope from outside: the same terms at the same cycles, and no PROM in the unit."""
     parameters = Specular(REFLECTION_MODELS[model])
-    unit = SpecularUnit(parameters, interval, shares_slope=True)
-    assert unit.latency == SpecularUnit(parameters, interval).latency
+    unit = SpecularUnit(parameters, initiation_interval=interval, shares_slope=True)
+    assert unit.latency == SpecularUnit(parameters, initiation_interval=interval).latency
     tables = 128 * 36 + 64 * 33 if model == "coscos4" else 0
     assert cost_of(unit).rom_bits == tables
     assert cost_of(SlopeUnit(parameters)).rom_bits == 1024 * 17
@@ -232,7 +232,7 @@ def test_shared_slope_equals_twin(verify, model, interval):
 )
 def test_exponent_for_good_equals_twin(verify, model, exponent, interval):
     parameters = Specular(REFLECTION_MODELS[model])
-    unit = SpecularUnit(parameters, interval, exponent=exponent)
+    unit = SpecularUnit(parameters, initiation_interval=interval, exponent=exponent)
     assert not hasattr(unit, "constants")
     codes = operands(parameters, exponent, exponent)
     dark = np.random.default_rng(exponent).random(len(codes)) < 0.1
