@@ -13,13 +13,13 @@ from blysk.bench.accuracy import scene_for
 from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
 from blysk.golden.number.polynomials import half_angle_factor, minimax
 from blysk.golden.number.unit_vector import quantise, values
-from blysk.golden.presets import METHODS
+from blysk.golden.presets import preset
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import COSQUAD, REFLECTION_MODELS, ReflectionModel
 from blysk.golden.reference.scene import Scene
-from blysk.sim.frames.spans import cut_wide_spans
+from blysk.sim.frames.frame import cut_spans
 from blysk.sim.meshes.teapot import teapot
 
 _SPANS = 4000
@@ -241,9 +241,7 @@ def _cuts() -> str:
         for exponent in (20, 100, 1000):
             scene = scene_for(teapot(triangles), exponent, 640, 480)
             raster = rasterise(scene)
-            method = METHODS["chord"]
-            widest, turn = method.widest_span(exponent), method.largest_bend(exponent)
-            cut, _ = cut_wide_spans(raster, widest, turn)
+            cut, _ = cut_spans(scene, raster, preset("chord"))
             row = [f"{len(scene.mesh.faces):,}", str(exponent), f"{len(raster.length):,}"]
             found = (cut.length, pieces(scene, raster, False), pieces(scene, raster, True))
             for lengths in found:
