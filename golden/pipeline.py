@@ -1,4 +1,4 @@
-"""The shading pipeline: spans in, pixels out; how a design is composed, and its bit-accurate model."""
+"""The shading pipeline: its input and output, the composition of a design, and its bit-accurate model."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +14,7 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
 from blysk.golden.methods.interpolator import Interpolator, Operands
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
+from blysk.golden.methods.local_chord_interpolator import SpanValues
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
@@ -25,21 +25,20 @@ __all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]
 
 @dataclass(frozen=True)
 class Spans:
-    """The pipeline's input: raster spans with quantised normals.
+    """Raster spans with quantised normals: the pipeline's input.
 
     Parameters
     ----------
     x, y : int arrays, shape (spans,)
-        First pixel of each span, 0 to 4095, or what the pipeline's coordinates hold.
+        First pixel of each span, 0 to 4095, or the largest coordinate of the pipeline.
     length : int array, shape (spans,)
-        Pixels, 0 to 4095. A span of length 0 gives no pixel; one that goes past the largest x starts again
-        at 0.
+        Pixels, 0 to 4095. A span of length 0 gives no pixel; past the largest x, x goes on from 0.
     normal_left, normal_right : int arrays, shape (spans, 3)
         Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``.
     material : int array, shape (spans,), optional
         Index of the material; ``None``: 0 for all.
     values : SpanValues, optional
-        For ``chord-local``, which reads no normals: values of each light.
+        Values of each light, for methods with `Interpolator.TAKES_VALUES`, which read no normals.
     """
 
     x: np.ndarray
@@ -66,18 +65,18 @@ class Spans:
 
 @dataclass(frozen=True)
 class Pixels:
-    """The pipeline's output.
+    """Pixels: the pipeline's output.
 
     Parameters
     ----------
     x, y : int arrays, shape (pixels,)
-        Place.
+        Column and row.
     color : uint8 array, shape (pixels, 3)
         Red, green, blue.
     last : bool array, shape (pixels,)
         Whether a pixel is the last of its span.
     out_of_range_spans : int
-        Spans wider than the method can shade, whose pixels are not to be trusted.
+        Spans of a larger angle than the method serves, whose pixels have no error bound.
     """
 
     x: np.ndarray
@@ -93,15 +92,15 @@ STYLES = ("throughput", "compact")
 
 @dataclass(frozen=True)
 class Build:
-    """How a design is built: what changes its cost and its cycles, and no pixel.
+    """Build options of a design: they change its cost and its cycles, and no pixel.
 
     Parameters
     ----------
     style : {"throughput", "compact"}
         One pixel a cycle, or few multipliers.
     setup_interval : int or None
-        Cycles from a span to the next at the closest, where the method has that choice: a smaller one needs
-        more multipliers. ``None``: 4, or in the compact style the largest.
+        Least cycles from a span to the next, where the method has that choice: a smaller number needs more
+        multipliers. ``None``: 4, or in the compact style the largest.
     exponent : int or None
         The specular exponent, fixed at build time; ``None``: that of the frame constants.
 
@@ -126,24 +125,24 @@ class Build:
 class Design:
     """A shading pipeline: an interpolator, diffuse and specular terms of each light, and the intensity.
 
-    `presets.preset` makes one by names. The bit-accurate model, `compute`, composes those of the units;
-    nothing is rounded in between. Formats and error bounds are theirs.
+    `presets.preset` makes one by names. The bit-accurate model, `compute`, composes those of the units, whose
+    formats and error bounds hold; nothing is rounded in between.
 
     Parameters
     ----------
     interpolator : Interpolator
         The method.
     specular : Specular or Power or None
-        The highlight; it takes the operand that the interpolator gives. ``None``: no specular light.
+        Specular term, of the operand that the interpolator gives. ``None``: no specular light.
     lights : int
-        Number of lights, 0 to 16. Without any there is ambient light alone, and no method.
+        Number of lights, 0 to 16. With none there is ambient light alone, and no method.
     materials : int
         Number of materials, 1 to `frame_constants.MAX_MATERIALS`.
     gate : bool
-        Whether a `HighlightGate` tells the lights which spans have no highlight. For unit normals that
-        changes no pixel.
+        Whether a `HighlightGate` decides which spans have no highlight. With unit normals that changes no
+        pixel.
     grey : bool
-        One channel in place of three: red's colour operands count, and the pixel has it three times.
+        One channel in place of three: it has red's colour operands, and the pixel has it three times.
     x_bits, y_bits, length_bits : int
         Bits of the coordinates, 1 to 12, and of a span's length, 2 to 12.
     build : Build
@@ -154,6 +153,8 @@ class Design:
     ValueError
         If the number of lights or materials or a number of bits is out of range, or a gate is asked for
         without specular light or with a method that has no error bound or no normals.
+
+    Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
 
     interpolator: Interpolator = field(default_factory=QuadraticInterpolator)
@@ -199,8 +200,8 @@ class Design:
 
     @property
     def takes_values(self) -> bool:
-        """Whether spans carry values of each light, in place of normals, so that L and H may be local."""
-        return isinstance(self.interpolator, LocalChordInterpolator)
+        """Whether spans carry values of each light in place of normals, so that L and H may be local."""
+        return self.interpolator.TAKES_VALUES
 
     @cached_property
     def highlight_gate(self) -> HighlightGate:
@@ -208,12 +209,16 @@ class Design:
         return HighlightGate(self.specular, interpolator=self.interpolator)
 
     def lit_spans(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> np.ndarray:
-        """Which spans the highlight gate lets through, for each light: bool array, shape (spans, lights).
+        """Spans that may have a highlight of each light, as the highlight gate decides.
 
         Parameters
         ----------
         spans, constants
             As for `compute`.
+
+        Returns
+        -------
+        bool array, shape (spans, lights)
         """
         constants = [constants] if isinstance(constants, FrameConstants) else constants
         left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
@@ -225,12 +230,12 @@ class Design:
         return np.stack(lit, axis=-1)
 
     def compute(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> Pixels:
-        """Bit-true pixels, in the order of the spans.
+        """Bit-accurate pixels, in the order of the spans.
 
         Parameters
         ----------
         spans : Spans
-            What is shaded.
+            Spans to shade.
         constants : FrameConstants or sequence of FrameConstants
             Of the material, or of each; L and H are those of the first.
 
@@ -241,6 +246,39 @@ class Design:
             lack the values that the method takes.
         """
         constants = [constants] if isinstance(constants, FrameConstants) else list(constants)
+        self._check(spans, constants)
+        kept = np.flatnonzero(np.asarray(spans.length) > 0)
+        length = np.asarray(spans.length, dtype=np.int64)[kept]
+        span, step = pixels_of(length)
+        color = np.empty((len(span), 3), dtype=np.uint8)
+        out_of_range = 0
+        if self.lights:
+            lit = self.lit_spans(spans, constants)[kept] if self.gate else None
+            interpolate = self._operands_of(spans, kept, length, constants[0])
+            first = 0
+            for part in runs_of(length):
+                operands = interpolate(part)
+                pixels = slice(first, first + len(operands.cosine.codes))
+                material = spans.material[kept][span[pixels]]
+                dark = np.zeros(operands.cosine.shape, dtype=bool) if lit is None else ~lit[span[pixels]]
+                for index in np.unique(material):
+                    which = np.flatnonzero(material == index)
+                    terms = operands.cosine[which], operands.highlight[which], dark[which]
+                    color[pixels][which] = self._shade(*terms, constants[index])
+                out_of_range += int(np.count_nonzero(operands.out_of_range))
+                first = pixels.stop
+        else:
+            color[:] = self._ambient(constants, spans.material[kept][span])
+        return Pixels(
+            x=(np.asarray(spans.x)[kept][span] + step) & ((1 << self.x_bits) - 1),
+            y=np.asarray(spans.y)[kept][span],
+            color=color,
+            last=step == length[span] - 1,
+            out_of_range_spans=out_of_range,
+        )
+
+    def _check(self, spans: Spans, constants: Sequence[FrameConstants]) -> None:
+        """Refuse constants of another design, and codes out of range."""
         if len(constants) != self.materials:
             raise ValueError(f"the constants are for {len(constants)} materials, not {self.materials}")
         for of_material in constants:
@@ -256,43 +294,17 @@ class Design:
             codes = np.asarray(getattr(spans, name))
             if codes.size and not 0 <= codes.min() <= codes.max() < 1 << bits:
                 raise ValueError(f"{name} must be 0 to {(1 << bits) - 1}")
-        kept = np.flatnonzero(np.asarray(spans.length) > 0)
-        length = np.asarray(spans.length, dtype=np.int64)[kept]
-        interpolate = self._interpolated(spans, kept, length, constants[0])
+        if not (self.takes_values and self.lights):
+            return
+        if spans.values is None or spans.values.diffuse.shape != (len(spans), self.lights, 3):
+            raise ValueError(f"method {self.method} takes spans with values for {self.lights} lights")
 
-        span, step = pixels_of(length)
-        color = np.empty((len(span), 3), dtype=np.uint8)
-        out_of_range, done = 0, 0
-        lit = self.lit_spans(spans, constants)[kept] if self.gate else None
-        for part in runs_of(length):
-            if not self.lights:
-                color[:] = self._ambient(constants, spans.material[kept][span])
-                break
-            operands = interpolate(part)
-            count = len(operands.cosine.codes)
-            of_pixel = span[done : done + count]
-            material = spans.material[kept][of_pixel]
-            dark = np.zeros((count, self.lights), dtype=bool) if lit is None else ~lit[of_pixel]
-            for index in np.unique(material):
-                which = np.flatnonzero(material == index)
-                color[done + which] = self._shade(
-                    operands.cosine[which], operands.highlight[which], dark[which], constants[index]
-                )
-            out_of_range, done = out_of_range + int(np.count_nonzero(operands.out_of_range)), done + count
-        return Pixels(
-            x=(np.asarray(spans.x)[kept][span] + step) & ((1 << self.x_bits) - 1),
-            y=np.asarray(spans.y)[kept][span],
-            color=color,
-            last=step == length[span] - 1,
-            out_of_range_spans=out_of_range,
-        )
-
-    def _interpolated(self, spans, kept, length, constants) -> Callable[[slice], Operands]:
-        """What takes a part of the spans that are kept to operands."""
-        if self.takes_values and self.lights:
-            if spans.values is None or spans.values.diffuse.shape != (len(spans), self.lights, 3):
-                raise ValueError(f"method {self.method} takes spans with values for {self.lights} lights")
-            values = [codes[kept] for codes in spans.values]
+    def _operands_of(
+        self, spans: Spans, kept: np.ndarray, length: np.ndarray, constants: FrameConstants
+    ) -> Callable[[slice], Operands]:
+        """Function from a part of the kept spans to the operands of its pixels."""
+        if self.takes_values:
+            values = spans[kept].values
             return lambda part: self.interpolator.compute_values(
                 SpanValues(*(codes[part] for codes in values)), length[part]
             )
@@ -303,6 +315,7 @@ class Design:
     def _shade(
         self, cosine: Fixed, highlight: Fixed, dark: np.ndarray, constants: FrameConstants
     ) -> np.ndarray:
+        """Colours of pixels of one material, shape (pixels, 3); of the operands, shape (pixels, lights)."""
         diffuse_unit = Diffuse(cosine.format)
         dark = dark | diffuse_unit.dark(cosine)
         diffuse = diffuse_unit.compute(cosine)
@@ -312,16 +325,18 @@ class Design:
         return self.intensity.compute(*self._colors(constants), diffuse, specular)
 
     def _ambient(self, constants: Sequence[FrameConstants], material: np.ndarray) -> np.ndarray:
-        """Colours of pixels of such materials without any light."""
+        """Colours of pixels by their materials, without any light."""
         nothing = Fixed(Intensity.TERM_FORMAT, np.zeros((1, 0), dtype=np.int64))
         each = [self.intensity.compute(*self._colors(of), nothing, nothing) for of in constants]
         return np.concatenate(each)[material]
 
     @property
     def intensity(self) -> Intensity:
-        """Twin of the intensity unit."""
+        """Bit-accurate model of the intensity unit."""
         return Intensity(self.lights, has_specular=self.specular is not None, channels=1 if self.grey else 3)
 
-    def _colors(self, constants: FrameConstants) -> tuple[Fixed, ...]:
+    @staticmethod
+    def _colors(constants: FrameConstants) -> tuple[Fixed, ...]:
+        """Ambient, diffuse and specular colour operands."""
         colors = (constants.ambient, constants.diffuse, constants.specular)
         return tuple(Fixed(Intensity.COLOR_FORMAT, codes) for codes in colors)

@@ -1,61 +1,48 @@
 """Designs by name: the methods and reflection models of the command line, the API and the tables."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
-from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.arccos import Arccos
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.angular_interpolator import AngularInterpolator
-from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods import (
+    angular_interpolator,
+    bisection_interpolator,
+    chord_interpolator,
+    linear_interpolator,
+    local_chord_interpolator,
+    quadratic_interpolator,
+    recurrence_interpolator,
+)
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator, Operand
-from blysk.golden.methods.linear_interpolator import LinearInterpolator
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
-from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
-from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
-from blysk.golden.normals.bisection import Bisection
-from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.pipeline import Build, Design
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 
 __all__ = ["METHODS", "MODELS", "PUBLISHED", "preset"]
 
-METHODS: dict[str, Interpolator] = {
-    method.name: method
-    for method in (
-        LinearInterpolator(),
-        BisectionInterpolator(),
-        QuadraticInterpolator(),
-        QuadraticInterpolator(form="direct"),
-        QuadraticInterpolator(form="horner"),
-        AngularInterpolator(),
-        RecurrenceInterpolator(),
-        LinearInterpolator(renormalised=True),
-        ChordInterpolator(),
-        LocalChordInterpolator(),
-    )
-}
+_MODULES = (
+    linear_interpolator,
+    bisection_interpolator,
+    quadratic_interpolator,
+    angular_interpolator,
+    recurrence_interpolator,
+    chord_interpolator,
+    local_chord_interpolator,
+)
+"""Modules of the methods, in the order of tables, with their ``METHODS`` and perhaps ``PUBLISHED``."""
+
+METHODS: dict[str, Interpolator] = {method.name: method for module in _MODULES for method in module.METHODS}
 """Interpolation methods."""
 
 PUBLISHED: dict[str, Interpolator] = {
-    method.name: method
-    for method in (
-        BisectionInterpolator(bisection=Bisection(as_published=True)),
-        QuadraticInterpolator(middle_normal=MiddleNormal("as_published")),
-        AngularInterpolator(AngularSetup("arccos", Arccos("as_published"))),
-        AngularInterpolator(AngularSetup("arccos", Arccos("corrected"))),
-        RecurrenceInterpolator("direct"),
-    )
+    method.name: method for module in _MODULES for method in getattr(module, "PUBLISHED", ())
 }
-"""Methods with the coefficients or in the form that the documents print, to be compared with the others: the
-polynomials of [T] 2.1 and 2.2, table 3.1 with its misprint and without, and formula 3.3 as it stands. A
-gate does not go with them."""
+"""Methods with the coefficients or in the form that the documents print, to be compared with the others.
+They have no error bound for a highlight gate."""
 
 MODELS: dict[str, Specular | Power] = {
     model.name: Specular(model) for model in REFLECTION_MODELS.values() if isinstance(model, Specular.SERVED)
 } | {"blinn": Power()}
-"""Units of the reflection models; every method serves each."""
+"""Specular units of the reflection models; every method serves each."""
 
 
 def preset(
@@ -80,11 +67,11 @@ def preset(
     lights : int
         Number of lights, 0 to 16.
     operand : {"cosine", "one_minus_cosine"}, optional
-        What the specular unit is given, of a method that finds normals; by default what the method gives.
+        Operand of the specular unit, of a method that finds normals; by default that of the method.
     style, setup_interval, exponent
         See `Build`.
     **options
-        Further fields of `Design`, or of the method.
+        Further fields of `Design`, or of the method; ``None``: its own value.
 
     Returns
     -------
@@ -93,20 +80,22 @@ def preset(
     Raises
     ------
     ValueError
-        If a name is unknown, a method has no choice of operand, or `Design` refuses a value.
+        If a name is unknown, the method lacks an option, or `Design` refuses a value.
     """
     if method not in METHODS | PUBLISHED:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
     if model is not None and model not in MODELS:
         raise ValueError(f"model must be one of {', '.join(MODELS)}, not {model!r}")
     interpolator = (METHODS | PUBLISHED)[method]
-    own = {name: options.pop(name) for name in ("terms", "fraction_bits") if options.get(name) is not None}
-    if own and not isinstance(interpolator, ChordInterpolator):
-        raise ValueError(f"terms and fraction_bits are for the method chord, not {method}")
     if operand not in (None, interpolator.operand):
         if not isinstance(interpolator, NormalInterpolator):
             raise ValueError(f"method {method} finds no normals, and gives 1 - cos gamma")
-        own["operand"] = operand
-    interpolator = replace(interpolator, **own)
+        interpolator = replace(interpolator, operand=operand)
+    of_design = {field.name for field in fields(Design)}
+    own = {name: options.pop(name) for name in list(options) if name not in of_design}
+    own = {name: value for name, value in own.items() if value is not None}
+    if unknown := sorted(own.keys() - {field.name for field in fields(interpolator)}):
+        raise ValueError(f"method {method} has no option {unknown[0]}")
     build = Build(style, setup_interval, exponent)
-    return Design(interpolator, MODELS[model] if model else None, lights, build=build, **options)
+    specular = MODELS[model] if model else None
+    return Design(replace(interpolator, **own), specular, lights, build=build, **options)

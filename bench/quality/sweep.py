@@ -49,7 +49,7 @@ FEW_EXPONENTS += (470, 500, 600, 700, 800, 900, 1000)
 LARGEST = 1.0
 """Target: the largest error of a channel, in LSB."""
 
-LARGEST_COSINE = 0.12 / 255 + ChordInterpolator().largest_bend(1) + 2.0**-15
+LARGEST_COSINE = 0.12 / 255 + ChordInterpolator().largest_deviation(1) + 2.0**-15
 """How near to 0 an exact N·L must be for its sign to be open, 1.3e-3: the error of the chord method's fit
 (see `largest_span_angle`) and of a part's bend, and those of vectors and words."""
 
@@ -169,7 +169,7 @@ class Frame:
             scene = self.scene_of(exponent)
             cut, _ = cut_local_spans(scene, self.raster, method)
             return cut, replace(quantise_spans(cut, material), values=local_values(scene, cut, 1))
-        cut, _ = cut_wide_spans(self.raster, method.widest_span(exponent), method.largest_bend(exponent))
+        cut, _ = cut_wide_spans(self.raster, method.widest_span(exponent), method.largest_deviation(exponent))
         return cut, quantise_spans(cut, material)
 
     def points(self, exponent: int, models: Iterable[str], method: str = "chord") -> Iterator[Point]:

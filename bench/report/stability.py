@@ -7,7 +7,6 @@ The same functions grade the cases for the report and for the tests.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -19,17 +18,10 @@ from amaranth.lib import wiring
 from blysk.bench.report.section import Drawing, Grade, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.tools.pages import svg
-from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.highlight_cosine import HighlightCosine
-from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.interpolator import Operands
-from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
-from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
-from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
-from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
@@ -73,7 +65,6 @@ __all__ = [
     "measure_case",
     "measure_ranges",
     "measure_stream",
-    "operand_error",
     "section",
     "stream_patterns",
     "tasks",
@@ -426,54 +417,6 @@ def _triangle_cases(rng) -> Iterator[Case]:
     yield _scene_case(9, "through the near plane", bent(plate, [(0, 1, 2), (0, 2, 3)]), low)
 
 
-@cache
-def operand_error(method: str, length: int, degrees: float) -> float:
-    """Largest error of N·L and of N·H that a method's devices state, against its own curve in float64.
-
-    Parameters
-    ----------
-    method : str
-        One of `METHODS`.
-    length : int
-        Pixels of the span.
-    degrees : float
-        Angle of the span, to 45 with the quadratic methods, and to what they flag with the others.
-    """
-    psi = np.radians(degrees)
-    # Three roundings to the result, 1/(m-1) by 2^-17, and the rounding of the differences at the last pixel.
-    rounding = np.sqrt(3) * (2.0**-18 + 2.0**-42 * (length + length**2 / 2))
-    middle = np.sqrt(3) * MiddleNormal.ERROR
-    straight = rounding + _STEP * (2 * np.sin(psi / 2) + _STEP)
-    if method == "linear":
-        return straight
-    if method == "renormalise":
-        return straight / np.cos(psi / 2) + Renormaliser.ERROR
-    if method == "quadratic":
-        return rounding + middle + _STEP * 0.83 + (3 * _STEP + 2.0**-34) * 0.305
-    if method in ("quadratic-eval", "quadratic-horner"):
-        return middle + np.sqrt(3) * QuadraticEvaluator(METHODS[method].form).error
-    if method == "bisection":
-        return _bisection_error(degrees > MAX_SPAN_ANGLE)
-    if method == "angular":
-        # The code of length 1, where the setup has 1; half a step of the result.
-        return AngularSetup.error(degrees) + HighlightCosine.ERROR + 2.0**-16 + 2.0**-26
-    setup = METHODS[method].setup if method != "chord-local" else LocalChordSetup()
-    if method == "recurrence":
-        return setup.error(length, psi)
-    # The cut of the results.
-    if method == "chord":
-        return float(max(setup.highlight_error(degrees), setup.diffuse_error(degrees))) + 2.0**-25
-    # The words of a span hold slopes to 1/2 and bends to 1/8.
-    return float(max(setup.highlight_error(0.5, 0.125), setup.diffuse_error(0.5, 0.125))) + 2.0**-25
-
-
-@cache
-def _bisection_error(is_wide: bool) -> float:
-    unit = AdaptiveNormaliser(METHODS["bisection"].threshold)
-    error = max(unit.error(k, is_wide) for k in range(unit.depth + 1))
-    return np.sqrt(3) * error + unit.threshold + 2.0**-19 + 0.017 * (8.1 * unit.threshold) ** 1.5
-
-
 def _design(case: Case, method: str) -> Design:
     return preset(method, MODEL, lights=len(case.scene.lights))
 
@@ -499,7 +442,7 @@ def _shade(case: Case, design: Design, raster: Raster, codes: Sequence[np.ndarra
     out_of_range = _operands(design, spans, constants).out_of_range
 
     degrees = np.minimum(_angles(raster), design.interpolator.MAX_ANGLE).max(initial=0)
-    error = operand_error(design.method, int(raster.length.max(initial=1)), float(degrees))
+    error = design.interpolator.operand_error(int(raster.length.max(initial=1)), float(degrees))
     error += min(_length_excess(codes), LENGTH_TOLERANCE)
     shown, whole = raster.visible, case.raster
     t = whole.offset / np.maximum(whole.length[whole.span] - 1, 1)

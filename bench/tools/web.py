@@ -298,7 +298,7 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
         design = preset(method)
         streams[method] = []
         for exponent in BANDS:
-            cut = design.interpolator.widest_span(exponent), design.interpolator.largest_bend(exponent)
+            cut = design.interpolator.widest_span(exponent), design.interpolator.largest_deviation(exponent)
             if cut not in cuts:
                 frame = prepare(scene_of(START | {"mesh": mesh, "view": view, "exponent": exponent}), design)
                 text = base64.b64encode(encode(frame.spans, frame.cut_raster.visible)).decode()

@@ -1,4 +1,4 @@
-"""Bisection of spans until straight lines will do ([T] figure 2.7): method ``bisection``."""
+"""Bisection of spans into segments short enough for straight lines ([T] figure 2.7): method ``bisection``."""
 
 from dataclasses import dataclass, field
 from functools import cache
@@ -8,21 +8,23 @@ import numpy as np
 from blysk.golden.methods.interpolator import NormalInterpolator
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
+from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR
 from blysk.golden.reference.curves import interpolate
 
-__all__ = ["BisectionInterpolator"]
+__all__ = ["METHODS", "PUBLISHED", "BisectionInterpolator"]
 
 
 @dataclass(frozen=True)
 class BisectionInterpolator(NormalInterpolator):
-    """Normals on straight lines over ``2^k`` arcs of the great circle, k just large enough.
+    """Normals on straight lines over ``2^k`` arcs of the great circle, with the least k that serves.
 
-    Formats and error bounds are those of `AdaptiveNormaliser`, for spans to 90
-    degrees.
+    Formats and error bounds are those of `AdaptiveNormaliser`, for spans to 90 degrees.
 
     Parameters
     ----------
+    operand : str
+        See `NormalInterpolator`.
     threshold : float
         Largest length error of a normal.
     bisection : Bisection
@@ -33,7 +35,7 @@ class BisectionInterpolator(NormalInterpolator):
     ValueError
         If the threshold is out of range or the operand unknown.
 
-    Source: [T] 2.1, figure 2.7.
+    Source: docs/theory/interpolation.md#adaptive-normaliser; [T] 2.1, figure 2.7.
     """
 
     threshold: float = 2.0**-14
@@ -57,12 +59,12 @@ class BisectionInterpolator(NormalInterpolator):
 
     @property
     def normaliser(self) -> AdaptiveNormaliser:
-        """The unit."""
+        """Model of the adaptive normaliser."""
         return _normaliser(self.threshold, self.bisection)
 
     @property
     def normal_error(self):
-        """That of three components, at the largest depth, and the codes' lengths."""
+        """That of three components, at the largest depth, and the lengths of the codes."""
         normaliser = self.normaliser
         return float(np.sqrt(3) * normaliser.error(normaliser.depth, False)) + CODE_LENGTH_ERROR
 
@@ -71,8 +73,12 @@ class BisectionInterpolator(NormalInterpolator):
         """One less the threshold and the rounding of the error block."""
         return 1 - self.threshold - 2.0**-18
 
+    def operand_error(self, length, degrees):
+        """Error of the normaliser at any depth, and what a straight line is off the great circle by."""
+        return _operand_error(self.normaliser, degrees > MAX_SPAN_ANGLE)
+
     def normals(self, normal_left, normal_right, length):
-        """Bit-true normals."""
+        """Bit-accurate normals."""
         normals, out_of_range, _ = self.normaliser.compute(normal_left, normal_right, length)
         return normals, out_of_range
 
@@ -91,5 +97,20 @@ class BisectionInterpolator(NormalInterpolator):
 
 @cache
 def _normaliser(threshold: float, bisection: Bisection) -> AdaptiveNormaliser:
-    """The unit, whose polynomials take half a second to fit."""
+    """The model, whose polynomials take half a second to fit."""
     return AdaptiveNormaliser(threshold, bisection)
+
+
+@cache
+def _operand_error(normaliser: AdaptiveNormaliser, beyond_45_degrees: bool) -> float:
+    threshold = normaliser.threshold
+    error = max(normaliser.error(depth, beyond_45_degrees) for depth in range(normaliser.depth + 1))
+    # A line leaves the great circle by the threshold in length, and by 0.017 psi^3 of its angle in direction.
+    return float(np.sqrt(3) * error + threshold + 2.0**-19 + 0.017 * (8.1 * threshold) ** 1.5)
+
+
+METHODS = (BisectionInterpolator(),)
+"""Its method."""
+
+PUBLISHED = (BisectionInterpolator(bisection=Bisection(as_published=True)),)
+"""The polynomials of [T] 2.1."""

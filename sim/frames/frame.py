@@ -155,7 +155,7 @@ def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int
         return cut_local_spans(scene, raster, interpolator)
     exponents = [material.exponent for material in scene.materials]
     widest = min(map(interpolator.widest_span, exponents))
-    return cut_wide_spans(raster, widest, min(map(interpolator.largest_bend, exponents)))
+    return cut_wide_spans(raster, widest, min(map(interpolator.largest_deviation, exponents)))
 
 
 def model_frame(scene: Scene, design: Design) -> SimulatedFrame:

@@ -173,14 +173,14 @@ class _Places:
 
     def turned(self, other: "_Places", method: LocalChordInterpolator) -> np.ndarray:
         """Whether a vector turns by more than the method allows from here to there; bool, shape (count,)."""
-        least = np.cos(np.radians(method.LARGEST_TURN))
+        least = np.cos(np.radians(method.MAX_VECTOR_ANGLE))
         result = np.einsum("sk,sk->s", self.normal, other.normal) < least
         result |= np.einsum("sk,sk->s", self.viewer, other.viewer) < least
         result |= (np.einsum("lsk,lsk->ls", self.direction, other.direction) < least).any(axis=0)
         move = np.linalg.norm(self.viewer - other.viewer, axis=1)
         move = move + np.linalg.norm(self.direction - other.direction, axis=2)
         total = [np.linalg.norm(place.direction + place.viewer, axis=2) for place in (self, other)]
-        return result | (move > method.LARGEST_MOVE * np.minimum(*total)).any(axis=0)
+        return result | (move > method.MAX_HALFWAY_CHANGE * np.minimum(*total)).any(axis=0)
 
 
 def _chunks(count: int) -> Iterator[slice]:

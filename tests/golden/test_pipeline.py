@@ -465,7 +465,7 @@ def test_bad_arguments_are_refused():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"terms": 3}, "terms and fraction_bits are for the method chord, not quadratic"),
+        ({"terms": 3}, "method quadratic has no option terms"),
         ({"materials": 0}, "materials must be 1 to 1024, not 0"),
         ({"materials": 1025}, "materials must be 1 to 1024, not 1025"),
         ({"gate": True, "model": None}, "without specular light there is nothing to gate"),

@@ -55,7 +55,7 @@ class Surface:
             directions.append(normalise(self.start[:, np.newaxis] + self.lights - point[:, np.newaxis]))
         move = sum(np.linalg.norm(a - b, axis=2) for a, b in (viewers, directions))
         total = [np.linalg.norm(v + d, axis=2) for v, d in zip(viewers, directions, strict=True)]
-        return (move > METHOD.LARGEST_MOVE * np.minimum(*total)).any(axis=1)
+        return (move > METHOD.MAX_HALFWAY_CHANGE * np.minimum(*total)).any(axis=1)
 
     def values(self):
         span = np.arange(len(self.start))

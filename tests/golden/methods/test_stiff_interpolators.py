@@ -8,7 +8,6 @@ methods do in all groups of cases is in `stability`.
 import numpy as np
 import pytest
 
-from blysk.bench.report.stability import operand_error as bound
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.normals.renormaliser import Renormaliser
@@ -23,6 +22,10 @@ ONE_VALUE = float(ONE_SQUARED.values)
 NAMES = [name for name in METHODS if name not in ("chord", "chord-local")]
 NORMALS = [name for name in NAMES if name not in ("angular", "recurrence")]
 ANGLES = [0, 1e-4, 1, 20, 44.9]
+
+
+def bound(method, length, degrees):
+    return METHODS[method].operand_error(length, degrees)
 
 
 def reference(method, left, right, length, vector):

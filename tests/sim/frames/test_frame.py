@@ -62,7 +62,7 @@ def simulator():
 
 
 def twin_pixels(scene):
-    bend = DESIGN.interpolator.largest_bend(scene.materials[0].exponent)
+    bend = DESIGN.interpolator.largest_deviation(scene.materials[0].exponent)
     cut, _ = cut_wide_spans(rasterise(scene), MAX_SPAN_ANGLE, bend)
     return cut, DESIGN.compute(
         quantise_spans(cut, scene.mesh.material), FrameConstants.of(scene, DESIGN.lights)
@@ -276,7 +276,7 @@ def test_frame_of_three_materials(engine):
         alone = dataclasses.replace(lone, material=material)
         method = several.interpolator
         widest = min(method.widest_span(material.exponent) for material in MATERIALS)
-        bend = min(method.largest_bend(material.exponent) for material in MATERIALS)
+        bend = min(method.largest_deviation(material.exponent) for material in MATERIALS)
         cut, _ = cut_wide_spans(rasterise(alone), widest, bend)
         spans = quantise_spans(cut, alone.mesh.material)
         pixels = one.compute(spans, FrameConstants.of(alone, 1))
