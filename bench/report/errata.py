@@ -14,7 +14,7 @@ from blysk.bench.report.cosine_quadratic import ZONE
 from blysk.bench.report.section import Section, Table
 from blysk.bench.store import Task
 from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.arccos import PRINTED_COEFFICIENTS, SEGMENT_BOUNDS, Arccos
+from blysk.golden.cosines.arccos import PUBLISHED_COEFFICIENTS, SEGMENT_BOUNDS, Arccos
 from blysk.golden.cosines.recurrence import Recurrence, shortcut_cosine
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax, reciprocal_root
@@ -114,12 +114,12 @@ def _misprint() -> Evidence:
 
 def _order() -> Evidence:
     x = np.linspace(0, 0.5, 501)
-    return _row_error(PRINTED_COEFFICIENTS[0][::-1], x), _row_error(PRINTED_COEFFICIENTS[0], x)
+    return _row_error(PUBLISHED_COEFFICIENTS[0][::-1], x), _row_error(PUBLISHED_COEFFICIENTS[0], x)
 
 
 def _arccos_claim() -> Evidence:
     worst = [
-        largest_error(np.arccos, PRINTED_COEFFICIENTS[k], *SEGMENT_BOUNDS[k : k + 2])[1] for k in range(4)
+        largest_error(np.arccos, PUBLISHED_COEFFICIENTS[k], *SEGMENT_BOUNDS[k : k + 2])[1] for k in range(4)
     ]
     return 0.002, max(worst)
 

@@ -17,9 +17,10 @@ from amaranth.lib.wiring import Component
 from tqdm import tqdm
 
 from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.arccos import ARCCOS_TABLES, SEGMENT_BOUNDS, Arccos, HalfChord
+from blysk.golden.cosines.arccos import ARCCOS_TABLES, SEGMENT_BOUNDS, Arccos
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.cosines.recurrence import RECURRENCE_FORMS, Recurrence
@@ -51,9 +52,10 @@ from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
-from blysk.hdl.cosines.arccos import ArccosUnit, HalfChordUnit
+from blysk.hdl.cosines.arccos import ArccosUnit
 from blysk.hdl.cosines.chord import ChordUnit
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
+from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
@@ -66,6 +68,7 @@ from blysk.hdl.lighting.light import LightUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SpecularUnit
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
+from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 from blysk.hdl.normals.bisection import BisectionUnit
 from blysk.hdl.normals.bisection_chain import BisectionChainUnit
@@ -76,7 +79,7 @@ from blysk.hdl.normals.gpq import GPQUnit
 from blysk.hdl.normals.middle_normal import MiddleNormalUnit
 from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 from blysk.hdl.normals.renormaliser import RenormaliserUnit
-from blysk.hdl.pipeline import INTERPOLATORS, ShadingPipelineUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import OutputFile
 from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.simulate import simulate
@@ -1053,7 +1056,7 @@ def _blocks() -> Iterator[Block]:
             "difference_setup",
             variant,
             "[T] 2.11",
-            partial(DifferenceSetupUnit, unit, interval),
+            partial(DifferenceSetupUnit, unit, initiation_interval=interval),
             partial(_difference_setup, unit=unit),
             f"{_SPANS_45}, {_LONG}",
             note="of the curve at any pixel that the differences lead to",
@@ -1261,7 +1264,7 @@ def _blocks() -> Iterator[Block]:
         "local_chord_setup",
         "interval 4",
         "chord.md",
-        partial(LocalChordSetupUnit, 1, 4),
+        LocalChordSetupUnit,
         _local_chord_setup,
         f"{local}, {_LONG}",
         note="of N.L and u at any pixel that the differences lead to; exact: the quadratic",
@@ -1278,7 +1281,7 @@ def _blocks() -> Iterator[Block]:
     )
     methods = {name: p for name, p in METHODS.items() if not isinstance(p, LocalChordInterpolator)}
     for method, p in methods.items():
-        unit = INTERPOLATORS[type(p)]
+        unit = unit_of(p)
         yield Block(
             unit.__module__.rpartition(".")[2],
             method,

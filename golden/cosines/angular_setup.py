@@ -1,4 +1,4 @@
-"""Angular setup ([T] 3.1): the great circle of a span as seen from a fixed vector."""
+"""Angular setup ([T] 3.1): the angles of a span's great circle to a fixed vector."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -7,7 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from blysk.golden.cosines.arccos import SEGMENT_BOUNDS, Arccos, HalfChord
+from blysk.golden.cosines.arccos import SEGMENT_BOUNDS, Arccos
+from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
@@ -18,34 +19,37 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 __all__ = ["SPAN_ANGLES", "AngularSetup"]
 
 SPAN_ANGLES = ("half_chord", "arccos")
-"""Units that psi may come from."""
+"""Units that may give psi."""
 
 
 @dataclass(frozen=True)
 class AngularSetup:
-    """``psi``, ``lambda``, ``cos beta`` and ``psi/(m-1)`` from ``N_l``, ``N_r`` and a fixed vector H.
+    """Angles ``psi``, ``lambda``, ``psi/(m-1)`` and ``cos beta`` from ``N_l``, ``N_r`` and a fixed vector H.
 
-    [T] 3.1 takes psi from arccos and ``tan lambda = (N_r.H - cos psi N_l.H)/(sin psi N_l.H)``, which is 0/0
-    where psi tends to 0, the usual case. Here, with ``a = N_l.H``, ``b = N_r.H`` and the angle counted from
-    the middle of the span,
+    [T] 3.1 takes psi from arccos and ``tan lambda = (N_r.H - cos psi N_l.H)/(sin psi N_l.H)``. That is 0/0
+    as psi tends to 0, and most spans are narrow. Here, with ``a = N_l.H``, ``b = N_r.H`` and the angle
+    counted from the middle of the span,
 
     - ``cos gamma(t) = x cos((t - 1/2) psi) + y sin((t - 1/2) psi)``,
     - ``x = (a + b)/(2 cos(psi/2))`` and ``y = (b - a)/(2 sin(psi/2))``,
     - ``cos beta = sqrt(x^2 + y^2)``, ``lambda = atan2(y, x) + psi/2``.
 
-    The curve goes through a and b whatever psi is, so an error of y counts times ``sin(psi/2)``: it fades
-    where y is hard to tell. All cancellations are exact, as dot products of code vectors are: ``w = |N_r -
-    N_l|^2 = N_l.N_l + N_r.N_r - 2 N_l.N_r`` and ``b - a``. Both half-angle functions come from ``z = w/4 =
-    sin^2(psi/2)``: ``1/(2 cos(psi/2)) = 1/2 + e(z)/2`` from a table, a small correction; ``1/(2 sin(psi/2))
-    = 2^j T(v)`` from a table on ``v = z 4^j`` in [1/4, 1), with ``b - a`` shifted by j. psi is that of
-    `HalfChord`; nothing needs an arccos. Beyond 90 degrees ``|N_r + N_l|^2`` takes the place of w and x and
-    y change places, so every angle from 0 to 180 degrees is served. Only for opposite normals is there no
-    plane: the setup then goes round by the pole ``x = 0``. The nearer they come to it, the more their
-    rounding turns the plane, by ``1/sin psi`` of it: spans over 150 degrees are flagged. One comparison does,
-    ``|N_r + N_l|^2 < 4 cos^2(75 degrees)``, less what rounding may take off: flagged for certain from 150.01.
+    The curve goes through a and b whatever psi is, so an error of y counts times ``sin(psi/2)``: it is small
+    for narrow spans, for which y is inaccurate. Differences of nearly equal numbers are exact, because dot
+    products of codes are exact: ``w = |N_r - N_l|^2 = N_l.N_l + N_r.N_r - 2 N_l.N_r`` and ``b - a``. Both
+    half-angle functions follow from ``z = w/4 = sin^2(psi/2)``: ``1/(2 cos(psi/2)) = 1/2 + e(z)/2`` with e, a
+    small correction, from a table; ``1/(2 sin(psi/2)) = 2^j T(v)`` with T from a table on ``v = z 4^j`` in
+    [1/4, 1), and ``b - a`` shifted by j. psi is that of `HalfChord`; no arccos is needed.
 
-    Polar coordinates are found by 22 steps of CORDIC; its gain is taken back by shifts and additions. A
-    span of one pixel gets ``psi/(m-1) = psi``, which nothing reads.
+    Beyond 90 degrees ``|N_r + N_l|^2`` takes the role of w, and x and y are exchanged, so that angles from 0
+    to 180 degrees are possible. Opposite normals alone have no plane; the curve then goes through the pole
+    ``x = 0``. The closer the angle is to 180 degrees, the more the rounding of the normals rotates the plane,
+    in proportion to ``1/sin psi``: spans over 150 degrees are flagged, by the comparison
+    ``|N_r + N_l|^2 < 4 cos^2(75 degrees)``. Its limit is lowered by the largest error of rounding, so that
+    all spans from 150.01 degrees on are flagged.
+
+    Polar coordinates come from 22 steps of CORDIC; shifts and additions divide by its gain. A span of one
+    pixel gets ``psi/(m-1) = psi``, which no unit reads.
 
     ============ ============ ====================================================================
     word         format       why
@@ -62,40 +66,41 @@ class AngularSetup:
     cos beta     UQ(1, 25)    over 1 only where normals of unequal length are few steps apart
     ============ ============ ====================================================================
 
-    Error of cos gamma(t) at any pixel, for the exact cosine of what the setup gives, against the formula
-    above in exact arithmetic on the same codes: `error`. Largest found: 5e-7 up to 0.1 degrees, 9e-7 at 1,
-    3e-6 at 10, 1.3e-5 at 45, 3.3e-5 from 90 on.
+    Error of cos gamma(t) at any pixel: `error`. It compares the exact cosine of the angles that the setup
+    gives with the formula above in exact arithmetic on the same codes. Largest found: 5e-7 up to 0.1
+    degrees, 9e-7 at 1, 3e-6 at 10, 1.3e-5 at 45, 3.3e-5 from 90 degrees on.
 
-    **By arccos**, as drawn: ``angle="arccos"`` takes psi from `Arccos` on ``N_l.N_r``, the square of the code
-    of length 1 divided out by ``r + r/2^16``, rounded to SQ(2, 16). psi is rounded to UQ(2, 15) radians and
-    brought to turns by a product with ``1/(2 pi)`` in UQ(-2, 19); ``psi/(m-1)`` reads the first 17 bits of
-    it. x and y stay as above (the printed ``tan lambda`` is 0/0 for equal normals), so that what is lost is
-    what arccos loses: `arccos_error`. Largest error of cos gamma found, by the span angle in degrees:
+    **By arccos**, as published: ``angle="arccos"`` takes psi from `Arccos` of ``r = N_l.N_r``, divided by
+    `ONE_SQUARED` as ``r + r/2^16`` and rounded to SQ(2, 16). psi is rounded to UQ(2, 15) radians and
+    converted to turns by a product with ``1/(2 pi)`` in UQ(-2, 19), of which ``psi/(m-1)`` reads the first 17
+    bits. x and y are those above (the published ``tan lambda`` is 0/0 for equal normals), so that the only
+    further error is that of arccos: `arccos_error`. Largest error of cos gamma found, by the span angle in
+    degrees:
 
-    ================= ====== ====== ====== ======
-    psi from          1e-4   1      10     45
-    ================= ====== ====== ====== ======
-    half chord        5.0e-7 7.4e-7 3.8e-6 1.3e-5
-    arccos, refitted  0.0095 0.0012 0.0049 2.6e-4
-    arccos, corrected 0.042  0.034  3.5e-4 5.0e-4
-    arccos, printed   0.088  0.078  0.045  5.0e-4
-    ================= ====== ====== ====== ======
+    ==================== ====== ====== ====== ======
+    psi from             1e-4   1      10     45
+    ==================== ====== ====== ====== ======
+    half chord           5.0e-7 7.4e-7 3.8e-6 1.3e-5
+    arccos, refitted     0.0095 0.0012 0.0049 2.6e-4
+    arccos, corrected    0.042  0.034  3.5e-4 5.0e-4
+    arccos, as published 0.088  0.078  0.045  5.0e-4
+    ==================== ====== ====== ====== ======
 
-    The vectors must be of unit length to within their rounding; words of others saturate or wrap.
+    The vectors must be of unit length but for their rounding; words of other vectors saturate or wrap.
 
     Parameters
     ----------
     angle : str
-        One of `SPAN_ANGLES`.
+        Unit that gives psi, one of `SPAN_ANGLES`.
     arccos : Arccos
-        Table of ``"arccos"``.
+        Arccos unit for ``angle="arccos"``.
 
     Raises
     ------
     ValueError
-        If the angle's unit is unknown.
+        If ``angle`` is unknown.
 
-    Source: [T] 3.1; blocks.md, "Highlight-cosine unit".
+    Source: docs/theory/interpolation.md#angular-method; [T] 3.1.
     """
 
     angle: Literal["half_chord", "arccos"] = "half_chord"
@@ -103,7 +108,7 @@ class AngularSetup:
 
     MAX_ANGLE = 150.0
     CHORD_FORMAT = HalfChord.OPERAND_FORMAT
-    # The rounding of two normals moves a squared sum of length 0.52 by under 3.6 steps.
+    # The rounding of two normals moves the square of a sum of length 0.52 by less than 3.6 steps.
     SHORTEST_SUM = Fixed(
         UQ(2, 17),
         int((ONE_SQUARED.values * 4 * np.cos(np.radians(MAX_ANGLE / 2)) ** 2 - 4 * COMPONENT.step) * 2.0**17),
@@ -138,12 +143,19 @@ class AngularSetup:
     def error(angle: np.ndarray) -> np.ndarray:
         """Bound of the error of cos gamma with the half chord, by the span angle in degrees.
 
-        x has the correction's errors (fit 2.5e-7, table 2^-22, rounding 2^-19), times at most 1, and the
-        cut of its factor, 2^-18 times 0.42; y has the rounding of its factor, 2^-17, and twice T's errors
-        (fit 2.9e-6, table 2^-22, rounding 2^-18); CORDIC has the last step's angle, 2^-21, a cut of 2^-26 a
-        step, and the rounding of its 22 angles. Half the error of psi counts at either end, and that of
-        ``psi/(m-1)`` (17 leading bits of psi, 2^-19 over 0.159, and the reciprocal, 2^-17) at the far one;
-        both times cos beta, at most 1.
+        - x: the errors of the correction (fit 2.5e-7, table 2^-22, rounding 2^-19), times at most 1, and the
+          cut of its factor, 2^-18 times 0.42.
+        - y: the rounding of its factor, 2^-17, and twice the errors of T (fit 2.9e-6, table 2^-22, rounding
+          2^-18).
+        - CORDIC: the angle of the last step, 2^-21; a cut of 2^-26 in each step; the rounding of 22 angles.
+        - psi: half of its error at either end, times cos beta, which is at most 1.
+        - ``psi/(m-1)``: 17 leading bits of psi, 2^-19 over 0.159, and the reciprocal, 2^-17, at the right
+          end, times cos beta.
+
+        Parameters
+        ----------
+        angle : array
+            Span angle in degrees.
         """
         half = np.radians(angle) / 2
         x = 2.5e-7 + 2.0**-22 + 2.0**-19 + 0.42 * 2.0**-18 + 2.0**-26
@@ -157,12 +169,17 @@ class AngularSetup:
     def arccos_error(self, angle: float) -> float:
         """Bound of the error of cos gamma with ``angle="arccos"``, for one span angle in degrees.
 
-        To `error` come the error of psi, half of which counts at either end, times cos beta, and the rounding
-        of psi for its step, 2^-19 turns. cos beta is at most 1, and a length that differs by 2^-17 adds its
-        quotient by the chord, up to sqrt 2. The cosine is off by 2^-17, its rounding, and by 2^-18 for either
-        length; psi has that, by arccos itself; the largest model error of the segments that such a cosine
-        may fall into, and their arithmetic error; 2^-16 for its last rounding and a relative ``2^-20 2 pi``
-        for that of ``1/(2 pi)``.
+        The sum of `error`; half the error of psi at either end, times cos beta; and the rounding of psi for
+        its step, 2^-19 turns. cos beta is at most 1, plus, for lengths that differ by 2^-17, that difference
+        over the chord, in all up to sqrt 2. The cosine is off by 2^-17, its rounding, and by 2^-18 for either
+        length. psi is off by the difference that this makes in arccos; by the largest model error of the
+        segments that such a cosine may belong to, and their arithmetic error; by 2^-16 for its last rounding;
+        and by a relative ``2^-20 2 pi`` for the rounding of ``1/(2 pi)``.
+
+        Parameters
+        ----------
+        angle : float
+            Span angle in degrees.
         """
         psi = np.radians(angle)
         around = np.clip(np.cos(psi) + np.array([-1, 0, 1]) * (2.0**-16 + 2.0**-30), -1, 1)
@@ -179,7 +196,7 @@ class AngularSetup:
 
     @cached_property
     def corrections(self) -> tuple[Fixed, Fixed]:
-        """Table of e over z from 0 to 1/2, ``1/(one sqrt(1 - z/one)) - 1``, and its rise to the next word."""
+        """Table of e for z from 0 to 1/2, ``1/(one sqrt(1 - z/one)) - 1``, with the rise to the next word."""
         one = float(ONE_SQUARED.values)
         start = np.arange(1 << self.ADDRESS_BITS) / (2 << self.ADDRESS_BITS)
         width = start[1]
@@ -191,9 +208,9 @@ class AngularSetup:
 
     @cached_property
     def reciprocals(self) -> tuple[Fixed, Fixed]:
-        """Table of T over v from 0 to 1, ``1/(2 sqrt(v one))``, and its fall.
+        """Table of T for v from 0 to 1, ``1/(2 sqrt(v one))``, with the fall to the next word.
 
-        The words below 1/4 are met by ``w = 0`` alone and hold 0.
+        Only ``w = 0`` reads the words for v below 1/4; they are 0.
         """
         one = float(ONE_SQUARED.values)
         start = np.arange(1 << self.ADDRESS_BITS) / (1 << self.ADDRESS_BITS)
@@ -216,20 +233,20 @@ class AngularSetup:
         value_format: Format,
         change_format: Format,
     ) -> tuple[Fixed, Fixed]:
-        """Lines of nearly least maximum error of a convex function: chords lowered by half their sag."""
+        """Lines of nearly least maximum error: chords of a convex function, lowered by half the sagitta."""
         low, middle, high = (function(start + width * part) for part in (0, 0.5, 1))
         value = np.clip(low - ((low + high) / 2 - middle) / 2, 0, value_format.max_code * value_format.step)
         return Fixed.round(value_format, value), Fixed.round(change_format, np.abs(high - low))
 
     @cached_property
     def directions(self) -> Fixed:
-        """``arctan 2^-i`` in turns, for each step of CORDIC."""
+        """Angles ``arctan 2^-i`` of the steps of CORDIC, in turns."""
         turns = np.arctan(2.0 ** -np.arange(self.CORDIC_STEPS)) / (2 * np.pi)
         return Fixed.round(self.DIRECTION_FORMAT, turns)
 
     @cached_property
     def gain_terms(self) -> tuple[tuple[int, int], ...]:
-        """Signs and right shifts whose sum is the reciprocal of CORDIC's gain to 2^-28."""
+        """Signs s and right shifts k: the sum of ``s 2^-k`` is the reciprocal of CORDIC's gain to 2^-28."""
         rest = np.prod(1 / np.sqrt(1 + 4.0 ** -np.arange(self.CORDIC_STEPS)))
         terms = []
         while abs(rest) > 2.0**-28:
@@ -241,7 +258,7 @@ class AngularSetup:
     def compute(
         self, normal_left: Fixed, normal_right: Fixed, vector: Fixed, length: np.ndarray
     ) -> tuple[Fixed, Fixed, Fixed, Fixed, np.ndarray]:
-        """Bit-true setup.
+        """Bit-accurate angles of spans.
 
         Parameters
         ----------
@@ -259,8 +276,8 @@ class AngularSetup:
         step : Fixed, shape (spans,), UQ(0, 40)
             ``psi/(m-1)`` in turns.
         cos_beta : Fixed, shape (spans,), UQ(1, 25)
-        wide : bool array, shape (spans,)
-            Whether the normals are over `MAX_ANGLE` apart, and their plane is not to be trusted.
+        out_of_range : bool array, shape (spans,)
+            Whether the normals are over `MAX_ANGLE` apart; the plane of the span is then inaccurate.
 
         Raises
         ------
@@ -271,10 +288,10 @@ class AngularSetup:
         if {normal_left.format, normal_right.format, vector.format} != {COMPONENT}:
             raise ValueError(f"operands must be {COMPONENT}")
         dot = DotProduct().compute
-        own = dot(normal_left, normal_left) + dot(normal_right, normal_right)
+        squares = dot(normal_left, normal_left) + dot(normal_right, normal_right)
         cross = dot(normal_left, normal_right)
         obtuse = cross.codes < 0
-        chord = own - Fixed(SQ(5, 34), np.abs(cross.codes)).scale(1).extend(SQ(6, 34))
+        chord = squares - Fixed(SQ(5, 34), np.abs(cross.codes)).scale(1).extend(SQ(6, 34))
         chord = chord.saturate(self.CHORD_FORMAT)
         left, right = dot(normal_left, vector), dot(normal_right, vector)
         total, difference = (left + right).extend(SQ(6, 34)), (right - left).extend(SQ(6, 34))
@@ -289,7 +306,7 @@ class AngularSetup:
             angle, angle_shift = HalfChord().compute(chord, obtuse), np.where(obtuse, 0, shift)
         else:
             angle, angle_shift = self._by_arccos(cross), np.zeros_like(shift)
-        cos_beta = sum(sign * (radius << 4 >> places) for sign, places in self.gain_terms)
+        cos_beta = sum(sign * (radius << 4 >> k) for sign, k in self.gain_terms)
         cos_beta = Fixed(SQ(4, self.GAIN_BITS), cos_beta).round_half_up(25).saturate(self.COS_BETA_FORMAT)
         half = angle.scale(-1).extend(UQ(0, 40))
         phase = (direction.extend(self.PHASE_FORMAT) + half).wrap(self.PHASE_FORMAT)
@@ -298,14 +315,14 @@ class AngularSetup:
         return angle, phase, step, cos_beta, out_of_range
 
     def _by_arccos(self, cross: Fixed) -> Fixed:
-        """Psi in turns, from the exact dot product of the normals."""
+        """Psi in turns by arccos, from the exact dot product of the normals."""
         cosine = Fixed(cross.format, cross.codes + (cross.codes >> 16)).round_half_up(16)
         radians, _ = self.arccos.compute(cosine.saturate(Arccos.OPERAND_FORMAT))
         radians = radians.round_half_up(15).saturate(self.RADIANS_FORMAT)
         return (radians * self.TURNS_PER_RADIAN).extend(self.ANGLE_FORMAT)
 
     def _looked_up(self, table, bits: np.ndarray, width: int) -> tuple[Fixed, Fixed]:
-        """Word at the top bits, and its change times the bits below them."""
+        """Word of a table at the leading bits, and its change times the fraction that follows them."""
         values, changes = table
         address = bits >> (width - self.ADDRESS_BITS)
         fraction = bits >> (width - self.ADDRESS_BITS - self.FRACTION_BITS) & ((1 << self.FRACTION_BITS) - 1)
@@ -313,7 +330,7 @@ class AngularSetup:
         return values[address], change.round_half_up(22)
 
     def _major(self, chord: Fixed, major: Fixed) -> np.ndarray:
-        """``major/2 (1 + e)`` at 26 fraction bits."""
+        """Codes of ``major/2 (1 + e)`` with 26 fraction bits."""
         bits = np.minimum(chord.codes, (1 << 35) - 1)
         value, change = self._looked_up(self.corrections, bits, 35)
         correction = (value + change).round_half_up(18).saturate(self.CORRECTION_FORMAT)
@@ -323,7 +340,7 @@ class AngularSetup:
         return (half.truncate(26) + product).wrap(self.AXIS_FORMAT).codes
 
     def _minor(self, chord: Fixed, minor: Fixed, shift: np.ndarray) -> np.ndarray:
-        """``minor 2^j T`` at 26 fraction bits."""
+        """Codes of ``minor 2^j T`` with 26 fraction bits."""
         value, change = self._looked_up(self.reciprocals, chord.codes << 2 * shift, 36)
         reciprocal = (value - change).round_half_up(17).saturate(self.RECIPROCAL_FORMAT)
         shifted = Fixed(SQ(23, 34), minor.codes << shift).wrap(SQ(3, 34))
@@ -331,18 +348,18 @@ class AngularSetup:
         return (reciprocal * factor).round_half_up(26).wrap(self.AXIS_FORMAT).codes
 
     def _polar(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, Fixed]:
-        """Radius times CORDIC's gain at 26 fraction bits, and direction."""
+        """Radius times CORDIC's gain, as codes with 26 fraction bits, and direction."""
         behind = x < 0
         x, y = np.where(behind, -x, x), np.where(behind, -y, y)
         direction = np.where(behind, self.DIRECTION_FORMAT.min_code, 0)
-        for i, turn in enumerate(self.directions.codes.tolist()):
+        for i, angle in enumerate(self.directions.codes.tolist()):
             below = y < 0
             x, y = np.where(below, x - (y >> i), x + (y >> i)), np.where(below, y + (x >> i), y - (x >> i))
-            direction = np.where(below, direction - turn, direction + turn)
+            direction = np.where(below, direction - angle, direction + angle)
         return x, Fixed(SQ(3, 28), direction).wrap(self.DIRECTION_FORMAT)
 
     def _step(self, angle: Fixed, shift: np.ndarray, length: np.ndarray) -> Fixed:
-        """``psi/(m-1)``, cut to 40 fraction bits; the reciprocal is that of `reciprocal_table`."""
+        """Step ``psi/(m-1)``, cut to 40 fraction bits; the reciprocal is that of `reciprocal_table`."""
         address, halvings = reciprocal_address(length - 1)
         leading = Fixed(UQ(18, 36), angle.codes << shift).round_half_up(18).saturate(self.MANTISSA_FORMAT)
         product = leading * reciprocal_table()[address]

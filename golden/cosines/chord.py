@@ -13,10 +13,10 @@ __all__ = ["Chord"]
 
 @dataclass(frozen=True)
 class Chord:
-    """``u = |a - b|^2 / 2``, for unit vectors ``1 - a . b``.
+    """Half the squared chord ``u = |a - b|^2 / 2``; for unit vectors ``1 - a . b``.
 
-    A length error e of a vector makes the dot product wrong by e, the chord by ``e^2/2 + e u`` only; and near
-    u = 0 it is no difference of nearly equal numbers.
+    If the length of a vector is off by e, the dot product is off by e, the chord by ``e^2/2 + e u`` only.
+    Near u = 0 the chord is not a difference of nearly equal numbers.
 
     ========== ========== =======================================================================
     word       format     why
@@ -26,22 +26,27 @@ class Chord:
     operand    UQ(1, 25)  of the specular unit; cut, saturates
     ========== ========== =======================================================================
 
-    u is exact where all components of ``a - b`` are under 1, which is wherever u < 1/2. Elsewhere halving
-    cuts half a step of each, and u is off by at most ``sqrt(3) 2^-17 |a - b| + 3 * 2^-35``, 2.7e-5.
+    u is exact where all components of ``a - b`` are under 1, which is always so for u < 1/2. Elsewhere
+    halving cuts up to half a step of each component, and u is off by at most
+    ``sqrt(3) 2^-17 |a - b| + 3 * 2^-35``, 2.7e-5 for unit vectors.
 
-    Source: chord.md; R. Lyon, *Phong shading reformulation for hardware renderer simplification*, 1993.
+    Source: docs/theory/chord.md#the-chord; [Lyon93].
     """
 
     FORMAT = UQ(2, 35)
     ARGUMENT_FORMAT = UQ(1, 25)
 
     def compute(self, a: Fixed, b: Fixed) -> Fixed:
-        """Bit-true u.
+        """Bit-accurate u.
 
         Parameters
         ----------
         a, b : Fixed, shape (..., 3), SQ(1, 17)
             Unit vectors.
+
+        Returns
+        -------
+        Fixed, shape (...), UQ(2, 35)
 
         Raises
         ------
@@ -57,5 +62,8 @@ class Chord:
         return Fixed(SQ(6, 34), square.codes << 2 * far).scale(-1).saturate(self.FORMAT)
 
     def operand(self, a: Fixed, b: Fixed) -> Fixed:
-        """Bit-true u as the specular unit takes it, UQ(1, 25)."""
+        """Bit-accurate u in UQ(1, 25), as the specular unit takes it.
+
+        Parameters and errors are those of `compute`.
+        """
         return self.compute(a, b).truncate(25).saturate(self.ARGUMENT_FORMAT)

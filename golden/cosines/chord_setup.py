@@ -1,4 +1,4 @@
-"""Chord setup: forward differences of N·L and of half the squared chord from N to H, span by span."""
+"""Chord setup: forward differences of N·L and of half the squared chord from N to H, for each span."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -18,21 +18,23 @@ __all__ = ["ChordSetup", "Differences", "largest_span_angle"]
 
 
 def largest_span_angle(exponent: int) -> float:
-    """Widest span, in degrees, that the three-point fit shades well: ``min(15, 20 n^(-1/6))``.
+    """Widest span, in degrees, that the quadratic fit shades well: ``min(15, 20 n^(-1/6))``.
 
-    The fit differs from exactly normalised interpolation by nearly ``c sqrt(n) psi^3`` LSB in the specular
-    term, at worst 0.25 at this angle, and by at most 0.12 in the diffuse one, at full reflection.
+    The fit differs from exactly normalised interpolation by about ``c sqrt(n) psi^3`` LSB in the specular
+    term, at most 0.25 LSB at this angle, and by at most 0.12 LSB in the diffuse term, at full reflection.
 
     Parameters
     ----------
     exponent : int
         n, 1 to 1000.
+
+    Source: docs/theory/chord.md#error-bound.
     """
     return min(15.0, 20.0 * exponent ** (-1 / 6))
 
 
 class Differences(NamedTuple):
-    """Start and first two differences of a quadratic, each a Fixed of shape (spans, lights)."""
+    """Start value and first two differences of a quadratic, each a Fixed of shape (spans, lights)."""
 
     start: Fixed
     first: Fixed
@@ -43,18 +45,18 @@ class Differences(NamedTuple):
 class ChordSetup:
     """Quadratics through the exact values at t = 0, 1/2 and 1 of ``f = N·L`` and ``u = |N - H|^2 / 2``.
 
-    For unit vectors ``u = 1 - N·H``, but it feels the length of a normal only at second order, and near the
-    peak it is no difference of nearly equal numbers. With ``w = |N_r - N_l|^2 / 2`` and the middle normal
-    ``h (N_l + N_r)``, ``h = 1/2 + e(w)``, the values in the middle need no middle normal:
+    For unit vectors ``u = 1 - N·H``, but u depends on the length of a normal only at second order, and near
+    the peak of a highlight it is not a difference of nearly equal numbers. With ``w = |N_r - N_l|^2 / 2`` and
+    the middle normal ``h (N_l + N_r)``, ``h = 1/2 + e(w)``, the values in the middle need no middle normal:
 
     - ``u = u_l + P t + G t^2`` with ``G = 4 e (2 - u_l - u_r)`` and ``P = (u_r - u_l) - G``;
     - ``f = f_l + P t + G t^2`` with ``G = -4 e (f_l + f_r)`` and ``P = (f_r - f_l) - G``.
 
-    The first difference is ``P dt + G dt^2``, the second ``2 G dt^2``, with dt and dt^2 of
-    `step_words`. A light costs 19 products a span, all of 18 bits or less; the
-    rest of a span 7. ``e = w (c1 + w (c2 + w c3))`` is exact at angle 0 and fitted to `MAX_ANGLE`; with fewer
-    terms, for scenes of narrow spans, it is fitted as well to an angle of their own (`ANGLES`), and a product
-    falls away with each.
+    P is the *slope* at t = 0 and G the *curvature*, half the second derivative. The first difference is
+    ``P dt + G dt^2``, the second ``2 G dt^2``, with dt and dt^2 of `step_words`. A span needs 7 products, and
+    19 for each light, all of 18 bits or less. ``e = w (c1 + w (c2 + w c3))`` is exact at angle 0 and fitted
+    up to `MAX_ANGLE`. With fewer terms, for scenes of narrow spans, it is fitted as closely up to a smaller
+    angle (`ANGLES`); each term less saves a product.
 
     ============= ============ =====================================================================
     word          format       why
@@ -66,31 +68,31 @@ class ChordSetup:
     e             UQ(-6, 23)   17 bits; at most 0.0098
     2 - u_l - u_r SQ(2, 16)    multiplier operand, cut; so is f_l + f_r
     G             SQ(-2, 20)   multiplier operand; at most 0.079
-    P of u        SQ(0, 35)    two words of 18 and 17 bits: the end of a span feels all of them
+    P of u        SQ(0, 35)    two words of 18 and 17 bits: every bit counts at the end of a span
     P of f        SQ(0, 18)    multiplier operand; rounded
-    differences   SQ(1, 46)    at pixel k their rounding adds up to ``2^-46 (k + k^2/2)``: 1.2e-7; scenes
-                               of short spans do with fewer fraction bits
+    differences   SQ(1, 46)    at pixel k their rounding adds up to ``2^-46 (k + k^2/2)``: 1.2e-7; fewer
+                               fraction bits are enough for scenes of short spans
     ============= ============ =====================================================================
 
     Error of u at any pixel against the quadratic through the exact values: `highlight_error`; of f:
     `diffuse_error`.
 
     A span over `max_angle` is flagged; its words saturate or wrap. Vectors need not be of unit length, but
-    at lengths far from 1 start values saturate.
+    start values saturate at lengths far from 1.
 
     Parameters
     ----------
     terms : int
-        Of the polynomial, 1 to 3.
+        Terms of the polynomial, 1 to 3.
     fraction_bits : int
-        Of the differences, 36 to 46; an even number, as twice as long a span needs two more.
+        Fraction bits of the differences, 36 to 46; even, as a span of twice the length needs two more.
 
     Raises
     ------
     ValueError
         If a parameter is out of range.
 
-    Source: chord.md; R. Lyon, *Phong shading reformulation for hardware renderer simplification*, 1993.
+    Source: docs/theory/chord.md#differences; [Lyon93].
     """
 
     terms: int = 3
@@ -102,7 +104,7 @@ class ChordSetup:
     SUM_FORMAT = UQ(-2, 19)
     FACTOR_FORMAT = UQ(-6, 23)
     OPERAND_FORMAT = SQ(2, 16)
-    BEND_FORMAT = SQ(-2, 20)
+    CURVATURE_FORMAT = SQ(-2, 20)
     SLOPE_FORMAT = SQ(0, 35)
     HIGH_FORMAT = SQ(0, 18)
     LOW_FORMAT = UQ(-18, 35)
@@ -117,7 +119,7 @@ class ChordSetup:
 
     @property
     def max_angle(self) -> float:
-        """Widest span in degrees, over which spans are flagged."""
+        """Widest span in degrees that is not flagged."""
         return self.ANGLES[self.terms]
 
     @property
@@ -127,23 +129,23 @@ class ChordSetup:
 
     @property
     def longest(self) -> int:
-        """Longest span for which the error bounds hold: the drift over it is under 1.3e-7."""
+        """Longest span in pixels for which the error bounds hold: it drifts by less than 1.3e-7."""
         return (1 << LENGTH_BITS - (46 - self.fraction_bits) // 2) - 1
 
     @property
     def shifted_format(self) -> Format:
-        """Format of products before their shift: a fraction bit more, by which they are rounded."""
+        """Format of products before their shift: one fraction bit more than the differences, for rounding."""
         return SQ(2, self.fraction_bits + 1)
 
     def shifted(self, product: Fixed) -> Fixed:
-        """A product in that format, cut."""
+        """A product in `shifted_format`, cut."""
         if product.format.fraction_bits > self.shifted_format.fraction_bits:
             product = product.truncate(self.shifted_format.fraction_bits)
         return product.extend(self.shifted_format)
 
     @property
     def coefficients(self) -> Fixed:
-        """``c1, c2, c3``, or the first of them, fitted in words of the hardware."""
+        """``c1, c2, c3``, or as many as there are terms, fitted in words of the hardware."""
         return Fixed(self.SUM_FORMAT, _coefficients(self.terms))
 
     @property
@@ -154,14 +156,14 @@ class ChordSetup:
     def compute(
         self, normal_left: Fixed, normal_right: Fixed, direction: Fixed, halfway: Fixed, length: np.ndarray
     ) -> tuple[Differences, Differences, np.ndarray]:
-        """Bit-true differences.
+        """Bit-accurate differences of f and of u.
 
         Parameters
         ----------
         normal_left, normal_right : Fixed, shape (spans, 3), SQ(1, 17)
             Unit normals of the spans' ends.
         direction, halfway : Fixed, shape (lights, 3), SQ(1, 17)
-            Unit vectors L and H.
+            Unit vectors L and H of each light.
         length : int array, shape (spans,)
             Pixels, 1 to 4095.
 
@@ -169,8 +171,8 @@ class ChordSetup:
         -------
         diffuse, highlight : Differences
             Of f and of u.
-        wide : bool array, shape (spans,)
-            Whether a span is over `max_angle`, and its differences not to be used.
+        out_of_range : bool array, shape (spans,)
+            Whether a span is over `max_angle`; its differences are then invalid.
 
         Raises
         ------
@@ -193,18 +195,18 @@ class ChordSetup:
         steps = self.steps(length)
         u_left, u_right = Chord().compute(left, halfway), Chord().compute(right, halfway)
         two = Fixed(UQ(2, 35), 2 << 35)
-        across = (two - (u_left + u_right)).truncate(16).saturate(self.OPERAND_FORMAT)
-        bend = (e * across).scale(2).round_half_up(20).saturate(self.BEND_FORMAT)
-        slope = (u_right - u_left - bend).wrap(self.SLOPE_FORMAT)
-        highlight = self.differences(u_left, slope, bend, *steps)
+        two_minus_sum = (two - (u_left + u_right)).truncate(16).saturate(self.OPERAND_FORMAT)
+        curvature = (e * two_minus_sum).scale(2).round_half_up(20).saturate(self.CURVATURE_FORMAT)
+        slope = (u_right - u_left - curvature).wrap(self.SLOPE_FORMAT)
+        highlight = self.differences(u_left, slope, curvature, *steps)
 
         f_left, f_right = (
             DotProduct().compute(n, direction).saturate(self.COSINE_FORMAT) for n in (left, right)
         )
-        along = (f_left + f_right).truncate(16).saturate(self.OPERAND_FORMAT)
-        bend = (-(e * along).scale(2)).round_half_up(20).saturate(self.BEND_FORMAT)
-        slope = (f_right - f_left - bend).round_half_up(18).wrap(self.HIGH_FORMAT)
-        diffuse = self.differences(f_left, slope.extend(self.SLOPE_FORMAT), bend, *steps)
+        f_sum = (f_left + f_right).truncate(16).saturate(self.OPERAND_FORMAT)
+        curvature = (-(e * f_sum).scale(2)).round_half_up(20).saturate(self.CURVATURE_FORMAT)
+        slope = (f_right - f_left - curvature).round_half_up(18).wrap(self.HIGH_FORMAT)
+        diffuse = self.differences(f_left, slope.extend(self.SLOPE_FORMAT), curvature, *steps)
         return diffuse, highlight, out_of_range
 
     def highlight_error(self, angle: float, u: np.ndarray = 2.0) -> np.ndarray:
@@ -213,24 +215,24 @@ class ChordSetup:
         The exact values are those of the vectors' directions, in units of `ONE_SQUARED`, as u is. Lengths
         are off by at most d, half a step. With ``E`` for the error of a word:
 
-        - ends, ``(d_l - d_r)^2/2 + (d_l + d_r) u``: ``E_u = 2 d^2 + 2 d (1 + d) u``, and where a component
-          may reach 1, from ``u = 1/2`` on, what `Chord` cuts;
-        - ``E_w = 2^-21 + 2 d^2 + 2 d (1 + d) w``, its rounding and the lengths;
+        - ends, ``(d_l - d_r)^2/2 + (d_l + d_r) u``: ``E_u = 2 d^2 + 2 d (1 + d) u``, and from ``u = 1/2`` on,
+          where a component may reach 1, the cut of `Chord`;
+        - ``E_w = 2^-21 + 2 d^2 + 2 d (1 + d) w``: the rounding of w and the lengths;
         - ``E_e``: the fit; ``E_w`` times the largest slope ``(4 - 2 w)^(-3/2)``; three roundings,
           ``(w + w^2) 2^-20 + 2^-24``;
-        - ``2 - u_l - u_r``: ``2 E_u``, the cut, 2^-16, and 2^-15 as 2 is not `ONE_SQUARED` twice;
-        - ``E_G``: ``8 E_e``, 4 e times the former, and 2^-21 for the rounding.
+        - ``2 - u_l - u_r``: ``2 E_u``, the cut, 2^-16, and 2^-15 because 2 stands for ``2 ONE_SQUARED``;
+        - ``E_G``: ``8 E_e``, 4 e times the error of ``2 - u_l - u_r``, and 2^-21 for the rounding.
 
-        The ends stay where they are whatever G is, so that G is felt as ``E_G t (1 - t)``, a quarter. dt
-        moves P by a relative 2^-17 and G by ``2^-16 + 2^-17 + 2^-34``, with ``|G| <= 8 e`` and ``|P - G|`` at
-        most the chord of the angle, or u; the drift comes to that.
+        G does not move the ends, so its error counts as ``E_G t (1 - t)``, at most a quarter of it. The error
+        of dt is a relative 2^-17 of P and ``2^-16 + 2^-17 + 2^-34`` of G, with ``|G| <= 8 e`` and ``|P - G|``
+        at most the chord of the angle, or u. The drift is added to these.
 
         Parameters
         ----------
         angle : float
-            Widest span in degrees, to `max_angle`.
+            Widest span in degrees, up to `max_angle`.
         u : array
-            Largest u of a span's two ends: the error grows with it.
+            Larger u of a span's two ends; the error grows with it.
         """
         d = COMPONENT.step / 2 * (1 + 2.0**-10)
         end = 2 * d**2 + 2 * d * (1 + d) * np.asarray(u, dtype=np.float64)
@@ -238,29 +240,29 @@ class ChordSetup:
         end = end + far * (np.asarray(u) >= 0.5 - 2.0**-15)
         chord = 2 * np.sin(np.radians(angle) / 2)
         e, e_error = self._factor_error(angle)
-        bend_error = 8 * e_error + 4 * e * (2 * end + 2.0**-16 + 2.0**-15) + 2.0**-21
-        return end + bend_error / 4 + self.walk_error(np.minimum(chord, u) + 8 * e, 8 * e)
+        curvature_error = 8 * e_error + 4 * e * (2 * end + 2.0**-16 + 2.0**-15) + 2.0**-21
+        return end + curvature_error / 4 + self.walk_error(np.minimum(chord, u) + 8 * e, 8 * e)
 
     def diffuse_error(self, angle: float) -> float:
         """Largest error of f at any pixel against the quadratic through the exact values.
 
         As `highlight_error`, but the ends are off by ``E_f = 2 d + d^2``, the sum ``f_l + f_r`` by
-        ``2 E_f + 2^-16`` alone, and the rounding of P adds 2^-19.
+        ``2 E_f + 2^-16`` only, and the rounding of P adds 2^-19.
 
         Parameters
         ----------
         angle : float
-            Widest span in degrees, to `max_angle`.
+            Widest span in degrees, up to `max_angle`.
         """
         d = COMPONENT.step / 2 * (1 + 2.0**-10)
         end = 2 * d + d**2
         chord = 2 * np.sin(np.radians(angle) / 2)
         e, e_error = self._factor_error(angle)
-        bend_error = 8 * e_error + 4 * e * (2 * end + 2.0**-16) + 2.0**-21
-        return float(end + bend_error / 4 + 2.0**-19 + self.walk_error(chord + 8 * e, 8 * e))
+        curvature_error = 8 * e_error + 4 * e * (2 * end + 2.0**-16) + 2.0**-21
+        return float(end + curvature_error / 4 + 2.0**-19 + self.walk_error(chord + 8 * e, 8 * e))
 
     def _factor_error(self, angle: float) -> tuple[float, float]:
-        """Largest e up to an angle, and its error."""
+        """Largest e up to an angle, and the largest error of e."""
         one = float(ONE_SQUARED.values)
         w = one * (1 - np.cos(np.radians(angle)))
         d = COMPONENT.step / 2 * (1 + 2.0**-10)
@@ -270,21 +272,23 @@ class ChordSetup:
         rounded = (w + w**2) * 2.0**-20 + 2.0**-24
         return float(half_angle_factor(w / one)) - 0.5, fit + moved + rounded
 
-    def walk_error(self, slope: np.ndarray, bend: np.ndarray) -> np.ndarray:
-        """Error at the end of a span from dt, and the drift over the pixels of the `longest` one.
+    def walk_error(self, slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
+        """Error at the end of a span that dt and the rounding of the differences cause, for `longest` pixels.
+
+        ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|`` for dt, ``2^-fraction_bits (k + k^2/2)`` for the drift.
 
         Parameters
         ----------
-        slope, bend : arrays
-            Sizes of P and G.
+        slope, curvature : arrays
+            Absolute values of P and G.
         """
         last = self.longest - 1
         drift = self.format.step * (last + last**2 / 2)
-        return 2.0**-17 * slope + (2.0**-16 + 2.0**-17 + 2.0**-34) * bend + drift
+        return 2.0**-17 * slope + (2.0**-16 + 2.0**-17 + 2.0**-34) * curvature + drift
 
     @staticmethod
     def steps(length: np.ndarray) -> tuple[Fixed, np.ndarray, Fixed, np.ndarray]:
-        """``dt = 2 reciprocal 2^-shift`` and ``dt^2 = 4 square 2^-square_shift``.
+        """Words of ``dt = 2 reciprocal 2^-shift`` and ``dt^2 = 4 square 2^-square_shift`` for all lights.
 
         Parameters
         ----------
@@ -311,25 +315,25 @@ class ChordSetup:
         self,
         start: Fixed,
         slope: Fixed,
-        bend: Fixed,
+        curvature: Fixed,
         reciprocal: Fixed,
         shift: np.ndarray,
         square: Fixed,
         square_shift: np.ndarray,
     ) -> Differences:
-        """Bit-true ``P dt + G dt^2`` and ``2 G dt^2``.
+        """Bit-accurate differences ``P dt + G dt^2`` and ``2 G dt^2``.
 
         Parameters
         ----------
-        start, slope, bend : Fixed, shape (spans, lights)
-            Value at t = 0, in any format; P in `SLOPE_FORMAT`; G in `BEND_FORMAT`.
+        start, slope, curvature : Fixed, shape (spans, lights)
+            Value at t = 0, in any format; P in `SLOPE_FORMAT`; G in `CURVATURE_FORMAT`.
         reciprocal, shift, square, square_shift
-            From `steps`.
+            As `steps` gives them.
         """
         high = Fixed(self.HIGH_FORMAT, slope.codes >> 17) * reciprocal
         low = Fixed(self.LOW_FORMAT, slope.codes & self.LOW_FORMAT.max_code) * reciprocal
         first_order = (high + low.truncate(48)).scale(1)
-        second_order = (bend * square).scale(2)
+        second_order = (curvature * square).scale(2)
         first_order, second_order = (
             Fixed(self.shifted_format, self.shifted(value).codes >> shift)
             .round_half_up(self.fraction_bits)

@@ -1,4 +1,4 @@
-"""Highlight-cosine unit: the angle to a fixed vector along a great circle ([T] 3.2)."""
+"""Highlight-cosine unit: the cosine of the angle to a fixed vector along a great circle ([T] 3.2)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,51 +12,51 @@ __all__ = ["HighlightCosine"]
 
 @dataclass(frozen=True)
 class HighlightCosine:
-    """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, once a pixel.
+    """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, for every pixel.
 
-    N(t) runs along a great circle from which H stands off by beta; the projection of H lies at the angle
-    lambda from N_l. One signed accumulator counts ``theta = lambda - t psi`` down in turns, through zero
-    where the span holds the highlight, so there is one pass where [T] has two. With the light vector in place
-    of H the same unit gives the diffuse term.
+    N(t) moves along a great circle. beta is the angle between the plane of this circle and H, and lambda the
+    angle from N_l to the projection of H onto the plane. One signed accumulator counts
+    ``theta = lambda - t psi`` down in turns. It passes through zero if the highlight is inside the span, so
+    that one pass is enough; [T] has two. With the light vector for H the unit gives the diffuse term.
 
-    The table holds ``v = 1 - cos`` over a quarter wave. With theta folded into it,
+    The table holds ``v = 1 - cos`` for a quarter of the wave. With theta folded into the quarter,
     ``1 - cos gamma = (1 - cos beta) + cos beta v`` in the half turn about the highlight and
-    ``(1 + cos beta) - cos beta v`` in the other. So the result is most accurate where it is small, which is
-    where a high exponent looks: below ``v = 1/32`` (14 degrees) the multiplier gets v with all its bits.
+    ``(1 + cos beta) - cos beta v`` in the other half. So the result is most accurate where it is small, which
+    matters for high exponents: below ``v = 1/32`` (14 degrees) the multiplier gets all bits of v.
 
     ============== ============= ====================================================================
     word           format        why
     ============== ============= ====================================================================
-    lambda, theta  SQ(0, 40)     turns; wraps as an angle does
+    lambda, theta  SQ(0, 40)     turns; wraps as an angle
     step           UQ(0, 40)     ``psi/(m-1)``; its rounding adds up to 2^-29 turns in 4095 pixels
-    cos beta       UQ(1, 25)     up to sqrt 2, for spans whose normals differ by their rounding alone
+    cos beta       UQ(1, 25)     up to sqrt 2, for spans whose normals only differ by their rounding
     table          36 bits       v in UQ(0, 22), rise over a segment in UQ(-8, 22): 512 words are
                                  one block RAM
-    v              UQ(0, 22)     to the multiplier in UQ(-5, 22) below 1/32, in UQ(0, 17) above
+    v              UQ(0, 22)     for the multiplier in UQ(-5, 22) below 1/32, in UQ(0, 17) above
     cos beta       UQ(1, 16)     for the multiplier
-    result         UQ(1, 25)     the specular unit's ``1 - cos gamma``; saturates
+    result         UQ(1, 25)     ``1 - cos gamma`` for the specular unit; saturates
     ============== ============= ====================================================================
 
     Arithmetic error of the result for exact operands and cos beta up to 1: `NEAR_ERROR` where v is under
-    1/32, else `ERROR`. Both hold the table's fit (``0.0858 h^2`` in its first segment, ``h^2/16`` in the
-    others, with ``h = pi/1024``), three roundings of 2^-23 (value, rise, their sum) and theta cut to 2^-25
-    turns; and the last rounding, 2^-26. Below 1/32 the rounding of cos beta, 2^-17, counts times 1/32; above
-    it counts times v, and v itself is rounded by 2^-18, by 2^-17 where it would round up to 1.
+    1/32, else `ERROR`. Both include the fit of the table (``0.0858 h^2`` in its first segment, ``h^2/16`` in
+    the others, with ``h = pi/1024``), three roundings of 2^-23 (value, rise, their sum), the cut of theta to
+    2^-25 turns, and the last rounding, 2^-26. Below 1/32 the rounding of cos beta, 2^-17, counts times 1/32.
+    Above it counts times v, and v itself is rounded by 2^-18, or by 2^-17 where it would round up to 1.
 
     Parameters
     ----------
     address_bits : int
-        The table has ``2**address_bits`` words; 4 to 12.
+        Address bits of the table, 4 to 12: it has ``2**address_bits`` words.
     interpolated : bool
-        Linear interpolation between them. Without it, as in the document, the table alone is off by
-        ``h/2``, 0.0015 with 512 words; the bounds above are those of 512 words with interpolation.
+        Linear interpolation between the words. Without it, as published, the table is off by ``h/2``, 0.0015
+        with 512 words; the bounds above are those of 512 words with interpolation.
 
     Raises
     ------
     ValueError
-        If the number of address bits is out of range.
+        If ``address_bits`` is out of range.
 
-    Source: [T] 3.2; blocks.md, "Highlight-cosine unit".
+    Source: docs/theory/interpolation.md#angular-method; [T] 3.2.
     """
 
     address_bits: int = 9
@@ -81,15 +81,15 @@ class HighlightCosine:
 
     @property
     def rise_format(self) -> Format:
-        """Format of the rise of v over a segment of the table: at most ``pi/2`` of its width."""
+        """Format of the rise of v over a segment of the table; a rise is at most ``pi/2`` of the width."""
         return UQ(1 - self.address_bits, self.TABLE_VALUE_FORMAT.fraction_bits)
 
     @cached_property
     def table(self) -> tuple[Fixed, Fixed]:
-        """The ROM: v at the start of each segment of the quarter wave, and its rise to the end.
+        """Table of v: value at the start of each segment of the quarter wave, and rise to its end.
 
         Each line is the one of least maximum error; the first goes through 0, so that the peak is exact.
-        Without interpolation the value is half-way between the ends', and the rise 0.
+        Without interpolation the value is the mean of both ends, and the rise is 0.
         """
         size = 1 << self.address_bits
         width = np.pi / 2 / size
@@ -100,18 +100,18 @@ class HighlightCosine:
             return Fixed.round(self.TABLE_VALUE_FORMAT, (low + high) / 2), Fixed.round(
                 self.rise_format, 0 * rise
             )
-        # The wave sags under its chord most where its slope, sin, is the chord's.
-        turning = np.arcsin(rise / width)
-        sag = low + (turning - start) * rise / width - (1 - np.cos(turning))
-        value = low - sag / 2
-        # Through 0 the least maximum error is that of the line with 2 (sqrt 2 - 1) of the chord's rise.
+        # The wave is farthest below its chord where its slope, the sine, is that of the chord.
+        steepest = np.arcsin(rise / width)
+        sagitta = low + (steepest - start) * rise / width - (1 - np.cos(steepest))
+        value = low - sagitta / 2
+        # Of the lines through 0, the one with 2 (sqrt 2 - 1) of the chord's rise has the least maximum error.
         value[0], rise[0] = 0, rise[0] * 2 * (np.sqrt(2) - 1)
         return Fixed.round(self.TABLE_VALUE_FORMAT, value), Fixed.round(self.rise_format, rise)
 
     def compute(
         self, phase: Fixed, step: Fixed, cos_beta: Fixed, span: np.ndarray, index: np.ndarray
     ) -> Fixed:
-        """Bit-true values, in closed form.
+        """Bit-accurate values, in closed form.
 
         Parameters
         ----------
@@ -123,7 +123,7 @@ class HighlightCosine:
         span : int array, shape (pixels,)
             Span of each pixel.
         index : int array, shape (pixels,)
-            Place of each pixel in its span, 0 to 4094.
+            Index of each pixel in its span, 0 to 4094.
 
         Returns
         -------
@@ -142,7 +142,7 @@ class HighlightCosine:
                 f"not {phase.format}, {step.format}, {cos_beta.format}"
             )
         theta = phase.codes[span] - np.asarray(index, dtype=np.int64) * step.codes[span]
-        # Inverted bits stand for the negative: 2^-40 turns off, and no carry.
+        # Inverted bits take the place of the negative, which needs a carry: 2^-40 turns off.
         bits = theta & ((1 << 40) - 1)
         magnitude = np.where(bits >> 39 > 0, ~bits, bits) & ((1 << 39) - 1)
         back = magnitude >> 38 > 0
@@ -162,7 +162,7 @@ class HighlightCosine:
         factor = beta.round_half_up(16).saturate(self.FACTOR_FORMAT)
         operand = Fixed(self.FAR_FORMAT, np.where(near, v.codes, far.codes))
         product = operand * factor
-        # 1/32 of what the far operand would weigh.
+        # The operand below 1/32 has five fraction bits more.
         aligned = Fixed(UQ(1, 26), np.where(near, product.codes >> 12, product.codes >> 7)).round_half_up(25)
         one = Fixed(UQ(1, 25), 1 << 25)
         total = np.where(back, (one + beta).codes - aligned.codes, (one - beta).codes + aligned.codes)

@@ -1,4 +1,4 @@
-"""Recurrence unit: cosines of equal steps by a recurrence of second order ([T] 3.3, figure 3.5)."""
+"""Recurrence unit: cosines of equally spaced angles by a recurrence of second order ([T] 3.3)."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -11,13 +11,13 @@ from blysk.golden.number.unit_vector import COMPONENT
 __all__ = ["RECURRENCE_FORMS", "Recurrence", "shortcut_cosine"]
 
 RECURRENCE_FORMS = ("reinsch", "direct")
-"""Forms of the recurrence."""
+"""Forms of the recurrence: Reinsch's and the direct one."""
 
 
 def shortcut_cosine(angle: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Cosine of one step by the shortcut of [T] 3.3, ``cos(psi/m) = (cos psi - 1)/m^2 + 1``.
 
-    Its ``1 - cos`` is too small by 0.3 % at psi = 10 degrees and by 8.8 % at 60.
+    ``1 - cos(psi/m)`` is then too small by 0.3 % at psi = 10 degrees and by 8.8 % at 60.
 
     Parameters
     ----------
@@ -25,29 +25,32 @@ def shortcut_cosine(angle: np.ndarray, steps: np.ndarray) -> np.ndarray:
         psi in radians.
     steps : array
         m.
+
+    Source: docs/theory/interpolation.md#recurrence; [T] 3.3.
     """
     return (np.cos(angle) - 1) / np.square(np.asarray(steps, dtype=np.float64)) + 1
 
 
 @dataclass(frozen=True)
 class Recurrence:
-    """``x(k) = A cos(phase - k d)`` for k = 0 ... m - 1, without a cosine: one product a pixel.
+    """Cosines ``x(k) = A cos(phase - k d)`` for k = 0 ... m - 1, by one product a pixel.
 
-    ``direct``, as drawn: ``x(k+1) = 2 cos(d) x(k) - x(k-1)``. Near 2 the coefficient's rounding, an absolute
-    one, swamps the small number ``2 - 2 cos d`` that bends the curve: in short words it is **unstable**.
+    ``direct``, as published: ``x(k+1) = 2 cos(d) x(k) - x(k-1)``. The coefficient is near 2, so its rounding
+    is large against ``2 - 2 cos d``, the small number that gives the curve its curvature: the form is
+    **unstable** in short words.
 
     ``reinsch``: ``D(k) = D(k-1) - K 2^(2-s) x(k)``, ``x(k+1) = x(k) + D(k)``, from ``D(0) = x(1) - x(0)``,
-    with ``K 2^(2-s) = 4 sin^2(d/2)``: the small number in a floating scale of its own, and the state with
-    guard bits, which cost adders and no multiplier.
+    with ``K 2^(2-s) = 4 sin^2(d/2)``. The small number has a floating scale of its own, and the state has
+    guard bits, which cost adders but no multiplier.
 
-    With F ``fraction_bits`` and E ``guard_bits``; the defaults give 18-bit multiplier operands:
+    F is ``fraction_bits`` and E ``guard_bits``; with the defaults multiplier operands have 18 bits:
 
     =============== ============================ ===========================================
     word            ``reinsch``                  ``direct``
     =============== ============================ ===========================================
     x               SQ(2, F + E), wraps          SQ(2, F), rounded, saturates
     D               SQ(2, F + E), wraps
-    coefficient     K UQ(0, F + 1), s 6 bits     ``-2 cos d`` SQ(2, F), which holds -2; cut
+    coefficient     K UQ(0, F + 1), s 6 bits     ``-2 cos d`` SQ(2, F), holds -2; cut
     operand         x rounded to SQ(2, F)        x
     product         cut to F + E fraction bits   rounded
     result          rounded, saturates           rounded, saturates
@@ -55,49 +58,54 @@ class Recurrence:
 
     The result has the format `result_format`.
 
-    With d to 90 degrees and ``|A| <= 1 - 2^-16``, the product of two unit vectors, nothing wraps or saturates
-    (|D| <= sqrt 2) in spans of any length, with 16 fraction bits and 20 guard bits or more. What shorter
-    words cut adds up: with 8 and 10 bits spans of hardly any step wrap after 1,300 pixels or so.
+    With d up to 90 degrees and ``|A| <= 1 - 2^-16``, the product of two unit vectors, no word of ``reinsch``
+    wraps (|D| <= sqrt 2) in spans of any length, with 16 or more fraction bits and 20 or more guard bits.
+    With shorter words the cuts add up: with 8 and 10 bits, spans of very small steps wrap after about 1300
+    pixels.
 
-    Error of the result, at most `error`: an error e of one step comes back after j more steps as
-    ``e sin(j d)/sin d``, at most ``j e``, so a span of m pixels sums up to ``(m-1)(m-2)/2`` times the
-    largest. In ``reinsch`` that is ``4 sin^2(d/2) 2^-F`` (K is off by a relative 2^-(F+1), the operand by
-    2^-(F+1)), which sums up to ``psi^2/2 2^-F`` at most, psi = (m - 1) d, **whatever the length**; and the
-    cut, 2^-(F+E), a drift of 4.8e-7 in 4095 pixels. In ``direct`` it is 2^-F for the cut coefficient and
-    2^-(F+1) for the rounding, with nothing to make it small: 0.05 after 64 pixels, none but 3 from 300 on.
+    Error of the result, at most `error`. An error e of one step is ``e sin(j d)/sin d`` after j more steps,
+    at most ``j e``, so that the errors of a span of m pixels add up to ``(m-1)(m-2)/2`` times the largest
+    one.
 
-    The figures of numbers.md, "Recurrences in fixed point", come out to the digits shown with the peak at
-    0.79 of the span: ``direct`` (its coefficient cut) 0.015, 0.40, 0.40 and 1.5e-3, ``reinsch`` with 20 guard
-    bits at most 5.7e-5 and, F = 24, 2.3e-7. A rounded coefficient gives ``direct`` under 0.1 in the second
-    and third case, by luck: ``2^F (2 - 2 cos d)`` is 1.1 there, close to a whole number.
+    - In ``reinsch`` one step is off by ``4 sin^2(d/2) 2^-F`` (K by a relative 2^-(F+1), the operand by
+      2^-(F+1)). These errors add up to at most ``psi^2/2 2^-F``, psi = (m - 1) d, **for any length**. The
+      cut, 2^-(F+E), adds up to 4.8e-7 in 4095 pixels.
+    - In ``direct`` one step is off by 2^-F for the cut coefficient and 2^-(F+1) for the rounding, however
+      small d is: 0.05 after 64 pixels; from 300 pixels on there is no bound below 3, that of the words.
 
-    **Interleaved**, for one pixel a clock: the loop holds a product, which takes several cycles, so four
-    recurrences share it. Phase j has pixels j, j + 4, j + 8, ...: ``x(k+4) = 2 cos(4d) x(k) - x(k-4)``, the
-    same recurrence with a step of 4d and start values of its own. It runs through ``ceil(m/4)`` values, so
-    that `error` is that of so many pixels 4d apart: the same ``psi^2/2 2^-F``, a sixteenth of the cut's drift
-    (3.0e-8), and for ``direct`` a sixteenth of its growth. The coefficient is read from pixel 8 on and the
-    second values from pixel 4 on, so 4d is held to 90 degrees: a span of up to 90 degrees has a larger one
-    only where nothing reads it. Other spans must have d up to 22.5 degrees if they have over 4 pixels.
+    With the peak at 0.79 of the span, the largest errors of ``direct`` (with its coefficient cut) in the four
+    published cases are 0.015, 0.40, 0.40 and 1.5e-3; those of ``reinsch`` with 20 guard bits are at most
+    5.7e-5 and, for F = 24, 2.3e-7. A rounded coefficient gives ``direct`` less than 0.1 in the second and
+    third case by chance, because ``2^F (2 - 2 cos d)``, 1.1, is close to a whole number.
 
-    A setup makes the start values from x(0), D(0) and the coefficient of d by seven steps of the recurrence
-    itself (`prologue`), in the loop that is there with ``interleave`` 1; these few steps add at most
-    `prologue_error`, in which nothing grows with the square of the length. Or from 17-bit cosines and sines,
-    as the highlight-cosine unit gives them: ``D = 2 sin(2d) A sin(phase - (j+2) d)`` is a small number times
-    a sine, so an error e of the sine counts ``psi e`` at the end of the span.
+    **Interleaved**, for one pixel a cycle: the product in the loop takes several cycles, so that four
+    recurrences share the loop. Phase j has the pixels j, j + 4, j + 8, ...:
+    ``x(k+4) = 2 cos(4d) x(k) - x(k-4)``, the same recurrence with a step of 4d and its own start values. A
+    phase has ``ceil(m/4)`` pixels, 4d apart, and `error` is the bound of these: the same ``psi^2/2 2^-F``, a
+    sixteenth of the drift by cuts (3.0e-8), and a sixteenth of the growth of ``direct``. The coefficient is
+    read from pixel 8 on and the second values from pixel 4 on, so 4d is limited to 90 degrees: in a span of
+    up to 90 degrees a larger 4d is never read. In wider spans of more than 4 pixels d must be at most 22.5
+    degrees.
+
+    A setup has two ways to the start values. From x(0), D(0) and the coefficient of d, by seven steps of the
+    recurrence itself (`prologue`), in the loop of ``interleave`` 1; these steps add at most `prologue_error`,
+    no part of which grows with the square of the length. Or from 17-bit cosines and sines, as the
+    highlight-cosine unit gives them: ``D = 2 sin(2d) A sin(phase - (j+2) d)`` is a small number times a
+    sine, so that an error e of the sine counts as ``psi e`` at the end of the span.
 
     Parameters
     ----------
     form : str
         One of `RECURRENCE_FORMS`.
     fraction_bits : int
-        8 to 32. Up to 16 a multiplier of 18x18 bits is enough.
+        F, 8 to 32. Up to 16 a multiplier of 18x18 bits is enough.
     guard_bits : int
-        10 to 28, of ``reinsch`` alone.
+        E, 10 to 28, in ``reinsch`` only.
     interleave : int
-        1, as drawn, or 4 phases. 1 is the default: a span then needs two start values a copy and not eight,
-        and registers for one phase; 4 is for who wants a pixel a clock.
+        Phases: 1, as published, or 4. With 1 a span has two start values for each cosine instead of eight,
+        and there are registers for one phase only; 4 gives a pixel a cycle.
     result_format : Format
-        Of the cosines; one of 25 fraction bits leaves the last rounding out of the error.
+        Format of the cosines; with 25 fraction bits the last rounding is negligible.
 
     Raises
     ------
@@ -105,7 +113,7 @@ class Recurrence:
         If the form or the number of phases is unknown, a number of bits is out of range, or the result's
         format is unsigned or has more fraction bits than the state of ``reinsch``.
 
-    Source: [T] 3.3, figure 3.5; C. Reinsch's form of Goertzel's algorithm; numbers.md.
+    Source: docs/theory/interpolation.md#recurrence; [T] 3.3, figure 3.5; [Stoer02].
     """
 
     form: Literal["reinsch", "direct"] = "reinsch"
@@ -135,7 +143,7 @@ class Recurrence:
 
     @property
     def state_format(self) -> Format:
-        """Format of the first value and of the second, or of the first difference in ``reinsch``."""
+        """Format of the state: x and, in ``reinsch``, D."""
         return SQ(2, self.fraction_bits + (self.guard_bits if self.form == "reinsch" else 0))
 
     @property
@@ -144,8 +152,8 @@ class Recurrence:
         return UQ(0, self.fraction_bits + 1) if self.form == "reinsch" else SQ(2, self.fraction_bits)
 
     @property
-    def bend_format(self) -> Format:
-        """Format of ``4 sin^2(d/2) x`` of ``reinsch`` before and while it is shifted right."""
+    def curvature_format(self) -> Format:
+        """Format of ``4 sin^2(d/2) x`` of ``reinsch`` before it is shifted right and while it is."""
         state, product = self.state_format.fraction_bits, 2 * self.fraction_bits - 1
         return SQ(4, max(state, product))
 
@@ -162,23 +170,23 @@ class Recurrence:
         Returns
         -------
         float64 array
-            3 where ``direct`` has no bound but that of its words.
+            3 where the only bound of ``direct`` is that of its words.
         """
         steps, angle = self._phase_span(length, angle)
         sums = steps * np.maximum(steps - 1, 0) / 2
         word, rounding = 2.0**-self.fraction_bits, self.result_format.step / 2
         if self.form == "reinsch":
             cut = self.state_format.step
-            # The state stays under 1.01. A step too small for the largest shift is held to 2^-(F + 47).
-            bend = 1.01 * np.square(angle / np.maximum(steps, 1)) + 2.0**-47
-            return sums * (bend * word + cut) + (steps + 2) * cut / 2 + rounding
+            # The state is under 1.01. At the largest shift the coefficient is off by 2^-(F + 47).
+            curvature = 1.01 * np.square(angle / np.maximum(steps, 1)) + 2.0**-47
+            return sums * (curvature * word + cut) + (steps + 2) * cut / 2 + rounding
         growth = sums * word
         with np.errstate(divide="ignore"):
             grown = (1.5 * growth + np.maximum(steps, 0.5) * word) / np.maximum(1 - growth, 0) + rounding
         return np.minimum(grown, 3.0)
 
     def _phase_span(self, length: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Steps of the longest phase, and the angle that they go through."""
+        """Steps of the longest phase, and the angle that they cover together."""
         length = np.asarray(length, dtype=np.float64)
         steps = np.ceil(length / self.interleave) - 1
         return steps, np.asarray(angle, dtype=np.float64) * self.interleave * steps / np.maximum(
@@ -186,11 +194,12 @@ class Recurrence:
         )
 
     def prologue_error(self, length: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """What start values from `prologue` add to `error`, in ``reinsch``, for spans of up to 90 degrees.
+        """Bound of the error that start values from `prologue` add to `error`, for spans up to 90 degrees.
 
-        A step d adds ``b = 4 sin^2(d/2) 2^-F + 2^-(F+E)`` at most to the difference, whose first value is
-        rounded by ``e = 2^-(F+E+1)``. So x(j) is off by ``b j (j-1)/2 + (j+1) e``, and ``x(j+4) - x(j)``, a
-        sum of four differences, by ``b (4j + 6) + 4 e``, which counts once for every step of its phase.
+        For ``reinsch``. A step adds at most ``b = 4 sin^2(d/2) 2^-F + 2^-(F+E)`` to the error of the
+        difference, whose first value is rounded by ``e = 2^-(F+E+1)``. So x(j) is off by
+        ``b j (j-1)/2 + (j+1) e``, and ``x(j+4) - x(j)``, a sum of four differences, by ``b (4j + 6) + 4 e``,
+        which counts once for every step of its phase.
 
         Parameters
         ----------
@@ -200,12 +209,12 @@ class Recurrence:
         steps, _ = self._phase_span(length, angle)
         step = np.asarray(angle, dtype=np.float64) / np.maximum(np.asarray(length) - 1, 1)
         cut = self.state_format.step
-        bend = (1.01 * np.square(step) + 2.0**-47) * 2.0**-self.fraction_bits + cut
-        # A wrong first value comes back up to 1/cos(2d) times, d being 11.25 degrees where it comes back.
-        return 1.09 * (3 * bend + 2 * cut) + steps * (18 * bend + 2 * cut)
+        error = (1.01 * np.square(step) + 2.0**-47) * 2.0**-self.fraction_bits + cut
+        # An error of the first value recurs up to 1/cos(2d) times as large, with d up to 11.25 degrees.
+        return 1.09 * (3 * error + 2 * cut) + steps * (18 * error + 2 * cut)
 
     def coefficient(self, step: np.ndarray) -> tuple[Fixed, np.ndarray]:
-        """Coefficient of a step, as a setup has to deliver it.
+        """Coefficient of a step, as the recurrence unit takes it.
 
         Parameters
         ----------
@@ -215,7 +224,7 @@ class Recurrence:
         Returns
         -------
         coefficient : Fixed, same shape, `coefficient_format`
-            K, or ``-2 cos d``; interleaved, those of 4d, up to 90 degrees.
+            K, or ``-2 cos d``; if interleaved, of 4d, up to 90 degrees.
         shift : int array, same shape
             s, 0 to 47; 0 in ``direct``.
 
@@ -235,12 +244,12 @@ class Recurrence:
         small = 4 * np.square(np.sin(step / 2))
         shift = np.minimum(2 - np.frexp(small)[1].astype(np.int64), (3 << (self.SHIFT_BITS - 2)) - 1)
         codes = np.floor(np.ldexp(small, format.fraction_bits + shift - 2) + 0.5).astype(np.int64)
-        # A word that rounds up to 1 is 1/2 at twice the scale.
+        # A word that is rounded up to 1 becomes 1/2 with a shift of one less.
         full = codes > format.max_code
         return Fixed(format, codes >> full), shift - full
 
     def start(self, amplitude: np.ndarray, phase: np.ndarray, step: np.ndarray) -> tuple[Fixed, Fixed]:
-        """First value, and second value or first difference, as a setup has to deliver them.
+        """First value, and second value or first difference, as the recurrence unit takes them.
 
         Parameters
         ----------
@@ -250,8 +259,8 @@ class Recurrence:
         Returns
         -------
         first, second : Fixed, `state_format`
-            ``x(0)``; ``x(1)`` in ``direct``, ``x(1) - x(0)`` in ``reinsch``. Interleaved with a last axis
-            more, of the four phases: ``x(j)``; ``x(j+4)``, or ``x(j+4) - x(j)``.
+            ``x(0)``; ``x(1)`` in ``direct``, ``x(1) - x(0)`` in ``reinsch``. If interleaved, with one more
+            axis for the four phases: ``x(j)``; ``x(j+4)``, or ``x(j+4) - x(j)``.
         """
         if self.interleave > 1:
             amplitude, phase, step = (np.asarray(x)[..., np.newaxis] for x in (amplitude, phase, step))
@@ -264,18 +273,18 @@ class Recurrence:
         return Fixed.round(self.state_format, first), Fixed.round(self.state_format, second)
 
     def _phase_step(self, step: np.ndarray) -> np.ndarray:
-        """Step of one phase; interleaved, up to 90 degrees."""
+        """Step of one phase: d; if interleaved, 4d up to 90 degrees."""
         return step if self.interleave == 1 else np.minimum(self.interleave * step, self.MAX_STEP)
 
     def prologue(
         self, first: Fixed, second: Fixed, coefficient: Fixed, shift: np.ndarray
     ) -> tuple[Fixed, Fixed]:
-        """Bit-true start values of the four phases, from those of the recurrence that is not interleaved.
+        """Bit-accurate start values of the four phases, from those of the recurrence that is not interleaved.
 
         Parameters
         ----------
         first, second, coefficient, shift
-            As for `states` with ``interleave`` 1, shape (spans,), the coefficient that of d.
+            As for `states` with ``interleave`` 1, shape (spans,); the coefficient is that of d.
 
         Returns
         -------
@@ -285,7 +294,7 @@ class Recurrence:
         codes = replace(self, interleave=1).states(first, second, coefficient, shift, 8).codes.T
         start, following = codes[:, :4], codes[:, 4:]
         if self.form == "reinsch":
-            # The register's half step.
+            # The half step that the register of x holds.
             start, following = (
                 self.state_format.wrap(start - self._half_operand),
                 self.state_format.wrap(following - start),
@@ -297,23 +306,23 @@ class Recurrence:
         return 1 << (self.guard_bits - 1)
 
     def states(self, first: Fixed, second: Fixed, coefficient: Fixed, shift: np.ndarray, steps: int) -> Fixed:
-        """Bit-true values of x, in the words of the state.
+        """Bit-accurate values of x in the format of the state.
 
         Parameters
         ----------
-        first, second : Fixed, shape (spans,) or interleaved (spans, 4), `state_format`
+        first, second : Fixed, shape (spans,) or, if interleaved, (spans, 4), `state_format`
             Start values, see `start`.
         coefficient : Fixed, shape (spans,), `coefficient_format`
             See `coefficient`.
         shift : int array, shape (spans,)
             s, 0 to 63.
         steps : int
-            How many.
+            Number of values of each span.
 
         Returns
         -------
         Fixed, shape (steps, spans), `state_format`
-            In ``reinsch`` with half a step of the operand, 2^-(F+1), added, as the register holds it.
+            In ``reinsch`` with half a step of the operand, 2^-(F+1), added, as in the register.
 
         Raises
         ------
@@ -329,7 +338,7 @@ class Recurrence:
         shift = np.asarray(shift, dtype=np.int64)
         if shift.size and not 0 <= shift.min() <= shift.max() < 1 << self.SHIFT_BITS:
             raise ValueError(f"shifts must be 0 to {(1 << self.SHIFT_BITS) - 1}")
-        # Products of more than 63 bits, which no default has, need Python's integers.
+        # Products of more than 63 bits, which the defaults do not have, need Python's integers.
         kind = object if self.fraction_bits > 29 else np.int64
         x, y, factor = (word.codes.astype(kind) for word in (first, second, coefficient))
         if self.interleave > 1:
@@ -338,7 +347,7 @@ class Recurrence:
         step = self._reinsch if self.form == "reinsch" else self._direct
         if self.form == "reinsch":
             x = self.state_format.wrap(x + self._half_operand)
-        # Every step rounds, so that there is no closed form: the loop is over time, not over spans.
+        # Every step rounds, so there is no closed form: a loop over pixels of all spans at once.
         for k in range(len(found)):
             found[k] = x
             x, y = step(x, y, factor, shift, k == 0)
@@ -348,9 +357,9 @@ class Recurrence:
 
     def _reinsch(self, x, difference, factor, shift, is_first):
         if not is_first:
-            bend = self.bend_format.fraction_bits
-            product = (x >> self.guard_bits) * factor << (bend - 2 * self.fraction_bits + 1)
-            cut = bend - self.state_format.fraction_bits
+            bits = self.curvature_format.fraction_bits
+            product = (x >> self.guard_bits) * factor << (bits - 2 * self.fraction_bits + 1)
+            cut = bits - self.state_format.fraction_bits
             difference = self.state_format.wrap(difference - (product >> shift >> cut))
         return self.state_format.wrap(x + difference), difference
 
@@ -370,7 +379,7 @@ class Recurrence:
         span: np.ndarray,
         index: np.ndarray,
     ) -> Fixed:
-        """Bit-true results of one copy.
+        """Bit-accurate cosines of every pixel.
 
         Parameters
         ----------
@@ -379,7 +388,7 @@ class Recurrence:
         span : int array, shape (pixels,)
             Span of each pixel.
         index : int array, shape (pixels,)
-            Place of each pixel in its span, from 0 on.
+            Index of each pixel in its span, from 0 on.
 
         Returns
         -------
@@ -396,10 +405,10 @@ class Recurrence:
         return self.result(states)
 
     def result(self, states: Fixed) -> Fixed:
-        """Bit-true results of states, rounded half up and saturated."""
+        """Bit-accurate cosines from values of `states`: rounded half up and saturated."""
         bits = self.result_format.fraction_bits
         if self.form == "reinsch":
-            # The register's half step gives way to that of the result.
+            # Half a step of the result in place of half a step of the operand.
             states = states + self.exchange
             return states.truncate(bits).saturate(self.result_format)
         if states.format.fraction_bits < bits:
@@ -408,7 +417,7 @@ class Recurrence:
 
     @property
     def exchange(self) -> Fixed:
-        """Half a step of the result less half a step of the operand of ``reinsch``."""
+        """Half a step of the result minus half a step of the operand of ``reinsch``."""
         return Fixed.round(
             SQ(0, self.state_format.fraction_bits),
             (self.result_format.step - 2.0**-self.fraction_bits) / 2,

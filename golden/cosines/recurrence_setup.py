@@ -1,4 +1,4 @@
-"""Recurrence setup: start values of the interleaved recurrence, straight from the dot products of a span."""
+"""Recurrence setup: start values of the interleaved recurrence, from the dot products of a span."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -27,39 +27,39 @@ class RecurrenceSetup:
     - ``x(0) = a``,
     - ``x(1) - x(0) = rho (b - a + a q) - a K/2``, ``rho = sin d/sin psi``, ``K = 4 sin^2(d/2)``.
 
-    There is no lambda, no A, no arctangent and no root: the two functions of the span are even in psi, so
-    they are smooth in q, and equal normals are no special case (``rho = 1/(m-1)``, ``K = 0``: x stays a, to
-    the bit). The angular setup and CORDIC are left out, and all but 16 products are the same for every H:
+    This needs neither lambda nor A, neither an arctangent nor a root. Both functions of the span are even in
+    psi and therefore smooth in q. Equal normals are no special case: ``rho = 1/(m-1)`` and ``K = 0``, so that
+    every x is exactly a. All but 16 products are the same for every H:
 
     - ``psi^2 = 2 q p(q)``, ``d^2 = Q = psi^2/(m-1)^2``, ``K = Q k(Q)`` and, for the coefficient of four
       pixels, ``16 Q k(16 Q)``;
     - ``rho = (1 + c)/(m-1)``, ``1 + c = i(q) (1 - s(Q))`` with ``i = psi/sin psi``, ``s = 1 - sin d/d``.
 
-    The four functions, less 1, are tables with linear interpolation. q, psi^2, Q and K have scales of their
-    own (a word in [1/2, 1) and a shift), so that a small angle keeps its relative precision. From ``x(0)``
-    and ``x(1) - x(0)`` seven steps of the recurrence make the start values of its four phases
-    (`Recurrence.prologue`): one product each.
+    The differences of the four functions from 1 are tables with linear interpolation. q, psi^2, Q and K each
+    have a floating scale (a word in [1/2, 1) and a shift), so that a small angle keeps its relative
+    precision. Seven steps of the recurrence, one product each, lead from ``x(0)`` and ``x(1) - x(0)`` to the
+    start values of the four phases (`Recurrence.prologue`).
 
     =============== ============ =================================================================
     word            format       why
     =============== ============ =================================================================
-    a, b            SQ(2, 34)    times 1 + 2^-16, so that a normal's code of length 1 counts as 1
-    q               UQ(0, 35)    the same; saturates. Word UQ(0, 17), rounded, and shift 0 to 34
-    p-1, i-1        UQ(0, 17)    from UQ(0, 22), rise UQ(-8, 22), 512 words on q
-    1-k, s          UQ(0, 17)    the same, on Q in UQ(2, 21)
-    psi^2/2, Q/8    UQ(0, 17)    word, 1/2 or more, rounded; their shifts add up
-    1/(m-1)         UQ(0, 17)    table of 2048 words; beside it ``1/(m-1)^2``, as exact
+    a, b            SQ(2, 34)    times 1 + 2^-16, so that the code of length 1 counts as 1
+    q               UQ(0, 35)    also times 1 + 2^-16; saturates. Word UQ(0, 17), rounded; shift 0 to 34
+    p-1, i-1        UQ(0, 17)    from UQ(0, 22), rise UQ(-8, 22), 512 words by q
+    1-k, s          UQ(0, 17)    from the same formats, by Q in UQ(2, 21)
+    psi^2/2, Q/8    UQ(0, 17)    word, 1/2 or more, rounded; their shifts are added
+    1/(m-1)         UQ(0, 17)    table of 2048 words, with ``1/(m-1)^2`` of the same precision
     c               SQ(1, 17)    -2^-16 to 0.571
     rho             UQ(0, 17)    word, 1/2 or more, and shift
     a q             SQ(2, 33)    a rounded to SQ(2, 16); shifted and cut to 28 fraction bits
-    b - a + a q     SQ(2, 28)    a multiplier takes its upper 18 bits, then its lower 12
+    b - a + a q     SQ(2, 28)    multiplied in two words, the upper 18 and the lower 12 bits
     K               UQ(0, 17)    as in `Recurrence`
     results         SQ(2, 44)    `Recurrence.state_format`; SQ(2, 16) in ``direct``
     =============== ============ =================================================================
 
-    Error of x at any pixel, for unit vectors: `error`. At pixel k an error e of the first difference counts k
-    times, and a relative one, f, of K counts ``(k d)^2/2 f``. Largest found in units of 1e-6, by the span's
-    angle in degrees, with the bound:
+    Error of x at any pixel, for unit vectors: `error`. At pixel k an error e of the first difference counts
+    as ``k e``, and a relative error f of K as ``(k d)^2/2 f``. Largest error found, with the bound, in units
+    of 1e-6, by the angle of the span in degrees:
 
     ======= ===== ===== ===== ===== =====
     angle   0     1     10    45    90
@@ -68,25 +68,26 @@ class RecurrenceSetup:
     bound   0.06  0.6   6.6   50    171
     ======= ===== ===== ===== ===== =====
 
-    Up to 90 degrees ``|b - a + a q| = |A sin lambda sin psi|`` is 1 at most, and a first difference
-    sqrt 2, so nothing wraps but x(j+4) - x(j) where its two pixels are over 90 degrees apart: the span ends
-    before. Spans over 90 degrees are flagged (q of ``1 + 2^-13`` or more; rounding of the normals and of q
-    moves it by 6.4e-5 at most); their words mean nothing. A span of one pixel gets ``m - 1 = 1``, which
-    nothing reads. The coefficient is that of a step 4d up to 90 degrees; one of spans of up to 4 pixels may
-    be any, and is not read either.
+    Up to 90 degrees ``|b - a + a q| = |A sin lambda sin psi|`` is at most 1, and a first difference at most
+    sqrt 2, so that no word wraps but x(j+4) - x(j) of two pixels more than 90 degrees apart, of which the
+    second is after the end of the span. Spans over 90 degrees are flagged (from a q of ``1 + 2^-13`` on;
+    rounding of the normals and of q moves q by at most 6.4e-5); their words are invalid. A span of one pixel
+    gets ``m - 1 = 1``, which no unit reads. The coefficient is that of a step 4d up to 90 degrees. In spans
+    of up to 4 pixels 4d may be larger; the coefficient is then arbitrary, and it is not read.
 
     Parameters
     ----------
     recurrence : Recurrence
-        Whose start values they are: interleaved, 16 fraction bits. Those of ``direct`` are made from those of
-        ``reinsch``, ``x(j+4)`` rounded half up, ``-2 cos 4d = K 2^(2-s) - 2`` rounded up.
+        Recurrence that gets the start values: interleaved, 16 fraction bits. The start values of ``direct``
+        are made from those of ``reinsch``: ``x(j+4)`` is rounded half up, ``-2 cos 4d = K 2^(2-s) - 2`` is
+        rounded up.
 
     Raises
     ------
     ValueError
-        If the recurrence is another.
+        If the recurrence is not interleaved or does not have 16 fraction bits.
 
-    Source: [T] 3.1, 3.3; blocks.md, "Recurrence unit".
+    Source: docs/theory/interpolation.md#recurrence; [T] 3.1, 3.3.
     """
 
     recurrence: Recurrence = field(default_factory=lambda: Recurrence(interleave=4, result_format=SQ(2, 25)))
@@ -114,26 +115,27 @@ class RecurrenceSetup:
 
     @cached_property
     def steps(self) -> Recurrence:
-        """The recurrence that makes the start values."""
+        """Recurrence of form ``reinsch`` that makes the start values."""
         return replace(self.recurrence, form="reinsch")
 
     def error(self, length: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """Bound of the error of every pixel, setup and recurrence, for unit vectors.
+        """Bound of the error of every pixel, setup and recurrence together, for unit vectors.
 
-        Against the curve above for the same codes, ``reinsch``. With ``e = 2^-18``, half a step of the 17-bit
-        words, and t, the error of the tables before that rounding, `TABLE_ERROR`:
+        Against the curve above for the same codes, for ``reinsch``. With ``e = 2^-18``, half a step of the
+        17-bit words, and ``t = TABLE_ERROR``, the error of the tables before they are rounded:
 
-        - K is off by a relative ``(2 + 1 + 2 + 2 + 2) e + t`` for Q (word of q, p, psi^2, square, Q, each 1/2
-          or more but p), ``(e + t)/0.81`` for k and ``e/0.40`` for its own rounding. Each step of the
-          recurrence then bends by so much more or less; errors of one step come back as often as steps
-          follow, which sums up to ``psi^2/2`` times it.
+        - K is off by a relative ``(2 + 1 + 2 + 2 + 2) e + t`` for Q (words of q, p, psi^2, square and Q, each
+          1/2 or more except p), by ``(e + t)/0.81`` for k and by ``e/0.40`` for its own rounding. Each step
+          of the recurrence has this relative error, which counts once for every following step: ``psi^2/2``
+          times it in sum.
         - rho is off by a relative 2 e for 1/(m-1), ``2.6 (e + t)`` for i and s, 3 e for c and its own
-          rounding, and the error of Q times ``d^2/4``, by which sin d/d depends on it. It counts psi times.
+          rounding, and ``d^2/4`` times the relative error of Q, on which sin d/d depends. This counts psi
+          times.
         - ``b - a + a q`` is off by ``4 e q`` for the words of q and a, and a few cuts, times ``psi/sin psi``.
-        - From q = 1/2 on `Chord` cuts half a step of each difference: q is off by 2.7e-5 at most, which moves
-          the curve by 0.65 times that (by ``tan(psi/2)/(2 sin psi)`` in its middle, plus the odd part).
+        - From q = 1/2 on `Chord` cuts half a step of each difference. q is then off by at most 2.7e-5, and
+          the curve by 0.65 times that (``tan(psi/2)/(2 sin psi)`` in its middle, plus the odd part).
 
-        To these come `Recurrence.error` and `Recurrence.prologue_error`.
+        `Recurrence.error` and `Recurrence.prologue_error` are added.
 
         Parameters
         ----------
@@ -146,18 +148,18 @@ class RecurrenceSetup:
         steps = np.maximum(np.asarray(length) - 1, 1)
         word, table = 2.0**-18, self.TABLE_ERROR
         square = 9 * word + table
-        bend = square + (word + table) / 0.81 + word / 0.40
+        coefficient = square + (word + table) / 0.81 + word / 0.40
         slope = 5 * word + 2.6 * (word + table) + np.square(angle / steps) / 4 * square
         q = 1 - np.cos(angle)
-        across = (4 * word * q + 4 * 2.0**-28) / np.sinc(angle / np.pi)
+        difference = (4 * word * q + 4 * 2.0**-28) / np.sinc(angle / np.pi)
         chord = np.where(q > 0.499, 0.65 * 2.7e-5, 0)
         cuts = 2.0**-32 + 4095 * 4 * 2.0**-44
         own = self.recurrence.error(length, angle) + self.recurrence.prologue_error(length, angle)
-        return np.square(angle) / 2 * bend + angle * slope + across + chord + cuts + own
+        return np.square(angle) / 2 * coefficient + angle * slope + difference + chord + cuts + own
 
     @cached_property
     def chord_tables(self) -> tuple[tuple[Fixed, Fixed], tuple[Fixed, Fixed]]:
-        """``psi^2/(2q) - 1`` and ``psi/sin psi - 1`` over q from 0 to 1."""
+        """Tables of ``psi^2/(2q) - 1`` and ``psi/sin psi - 1`` for q from 0 to 1."""
 
         def angle(q):
             return 2 * np.arcsin(np.sqrt(q / 2))
@@ -173,19 +175,19 @@ class RecurrenceSetup:
 
     @cached_property
     def step_tables(self) -> tuple[tuple[Fixed, Fixed], tuple[Fixed, Fixed]]:
-        """``1 - 4 sin^2(d/2)/d^2`` and ``1 - sin d/d`` over ``d^2`` from 0 to 4."""
+        """Tables of ``1 - 4 sin^2(d/2)/d^2`` and ``1 - sin d/d`` for ``d^2`` from 0 to 4."""
 
-        def bend(square):
+        def one_minus_k(square):
             return 1 - 4 * np.square(np.sin(np.sqrt(square) / 2)) / square
 
         def sine(square):
             return 1 - np.sin(np.sqrt(square)) / np.sqrt(square)
 
         start = 4 * np.arange(1 << self.ADDRESS_BITS) / (1 << self.ADDRESS_BITS)
-        return self._lines(bend, start), self._lines(sine, start)
+        return self._lines(one_minus_k, start), self._lines(sine, start)
 
     def _lines(self, function: Callable, start: np.ndarray) -> tuple[Fixed, Fixed]:
-        """Starts and changes of lines of nearly least maximum error; the functions are 0 at 0."""
+        """Start values and changes of lines of nearly least maximum error; the function is 0 at 0."""
         width = start[1]
         low, middle, high = (function(np.maximum(start + width * part, 1e-12)) for part in (0, 0.5, 1))
         value = np.maximum(low - ((low + high) / 2 - middle) / 2, 0)
@@ -194,7 +196,7 @@ class RecurrenceSetup:
 
     @cached_property
     def reciprocals(self) -> tuple[Fixed, Fixed, np.ndarray]:
-        """Words r and S of ``1/(m-1) = 2 r 2^-s``, ``1/(m-1)^2 = 4 S 2^-(2s + small)``, and ``small``."""
+        """Words r and S of ``1/(m-1) = 2 r 2^-s`` and ``1/(m-1)^2 = 4 S 2^-(2s + small)``, and ``small``."""
         size = 1 << (LENGTH_BITS - 1)
         square = 1 / np.square(1 + np.arange(size) / size)
         square[0] = 0.25
@@ -205,7 +207,7 @@ class RecurrenceSetup:
     def compute(
         self, normal_left: Fixed, normal_right: Fixed, vector: Fixed, length: np.ndarray
     ) -> tuple[Fixed, Fixed, Fixed, np.ndarray, np.ndarray]:
-        """Bit-true setup.
+        """Bit-accurate start values of spans.
 
         Parameters
         ----------
@@ -221,11 +223,11 @@ class RecurrenceSetup:
         first, second : Fixed, shape (spans, 4), `Recurrence.state_format`
             See `Recurrence.start`.
         coefficient : Fixed, shape (spans,), `Recurrence.coefficient_format`
-            Of four pixels.
+            Coefficient of a step of four pixels.
         shift : int array, shape (spans,)
-            Its shift.
-        wide : bool array, shape (spans,)
-            Whether the span is over 90 degrees.
+            Shift of the coefficient.
+        out_of_range : bool array, shape (spans,)
+            Whether the span is over 90 degrees; its words are then invalid.
 
         Raises
         ------
@@ -244,36 +246,36 @@ class RecurrenceSetup:
         address, step_shift = reciprocal_address(length - 1)
         reciprocal, reciprocal_square, small = (word[address] for word in self.reciprocals)
 
-        # Half of psi^2; an eighth of Q.
+        # psi^2/2 and Q/8.
         psi_square, over = self._under_one(q + q * square)
         q_square, under = self._over_half(psi_square * reciprocal_square)
         exponent = q_shift - over + 2 * step_shift + small + under
         step_bits, phase_bits = (
             (q_square.codes << bits >> exponent) & self.SQUARE_FORMAT.max_code for bits in (7, 11)
         )
-        bend = self._looked_up(self.step_tables[0], step_bits, 23)
         sine = self._looked_up(self.step_tables[1], step_bits, 23)
-        phase_bend = self._looked_up(self.step_tables[0], phase_bits, 23)
         step_coefficient, coefficient = (
-            (q_square - q_square * table).round_half_up(17).saturate(self.WORD_FORMAT)
-            for table in (bend, phase_bend)
+            (q_square - q_square * self._looked_up(self.step_tables[0], bits, 23))
+            .round_half_up(17)
+            .saturate(self.WORD_FORMAT)
+            for bits in (step_bits, phase_bits)
         )
         excess = ((inverse - sine) - inverse * sine).round_half_up(17).saturate(self.EXCESS_FORMAT)
         rho, over = self._under_one(reciprocal + reciprocal * excess)
         rho_shift = step_shift - over
 
         left, right = (self._cosine(normal, vector) for normal in (normal_left, normal_right))
-        across = left.round_half_up(16).saturate(self.OPERAND_FORMAT) * q
-        across = Fixed(across.format, across.codes >> q_shift).truncate(28)
-        slope = ((right - left).truncate(28) + across).wrap(self.SLOPE_FORMAT)
+        a_q = left.round_half_up(16).saturate(self.OPERAND_FORMAT) * q
+        a_q = Fixed(a_q.format, a_q.codes >> q_shift).truncate(28)
+        slope = ((right - left).truncate(28) + a_q).wrap(self.SLOPE_FORMAT)
         high = Fixed(self.OPERAND_FORMAT, slope.codes >> self.SLOPE_LOW_FORMAT.width)
         low = Fixed(self.SLOPE_LOW_FORMAT, slope.codes & self.SLOPE_LOW_FORMAT.max_code)
-        along = (high * rho + low * rho).scale(1)
-        along = Fixed(along.format, along.codes >> rho_shift)
+        rho_slope = (high * rho + low * rho).scale(1)
+        rho_slope = Fixed(rho_slope.format, rho_slope.codes >> rho_shift)
         state = self.steps.state_format
         first = left.extend(state)
-        step_bend = self._bend(first, step_coefficient, exponent - 1)
-        second = (along - Fixed(step_bend.format, step_bend.codes >> 1)).wrap(state)
+        curvature = self._curvature(first, step_coefficient, exponent - 1)
+        second = (rho_slope - Fixed(curvature.format, curvature.codes >> 1)).wrap(state)
         first, second = self.steps.prologue(first, second, step_coefficient, exponent - 1)
         shift = np.maximum(exponent - 5, 0)
         if self.recurrence.form == "direct":
@@ -285,11 +287,12 @@ class RecurrenceSetup:
         return first, second, coefficient, shift, out_of_range
 
     def _cosine(self, normal: Fixed, vector: Fixed) -> Fixed:
+        """Dot product in units of `ONE_SQUARED`."""
         cosine = DotProduct().compute(normal, vector)
         return (cosine + cosine.scale(-16).truncate(34)).saturate(self.COSINE_FORMAT)
 
     def _normalised(self, chord: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Word in [1/2, 1), or 0, and its shift."""
+        """Word in [1/2, 1), or 0, and its left shift."""
         shift = np.full_like(chord.codes, self.CHORD_SHIFT)
         for j in range(self.CHORD_SHIFT - 1, -1, -1):
             shift[chord.codes >> (34 - j) > 0] = j
@@ -297,19 +300,19 @@ class RecurrenceSetup:
         return word.round_half_up(17).saturate(self.WORD_FORMAT), shift
 
     def _under_one(self, value: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Word under 1, and whether it is half of the value."""
+        """Word under 1 of a value under 2, and whether it is half of the value."""
         over = value >= Fixed(UQ(1, 0), 1)
         halved = Fixed(value.format, np.where(over, value.codes, value.codes << 1)).scale(-1)
         return halved.round_half_up(17).saturate(self.WORD_FORMAT), over.astype(np.int64)
 
     def _over_half(self, value: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Word of 1/2 or more, and whether it is twice the value."""
+        """Word of 1/2 or more of a value of 1/4 or more, and whether it is twice the value."""
         under = value < Fixed(UQ(0, 1), 1)
         doubled = Fixed(value.format, value.codes << under)
         return doubled.round_half_up(17).saturate(self.WORD_FORMAT), under.astype(np.int64)
 
     def _looked_up(self, table: tuple[Fixed, Fixed], bits: np.ndarray, width: int) -> Fixed:
-        """Value of a table at so many bits, interpolated."""
+        """Interpolated value of a table at an operand of ``width`` bits."""
         values, changes = table
         below = width - self.ADDRESS_BITS
         address = bits >> below
@@ -317,10 +320,10 @@ class RecurrenceSetup:
         change = (Fixed(UQ(0, self.FRACTION_BITS), fraction) * changes[address]).round_half_up(22)
         return (values[address] + change).round_half_up(17).saturate(self.WORD_FORMAT)
 
-    def _bend(self, x: Fixed, coefficient: Fixed, shift: np.ndarray) -> Fixed:
-        """``K 2^(2-s) x`` as the recurrence finds it."""
+    def _curvature(self, x: Fixed, coefficient: Fixed, shift: np.ndarray) -> Fixed:
+        """Second difference ``K 2^(2-s) x``, as the recurrence computes it."""
         r = self.steps
         half = Fixed(r.state_format, 1 << (r.guard_bits - 1))
         operand = (x + half).wrap(r.state_format).truncate(r.fraction_bits)
-        bend = (operand * coefficient).scale(2).extend(r.bend_format)
-        return Fixed(bend.format, bend.codes >> shift).truncate(r.state_format.fraction_bits)
+        curvature = (operand * coefficient).scale(2).extend(r.curvature_format)
+        return Fixed(curvature.format, curvature.codes >> shift).truncate(r.state_format.fraction_bits)

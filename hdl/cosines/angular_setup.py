@@ -1,4 +1,4 @@
-"""Angular setup ([T] 3.1): dot products, the angle of a span, and CORDIC, on shared multipliers."""
+"""Angular setup ([T] 3.1): dot products, the angle of a span and CORDIC, on shared multipliers."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,8 @@ from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
 from amaranth.lib import data
 
 from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.arccos import Arccos, HalfChord
+from blysk.golden.cosines.arccos import Arccos
+from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT
@@ -15,22 +16,22 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.reciprocal import reciprocal_words
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
-from blysk.hdl.cosines.arccos import ArccosUnit, half_chord_words, normalised_words
+from blysk.hdl.cosines.arccos import ArccosUnit
+from blysk.hdl.cosines.half_chord import half_chord_words, normalised_words
 
 __all__ = ["AngularSetupUnit"]
 
 
 class AngularSetupUnit(PipelinedUnit):
-    """``psi``, ``lambda``, ``psi/(m-1)`` and ``cos beta`` of a span and a fixed vector.
+    """Angles ``psi``, ``lambda``, ``psi/(m-1)`` and ``cos beta`` of a span and a fixed vector.
 
-    Equations, tables, formats and error bound are those of `AngularSetup`, the bit-true
-    twin.
+    `AngularSetup` is the bit-accurate model; it has equations, tables, formats and the error bound.
 
-    Twenty-six multiplications: five dot products of three, six of the half chord, two more interpolations, x,
-    y and the step. With an initiation interval I, ``ceil(26/I)`` multipliers take turns at them
+    A beat needs 26 multiplications: five dot products of three, six of the half chord, two more
+    interpolations, x, y and the step. They share ``ceil(26/I)`` multipliers, I the initiation interval
     (`dataflow`). With ``angle="arccos"`` the pipelined arccos unit, which has two multipliers, takes the
-    place of the half chord, and one multiplication that of its six, to bring psi to turns: ``2 + ceil(21/I)``
-    multipliers. The results are the same to the bit.
+    place of the half chord; one multiplication, which converts psi to turns, takes the place of six. There
+    are then ``2 + ceil(21/I)`` multipliers. Results do not depend on I.
 
     =================== == == == == == ==
     initiation interval 1  2  3  4  5  6
@@ -41,37 +42,38 @@ class AngularSetupUnit(PipelinedUnit):
     multipliers         23 13 9  8  7  6
     =================== == == == == == ==
 
-    Four tables: 512 words of 36 bits twice (once by arccos) and of 34 once, and 2048 of 17. CORDIC is
-    unrolled, 22 steps of three adders, as is the sum that takes back its gain.
+    There are four tables: two of 512 words of 36 bits (by arccos one), one of 512 words of 34 bits, one of
+    2048 words of 17 bits. CORDIC is unrolled to 22 steps of three adders, as is the sum that divides by its
+    gain.
 
     Parameters
     ----------
     parameters : AngularSetup
-        Where psi comes from, tables and formats.
+        Bit-accurate model: unit that gives psi, tables and formats.
     initiation_interval : int or None
-        1 to 26, or to 21 by arccos: distance in cycles of two inputs. ``None``: 6.
+        Cycles from an input to the next, 1 to 26, by arccos 1 to 21; ``None``: 6.
 
     Raises
     ------
     ValueError
-        If `initiation_interval` is none of those.
+        If ``initiation_interval`` is out of range.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"normal_left", "normal_right", "vector", "length"})))`
-        Unit vectors, three components ``SQ(1, 17)`` each; length 1 to 4095.
+        Unit vectors of three components ``SQ(1, 17)``; length 1 to 4095.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
         ``angle`` UQ(0, 36), ``phase`` SQ(0, 40), ``step`` UQ(0, 40), all in turns; ``cos_beta`` UQ(1, 25);
-        ``length``; ``out_of_range``: the span is over 150 degrees, and its plane not to be trusted.
+        ``length``; ``out_of_range``: the span is over 150 degrees, and its plane is inaccurate.
 
-    Source: [T] 3.1.
+    Source: docs/theory/interpolation.md#angular-method; [T] 3.1.
     """
 
-    def __init__(self, parameters: AngularSetup | None = None, initiation_interval: int | None = None):
+    def __init__(self, parameters: AngularSetup | None = None, *, initiation_interval: int | None = None):
         self.parameters = p = parameters or AngularSetup()
-        uses = 26 if p.angle == "half_chord" else 21
-        interval = checked_interval(initiation_interval, uses, 6)
-        self._graph = Dataflow(interval, uses)
+        products = 26 if p.angle == "half_chord" else 21
+        interval = checked_interval(initiation_interval, products, 6)
+        self._graph = Dataflow(interval, products)
         self._words = self._describe()
         super().__init__(
             data.StructLayout(
@@ -97,7 +99,7 @@ class AngularSetupUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the age of its last word."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         self._m = m
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
@@ -116,14 +118,14 @@ class AngularSetupUnit(PipelinedUnit):
         )
         sums = shared_sums(g, 5, COMPONENT * COMPONENT)
         pairs = ((left, left), (right, right), (left, right), (left, vector), (right, vector))
-        own_left, own_right, cross, dot_left, dot_right = (
+        square_left, square_right, cross, dot_left, dot_right = (
             dot(g, f"dot_{k}", a, b, sums) for k, (a, b) in enumerate(pairs)
         )
 
-        own = g.register("own", lambda a, b: a + b, own_left, own_right)
+        squares = g.register("squares", lambda a, b: a + b, square_left, square_right)
         obtuse = g.register("obtuse", lambda cross: Value.cast(cross)[-1], cross)
         size = g.register("cross", _magnitude, cross)
-        chord = g.register("chord_wide", lambda own, size: own - size.scale(1).extend(SQ(6, 34)), own, size)
+        chord = g.register("chord_exact", lambda a, b: a - b.scale(1).extend(SQ(6, 34)), squares, size)
         chord = g.register("chord", lambda chord: chord.saturate(p.CHORD_FORMAT), chord)
         total = g.register("dot_sum", lambda a, b: a + b, dot_left, dot_right)
         difference = g.register("dot_difference", lambda a, b: b - a, dot_left, dot_right)
@@ -167,7 +169,7 @@ class AngularSetupUnit(PipelinedUnit):
         }
 
     def _by_arccos(self, cross: Word) -> Word:
-        """Psi by arccos, and the product that brings it to turns."""
+        """Word of psi by arccos, and the product that converts it to turns."""
         g, p = self._graph, self.parameters
 
         def exact(cross):
@@ -199,7 +201,7 @@ class AngularSetupUnit(PipelinedUnit):
         return g.register("turns", lambda turns: Value.cast(turns.extend(p.ANGLE_FORMAT)), turns)
 
     def _looked_up(self, name: str, table, address: Word, fraction: Word, sign: int, format) -> Word:
-        """Interpolated word of a table, rounded to a format of a binary place less: seven cycles at least."""
+        """Interpolated word of a table, rounded to a format: seven cycles at least."""
         g = self._graph
         values, changes = table
         width = changes.format.width
@@ -213,18 +215,18 @@ class AngularSetupUnit(PipelinedUnit):
             f"{name}_product", fraction, change, lambda fraction: FixedValue(fraction_format, fraction)
         )
 
-        def moved(value, product):
+        def interpolated(value, product):
             product = product.round_half_up(22)
             return value + product if sign > 0 else value - product
 
-        total = g.register(f"{name}_sum", moved, value, product)
+        total = g.register(f"{name}_sum", interpolated, value, product)
         rounded = g.register(
             f"{name}_rounded", lambda total: total.round_half_up(format.fraction_bits), total
         )
         return g.register(f"{name}_result", lambda rounded: rounded.saturate(format), rounded)
 
-    def _places(self, name: str, bits: Word, width: int) -> tuple[Word, Word]:
-        """Address of a table, from the top bits, and the bits below it."""
+    def _address(self, name: str, bits: Word, width: int) -> tuple[Word, Word]:
+        """Address of a table, from the leading bits, and the fraction that follows it."""
         g, p = self._graph, self.parameters
         below = width - p.ADDRESS_BITS
         return (
@@ -233,7 +235,7 @@ class AngularSetupUnit(PipelinedUnit):
         )
 
     def _major(self, major: Word, chord: Word) -> Word:
-        """The x before the exchange, ``major/2 (1 + e)``."""
+        """Word of ``major/2 (1 + e)``, which is x up to 90 degrees."""
         g, p = self._graph, self.parameters
 
         def clamped(chord):
@@ -241,8 +243,8 @@ class AngularSetupUnit(PipelinedUnit):
             return Mux(bits[35], (1 << 35) - 1, bits[:35])[35 - p.ADDRESS_BITS - p.FRACTION_BITS :]
 
         bits = g.register("correction_bits", clamped, chord)
-        places = self._places("correction", bits, p.ADDRESS_BITS + p.FRACTION_BITS)
-        correction = self._looked_up("corrections", p.corrections, *places, 1, p.CORRECTION_FORMAT)
+        operand = self._address("correction", bits, p.ADDRESS_BITS + p.FRACTION_BITS)
+        correction = self._looked_up("corrections", p.corrections, *operand, 1, p.CORRECTION_FORMAT)
         half = g.wire("major_half", lambda major: major.scale(-1).truncate(26), major)
         operand = g.register(
             "half_operand", lambda major: major.scale(-1).truncate(17).saturate(COMPONENT), major
@@ -252,10 +254,10 @@ class AngularSetupUnit(PipelinedUnit):
         return g.register("x", lambda half, x: (half + x).wrap(p.AXIS_FORMAT), half, product)
 
     def _minor(self, minor: Word, shift: Word, v: Word) -> Word:
-        """The y before the exchange, ``minor 2^j T``."""
+        """Word of ``minor 2^j T``, which is y up to 90 degrees."""
         g, p = self._graph, self.parameters
-        places = self._places("reciprocal", v, 36)
-        reciprocal = self._looked_up("inverse_roots", p.reciprocals, *places, -1, p.RECIPROCAL_FORMAT)
+        operand = self._address("reciprocal", v, 36)
+        reciprocal = self._looked_up("inverse_roots", p.reciprocals, *operand, -1, p.RECIPROCAL_FORMAT)
         code = g.register(
             "minor_coarse",
             lambda minor, shift: (Value.cast(minor) << Cat(Const(0, 2), shift[2:]))[:37],
@@ -271,7 +273,7 @@ class AngularSetupUnit(PipelinedUnit):
         return g.register("y", lambda y: y.round_half_up(26).wrap(p.AXIS_FORMAT), product)
 
     def _step(self, angle: Word, obtuse: Word, shift: Word, length: Word) -> Word:
-        """Bits of ``psi/(m-1)``."""
+        """Word of the bits of ``psi/(m-1)``."""
         g, p = self._graph, self.parameters
         leading = angle
         if p.angle == "half_chord":
@@ -284,69 +286,65 @@ class AngularSetupUnit(PipelinedUnit):
             "psi_rounded", lambda psi: FixedValue(p.ANGLE_FORMAT, psi).round_half_up(18), leading
         )
         leading = g.register("psi_leading", lambda psi: psi.saturate(p.MANTISSA_FORMAT), leading)
-        reciprocal, places = reciprocal_words(g, length, since=leading.stage - 4)
+        reciprocal, step_shift = reciprocal_words(g, length, since=leading.stage - 4)
         if p.angle == "half_chord":
-            places = g.register("places_sum", lambda a, b: (a + b)[:5], places, shift)
+            step_shift = g.register("step_shift", lambda a, b: (a + b)[:5], step_shift, shift)
         else:
-            places = g.wire("places_sum", lambda places: Cat(places, Const(0, 1))[:5], places)
+            step_shift = g.wire("step_shift", lambda shift: Cat(shift, Const(0, 1))[:5], step_shift)
         product = g.multiply("step_exact", leading, reciprocal)
         step = g.register(
             "step_coarse",
-            lambda product, places: (Cat(Const(0, 6), product) >> Cat(Const(0, 3), places[3:]))[:40],
+            lambda product, shift: (Cat(Const(0, 6), product) >> Cat(Const(0, 3), shift[3:]))[:40],
             product,
-            places,
+            step_shift,
         )
-        return g.register("step", lambda step, places: (step >> places[:3])[:40], step, places)
+        return g.register("step", lambda step, shift: (step >> shift[:3])[:40], step, step_shift)
 
     def _polar(self, x: Word, y: Word, obtuse: Word) -> tuple[Word, Word]:
-        """Cos beta and the direction, by CORDIC, one step a clock."""
+        """Words of cos beta and of the direction, by one step of CORDIC a cycle."""
         g, p = self._graph, self.parameters
-        width, turns = p.ROTATED_FORMAT.width, p.DIRECTION_FORMAT.width
+        width, direction_width = p.ROTATED_FORMAT.width, p.DIRECTION_FORMAT.width
         first, second = (
             g.register(
                 name, lambda *words: Value.cast(_choice(*words).extend(p.ROTATED_FORMAT)), obtuse, *words
             )
-            for name, words in (("x_turned", (y, x)), ("y_turned", (x, y)))
+            for name, words in (("x_exchanged", (y, x)), ("y_exchanged", (x, y)))
         )
 
-        def turned(value, behind):
-            return Mux(behind[-1], -value, value)[:width].as_signed()
+        def negated(value, x):
+            return Mux(x[-1], -value, value)[:width].as_signed()
 
-        across = g.register("across", turned, second, first)
-        along = g.register("along", turned, first, first)
+        # Half a turn where x is negative.
+        y = g.register("cordic_y", negated, second, first)
+        x = g.register("cordic_x", negated, first, first)
         direction = g.register(
             "direction",
-            lambda x: Mux(x[-1], p.DIRECTION_FORMAT.min_code, 0)[:turns].as_signed(),
+            lambda x: Mux(x[-1], p.DIRECTION_FORMAT.min_code, 0)[:direction_width].as_signed(),
             first,
         )
-        for i, turn in enumerate(p.directions.codes.tolist()):
+        for i, angle in enumerate(p.directions.codes.tolist()):
 
-            def rotate(a, b, across, opposed, i=i):
-                below = across[-1]
-                return _added(a, _halved(b, i), ~below if opposed else below).as_signed()
+            def rotated(a, b, y, negate, i=i):
+                below = y[-1]
+                return _added(a, _halved(b, i), ~below if negate else below).as_signed()
 
-            direction = g.register(
-                f"direction_{i}",
-                lambda direction, across, turn=turn: (direction + Mux(across[-1], -turn, turn))[
-                    :turns
-                ].as_signed(),
-                direction,
-                across,
+            def added(direction, y, angle=angle):
+                return (direction + Mux(y[-1], -angle, angle))[:direction_width].as_signed()
+
+            direction = g.register(f"direction_{i}", added, direction, y)
+            x, y = (
+                g.register(f"cordic_x_{i}", lambda x, y, r=rotated: r(x, y, y, False), x, y),
+                g.register(f"cordic_y_{i}", lambda y, x, r=rotated: r(y, x, y, True), y, x),
             )
-            along, across = (
-                g.register(f"along_{i}", lambda a, b, r=rotate: r(a, b, b, False), along, across),
-                g.register(f"across_{i}", lambda a, b, r=rotate: r(a, b, a, True), across, along),
-            )
-        # The gain is taken back by a tree of additions.
+        # A tree of additions divides by the gain.
         zeros = p.GAIN_BITS - p.ROTATED_FORMAT.fraction_bits
 
-        def term(along, sign, places):
-            out_of_range = Cat(Const(0, zeros), along).as_signed()
-            return out_of_range >> places if sign > 0 else -(out_of_range >> places)
+        def term(x, sign, shift):
+            shifted = Cat(Const(0, zeros), x).as_signed() >> shift
+            return shifted if sign > 0 else -shifted
 
         terms = [
-            g.wire(f"gain_{places}", lambda along, t=(sign, places): term(along, *t), along)
-            for sign, places in p.gain_terms
+            g.wire(f"gain_{shift}", lambda x, t=(sign, shift): term(x, *t), x) for sign, shift in p.gain_terms
         ]
         while len(terms) > 1:
             terms = [
@@ -361,24 +359,26 @@ class AngularSetupUnit(PipelinedUnit):
 
 
 def _magnitude(cross: FixedValue) -> FixedValue:
+    """Absolute value of a dot product."""
     code = Value.cast(cross)
     return FixedValue(SQ(5, 34), Mux(code[-1], -code, code)[:39].as_signed())
 
 
 def _sum(terms: Sequence[Value], width: int) -> Value:
+    """Sum of terms in a signed word."""
     return sum(terms)[:width].as_signed()
 
 
 def _choice(condition, a, b):
-    """One of two fixed-point values of a format."""
+    """Value a if the condition holds, else b; both of one fixed-point format."""
     return FixedValue(a.format, Mux(condition, Value.cast(a), Value.cast(b)))
 
 
 def _halved(a, times):
-    """``a / 2**times``, cut, in as many bits."""
+    """``a / 2**times``, cut, with the width of a."""
     return Cat(a[times:], a[-1].replicate(times))
 
 
 def _added(a, b, negate):
-    """``a + b``, or ``a - b`` where told, with one adder: the negative is the inverse and a carry."""
+    """``a - b`` if ``negate``, else ``a + b``, with one adder: -b is the inverse of b and a carry."""
     return (Cat(Const(1, 1), a) + Cat(negate, b ^ negate.replicate(len(b))))[1 : len(a) + 1]

@@ -17,18 +17,18 @@ __all__ = ["ChordUnit", "chord"]
 
 
 def chord(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]) -> Word:
-    """``|a - b|^2 / 2`` in ``UQ(2, 35)``: three multiplications of the graph.
+    """Word of ``|a - b|^2 / 2`` in ``UQ(2, 35)``: three multiplications of the graph.
 
     Parameters
     ----------
     graph : Dataflow
         Graph that gets the words.
     name : str
-        Of the result.
+        Name of the result.
     a : Word
         A unit vector.
     b : Word or callable
-        The other; or what gives one that stays while beats are inside.
+        The other unit vector; or a function that gives one that is constant while beats are inside.
     """
     differences = data.ArrayLayout(FixedShape(COMPONENT - COMPONENT), 3)
 
@@ -60,22 +60,28 @@ def chord(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]
 
 
 class ChordUnit(PipelinedUnit):
-    """``u = |a - b|^2 / 2``; `Chord` is the bit-true twin.
+    """Half the squared chord ``u = |a - b|^2 / 2`` of two unit vectors; `Chord` is the bit-accurate model.
 
-    The latency is 11 cycles (difference, halving, operand, four for the product, two sums, alignment,
-    saturation) and the initiation interval 1. Three multipliers of 18x18 bits.
+    Latency 11 cycles (difference, halving, operand, four for the product, two sums, alignment, saturation),
+    initiation interval 1. Three multipliers of 18x18 bits.
+
+    Parameters
+    ----------
+    parameters : Chord
+        Bit-accurate model.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"a": ..., "b": ...})))`
-        Two unit vectors, three components ``SQ(1, 17)`` each.
+        Two unit vectors of three components ``SQ(1, 17)``.
     o : :py:`Out(stream.Signature(UQ(1, 25)))`
         u, as the specular unit takes it.
 
-    Source: chord.md.
+    Source: docs/theory/chord.md#the-chord; [Lyon93].
     """
 
-    def __init__(self):
+    def __init__(self, parameters: Chord | None = None):
+        self.parameters = parameters or Chord()
         self._graph = graph = Dataflow(1, 3)
         a, b = (graph.input(name, lambda operands, name=name: operands[name]) for name in "ab")
         u = chord(graph, "u", a, b)
@@ -87,6 +93,6 @@ class ChordUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph."""
+        """Describe the registers of the graph."""
         u = self._graph.build(m, self, operands)(self._result, self.latency)
         return u.truncate(Chord.ARGUMENT_FORMAT.fraction_bits).saturate(Chord.ARGUMENT_FORMAT)

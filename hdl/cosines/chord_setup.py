@@ -1,4 +1,4 @@
-"""Chord setup: forward differences of N·L and of half the squared chord from N to H, span by span."""
+"""Chord setup: forward differences of N·L and of half the squared chord from N to H, for each span."""
 
 from collections.abc import Callable
 
@@ -29,7 +29,7 @@ __all__ = [
 def chord_differences_shape(
     lights: int, highlights: bool = True, parameters: ChordSetup | None = None
 ) -> data.StructLayout:
-    """Shape of a prepared span: start and differences of N·L and of u for each light, and the length."""
+    """Shape of a prepared span: start and differences of N·L and of u for each light; length; flag."""
     p = parameters or ChordSetup()
 
     def differences(start):
@@ -50,14 +50,14 @@ def chord_differences_shape(
 
 
 class ChordDifferencesUnit(PipelinedUnit):
-    """What two setups share: their results, by name, from the words of a graph.
+    """A setup of differences, which reads its results from the words of a graph.
 
-    A subclass sets ``_graph`` and ``_results``: words by ``(light, function, name)``, ``length``,
-    ``out_of_range``.
+    A subclass sets ``_graph`` and ``_results``, a mapping of ``(light, function, name)``, ``length`` and
+    ``out_of_range`` to words.
     """
 
     def datapath(self, m, operands):
-        """The graph, read at the age of its last words."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         for index, light in enumerate(result.lights):
@@ -73,42 +73,42 @@ class ChordDifferencesUnit(PipelinedUnit):
 class ChordSetupUnit(ChordDifferencesUnit):
     """Differences of ``f = N·L`` and ``u = |N - H|^2 / 2`` along a span, for each light.
 
-    Formats and error bounds are those of `ChordSetup`, the bit-true twin.
+    `ChordSetup` is the bit-accurate model; it has formats and error bounds.
 
-    The 7 products of a span and the 19 of each light take turns at ``ceil((7 + 19 lights) / I)`` multipliers
-    of 18x18 bits, I the initiation interval: 7 for one light and an interval of 4. Without highlights there
-    are 9 products a light. A table of ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals. The
-    latency, `latency`, follows from the turns.
+    The 7 products of a span and the 19 of each light share ``ceil((7 + 19 lights) / I)`` multipliers of 18x18
+    bits, I the initiation interval: 7 multipliers for one light and I = 4. Without highlights a light has 9
+    products. A table of ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals. The attribute
+    ``latency`` depends on how the products share the multipliers.
 
     Parameters
     ----------
     parameters : ChordSetup
-        Terms of the polynomial, each of which is a product of a span, and bits of the differences.
+        Bit-accurate model: terms of the polynomial, one product a span each, and bits of the differences.
     lights : int
         Number of lights, 1 or more.
     initiation_interval : int
-        Distance in cycles of two inputs, at least 1.
+        Cycles from an input to the next, at least 1.
     length_bits : int
         Bits of the length, 2 to 12: spans have at most ``2^length_bits - 1`` pixels.
     highlights : bool
-        Whether there is u.
+        Whether there are differences of u.
 
     Raises
     ------
     ValueError
-        If `initiation_interval` or `length_bits` is none of those.
+        If ``initiation_interval`` or ``length_bits`` is out of range.
 
     Members
     -------
     i : :py:`In(stream.Signature(span_normals_shape()))`
-        Spans; their length has `length_bits` bits and is at least 1.
+        Spans; the length has ``length_bits`` bits and is at least 1.
     o : :py:`Out(stream.Signature(chord_differences_shape(lights, highlights, parameters)))`
-        Starts and differences; the length; ``out_of_range``: the span is over 22.5 degrees and they mean
-        nothing.
+        Starts and differences; the length; ``out_of_range``: the span is over 22.5 degrees, and its
+        differences are invalid.
     constants : :py:`In(light_vectors_shape(lights))`
-        Unit vectors L and H; stay while beats are inside.
+        Unit vectors L and H, constant while beats are inside.
 
-    Source: chord.md.
+    Source: docs/theory/chord.md#differences; [Lyon93].
     """
 
     def __init__(
@@ -181,48 +181,57 @@ class ChordSetupUnit(ChordDifferencesUnit):
                 self._highlight(results, i, u, e, steps)
             total = g.register(f"f_{i}_sum", lambda a, b: a + b, *f)
             operand = g.register(
-                f"f_{i}_along", lambda total: total.truncate(16).saturate(p.OPERAND_FORMAT), total
+                f"f_{i}_operand", lambda total: total.truncate(16).saturate(p.OPERAND_FORMAT), total
             )
-            bend = g.multiply(f"f_{i}_bend", e, operand)
-            bend = g.register(
-                f"f_{i}_bend_rounded", lambda product: (-product.scale(2)).round_half_up(20), bend
+            curvature = g.multiply(f"f_{i}_curvature_exact", e, operand)
+            curvature = g.register(
+                f"f_{i}_curvature_rounded", lambda product: (-product.scale(2)).round_half_up(20), curvature
             )
-            bend = g.register(f"f_{i}_bend_word", lambda bend: bend.saturate(p.BEND_FORMAT), bend)
+            curvature = g.register(
+                f"f_{i}_curvature", lambda curvature: curvature.saturate(p.CURVATURE_FORMAT), curvature
+            )
             rise = g.register(f"f_{i}_rise", lambda a, b: b - a, *f)
-            slope = g.register(f"f_{i}_slope_exact", lambda rise, bend: rise - bend, rise, bend)
+            slope = g.register(f"f_{i}_slope_exact", lambda a, b: a - b, rise, curvature)
             slope = g.register(
                 f"f_{i}_slope", lambda slope: slope.round_half_up(18).wrap(p.HIGH_FORMAT), slope
             )
-            self._differences(results, i, "diffuse", f[0], slope, bend, steps)
+            self._differences(results, i, "diffuse", f[0], slope, curvature, steps)
         return results
 
     def _highlight(self, results, i: int, u: list[Word], e: Word, steps) -> None:
+        """Add the differences of u of a light to the results."""
         g, p = self._graph, self.parameters
         two = FixedValue.constant(UQ(2, 35), 2)
         total = g.register(f"u_{i}_sum", lambda a, b: a + b, *u)
-        across = g.register(f"u_{i}_rest", lambda total: two - total, total)
+        operand = g.register(f"u_{i}_two_minus_sum", lambda total: two - total, total)
         operand = g.register(
-            f"u_{i}_across", lambda rest: rest.truncate(16).saturate(p.OPERAND_FORMAT), across
+            f"u_{i}_operand", lambda exact: exact.truncate(16).saturate(p.OPERAND_FORMAT), operand
         )
-        bend = g.multiply(f"u_{i}_bend", e, operand)
-        bend = g.register(f"u_{i}_bend_rounded", lambda product: product.scale(2).round_half_up(20), bend)
-        bend = g.register(f"u_{i}_bend_word", lambda bend: bend.saturate(p.BEND_FORMAT), bend)
+        curvature = g.multiply(f"u_{i}_curvature_exact", e, operand)
+        curvature = g.register(
+            f"u_{i}_curvature_rounded", lambda product: product.scale(2).round_half_up(20), curvature
+        )
+        curvature = g.register(
+            f"u_{i}_curvature", lambda curvature: curvature.saturate(p.CURVATURE_FORMAT), curvature
+        )
         rise = g.register(f"u_{i}_rise", lambda a, b: b - a, *u)
-        slope = g.register(f"u_{i}_slope", lambda rise, bend: (rise - bend).wrap(p.SLOPE_FORMAT), rise, bend)
-        self._differences(results, i, "highlight", u[0], slope, bend, steps)
+        slope = g.register(f"u_{i}_slope", lambda a, b: (a - b).wrap(p.SLOPE_FORMAT), rise, curvature)
+        self._differences(results, i, "highlight", u[0], slope, curvature, steps)
 
     def _cosine(self, name: str, normal: Word, vector: Callable[[data.View], data.View]) -> Word:
+        """Dot product of a normal and a constant vector, saturated."""
         total = dot(self._graph, name, normal, vector, self._sums)
         return self._graph.register(name, lambda total: total.saturate(self.parameters.COSINE_FORMAT), total)
 
-    def _differences(self, results, i, function, start, slope, bend, steps) -> None:
+    def _differences(self, results, i, function, start, slope, curvature, steps) -> None:
+        """Add the differences of f or u of a light to the results."""
         words = difference_words(
             self._graph,
             self._shifter,
             f"{function}_{i}",
             start,
             slope,
-            bend,
+            curvature,
             steps,
             function == "highlight",
             self.parameters,
@@ -231,11 +240,11 @@ class ChordSetupUnit(ChordDifferencesUnit):
 
 
 def shared_shifters(graph: Dataflow, uses: int, parameters: ChordSetup) -> FunctionalUnit:
-    """What shifts for so many differences, two of each quadratic; see `difference_words`."""
+    """Shifters for so many differences, two of each quadratic; see `difference_words`."""
     format = parameters.shifted_format
 
     def shift(register, value, amount):
-        # In two stages, then rounded half up to the fraction bits of the differences.
+        # Two stages of shift, then rounding half up to the fraction bits of the differences.
         coarse = FixedValue(format, Value.cast(value) >> Cat(Const(0, 2), amount[2:]))
         coarse, fine = register(coarse, "coarse"), register(amount[:2], "fine_amount")
         shifted = register(FixedValue(format, Value.cast(coarse) >> fine), "shifted")
@@ -247,7 +256,7 @@ def shared_shifters(graph: Dataflow, uses: int, parameters: ChordSetup) -> Funct
 def step_words(
     graph: Dataflow, length: Word, length_bits: int = LENGTH_BITS
 ) -> tuple[Word, Word, Word, Word]:
-    """``dt = 2 reciprocal 2^-shift`` and ``dt^2 = 4 square 2^-shift``, with their shifts: one multiplication.
+    """Words of ``dt = 2 reciprocal 2^-shift`` and ``dt^2 = 4 square 2^-square_shift``: one multiplication.
 
     Parameters
     ----------
@@ -257,6 +266,11 @@ def step_words(
         Pixels, 1 or more.
     length_bits : int
         Bits of the length, 2 to 12.
+
+    Returns
+    -------
+    reciprocal, shift, square, square_shift : Word
+        As `ChordSetup.steps` gives them.
     """
     reciprocal, shift = reciprocal_words(graph, length, length_bits=length_bits)
     square = graph.multiply("square_exact", reciprocal, reciprocal)
@@ -269,29 +283,31 @@ def difference_words(
     name: str,
     start: Word,
     slope: Word,
-    bend: Word,
+    curvature: Word,
     steps: tuple[Word, Word, Word, Word],
     has_low: bool,
     parameters: ChordSetup,
 ) -> dict[str, Word]:
-    """Differences of `ChordSetup.differences`: two multiplications, or three.
+    """Words of the differences ``P dt + G dt^2`` and ``2 G dt^2``: two multiplications, or three.
+
+    `ChordSetup.differences` is their bit-accurate model.
 
     Parameters
     ----------
     graph : Dataflow
         Graph that gets the words.
-    shifters : Operator
-        From `shared_shifters`.
+    shifters : FunctionalUnit
+        Shifters of `shared_shifters`.
     name : str
-        Of the words.
-    start, slope, bend : Word
+        Common part of the words' names.
+    start, slope, curvature : Word
         Value at t = 0, P and G.
-    steps : four of Word
-        From `step_words`.
+    steps : tuple of Word
+        Words of `step_words`.
     has_low : bool
-        Whether P has more bits than a multiplier's operand, to 35, and is multiplied in two words.
+        Whether P has more bits than a multiplier's operand, up to 35, and is multiplied in two words.
     parameters : ChordSetup
-        Formats.
+        Bit-accurate model, with the formats.
 
     Returns
     -------
@@ -318,12 +334,12 @@ def difference_words(
         width = p.LOW_FORMAT.width
         high = graph.multiply(f"{name}_high", slope, reciprocal, half(p.HIGH_FORMAT, slice(width, None)))
         low = graph.multiply(f"{name}_low", slope, reciprocal, half(p.LOW_FORMAT, slice(width)))
-        along = graph.register(f"{name}_along", lambda high, low: high + low.truncate(48), high, low)
+        product = graph.register(f"{name}_slope_product", lambda a, b: a + b.truncate(48), high, low)
     else:
-        along = graph.multiply(f"{name}_along", slope, reciprocal)
-    first = shifted(f"{name}_first_order", along, shift, 1)
-    across = graph.multiply(f"{name}_across", bend, square)
-    second = shifted(f"{name}_second_order", across, square_shift, 2)
+        product = graph.multiply(f"{name}_slope_product", slope, reciprocal)
+    first = shifted(f"{name}_first_order", product, shift, 1)
+    product = graph.multiply(f"{name}_curvature_product", curvature, square)
+    second = shifted(f"{name}_second_order", product, square_shift, 2)
     return {
         "start": start,
         "first": graph.register(f"{name}_first", lambda a, b: (a + b).wrap(p.format), first, second),

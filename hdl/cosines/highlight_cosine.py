@@ -26,20 +26,20 @@ def highlight_shape() -> data.StructLayout:
 
 
 class HighlightCosineUnit(wiring.Component):
-    """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, one a clock, first pixel first.
+    """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, one pixel a cycle.
 
-    Table, formats and error bounds are those of `HighlightCosine`, the bit-true twin.
+    `HighlightCosine` is the bit-accurate model; it has table, formats and error bounds.
 
-    A span of m pixels taken in on one clock gives its first value 12 cycles later (accumulator, folding,
-    table and its register, rise, sum, operand, product, alignment, rounding, sum, saturation) and one more
-    on each of the m - 1 cycles after, unless the output waits; the next span is taken in on the clock that
-    leaves no gap. A span of length 0 takes one clock and gives nothing. Two multipliers: one of 17 x 17 bits,
-    and one of 14 x 14 for the interpolation, where there is one.
+    The first value of a span comes 12 cycles after the span is accepted (accumulator, folding, table and its
+    register, rise, sum, operand, product, alignment, rounding, sum, saturation), the values of the other
+    pixels in the following cycles, unless the output is stalled. The next span is accepted early enough that
+    there is no gap. A span of length 0 takes one cycle and has no value. Two multipliers: one of 17 x 17 bits
+    and, with interpolation, one of 14 x 14.
 
     Parameters
     ----------
     parameters : HighlightCosine
-        Table.
+        Bit-accurate model, with the table.
 
     Members
     -------
@@ -48,7 +48,7 @@ class HighlightCosineUnit(wiring.Component):
     o : :py:`Out(stream.Signature(UQ(1, 25)))`
         ``1 - cos gamma``.
 
-    Source: [T] 3.2.
+    Source: docs/theory/interpolation.md#angular-method; [T] 3.2.
     """
 
     latency = 12
@@ -63,7 +63,7 @@ class HighlightCosineUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """Accumulator and counter, and the stages after them under one enable."""
+        """Describe the counter, the accumulator and the stages after it, which share one enable."""
         m = Module()
         phase_format = HighlightCosine.PHASE_FORMAT
         theta, step = Signal(FixedShape(phase_format)), Signal(FixedShape(HighlightCosine.STEP_FORMAT))
@@ -86,7 +86,7 @@ class HighlightCosineUnit(wiring.Component):
         return m
 
     def _wave(self, m, theta, cos_beta):
-        """Stages 2 to 12."""
+        """Registers of the stages 2 to 12."""
         p, register = self.parameters, PipelinedUnit.register
         carried = {"beta": cos_beta}
 
@@ -94,7 +94,7 @@ class HighlightCosineUnit(wiring.Component):
             for name in carried:
                 carried[name] = register(m, carried[name], f"{name}_{stage}")
 
-        # A negative is its inverted bits: a step of the word off, and no carry.
+        # Inverted bits take the place of the negative, which needs a carry: 2^-40 turns off.
         magnitude = Mux(theta[39], ~theta, theta)[:39]
         angle = register(m, Mux(magnitude[38], ~magnitude, magnitude)[:38], "angle_2")
         carried["back"] = magnitude[38]

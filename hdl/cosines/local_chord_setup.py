@@ -24,7 +24,7 @@ __all__ = ["LocalChordSetupUnit", "span_values_shape"]
 def span_values_shape(
     lights: int, highlights: bool = True, length_bits: int = LENGTH_BITS
 ) -> data.StructLayout:
-    """Shape of a span that carries, for each light, N·L and u at its first pixel, middle and last pixel."""
+    """Shape of a span with N·L and u of each light at the first pixel, in the middle, at the last pixel."""
     light = {"diffuse": data.ArrayLayout(FixedShape(LocalChordSetup.DIFFUSE_FORMAT), 3)}
     if highlights:
         light["highlight"] = data.ArrayLayout(FixedShape(LocalChordSetup.HIGHLIGHT_FORMAT), 3)
@@ -36,47 +36,52 @@ def span_values_shape(
 class LocalChordSetupUnit(ChordDifferencesUnit):
     """Differences of ``f = N·L`` and ``u = |N - H|^2 / 2`` along a span, from three values of each.
 
-    Formats and error bounds are those of `LocalChordSetup`, the bit-true twin.
+    `LocalChordSetup` is the bit-accurate model; it has formats and error bounds.
 
-    One product of a span, 3 of each u and 2 of each f take turns at ``ceil((1 + 5 lights) / I)`` multipliers
-    of 18x18 bits, I the initiation interval: 2 for one light and an interval of 4. Without highlights there
-    are 2 products a light. A table of ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals. The
-    latency, `latency`, follows from the turns.
+    One product of a span, 3 of each u and 2 of each f share ``ceil((1 + 5 lights) / I)`` multipliers of 18x18
+    bits, I the initiation interval: 2 multipliers for one light and I = 4. Without highlights a light has 2
+    products. A table of ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals. The attribute
+    ``latency`` depends on how the products share the multipliers.
 
     Parameters
     ----------
+    parameters : LocalChordSetup
+        Bit-accurate model.
     lights : int
         Number of lights, 1 or more.
     initiation_interval : int
-        Distance in cycles of two inputs, at least 1.
+        Cycles from an input to the next, at least 1.
     length_bits : int
         Bits of the length, 2 to 12: spans have at most ``2^length_bits - 1`` pixels.
     highlights : bool
-        Whether there is u.
+        Whether there are differences of u.
 
     Raises
     ------
     ValueError
-        If `initiation_interval` or `length_bits` is none of those.
+        If ``initiation_interval`` or ``length_bits`` is out of range.
 
     Members
     -------
     i : :py:`In(stream.Signature(span_values_shape(lights, highlights, length_bits)))`
-        Spans; their length is at least 1.
+        Spans; the length is at least 1.
     o : :py:`Out(stream.Signature(chord_differences_shape(lights, highlights)))`
-        Starts and differences; the length; ``out_of_range``: a word does not fit, and they mean nothing.
+        Starts and differences; the length; ``out_of_range``: P or G does not fit its word, and the
+        differences are invalid.
 
-    Source: chord.md.
+    Source: docs/theory/chord.md#local-lights.
     """
 
     def __init__(
         self,
+        parameters: LocalChordSetup | None = None,
         lights: int = 1,
+        *,
         initiation_interval: int = 4,
         length_bits: int = LENGTH_BITS,
         highlights: bool = True,
     ):
-        self.parameters = LocalChordSetup()
+        self.parameters = parameters or LocalChordSetup()
         self.highlights = highlights
         self.lights = lights
         self.length_bits = checked_length_bits(length_bits)
@@ -102,14 +107,14 @@ class LocalChordSetupUnit(ChordDifferencesUnit):
         results, flags = {"length": length}, []
         for i in range(self.lights):
             for function, slope_format in functions:
-                start, slope, bend = self._quadratic(i, function, slope_format, flags)
+                start, slope, curvature = self._quadratic(i, function, slope_format, flags)
                 words = difference_words(
                     g,
                     self._shifters,
                     f"{function}_{i}",
                     start,
                     slope,
-                    bend,
+                    curvature,
                     steps,
                     has_low=slope_format.width > ChordSetup.HIGH_FORMAT.width,
                     parameters=ChordSetup(),
@@ -119,7 +124,7 @@ class LocalChordSetupUnit(ChordDifferencesUnit):
         return results
 
     def _quadratic(self, i: int, function: str, slope_format: Format, flags: list[Word]):
-        """``v_l``, P and G of a function; what does not fit is flagged."""
+        """Words of ``v_l``, P and G of f or u; the flags get a word where P or G is out of range."""
         g, p = self._graph, self.parameters
         name = f"{function}_{i}"
         values = g.input(name, lambda operands: operands["values"][i][function])
@@ -127,23 +132,26 @@ class LocalChordSetupUnit(ChordDifferencesUnit):
         ends = g.register(f"{name}_ends", lambda v: v[0] + v[2], values)
         rise = g.register(f"{name}_rise", lambda v: v[2] - v[0], values)
         exact = g.register(
-            f"{name}_bend_exact", lambda ends, v: (ends - v[1].scale(1)).scale(1), ends, values
+            f"{name}_curvature_exact", lambda ends, v: (ends - v[1].scale(1)).scale(1), ends, values
         )
         exact = g.register(
-            f"{name}_bend_rounded", lambda x: x.round_half_up(p.BEND_FORMAT.fraction_bits), exact
+            f"{name}_curvature_rounded", lambda x: x.round_half_up(p.CURVATURE_FORMAT.fraction_bits), exact
         )
-        bend = g.register(f"{name}_bend", lambda x: x.saturate(p.BEND_FORMAT), exact)
-        flags.append(g.register(f"{name}_bend_wide", lambda x: _exceeds(x, p.BEND_FORMAT), exact))
-        exact = g.register(f"{name}_slope_exact", lambda rise, bend: rise - bend, rise, bend)
+        curvature = g.register(f"{name}_curvature", lambda x: x.saturate(p.CURVATURE_FORMAT), exact)
+        flags.append(self._flag(f"{name}_curvature", exact, p.CURVATURE_FORMAT))
+        exact = g.register(f"{name}_slope_exact", lambda a, b: a - b, rise, curvature)
         exact = g.register(
             f"{name}_slope_rounded", lambda x: x.round_half_up(slope_format.fraction_bits), exact
         )
         slope = g.register(f"{name}_slope", lambda x: x.saturate(slope_format), exact)
-        flags.append(g.register(f"{name}_slope_wide", lambda x: _exceeds(x, slope_format), exact))
-        return start, slope, bend
+        flags.append(self._flag(f"{name}_slope", exact, slope_format))
+        return start, slope, curvature
 
+    def _flag(self, name: str, exact: Word, format: Format) -> Word:
+        """Whether a signed format of the same fraction bits does not hold a value."""
 
-def _exceeds(x, format: Format):
-    """Whether a signed format of the same fraction bits does not hold a value."""
-    above = x.as_value()[format.width - 1 :]
-    return above.any() & ~above.all()
+        def exceeds(value):
+            above = value.as_value()[format.width - 1 :]
+            return above.any() & ~above.all()
+
+        return self._graph.register(f"{name}_out_of_range", exceeds, exact)

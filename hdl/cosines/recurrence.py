@@ -1,4 +1,4 @@
-"""Recurrence unit ([T] figure 3.5): two cosines of equal steps, one product a pixel each."""
+"""Recurrence unit ([T] figure 3.5): two cosines of equally spaced angles, by one product a pixel each."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
@@ -15,38 +15,38 @@ _COPIES = ("diffuse", "highlight")
 
 
 class RecurrenceUnit(wiring.Component):
-    """``x(k) = A cos(phase - k d)``, once for the diffuse and once for the highlight term of a span.
+    """Cosines ``x(k) = A cos(phase - k d)`` along a span, one for the diffuse and one for the specular term.
 
-    The two copies share the coefficient register and the counter, which marks the last pixel of a span.
-    Forms, formats and error bound are those of `Recurrence`, the bit-true twin.
+    `Recurrence` is the bit-accurate model; it has forms, formats and the error bound. Both cosines share the
+    register of the coefficient and the counter, which marks the last pixel of a span.
 
-    With ``interleave`` 1, every pixel needs the one before, so that the registers of the loop cannot be
-    filled with other pixels: ``reinsch`` gives a pixel every 4 cycles (product, two stages of shift, sums),
-    ``direct`` every 3 (product, sum, saturation). The next span is taken in ``4 (m - 1) + 1``
-    (``3 (m - 1) + 1``) cycles after one of m pixels.
+    With ``interleave`` 1 every pixel depends on the one before it, so that the registers of the loop cannot
+    hold other pixels meanwhile: ``reinsch`` gives a pixel every 4 cycles (product, two stages of shift,
+    sums), ``direct`` every 3 (product, sum, saturation). After a span of m pixels the next is accepted
+    ``4 (m - 1) + 1`` (``3 (m - 1) + 1``) cycles later.
 
-    With ``interleave`` 4, every pixel needs the one four before. The four phases follow each other through
-    the loop's four registers, so there is a pixel on every clock; a span takes m cycles, and the next follows
-    without a gap.
+    With ``interleave`` 4 every pixel depends on the fourth before it. The four phases follow each other
+    through the four registers of the loop, so that there is a pixel in every cycle. A span takes m cycles,
+    and the next one follows without a gap.
 
-    Either way the first pixel comes 3 cycles after its span was taken in, and a span of length 0 takes one
-    clock and gives nothing. Two multipliers, one a copy: 18 x 18 bits with the defaults.
+    In both cases the first pixel comes 3 cycles after its span is accepted, and a span of length 0 takes one
+    cycle and has no pixel. Two multipliers, one for each cosine; with the defaults of 18 x 18 bits.
 
     Parameters
     ----------
     parameters : Recurrence
-        Form and formats.
+        Bit-accurate model: form and formats.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"diffuse", "highlight", "coefficient", "shift", "length"})))`
-        Of each copy ``first`` and ``second`` in `Recurrence.state_format`: x(0), and x(1) - x(0) in
-        ``reinsch``, x(1) in ``direct``; interleaved, arrays of four, see `Recurrence.start`. Coefficient;
-        shift, in ``reinsch`` alone; length 0 to 4095.
+        For each cosine ``first`` and ``second`` in `Recurrence.state_format`: x(0), and x(1) - x(0) in
+        ``reinsch``, x(1) in ``direct``; if interleaved, arrays of four, see `Recurrence.start`. Coefficient;
+        shift, in ``reinsch`` only; length 0 to 4095.
     o : :py:`Out(stream.Signature(StructLayout({"diffuse", "highlight", "last"})))`
         Both cosines in `Recurrence.result_format`; whether this is the last pixel of its span.
 
-    Source: [T] 3.3, figure 3.5.
+    Source: docs/theory/interpolation.md#recurrence; [T] 3.3, figure 3.5.
     """
 
     latency = 3
@@ -71,7 +71,7 @@ class RecurrenceUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """Counters, coefficient, the loop of each copy, and two registers for rounding and saturation."""
+        """Describe counters, coefficient, the loop of each cosine, and registers that round and saturate."""
         m = Module()
         p, span = self.parameters, self.i.payload
         active, after, phase = Signal(), Signal(p.LENGTH_BITS), Signal(range(self.cycles_per_pixel))
@@ -85,9 +85,9 @@ class RecurrenceUnit(wiring.Component):
             load.eq(self.i.valid & self.i.ready),
         ]
         ends = phase == self.cycles_per_pixel - 1
-        # Interleaved: which of the next pixels are the first of their phases.
-        first_to_come = Signal(p.interleave - 1)
-        starts = load | first_to_come[0] if p.interleave > 1 else load
+        # If interleaved: whether the next pixels are the first ones of their phases.
+        starting = Signal(p.interleave - 1)
+        starts = load | starting[0] if p.interleave > 1 else load
         coefficient = Signal(FixedShape(p.coefficient_format))
         shift = Signal(p.SHIFT_BITS)
         with m.If(advance):
@@ -114,8 +114,8 @@ class RecurrenceUnit(wiring.Component):
             with m.If(starts | ends):
                 m.d.sync += is_first.eq(starts)
             if p.interleave > 1:
-                m.d.sync += first_to_come.eq(Mux(load, (1 << (p.interleave - 1)) - 1, first_to_come >> 1))
-            is_first = self._late(m, is_first, 2 if p.form == "reinsch" else 3, "is_first")
+                m.d.sync += starting.eq(Mux(load, (1 << (p.interleave - 1)) - 1, starting >> 1))
+            is_first = self._delayed(m, is_first, 2 if p.form == "reinsch" else 3, "is_first")
             for name in _COPIES:
                 start = self._start(m, name, load)
                 if p.form == "reinsch":
@@ -130,7 +130,7 @@ class RecurrenceUnit(wiring.Component):
         return m
 
     def _start(self, m, name, load):
-        """First and second value of the pixel that comes next: the input's, then those held of it."""
+        """First and second value of the next phase: from the input, then from registers that hold them."""
         p, payload = self.parameters, self.i.payload[name]
         if p.interleave == 1:
             return payload.first, payload.second
@@ -140,23 +140,23 @@ class RecurrenceUnit(wiring.Component):
                 Signal(FixedShape(p.state_format), name=f"{name}_{which}_{phase}")
                 for phase in range(1, p.interleave)
             ]
-            for place, word in enumerate(held):
-                following = held[min(place + 1, len(held) - 1)]
-                given = payload[which][place + 1]
+            for k, word in enumerate(held):
+                following = held[min(k + 1, len(held) - 1)]
+                given = payload[which][k + 1]
                 m.d.sync += Value.cast(word).eq(Mux(load, Value.cast(given), Value.cast(following)))
             chosen = Mux(load, Value.cast(payload[which][0]), Value.cast(held[0]))
             words.append(FixedValue(p.state_format, chosen))
         return words
 
-    def _late(self, m, value, cycles, name):
-        """Interleaved, ``value`` so many cycles on; else it has stayed for the whole of its pixel."""
+    def _delayed(self, m, value, cycles, name):
+        """A value some cycles later; if not interleaved, the value itself, constant during its pixel."""
         if self.parameters.interleave > 1:
-            for clock in range(cycles):
-                value = PipelinedUnit.register(m, value, f"{name}_late_{clock}")
+            for k in range(cycles):
+                value = PipelinedUnit.register(m, value, f"{name}_delayed_{k}")
         return value
 
     def _reinsch(self, m, name, start, starts, ends, is_first, coefficient, shift):
-        """``D -= K 2^(2-s) x; x += D``, with x + D, for the old D, summed up beforehand."""
+        """Loop of ``D -= K 2^(2-s) x; x += D``; the sum of x and the old D does not wait for the product."""
         p = self.parameters
         first, second = start
         state = p.state_format
@@ -165,31 +165,31 @@ class RecurrenceUnit(wiring.Component):
         )
         operand = x.truncate(p.fraction_bits)
         product = Signal(FixedShape(operand.format * p.coefficient_format), name=f"{name}_product")
-        bend = product.scale(2).extend(p.bend_format)
+        curvature = product.scale(2).extend(p.curvature_format)
         coarse, fine = (
-            Signal(FixedShape(p.bend_format), name=f"{name}_{word}") for word in ("coarse", "fine")
+            Signal(FixedShape(p.curvature_format), name=f"{name}_{word}") for word in ("coarse", "fine")
         )
-        fine_shift = FixedValue(p.bend_format, Value.cast(coarse) >> shift[:3])
+        shifted = FixedValue(p.curvature_format, Value.cast(coarse) >> shift[:3])
         step = fine.truncate(state.fraction_bits)
         m.d.sync += [
             product.eq(operand * coefficient),
-            coarse.eq(FixedValue(p.bend_format, Value.cast(bend) >> Cat(Const(0, 3), shift[3:]))),
-            # The difference from the first value to the second is given.
-            Value.cast(fine).eq(Mux(is_first, 0, Value.cast(fine_shift))),
+            coarse.eq(FixedValue(p.curvature_format, Value.cast(curvature) >> Cat(Const(0, 3), shift[3:]))),
+            # D(0) is given.
+            Value.cast(fine).eq(Mux(is_first, 0, Value.cast(shifted))),
             total.eq((x + difference).wrap(state)),
         ]
-        total = self._late(m, total, 2, f"{name}_sum")
-        kept = self._late(m, difference, 3, f"{name}_difference")
+        total = self._delayed(m, total, 2, f"{name}_sum")
+        before = self._delayed(m, difference, 3, f"{name}_difference")
         half_step = FixedValue.constant(state, 2.0 ** -(p.fraction_bits + 1))
         with m.If(starts):
             m.d.sync += [x.eq((first + half_step).wrap(state)), difference.eq(second)]
         with m.Elif(ends):
-            m.d.sync += [x.eq((total - step).wrap(state)), difference.eq((kept - step).wrap(state))]
+            m.d.sync += [x.eq((total - step).wrap(state)), difference.eq((before - step).wrap(state))]
         exchange = FixedValue.constant(p.exchange.format, p.exchange.values.item())
         return (x + exchange).truncate(p.result_format.fraction_bits)
 
     def _direct(self, m, name, start, starts, ends, is_first, coefficient):
-        """``x(k+1) = -(-2 cos d) x(k) - x(k-1)``; for the first pixel the other register holds x(1)."""
+        """Loop of ``x(k+1) = -(-2 cos d) x(k) - x(k-1)``; ``other`` is x(k-1), at the first pixel x(1)."""
         p = self.parameters
         first, second = start
         state = p.state_format
@@ -200,10 +200,10 @@ class RecurrenceUnit(wiring.Component):
         total = Signal((base - product).shape(), name=f"{name}_sum")
         m.d.sync += [product.eq(x * coefficient), base.eq(half_step - other), total.eq(base - product)]
         following = total.truncate(state.fraction_bits).saturate(state)
-        # Four phases fill four registers; the loop has three of its own.
-        following = self._late(m, following, 1, f"{name}_following")
-        given = self._late(m, other, 3, f"{name}_other")
-        before = self._late(m, x, 3, f"{name}_x")
+        # The loop has three registers; four phases need a fourth.
+        following = self._delayed(m, following, 1, f"{name}_following")
+        given = self._delayed(m, other, 3, f"{name}_other")
+        before = self._delayed(m, x, 3, f"{name}_x")
         with m.If(starts):
             m.d.sync += [x.eq(first), other.eq(second)]
         with m.Elif(ends):

@@ -18,7 +18,7 @@ _SHIFT_BITS = 6
 
 
 def recurrence_starts_shape(parameters: RecurrenceSetup, lights: int) -> data.StructLayout:
-    """Shape of a prepared span: start values for L and H of each light; coefficient, shift, length, flag."""
+    """Shape of a prepared span: start values for L and H of each light; coefficient, shift; length; flag."""
     r = parameters.recurrence
     words = data.ArrayLayout(FixedShape(r.state_format), r.interleave)
     start = data.StructLayout(dict.fromkeys(("first", "second"), words))
@@ -34,13 +34,12 @@ def recurrence_starts_shape(parameters: RecurrenceSetup, lights: int) -> data.St
 class RecurrenceSetupUnit(PipelinedUnit):
     """Start values of the four phases of ``N . L`` and ``N . H`` along a span, for each light.
 
-    Equations, formats and error bound are those of `RecurrenceSetup`, the bit-true
-    twin.
+    `RecurrenceSetup` is the bit-accurate model; it has equations, formats and the error bound.
 
-    The 14 products of a span and the 32 of each light take turns at ``ceil((14 + 32 lights) / I)``
-    multipliers of 18x18 bits, I the initiation interval. Half of those of a light are its seven steps of the
-    recurrence, twice; each also takes a turn at a shifter of 48 bits, of which there are
-    ``ceil(18 lights / I)``. For one light:
+    The 14 products of a span and the 32 of each light share ``ceil((14 + 32 lights) / I)`` multipliers of
+    18x18 bits, I the initiation interval. 14 products of a light are the seven steps of the recurrence for L
+    and for H. There are 18 shifts a light, which share ``ceil(18 lights / I)`` shifters of 48 bits. For one
+    light:
 
     =================== === === === === ===
     initiation interval 1   2   4   8   46
@@ -50,38 +49,44 @@ class RecurrenceSetupUnit(PipelinedUnit):
     shifters            18  9   5   3   1
     =================== === === === === ===
 
-    Tables: 512 words of 72 bits twice and of 36 once, and 2048 of 35.
+    There are four tables: two of 512 words of 72 bits, one of 512 words of 36 bits, one of 2048 words of 35
+    bits.
 
     Parameters
     ----------
     parameters : RecurrenceSetup
-        Twin.
+        Bit-accurate model.
     lights : int
         Number of lights, 1 or more.
     initiation_interval : int
-        Distance in cycles of two inputs, at least 1.
+        Cycles from an input to the next, at least 1.
+
+    Raises
+    ------
+    ValueError
+        If ``initiation_interval`` is out of range.
 
     Members
     -------
     i : :py:`In(stream.Signature(span_normals_shape()))`
         Spans of length 1 to 4095.
     o : :py:`Out(stream.Signature(recurrence_starts_shape(parameters, lights)))`
-        Start values; K of four pixels and its shift; the length; ``out_of_range``: the span is over 90
-        degrees and they mean nothing.
+        Start values; K of a step of four pixels and its shift; the length; ``out_of_range``: the span is
+        over 90 degrees, and its words are invalid.
     constants : :py:`In(light_vectors_shape(lights))`
-        Unit vectors L and H; stay while beats are inside.
+        Unit vectors L and H, constant while beats are inside.
 
-    Source: [T] 3.1, 3.3.
+    Source: docs/theory/interpolation.md#recurrence; [T] 3.1, 3.3.
     """
 
     def __init__(
-        self, parameters: RecurrenceSetup | None = None, lights: int = 1, initiation_interval: int = 4
+        self, parameters: RecurrenceSetup | None = None, lights: int = 1, *, initiation_interval: int = 4
     ):
         self.parameters = p = parameters or RecurrenceSetup()
         self.lights = lights
         self._graph = g = Dataflow(initiation_interval, 14 + 32 * lights)
         self.multipliers = g.multiplier.count
-        self._shifted = p.steps.bend_format
+        self._shifted = p.steps.curvature_format
         self._shifter = g.share(
             "shifter", 18 * lights, (FixedShape(self._shifted), unsigned(_SHIFT_BITS)), 2, self._shift
         )
@@ -96,15 +101,15 @@ class RecurrenceSetupUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the age of its last words."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         for key, word in self._results.items():
             if isinstance(key, str):
                 target = result[key]
             else:
-                light, copy, which, phase = key
-                target = result.lights[light][copy][which][phase]
+                light, function, which, phase = key
+                target = result.lights[light][function][which][phase]
             m.d.comb += target.eq(value(word, self.latency))
         return result
 
@@ -123,20 +128,44 @@ class RecurrenceSetupUnit(PipelinedUnit):
         u = g.register("chord", lambda u: u.saturate(p.CHORD_FORMAT), u)
         q, q_shift = self._normalised(u)
         square, inverse = self._looked_up("chord", p.chord_tables, g.register("chord_bits", Value.cast, u))
-        cosines = {}
-        for i in range(self.lights):
-            for copy, name in (("diffuse", "direction"), ("highlight", "halfway")):
-                cosines[i, copy] = [
-                    self._cosine(f"{copy}_{i}_{side}", n, lambda _, i=i, name=name: self.constants[i][name])
-                    for side, n in (("left", left), ("right", right))
-                ]
+        cosines = self._cosines(left, right)
         reciprocal, reciprocal_square, step_shift, square_shift = self._steps(length)
 
+        q_square, exponent = self._step_square(q, q_shift, square, reciprocal_square, square_shift)
+        sine, step, phase = self._step_functions(q_square, exponent)
+        rho, rho_shift = self._rho(inverse, sine, reciprocal, step_shift)
+
+        results = {"length": length, "out_of_range": out_of_range}
+        if p.recurrence.form == "reinsch":
+            results |= dict(zip(("coefficient", "shift"), phase, strict=True))
+        else:
+            results["coefficient"] = self._cosine_coefficient(*phase)
+        slopes = {key: self._slope(_name(key), ends, q, q_shift) for key, ends in cosines.items()}
+        differences = {key: self._rho_slope(_name(key), s, rho, rho_shift) for key, s in slopes.items()}
+        firsts = {key: ends[0] for key, ends in cosines.items()}
+        return results | self._starts(self._states(firsts, differences, *step))
+
+    def _cosines(self, left: Word, right: Word) -> dict[tuple[int, str], list[Word]]:
+        """Words of a and b for L and H of each light."""
+        return {
+            (i, function): [
+                self._cosine(f"{function}_{i}_{side}", n, lambda _, i=i, name=name: self.constants[i][name])
+                for side, n in (("left", left), ("right", right))
+            ]
+            for i in range(self.lights)
+            for function, name in (("diffuse", "direction"), ("highlight", "halfway"))
+        }
+
+    def _step_square(
+        self, q: Word, q_shift: Word, square: Word, reciprocal_square: Word, square_shift: Word
+    ) -> tuple[Word, Word]:
+        """Word of Q/8, 1/2 or more, and the exponent of Q."""
+        g = self._graph
         product = g.multiply("psi_square_product", q, square)
         psi_square = g.register("psi_square_exact", lambda q, product: q + product, q, product)
         psi_square, over = self._under_one("psi_square", psi_square)
         exponent = g.register(
-            "exponent_of_span", lambda a, b, over: (a + b - over)[:_SHIFT_BITS], q_shift, square_shift, over
+            "span_exponent", lambda a, b, over: (a + b - over)[:_SHIFT_BITS], q_shift, square_shift, over
         )
         product = g.multiply("q_square_product", psi_square, reciprocal_square)
         under = g.register("q_square_under", lambda product: ~Value.cast(product)[-1], product)
@@ -149,7 +178,13 @@ class RecurrenceSetupUnit(PipelinedUnit):
             product,
         )
         q_square = self._word("q_square", q_square)
-        exponent = g.register("exponent", lambda a, under: (a + under)[:_SHIFT_BITS], exponent, under)
+        return q_square, g.register("exponent", lambda a, under: (a + under)[:_SHIFT_BITS], exponent, under)
+
+    def _step_functions(
+        self, q_square: Word, exponent: Word
+    ) -> tuple[Word, tuple[Word, Word], tuple[Word, Word]]:
+        """Words of ``1 - sin d/d``, and K with its shift, first for a step d, then for 4d."""
+        g, p = self._graph, self.parameters
         bits = g.register(
             "step_coarse",
             lambda word, e: Cat(Const(0, 11), Value.cast(word)) >> Cat(Const(0, 3), e[3:]),
@@ -160,15 +195,19 @@ class RecurrenceSetupUnit(PipelinedUnit):
         width = p.SQUARE_FORMAT.width
         step_bits = g.register("step_bits", lambda bits: bits[4 : 4 + width], bits)
         phase_bits = g.register("phase_bits", lambda bits: bits[:width], bits)
-        bend, sine = self._looked_up("step", p.step_tables, step_bits)
-        (phase_bend,) = self._looked_up("phase", p.step_tables[:1], phase_bits)
-        step_k, phase_k = (
+        step_table, sine = self._looked_up("step", p.step_tables, step_bits)
+        (phase_table,) = self._looked_up("phase", p.step_tables[:1], phase_bits)
+        step, phase = (
             self._coefficient(name, q_square, table)
-            for name, table in (("step", bend), ("phase", phase_bend))
+            for name, table in (("step", step_table), ("phase", phase_table))
         )
-        step_s = g.register("step_shift", lambda e: (e - 1)[:_SHIFT_BITS], exponent)
-        phase_s = g.register("phase_shift", lambda e: Mux(e >= 5, e - 5, 0)[:_SHIFT_BITS], exponent)
+        step_shift = g.register("step_shift", lambda e: (e - 1)[:_SHIFT_BITS], exponent)
+        phase_shift = g.register("phase_shift", lambda e: Mux(e >= 5, e - 5, 0)[:_SHIFT_BITS], exponent)
+        return sine, (step, step_shift), (phase, phase_shift)
 
+    def _rho(self, inverse: Word, sine: Word, reciprocal: Word, step_shift: Word) -> tuple[Word, Word]:
+        """Word of rho and its shift."""
+        g, p = self._graph, self.parameters
         product = g.multiply("excess_product", inverse, sine)
         excess = g.register("excess_difference", lambda a, b: a - b, inverse, sine)
         excess = g.register("excess_exact", lambda a, product: a - product, excess, product)
@@ -177,60 +216,65 @@ class RecurrenceSetupUnit(PipelinedUnit):
         product = g.multiply("rho_product", reciprocal, excess)
         rho = g.register("rho_exact", lambda r, product: r + product, reciprocal, product)
         rho, over = self._under_one("rho", rho)
-        rho_shift = g.register("rho_shift", lambda shift, over: (shift - over)[:4], step_shift, over)
+        return rho, g.register("rho_shift", lambda shift, over: (shift - over)[:4], step_shift, over)
 
-        results = {"length": length, "out_of_range": out_of_range}
-        if p.recurrence.form == "reinsch":
-            results |= {"coefficient": phase_k, "shift": phase_s}
-        else:
-            results["coefficient"] = self._cosine_coefficient(phase_k, phase_s)
-        slopes = {key: self._slope(f"{key[1]}_{key[0]}", ends, q, q_shift) for key, ends in cosines.items()}
-        along = {key: self._along(f"{key[1]}_{key[0]}", s, rho, rho_shift) for key, s in slopes.items()}
-        r, state = p.steps, p.steps.state_format
-        half = FixedValue.constant(state, 2.0 ** -(r.fraction_bits + 1))
-        # As in the recurrence unit, x is held with half a step of the operand added.
+    def _states(self, firsts: dict, differences: dict, step_k: Word, step_s: Word) -> dict:
+        """Words of x(0) to x(7) for L and H of each light, with half a step added as in the recurrence unit.
+
+        Parameters
+        ----------
+        firsts, differences : dict of Word
+            a, and ``rho (b - a + a q)``.
+        step_k, step_s : Word
+            K of a step d, and its shift.
+        """
+        g, r = self._graph, self.parameters.steps
+        state, half = r.state_format, self._half_step
         x = {
-            key: [
-                g.register(
-                    f"{key[1]}_{key[0]}_x_0", lambda a: (a.extend(state) + half).wrap(state), cosines[key][0]
-                )
-            ]
-            for key in along
+            key: [g.register(f"{_name(key)}_x_0", lambda a: (a.extend(state) + half).wrap(state), first)]
+            for key, first in firsts.items()
         }
-        difference: dict = {}
+        differences = dict(differences)
         for k in range(7):
             for key, words in x.items():
-                name = f"{key[1]}_{key[0]}"
+                name, difference = _name(key), differences[key]
                 product = g.multiply(
                     f"{name}_product_{k}", words[k], step_k, lambda x: x.truncate(r.fraction_bits)
                 )
-                bend = self._right(
-                    f"{name}_bend_{k}", product, step_s, lambda v: v.scale(2).extend(self._shifted)
+                curvature = self._right(
+                    f"{name}_curvature_{k}", product, step_s, lambda v: v.scale(2).extend(self._shifted)
                 )
                 if k == 0:
-                    difference[key] = g.register(
+                    difference = g.register(
                         f"{name}_difference_0",
                         lambda a, b: (a - b.scale(-1).truncate(b.format.fraction_bits)).wrap(state),
-                        along[key],
-                        bend,
+                        difference,
+                        curvature,
                     )
-                    total = g.register(
-                        f"{name}_x_1", lambda x, d: (x + d).wrap(state), words[0], difference[key]
-                    )
+                    total = g.register(f"{name}_x_1", lambda x, d: (x + d).wrap(state), words[0], difference)
                 else:
                     total = g.register(
-                        f"{name}_sum_{k}", lambda x, d: (x + d).wrap(state), words[k], difference[key]
+                        f"{name}_sum_{k}", lambda x, d: (x + d).wrap(state), words[k], difference
                     )
-                    difference[key] = g.register(
-                        f"{name}_difference_{k}", lambda d, b: (d - b).wrap(state), difference[key], bend
+                    difference = g.register(
+                        f"{name}_difference_{k}", lambda d, b: (d - b).wrap(state), difference, curvature
                     )
-                    total = g.register(f"{name}_x_{k + 1}", lambda x, b: (x - b).wrap(state), total, bend)
+                    total = g.register(
+                        f"{name}_x_{k + 1}", lambda x, b: (x - b).wrap(state), total, curvature
+                    )
+                differences[key] = difference
                 words.append(total)
-        for (light, copy), words in x.items():
+        return x
+
+    def _starts(self, states: dict) -> dict:
+        """Words of the start values, by light, function, ``first`` or ``second``, and phase."""
+        g, r, half = self._graph, self.parameters.recurrence, self._half_step
+        state, results = self.parameters.steps.state_format, {}
+        for key, words in states.items():
             for j in range(r.interleave):
-                name = f"{copy}_{light}_start_{j}"
+                name = f"{_name(key)}_start_{j}"
                 first, second = words[j], words[j + r.interleave]
-                if p.recurrence.form == "reinsch":
+                if r.form == "reinsch":
                     first, second = (
                         g.register(f"{name}_first", lambda x: (x - half).wrap(state), first),
                         g.register(f"{name}_second", lambda x, y: (y - x).wrap(state), first, second),
@@ -240,17 +284,23 @@ class RecurrenceSetupUnit(PipelinedUnit):
                         self._short(f"{name}_{which}", word)
                         for which, word in (("first", first), ("second", second))
                     )
-                results[light, copy, "first", j] = first
-                results[light, copy, "second", j] = second
+                results[*key, "first", j] = first
+                results[*key, "second", j] = second
         return results
 
+    @property
+    def _half_step(self) -> FixedValue:
+        """Half a step of the recurrence's operand."""
+        r = self.parameters.steps
+        return FixedValue.constant(r.state_format, 2.0 ** -(r.fraction_bits + 1))
+
     def _short(self, name, word) -> Word:
-        """A value of ``direct``, which the half step in the word rounds."""
+        """Word of a value of ``direct``; the half step that the operand has rounds it."""
         format = self.parameters.recurrence.state_format
         return self._graph.register(name, lambda x: x.truncate(format.fraction_bits), word)
 
     def _cosine_coefficient(self, coefficient, shift) -> Word:
-        """``-2 cos 4d`` from K, rounded up."""
+        """Word of ``-2 cos 4d`` from K, rounded up."""
         g, format = self._graph, self.parameters.recurrence.coefficient_format
         code = g.register(
             "cosine_negative",
@@ -267,30 +317,30 @@ class RecurrenceSetupUnit(PipelinedUnit):
         return g.register("cosine_coefficient", lambda c: c.saturate(format), exact)
 
     def _cosine(self, name, normal, vector) -> Word:
-        """Dot product, in units of `ONE_SQUARED`."""
+        """Word of a dot product in units of `ONE_SQUARED`."""
         g, p = self._graph, self.parameters
         total = dot(g, name, normal, vector)
         total = g.register(f"{name}_unit", lambda v: v + v.scale(-16).truncate(34), total)
         return g.register(name, lambda v: v.saturate(p.COSINE_FORMAT), total)
 
     def _slope(self, name, ends, q, q_shift) -> Word:
-        """``b - a + a q``."""
+        """Word of ``b - a + a q``."""
         g, p = self._graph, self.parameters
         left, right = ends
         operand = g.register(f"{name}_rounded", lambda a: a.round_half_up(16), left)
         operand = g.register(f"{name}_operand", lambda a: a.saturate(p.OPERAND_FORMAT), operand)
-        product = g.multiply(f"{name}_across_product", operand, q)
-        across = self._right(f"{name}_across", product, q_shift, lambda v: v.extend(self._shifted))
+        product = g.multiply(f"{name}_a_q_product", operand, q)
+        product = self._right(f"{name}_a_q", product, q_shift, lambda v: v.extend(self._shifted))
         rise = g.register(f"{name}_rise", lambda a, b: (b - a).truncate(28), left, right)
         return g.register(
             f"{name}_slope",
-            lambda rise, across: (rise + across.truncate(28)).wrap(p.SLOPE_FORMAT),
+            lambda rise, a_q: (rise + a_q.truncate(28)).wrap(p.SLOPE_FORMAT),
             rise,
-            across,
+            product,
         )
 
-    def _along(self, name, slope, rho, rho_shift) -> Word:
-        """``rho`` times the slope."""
+    def _rho_slope(self, name, slope, rho, rho_shift) -> Word:
+        """Word of ``rho (b - a + a q)``."""
         g, p = self._graph, self.parameters
         low_bits = p.SLOPE_LOW_FORMAT.width
         high = g.multiply(
@@ -299,21 +349,21 @@ class RecurrenceSetupUnit(PipelinedUnit):
         low = g.multiply(
             f"{name}_low", slope, rho, lambda v: FixedValue(p.SLOPE_LOW_FORMAT, Value.cast(v)[:low_bits])
         )
-        total = g.register(f"{name}_along_exact", lambda high, low: (high + low).scale(1), high, low)
-        return self._right(f"{name}_along", total, rho_shift, lambda v: v.extend(self._shifted))
+        total = g.register(f"{name}_rho_slope_exact", lambda high, low: (high + low).scale(1), high, low)
+        return self._right(f"{name}_rho_slope", total, rho_shift, lambda v: v.extend(self._shifted))
 
     def _right(self, name, value, shift, aligned) -> Word:
-        """A word shifted right."""
+        """Word of a value shifted right."""
         return self._graph.use(self._shifter, name, (value, shift), lambda v, s: (aligned(v), s))
 
     def _shift(self, register, value, amount):
-        """In two stages."""
+        """Shifter of two stages."""
         coarse = FixedValue(self._shifted, Value.cast(value) >> Cat(Const(0, 3), amount[3:]))
         coarse, fine = register(coarse, "coarse"), register(amount[:3], "fine_amount")
         return register(FixedValue(self._shifted, Value.cast(coarse) >> fine), "shifted")
 
     def _normalised(self, chord: Word) -> tuple[Word, Word]:
-        """Word in [1/2, 1), or 0, and its shift."""
+        """Word in [1/2, 1), or 0, and its left shift."""
         g, p = self._graph, self.parameters
 
         def shift_of(chord):
@@ -339,7 +389,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         return self._word("chord_word", word), shift
 
     def _word(self, name, value) -> Word:
-        """Rounded to 17 bits under 1."""
+        """Word of a value rounded to 17 bits and saturated under 1."""
         g, p = self._graph, self.parameters
         rounded = g.register(f"{name}_rounded", lambda v: v.round_half_up(17), value)
         return g.register(name, lambda v: v.saturate(p.WORD_FORMAT), rounded)
@@ -356,14 +406,14 @@ class RecurrenceSetupUnit(PipelinedUnit):
         return self._word(name, g.register(f"{name}_halved", halved, value, over)), over
 
     def _looked_up(self, name, tables, bits) -> list[Word]:
-        """Values of tables at a word, interpolated."""
+        """Words of the interpolated values of tables at an operand."""
         g, p = self._graph, self.parameters
         value_bits, change_bits = p.TABLE_VALUE_FORMAT.width, p.TABLE_CHANGE_FORMAT.width
         width = value_bits + change_bits
         words = [
             sum(
-                (int(value) << change_bits | int(change)) << (width * place)
-                for place, (value, change) in enumerate(row)
+                (int(value) << change_bits | int(change)) << (width * k)
+                for k, (value, change) in enumerate(row)
             )
             for row in zip(*(zip(v.codes, c.codes, strict=True) for v, c in tables), strict=True)
         ]
@@ -378,51 +428,51 @@ class RecurrenceSetupUnit(PipelinedUnit):
         read = g.look_up(f"{name}_tables", words, width * len(tables), address)
         entry = g.register(f"{name}_entry", lambda word: word, read)
         found = []
-        for place in range(len(tables)):
+        for k in range(len(tables)):
 
-            def change(entry, start=width * place):
+            def change(entry, start=width * k):
                 return FixedValue(p.TABLE_CHANGE_FORMAT, entry[start : start + change_bits])
 
-            def total(entry, product, start=width * place + change_bits):
+            def total(entry, product, start=width * k + change_bits):
                 value = FixedValue(p.TABLE_VALUE_FORMAT, entry[start : start + value_bits])
                 return value + product.round_half_up(22)
 
-            product = g.multiply(f"{name}_{place}_product", entry, fraction, change)
-            value = g.register(f"{name}_{place}_sum", total, entry, product)
-            found.append(self._word(f"{name}_{place}", value))
+            product = g.multiply(f"{name}_{k}_product", entry, fraction, change)
+            value = g.register(f"{name}_{k}_sum", total, entry, product)
+            found.append(self._word(f"{name}_{k}", value))
         return found
 
-    def _coefficient(self, name, q_square, bend) -> Word:
-        """``Q (1 - bend)``."""
+    def _coefficient(self, name, q_square, one_minus_k) -> Word:
+        """Word of K = ``Q k(Q)``."""
         g = self._graph
-        product = g.multiply(f"{name}_bend_product", q_square, bend)
+        product = g.multiply(f"{name}_coefficient_product", q_square, one_minus_k)
         value = g.register(f"{name}_coefficient_exact", lambda q, product: q - product, q_square, product)
         return self._word(f"{name}_coefficient", value)
 
     def _steps(self, length: Word) -> tuple[Word, Word, Word, Word]:
-        """Words of ``1/(m-1)`` and its square, and their shifts."""
+        """Words of ``1/(m-1)`` and its square, and their shifts: six cycles."""
         g, p = self._graph, self.parameters
         top, bits = LENGTH_BITS - 1, p.WORD_FORMAT.width
 
-        def position(steps):
-            place = Const(0, 4)
+        def leading(steps):
+            position = Const(0, 4)
             for bit in range(LENGTH_BITS):
-                place = Mux(steps[bit], bit, place)
-            return place
+                position = Mux(steps[bit], bit, position)
+            return position
 
         def part(entry, start):
             return FixedValue(p.WORD_FORMAT, entry[start : start + bits])
 
         steps = g.register("steps", lambda length: (length - 1)[:LENGTH_BITS], length)
-        place = g.register("position", position, steps)
-        address = g.register("address", lambda steps, place: (steps << (top - place)[:4])[:top], steps, place)
+        position = g.register("position", leading, steps)
+        address = g.register("address", lambda a, b: (a << (top - b)[:4])[:top], steps, position)
         reciprocal, square, small = (
             word.codes if isinstance(word, Fixed) else word for word in p.reciprocals
         )
         words = (small << 2 * bits | square << bits | reciprocal).tolist()
         read = g.look_up("reciprocals", words, 2 * bits + 1, address)
         entry = g.register("reciprocal_entry", lambda word: word, read)
-        shift = g.register("place_shift", lambda place, address: (place + address.any())[:4], place, address)
+        shift = g.register("reciprocal_shift", lambda a, b: (a + b.any())[:4], position, address)
         square_shift = g.register(
             "square_shift", lambda entry, shift: Cat(entry[2 * bits], shift), entry, shift
         )
@@ -432,3 +482,9 @@ class RecurrenceSetupUnit(PipelinedUnit):
             shift,
             square_shift,
         )
+
+
+def _name(key: tuple[int, str]) -> str:
+    """Common part of the names of a light's words."""
+    light, function = key
+    return f"{function}_{light}"

@@ -289,7 +289,7 @@ def _is_wide(scene, raster, interpolator, exponent, origin, first, last) -> np.n
         bend = 2 * (left + right - 2 * middle)
         slope = right - left - bend
         # A step of the rounding words less than they hold.
-        bad |= (np.abs(one * bend) > 2.0 ** (p.BEND_FORMAT.integer_bits - 1) - 2.0**-19).any(axis=1)
+        bad |= (np.abs(one * bend) > 2.0 ** (p.CURVATURE_FORMAT.integer_bits - 1) - 2.0**-19).any(axis=1)
         bad |= (np.abs(one * slope) > 2.0 ** (slope_format.integer_bits - 1) - 2.0**-17).any(axis=1)
         miss = np.maximum(
             np.abs(left + slope / 4 + bend / 16 - quarter),

@@ -8,7 +8,8 @@ from amaranth.hdl import Mux, Signal, signed
 
 import blysk.hdl.cosines.angular_setup
 from blysk.golden.cosines.angular_setup import SPAN_ANGLES, AngularSetup
-from blysk.golden.cosines.arccos import Arccos, HalfChord
+from blysk.golden.cosines.arccos import Arccos
+from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
@@ -16,7 +17,7 @@ from blysk.golden.number.reciprocal import reciprocal_address
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
-from blysk.hdl.cosines.arccos import HalfChordUnit
+from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 
 from .bounds import Bounds, cut_by, registers_of, unknown, word, wrapped_by
@@ -196,7 +197,7 @@ V_FORMAT, PLACES_FORMAT = UQ(0, 36), UQ(5, 0)
 SIZE_FORMAT, GAIN_FORMAT = SQ(5, 34), SQ(4, AngularSetup.GAIN_BITS)
 
 CUTS = {
-    "blysk.hdl.cosines.arccos.normalised_words",
+    "blysk.hdl.cosines.half_chord.normalised_words",
     "blysk.hdl.core.reciprocal.reciprocal_words",
     *(
         f"blysk.hdl.cosines.angular_setup.{name}"
@@ -206,7 +207,7 @@ CUTS = {
 CUTS_BY_ANGLE = {
     "half_chord": {
         "blysk.hdl.cosines.angular_setup.AngularSetupUnit._step",
-        "blysk.hdl.cosines.arccos.half_chord_words",
+        "blysk.hdl.cosines.half_chord.half_chord_words",
     },
     "arccos": {
         "blysk.hdl.cosines.angular_setup.AngularSetupUnit._by_arccos",
@@ -225,20 +226,20 @@ REGISTERS = {
     "v_coarse": V_FORMAT,
     "minor_coarse": SQ(3, 34),
     "minor_shifted": SQ(3, 34),
-    "[xy]_turned": AngularSetup.ROTATED_FORMAT,
-    "along*": AngularSetup.ROTATED_FORMAT,
-    "across*": AngularSetup.ROTATED_FORMAT,
+    "[xy]_exchanged": AngularSetup.ROTATED_FORMAT,
+    "cordic_x*": AngularSetup.ROTATED_FORMAT,
+    "cordic_y*": AngularSetup.ROTATED_FORMAT,
     "direction*": AngularSetup.DIRECTION_FORMAT,
     "gain_*": GAIN_FORMAT,
     "phase": AngularSetup.PHASE_FORMAT,
-    "places_sum*": PLACES_FORMAT,
+    "step_shift*": PLACES_FORMAT,
     "step_coarse": AngularSetup.STEP_FORMAT,
     "step": AngularSetup.STEP_FORMAT,
 }
 
 REGISTERS_BY_ANGLE = {
     "half_chord": {
-        "angle_turned": AngularSetup.ANGLE_FORMAT,
+        "psi": AngularSetup.ANGLE_FORMAT,
         "angle_shift*": PLACES_FORMAT,
         "psi_coarse": AngularSetup.ANGLE_FORMAT,
         "psi_shifted": AngularSetup.ANGLE_FORMAT,
@@ -383,7 +384,12 @@ SHORTER_REGISTERS = {
     "minor 2^j": (AngularSetupUnit, "_minor", "shift[2:]))[:37]", "shift[2:]))[:36]"),
     "half turn": (AngularSetupUnit, "_polar", "-value, value)[:width]", "-value, value)[: width - 1]"),
     "steps of CORDIC": (AngularSetupUnit, "_polar", "else below).as", "else below)[: width - 1].as"),
-    "direction": (AngularSetupUnit, "_polar", "min_code, 0)[:turns]", "min_code, 0)[: turns - 1]"),
+    "direction": (
+        AngularSetupUnit,
+        "_polar",
+        "min_code, 0)[:direction_width]",
+        "min_code, 0)[: direction_width - 1]",
+    ),
     "shift of psi": (AngularSetupUnit, "_step", "Mux(obtuse, 0, shift)[:5]", "Mux(obtuse, 0, shift)[:4]"),
     "psi": (AngularSetupUnit, "_step", "shift[2:]))[:36]", "shift[2:]))[:35]"),
     "places": (AngularSetupUnit, "_step", "(a + b)[:5]", "(a + b)[:4]"),

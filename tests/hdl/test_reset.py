@@ -10,7 +10,8 @@ from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.number.unit_vector import quantise
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
-from blysk.hdl.cosines.arccos import ArccosUnit, HalfChordUnit
+from blysk.hdl.cosines.arccos import ArccosUnit
+from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
@@ -22,7 +23,7 @@ UNITS = {
     "arccos_sequential": lambda: ArccosUnit(form="sequential"),
     "half_chord": HalfChordUnit,
     "angular_setup": AngularSetupUnit,
-    "angular_setup_by_arccos": lambda: AngularSetupUnit(AngularSetup("arccos"), 4),
+    "angular_setup_by_arccos": lambda: AngularSetupUnit(AngularSetup("arccos"), initiation_interval=4),
     "highlight_cosine": HighlightCosineUnit,
     "highlight_gate": HighlightGateUnit,
     "highlight_gate_every_4_cycles": lambda: HighlightGateUnit(initiation_interval=4),

@@ -11,8 +11,9 @@ import pytest
 from blysk.bench.tools import blocks
 from blysk.bench.tools.blocks import BLOCKS, Decisions, Sample, rows, sample_of, table
 from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.arccos import ARCCOS_TABLES, Arccos, HalfChord
+from blysk.golden.cosines.arccos import ARCCOS_TABLES, Arccos
 from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.cosines.recurrence import RECURRENCE_FORMS, Recurrence

@@ -22,9 +22,10 @@ from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.core.fixed import SQ, UQ
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
-from blysk.hdl.cosines.arccos import ArccosUnit, HalfChordUnit
+from blysk.hdl.cosines.arccos import ArccosUnit
 from blysk.hdl.cosines.chord import ChordUnit
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
+from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
@@ -221,7 +222,9 @@ CORES = {
     "chord_setup": ChordSetupUnit,
     "chord_setup_of_two_lights": lambda: ChordSetupUnit(lights=2, initiation_interval=1),
     "local_chord_setup": LocalChordSetupUnit,
-    "local_chord_of_two_lights": lambda: LocalChordInterpolatorUnit(LocalChordInterpolator(), 2, 3),
+    "local_chord_of_two_lights": lambda: LocalChordInterpolatorUnit(
+        LocalChordInterpolator(), 2, setup_interval=3
+    ),
     # One of each method; `quadratic` is above.
     **{
         f"pipeline_{method.replace('-', '_')}": lambda method=method: ShadingPipelineUnit(preset(method))
