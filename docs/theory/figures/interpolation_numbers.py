@@ -10,7 +10,8 @@ from numpy.polynomial.polynomial import polyval
 
 from blysk.bench.report.errata import FACTOR_PRINTED, ROOT_PRINTED
 from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.arccos import SEGMENT_BOUNDS, Arccos, HalfChord
+from blysk.golden.cosines.arccos import SEGMENT_BOUNDS, Arccos
+from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.cosines.recurrence import Recurrence, shortcut_cosine
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection

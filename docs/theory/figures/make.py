@@ -9,17 +9,12 @@ the page has to have them.
 """
 
 import argparse
+import importlib
 import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-
-import chord_numbers
-import interpolation_numbers
-import models_numbers
-import published_numbers
-import units_numbers
 
 PAGES = Path(__file__).parents[1]
 _NUMBER = re.compile(r"(-?[\d,]*\.?\d+)(e[+-]\d+)?(\D*)")
@@ -106,12 +101,10 @@ def main() -> int:
     parser.add_argument("--check", action="store_true", help="change nothing, fail where something differs")
     parser.add_argument("pages", nargs="*", help="pages, such as chord.md; all by default")
     chosen = parser.parse_args()
-    here = (models_numbers, interpolation_numbers, chord_numbers, units_numbers, published_numbers)
     wrong = []
-    for module in here:
-        pages = MODULES[module.__name__]
+    for name, pages in MODULES.items():
         if not chosen.pages or set(pages) & set(chosen.pages):
-            wrong += work(module, pages, chosen.check)
+            wrong += work(importlib.import_module(name), pages, chosen.check)
     print(*wrong, sep="\n", file=sys.stderr)
     return 1 if wrong else 0
 
