@@ -1123,7 +1123,7 @@ def _blocks() -> Iterator[Block]:
                 "arccos",
                 f"{table}, {form}",
                 "[T] 3.3",
-                partial(ArccosUnit, Arccos(table), form),
+                partial(ArccosUnit, Arccos(table), form=form),
                 partial(_arccos, table=table),
                 "x -1 to 1",
                 "rad",
