@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from blysk.golden.cosines.chord_setup import ChordSetup
-from blysk.golden.number.unit_vector import ONE, ONE_SQUARED
+from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
@@ -41,7 +41,7 @@ def difference_beats(unit, words, length, out_of_range) -> np.ndarray:
 
 
 def _measure(rng, count):
-    """N·L and u at any pixel that the differences lead to; 1 is the product of two unit vectors."""
+    """N·L and u at any pixel, by the differences in exact arithmetic; 1 is the product of unit vectors."""
     length = log_lengths(rng, count, 2)
     left, right = span_ends(rng, count, ChordSetup.MAX_ANGLE)
     light, halfway = unit_codes(rng, count), vectors_near(rng, left, right)
@@ -69,7 +69,7 @@ def _expect(unit, case):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any angle, of any size, any words; lengths by their logarithm."""
+    """Pairs of normals at any distance, every sixteenth of any words; lengths by their logarithm."""
     left, right = any_pairs(rng, count)
     beats = {"normal_left": left, "normal_right": right, "length": any_lengths(rng, count)}
     beats["length"] %= 1 << unit.length_bits
@@ -78,20 +78,21 @@ def _spans(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Angles about the widest, ends of words, left normals that are H, components of N - H of -1."""
+    """Angles about the widest, ends of words, the largest differences, N that is H, N - H of -1."""
     beats = setup_spans(rng, count, 22.4, 22.6)
+    beats["normal_left"][100:104], beats["normal_right"][100:104] = COMPONENT.max_code, COMPONENT.min_code
     direction, halfway = (unit_codes(rng, unit.lights) for _ in range(2))
     halfway = np.abs(halfway)
-    # Near the peak u and its differences are small.
+    # Near the peak of a highlight u and its differences are small.
     beats["normal_left"][:50] = halfway[0]
-    # Components of N - H of -1, the most that is not halved.
+    # The largest difference of components that is not halved.
     less = np.repeat(np.vstack([np.eye(3, dtype=np.int64), [1, 1, 1]]) << 17, 10, axis=0)
     beats["normal_left"][50:90] = beats["normal_right"][60:100] = halfway[0] - less
     return Case(beats, light_constants(unit, direction, halfway))
 
 
 def _last_bits(unit, rng, count):
-    """Many spans: the last bits of products and sums are rounded off, each decides once in thousands."""
+    """Many spans: the last bits of products and of sums are rounded off and rarely matter."""
     beats = setup_spans(rng, count, 22.4, 22.6)
     return Case(beats, light_constants(unit, *(unit_codes(rng, unit.lights) for _ in range(2))))
 
@@ -105,6 +106,7 @@ def _variants():
                 _measure,
                 f"spans to 22.5 degrees, {LONG}",
                 note="of N.L and u at any pixel that the differences lead to; exact: the quadratic",
+                long=interval != 4,
             ),
         )
     for lights, interval in ((1, 2), (1, 3), (1, 5), (1, 7), (1, 13), (2, 4)):
@@ -131,19 +133,28 @@ RECORD = Record(
     },
     waivers={
         "f_*_rise": "The slope wraps to -1/2 to 1/2 and is rounded: the bits above and below are cut off.",
-        "u_*_rise": "The slope wraps to -1/2 to 1/2: the sign, three places above its own, is cut off.",
+        "u_*_rise": "The slope wraps to -1/2 to 1/2: the sign, three bits above its own, is cut off.",
         "square": "The square of a reciprocal is normalised: its first bit is 1 already.",
         "*_far": "A difference of 1 or more, halved, makes w at least 1/8, too, where it saturates.",
     },
     still={
-        "the second bit of a square is 0": "datapath.{span,u_0_left}_square_2_9[1] datapath.u_0_right_square_{0_9,2_10}[1]",
-        "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": "datapath.{span,u_0_left}_square_2_9[35] datapath.u_0_right_square_{0_9,2_10}[35] datapath.{span,u_0_left,u_0_right}_square_partial[36] datapath.{span,u_0_left,u_0_right}_square_total[36-37] datapath.{span,u_0_left,u_0_right}_aligned[38-39]",
-        "from the unit vector H to three components up to 1 the squared distance is less than 8": "datapath.u_0_{left,right}_aligned[37]",
-        "a reciprocal and its square are normalised, so that their first bit is 1": "datapath.reciprocals.port__data[16] datapath.reciprocal[16] datapath.square_rounded[16] datapath.square[16]",
-        "no square of the table rounds to 1": "datapath.square_rounded[17]",
-        "a length of 12 bits takes shifts up to 12, and of a square up to 25": "datapath.shift[4] datapath.square_shift[5]",
-        "inner sums of the polynomial are 0.046 to 0.050, and 0.125 to 0.132": "datapath.horner_2[14-16] datapath.horner_1[12-16]",
-        "the polynomial is less than 0.017": "datapath.e_rounded[18]",
-        "twice a number is even": "datapath.highlight_0_second[0] datapath.diffuse_0_second[0] top.spare[83] top.spare[214]",
+        "the second bit of a square is 0": "*_square_2[1] u_?_right_square_0[1]",
+        "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
+            "*_square_2[35] u_?_right_square_0[35] *_square_partial[36] *_square_total[36-37] "
+            "*_aligned[38-39]"
+        ),
+        "from the unit vector H to three components up to 1 the squared distance is less than 8": (
+            "u_*_aligned[37]"
+        ),
+        "a reciprocal and its square are normalised, so that their first bit is 1": (
+            "reciprocals.port__data[16] reciprocal[16] square_rounded[16] square[16]"
+        ),
+        "no square of the table rounds to 1": "square_rounded[17]",
+        "a length of 12 bits takes shifts up to 12, and of a square up to 25": "shift[4] square_shift[5]",
+        "inner sums of the polynomial are 0.046 to 0.050, and 0.125 to 0.132": (
+            "horner_2[14-16] horner_1[12-16]"
+        ),
+        "the polynomial is less than 0.017": "e_rounded[18]",
+        "twice a number is even": "*_second[0] top.spare[83] top.spare[214]",
     },
 )
