@@ -1,5 +1,8 @@
 """Light unit: diffuse and specular term of one light ([T] figure 4.10)."""
 
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
 from amaranth.hdl import Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
@@ -11,9 +14,45 @@ from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import PipelinedUnit, connect_fifo
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.power import PowerUnit
-from blysk.hdl.lighting.specular import SpecularUnit
+from blysk.hdl.lighting.specular import SlopeUnit, SpecularUnit
 
-__all__ = ["LightUnit"]
+__all__ = ["SPECULAR_KINDS", "LightUnit", "SpecularKind"]
+
+
+class SpecularKind(NamedTuple):
+    """Kind of specular unit that a light or a pipeline may have.
+
+    Parameters
+    ----------
+    unit : callable
+        Makes the unit, of latency ``latency``, from its bit-accurate model and the options
+        ``initiation_interval``, ``exponent`` (fixed at build time, or ``None``) and ``shares_slope``.
+    compact_interval : callable
+        Initiation interval at which one multiplier serves, from the model and the fixed exponent or ``None``.
+    slope_unit : callable or None
+        Makes the unit of what depends on the exponent alone, from the model; it serves all lights. ``None``:
+        there is no such unit.
+    """
+
+    unit: Callable[..., PipelinedUnit]
+    compact_interval: Callable[[Any, int | None], int]
+    slope_unit: Callable[[Any], wiring.Component] | None = None
+
+
+def _specular_unit(parameters: Specular, **options) -> PipelinedUnit:
+    return SpecularUnit(parameters, **options)
+
+
+def _power_unit(parameters: Power, *, initiation_interval: int, **_) -> PipelinedUnit:
+    """A power needs nothing of its exponent beforehand, and has two structures."""
+    return PowerUnit(parameters, form="sequential" if initiation_interval >= 42 else "pipelined")
+
+
+SPECULAR_KINDS: dict[type, SpecularKind] = {
+    Specular: SpecularKind(_specular_unit, SpecularUnit.multiplications, SlopeUnit),
+    Power: SpecularKind(_power_unit, lambda parameters, exponent: 42),
+}
+"""Kinds of specular units, by the classes of their bit-accurate models."""
 
 
 class LightUnit(wiring.Component):
@@ -69,14 +108,12 @@ class LightUnit(wiring.Component):
         gated: bool = False,
     ):
         self.parameters = p = parameters or Specular()
-        self._exponent = None
-        if isinstance(p, Power):
-            self._specular = PowerUnit(p, form="sequential" if initiation_interval >= 42 else "pipelined")
-            self._exponent = exponent
-        else:
-            self._specular = SpecularUnit(
-                p, initiation_interval=initiation_interval, exponent=exponent, shares_slope=shares_slope
-            )
+        self._specular = SPECULAR_KINDS[type(p)].unit(
+            p, initiation_interval=initiation_interval, exponent=exponent, shares_slope=shares_slope
+        )
+        constants = self._specular.signature.members.get("constants")
+        # Of a unit that is not built for a fixed exponent.
+        self._exponent = exponent if constants is not None else None
         self.latency = self._specular.latency
         self.initiation_interval = self._specular.initiation_interval
         self.skips_dark = self.initiation_interval > 1
@@ -92,8 +129,8 @@ class LightUnit(wiring.Component):
             "i": In(stream.Signature(data.StructLayout(operands))),
             "o": Out(stream.Signature(data.StructLayout(terms))),
         }
-        if "constants" in self._specular.signature.members and self._exponent is None:
-            members["constants"] = self._specular.signature.members["constants"]
+        if constants is not None and self._exponent is None:
+            members["constants"] = constants
         super().__init__(members)
 
     def elaborate(self, platform):

@@ -1,4 +1,4 @@
-"""The angular method ([T] 3.1, 3.2): cosines of angles that grow evenly along the great circle."""
+"""The angular method ([T] 3.1, 3.2): cosines of angles in equal steps on the great circle."""
 
 from amaranth.hdl import Module
 from amaranth.lib import stream
@@ -14,37 +14,37 @@ from blysk.hdl.methods.interpolator import InterpolatorUnit
 __all__ = ["AngularInterpolatorUnit"]
 
 
-class AngularInterpolatorUnit(InterpolatorUnit):
-    """Angular setup and highlight cosine, once for L and once for H of each light, side by side.
+class AngularInterpolatorUnit(InterpolatorUnit, parameters=AngularInterpolator):
+    """Angular setup and highlight cosine in series, for L and for H of each light in parallel.
 
-    `AngularInterpolator` is the twin. All chains are equal, are offered the same
-    spans and taken from on the same cycles, so what holds of one handshake holds of the others. Two
-    multipliers a vector, and those of the angular setup.
+    `AngularInterpolator` is the bit-accurate model. All series are equal and have the same input and the same
+    ready of the output, so they are in the same state on every cycle, and the handshake of one is that of
+    all. Two multipliers a vector, and those of the angular setup.
 
     Parameters
     ----------
     parameters : AngularInterpolator
-        Twin.
+        Bit-accurate model.
     lights : int
         Number of lights, at least 1.
-    setup_interval : int
-        Clocks from a span to the next at the closest, 1 to 6.
     options
-        As for `InterpolatorUnit`.
+        As for `InterpolatorUnit`; ``setup_interval`` is 1 to 6.
 
-    Source: [T] 3.1, 3.2.
+    Source: docs/theory/interpolation.md#angular-method; [T] 3.1, 3.2.
     """
 
     @classmethod
     def setup_intervals(cls, parameters):
-        """What the setup can be built for."""
+        """Initiation intervals of the angular setup."""
         return range(1, 7)
 
-    def __init__(self, parameters: AngularInterpolator, lights: int, setup_interval: int = 4, **options):
+    def __init__(self, parameters: AngularInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
-        self.setup_interval = setup_interval
         self._chains = {
-            (light, name): (AngularSetupUnit(parameters.setup, setup_interval), HighlightCosineUnit())
+            (light, name): (
+                AngularSetupUnit(parameters.setup, initiation_interval=self.setup_interval),
+                HighlightCosineUnit(),
+            )
             for light in range(lights)
             for name in (("direction", "halfway") if self.highlights else ("direction",))
         }
@@ -52,7 +52,7 @@ class AngularInterpolatorUnit(InterpolatorUnit):
         self.latency = setup.latency + SLICE_LATENCY + cosine.latency
 
     def elaborate(self, platform):
-        """Chains in lockstep, each with registers that hold spans ready."""
+        """Setup, register slice and cosine for each vector."""
         m = Module()
         one = FixedValue.constant(UQ(1, 25), 1)
         for (light, name), (setup, cosine) in self._chains.items():

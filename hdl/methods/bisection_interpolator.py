@@ -1,4 +1,4 @@
-"""Bisection of spans until straight lines will do ([T] figure 2.7): method ``bisection``."""
+"""Bisection of spans into segments short enough for straight lines ([T] figure 2.7): method ``bisection``."""
 
 from amaranth.lib import stream
 
@@ -10,10 +10,10 @@ from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 __all__ = ["BisectionInterpolatorUnit"]
 
 
-class BisectionInterpolatorUnit(NormalInterpolatorUnit):
-    """The adaptive normaliser; `BisectionInterpolator` is the twin.
+class BisectionInterpolatorUnit(NormalInterpolatorUnit, parameters=BisectionInterpolator):
+    """The adaptive normaliser; `BisectionInterpolator` is the bit-accurate model.
 
-    `latency` and `setup_interval` are those of a span that is not divided; a divided one takes longer (see
+    `latency` and `setup_interval` are those of a span of one segment; more segments take longer (see
     `AdaptiveNormaliserUnit`).
 
     Parameters
@@ -25,7 +25,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit):
     options
         As for `InterpolatorUnit`.
 
-    Source: [T] 2.1, figure 2.7.
+    Source: docs/theory/interpolation.md#adaptive-normaliser; [T] 2.1, figure 2.7.
     """
 
     def __init__(self, parameters: BisectionInterpolator, lights: int, **options):
@@ -36,7 +36,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit):
         self.setup_interval = preparation - 2
 
     def source(self, m):
-        """The normaliser, and one flag a span."""
+        """The normaliser; its flag, of the last pixel of a span."""
         m.submodules.adaptive_normaliser = normaliser = self._normaliser
         m.d.comb += [
             *(normaliser.i.payload[name].eq(word) for name, word in span_words(self.i.payload)),

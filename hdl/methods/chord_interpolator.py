@@ -1,4 +1,4 @@
-"""The chord method: scalar forward differences of N·L and of the squared chord from N to H (chord.md)."""
+"""The chord method: forward differences of N·L and of half the squared chord from N to H."""
 
 from amaranth.hdl import Module
 from amaranth.lib import wiring
@@ -6,7 +6,8 @@ from amaranth.lib import wiring
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.hdl.core.stream import SLICE_LATENCY, connect, connect_slice
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape
-from blysk.hdl.methods.interpolator import InterpolatorUnit, operands_shape
+from blysk.hdl.methods.interpolator import InterpolatorUnit
+from blysk.hdl.methods.light_products import operands_shape
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 
 __all__ = ["ChordAccumulatorUnit", "ChordInterpolatorUnit"]
@@ -17,19 +18,22 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
     Parameters
     ----------
+    parameters : ChordInterpolator
+        Formats.
     lights : int
         Number of lights, at least 1.
     highlights : bool
         Whether there is u.
-    parameters : ChordInterpolator
-        Formats.
     """
 
-    def __init__(self, lights: int, highlights: bool = True, parameters: ChordInterpolator | None = None):
+    def __init__(
+        self, parameters: ChordInterpolator | None = None, lights: int = 1, *, highlights: bool = True
+    ):
         self.parameters = p = parameters or ChordInterpolator()
         self.functions = ("diffuse", "highlight") if highlights else ("diffuse",)
         super().__init__(
-            chord_differences_shape(lights, highlights, p.setup), operands_shape(p, lights, highlights)
+            chord_differences_shape(lights, highlights, p.setup),
+            operands_shape(p, lights, highlights=highlights),
         )
 
     def quadratics(self, values):
@@ -43,8 +47,8 @@ class ChordAccumulatorUnit(AccumulatorUnit):
                 yield f"{name}_{index}", parameters, (span.start, span.first, span.second), value
 
 
-class ChordInterpolatorUnit(InterpolatorUnit):
-    """Chord setup, then accumulators; `ChordInterpolator` is the twin.
+class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
+    """Chord setup, then accumulators; `ChordInterpolator` is the bit-accurate model.
 
     No multiplier a pixel; those of the setup are ``ceil((7 + 19 lights) / setup_interval)``, without
     highlights ``ceil((7 + 9 lights) / setup_interval)``.
@@ -52,37 +56,34 @@ class ChordInterpolatorUnit(InterpolatorUnit):
     Parameters
     ----------
     parameters : ChordInterpolator
-        Twin.
+        Bit-accurate model.
     lights : int
         Number of lights, at least 1.
-    setup_interval : int
-        Clocks from a span to the next at the closest, at least 1.
     options
-        As for `InterpolatorUnit`.
+        As for `InterpolatorUnit`; ``setup_interval`` is 1 to 26.
 
-    Source: chord.md.
+    Source: docs/theory/chord.md#differences.
     """
 
     @classmethod
     def setup_intervals(cls, parameters):
-        """What the setup can be built for."""
+        """Initiation intervals of the chord setup that save multipliers of one light."""
         return range(1, 27)
 
-    def __init__(self, parameters: ChordInterpolator, lights: int, setup_interval: int = 4, **options):
+    def __init__(self, parameters: ChordInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
-        self.setup_interval = setup_interval
         self._setup = ChordSetupUnit(
             parameters.setup,
             lights,
-            initiation_interval=setup_interval,
+            initiation_interval=self.setup_interval,
             length_bits=self.length_bits,
             highlights=self.highlights,
         )
-        self._accumulator = ChordAccumulatorUnit(lights, self.highlights, parameters)
+        self._accumulator = ChordAccumulatorUnit(parameters, lights, highlights=self.highlights)
         self.latency = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
 
     def elaborate(self, platform):
-        """Registers between the two hold spans ready, so that a long one pays for short ones after it."""
+        """A register slice between the two holds spans, so that short spans after a long one are ready."""
         m = Module()
         m.submodules.chord_setup = setup = self._setup
         m.submodules.chord_accumulator = accumulator = self._accumulator

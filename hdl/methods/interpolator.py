@@ -1,187 +1,144 @@
-"""Interpolators: from spans to what shading needs at every pixel, whatever the method."""
+"""Interpolators: units that take a span to the operands of its pixels, by any method."""
 
-from amaranth.hdl import Module, Signal, Value
+from typing import ClassVar
+
+from amaranth.hdl import Module, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
-from blysk.hdl.core.dataflow import Dataflow, dot
-from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.shapes import light_vectors_shape, normal_shape, span_normals_shape
-from blysk.hdl.core.stream import PipelinedUnit, connect
-from blysk.hdl.cosines.chord import chord
+from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
+from blysk.hdl.core.stream import connect
+from blysk.hdl.methods.light_products import LightProductsUnit, operands_shape
 
-__all__ = [
-    "InterpolatorUnit",
-    "LightProductsUnit",
-    "NormalInterpolatorUnit",
-    "operands_shape",
-    "span_words",
-]
+__all__ = ["InterpolatorUnit", "NormalInterpolatorUnit", "span_words"]
 
 
 def span_words(span: data.View) -> list[tuple[str, Value]]:
-    """Names and values of a span's members; a shorter length is taken for one of 12 bits."""
+    """Names and values of a span's members; a shorter length may be assigned to one of 12 bits."""
     return [(name, span[name]) for name in ("normal_left", "normal_right", "length")]
-
-
-def operands_shape(parameters: Interpolator, lights: int, highlights: bool = True) -> data.ArrayLayout:
-    """Shape of what an interpolator gives for a pixel: for each light N·L, and N·H or 1 - N·H."""
-    operands = {"cosine": FixedShape(parameters.COSINE_FORMAT)}
-    if highlights:
-        operands["highlight"] = FixedShape(Specular(operand=parameters.operand).operand_format)
-    return data.ArrayLayout(data.StructLayout(operands), lights)
 
 
 class InterpolatorUnit(wiring.Component):
     """A method of the pipeline: spans in, the operands of their pixels out, first pixel first.
 
-    One subclass a method, whose bit-true twin is the subclass of `Interpolator` of the
-    same name. It sets `latency`, cycles from a span to its first pixel when nothing waits;
-    `setup_interval`, cycles from a span to the next at the closest; and `cycles_per_pixel`.
+    Each method has a subclass, which names the class of its bit-accurate model::
+
+        class LinearInterpolatorUnit(NormalInterpolatorUnit, parameters=LinearInterpolator):
+
+    and sets three attributes: `latency`, cycles from a span to its first pixel while nothing is stalled;
+    `setup_interval`, least cycles from a span to the next; and `cycles_per_pixel`.
 
     Parameters
     ----------
     parameters : Interpolator
-        Twin.
+        Bit-accurate model.
     lights : int
         Number of lights, at least 1.
+    setup_interval : int or None
+        Least cycles from a span to the next, one of `setup_intervals`. ``None``: 4, the largest if it is
+        less, or that of a method without a choice.
     highlights : bool
-        Whether there is specular light; else there are no operands of it.
+        Whether there is specular light; without it there are no operands of it.
     length_bits : int
         Bits of the length.
+    product_interval : int
+        Least cycles from a pixel to the next in the products with L and H, of methods that find normals.
 
     Members
     -------
-    i : :py:`In(stream.Signature(span_normals_shape(length_bits)))`
+    i : :py:`In(stream.Signature(span_shape(lights, highlights=highlights, length_bits=length_bits)))`
         Spans of length 1 or more.
-    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights)))`
+    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
         Operands of the pixels.
     constants : :py:`In(light_vectors_shape(lights))`
-        L and H of each light; stay while spans are inside.
-    wide : :py:`Out(1)`
-        High for one clock for each span that is too wide for the method.
+        L and H of each light; constant while spans are inside. None of methods with `TAKES_VALUES`.
+    out_of_range : :py:`Out(1)`
+        High for one cycle for each span of an angle that the method does not serve.
+
+    Raises
+    ------
+    ValueError
+        If the method is not built for the setup interval.
     """
+
+    UNITS: ClassVar[dict[type[Interpolator], type["InterpolatorUnit"]]] = {}
+    """Unit of each method, by the class of its model; `registry` fills it."""
 
     cycles_per_pixel = 1
 
+    def __init_subclass__(cls, *, parameters: type[Interpolator] | None = None, **options):
+        super().__init_subclass__(**options)
+        if parameters is not None:
+            InterpolatorUnit.UNITS[parameters] = cls
+
     @classmethod
     def setup_intervals(cls, parameters: Interpolator) -> range:
-        """Values of a constructor argument ``setup_interval`` that there may be; none by default."""
+        """Setup intervals that the method can be built for; empty where it has no choice."""
         return range(0)
+
+    @classmethod
+    def span_shape(cls, lights: int, *, highlights: bool = True, length_bits: int = LENGTH_BITS):
+        """Shape of a span.
+
+        Parameters
+        ----------
+        lights, highlights, length_bits
+            Of the unit.
+        """
+        return span_normals_shape(length_bits)
 
     def __init__(
         self,
         parameters: Interpolator,
         lights: int,
         *,
+        setup_interval: int | None = None,
         highlights: bool = True,
         length_bits: int = LENGTH_BITS,
+        product_interval: int = 1,
     ):
+        intervals = self.setup_intervals(parameters)
+        if setup_interval not in (None, *intervals):
+            choice = f"1 to {intervals[-1]}" if intervals else "left out"
+            raise ValueError(f"setup_interval of {parameters.name} must be {choice}, not {setup_interval}")
+        if intervals:
+            self.setup_interval = setup_interval or min(4, intervals[-1])
         self.parameters = parameters
         self.lights = lights
         self.highlights = highlights
         self.length_bits = length_bits
-        super().__init__(
-            {
-                "i": In(stream.Signature(span_normals_shape(length_bits))),
-                "o": Out(stream.Signature(operands_shape(parameters, lights, highlights))),
-                "constants": In(light_vectors_shape(lights)),
-                "out_of_range": Out(1),
-            }
-        )
-
-
-class LightProductsUnit(PipelinedUnit):
-    """Products of a normal with L and H of every light: ``N . L``, and ``N . H`` or the chord.
-
-    With an initiation interval of 1 the latency is 7 cycles (operands, four for the products, two sums), with
-    the chord 11. Six products a light, three without highlights; with a longer interval they take turns at
-    fewer multipliers.
-
-    Parameters
-    ----------
-    parameters : NormalInterpolator
-        Which specular operand.
-    lights : int
-        Number of lights, at least 1.
-    highlights : bool
-        Whether there is specular light.
-    initiation_interval : int
-        Distance in cycles of two inputs, at least 1.
-
-    Members
-    -------
-    i : :py:`In(stream.Signature(ArrayLayout(SQ(1, 17), 3)))`
-        Normals.
-    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights)))`
-        Operands.
-    constants : :py:`In(light_vectors_shape(lights))`
-        L and H; stay while beats are inside.
-    """
-
-    def __init__(
-        self,
-        parameters: NormalInterpolator,
-        lights: int,
-        highlights: bool = True,
-        initiation_interval: int = 1,
-    ):
-        self._graph = graph = Dataflow(initiation_interval, (6 if highlights else 3) * lights)
-        normal = graph.input("normal", lambda operands: operands)
-        self._words = []
-        for i in range(lights):
-            words = {"cosine": dot(graph, f"cosine_{i}", normal, lambda _, i=i: self.constants[i].direction)}
-            if highlights:
-                product = dot if parameters.operand == "cosine" else chord
-                vector = lambda *_, i=i: self.constants[i].halfway  # noqa: E731
-                words["highlight"] = product(graph, f"highlight_{i}", normal, vector)
-            self._words.append(words)
-        super().__init__(
-            normal_shape(),
-            operands_shape(parameters, lights, highlights),
-            latency=max(word.stage for word in words.values()),
-            initiation_interval=initiation_interval,
-            constants=light_vectors_shape(lights),
-        )
-
-    def datapath(self, m, operands):
-        """The graph; the chord in the specular unit's format."""
-        value = self._graph.build(m, self, operands)
-        result = Signal(self.o.payload.shape())
-        for light, words in zip(result, self._words, strict=True):
-            m.d.comb += light.cosine.eq(value(words["cosine"], self.latency))
-            if "highlight" in words:
-                highlight, format = value(words["highlight"], self.latency), light.highlight.format
-                m.d.comb += light.highlight.eq(highlight.truncate(format.fraction_bits).saturate(format))
-        return result
+        self.product_interval = product_interval
+        span = self.span_shape(lights, highlights=highlights, length_bits=length_bits)
+        members = {
+            "i": In(stream.Signature(span)),
+            "o": Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights))),
+            "out_of_range": Out(1),
+        }
+        if not parameters.TAKES_VALUES:
+            members["constants"] = In(light_vectors_shape(lights))
+        super().__init__(members)
 
 
 class NormalInterpolatorUnit(InterpolatorUnit):
-    """A method that finds normals, before the products with L and H of every light.
+    """A method that finds normals, and their products with L and H of every light.
 
-    A subclass makes, in `source`, what takes spans to normals, and sets `latency` with `product_latency`
-    added. ``ceil(6 lights / product_interval)`` multipliers for the products, half as many without
+    A subclass describes the part from spans to normals in `source`, and sets `latency` with `product_latency`
+    added. The products have ``ceil(6 lights / product_interval)`` multipliers, half as many without
     highlights.
-
-    Parameters
-    ----------
-    parameters, lights, options
-        As for `InterpolatorUnit`.
-    product_interval : int
-        Clocks from a pixel to the next at the closest, at least 1.
     """
 
-    def __init__(self, parameters: NormalInterpolator, lights: int, *, product_interval: int = 1, **options):
+    def __init__(self, parameters: NormalInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
-        self.product_interval = product_interval
-        self._products = LightProductsUnit(parameters, lights, self.highlights, product_interval)
+        self._products = LightProductsUnit(
+            parameters, lights, highlights=self.highlights, initiation_interval=self.product_interval
+        )
         self.product_latency = self._products.latency
+        self.cycles_per_pixel = max(self.cycles_per_pixel, self.product_interval)
 
     def source(self, m: Module) -> tuple[stream.Interface, Value]:
-        """Make in ``m`` what takes ``self.i`` to normals: their stream, and the flag for wide spans."""
+        """Describe in ``m`` the part from spans to normals; return their stream, and ``out_of_range``."""
         raise NotImplementedError
 
     def elaborate(self, platform):

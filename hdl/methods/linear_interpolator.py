@@ -1,4 +1,4 @@
-"""Linear interpolation of normals, as it comes (``linear``) or brought to unit length (``renormalise``)."""
+"""Linear interpolation of normals, as it is (``linear``) or brought to unit length (``renormalise``)."""
 
 from amaranth.hdl import Cat, Signal, Value
 from amaranth.lib import fifo, stream
@@ -15,12 +15,12 @@ from blysk.hdl.normals.renormaliser import RenormaliserUnit
 __all__ = ["LinearInterpolatorUnit"]
 
 
-class LinearInterpolatorUnit(NormalInterpolatorUnit):
-    """Normals on a straight line; `LinearInterpolator` is the twin.
+class LinearInterpolatorUnit(NormalInterpolatorUnit, parameters=LinearInterpolator):
+    """Normals on a straight line; `LinearInterpolator` is the bit-accurate model.
 
     The difference setup of a straight line, ``P = N_r - N_l``, the accumulator, and with ``renormalised`` the
-    direct renormaliser, of eight multipliers. A span that is too wide is flagged when it comes in; with
-    ``renormalised`` at the first pixel that shows it, as only the renormaliser knows which it does not serve.
+    direct renormaliser, of eight multipliers. A span that is out of range is flagged when it is accepted;
+    with ``renormalised`` at its first pixel that is out of range of the difference or of the renormaliser.
 
     Parameters
     ----------
@@ -28,27 +28,24 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
         Renormalised or not, and the specular operand.
     lights : int
         Number of lights, at least 1.
-    setup_interval : int
-        Clocks from a span to the next at the closest, 1 to 7.
     options
-        As for `InterpolatorUnit`.
+        As for `InterpolatorUnit`; ``setup_interval`` is 1 to 7.
 
-    Source: [T] 2.1; numbers.md, "Rivals to measure against".
+    Source: docs/theory/interpolation.md#spans, docs/theory/interpolation.md#renormaliser; [T] 2.1.
     """
 
-    # Spans that wait ready for the accumulator: one at the output of the setup, two in the registers between.
     PREPARED = 3
+    """Spans before the accumulator: one at the output of the setup, two in the register slice."""
 
     @classmethod
     def setup_intervals(cls, parameters):
-        """What the setup can be built for."""
+        """Initiation intervals of the difference setup."""
         return range(1, 8)
 
-    def __init__(self, parameters: LinearInterpolator, lights: int, setup_interval: int = 4, **options):
+    def __init__(self, parameters: LinearInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
-        self.setup_interval = setup_interval
         self._setup = DifferenceSetupUnit(
-            initiation_interval=setup_interval, length_bits=self.length_bits, order=1
+            initiation_interval=self.setup_interval, length_bits=self.length_bits, order=1
         )
         self._accumulator = DifferenceAccumulatorUnit()
         units = [self._setup, self._accumulator]
@@ -85,20 +82,24 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
             normals.valid.eq(renormaliser.o.valid),
             renormaliser.o.ready.eq(normals.ready),
         ]
-        first, far = self._marks(m, far)
-        # Of this span: a pixel before this one has shown it.
-        shown, shows = Signal(), Signal()
-        before = shown & ~first
-        m.d.comb += shows.eq((first & far) | renormaliser.o.payload.outside)
+        first, far = self._flags_of_pixels(m, far)
+        # Whether an earlier pixel of this span was out of range.
+        flagged, outside = Signal(), Signal()
+        before = flagged & ~first
+        m.d.comb += outside.eq((first & far) | renormaliser.o.payload.outside)
         m.d.sync += out_of_range.eq(0)
         with m.If(normals.valid & normals.ready):
-            m.d.sync += [out_of_range.eq(shows & ~before), shown.eq(shows | before)]
+            m.d.sync += [out_of_range.eq(outside & ~before), flagged.eq(outside | before)]
         return normals, out_of_range
 
-    def _marks(self, m, far):
-        """Of a normal that the renormaliser offers: whether it is a span's first, and then ``far`` of it."""
+    def _flags_of_pixels(self, m, far):
+        """For each normal of the renormaliser: whether it is the first of its span, and ``far`` of the span.
+
+        ``far`` is of a span at the input. Registers parallel to those of the accumulator and the renormaliser
+        carry both flags.
+        """
         setup, accumulator, renormaliser = self._setup, self._accumulator, self._renormaliser
-        # Holds every span between the input and the accumulator, and so is never full.
+        # Never full: it has room for every span between the input and the accumulator.
         depth = -(-setup.latency // self.setup_interval) + 1 + self.PREPARED
         m.submodules.far = spans = fifo.SyncFIFOBuffered(width=1, depth=depth)
         load = accumulator.i.valid & accumulator.i.ready
@@ -107,14 +108,13 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit):
             spans.w_en.eq(self.i.valid & self.i.ready),
             spans.r_en.eq(load),
         ]
-        mark = Cat(load, spans.r_data)
-        for name, unit in (("young", accumulator), ("old", renormaliser)):
-            # As many registers as the values go through in the unit, and one to wait in beside theirs.
-            marks = Signal(2 * unit.latency, name=name)
-            beside = stream.Signature(2).create(path=(name,))
-            advance = skid_buffer(m, beside, unit.o.valid, marks[-2:])
-            m.d.comb += beside.ready.eq(unit.o.ready)
+        flags = Cat(load, spans.r_data)
+        for name, unit in (("accumulator_flags", accumulator), ("renormaliser_flags", renormaliser)):
+            stages = Signal(2 * unit.latency, name=name)
+            output = stream.Signature(2).create(path=(name,))
+            advance = skid_buffer(m, output, unit.o.valid, stages[-2:])
+            m.d.comb += output.ready.eq(unit.o.ready)
             with m.If(advance):
-                m.d.sync += marks.eq(Cat(mark, marks))
-            mark = beside.payload
-        return mark[0], mark[1]
+                m.d.sync += stages.eq(Cat(flags, stages))
+            flags = output.payload
+        return flags[0], flags[1]

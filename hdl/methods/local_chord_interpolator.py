@@ -1,88 +1,63 @@
 """The chord method for point lights and a near viewer: three values of N·L and of the chord a span."""
 
 from amaranth.hdl import Module
-from amaranth.lib import stream, wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib import wiring
 
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import SLICE_LATENCY, connect, connect_slice
 from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit, span_values_shape
 from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
-from blysk.hdl.methods.interpolator import operands_shape
+from blysk.hdl.methods.interpolator import InterpolatorUnit
 
 __all__ = ["LocalChordInterpolatorUnit"]
 
 
-class LocalChordInterpolatorUnit(wiring.Component):
+class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpolator):
     """Local chord setup, then accumulators: spans with values in, the operands of their pixels out.
 
-    `LocalChordInterpolator` is the twin. No multiplier a pixel; those of the
-    setup are ``ceil((1 + 5 lights) / setup_interval)``, without highlights ``ceil((1 + 2 lights) /
-    setup_interval)``.
+    `LocalChordInterpolator` is the bit-accurate model. No multiplier a pixel; those of the setup are
+    ``ceil((1 + 5 lights) / setup_interval)``, without highlights ``ceil((1 + 2 lights) / setup_interval)``.
 
-    An `InterpolatorUnit` but for its input, which has values in place of normals, and the
-    vectors of the lights, which it does not need.
+    Spans carry values in place of normals, so there are no vectors of lights. A span is flagged if one of its
+    words does not fit.
 
     Parameters
     ----------
     parameters : LocalChordInterpolator
-        Twin.
+        Bit-accurate model.
     lights : int
         Number of lights, at least 1.
-    setup_interval : int
-        Clocks from a span to the next at the closest, at least 1.
-    highlights : bool
-        Whether there is specular light; else there are no values and no operands of it.
-    length_bits : int
-        Bits of the length.
+    options
+        As for `InterpolatorUnit`; ``setup_interval`` is 1 to 6.
 
-    Members
-    -------
-    i : :py:`In(stream.Signature(span_values_shape(lights, highlights, length_bits)))`
-        Spans of length 1 or more.
-    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights)))`
-        Operands of the pixels.
-    wide : :py:`Out(1)`
-        High for one clock for each span of which a word does not fit.
-
-    Source: chord.md.
+    Source: docs/theory/chord.md#local-lights.
     """
-
-    cycles_per_pixel = 1
 
     @classmethod
     def setup_intervals(cls, parameters):
-        """What the setup can be built for."""
+        """Initiation intervals of the local chord setup that save multipliers of one light."""
         return range(1, 7)
 
-    def __init__(
-        self,
-        parameters: LocalChordInterpolator,
-        lights: int,
-        setup_interval: int = 4,
-        *,
-        highlights: bool = True,
-        length_bits: int = LENGTH_BITS,
-    ):
-        self.parameters = parameters
-        self.lights = lights
-        self.setup_interval = setup_interval
-        self.highlights = highlights
-        self.length_bits = length_bits
-        self._setup = LocalChordSetupUnit(lights, setup_interval, length_bits, highlights)
-        self._accumulator = ChordAccumulatorUnit(lights, highlights)
-        self.latency = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
-        super().__init__(
-            {
-                "i": In(stream.Signature(span_values_shape(lights, highlights, length_bits))),
-                "o": Out(stream.Signature(operands_shape(parameters, lights, highlights))),
-                "out_of_range": Out(1),
-            }
+    @classmethod
+    def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS):
+        """Three values of each operand of each light, and the length."""
+        return span_values_shape(lights, highlights, length_bits)
+
+    def __init__(self, parameters: LocalChordInterpolator, lights: int, **options):
+        super().__init__(parameters, lights, **options)
+        self._setup = LocalChordSetupUnit(
+            None,
+            lights,
+            initiation_interval=self.setup_interval,
+            length_bits=self.length_bits,
+            highlights=self.highlights,
         )
+        self._accumulator = ChordAccumulatorUnit(lights=lights, highlights=self.highlights)
+        self.latency = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
 
     def elaborate(self, platform):
-        """Registers between the two hold spans ready, so that a long one pays for short ones after it."""
+        """A register slice between the two holds spans, so that short spans after a long one are ready."""
         m = Module()
         m.submodules.local_chord_setup = setup = self._setup
         m.submodules.chord_accumulator = accumulator = self._accumulator

@@ -15,11 +15,11 @@ from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 __all__ = ["QuadraticInterpolatorUnit"]
 
 
-class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
-    """Normals on a quadratic curve; `QuadraticInterpolator` is the twin.
+class QuadraticInterpolatorUnit(NormalInterpolatorUnit, parameters=QuadraticInterpolator):
+    """Normals on a quadratic curve; `QuadraticInterpolator` is the bit-accurate model.
 
-    Middle normal and G/P/Q prepare spans; forward differences, or an evaluator, make their pixels. The
-    lengths go round the preparation in a FIFO.
+    Middle normal and G/P/Q find the coefficients of a span; forward differences, or an evaluator, find the
+    normals of its pixels. A FIFO carries the lengths past the first two.
 
     =============== ======================== ===================== ============
     form            multipliers              setup interval        cycles/pixel
@@ -35,44 +35,42 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
         Form and specular operand.
     lights : int
         Number of lights, at least 1.
-    setup_interval : int
-        Clocks from a span to the next at the closest, 1 to 7: what the middle normal and the difference
-        setup are built for.
     options
-        As for `InterpolatorUnit`.
+        As for `InterpolatorUnit`; ``setup_interval`` of the form ``differences`` is 1 to 7.
 
-    Source: [T] 2.2, 2.3, figures 2.8 to 2.11.
+    Source: docs/theory/interpolation.md#quadratic-normals, docs/theory/interpolation.md#forward-differences;
+    [T] 2.2, 2.3, figures 2.8 to 2.11.
     """
 
     @classmethod
     def setup_intervals(cls, parameters):
-        """What the setup can be built for."""
+        """Initiation intervals of the middle normal and the difference setup."""
         return range(1, 8) if parameters.form == "differences" else range(0)
 
-    def __init__(self, parameters: QuadraticInterpolator, lights: int, setup_interval: int = 4, **options):
+    def __init__(self, parameters: QuadraticInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
-        self._middle, self._gpq = MiddleNormalUnit(parameters.middle_normal, setup_interval), GPQUnit()
+        differences = parameters.form == "differences"
+        interval = self.setup_interval if differences else 4
+        self._middle = MiddleNormalUnit(parameters.middle_normal, initiation_interval=interval)
+        self._gpq = GPQUnit()
         before = self._middle.latency + self._gpq.latency
-        if parameters.form == "differences":
-            self._setup = DifferenceSetupUnit(
-                initiation_interval=setup_interval, length_bits=self.length_bits
-            )
+        if differences:
+            self._setup = DifferenceSetupUnit(initiation_interval=interval, length_bits=self.length_bits)
             self._accumulator = DifferenceAccumulatorUnit()
-            self.setup_interval = setup_interval
             after = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
         else:
             self._evaluator = QuadraticEvaluatorUnit(QuadraticEvaluator(parameters.form))
-            # A pixel comes every two cycles, on which an interval of 7 does not end.
+            # With two cycles a pixel an interval of 7 ends between two pixels.
             self.setup_interval = 7 if parameters.form == "direct" else 8
-            self.cycles_per_pixel = self._evaluator.cycles_per_pixel
+            self.cycles_per_pixel = max(self.cycles_per_pixel, self._evaluator.cycles_per_pixel)
             after = self._evaluator.latency
         self.latency = before + after + self.product_latency
 
     def source(self, m):
-        """Coefficients, and the form that takes them to normals."""
+        """Coefficients, and the normals of the form."""
         m.submodules.middle_normal = middle = self._middle
         m.submodules.gpq = gpq = self._gpq
-        # As many as both units hold, each with one that waits: never full.
+        # Never full: both units hold as many spans, and each one more at its output.
         depth = -(-middle.latency // middle.initiation_interval) + gpq.latency + 2
         m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=self.length_bits, depth=depth)
         length = stream.Signature(self.length_bits).create(path=("length",))
@@ -93,7 +91,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit):
             ),
             gpq.i.valid.eq(middle.o.valid),
             middle.o.ready.eq(gpq.i.ready),
-            # A length is always there before its coefficients: the two have left together.
+            # A length comes before its coefficients, which take longer: both start on the same cycle.
             *(curve.i.payload[name].eq(gpq.o.payload[name]) for name in "gpq"),
             curve.i.payload.length.eq(length.payload),
             curve.i.valid.eq(gpq.o.valid),

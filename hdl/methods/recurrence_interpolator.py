@@ -1,4 +1,4 @@
-"""The recurrence method ([T] 3.3): cosines of equal steps along the great circle, one product each."""
+"""The recurrence method ([T] 3.3): cosines of equal steps on the great circle, one product each."""
 
 from amaranth.hdl import Module, Value
 
@@ -13,43 +13,42 @@ from blysk.hdl.methods.interpolator import InterpolatorUnit, span_words
 __all__ = ["RecurrenceInterpolatorUnit"]
 
 
-class RecurrenceInterpolatorUnit(InterpolatorUnit):
-    """Recurrence setup, then a recurrence unit for each light, which has a copy for L and one for H.
+class RecurrenceInterpolatorUnit(InterpolatorUnit, parameters=RecurrenceInterpolator):
+    """Recurrence setup, then a recurrence unit for each light, with a copy for L and one for H.
 
-    `RecurrenceInterpolator` is the twin. All recurrence units are equal, are
-    offered the same spans and taken from on the same cycles. Two multipliers a light, and those of the
-    setup, ``ceil((14 + 32 lights) / setup_interval)``. Without highlights the setup and the units are the
-    same, and what follows from H goes nowhere.
+    `RecurrenceInterpolator` is the bit-accurate model. All recurrence units are equal and have the same input
+    and the same ready of the output, so they are in the same state on every cycle. Two multipliers a light,
+    and those of the setup, ``ceil((14 + 32 lights) / setup_interval)``. Without highlights the units are the
+    same, and the results of H are not connected.
 
     Parameters
     ----------
     parameters : RecurrenceInterpolator
-        Twin.
+        Bit-accurate model.
     lights : int
         Number of lights, at least 1.
-    setup_interval : int
-        Clocks from a span to the next at the closest, at least 1.
     options
-        As for `InterpolatorUnit`.
+        As for `InterpolatorUnit`; ``setup_interval`` is 1 to 46.
 
-    Source: [T] 3.1, 3.3, figure 3.5.
+    Source: docs/theory/interpolation.md#recurrence; [T] 3.1, 3.3, figure 3.5.
     """
 
     @classmethod
     def setup_intervals(cls, parameters):
-        """What the setup can be built for."""
+        """Initiation intervals of the recurrence setup that save multipliers of one light."""
         return range(1, 47)
 
-    def __init__(self, parameters: RecurrenceInterpolator, lights: int, setup_interval: int = 4, **options):
+    def __init__(self, parameters: RecurrenceInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
-        self.setup_interval = setup_interval
-        self._setup = RecurrenceSetupUnit(parameters.setup, lights, setup_interval)
+        self._setup = RecurrenceSetupUnit(
+            parameters.setup, lights, initiation_interval=self.setup_interval
+        )
         self._recurrences = [RecurrenceUnit(parameters.setup.recurrence) for _ in range(lights)]
         unit = self._recurrences[0]
         self.latency = self._setup.latency + SLICE_LATENCY + unit.latency
 
     def elaborate(self, platform):
-        """Registers between the two hold spans ready, so that a long one pays for short ones after it."""
+        """A register slice between the two holds spans, so that short spans after a long one are ready."""
         m = Module()
         m.submodules.recurrence_setup = setup = self._setup
         m.d.comb += [

@@ -32,7 +32,8 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import BACK_FACES, LARGEST_SIDE, VIEWERS, Scene
 from blysk.hdl.emit.verilog import emit
 from blysk.hdl.emit.yosys import NetlistError
-from blysk.hdl.pipeline import INTERPOLATORS, PORT_DESCRIPTIONS, ShadingPipelineUnit
+from blysk.hdl.methods.registry import unit_of
+from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit
 from blysk.sim.cli.printing import (
     fit_figures,
     frame_figures,
@@ -351,7 +352,7 @@ def chosen_design(settings: Settings, lights: int) -> Design:
         )
     except ValueError as error:
         raise settings.refuse("highlight", str(error), "leave it out") from None
-    served = INTERPOLATORS[type(design.interpolator)].setup_intervals(design.interpolator)
+    served = unit_of(design.interpolator).setup_intervals(design.interpolator)
     if settings["setup_interval"] not in (None, *served):
         remedy = f"give 1 to {max(served)}" if served else "leave it out"
         raise settings.refuse("setup_interval", f"method {design.method} is not built for it", remedy)

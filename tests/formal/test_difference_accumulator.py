@@ -118,7 +118,7 @@ def of_sums(unit):
 
 SUMS = {
     "normal": DifferenceAccumulatorUnit,
-    "chord": lambda: ChordAccumulatorUnit(1),
+    "chord": lambda: ChordAccumulatorUnit(),
 }
 
 

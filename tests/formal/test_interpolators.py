@@ -374,7 +374,7 @@ UNITS = {
         quadratic_stretches,
     ),
     "quadratic-eval": (
-        partial(QuadraticInterpolatorUnit, QuadraticInterpolator(form="direct"), 1, **OPTIONS),
+        partial(QuadraticInterpolatorUnit, QuadraticInterpolator(form="direct"), 1, length_bits=LENGTH_BITS),
         evaluator_stretches,
     ),
     "chord_interpolator": (
@@ -496,8 +496,8 @@ BUGS = {
     ),
     "prepared local spans are lost": (
         "local_chord_interpolator",
-        "m.d.comb += self.wide",
-        "m.d.comb += setup.o.ready.eq(1); m.d.comb += self.wide",
+        "m.d.comb += self.out_of_range",
+        "m.d.comb += setup.o.ready.eq(1); m.d.comb += self.out_of_range",
     ),
     "angles are lost": ("angular", "setup.o.ready.eq(prepared.ready)", "setup.o.ready.eq(1)"),
     "cosines are lost": ("angular", "cosine.o.ready.eq(self.o.ready)", "cosine.o.ready.eq(1)"),
@@ -533,8 +533,8 @@ def test_bugs_are_found(refute, plant, bug):
 )
 def test_lost_products_are_found(refute, plant, name):
     """Products that are dropped while they wait, planted in all methods that find normals."""
-    bug = "products.o.ready.eq(1), self.wide.eq(wide)"
-    plant(NormalInterpolatorUnit, "elaborate", "self.wide.eq(wide)", bug)
+    flag = "self.out_of_range.eq(out_of_range)"
+    plant(NormalInterpolatorUnit, "elaborate", flag, f"products.o.ready.eq(1), {flag}")
     refute(of_cycles(name, exact=True), 30)
 
 

@@ -29,14 +29,11 @@ NARROW = {"x_bits": 2, "y_bits": 1, "length_bits": 2}
 class Line(InterpolatorUnit):
     """In the interpolator's place: two bits of the left normal, one more for each pixel and light."""
 
-    latency = setup_interval = 1
+    latency = 1
 
     @classmethod
     def setup_intervals(cls, parameters):
         return range(1, 2)
-
-    def __init__(self, parameters, lights, setup_interval=1, product_interval=1, **options):
-        super().__init__(parameters, lights, **options)
 
     def elaborate(self, platform):
         m = Module()
@@ -90,7 +87,7 @@ def stand_ins(monkeypatch):
         monkeypatch.setattr(blysk.hdl.pipeline, "CompactIntensityUnit", compact)
         for module, unit, *options in units:
             monkeypatch.setattr(module, unit.__name__, short(unit, *options))
-        monkeypatch.setitem(blysk.hdl.pipeline.INTERPOLATORS, LinearInterpolator, Line)
+        monkeypatch.setitem(InterpolatorUnit.UNITS, LinearInterpolator, Line)
         monkeypatch.setattr(ShadingPipelineUnit, "_waiting_spans", 3)
         return ShadingPipelineUnit(parameters.built(style=style))
 

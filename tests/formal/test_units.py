@@ -33,7 +33,7 @@ from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SpecularUnit
 from blysk.hdl.methods.bisection_interpolator import BisectionInterpolatorUnit
 from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit, ChordInterpolatorUnit
-from blysk.hdl.methods.interpolator import LightProductsUnit
+from blysk.hdl.methods.light_products import LightProductsUnit
 from blysk.hdl.methods.linear_interpolator import LinearInterpolatorUnit
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
 from blysk.hdl.methods.quadratic_interpolator import QuadraticInterpolatorUnit
@@ -69,7 +69,7 @@ PIPELINED = {
     "gpq": GPQUnit,
     "highlight_gate": HighlightGateUnit,
     "intensity": IntensityUnit,
-    "light_products": partial(LightProductsUnit, LinearInterpolator(), 1, True, 3),
+    "light_products": partial(LightProductsUnit, initiation_interval=3),
     "local_chord_setup": LocalChordSetupUnit,
     "middle_normal": MiddleNormalUnit,
     "power": PowerUnit,

@@ -445,7 +445,7 @@ def test_sums_are_cut_in_these_places_alone():
         *(make() for make in (BisectionUnit, BisectionChainUnit, RenormaliserUnit, HalfChordUnit)),
         *(make() for make in (ChordSetupUnit, RecurrenceSetupUnit, RecurrenceUnit)),
         *(make() for make in (DifferenceAccumulatorUnit, AdaptiveNormaliserUnit)),
-        ChordAccumulatorUnit(1),
+        ChordAccumulatorUnit(),
     )
     assert set.union(*map(cut_by, units)) == set(CUTS)
 
@@ -501,7 +501,7 @@ def test_sums_of_segments_do_not_wrap(wraps, levels):
 def test_sums_of_chords_do_not_wrap(wraps, name, bits):
     """The same, for unit vectors and any P and G; so differences of a pixel to the next. Local chords too."""
     of_chord_sums(name, bits)
-    assert wrapped_by(ChordAccumulatorUnit(1, True, ChordInterpolator(fraction_bits=bits))) <= set(wraps)
+    assert wrapped_by(ChordAccumulatorUnit(ChordInterpolator(fraction_bits=bits))) <= set(wraps)
 
 
 def test_bounds_hold():

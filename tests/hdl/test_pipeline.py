@@ -21,7 +21,8 @@ from blysk.golden.pipeline import STYLES, Build, Spans
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.pipeline import INTERPOLATORS, ShadingPipelineUnit
+from blysk.hdl.methods.registry import unit_of
+from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import dtype_of, pack, unpack
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import beats_of
@@ -290,7 +291,7 @@ def intervals():
     often |= {"recurrence": (1,)}
     for method, soon in often.items():
         interpolator = METHODS[method]
-        for interval in INTERPOLATORS[type(interpolator)].setup_intervals(interpolator):
+        for interval in unit_of(interpolator).setup_intervals(interpolator):
             marks = () if interval in soon else (pytest.mark.long,)
             yield pytest.param(method, interval, marks=marks)
 
@@ -318,7 +319,7 @@ def test_setup_interval(method, interval, normal_pairs):
 
 
 def methods_with_intervals():
-    return {method: INTERPOLATORS[type(twin)].setup_intervals(twin) for method, twin in METHODS.items()}
+    return {method: unit_of(twin).setup_intervals(twin) for method, twin in METHODS.items()}
 
 
 def test_intervals_that_there_are(never_built):
@@ -340,10 +341,6 @@ def test_intervals_that_there_are(never_built):
     for method, allowed in methods_with_intervals().items():
         if 4 in allowed:
             assert ShadingPipelineUnit(preset(method)).setup_interval == 4
-
-
-def test_every_method_has_a_unit():
-    assert {type(twin) for twin in METHODS.values()} == set(INTERPOLATORS)
 
 
 # Just within, and beyond, what each method takes. Linear normals of 45 degrees differ by less than 1 in every

@@ -51,6 +51,7 @@ from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.hdl.lighting.light import LightUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SpecularUnit
+from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 from blysk.hdl.normals.bisection import BisectionUnit
 from blysk.hdl.normals.bisection_chain import BisectionChainUnit
@@ -61,7 +62,6 @@ from blysk.hdl.normals.gpq import GPQUnit
 from blysk.hdl.normals.middle_normal import MiddleNormalUnit
 from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 from blysk.hdl.normals.renormaliser import RenormaliserUnit
-from blysk.hdl.pipeline import INTERPOLATORS
 from blysk.sim.engines.beats import dtype_of
 
 from ..lists import FURTHER_MODELS, SPECULAR_MODELS
@@ -441,7 +441,7 @@ def _operands(unit, operands) -> np.ndarray:
 
 def _interpolator(rng, count, method):
     twin = METHODS[method]
-    unit = INTERPOLATORS[type(twin)](twin, _LIGHTS)
+    unit = unit_of(twin)(twin, _LIGHTS)
     length = _lengths(rng, count, 1)
     if isinstance(twin, LocalChordInterpolator):
         values = _values(rng, len(length))
@@ -509,7 +509,7 @@ DEVICES: dict[str, Callable[[np.random.Generator, int], Case]] = {
     "recurrence_setup": _recurrence_setup,
     "local_chord_setup": _local_chord_setup,
     **{
-        f"{INTERPOLATORS[type(twin)].__module__.rpartition('.')[2]}, {method}": partial(
+        f"{unit_of(twin).__module__.rpartition('.')[2]}, {method}": partial(
             _interpolator, method=method
         )
         for method, twin in METHODS.items()

@@ -9,7 +9,7 @@ from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.methods.interpolator import LightProductsUnit
+from blysk.hdl.methods.light_products import LightProductsUnit
 from blysk.sim.engines.beats import dtype_of
 
 

@@ -63,7 +63,7 @@ def expected_of(unit, values, length):
 def test_equals_twin(lights, interval):
     """Every operand; the cycles of every pixel; random stalls on both sides, on both engines."""
     rng = np.random.default_rng(lights + 10 * interval)
-    unit = LocalChordInterpolatorUnit(METHOD, lights, interval)
+    unit = LocalChordInterpolatorUnit(METHOD, lights, setup_interval=interval)
     values, length = spans(rng, lights, 300)
     beats = beats_of(unit, values, length)
     expected, out_of_range = expected_of(unit, values, length)
@@ -96,7 +96,7 @@ def test_equals_twin(lights, interval):
 def test_long_spans_leave_no_gap():
     """One pixel a clock from the first on, spans of the interval's length and more."""
     rng = np.random.default_rng(5)
-    unit = LocalChordInterpolatorUnit(METHOD, 1, 4)
+    unit = LocalChordInterpolatorUnit(METHOD, 1)
     values, length = spans(rng, 1, 60, 4095)
     length = np.maximum(length, 4)
     expected, _ = expected_of(unit, values, length)
@@ -116,7 +116,7 @@ def test_every_bit_counts():
 
 def test_without_highlights():
     rng = np.random.default_rng(6)
-    unit = LocalChordInterpolatorUnit(METHOD, 2, 2, highlights=False, length_bits=5)
+    unit = LocalChordInterpolatorUnit(METHOD, 2, setup_interval=2, highlights=False, length_bits=5)
     assert cost_of(unit).multiplier_count == 3
     values, length = spans(rng, 2, 100)
     values = SpanValues(values.diffuse, 0 * values.highlight)
@@ -133,7 +133,7 @@ def words_of(unit, beats):
 def test_wide_is_high_once_a_span():
     """As many cycles as the twin flags spans, while the output waits now and then."""
     rng = np.random.default_rng(7)
-    unit = LocalChordInterpolatorUnit(METHOD, 1, 2)
+    unit = LocalChordInterpolatorUnit(METHOD, 1, setup_interval=2)
     values, length = spans(rng, 1, 60, 6)
     expected, out_of_range = expected_of(unit, values, length)
     words = words_of(unit, beats_of(unit, values, length))
@@ -159,7 +159,7 @@ def test_wide_is_high_once_a_span():
 
 def test_reset_leaves_nothing_behind(verify_reset):
     """After a reset in mid-span, too."""
-    unit = LocalChordInterpolatorUnit(METHOD, 1, 4)
+    unit = LocalChordInterpolatorUnit(METHOD, 1)
     values, length = spans(np.random.default_rng(8), 1, 12, 6)
     pixels = length[:6].sum()
     found = verify_reset(unit, beats_of(unit, values, length), (1, 9, 18, 30), unit.latency + pixels + 10)
@@ -170,13 +170,13 @@ def test_reset_leaves_nothing_behind(verify_reset):
 @pytest.mark.parametrize(("lights", "interval"), VARIANTS)
 def test_multipliers(lights, interval):
     """Those of the setup alone."""
-    cost = cost_of(LocalChordInterpolatorUnit(METHOD, lights, interval))
+    cost = cost_of(LocalChordInterpolatorUnit(METHOD, lights, setup_interval=interval))
     assert cost.multipliers == {(18, 18): -(-(1 + 5 * lights) // interval)}
 
 
 def test_is_an_interpolator_but_for_its_input():
     """The shell finds what it reads of an interpolator unit."""
-    unit = LocalChordInterpolatorUnit(METHOD, 2, 3)
+    unit = LocalChordInterpolatorUnit(METHOD, 2, setup_interval=3)
     assert (unit.lights, unit.setup_interval, unit.cycles_per_pixel) == (2, 3, 1)
     assert list(type(unit).setup_intervals(METHOD)) == [1, 2, 3, 4, 5, 6]
     theirs = InterpolatorUnit(METHOD, 2)

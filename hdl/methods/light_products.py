@@ -1,0 +1,104 @@
+"""Products of a normal with the vectors of every light."""
+
+from amaranth.hdl import Signal
+from amaranth.lib import data
+
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
+from blysk.golden.methods.linear_interpolator import LinearInterpolator
+from blysk.hdl.core.dataflow import Dataflow, dot
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.shapes import light_vectors_shape, normal_shape
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.cosines.chord import chord
+
+__all__ = ["LightProductsUnit", "operands_shape"]
+
+
+def operands_shape(parameters: Interpolator, lights: int, *, highlights: bool = True) -> data.ArrayLayout:
+    """Shape of the operands of a pixel: for each light N·L, and N·H or 1 - N·H.
+
+    Parameters
+    ----------
+    parameters : Interpolator
+        Formats.
+    lights : int
+        Number of lights.
+    highlights : bool
+        Whether there is specular light.
+    """
+    operands = {"cosine": FixedShape(parameters.COSINE_FORMAT)}
+    if highlights:
+        operands["highlight"] = FixedShape(Specular(operand=parameters.operand).operand_format)
+    return data.ArrayLayout(data.StructLayout(operands), lights)
+
+
+class LightProductsUnit(PipelinedUnit):
+    """``N . L``, and ``N . H`` or half the squared chord, of a normal with L and H of every light.
+
+    `NormalInterpolator.products` is the bit-accurate model. With an initiation interval of 1 the latency is 7
+    cycles (operands, four for the products, two sums), with the chord 11. Six products a light, three without
+    highlights, share ``ceil(6 lights / initiation_interval)`` multipliers of 18 by 18 bits.
+
+    Parameters
+    ----------
+    parameters : NormalInterpolator
+        Operand of the specular unit.
+    lights : int
+        Number of lights, at least 1.
+    highlights : bool
+        Whether there is specular light.
+    initiation_interval : int
+        Least cycles from an input to the next, at least 1.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(ArrayLayout(SQ(1, 17), 3)))`
+        Normals.
+    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
+        Operands.
+    constants : :py:`In(light_vectors_shape(lights))`
+        L and H; constant while beats are inside.
+
+    Source: docs/theory/interpolation.md#dot-product, docs/theory/chord.md#the-chord; [T] figure 2.5.
+    """
+
+    def __init__(
+        self,
+        parameters: NormalInterpolator | None = None,
+        lights: int = 1,
+        *,
+        highlights: bool = True,
+        initiation_interval: int = 1,
+    ):
+        self.parameters = parameters = parameters or LinearInterpolator()
+        self.lights = lights
+        self.highlights = highlights
+        self._graph = graph = Dataflow(initiation_interval, (6 if highlights else 3) * lights)
+        normal = graph.input("normal", lambda operands: operands)
+        self._words = []
+        for i in range(lights):
+            words = {"cosine": dot(graph, f"cosine_{i}", normal, lambda _, i=i: self.constants[i].direction)}
+            if highlights:
+                product = chord if parameters.uses_chord else dot
+                vector = lambda *_, i=i: self.constants[i].halfway  # noqa: E731
+                words["highlight"] = product(graph, f"highlight_{i}", normal, vector)
+            self._words.append(words)
+        super().__init__(
+            normal_shape(),
+            operands_shape(parameters, lights, highlights=highlights),
+            latency=max(word.stage for word in words.values()),
+            initiation_interval=initiation_interval,
+            constants=light_vectors_shape(lights),
+        )
+
+    def datapath(self, m, operands):
+        """The graph; the chord in the specular unit's format."""
+        value = self._graph.build(m, self, operands)
+        result = Signal(self.o.payload.shape())
+        for light, words in zip(result, self._words, strict=True):
+            m.d.comb += light.cosine.eq(value(words["cosine"], self.latency))
+            if self.highlights:
+                highlight, format = value(words["highlight"], self.latency), light.highlight.format
+                m.d.comb += light.highlight.eq(highlight.truncate(format.fraction_bits).saturate(format))
+        return result
