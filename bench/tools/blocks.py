@@ -69,7 +69,6 @@ from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SpecularUnit
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
 from blysk.hdl.methods.registry import unit_of
-from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 from blysk.hdl.normals.bisection import BisectionUnit
 from blysk.hdl.normals.bisection_chain import BisectionChainUnit
