@@ -1,11 +1,15 @@
 """How RTL is held against its bit-accurate model, whatever the unit."""
 
 from collections.abc import Mapping
+from weakref import WeakKeyDictionary
 
 import numpy as np
-from amaranth.hdl import ResetInserter, Signal, Value
+from amaranth.hdl import ResetInserter, Signal, Value, unsigned
+from amaranth.lib import data
+from amaranth.lib.wiring import Component, Out
 from amaranth.sim import Simulator
 
+from blysk.bench.quality.mutation import Wrapped
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.simulate import simulate
@@ -25,43 +29,81 @@ def assert_beats_equal(actual, expected, path="beat"):
         np.testing.assert_array_equal(actual, expected, err_msg=path)
 
 
+class Counted(Wrapped):
+    """A unit, with the number of cycles on which its ``out_of_range`` is high as status."""
+
+    def __init__(self, unit: Component):
+        super().__init__(unit, status=Out(data.StructLayout({"out_of_range": unsigned(32)})))
+
+    def elaborate(self, platform):
+        m = super().elaborate(platform)
+        m.submodules.unit = self.unit
+        m.d.sync += self.status.out_of_range.eq(self.status.out_of_range + self.unit.out_of_range)
+        return m
+
+
+_counted: WeakKeyDictionary[Component, Counted] = WeakKeyDictionary()
+
+
+def with_status(unit: Component, run) -> Component:
+    """The unit itself, or the one that counts its flags, the same for all its runs."""
+    if run.status is None or "status" in unit.signature.members:
+        return unit
+    if unit not in _counted:
+        _counted[unit] = Counted(unit)
+    return _counted[unit]
+
+
 def assert_equals_model(unit, run, engine="auto"):
-    """Every beat; of a pipelined unit without stalls every cycle; the first beats in both engines."""
-    case = run.case
+    """Every beat, the status, of a pipelined unit without stalls every cycle; few beats in both engines."""
+    case, component = run.case, with_status(unit, run)
     options = {"constants": case.constants, "write": case.write, **run.stalls}
-    found = simulate(unit, case.beats, count=run.count, engine=engine, **options)
+    found = simulate(component, case.beats, count=run.count, engine=engine, **options)
     assert_beats_equal(found.beats, run.expected)
+    if run.status is not None:
+        assert {name: found.status[name] for name in run.status} == run.status
     if isinstance(unit, PipelinedUnit) and not run.stalls:
         np.testing.assert_array_equal(found.input_cycles, np.arange(run.count) * unit.initiation_interval)
         np.testing.assert_array_equal(found.cycles, found.input_cycles + unit.latency)
     if run.stalls:
         few = min(length_of(case.beats), FEW)
         beats = first(case.beats, few)
-        slow, fast = (
-            simulate(unit, beats, count=None, engine=name, idle_timeout=2000, **options)
-            for name in ("pysim", engine)
-        )
+        fast = simulate(component, beats, count=None, engine=engine, idle_timeout=2000, **options)
+        # Told how many beats come, the slow engine need not wait for more.
+        slow = simulate(component, beats, count=len(fast.beats), engine="pysim", idle_timeout=2000, **options)
         for name in ("beats", "cycles", "input_cycles"):
             np.testing.assert_array_equal(getattr(slow, name), getattr(fast, name))
     return found
 
 
-def resets(unit, case: Case, befores, cycles):
-    """Output cycles and payloads after power-up, and after resets with beats inside; the first six beats."""
-    packed = [
-        int.from_bytes(row.astype("<u4").tobytes(), "little")
-        for row in pack(unit.i.payload.shape(), case.beats)
-    ]
+def resets(unit, case: Case, befores, cycles, count=6):
+    """Cycles from the first input, and payloads, of the outputs after power-up and after resets.
+
+    The first beats are answered; others are inside on the reset.
+    """
+    packed = words_of(unit.i, case.beats)
+    writes = [] if case.write is None else words_of(unit.write, case.write)
     reset, found = Signal(), []
 
-    async def send(context, words):
-        sent, taken = 0, []
+    async def send(context, port, words):
+        """Beats of a stream, each until it is accepted."""
+        sent = 0
+        while sent < len(words):
+            context.set(port.valid, 1)
+            context.set(Value.cast(port.payload).as_unsigned(), words[sent])
+            sent += context.get(port.ready)
+            await context.tick()
+        context.set(port.valid, 0)
+
+    async def answer(context, words):
+        sent, taken, start = 0, [], None
         for cycle in range(cycles):
             context.set(unit.i.valid, sent < len(words))
             context.set(Value.cast(unit.i.payload).as_unsigned(), words[min(sent, len(words) - 1)])
             accepted = context.get(unit.i.valid & unit.i.ready)
+            start = cycle if accepted and start is None else start
             if context.get(unit.o.valid):
-                taken.append((cycle, context.get(Value.cast(unit.o.payload).as_unsigned())))
+                taken.append((cycle - start, context.get(Value.cast(unit.o.payload).as_unsigned())))
             await context.tick()
             sent += accepted
         return taken
@@ -73,6 +115,7 @@ def resets(unit, case: Case, befores, cycles):
             context.set(Value.cast(unit.i.payload).as_unsigned(), words[sent % len(words)])
             sent += context.get(unit.i.ready)
             await context.tick()
+        context.set(unit.i.valid, 0)
 
     async def bench(context):
         if case.constants is not None:
@@ -81,18 +124,28 @@ def resets(unit, case: Case, befores, cycles):
             context.set(Value.cast(unit.constants).as_unsigned(), code)
         context.set(unit.o.ready, 1)
         for before in (0, *befores):
-            await keep(context, packed[6:], before)
+            if writes and before:
+                await send(context, unit.write, writes)
+            await keep(context, packed[count:], before)
             context.set(reset, before > 0)
             await context.tick()
             context.set(reset, 0)
             assert not context.get(unit.o.valid)
-            found.append(await send(context, packed[:6]))
+            if writes:
+                await send(context, unit.write, writes)
+            found.append(await answer(context, packed[:count]))
 
     simulator = Simulator(ResetInserter(reset)(unit))
     simulator.add_clock(1e-6)
     simulator.add_testbench(bench)
     simulator.run()
     return found
+
+
+def words_of(port, beats) -> list[int]:
+    """Payloads of a stream as integers."""
+    rows = pack(port.payload.shape(), beats)
+    return [int.from_bytes(row.astype("<u4").tobytes(), "little") for row in rows]
 
 
 def _single(beat):

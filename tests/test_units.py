@@ -6,6 +6,7 @@ import inspect
 import pytest
 
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.record import Case, first
 from blysk.sim.units.registry import RECORDS
 
@@ -17,8 +18,9 @@ def _runs():
         for variant, given in record.variants.items():
             for stimulus, sent in record.stimuli_of(variant).items():
                 marks = [pytest.mark.long] if given.long or sent.long else []
-                # The default variant gets every stimulus, the others the first.
-                if variant != record.default and stimulus != next(iter(record.stimuli_of(variant))):
+                # The default variant gets every stimulus, the others the first and those that name them.
+                is_first = stimulus == next(iter(record.stimuli_of(variant)))
+                if not (variant == record.default or is_first or variant in sent.variants):
                     continue
                 yield pytest.param(name, variant, stimulus, marks=marks, id=f"{name}-{variant}-{stimulus}")
 
@@ -39,20 +41,33 @@ def first_case(record, unit, count):
     return Case(first(run.case.beats, count), run.case.constants, run.case.write)
 
 
-PIPELINED = [name for name, record in RECORDS.items() if issubclass(record.kind, PipelinedUnit)]
-
-
-@pytest.mark.parametrize("name", PIPELINED)
+@pytest.mark.parametrize("name", RECORDS)
 def test_reset_leaves_nothing_behind(name):
     """Reset with beats inside: the unit then answers as from power-up, on the same cycles."""
     record = RECORDS[name]
     unit = record.variants[record.default].unit()
-    case = first_case(record, unit, 12)
-    interval = unit.initiation_interval
-    befores = 1, 2 * interval + 1, unit.latency + 2
-    first, *others = resets(unit, case, befores, unit.latency + 6 * interval)
-    assert [cycle for cycle, _ in first] == [unit.latency + interval * k for k in range(6)]
-    assert all(found == first for found in others)
+    case, count = first_case(record, unit, 24), 12
+    if isinstance(unit, PipelinedUnit):
+        interval, count = unit.initiation_interval, 6
+        cycles, befores = unit.latency + 6 * interval, (1, 2 * interval + 1, unit.latency + 2)
+        expected = [unit.latency + interval * k for k in range(6)]
+    else:
+        beats = first(case.beats, count)
+        run = simulate(
+            unit,
+            beats,
+            count=None,
+            constants=case.constants,
+            write=case.write,
+            engine="auto",
+            idle_timeout=2000,
+        )
+        cycles = run.total_cycles - run.input_cycles[0] + 5
+        befores = 1, cycles // 4, cycles // 2, 3 * cycles // 4
+        expected = [cycle - run.input_cycles[0] for cycle in run.cycles.tolist()]
+    found, *others = resets(unit, case, befores, cycles, count)
+    assert [cycle for cycle, _ in found] == expected
+    assert all(other == found for other in others)
 
 
 @pytest.mark.parametrize("name", RECORDS)

@@ -227,12 +227,15 @@ class UnitRun:
         Input.
     expected : Beats
         Output beats of the bit-accurate model.
+    status : dict or None
+        Expected members of the status after the run, see `Record.status`.
     stalls : dict
         Arguments ``input_stalls`` and ``output_stalls`` of `simulate`; empty for none.
     """
 
     case: Case
     expected: Beats
+    status: Mapping[str, int] | None
     stalls: dict[str, np.ndarray]
 
     @property
@@ -259,6 +262,9 @@ class Record:
         Takes the component and a `Case`; gives the output beats by the bit-accurate model.
     stimuli : dict
         By name; the first serves for any number of beats, in other simulators too.
+    status : callable, optional
+        Takes the component and a `Case`; gives expected members of the port ``status`` after a run, by name.
+        Of a component without that port: ``out_of_range``, on how many cycles that port is high.
     axis : str
         What errors are drawn against; empty for nothing.
     logarithmic : bool
@@ -275,6 +281,7 @@ class Record:
     variants: Mapping[str, Variant]
     expect: Callable[[Component, Case], Beats]
     stimuli: Mapping[str, Stimulus]
+    status: Callable[[Component, Case], Mapping[str, int]] | None = None
     axis: str = "angle of the span, degrees"
     logarithmic: bool = False
     waivers: Mapping[str, str] = field(default_factory=dict)
@@ -319,7 +326,7 @@ class Record:
         for repeat in range(given.repeats):
             rng = np.random.default_rng([seed, *stimulus.encode(), repeat])
             case = given.make(unit, rng, given.count)
-            expected = self.expect(unit, case)
+            expected, status = self.expect(unit, case), self._status(unit, case)
             for shares in STALLS if given.stalled else STALLS[:1]:
                 names = ("input_stalls", "output_stalls")
                 periods = (997, 1009)
@@ -328,11 +335,14 @@ class Record:
                     for name, period, share in zip(names, periods, shares, strict=True)
                     if share
                 }
-                yield UnitRun(case, expected, stalls)
+                yield UnitRun(case, expected, status, stalls)
             if given.stalled:
                 few = Case(first(case.beats, PAUSED), case.constants, case.write)
                 pauses = np.arange(PAUSE * PAUSED) % PAUSE != 0
-                yield UnitRun(few, self.expect(unit, few), {"input_stalls": pauses})
+                yield UnitRun(few, self.expect(unit, few), self._status(unit, few), {"input_stalls": pauses})
+
+    def _status(self, unit: Component, case: Case) -> Mapping[str, int] | None:
+        return None if self.status is None else self.status(unit, case)
 
 
 def first(beats: Beats, count: int) -> Beats:
