@@ -27,17 +27,25 @@ from blysk.sim.units.operands import (
 )
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
-__all__ = ["RECORD", "difference_beats"]
+__all__ = ["RECORD", "difference_beats", "value_at"]
 
 
 def difference_beats(unit, words, length, out_of_range) -> np.ndarray:
-    """Output beats of a setup of differences: those of N·L and of u, the length and the flag."""
+    """Output beats of a setup of differences: those of N·L and, if it has them, of u; length and flag."""
     expected = np.zeros(len(length), dtype_of(unit.o.payload.shape()))
     for name, differences in zip(("diffuse", "highlight"), words, strict=True):
-        for field in ("start", "first", "second"):
-            expected["lights"][name][field] = getattr(differences, field).codes
+        if name in expected["lights"].dtype.names:
+            for field in ("start", "first", "second"):
+                expected["lights"][name][field] = getattr(differences, field).codes
     expected["length"], expected["out_of_range"] = length, out_of_range
     return expected
+
+
+def value_at(differences, pixel) -> np.ndarray:
+    """Value of the first light's quadratic at a pixel of each span, in float64, in units of `ONE_SQUARED`."""
+    start, first, second = (word.values[:, 0] for word in differences)
+    k = pixel.astype(np.float64)
+    return (start + k * first + k * (k - 1) / 2 * second) / ONE_SQUARED.values
 
 
 def _measure(rng, count):
@@ -52,12 +60,8 @@ def _measure(rng, count):
     t = pixel / (length - 1)
     normals = interpolate("quadratic", *(normalise(end / ONE) for end in (left, right)), t)
     exact = np.stack([dot(normals, normalise(light / ONE)), 1 - dot(normals, normalise(halfway / ONE))])
-    k = pixel.astype(np.float64)
-    found = [
-        w.start.values[:, 0] + k * w.first.values[:, 0] + k * (k - 1) / 2 * w.second.values[:, 0]
-        for w in (diffuse, highlight)
-    ]
-    return Sample(np.stack(found) / ONE_SQUARED.values, exact, exact, degrees_between(left, right)[:, 0])
+    found = np.stack([value_at(words, pixel) for words in (diffuse, highlight)])
+    return Sample(found, exact, exact, degrees_between(left, right)[:, 0])
 
 
 def _expect(unit, case):

@@ -1,0 +1,210 @@
+"""Record of the local chord setup, and the values of spans that it shares with the method's."""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from blysk.golden.cosines.local_chord_setup import LocalChordSetup
+from blysk.golden.methods.local_chord_interpolator import SpanValues
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.reference.curves import interpolate
+from blysk.golden.reference.geometry import normalise
+from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit
+from blysk.sim.engines.beats import dtype_of
+from blysk.sim.units.cosines.chord_setup import difference_beats, value_at
+from blysk.sim.units.operands import (
+    LONG,
+    any_codes,
+    any_lengths,
+    dot,
+    log_lengths,
+    pixel_of,
+    sphere,
+    spread_angles,
+    turned,
+)
+from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
+
+__all__ = [
+    "LOCAL",
+    "RECORD",
+    "any_values",
+    "local_curves",
+    "parabola",
+    "three_values",
+    "value_beats",
+    "values_of",
+]
+
+LOCAL = "lights and viewer 2 to 4 away, spans to 0.3 and 15 degrees"
+FORMATS = {"diffuse": LocalChordSetup.DIFFUSE_FORMAT, "highlight": LocalChordSetup.HIGHLIGHT_FORMAT}
+
+
+def local_curves(rng: np.random.Generator, spans: int) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """N·L and ``1 - N·H`` along spans with near lights and a near viewer: a function of span and t."""
+    start = rng.normal(size=(spans, 3))
+    step = rng.uniform(0, 0.3, (spans, 1)) * sphere(rng, spans)
+    to_viewer = sphere(rng, spans)
+    to_light = turned(rng, to_viewer, rng.uniform(0, 120, spans))
+    viewer, light = (start + rng.uniform(2, 4, (spans, 1)) * way for way in (to_viewer, to_light))
+    left = turned(rng, normalise(to_viewer + to_light), rng.permutation(spread_angles(rng, spans, 90.0)))
+    right = turned(rng, left, rng.permutation(spread_angles(rng, spans, 15.0)))
+
+    def at(span, t):
+        position = start[span] + t[:, np.newaxis] * step[span]
+        ways = [normalise(point[span] - position) for point in (light, viewer)]
+        normal = interpolate("normalised", left[span], right[span], t)
+        return np.stack([dot(normal, ways[0]), 1 - dot(normal, normalise(ways[0] + ways[1]))])
+
+    return at
+
+
+def three_values(at, spans: int) -> tuple[np.ndarray, SpanValues]:
+    """Exact values at the ends and in the middle, shape (2, spans, 3), and their codes for one light."""
+    exact = np.stack([at(np.arange(spans), np.full(spans, t)) for t in (0.0, 0.5, 1.0)], axis=-1)
+    return exact, SpanValues.quantise(*exact[:, :, np.newaxis])
+
+
+def parabola(values: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Quadratic through values at t = 0, 1/2 and 1, which are along the last axis."""
+    left, middle, right = np.moveaxis(values, -1, 0)
+    return left + t * (4 * middle - right - 3 * left + t * 2 * (left + right - 2 * middle))
+
+
+def _measure(rng, count):
+    """N·L and u at any pixel, by the differences in exact arithmetic; 1 is the product of unit vectors."""
+    length = log_lengths(rng, count, 2)
+    pixel = pixel_of(rng, length)
+    exact, values = three_values(local_curves(rng, count), count)
+    words = (Fixed(format, codes) for format, codes in zip(FORMATS.values(), values, strict=True))
+    *differences, out_of_range = LocalChordSetup().compute(*words, length)
+    kept = ~out_of_range
+    found = np.stack([value_at(words, pixel) for words in differences])[:, kept]
+    exact = parabola(exact, pixel / (length - 1))[:, kept]
+    return Sample(found, exact, exact, pixel[kept])
+
+
+def values_of(beats) -> SpanValues:
+    """Values that input beats carry; those of u are 0 in beats without highlights."""
+    values = beats["values"]
+    diffuse = values["diffuse"]
+    return SpanValues(diffuse, values["highlight"] if "highlight" in values.dtype.names else 0 * diffuse)
+
+
+def _expect(unit, case):
+    beats = case.beats
+    words = (Fixed(format, code) for format, code in zip(FORMATS.values(), values_of(beats), strict=True))
+    *differences, out_of_range = unit.parameters.compute(*words, beats["length"])
+    return difference_beats(unit, differences, beats["length"], out_of_range)
+
+
+def any_values(rng: np.random.Generator, count: int, lights: int) -> SpanValues:
+    """Three values of each function: of every eighth span any codes, else on curves of every size."""
+    values = []
+    for format in FORMATS.values():
+        codes = any_codes(rng, format, count, lights, 3)
+        change = 10.0 ** rng.uniform(-5, -0.5, (count, 1, 1)) * rng.uniform(-0.3, 0.3, (count, lights, 3))
+        curve = np.clip(codes[..., :1] + change * format.max_code, format.min_code, format.max_code)
+        values.append(np.where(np.arange(count)[:, None, None] % 8, curve.astype(np.int64), codes))
+    return SpanValues(*values)
+
+
+def value_beats(unit, values: SpanValues, length: np.ndarray) -> np.ndarray:
+    """Input beats of a unit that takes values of spans."""
+    beats = np.zeros(len(length), dtype_of(unit.i.payload.shape()))
+    for name, codes in zip(FORMATS, values, strict=True):
+        if name in beats["values"].dtype.names:
+            beats["values"][name] = codes
+    beats["length"] = length
+    return beats
+
+
+def _lengths(unit, rng, count):
+    return np.maximum(any_lengths(rng, count) % (1 << unit.length_bits), 1)
+
+
+def _spans(unit, rng, count):
+    """Curves of every size, every eighth span of any words; lengths by their logarithm."""
+    return Case(value_beats(unit, any_values(rng, count, unit.lights), _lengths(unit, rng, count)))
+
+
+def _corners(unit, rng, count):
+    """P and G in range, about the ends of their words and beyond; equal values; ends of words."""
+    values = []
+    for format in FORMATS.values():
+        start = rng.uniform(format.min_code * 0.9, format.max_code * 0.9, (count, unit.lights))
+        size = 10.0 ** rng.uniform(-6, 0.1, (count, 1))
+        slope = rng.uniform(-0.5, 0.5, start.shape) * size / format.step
+        curvature = rng.uniform(-0.125, 0.125, start.shape) * size / format.step
+        slope[:40] = 0.5 / format.step + rng.integers(-200, 200, (40, unit.lights))
+        curvature[40:80] = 0.125 / format.step + rng.integers(-200, 200, (40, unit.lights))
+        slope[20:60] *= -1
+        curvature[60:80] *= -1
+        codes = np.stack([start + t * (slope + t * curvature) for t in (0, 0.5, 1)], axis=2)
+        codes = np.clip(np.rint(codes), format.min_code, format.max_code).astype(np.int64)
+        codes[80:120] = rng.choice([format.min_code, format.max_code, 0, 1], (40, unit.lights, 3))
+        codes[120:160] = codes[120:160, :, :1]
+        values.append(codes)
+    length = rng.integers(1, 1 << unit.length_bits, count)
+    length[160:172] = np.minimum([1, 2, 3, 4, 5, 16, 17, 2048, 2049, 2050, 4094, 4095], length.max())
+    return Case(rng.permutation(value_beats(unit, SpanValues(*values), length)))
+
+
+def _last_bits(unit, rng, count):
+    """Many spans: the last bits of products and of sums are rounded off and rarely matter."""
+    return _corners(unit, rng, count)
+
+
+def _variants():
+    yield (
+        "interval 4",
+        Variant(
+            LocalChordSetupUnit,
+            _measure,
+            f"{LOCAL}, {LONG}",
+            note="of N.L and u at any pixel that the differences lead to; exact: the quadratic",
+        ),
+    )
+    for lights, interval in (*((1, i) for i in (1, 2, 3, 5, 6)), (2, 4), (3, 16)):
+        unit = partial(LocalChordSetupUnit, None, lights, initiation_interval=interval)
+        yield f"{lights} lights, interval {interval}", Variant(unit)
+    yield "9 bits of length", Variant(partial(LocalChordSetupUnit, length_bits=9))
+    yield (
+        "no highlights",
+        Variant(partial(LocalChordSetupUnit, None, 2, initiation_interval=2, highlights=False)),
+    )
+
+
+RECORD = Record(
+    name="local_chord_setup",
+    title="Forward differences of N·L and of half the squared chord from three values",
+    source="docs/theory/chord.md#local-lights",
+    variants=dict(_variants()),
+    expect=_expect,
+    stimuli={
+        "spans": Stimulus(_spans, 500),
+        "corners": Stimulus(_corners, 500),
+        "last bits": Stimulus(_last_bits, 30_000, stalled=False),
+    },
+    axis="pixel of the span",
+    logarithmic=True,
+    waivers={},
+    still={
+        "a reciprocal and its square are normalised, so that their first bit is 1": (
+            "reciprocals.port__data[16] reciprocal[16] square_rounded[16] square[16] "
+            "multiplier_?_b_?[16] multiplier_?_1[16]"
+        ),
+        "they are not negative, and less than 1": (
+            "square_rounded[17] multiplier_?_b_?[17] multiplier_?_1[17]"
+        ),
+        "a length of 12 bits takes shifts up to 12, and of a square up to 25": "shift[4] square_shift[5]",
+        "a slope of u has 9 bits less than the word in which it is multiplied": (
+            "highlight_0_slope_product[0-4] shifter_0_0[0-4]"
+        ),
+        "twice a number is even": "*_0_second[0] top.spare[83] top.spare[214]",
+        "values have 9 bits less than starts, and those of u are less than 2": (
+            "top.spare[0-8] top.spare[130-138] top.spare[166]"
+        ),
+    },
+)
