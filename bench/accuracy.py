@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 
+from blysk.golden.frames.compare import Comparison, compare
 from blysk.golden.pipeline import Design
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
-from blysk.sim.frames.frame import Comparison, FrameSimulator, SimulatedFrame, compare
+from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
 
 __all__ = ["DESIGNS", "EXPONENTS", "measure", "scene_for"]
 

@@ -19,6 +19,9 @@ import numpy as np
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.cut import cut_local_spans, cut_wide_spans
+from blysk.golden.frames.local import local_values
+from blysk.golden.frames.prepare import quantise_spans
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.local_chord_interpolator import SpanValues
@@ -34,7 +37,6 @@ from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import Scene
 from blysk.sim.errors import InputError
-from blysk.sim.frames.spans import cut_local_spans, cut_wide_spans, local_values, quantise_spans
 from blysk.sim.meshes.mesh import load_mesh
 
 __all__ = ["EXPONENTS", "FEW_EXPONENTS", "LARGEST", "LARGEST_COSINE", "Frame", "Point", "Summary", "main"]

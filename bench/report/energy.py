@@ -14,10 +14,10 @@ from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.tools.pages import svg
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.toggles import ToggleCounter
-from blysk.sim.frames.frame import prepare
 from blysk.sim.meshes.teapot import teapot
 
 __all__ = ["BLOCKS", "EXPONENTS", "by_block", "measure", "section", "tasks"]

@@ -23,6 +23,7 @@ from tqdm import tqdm
 from blysk.bench.accuracy import scene_for
 from blysk.bench.command import run
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.fixed import Fixed
@@ -36,7 +37,7 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import Size
 from blysk.sim.engines.simulate import Run, simulate
 from blysk.sim.engines.toggles import ToggleCounter
-from blysk.sim.frames.frame import beats_of, prepare
+from blysk.sim.frames.frame import beats_of
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.output import check_writable, write_json
 

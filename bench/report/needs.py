@@ -9,14 +9,15 @@ import numpy as np
 from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.tools.pages import svg
+from blysk.golden.frames.frame import model_frame
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
-from blysk.sim.cli.printing import fit_figures
-from blysk.sim.frames.fit import Fit, Omission, for_scene
-from blysk.sim.frames.frame import FrameSimulator, model_frame
+from blysk.sim.frames.figures import difference_figures, saving_figures
+from blysk.sim.frames.frame import FrameSimulator
+from blysk.sim.frames.specialise import Reduction, Specialisation, specialise
 from blysk.sim.meshes.teapot import teapot
 
 __all__ = ["QUICK_SCENES", "SCENES", "measure", "ring", "section", "simulate_both", "tasks"]
@@ -116,14 +117,14 @@ QUICK_SCENES = ("copper teapot", "matt teapot, k_s = 0")
 """Scenes of the quick report."""
 
 
-def _fit(name: str, size: Sequence[int]) -> tuple[Scene, Fit]:
+def _specialised(name: str, size: Sequence[int]) -> tuple[Scene, Specialisation]:
     build, options = SCENES[name]
     scene = build(*size)
-    return scene, for_scene(scene, options and preset(lights=len(scene.lights), **options))
+    return scene, specialise(scene, options and preset(lights=len(scene.lights), **options))
 
 
 def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
-    """What a scene's pipeline goes without, and its frame beside that of the full one, by bit-true twins.
+    """Reductions of a scene's pipeline, and its frame against the full one's, by bit-accurate models.
 
     Parameters
     ----------
@@ -137,20 +138,21 @@ def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
     Returns
     -------
     dict
-        That of `fit_figures` but for the cycles, and ``reasons``, what is left out and why,
+        Those of `saving_figures` and `difference_figures`, and ``reasons``, what is left out and why,
         ``method``, ``model`` and ``pixels``.
     """
-    scene, fit = _fit(name, size)
-    full, fitted = model_frame(scene, fit.full), model_frame(fit.scenes[0], fit.design)
-    counted = fit
+    scene, found = _specialised(name, size)
+    full, smaller = model_frame(scene, found.full), model_frame(found.scenes[0], found.design)
+    counted = found
     if not steps:
-        together = {key: value for omission in fit.omissions for key, value in omission.changes.items()}
-        counted = Fit(fit.full, (Omission("all of it", together),), fit.scenes)
-    figures = fit_figures(counted, fitted, full)
-    return {key: value for key, value in figures.items() if "cycles" not in key} | {
-        "reasons": [omission.reason for omission in fit.omissions],
-        "method": fit.full.method,
-        "model": fit.full.model,
+        together = {key: value for reduction in found.reductions for key, value in reduction.changes.items()}
+        counted = replace(found, reductions=(Reduction("all of it", together),))
+    return {
+        **saving_figures(counted),
+        **difference_figures(smaller, full),
+        "reasons": [reduction.reason for reduction in found.reductions],
+        "method": found.full.method,
+        "model": found.full.model,
         "pixels": full.pixels,
     }
 
@@ -163,19 +165,15 @@ def simulate_both(name: str, size: Sequence[int]) -> dict[str, int]:
     name, size
         As for `measure`.
     """
-    scene, fit = _fit(name, size)
-    full = FrameSimulator(fit.full).render(scene)
-    fitted = FrameSimulator(fit.design).render(fit.scenes[0])
-    different = (full.image != fitted.image).any(axis=-1)
-    return {
-        "cycles": fitted.cycles,
-        "full_cycles": full.cycles,
-        "different_pixels": int(np.count_nonzero(different)),
-    }
+    scene, found = _specialised(name, size)
+    full = FrameSimulator(found.full, "cxxrtl").render(scene)
+    smaller = FrameSimulator(found.design, "cxxrtl").render(found.scenes[0])
+    different = difference_figures(smaller, full)["different_pixels"]
+    return {"cycles": smaller.cycles, "full_cycles": full.cycles, "different_pixels": different}
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Each scene by twins and, if it need not be quick, by simulation."""
+    """Each scene by models and, if it need not be quick, by simulation."""
     size = list(_QUICK if quick else _FULL)
     settings = [{"name": name, "size": size} for name in (QUICK_SCENES if quick else SCENES)]
     counted = [Task(measure, each | {"steps": not quick}) for each in settings]
@@ -197,59 +195,59 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     most = max(found, key=lambda name: _left(found[name], "cells"))
     text = [
         "`--fit` builds only what a scene needs. It changes no word of the arithmetic, so the frame must be "
-        f"that of the full pipeline to the bit: {same} of {len(found)} are, by the bit-true twins of both "
-        f"pipelines, {simulated} of them by simulation, too.",
+        f"that of the full pipeline to the bit: {same} of {len(found)} are, by the bit-accurate models of "
+        f"both pipelines, {simulated} of them by simulation, too.",
         f"What stays is from {_left(found[least], 'cells'):.0%} of the cells ({least}) to "
         f"{_left(found[most], 'cells'):.0%} ({most}). Cells are operators, multiplexers, registers and "
         "memories of any width, before technology mapping.",
     ]
     return Section(
-        "needs", "What a scene does not need", text, [_totals(found), _drawing(found), _omissions(found)]
+        "needs", "What a scene does not need", text, [_totals(found), _drawing(found), _reductions(found)]
     )
 
 
 def _left(figures: dict, resource: str) -> float:
     """Share of a resource that stays; of one that the full pipeline does not have, all."""
     full = figures["full"][resource]
-    return figures["fitted"][resource] / full if full else 1.0
+    return figures["specialised"][resource] / full if full else 1.0
 
 
 def _totals(found: dict[str, dict]) -> Table:
     columns = ["scene", "method", "model", "pixels"]
     for resource in _RESOURCES:
         name = resource.replace("_", " ")
-        columns += [f"{name}, full", f"{name}, fitted"]
-    columns += ["cycles, full", "cycles, fitted", "pixels of another colour"]
+        columns += [f"{name}, full", f"{name}, specialised"]
+    columns += ["cycles, full", "cycles, specialised", "pixels of another colour"]
     rows: list[list[Cell]] = []
     grades: list[list[Grade]] = []
     for name, of in found.items():
         row: list[Cell] = [name, of["method"], of["model"], of["pixels"]]
         for resource in _RESOURCES:
-            row += [of[which][resource] for which in ("full", "fitted")]
+            row += [of[which][resource] for which in ("full", "specialised")]
         rows.append([*row, of["full_cycles"], of["cycles"], of["different_pixels"]])
         grades.append([""] * (len(columns) - 1) + ["bad" if of["different_pixels"] else "good"])
     note = (
         "The full pipeline has as many lights and materials as the scene, 12-bit coordinates and lengths, a "
         "PROM of exponents, three channels and, where the method can have one, a highlight gate."
     )
-    return Table("needs", "The full pipeline and the fitted one", columns, rows, note, grades)
+    return Table("needs", "The full pipeline and the specialised one", columns, rows, note, grades)
 
 
-def _omissions(found: dict[str, dict]) -> Table:
+def _reductions(found: dict[str, dict]) -> Table:
     columns = ["scene", "left out, and why", *(f"saves {name.replace('_', ' ')}" for name in _RESOURCES)]
     rows: list[list[Cell]] = []
     for name, of in found.items():
-        if len(of["reasons"]) == len(of["omissions"]):
+        if len(of["reasons"]) == len(of["reductions"]):
             rows += [
-                [name, omission["reason"], *(omission["saves"][resource] for resource in _RESOURCES)]
-                for omission in of["omissions"]
+                [name, reduction["reason"], *(reduction["saves"][resource] for resource in _RESOURCES)]
+                for reduction in of["reductions"]
             ]
         else:
             rows += [[name, reason, *[None] * len(_RESOURCES)] for reason in of["reasons"]]
-            saves = [sum(each["saves"][resource] for each in of["omissions"]) for resource in _RESOURCES]
+            saves = [sum(each["saves"][resource] for each in of["reductions"]) for resource in _RESOURCES]
             rows.append([name, "all of it", *saves])
     note = "Each on top of those above it."
-    return Table("needs-omissions", "What is left out of each pipeline", columns, rows, note)
+    return Table("needs-reductions", "What is left out of each pipeline", columns, rows, note)
 
 
 def _drawing(found: dict[str, dict]) -> Drawing:

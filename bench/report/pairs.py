@@ -16,13 +16,14 @@ import numpy as np
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.errors import InputError
-from blysk.sim.frames.frame import beats_of, prepare
+from blysk.sim.frames.frame import beats_of
 from blysk.sim.meshes.mesh import load_mesh
 
 __all__ = ["EXPONENTS", "Pair", "main", "measure", "mismatches"]

@@ -39,6 +39,9 @@ from blysk.bench.report.section import Cell, Grade, Section, Table
 from blysk.bench.speed.renderer import timed
 from blysk.bench.store import Task
 from blysk.bench.tools.fpga import DEVICE, tool_versions
+from blysk.golden.frames.compare import method_in_float64
+from blysk.golden.frames.frame import model_frame
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.metrics import error_figures
@@ -50,7 +53,7 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.cxxrtl import find_compilers
 from blysk.sim.errors import InputError
-from blysk.sim.frames.frame import FrameSimulator, method_in_float64, model_frame, prepare
+from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.mesh import load_mesh
 
 __all__ = [
@@ -101,7 +104,7 @@ QUICK_SIMULATED = [
     ("chord-local", "cosquad"),
     ("chord", "cosquad"),
 ]
-"""Those that the quick report simulates; of the others it has the twin's frames, and no cycles."""
+"""Those that the quick report simulates; of the others it has the model's frames, and no cycles."""
 
 _KINDS = {
     "model": "model error",
@@ -203,7 +206,7 @@ def frames(
     exponents : sequence of int
         One frame each.
     simulated : bool
-        Whether the frames are simulated; else they are those of the bit-true twin, equal to the bit.
+        Whether the frames are simulated; else they are those of the bit-accurate model, equal to the bit.
 
     Returns
     -------
@@ -213,12 +216,12 @@ def frames(
         ``shown`` ones, ``spans``, ``out_of_range_spans`` and ``cycles`` (``None`` if not simulated).
     """
     design = preset(method, model)
-    simulator = FrameSimulator(design) if simulated else None
+    simulator = FrameSimulator(design, "cxxrtl") if simulated else None
     results = []
     for scene in scenes_of(place, exponents):
         frame = simulator.render(scene) if simulator else model_frame(scene, design)
         same_method = method_in_float64(scene, design, frame.cut_raster)
-        names = {"method": method, "model": model, "engine": frame.engine}
+        names = {"method": method, "model": model, "engine": simulator.engine if simulator else "model"}
         results.append(
             {
                 "settings": {**_settings(place, scene), **names},
@@ -347,7 +350,7 @@ def speeds(
         nanoseconds a shown pixel to shade the same spans by the same method and model in float64 NumPy.
     """
     design = preset(method, model)
-    simulator = FrameSimulator(design) if simulated else None
+    simulator = FrameSimulator(design, "cxxrtl") if simulated else None
     results = []
     for scene in scenes_of(place, exponents):
         prepared = prepare(scene, design)
@@ -483,7 +486,7 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
     ----------
     quick : bool
         A teapot of 992 triangles at 160x120 and exponent 100, `QUICK_SIMULATED` designs through the
-        simulation, the others through the twin, no clock rates. Else one of 10,712 triangles at 640x480, all
+        simulation, the others through the model, no clock rates. Else one of 10,712 triangles at 640x480, all
         `EXPONENTS`, every design simulated, and placed and routed where the tools are installed. Without
         a C++ compiler nothing is simulated.
     meshes : sequence of str
@@ -644,8 +647,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
       - ``id``, ``label``: texts; ``group``: a key of ``groups``;
       - ``settings``: everything that the frame depends on; among them ``source`` (the mesh), ``exponent``,
-        ``method``, ``model``, ``width``, ``height``, ``engine`` (``cxxrtl``: simulated, ``twin``: its
-        bit-true twin, ``float64``: the golden renderer);
+        ``method``, ``model``, ``width``, ``height``, ``engine`` (``cxxrtl``: simulated, ``model``: its
+        bit-accurate model, ``float64``: the golden renderer);
       - ``command``: a line for a shell that makes it again;
       - ``errors``: value or ``None`` by key of ``errors``; ``times``: by key of ``times``;
       - ``verdicts``: whether both frames look identical, by kind of error: ``total``, ``method``,
@@ -716,10 +719,10 @@ def _text(points: Sequence[Mapping[str, Any]]) -> list[str]:
         "are rounded to 8 bits."
     )
     simulated = [point for point in points if point["settings"]["engine"] == "cxxrtl"]
-    twins = [point for point in points if point["settings"]["engine"] == "twin"]
+    modelled = [point for point in points if point["settings"]["engine"] == "model"]
     engines = f"{len(simulated):,} frames went through the simulated RTL"
-    if twins:
-        engines += f", {len(twins):,} through its bit-true twin, which has no cycles"
+    if modelled:
+        engines += f", {len(modelled):,} through its bit-accurate model, which has no cycles"
     return [*map(_glance, _by_scene(points).values()), of_error, of_time, f"{engines}."]
 
 
@@ -792,10 +795,10 @@ def _table(points: Sequence[Mapping[str, Any]]) -> Table:
         title="Every point",
         columns=list(columns),
         rows=rows,
-        note="Engine cxxrtl: simulated RTL; twin: its bit-true twin; float64: the golden renderer, rounded "
-        "to 8 bits. Multipliers, cells, register and memory bits are counted before technology mapping. "
-        "Identical to the eye: to the exact frame, to exact interpolation with the same model, and to the "
-        "same method and model in float64; good: yes, bad: no.",
+        note="Engine cxxrtl: simulated RTL; model: its bit-accurate model; float64: the golden renderer, "
+        "rounded to 8 bits. Multipliers, cells, register and memory bits are counted before technology "
+        "mapping. Identical to the eye: to the exact frame, to exact interpolation with the same model, and "
+        "to the same method and model in float64; good: yes, bad: no.",
         grades=[[graded[cell] if isinstance(cell, bool) else "" for cell in row] for row in rows],
     )
 

@@ -19,6 +19,8 @@ from blysk.bench.report.section import Drawing, Grade, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.tools.pages import svg
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.cut import cut_spans
+from blysk.golden.frames.local import local_values
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.interpolator import Operands
@@ -39,8 +41,7 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.frames.frame import beats_of, cut_spans
-from blysk.sim.frames.spans import local_values
+from blysk.sim.frames.frame import beats_of
 from blysk.sim.meshes.mesh import load_mesh
 
 __all__ = [

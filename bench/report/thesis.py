@@ -19,13 +19,13 @@ from blysk.bench.tools.blocks import BLOCKS, row_of
 from blysk.bench.tools.fpga import TooLarge, lay_out, tool_versions
 from blysk.bench.tools.pages import svg
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.metrics import error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
 from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.sim.frames.frame import prepare
 from blysk.sim.meshes.teapot import teapot
 
 __all__ = [

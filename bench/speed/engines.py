@@ -32,12 +32,13 @@ from amaranth.lib.wiring import Component
 from blysk.bench.accuracy import scene_for
 from blysk.bench.speed.verilator import Verilated, free_stimulus
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.simulate import Run, simulate
-from blysk.sim.frames.frame import beats_of, prepare
+from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.meshes.mesh import load_mesh
 

@@ -18,12 +18,13 @@ import numpy as np
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Spans
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.frames.frame import beats_of, prepare
+from blysk.sim.frames.frame import beats_of
 from blysk.sim.meshes.teapot import teapot
 
 __all__ = ["BINS", "INTERVALS", "LARGEST", "LONG", "METHODS", "TRIANGLES", "Lengths", "Throughput"]

@@ -29,6 +29,8 @@ from blysk.bench.report.points import front, place_of, scenes_of
 from blysk.bench.report.section import Drawing, Section, Table
 from blysk.bench.store import Task, results_of
 from blysk.bench.tools.pages import svg
+from blysk.golden.frames.compare import compare
+from blysk.golden.frames.frame import model_frame
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
@@ -44,11 +46,10 @@ from blysk.golden.reference.scene import Scene
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import Choice, OutputFile, Size, Whole
-from blysk.sim.cli.printing import ERRORS
 from blysk.sim.cli.scene_file import HIGHLIGHTS
 from blysk.sim.errors import InputError
 from blysk.sim.frames.animation import turned
-from blysk.sim.frames.frame import compare, model_frame
+from blysk.sim.frames.figures import ERRORS
 from blysk.sim.frames.workers import check_address, cluster_executor, local_executor, processors
 from blysk.sim.output import check_writable, write_json
 

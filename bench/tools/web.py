@@ -40,6 +40,7 @@ from blysk.bench.report.report import (
 from blysk.bench.store import Task, version_of
 from blysk.bench.tools.pages import PROJECT
 from blysk.golden.frame_constants import FIELDS_OF_A_FRAME, FIELDS_OF_A_LIGHT, LIGHT_STRIDE
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.unit_vector import COMPONENT, ONE
@@ -61,7 +62,6 @@ from blysk.sim.engines.probes import ObservedPipeline, probes_of
 from blysk.sim.engines.wasm import build, format_of, ports_of
 from blysk.sim.errors import InputError
 from blysk.sim.frames.animation import turntable
-from blysk.sim.frames.frame import prepare
 from blysk.sim.frames.workers import processors
 from blysk.sim.meshes.teapot import teapot
 from blysk.sim.output import atomic_writer, files_within, write_json, write_text

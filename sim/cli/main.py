@@ -21,6 +21,7 @@ from click.core import ParameterSource
 from tqdm import tqdm
 
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants, address_table
+from blysk.golden.frames.compare import compare
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.pipeline import STYLES, Design
@@ -34,31 +35,24 @@ from blysk.hdl.emit.verilog import emit
 from blysk.hdl.emit.yosys import NetlistError
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit
-from blysk.sim.cli.printing import (
-    fit_figures,
-    frame_figures,
-    print_counts,
-    print_errors,
-    print_figures,
-    print_fit,
-    worst_errors,
-)
 from blysk.sim.cli.scene_file import HIGHLIGHTS, read_scene_file
 from blysk.sim.engines.engine import CompilerMissing, SimulationError
 from blysk.sim.errors import InputError, one_line
 from blysk.sim.frames.animation import (
-    Film,
-    cluster,
+    Animation,
+    dask_executor,
     equal_distance,
-    process_pool,
-    shoot,
+    process_executor,
+    render_frames,
     turned,
     turntable,
     write_gif,
 )
-from blysk.sim.frames.fit import Fit, for_scene
-from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame, compare
+from blysk.sim.frames.figures import animation_figures, difference_figures, frame_figures, saving_figures
+from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
 from blysk.sim.frames.picture import check_image_path, write_comparison, write_image
+from blysk.sim.frames.specialise import Specialisation, specialise
+from blysk.sim.frames.summary import animation_lines, frame_lines, specialisation_lines
 from blysk.sim.frames.testbench import check_folder, write_testbench
 from blysk.sim.frames.workers import check_address, processors
 from blysk.sim.meshes.mesh import LoadedMesh, load_mesh, surfaces
@@ -531,12 +525,12 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
         output = f"{Path(mesh).stem}-blysk.{'gif' if frames else 'png'}"
     inputs = [mesh, settings["mesh"]]
     if frames:
-        pictures, animation = _film_paths(output, frames, {"--compare": comparison, "--vcd": vcd})
+        pictures, gif = _animation_paths(output, frames, {"--compare": comparison, "--vcd": vcd})
         if address is not None:
             check_address(address)
         if jobs and address:
             raise InputError("--jobs", "a cluster has its own workers", "leave out --jobs or --cluster")
-        _check_outputs(inputs, pictures=[animation, *pictures], others=[figures])
+        _check_outputs(inputs, pictures=[gif, *pictures], others=[figures])
     elif jobs or address is not None:
         raise InputError("--jobs" if jobs else "--cluster", "is for many frames", "give --frames, too")
     else:
@@ -563,11 +557,11 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
         seconds["build"] = perf_counter() - start - seconds["load"]
         stage.set_description_str("rasterising and simulating")
         if frames:
-            film = Film(fit.scenes[0], fit.design, settings["engine"], design)
+            animation = Animation(fit.scenes[0], fit.design, settings["engine"], design)
             cameras = [scene.camera for scene in scenes]
-            report = _shoot_film(loaded, film, cameras, pictures, seconds, jobs, address)
+            report = _render_animation(loaded, animation, cameras, pictures, seconds, jobs, address)
             stage.set_description_str("writing the animation")
-            write_gif(animation, pictures)
+            write_gif(gif, pictures)
             seconds["animation"] = perf_counter() - start - sum(seconds.values())
         else:
             frame = _simulate(simulator, fit.scenes[0], vcd)
@@ -577,7 +571,10 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
             if settings["fit"]:
                 stage.set_description_str("comparing with the full pipeline")
                 whole = None if vcd else _simulate(_simulator(design, settings), scenes[0], None)
-                report["fit"] = fit_figures(fit, frame, whole)
+                report["specialisation"] = {**saving_figures(fit), "cycles": frame.cycles}
+                if whole is not None:
+                    report["specialisation"]["full_cycles"] = whole.cycles
+                    report["specialisation"] |= difference_figures(frame, whole)
             stage.set_description_str("writing")
             if output:
                 write_image(output, frame.image)
@@ -587,23 +584,25 @@ def render(context, mesh, output, comparison, figures, vcd, frames, jobs, addres
         if figures:
             write_json(figures, report)
     if frames:
-        _print_film(report)
-        written = {"frames": f"{pictures[0]} to {pictures[-1]}", "animation": animation}
+        lines = animation_lines(report)
+        written = {"frames": f"{pictures[0]} to {pictures[-1]}", "animation": gif}
     else:
-        print_figures(report)
-        print_fit(report.get("fit"))
-        for text in loaded.ignored:
-            print(f"{'ignored':<12}{text}")
+        lines = [*frame_lines(report)]
+        if settings["fit"]:
+            lines += specialisation_lines(report["specialisation"])
+        lines += [f"{'ignored':<12}{text}" for text in loaded.ignored]
         written = {"frame": output, "comparison": comparison}
+    for line in lines:
+        print(line)
     for name, path in {**written, "figures": figures, "waves": vcd}.items():
         if path:
             print(f"{name:<12}{path}")
 
 
-def _fitted(scenes: Sequence[Scene], design: Design, settings: Settings) -> Fit:
+def _fitted(scenes: Sequence[Scene], design: Design, settings: Settings) -> Specialisation:
     if settings["fit"]:
-        return for_scene(scenes, design, exact=not settings["words"])
-    return Fit(design, (), tuple(scenes))
+        return specialise(scenes, design, exact=not settings["words"])
+    return Specialisation(design, (), tuple(scenes))
 
 
 @cli.command(short_help="Emit the pipeline as Verilog.")
@@ -698,7 +697,9 @@ def _check_outputs(inputs: list[str], pictures: list[str | None], others: list[s
             (check_image_path if path in pictures else check_writable)(path)
 
 
-def _film_paths(output: str | None, count: int, others: Mapping[str, str | None]) -> tuple[list[str], str]:
+def _animation_paths(
+    output: str | None, count: int, others: Mapping[str, str | None]
+) -> tuple[list[str], str]:
     """Files of the frames and of the animation."""
     for option, path in others.items():
         if path:
@@ -837,65 +838,32 @@ def _cameras(vertices: np.ndarray, shift: int, settings: Settings, count: int) -
         raise settings.refuse(name, str(error), "choose another direction or place for the camera") from None
 
 
-def _shoot_film(
+def _render_animation(
     loaded: LoadedMesh,
-    film: Film,
+    animation: Animation,
     cameras: list[Camera],
     pictures: list[str],
     seconds: dict[str, float],
     jobs: int | None,
     address: str | None,
 ) -> dict:
-    """Draw and write the frames; the figures of all."""
+    """Render and write the frames; the figures of all."""
     start = perf_counter()
     done = {}
-    crew = cluster(film, address) if address else process_pool(film, min(jobs or processors(), len(cameras)))
-    with crew as crew, tqdm(total=len(cameras), unit=" frames", leave=False, disable=None) as bar:
-        for index, shot in shoot(crew, cameras):
-            write_image(pictures[index], shot.image)
-            done[index] = {"picture": pictures[index], **_with_mesh(loaded, shot.figures, {})}
+    if address:
+        workers = dask_executor(animation, address)
+    else:
+        workers = process_executor(animation, min(jobs or processors(), len(cameras)))
+    with workers as executor, tqdm(total=len(cameras), unit=" frames", leave=False, disable=None) as bar:
+        for index, frame in render_frames(executor, cameras):
+            write_image(pictures[index], frame.image)
+            done[index] = {"picture": pictures[index], **_with_mesh(loaded, frame.figures, {})}
             bar.update()
-        name = crew.name
-    figures = [done[index] for index in range(len(cameras))]
-    pixels, cycles = (sum(frame[key] for frame in figures) for key in ("pixels", "cycles"))
-    counts = {key: sum(frame["counts"][key] for frame in figures) for key in figures[0]["counts"]}
+        name = executor.name
     seconds["frames"] = perf_counter() - start
-    same = ("mesh", "method", "model", "exponent", "lights", "materials")
-    same += ("engine", "width", "height", "triangles")
-    return {
-        **{key: figures[0][key] for key in same},
-        "workers": name,
-        "frame_count": len(figures),
-        "visible_pixels": sum(frame["visible_pixels"] for frame in figures),
-        "pixels": pixels,
-        "cycles": cycles,
-        "cycles_per_pixel": cycles / pixels if pixels else math.nan,
-        **worst_errors(figures),
-        "counts": {**counts, **_mesh_counts(loaded)},
-        "frames": figures,
-        "seconds": seconds,
-    }
-
-
-def _print_film(report: dict) -> None:
-    rows = {
-        "mesh": f"{report['mesh']}, {report['width']}x{report['height']}, {report['triangles']:,} triangles",
-        "model": f"{report['model']}, exponent {report['exponent']}, lights {report['lights']}",
-        "method": report["method"],
-        "engine": f"{report['engine']}, {report['workers']}",
-        "turntable": f"{report['frame_count']:,} frames, "
-        f"{report['frame_count'] / report['seconds']['frames']:.2f} a second",
-        "pixels": f"{report['pixels']:,} shaded, {report['visible_pixels']:,} visible",
-        "cycles": f"{report['cycles']:,}",
-    }
-    if report["pixels"]:
-        rows["cycles"] += f", {report['cycles_per_pixel']:.3f} a pixel"
-    for name, value in rows.items():
-        print(f"{name:<12}{value}")
-    print(f"{'errors':<12}the worst of every frame")
-    print_errors(report if report["visible_pixels"] else None)
-    print_counts(report["counts"])
-    print(f"{'seconds':<12}{', '.join(f'{name} {value:.2f}' for name, value in report['seconds'].items())}")
+    figures = animation_figures([done[index] for index in range(len(cameras))])
+    figures["counts"] |= _mesh_counts(loaded)
+    return {"mesh": loaded.name, **figures, "workers": name, "seconds": seconds}
 
 
 def _simulate(simulator: FrameSimulator, scene: Scene, vcd: str | None) -> SimulatedFrame:

@@ -1,4 +1,4 @@
-"""Turntables: a camera that goes once round, and its frames, spread over processes or machines."""
+"""Animations: a camera that goes once round, and its frames, rendered by processes or machines."""
 
 import functools
 import os
@@ -13,30 +13,31 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from blysk.golden.frames.compare import compare
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.scene import Scene
-from blysk.sim.cli.printing import frame_figures
-from blysk.sim.frames.frame import FrameSimulator, compare
+from blysk.sim.frames.figures import frame_figures
+from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.frames.workers import cluster_client, local_executor
 from blysk.sim.output import atomic_writer
 
 __all__ = [
-    "Crew",
-    "Film",
-    "Shot",
-    "cluster",
+    "Animation",
+    "AnimationFrame",
+    "FrameExecutor",
+    "dask_executor",
     "equal_distance",
-    "process_pool",
-    "shoot",
-    "shot",
+    "process_executor",
+    "render_frame",
+    "render_frames",
     "turned",
     "turntable",
     "write_gif",
 ]
 
-# Where the camera goes.
+# The camera's way.
 
 
 def turned(vector: Sequence[float], axis: Sequence[float], count: int) -> np.ndarray:
@@ -65,8 +66,8 @@ def turned(vector: Sequence[float], axis: Sequence[float], count: int) -> np.nda
     if count > 1 and np.linalg.norm(np.cross(normalise(vector), unit)) < 1e-6:
         raise ValueError("the camera looks along the axis that it would turn about")
     angle = 2 * np.pi / count * np.arange(count)[:, np.newaxis]
-    along = unit * (unit @ vector)
-    return vector * np.cos(angle) + np.cross(unit, vector) * np.sin(angle) + along * (1 - np.cos(angle))
+    parallel = unit * (unit @ vector)
+    return vector * np.cos(angle) + np.cross(unit, vector) * np.sin(angle) + parallel * (1 - np.cos(angle))
 
 
 def turntable(camera: Camera, count: int) -> list[Camera]:
@@ -80,8 +81,8 @@ def turntable(camera: Camera, count: int) -> list[Camera]:
         If there are several and the camera looks along the axis.
     """
     offset = np.subtract(camera.position, camera.target)
-    places = np.add(camera.target, turned(offset, camera.up, count)[1:])
-    return [camera, *(replace(camera, position=tuple(place)) for place in places.tolist())]
+    positions = np.add(camera.target, turned(offset, camera.up, count)[1:])
+    return [camera, *(replace(camera, position=tuple(position)) for position in positions.tolist())]
 
 
 def equal_distance(cameras: Sequence[Camera]) -> list[Camera]:
@@ -102,24 +103,24 @@ def equal_distance(cameras: Sequence[Camera]) -> list[Camera]:
     ]
 
 
-# What a worker does.
+# The frames, in a worker.
 
 
 @dataclass(frozen=True)
-class Film:
+class Animation:
     """What all frames of an animation have in common.
 
     Parameters
     ----------
     scene : Scene
-        What is drawn; its camera counts for nothing.
+        The scene; each frame has a camera of its own.
     design : Design
         The pipeline.
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
     full : Design, optional
-        What the pipeline was fitted from, whose method and model the frames are held against. ``None``: the
-        pipeline itself.
+        The full pipeline of a specialised one: the frames' errors are against its method and model. ``None``:
+        the pipeline itself.
     """
 
     scene: Scene
@@ -129,7 +130,7 @@ class Film:
 
 
 @dataclass(frozen=True)
-class Shot:
+class AnimationFrame:
     """A frame of an animation.
 
     Parameters
@@ -145,7 +146,7 @@ class Shot:
 
 
 _ONE_AT_A_TIME = threading.Lock()
-_film: Film | None = None
+_animation: Animation | None = None
 
 
 @functools.lru_cache(maxsize=1)
@@ -153,111 +154,110 @@ def _simulator(design: Design, engine: str) -> FrameSimulator:
     return FrameSimulator(design, engine)
 
 
-def shot(film: Film, camera: Camera) -> Shot:
-    """Render one frame and hold it against the golden renderer.
+def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
+    """Render one frame, and compare it with the golden renderer's.
 
     A process builds or loads its model at the first frame. A model has one state: threads take turns.
     """
     with _ONE_AT_A_TIME:
-        scene = replace(film.scene, camera=camera)
-        frame = _simulator(film.design, film.engine).render(scene)
-        full = film.full or film.design
-        return Shot(frame.image, frame_figures(scene, full, frame, compare(scene, full, frame)))
+        scene = replace(animation.scene, camera=camera)
+        frame = _simulator(animation.design, animation.engine).render(scene)
+        full = animation.full or animation.design
+        return AnimationFrame(frame.image, frame_figures(scene, full, frame, compare(scene, full, frame)))
 
 
-def _begin(film: Film) -> None:
-    """First thing in a process of the pool: the film crosses once, not with every frame."""
-    global _film
-    _film = film
+def _begin(animation: Animation) -> None:
+    """First call in a process of the pool: the animation is sent once, not with every frame."""
+    global _animation
+    _animation = animation
 
 
-def _shot(camera: Camera) -> Shot:
-    return shot(_film, camera)
+def _render_frame(camera: Camera) -> AnimationFrame:
+    assert _animation is not None
+    return render_frame(_animation, camera)
 
 
-# Who does it.
+# The frames, over workers.
 
 
 @dataclass(frozen=True)
-class Crew:
-    """Workers that wait for cameras.
+class FrameExecutor:
+    """Workers that render frames of an animation.
 
     Parameters
     ----------
     submit : callable
-        Takes a camera, returns the `concurrent.futures.Future` of its `Shot`.
+        Takes a camera, returns the `concurrent.futures.Future` of its `AnimationFrame`.
     workers : int
         Frames at a time.
     name : str
         For the report.
     """
 
-    submit: Callable[[Camera], Future]
+    submit: Callable[[Camera], Future[AnimationFrame]]
     workers: int
     name: str
 
 
 @contextmanager
-def process_pool(film: Film, jobs: int) -> Iterator[Crew]:
-    """A crew of processes on this machine, see `local_executor`.
+def process_executor(animation: Animation, jobs: int) -> Iterator[FrameExecutor]:
+    """Processes on this machine that render frames, see `local_executor`.
 
     The model must be in the cache, or each process builds it for itself.
 
     Parameters
     ----------
-    film : Film
-        What they draw.
+    animation : Animation
+        What all frames have in common.
     jobs : int
-        How many processes.
+        Number of processes.
     """
-    with local_executor(jobs, _begin, (film,)) as executor:
-        yield Crew(functools.partial(executor.submit, _shot), jobs, f"{jobs} process{'es' * (jobs > 1)}")
+    with local_executor(jobs, _begin, (animation,)) as executor:
+        submit = functools.partial(executor.submit, _render_frame)
+        yield FrameExecutor(submit, jobs, f"{jobs} process{'es' * (jobs > 1)}")
 
 
 @contextmanager
-def cluster(film: Film, address: str) -> Iterator[Crew]:
-    """A crew of the workers of a Dask scheduler, see `cluster_client`.
+def dask_executor(animation: Animation, address: str) -> Iterator[FrameExecutor]:
+    """Workers of a Dask scheduler that render frames, see `cluster_client`.
 
     Parameters
     ----------
-    film : Film
-        What they draw; it crosses to each worker once.
+    animation : Animation
+        What all frames have in common; it is sent to each worker once.
     address : str
         Of the scheduler, ``tcp://host:8786``.
     """
     with cluster_client(address) as client:
         workers = len(client.nthreads())
-        shared = client.scatter(film, broadcast=True, hash=False)
+        shared = client.scatter(animation, broadcast=True, hash=False)
         executor = client.get_executor(pure=False)
         try:
-            yield Crew(
-                functools.partial(executor.submit, shot, shared),
-                workers,
-                f"{workers} worker{'s' * (workers > 1)} at {address}",
-            )
+            submit = functools.partial(executor.submit, render_frame, shared)
+            yield FrameExecutor(submit, workers, f"{workers} worker{'s' * (workers > 1)} at {address}")
         finally:
             executor.shutdown(wait=False)
 
 
-def shoot(crew: Crew, cameras: Sequence[Camera]) -> Iterator[tuple[int, Shot]]:
-    """Frames as they are done, in any order, with the index of each.
+def render_frames(executor: FrameExecutor, cameras: Sequence[Camera]) -> Iterator[tuple[int, AnimationFrame]]:
+    """Frames in the order in which they are done, each with its index.
 
     At most two frames a worker are under way, so that finished ones do not fill the memory.
 
     Parameters
     ----------
-    crew : Crew
-        Who draws them.
+    executor : FrameExecutor
+        The workers.
     cameras : sequence of Camera
         One a frame.
     """
     waiting = iter(enumerate(cameras))
-    pending: dict[Future, int] = {}
+    pending: dict[Future[AnimationFrame], int] = {}
     try:
         while True:
-            while len(pending) < 2 * crew.workers and (entry := next(waiting, None)) is not None:
+            while len(pending) < 2 * executor.workers and (entry := next(waiting, None)) is not None:
                 index, camera = entry
-                pending[crew.submit(camera)] = index
+                pending[executor.submit(camera)] = index
             if not pending:
                 return
             done, _ = wait(pending, return_when=FIRST_COMPLETED)
@@ -270,7 +270,7 @@ def shoot(crew: Crew, cameras: Sequence[Camera]) -> Iterator[tuple[int, Shot]]:
             future.cancel()
 
 
-# What comes of it.
+# The file.
 
 
 def write_gif(path: str | os.PathLike, frames: Iterable[str | os.PathLike], milliseconds: int = 50) -> None:

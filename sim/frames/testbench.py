@@ -10,13 +10,14 @@ from string import Template
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Design, Pixels, Spans
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.errors import InputError
-from blysk.sim.frames.frame import beats_of, prepare
+from blysk.sim.frames.frame import beats_of
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.output import files_within, write_text
 

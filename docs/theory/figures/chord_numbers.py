@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
+from blysk.golden.frames.cut import cut_spans
 from blysk.golden.number.polynomials import half_angle_factor, minimax
 from blysk.golden.number.unit_vector import quantise, values
 from blysk.golden.presets import preset
@@ -19,7 +20,6 @@ from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import COSQUAD, REFLECTION_MODELS, ReflectionModel
 from blysk.golden.reference.scene import Scene
-from blysk.sim.frames.frame import cut_spans
 from blysk.sim.meshes.teapot import teapot
 
 _SPANS = 4000

@@ -9,6 +9,7 @@ from markdown import table
 from blysk.bench.accuracy import scene_for
 from blysk.bench.report.errata import ERRATA
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import MAX_INTENSITY, Intensity
 from blysk.golden.lighting.power import Power
@@ -16,7 +17,6 @@ from blysk.golden.lighting.specular import Specular
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.reflection import COSQUAD
-from blysk.sim.frames.frame import prepare
 from blysk.sim.meshes.teapot import teapot
 
 

@@ -19,6 +19,7 @@ from blysk.bench.quality.baselines import (
 )
 from blysk.bench.tools.blocks import BLOCKS
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import STYLES
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.hdl.emit.cost import cost_of
@@ -26,7 +27,6 @@ from blysk.hdl.normals.dot_product import DotProductUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.errors import InputError
-from blysk.sim.frames.frame import prepare
 
 BASELINES = read()
 

@@ -11,13 +11,13 @@ from blysk.bench import accuracy
 from blysk.bench.quality import sweep
 from blysk.bench.quality.sweep import EXPONENTS, FEW_EXPONENTS, LARGEST, Frame, Point, main, summarise
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.presets import MODELS, preset
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_spans
-from blysk.sim.frames.frame import prepare
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.teapot import teapot
 

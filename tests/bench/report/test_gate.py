@@ -22,11 +22,11 @@ from blysk.bench.report.gate import (
     shares_of,
 )
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Spans
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.toggles import ToggleCounter
-from blysk.sim.frames.frame import prepare
 from blysk.sim.meshes.teapot import teapot
 
 

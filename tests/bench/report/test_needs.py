@@ -9,12 +9,13 @@ import pytest
 from blysk.bench.report import needs
 from blysk.bench.report.needs import QUICK_SCENES, SCENES, measure, ring, section, simulate_both, tasks
 from blysk.bench.report.section import Drawing, Table
+from blysk.golden.frames.frame import model_frame
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.raster import face_normals
 from blysk.hdl.emit.cost import Cost
 from blysk.sim.cli.scene_file import read_scene_file
-from blysk.sim.frames.fit import Fit
-from blysk.sim.frames.frame import model_frame
+from blysk.sim.frames.frame import SimulatedFrame
+from blysk.sim.frames.specialise import Specialisation
 from blysk.sim.meshes.mesh import load_mesh
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -37,14 +38,14 @@ WHY = {
 def costs(monkeypatch):
     """Costs without a netlist: a cell less with each step."""
 
-    def counted(fit):
+    def counted(specialisation):
         full, *steps = (
             Cost(cells, {(18, 18): cells // 10}, 0, 10 * cells, 5, cells)
-            for cells in range(100, 99 - len(fit.omissions), -1)
+            for cells in range(100, 99 - len(specialisation.reductions), -1)
         )
         return full, tuple(steps)
 
-    monkeypatch.setattr(Fit, "costs", counted)
+    monkeypatch.setattr(Specialisation, "costs", counted)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -54,11 +55,11 @@ def test_scenes(name, costs):
     assert any(WHY[name] in reason for reason in found["reasons"])
     assert found["different_pixels"] == 0
     assert found["pixels"] > 300
-    assert [omission["reason"] for omission in found["omissions"]] == found["reasons"]
-    saved = sum(omission["saves"]["cells"] for omission in found["omissions"])
-    assert found["full"]["cells"] - found["fitted"]["cells"] == saved == len(found["reasons"])
+    assert [reduction["reason"] for reduction in found["reductions"]] == found["reasons"]
+    saved = sum(reduction["saves"]["cells"] for reduction in found["reductions"])
+    assert found["full"]["cells"] - found["specialised"]["cells"] == saved == len(found["reasons"])
     assert not {"cycles", "full_cycles"} & set(found)
-    assert measure(name, SMALL, steps=False)["fitted"]["cells"] == 99
+    assert measure(name, SMALL, steps=False)["specialised"]["cells"] == 99
 
 
 def test_a_frame_that_differs_is_told(monkeypatch, costs):
@@ -81,23 +82,23 @@ def test_a_matt_scene_saves_half():
     """By its netlists, and by simulation of both."""
     found = measure("matt teapot, k_s = 0", SMALL, steps=False)
     for resource in ("cells", "multipliers", "register_bits", "memory_bits"):
-        assert 0 < found["fitted"][resource] < 0.6 * found["full"][resource]
+        assert 0 < found["specialised"][resource] < 0.6 * found["full"][resource]
     simulated = simulate_both("matt teapot, k_s = 0", SMALL)
     assert simulated["different_pixels"] == 0
     assert found["pixels"] < simulated["cycles"] <= simulated["full_cycles"]
 
 
 def test_both_are_simulated(monkeypatch):
-    """By two simulators, the fitted one with the scene that it is for."""
+    """By two simulators, the specialised one with the scene that it is for."""
     asked = []
 
     class Simulator:
-        def __init__(self, design):
+        def __init__(self, design, engine):
             self.design = design
 
         def render(self, scene):
             asked.append((self.design, len(scene.lights)))
-            frame = model_frame(scene, self.design)
+            frame = SimulatedFrame(**vars(model_frame(scene, self.design)), cycles=0, engine="pysim")
             frame.image[0, : len(asked) - 1] ^= 1
             return frame
 
@@ -135,8 +136,8 @@ def test_section():
     half = {name: count // 2 for name, count in figures.items()}
     counted = {
         "full": figures,
-        "fitted": half,
-        "omissions": [{"reason": "this", "saves": half}],
+        "specialised": half,
+        "reductions": [{"reason": "this", "saves": half}],
         "largest_difference": 0,
         "different_pixels": 0,
         "reasons": ["this"],
@@ -146,17 +147,17 @@ def test_section():
     }
     full = [task for task in tasks(quick=False) if task.settings["name"] in QUICK_SCENES]
     simulated = {"cycles": 9, "full_cycles": 12, "different_pixels": 0}
-    results = [counted, counted | {"fitted": figures}, simulated, simulated | {"different_pixels": 3}]
+    results = [counted, counted | {"specialised": figures}, simulated, simulated | {"different_pixels": 3}]
     assert [task.function for task in full] == [measure, measure, simulate_both, simulate_both]
     made = section(full, results)
     assert made.name == "needs"
-    totals, omissions = (part for part in made.parts if isinstance(part, Table))
+    totals, reductions = (part for part in made.parts if isinstance(part, Table))
     assert [part.name for part in made.parts if isinstance(part, Drawing)] == ["needs-shares"]
     first, second = totals.records()
-    assert (first["cells, full"], first["cells, fitted"], first["cycles, fitted"]) == (100, 50, 9)
+    assert (first["cells, full"], first["cells, specialised"], first["cycles, specialised"]) == (100, 50, 9)
     assert (first["pixels of another colour"], second["pixels of another colour"]) == (0, 3)
     assert [row[-1] for row in totals.grades] == ["good", "bad"]
-    assert [row["saves cells"] for row in omissions.records()] == [50, 50]
+    assert [row["saves cells"] for row in reductions.records()] == [50, 50]
     text = " ".join(made.text)
     assert "to the bit: 1 of 2 are" in text
     assert "2 of them by simulation" in text
@@ -165,6 +166,6 @@ def test_section():
     quick = tasks(quick=True)
     assert [task.settings["name"] for task in quick] == list(QUICK_SCENES)
     several = counted | {"reasons": ["this", "that"]}
-    totals, _, omissions = section(quick, [several, several]).parts
+    totals, _, reductions = section(quick, [several, several]).parts
     assert totals.records()[0]["cycles, full"] is None
-    assert [row["saves cells"] for row in omissions.records()] == [None, None, 50] * 2
+    assert [row["saves cells"] for row in reductions.records()] == [None, None, 50] * 2

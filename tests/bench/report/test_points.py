@@ -159,13 +159,13 @@ def test_simulated_point_is_that_of_the_frame_runner(found):
         assert point["hardware"]["multipliers"] > 0
 
 
-def test_twin_has_the_simulated_frame(measured):
+def test_model_has_the_simulated_frame(measured):
     simulated = measured[1][0]
-    twin = frames(*SIMULATED, PLACE, [10, 100], simulated=False)
-    for one, other in zip(simulated, json.loads(json.dumps(twin)), strict=True):
+    model = frames(*SIMULATED, PLACE, [10, 100], simulated=False)
+    for one, other in zip(simulated, json.loads(json.dumps(model)), strict=True):
         assert one["cycles"] > one["pixels"]
-        assert (one["settings"]["engine"], other["settings"]["engine"]) == ("cxxrtl", "twin")
-        same = {**one, "cycles": None, "settings": {**one["settings"], "engine": "twin"}}
+        assert (one["settings"]["engine"], other["settings"]["engine"]) == ("cxxrtl", "model")
+        same = {**one, "cycles": None, "settings": {**one["settings"], "engine": "model"}}
         assert same == other
 
 
@@ -309,7 +309,7 @@ def test_section(measured):
         assert set(point["times"]) == {axis["key"] for axis in TIMES}
     json.dumps(made.figures, allow_nan=False)
     assert "of 5 hardware designs" in made.text[0]
-    assert "2 frames went through the simulated RTL, 8 through its bit-true twin" in made.text[-1]
+    assert "2 frames went through the simulated RTL, 8 through its bit-accurate model" in made.text[-1]
 
 
 def picture(uri):

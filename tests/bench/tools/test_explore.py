@@ -35,6 +35,8 @@ from blysk.bench.tools.explore import (
     tasks_of,
 )
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.compare import compare
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import STYLES
 from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.raster import rasterise
@@ -42,9 +44,9 @@ from blysk.golden.reference.renderer import render
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import cli
-from blysk.sim.cli.printing import ERRORS
 from blysk.sim.errors import InputError
-from blysk.sim.frames.frame import FrameSimulator, compare, prepare
+from blysk.sim.frames.figures import ERRORS
+from blysk.sim.frames.frame import FrameSimulator
 
 SMALL = {"triangles": 128, "size": (40, 30)}
 

@@ -16,12 +16,12 @@ from click.testing import CliRunner
 from blysk.bench.report.report import chosen_tasks
 from blysk.bench.tools import web
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import main
 from blysk.sim.engines.probes import probes_of
 from blysk.sim.errors import InputError
-from blysk.sim.frames.frame import prepare
 
 pytest.importorskip("ziglang", reason="ziglang is not installed")
 

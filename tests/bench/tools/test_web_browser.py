@@ -15,6 +15,8 @@ import pytest
 from blysk.bench.store import results_of
 from blysk.bench.tools import web
 from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.frames.frame import frame_buffer
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.number.unit_vector import ONE
 from blysk.golden.reference.metrics import error_figures
 from blysk.golden.reference.reflection import REFLECTION_MODELS
@@ -25,7 +27,7 @@ from blysk.sim.engines.engine import Stimulus
 from blysk.sim.engines.probes import ObservedPipeline
 from blysk.sim.engines.pysim import Model
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.frames.frame import FrameSimulator, _picture, beats_of, prepare
+from blysk.sim.frames.frame import FrameSimulator, beats_of
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 pytest.importorskip("ziglang", reason="ziglang is not installed")
@@ -138,13 +140,13 @@ def natively(state):
         engine="auto",
     )
     colors = np.stack([run.beats[name] for name in "rgb"], axis=-1)
-    return _picture(scene, frame.cut_raster, colors), run
+    return frame_buffer(scene, frame.cut_raster, colors), run
 
 
 def by_twin(state):
     scene, design, frame = prepared(state)
     pixels = design.compute(frame.spans, FrameConstants.of(scene, 1))
-    return _picture(scene, frame.cut_raster, pixels.color)
+    return frame_buffer(scene, frame.cut_raster, pixels.color)
 
 
 def figure(page, name):

@@ -32,7 +32,7 @@ import numpy as np
 import trimesh
 
 import blysk.sim.cli.main
-from blysk.sim.frames.frame import model_frame
+from blysk.golden.frames.frame import model_frame
 
 MEMORY = 1 << 30
 SECONDS = 10

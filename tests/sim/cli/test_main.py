@@ -577,12 +577,14 @@ def test_fit_says_what_it_leaves_out(folder, capsys):
         r"^left out +no specular path: every k_s is 0; saves [\d,]+ cells, \d+ mult", output, re.M
     )
     assert re.search(r"^left out +x in 6 bits: 64 columns; saves ", output, re.M)
-    assert re.search(r"^fitted +[\d,]+ of [\d,]+ cells, \d+ of \d+ multipliers, .* cycles$", output, re.M)
+    assert re.search(
+        r"^specialised +[\d,]+ of [\d,]+ cells, \d+ of \d+ multipliers, .* cycles$", output, re.M
+    )
     assert re.search(r"^ +the frame is that of the full pipeline, to the bit$", output, re.M)
-    fit = json.loads(Path("a.json").read_text())["fit"]
+    fit = json.loads(Path("a.json").read_text())["specialisation"]
     assert (fit["largest_difference"], fit["different_pixels"]) == (0, 0)
-    for name, count in fit["fitted"].items():
-        saved = sum(omission["saves"][name] for omission in fit["omissions"])
+    for name, count in fit["specialised"].items():
+        saved = sum(reduction["saves"][name] for reduction in fit["reductions"])
         assert count == fit["full"][name] - saved < fit["full"][name]
 
 
@@ -608,7 +610,7 @@ def test_point_lights(folder, refused, capsys):
     np.testing.assert_array_equal(picture("a.png"), picture("b.png"))
     fitted = ["--fit", "--engine", "pysim", "--triangles", "64", "--size", "16x12", "--json", "c.json"]
     assert main(["render", "teapot", *local, *fitted, "-o", "c.png"]) == 0
-    assert json.loads(Path("c.json").read_text())["fit"]["different_pixels"] == 0
+    assert json.loads(Path("c.json").read_text())["specialisation"]["different_pixels"] == 0
     capsys.readouterr()
     what = "need the values of a span; use chord-local"
     refused("render", "teapot", "--point-light", "3,4,5", thing="--method quadratic", says=what)

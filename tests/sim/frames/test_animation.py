@@ -11,24 +11,25 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
+from blysk.golden.frames.compare import compare
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.sim.errors import InputError
 from blysk.sim.frames.animation import (
-    Crew,
-    Film,
-    cluster,
+    Animation,
+    FrameExecutor,
+    dask_executor,
     equal_distance,
-    process_pool,
-    shoot,
-    shot,
+    process_executor,
+    render_frame,
+    render_frames,
     turned,
     turntable,
     write_gif,
 )
-from blysk.sim.frames.frame import FrameSimulator, compare
+from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.frames.picture import write_image
 from blysk.sim.meshes.mesh import load_mesh
 
@@ -108,7 +109,7 @@ def test_frames_come_in_any_order_and_none_twice():
             return executor.submit(work, camera)
 
         done = []
-        for index, result in shoot(Crew(submit, 3, "threads"), range(40)):
+        for index, result in render_frames(FrameExecutor(submit, 3, "threads"), range(40)):
             assert result == index * 10
             done.append(index)
             # Two a worker under way, and no more: the memory holds no more.
@@ -124,7 +125,7 @@ def test_what_waits_is_taken_back():
         futures.append(Future())
         return futures[-1]
 
-    frames = shoot(Crew(submit, 1, "nobody"), range(5))
+    frames = render_frames(FrameExecutor(submit, 1, "nobody"), range(5))
     with ThreadPoolExecutor(1) as helper:
         first = helper.submit(next, frames)
         while len(futures) < 2:
@@ -140,7 +141,7 @@ def test_what_waits_is_taken_back():
 
 
 @pytest.fixture(scope="module")
-def film():
+def animation():
     mesh = load_mesh("teapot", triangles=100).mesh
     scene = Scene(
         mesh=mesh,
@@ -150,23 +151,23 @@ def film():
         material=Material((0.1, 0.1, 0.1), (0.6, 0.5, 0.4), (0.5, 0.5, 0.5), 30),
         lights=[Light((-0.5, 0.8, 0.7))],
     )
-    return Film(scene, preset())
+    return Animation(scene, preset())
 
 
 @pytest.fixture(scope="module")
-def cameras(film):
-    return turntable(film.scene.camera, COUNT)
+def cameras(animation):
+    return turntable(animation.scene.camera, COUNT)
 
 
 @pytest.fixture(scope="module")
-def singly(film, cameras):
+def singly(animation, cameras):
     """Each frame by itself: the pictures, and the errors."""
-    simulator = FrameSimulator(film.design)
+    simulator = FrameSimulator(animation.design)
     frames = []
     for camera in cameras:
-        scene = replace(film.scene, camera=camera)
+        scene = replace(animation.scene, camera=camera)
         frame = simulator.render(scene)
-        frames.append((frame.image, frame.cycles, compare(scene, film.design, frame)))
+        frames.append((frame.image, frame.cycles, compare(scene, animation.design, frame)))
     assert len({image.tobytes() for image, *_ in frames}) == COUNT
     return frames
 
@@ -180,23 +181,23 @@ def assert_the_same(frame, expected):
         assert frame.figures[name]["rmse_lsb"] == getattr(comparison, name).rmse_lsb
 
 
-def test_frames_of_processes_are_those_drawn_singly(film, cameras, singly):
+def test_frames_of_processes_are_those_drawn_singly(animation, cameras, singly):
     order = [3, 0, 4, 2, 1]
     children = set(multiprocessing.active_children())
-    with process_pool(film, 2) as crew:
-        assert (crew.workers, crew.name) == (2, "2 processes")
-        frames = dict(shoot(crew, [cameras[index] for index in order]))
+    with process_executor(animation, 2) as executor:
+        assert (executor.workers, executor.name) == (2, "2 processes")
+        frames = dict(render_frames(executor, [cameras[index] for index in order]))
     assert set(multiprocessing.active_children()) == children
     for place, index in enumerate(order):
         assert_the_same(frames[place], singly[index])
 
 
-def test_processes_end_with_the_block(film, cameras):
+def test_processes_end_with_the_block(animation, cameras):
     children = set(multiprocessing.active_children())
 
     def interrupted():
-        with process_pool(film, 2) as crew:
-            crew.submit(cameras[0])
+        with process_executor(animation, 2) as executor:
+            executor.submit(cameras[0])
             assert len(set(multiprocessing.active_children()) - children) >= 1
             raise KeyboardInterrupt
 
@@ -207,13 +208,13 @@ def test_processes_end_with_the_block(film, cameras):
     assert time.monotonic() - start < 10
 
 
-def test_a_process_that_dies(film, cameras):
+def test_a_process_that_dies(animation, cameras):
     def killed():
-        with process_pool(film, 1) as crew:
-            crew.submit(cameras[0])
+        with process_executor(animation, 1) as executor:
+            executor.submit(cameras[0])
             for child in set(multiprocessing.active_children()) - children:
                 child.kill()
-            list(shoot(crew, cameras))
+            list(render_frames(executor, cameras))
 
     children = set(multiprocessing.active_children())
     with pytest.raises(InputError, match=r"--jobs 1: a process died, .*; use fewer"):
@@ -238,47 +239,47 @@ def scheduler():
         yield local
 
 
-def test_frames_of_a_cluster_are_those_drawn_singly(film, cameras, singly, scheduler):
+def test_frames_of_a_cluster_are_those_drawn_singly(animation, cameras, singly, scheduler):
     order = [4, 1, 0, 3, 2]
-    with cluster(film, scheduler.scheduler_address) as crew:
-        assert crew.workers == 2
-        frames = dict(shoot(crew, [cameras[index] for index in order]))
+    with dask_executor(animation, scheduler.scheduler_address) as executor:
+        assert executor.workers == 2
+        frames = dict(render_frames(executor, [cameras[index] for index in order]))
     for place, index in enumerate(order):
         assert_the_same(frames[place], singly[index])
 
 
-def test_a_cluster_without_workers(film):
+def test_a_cluster_without_workers(animation):
     distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0", host="127.0.0.1") as empty,
         pytest.raises(InputError, match="the scheduler has no workers; start some: dask worker tcp://"),
-        cluster(film, empty.scheduler_address),
+        dask_executor(animation, empty.scheduler_address),
     ):
         pass
 
 
-def test_nobody_at_the_address(film, monkeypatch):
+def test_nobody_at_the_address(animation, monkeypatch):
     pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
     monkeypatch.setattr("blysk.sim.frames.workers._CONNECT_SECONDS", 1)
     with (
         pytest.raises(InputError, match=r"no Dask scheduler answers \(.*; start one with `dask scheduler`"),
-        cluster(film, "tcp://127.0.0.1:1"),
+        dask_executor(animation, "tcp://127.0.0.1:1"),
     ):
         pass
 
 
-def test_an_error_on_a_cluster_is_that_of_the_frame(film, scheduler):
+def test_an_error_on_a_cluster_is_that_of_the_frame(animation, scheduler):
     with (
         pytest.raises(AttributeError, match="viewer"),
-        cluster(film, scheduler.scheduler_address) as crew,
+        dask_executor(animation, scheduler.scheduler_address) as executor,
     ):
-        list(shoot(crew, [None]))
+        list(render_frames(executor, [None]))
 
 
-def test_the_same_process_draws_the_same(film, cameras, singly):
+def test_the_same_process_draws_the_same(animation, cameras, singly):
     """What a worker does, without one."""
     for index in (1, 0):
-        assert_the_same(shot(film, cameras[index]), singly[index])
+        assert_the_same(render_frame(animation, cameras[index]), singly[index])
 
 
 # The animation.

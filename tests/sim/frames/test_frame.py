@@ -1,4 +1,4 @@
-"""Frames of the simulated pipeline against its twin, against float64, and against each other."""
+"""Frames of the simulated pipeline against its bit-accurate model, float64 and each other."""
 
 import dataclasses
 import functools
@@ -10,6 +10,9 @@ import pytest
 
 import blysk.sim.frames.frame
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.compare import compare
+from blysk.golden.frames.cut import cut_wide_spans
+from blysk.golden.frames.prepare import quantise_spans
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
@@ -21,8 +24,7 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_spans
 from blysk.golden.reference.scene import Scene
 from blysk.sim.engines.engine import SimulationError
-from blysk.sim.frames.frame import FrameSimulator, compare
-from blysk.sim.frames.spans import cut_wide_spans, quantise_spans
+from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.teapot import teapot
 
@@ -61,7 +63,7 @@ def simulator():
     return FrameSimulator(DESIGN)
 
 
-def twin_pixels(scene):
+def model_pixels(scene):
     bend = DESIGN.interpolator.largest_deviation(scene.materials[0].exponent)
     cut, _ = cut_wide_spans(rasterise(scene), MAX_SPAN_ANGLE, bend)
     return cut, DESIGN.compute(
@@ -69,10 +71,10 @@ def twin_pixels(scene):
     )
 
 
-def test_frame_is_the_twin_after_a_depth_test(simulator):
+def test_frame_is_the_model_after_a_depth_test(simulator):
     scene = scene_of("500")
     frame = simulator.render(scene)
-    cut, pixels = twin_pixels(scene)
+    cut, pixels = model_pixels(scene)
     assert frame.pixels == len(pixels.x) == len(cut.span)
     assert frame.spans == len(cut.length)
     # Depth of each fragment from the plane through its triangle's corners on the screen.
@@ -234,9 +236,9 @@ def changed(monkeypatch, field):
     monkeypatch.setattr(blysk.sim.frames.frame, "simulate", wrong)
 
 
-def test_model_that_is_not_the_twin(monkeypatch):
+def test_simulation_that_is_not_the_model(monkeypatch):
     changed(monkeypatch, "g")
-    with pytest.raises(SimulationError, match="pixels are not those of its twin"):
+    with pytest.raises(SimulationError, match="pixels are not those of its bit-accurate model"):
         FrameSimulator(preset(), "pysim")
 
 
@@ -255,7 +257,7 @@ MATERIALS = (
 
 @pytest.mark.parametrize("engine", ["cxxrtl", "pysim"])
 def test_frame_of_three_materials(engine):
-    """Each pixel is that of a frame in its triangle's material alone, by the twin.
+    """Each pixel is that of a frame in its triangle's material alone, by the bit-accurate model.
 
     The materials are scattered over the triangles: the spans are in another order than without.
     """

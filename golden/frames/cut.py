@@ -1,36 +1,52 @@
-"""From the rasteriser's spans to the pipeline's: cut where too wide, and quantised."""
+"""Cutting of spans that are too wide for an interpolation method."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
+from blysk.golden.frames.local import CHUNK, SurfacePoints, along_spans, chunks
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import pixels_of, runs_of
-from blysk.golden.number.unit_vector import ONE_SQUARED, quantise
-from blysk.golden.pipeline import Spans
+from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.pipeline import Design
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["cut_local_spans", "cut_wide_spans", "local_values", "quantise_spans", "sort_by_material"]
+__all__ = ["cut_local_spans", "cut_spans", "cut_wide_spans"]
 
-# Spans worked on at once; bounds the memory, changes no result.
-_CHUNK = 1 << 16
+
+def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int]:
+    """Spans cut as the method of a pipeline needs them, and how many of the given ones were cut.
+
+    Parameters
+    ----------
+    scene : Scene
+        Materials and, for methods that take values, lights and viewer.
+    raster : Raster
+        Spans from `rasterise`.
+    design : Design
+        The pipeline.
+    """
+    interpolator = design.interpolator
+    if design.takes_values:
+        return cut_local_spans(scene, raster, interpolator)
+    exponents = [material.exponent for material in scene.materials]
+    widest = min(map(interpolator.widest_span, exponents))
+    return cut_wide_spans(raster, widest, min(map(interpolator.largest_deviation, exponents)))
 
 
 def cut_wide_spans(
-    raster: Raster, largest_angle: float, largest_bend: float = math.inf
+    raster: Raster, largest_angle: float, largest_deviation: float = math.inf
 ) -> tuple[Raster, int]:
     """Halve spans until the normals at the ends of each are at most an angle apart.
 
     A part of a span has a curve of its own: along ``normalise((1-t) N_l + t N_r)`` the angle does not grow
     evenly, so that in the middle of the part the span's normal is not quite the middle normal of the part's
-    ends. Parts in which the two are further apart than ``largest_bend`` are halved, too.
+    ends. Parts in which the two are further apart than ``largest_deviation`` are halved, too.
 
     The normals at a cut are those of the span's own curve, ``normalise((1-t) N_l + t N_r)``, at the pixel
     centres on both sides of it. A pixel more or less than half goes to the right. The fragments stay as they
@@ -42,7 +58,7 @@ def cut_wide_spans(
         Spans; replaced are ``x, y, length, triangle, normal_left, normal_right, back, span, offset``.
     largest_angle : float
         Degrees, over 0.
-    largest_bend : float
+    largest_deviation : float
         Radians, over 0.
 
     Returns
@@ -68,10 +84,10 @@ def cut_wide_spans(
         out_of_range = (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
         # A whole span bends evenly; a part of two pixels has nothing between them.
         part = np.flatnonzero((last - first > 1) & (last - first < raster.length[origin] - 1) & ~out_of_range)
-        if len(part) and largest_bend < math.inf:
+        if len(part) and largest_deviation < math.inf:
             own = normals(origin[part], (first[part] + last[part]) / 2)
             bend = np.linalg.norm(own - normalise(left[part] + right[part]), axis=-1)
-            out_of_range[part[bend > largest_bend]] = True
+            out_of_range[part[bend > largest_deviation]] = True
         if not out_of_range.any():
             break
         middle = (first[out_of_range] + last[out_of_range] + 1) // 2
@@ -116,7 +132,7 @@ def _parts(raster, origin, first, last, left, right, has_weights=False) -> Raste
     if has_weights:
         steps = np.maximum(raster.length[origin] - 1, 1)
         for side, place in (("left", first), ("right", last)):
-            weights, line = _along(raster, origin, place / steps)
+            weights, line = along_spans(raster, origin, place / steps)
             ends |= {f"weights_{side}": weights, f"magnitude_{side}": np.linalg.norm(line, axis=1)}
     return replace(
         raster,
@@ -131,61 +147,6 @@ def _parts(raster, origin, first, last, left, right, has_weights=False) -> Raste
         span=span,
         offset=(np.arange(len(span)) - start[span]).astype(np.int16),
     )
-
-
-def _along(raster: Raster, span: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weights and normals, not of unit length, at places of spans; both linear along a span."""
-    t = t[:, np.newaxis]
-    weights = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
-    left = raster.magnitude_left[span][:, np.newaxis] * raster.normal_left[span]
-    right = raster.magnitude_right[span][:, np.newaxis] * raster.normal_right[span]
-    return weights, (1 - t) * left + t * right
-
-
-@dataclass(frozen=True)
-class _Places:
-    """What places on the surface have: N and V (count, 3); f, u (count, lights); L (lights, count, 3)."""
-
-    normal: np.ndarray
-    viewer: np.ndarray
-    direction: np.ndarray
-    diffuse: np.ndarray
-    highlight: np.ndarray
-
-    @classmethod
-    def at(cls, scene: Scene, raster: Raster, span: np.ndarray, t: np.ndarray) -> "_Places":
-        """Those of spans, at t of each."""
-        weights, line = _along(raster, span, t)
-        # Between opposite normals the line passes through 0, where any normal is as good.
-        normal = np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left[span])
-        share = weights / weights.sum(axis=1, keepdims=True)
-        corners = scene.mesh.vertices[scene.mesh.faces[raster.triangle[span]]]
-        points = np.einsum("sn,snk->sk", share, corners)
-        viewer = np.broadcast_to(scene.view_vectors(points), points.shape)
-        direction = np.empty((len(scene.lights), *points.shape))
-        for index, light in enumerate(scene.lights):
-            direction[index] = light.towards(points)
-        halfway = halfway_vector(direction, viewer)
-        diffuse = np.einsum("sk,lsk->sl", normal, direction)
-        highlight = np.square(normal - halfway).sum(axis=2).T / 2
-        highlight = np.where(halfway.any(axis=2).T, highlight, 2.0)
-        return cls(normal, viewer, direction, np.clip(diffuse, -1, 1), np.clip(highlight, 0, 2))
-
-    def turned(self, other: "_Places", method: LocalChordInterpolator) -> np.ndarray:
-        """Whether a vector turns by more than the method allows from here to there; bool, shape (count,)."""
-        least = np.cos(np.radians(method.MAX_VECTOR_ANGLE))
-        result = np.einsum("sk,sk->s", self.normal, other.normal) < least
-        result |= np.einsum("sk,sk->s", self.viewer, other.viewer) < least
-        result |= (np.einsum("lsk,lsk->ls", self.direction, other.direction) < least).any(axis=0)
-        move = np.linalg.norm(self.viewer - other.viewer, axis=1)
-        move = move + np.linalg.norm(self.direction - other.direction, axis=2)
-        total = [np.linalg.norm(place.direction + place.viewer, axis=2) for place in (self, other)]
-        return result | (move > method.MAX_HALFWAY_CHANGE * np.minimum(*total)).any(axis=0)
-
-
-def _chunks(count: int) -> Iterator[slice]:
-    for start in range(0, count, _CHUNK):
-        yield slice(start, start + _CHUNK)
 
 
 def cut_local_spans(
@@ -236,7 +197,7 @@ def cut_local_spans(
     settled = []
     while len(origin):
         out_of_range = np.zeros(len(origin), dtype=bool)
-        for part in _chunks(len(origin)):
+        for part in chunks(len(origin)):
             exponent = exponents[scene.mesh.material[raster.triangle[origin[part]]]]
             out_of_range[part] = _is_wide(
                 scene, whole, interpolator, exponent, origin[part], first[part], last[part]
@@ -252,7 +213,7 @@ def cut_local_spans(
     steps = np.maximum(raster.length[origin] - 1, 1)
 
     def normals(place):
-        _, line = _along(whole, origin, place / steps)
+        _, line = along_spans(whole, origin, place / steps)
         return np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left[origin])
 
     result = _parts(whole, origin, first, last, normals(first), normals(last), has_weights=True)
@@ -267,13 +228,15 @@ def _is_wide(scene, raster, interpolator, exponent, origin, first, last) -> np.n
     origin, first, last, exponent = origin[several], first[several], last[several], exponent[several]
     steps = raster.length[origin] - 1
     pixels = last - first + 1
-    ends = [_Places.at(scene, raster, origin, place / steps) for place in (first, last)]
+    ends = [SurfacePoints.at(scene, raster, origin, place / steps) for place in (first, last)]
     turned = (pixels > 3) & ends[0].turned(ends[1], interpolator)
     out_of_range[several[turned]] = True
     # Of the rest, what lies between tells.
     part = np.flatnonzero(~turned)
     origin, first, last, steps = origin[part], first[part], last[part], steps[part]
-    between = [_Places.at(scene, raster, origin, (first + (last - first) * k / 4) / steps) for k in (1, 2, 3)]
+    between = [
+        SurfacePoints.at(scene, raster, origin, (first + (last - first) * k / 4) / steps) for k in (1, 2, 3)
+    ]
     bad = np.zeros(len(part), dtype=bool)
     checked = (pixels[part] > 3)[:, np.newaxis]
     one = float(ONE_SQUARED.values)
@@ -322,11 +285,11 @@ def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, bend
     """Whether N·L of a pixel of a span might have the wrong sign, for the lights that are told."""
     result = np.zeros(len(origin), dtype=bool)
     bound = LocalChordSetup.diffuse_error(np.abs(slope), np.abs(bend))
-    for run in runs_of(last - first + 1, _CHUNK):
+    for run in runs_of(last - first + 1, CHUNK):
         span, step = pixels_of((last - first + 1)[run])
         of_pixel = run.start + span
         place = (first[of_pixel] + step) / (raster.length[origin[of_pixel]] - 1)
-        exact = _Places.at(scene, raster, origin[of_pixel], place).diffuse
+        exact = SurfacePoints.at(scene, raster, origin[of_pixel], place).diffuse
         t = (step / (last - first)[of_pixel])[:, np.newaxis]
         fit = left[of_pixel] + t * (slope[of_pixel] + t * bend[of_pixel])
         wrong = np.where(exact > 0, fit <= bound[of_pixel], fit > -bound[of_pixel])
@@ -334,83 +297,3 @@ def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, bend
         wrong &= (np.abs(exact) > LocalChordSetup.DIFFUSE_FORMAT.step) & lights[of_pixel]
         result |= np.bincount(of_pixel, wrong.any(axis=1), len(origin)) > 0
     return result
-
-
-def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> SpanValues:
-    """What the local chord method needs of each span: exact values of N·L and u at three places, as codes.
-
-    N, L and H are of unit length at each of the three. Where a point light is on the surface itself N·L is 0;
-    where there is no half-way vector (``L = -V``) u is 2. A span of two pixels has nothing in the middle: it
-    gets the mean, and no bend.
-
-    Parameters
-    ----------
-    scene : Scene
-        Mesh, lights and viewer.
-    raster : Raster
-        Spans from `cut_local_spans`, in any order.
-    lights : int, optional
-        Lights of the pipeline, by default those of the scene. Lights that the scene does not have have an
-        N·L of 0, and are dark.
-    """
-    count = len(scene.lights) if lights is None else lights
-    spans = np.arange(len(raster.length))
-    diffuse, highlight = np.zeros((2, len(spans), count, 3))
-    # Of a span of one pixel the first value is all three; of two, there is none in the middle.
-    for place, t, pixels in ((0, 0.0, 1), (2, 1.0, 2), (1, 0.5, 3)):
-        has = spans[raster.length >= pixels]
-        lacks = spans[raster.length < pixels]
-        for values in (diffuse, highlight):
-            values[lacks, :, place] = (
-                values[lacks, :, ::2].mean(axis=2) if place == 1 else values[lacks, :, 0]
-            )
-        for part in _chunks(len(has)):
-            exact = _Places.at(scene, raster, has[part], np.full(len(has[part]), t))
-            diffuse[has[part], : len(scene.lights), place] = exact.diffuse
-            highlight[has[part], : len(scene.lights), place] = exact.highlight
-    return SpanValues.quantise(diffuse, highlight)
-
-
-def sort_by_material(raster: Raster, material: np.ndarray) -> Raster:
-    """The same spans and fragments, spans of one material after the other.
-
-    Parameters
-    ----------
-    raster : Raster
-        Spans.
-    material : int array
-        Material of each triangle.
-    """
-    of_span = material[raster.triangle]
-    if not np.any(of_span[1:] < of_span[:-1]):
-        return raster
-    spans = np.argsort(of_span, kind="stable")
-    place = np.empty_like(spans)
-    place[spans] = np.arange(len(spans))
-    fragments = np.argsort(place[raster.span], kind="stable")
-    by_span = ("x", "y", "length", "triangle", "normal_left", "normal_right", "back")
-    by_span += ("magnitude_left", "magnitude_right", "weights_left", "weights_right")
-    kept = {name: getattr(raster, name) for name in by_span}
-    moved = {name: values[spans] if len(values) else values for name, values in kept.items()}
-    moved |= {name: getattr(raster, name)[fragments] for name in ("offset", "pixel", "visible")}
-    return replace(raster, **moved, span=place[raster.span][fragments].astype(raster.span.dtype))
-
-
-def quantise_spans(raster: Raster, material: np.ndarray) -> Spans:
-    """The pipeline's input beats for a raster, normals in codes of ``SQ(1, 17)``.
-
-    Parameters
-    ----------
-    raster : Raster
-        Spans.
-    material : int array
-        Material of each triangle.
-    """
-    return Spans(
-        x=raster.x,
-        y=raster.y,
-        length=raster.length,
-        normal_left=quantise(raster.normal_left),
-        normal_right=quantise(raster.normal_right),
-        material=material[raster.triangle],
-    )

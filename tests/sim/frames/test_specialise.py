@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
@@ -13,8 +14,8 @@ from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.sim.frames.fit import for_scene
-from blysk.sim.frames.frame import FrameSimulator, prepare
+from blysk.sim.frames.frame import FrameSimulator
+from blysk.sim.frames.specialise import specialise
 from blysk.sim.meshes.teapot import teapot
 
 KEY, FILL, BLACK = Light((-0.5, 0.8, 0.7)), Light((0.7, 0.1, 0.5)), Light((0, 0, 1), (0, 0, 0))
@@ -43,45 +44,45 @@ def pixels_of(scene, design):
     return design.compute(prepare(scene, design).spans, constants)
 
 
-def assert_same_frame(scene, fit):
+def assert_same_frame(scene, special):
     """By the twins; spans of merged materials may come in another order."""
     frames = []
-    for drawn, design in ((scene, fit.full), (fit.scenes[0], fit.design)):
+    for drawn, design in ((scene, special.full), (special.scenes[0], special.design)):
         pixels = pixels_of(drawn, design)
         order = np.lexsort((*pixels.color.T, pixels.x, pixels.y))
         frames.append((pixels.x[order], pixels.y[order], pixels.color[order]))
-    for full, fitted in zip(*frames, strict=True):
-        np.testing.assert_array_equal(full, fitted)
+    for full, smaller in zip(*frames, strict=True):
+        np.testing.assert_array_equal(full, smaller)
 
 
-def reasons(fit):
+def reasons(special):
     return {
-        name: omission.reason
-        for omission in fit.omissions
-        for key, value in omission.changes.items()
+        name: reduction.reason
+        for reduction in special.reductions
+        for key, value in reduction.changes.items()
         for name in (value if isinstance(value, dict) else [key])
     }
 
 
 def test_everything_is_needed():
-    """Two materials that differ, coloured light, highlights: the widths alone are fitted."""
+    """Two materials that differ, coloured light, highlights: the widths alone are smaller."""
     mesh = teapot(2000)
     mesh = replace(mesh, material=np.arange(len(mesh.faces)) % 2)
     scene = scene_of((CLAY, replace(CLAY, exponent=9)), (KEY, FILL), mesh=mesh)
-    fit = for_scene(scene, full_of(scene))
-    assert set(reasons(fit)) == {"x_bits", "y_bits", "length_bits"}
-    assert_same_frame(scene, fit)
+    special = specialise(scene, full_of(scene))
+    assert set(reasons(special)) == {"x_bits", "y_bits", "length_bits"}
+    assert_same_frame(scene, special)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("style", ["throughput", pytest.param("compact", marks=pytest.mark.long)])
 def test_no_specular_path(style):
     scene = scene_of(replace(CLAY, specular=(0, 0, 0)))
-    fit = for_scene(scene, full_of(scene))
-    assert reasons(fit)["specular"] == "no specular path: every k_s is 0"
-    assert (fit.design.model, fit.design.gate, fit.design.build.exponent) == (None, False, None)
-    assert_same_frame(scene, fit)
-    full, steps = fit.costs(None, style)
+    special = specialise(scene, full_of(scene, style=style))
+    assert reasons(special)["specular"] == "no specular path: every k_s is 0"
+    assert (special.design.model, special.design.gate, special.design.build.exponent) == (None, False, None)
+    assert_same_frame(scene, special)
+    full, steps = special.costs()
     assert steps[0].multiplier_count <= full.multiplier_count - (6 if style == "throughput" else 1)
     assert steps[-1].register_bits < steps[0].register_bits < 0.65 * full.register_bits
     assert all(
@@ -92,28 +93,28 @@ def test_no_specular_path(style):
 def test_no_highlight_by_the_gate():
     """A light from behind: its half-way vector is far from every normal."""
     scene = scene_of(replace(CLAY, exponent=500), (Light((0.3, 0.3, -1)),), mesh=FLOOR)
-    fit = for_scene(scene, full_of(scene))
-    assert reasons(fit)["specular"] == "no specular path: the gate proves that no span holds a highlight"
-    assert_same_frame(scene, fit)
+    special = specialise(scene, full_of(scene))
+    assert reasons(special)["specular"] == "no specular path: the gate proves that no span holds a highlight"
+    assert_same_frame(scene, special)
 
 
 def test_no_gate():
     """At exponent 1 the highlight is everywhere."""
     scene = scene_of(replace(CLAY, exponent=1))
-    fit = for_scene(scene, full_of(scene))
-    assert reasons(fit)["gate"] == "no highlight gate: every span may hold a highlight"
-    assert not fit.design.gate
-    assert_same_frame(scene, fit)
-    assert "gate" not in reasons(for_scene(scene, full_of(scene, gate=False)))
+    special = specialise(scene, full_of(scene))
+    assert reasons(special)["gate"] == "no highlight gate: every span may hold a highlight"
+    assert not special.design.gate
+    assert_same_frame(scene, special)
+    assert "gate" not in reasons(specialise(scene, full_of(scene, gate=False)))
 
 
 @pytest.mark.long
 def test_fixed_exponent():
     scene = scene_of()
-    fit = for_scene(scene, full_of(scene))
-    assert reasons(fit)["exponent"] == "exponent fixed at 50: PROM folded"
-    assert_same_frame(scene, fit)
-    full, step = (cost_of(ShadingPipelineUnit(replace(fit.full, exponent=x))) for x in (None, 50))
+    special = specialise(scene, full_of(scene))
+    assert reasons(special)["exponent"] == "exponent fixed at 50: PROM folded"
+    assert_same_frame(scene, special)
+    full, step = (cost_of(ShadingPipelineUnit(special.full.built(exponent=x))) for x in (None, 50))
     assert step.rom_bits <= full.rom_bits - 2 * 1024 * 17
     assert step.multiplier_count == full.multiplier_count - 1
 
@@ -124,38 +125,38 @@ def test_equal_materials():
     mesh = replace(mesh, material=np.arange(len(mesh.faces)) % 3)
     other = replace(CLAY, diffuse=(0.1, 0.2, 0.3))
     scene = scene_of((CLAY, other, CLAY), mesh=mesh)
-    fit = for_scene(scene, full_of(scene))
-    assert reasons(fit)["materials"] == "a smaller memory of materials: 2 of 3 differ"
-    assert_same_frame(scene, fit)
+    special = specialise(scene, full_of(scene))
+    assert reasons(special)["materials"] == "a smaller memory of materials: 2 of 3 differ"
+    assert_same_frame(scene, special)
     scene = scene_of((CLAY, CLAY, CLAY), mesh=mesh)
-    fit = for_scene(scene, full_of(scene))
-    assert reasons(fit)["materials"] == "no memory of materials: 1 of 3 differ"
-    assert (fit.design.materials, fit.design.build.exponent) == (1, 50)
-    assert_same_frame(scene, fit)
-    full = cost_of(ShadingPipelineUnit(fit.full))
-    assert cost_of(ShadingPipelineUnit(fit.design)).ram_bits < full.ram_bits
+    special = specialise(scene, full_of(scene))
+    assert reasons(special)["materials"] == "no memory of materials: 1 of 3 differ"
+    assert (special.design.materials, special.design.build.exponent) == (1, 50)
+    assert_same_frame(scene, special)
+    full = cost_of(ShadingPipelineUnit(special.full))
+    assert cost_of(ShadingPipelineUnit(special.design)).ram_bits < full.ram_bits
 
 
 def test_black_lights():
     scene = scene_of(lights=(KEY, BLACK, FILL))
-    fit = for_scene(scene, full_of(scene))
-    assert reasons(fit)["lights"] == "1 of 3 lights: they light nothing"
-    assert fit.scenes[0].lights == (KEY, FILL)
-    assert_same_frame(scene, fit)
+    special = specialise(scene, full_of(scene))
+    assert reasons(special)["lights"] == "1 of 3 lights: they light nothing"
+    assert special.scenes[0].lights == (KEY, FILL)
+    assert_same_frame(scene, special)
 
 
 def test_methods_that_no_gate_serves():
     """Spans that carry values are cut by all lights, the dark one too, and have no normals for a gate."""
     scene = scene_of(replace(CLAY, exponent=400), (KEY, BLACK, FILL))
     for method in ("chord-local", "quadratic-published"):
-        fit = for_scene(scene, preset(method, lights=3))
-        assert ("lights" in reasons(fit)) == (method != "chord-local")
-        assert reasons(fit)["exponent"] == "exponent fixed at 400: PROM folded"
-        assert_same_frame(scene, fit)
+        special = specialise(scene, preset(method, lights=3))
+        assert ("lights" in reasons(special)) == (method != "chord-local")
+        assert reasons(special)["exponent"] == "exponent fixed at 400: PROM folded"
+        assert_same_frame(scene, special)
     dark = scene_of(lights=(BLACK,))
-    fit = for_scene(dark, preset("chord-local"))
-    assert reasons(fit)["lights"] == "no light path: no light lights anything"
-    assert_same_frame(dark, fit)
+    special = specialise(dark, preset("chord-local"))
+    assert reasons(special)["lights"] == "no light path: no light lights anything"
+    assert_same_frame(dark, special)
 
 
 @pytest.mark.parametrize(
@@ -164,30 +165,30 @@ def test_methods_that_no_gate_serves():
 )
 def test_no_light_at_all(material, lights):
     scene = scene_of(material, lights)
-    fit = for_scene(scene, full_of(scene))
-    assert reasons(fit)["lights"] == "no light path: no light lights anything"
-    assert_same_frame(scene, fit)
-    assert cost_of(ShadingPipelineUnit(fit.design)).multiplier_count == 0
+    special = specialise(scene, full_of(scene))
+    assert reasons(special)["lights"] == "no light path: no light lights anything"
+    assert_same_frame(scene, special)
+    assert cost_of(ShadingPipelineUnit(special.design)).multiplier_count == 0
 
 
 def test_one_channel():
     scene = scene_of(Material((0.1,) * 3, (0.5,) * 3, (0.4,) * 3, 30))
-    fit = for_scene(scene, full_of(scene))
-    assert reasons(fit)["grey"] == "one channel of three: every colour is grey"
-    assert_same_frame(scene, fit)
+    special = specialise(scene, full_of(scene))
+    assert reasons(special)["grey"] == "one channel of three: every colour is grey"
+    assert_same_frame(scene, special)
     tinted = replace(scene, lights=(Light((0, 0, 1), (1, 1, 0.9)),))
-    assert "grey" not in reasons(for_scene(tinted, full_of(tinted)))
+    assert "grey" not in reasons(specialise(tinted, full_of(tinted)))
 
 
 def test_widths():
     scene = scene_of(size=(512, 300))
-    fit = for_scene(scene, full_of(scene))
-    longest = prepare(scene, fit.full).spans.length.max()
+    special = specialise(scene, full_of(scene))
+    longest = prepare(scene, special.full).spans.length.max()
     bits = int(longest).bit_length()
-    assert (fit.design.x_bits, fit.design.y_bits, fit.design.length_bits) == (9, 9, bits)
-    assert reasons(fit)["length_bits"] == f"length in {bits} bits: the longest span has {longest} pixels"
-    assert reasons(fit)["x_bits"] == "x in 9 bits: 512 columns"
-    assert_same_frame(scene, fit)
+    assert (special.design.x_bits, special.design.y_bits, special.design.length_bits) == (9, 9, bits)
+    assert reasons(special)["length_bits"] == f"length in {bits} bits: the longest span has {longest} pixels"
+    assert reasons(special)["x_bits"] == "x in 9 bits: 512 columns"
+    assert_same_frame(scene, special)
 
 
 @pytest.mark.long
@@ -196,17 +197,21 @@ def test_shorter_words():
     for mesh, terms in ((teapot(2000), 2), (FLOOR, 1)):
         scene = scene_of(size=(100, 80), mesh=mesh)
         full = full_of(scene)
-        assert {"terms", "fraction_bits"}.isdisjoint(reasons(for_scene(scene, full)))
-        fit = for_scene(scene, full, exact=False)
-        assert fit.design.interpolator.terms == terms
-        assert reasons(fit)["terms"].startswith(f"polynomial of {terms} in place of 3 terms: the widest span")
-        assert reasons(fit)["fraction_bits"].startswith("differences of 36 in place of 46 fraction bits: ")
-        assert fit.design.highlight_gate.interpolator == fit.design.interpolator
+        assert {"terms", "fraction_bits"}.isdisjoint(reasons(specialise(scene, full)))
+        special = specialise(scene, full, exact=False)
+        assert special.design.interpolator.terms == terms
+        assert reasons(special)["terms"].startswith(
+            f"polynomial of {terms} in place of 3 terms: the widest span"
+        )
+        assert reasons(special)["fraction_bits"].startswith(
+            "differences of 36 in place of 46 fraction bits: "
+        )
+        assert special.design.highlight_gate.interpolator == special.design.interpolator
         spans, constants = prepare(scene, full).spans, FrameConstants.of(scene)
-        pixels = [design.compute(spans, constants) for design in (full, fit.design)]
+        pixels = [design.compute(spans, constants) for design in (full, special.design)]
         assert [of.out_of_range_spans for of in pixels] == [0, 0]
         assert np.abs(np.diff([of.color.astype(int) for of in pixels], axis=0)).max() <= 1
-    shorter = replace(full, interpolator=fit.design.interpolator)
+    shorter = replace(full, interpolator=special.design.interpolator)
     less, more = (cost_of(ShadingPipelineUnit(design)) for design in (shorter, full))
     assert less.multiplier_count == more.multiplier_count - 1
     assert less.register_bits < more.register_bits - 300
@@ -218,7 +223,7 @@ def test_frames_of_a_turntable():
     out_of_range = Camera.framing(near.mesh.vertices * 4, (0.4, 0.5, 1), "perspective", 1.2)
     far = replace(far, camera=out_of_range)
     full = full_of(near)
-    bits = [for_scene(scenes, full).design.length_bits for scenes in (near, far, (far, near))]
+    bits = [specialise(scenes, full).design.length_bits for scenes in (near, far, (far, near))]
     assert bits[1] < bits[0] == bits[2]
 
 
@@ -227,23 +232,23 @@ def test_nothing_on_the_picture():
     mesh = teapot(200)
     away = Camera.framing(np.add(mesh.vertices, (100.0, -100.0, 0.0)), (0.4, 0.5, 1), "perspective", 1.0)
     scene = replace(scene_of(mesh=mesh), camera=away)
-    fit = for_scene(scene, full_of(scene))
-    assert (fit.design.model, fit.design.length_bits) == (None, 2)
+    special = specialise(scene, full_of(scene))
+    assert (special.design.model, special.design.length_bits) == (None, 2)
 
 
 def test_default_is_the_chord_method_with_a_gate():
     scene = scene_of(lights=())
-    assert for_scene(scene).full == preset("chord", gate=True)
+    assert specialise(scene).full == preset("chord", gate=True)
 
 
 @pytest.mark.long
 def test_simulated_frame():
-    """The RTL of the fitted pipeline draws the frame of the full one."""
+    """The RTL of the smaller pipeline draws the frame of the full one."""
     scene = scene_of(Material((0.1,) * 3, (0.5,) * 3, (0.4,) * 3, 30), (KEY, BLACK), size=(120, 90))
-    fit = for_scene(scene, full_of(scene))
-    assert {"lights", "exponent", "grey", "x_bits", "y_bits", "length_bits"} <= set(reasons(fit))
-    full = FrameSimulator(fit.full).render(scene)
-    fitted = FrameSimulator(fit.design).render(fit.scenes[0])
-    np.testing.assert_array_equal(full.image, fitted.image)
+    special = specialise(scene, full_of(scene))
+    assert {"lights", "exponent", "grey", "x_bits", "y_bits", "length_bits"} <= set(reasons(special))
+    full = FrameSimulator(special.full).render(scene)
+    smaller = FrameSimulator(special.design).render(special.scenes[0])
+    np.testing.assert_array_equal(full.image, smaller.image)
     assert len(np.unique(full.image)) > 50
-    assert fitted.cycles <= full.cycles
+    assert smaller.cycles <= full.cycles

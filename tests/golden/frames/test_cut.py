@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.cut import cut_local_spans, cut_wide_spans
+from blysk.golden.frames.local import local_values
+from blysk.golden.frames.prepare import quantise_spans, sort_by_material
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
@@ -21,13 +24,6 @@ from blysk.golden.reference.raster import Raster, fragment_normals, rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import fragment_positions, shade_spans
 from blysk.golden.reference.scene import Scene
-from blysk.sim.frames.spans import (
-    cut_local_spans,
-    cut_wide_spans,
-    local_values,
-    quantise_spans,
-    sort_by_material,
-)
 from blysk.sim.meshes.teapot import teapot
 
 WIDTH = 4095
@@ -275,15 +271,15 @@ def test_spans_have_the_material_of_their_triangle(normal_pairs):
         assert np.array_equal(quantise_spans(given, material).material, material[given.triangle])
 
 
-@pytest.mark.parametrize("largest_bend", [1e-3, 1e-5])
-def test_parts_bend_evenly(largest_bend, normal_pairs):
+@pytest.mark.parametrize("largest_deviation", [1e-3, 1e-5])
+def test_parts_bend_evenly(largest_deviation, normal_pairs):
     """The curve of the whole span, in the middle of each part, is the middle normal of the part's ends."""
     rng = np.random.default_rng(20)
     count = 400
     left, right = normal_pairs(rng, count, rng.uniform(5, 120, count))
     raster = raster_of(rng, left, right, rng.integers(2, 200, count))
     coarse, _ = cut_wide_spans(raster, 10.0)
-    fine, cut = cut_wide_spans(raster, 10.0, largest_bend)
+    fine, cut = cut_wide_spans(raster, 10.0, largest_deviation)
 
     def bends(parts):
         """Of parts of more than two pixels, in radians."""
@@ -297,7 +293,7 @@ def test_parts_bend_evenly(largest_bend, normal_pairs):
             (parts.length > 2) & (parts.length < raster.length[whole])
         ]
 
-    assert bends(coarse).max() > largest_bend >= bends(fine).max()
+    assert bends(coarse).max() > largest_deviation >= bends(fine).max()
     assert len(fine.length) > len(coarse.length)
     assert cut <= count
     assert np.array_equal(fine.pixel, raster.pixel)
@@ -543,7 +539,7 @@ def test_local_results_do_not_depend_on_the_chunks(monkeypatch):
     raster = rasterise(scene)
     results = []
     for chunk in (1 << 16, 97):
-        monkeypatch.setattr("blysk.sim.frames.spans._CHUNK", chunk)
+        monkeypatch.setattr("blysk.golden.frames.local.CHUNK", chunk)
         cut, count = cut_local_spans(scene, raster)
         results.append((cut.length, count, *local_values(scene, cut)))
     for a, b in zip(*results, strict=True):

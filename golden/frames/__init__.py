@@ -1,0 +1,1 @@
+"""Frames: spans prepared for a pipeline, its bit-accurate pixels, and their errors."""

@@ -1,0 +1,103 @@
+"""Errors of a frame against its method in float64, exact interpolation and exact shading."""
+
+import math
+from dataclasses import dataclass, fields
+from time import perf_counter
+
+import numpy as np
+
+from blysk.golden.frames.frame import Frame
+from blysk.golden.frames.local import local_values
+from blysk.golden.pipeline import Design
+from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
+from blysk.golden.reference.raster import Raster
+from blysk.golden.reference.reflection import BLINN
+from blysk.golden.reference.renderer import render, shade_operands, shade_spans
+from blysk.golden.reference.scene import Scene
+
+__all__ = ["Comparison", "compare", "method_in_float64"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Errors of a frame over the pixels that show the surface.
+
+    Parameters
+    ----------
+    golden : float64 array, shape (height, width, 3)
+        Exactly normalised Phong interpolation along the spans with the frame's model, in [0, 1].
+    arithmetic_error : ErrorFigures
+        Against the same method and model in float64.
+    method_error : ErrorFigures
+        Against ``golden``.
+    total_error : ErrorFigures
+        Against the exact frame: Phong shading as on a GPU, Blinn's model.
+    nmse : float
+        Against the exact frame.
+    mnse_published, mnse_published_share : float
+        MNSE as published in [T], against the exact frame, and the share of values where it is defined.
+    seconds : float
+        Time of the three golden frames.
+    """
+
+    golden: np.ndarray
+    arithmetic_error: ErrorFigures
+    method_error: ErrorFigures
+    total_error: ErrorFigures
+    nmse: float
+    mnse_published: float
+    mnse_published_share: float
+    seconds: float
+
+
+def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarray:
+    """A frame by the method and the model of a pipeline, in exact arithmetic.
+
+    Parameters
+    ----------
+    scene, design
+        What is drawn, and by what.
+    raster : Raster
+        The spans, wide ones cut.
+
+    Returns
+    -------
+    float64 array, shape (height, width, 3)
+        In [0, 1].
+    """
+    interpolator = design.interpolator
+    if design.takes_values:
+        values = local_values(scene, raster)
+        cosine, one_minus_cosine = interpolator.exact_operands(values, raster.length)
+        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, design.specular.model)
+    return shade_spans(
+        scene, raster, interpolator.exact_normals, design.specular.model, interpolator.uses_chord
+    )
+
+
+def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
+    """Errors of a frame against three frames of the golden renderer; all NaN if it shows no surface.
+
+    Parameters
+    ----------
+    scene, design
+        What was drawn, and by what pipeline; of a specialised one the full scene and pipeline.
+    frame : Frame
+        Its frame.
+    """
+    start = perf_counter()
+    same_method = method_in_float64(scene, design, frame.cut_raster)
+    golden = shade_spans(scene, frame.raster, "normalised", design.specular.model)
+    exact = render(scene, "phong", BLINN, raster=frame.raster)
+    seconds = perf_counter() - start
+    if exact.mask.any():
+        figures = [
+            error_figures(frame.image, reference * 255, exact.mask)
+            for reference in (same_method, golden, exact.image)
+        ]
+        shown, reference = frame.image[exact.mask], exact.image[exact.mask] * 255
+        squares = (nmse(shown, reference), *mnse_published(shown, reference))
+    else:
+        figures = [ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))] * 3
+        squares = (math.nan,) * 3
+    return Comparison(golden, *figures, *squares, seconds)

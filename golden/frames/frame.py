@@ -1,0 +1,104 @@
+"""A shaded frame: its picture, and the frame of a pipeline's bit-accurate model."""
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from blysk.golden.frames.prepare import PreparedFrame, constants_of, prepare
+from blysk.golden.pipeline import Design
+from blysk.golden.reference.raster import Raster
+from blysk.golden.reference.scene import Scene
+
+__all__ = ["Frame", "frame_buffer", "model_frame"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A scene's picture by the pixels of a pipeline.
+
+    Parameters
+    ----------
+    image : uint8 array, shape (height, width, 3)
+        The frame buffer, after the depth test.
+    prepared : PreparedFrame
+        The pipeline's spans.
+    out_of_range_spans : int
+        Spans whose angle the pipeline reports as larger than its method serves.
+    seconds : dict
+        Of ``raster`` (rasterise, cut, quantise) and of the pixels.
+    """
+
+    image: np.ndarray
+    prepared: PreparedFrame
+    out_of_range_spans: int
+    seconds: dict[str, float]
+
+    @property
+    def raster(self) -> Raster:
+        """The rasteriser's spans."""
+        return self.prepared.raster
+
+    @property
+    def cut_raster(self) -> Raster:
+        """The pipeline's spans before quantisation."""
+        return self.prepared.cut_raster
+
+    @property
+    def spans(self) -> int:
+        """Number of spans that went into the pipeline."""
+        return len(self.cut_raster.length)
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels that came out of it, hidden ones included."""
+        return len(self.cut_raster.span)
+
+
+def frame_buffer(scene: Scene, raster: Raster, colors: np.ndarray) -> np.ndarray:
+    """Frame buffer with the colours of the visible fragments over the background.
+
+    Parameters
+    ----------
+    scene : Scene
+        Size and background; this is rounded to the nearest code, half up.
+    raster : Raster
+        Fragments, and which of them are visible.
+    colors : uint8 array, shape (fragments, 3)
+        Red, green, blue of each.
+
+    Returns
+    -------
+    uint8 array, shape (height, width, 3)
+    """
+    image = np.empty((scene.height, scene.width, 3), dtype=np.uint8)
+    image[...] = np.floor(np.multiply(scene.background, 255) + 0.5)
+    image.reshape(-1, 3)[raster.pixel[raster.visible]] = colors[raster.visible]
+    return image
+
+
+def model_frame(scene: Scene, design: Design) -> Frame:
+    """Frame by a pipeline's bit-accurate model: the image of the simulated one to the bit.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to draw: at most as many lights as the design has, and as many materials.
+    design : Design
+        The pipeline.
+
+    Raises
+    ------
+    ValueError
+        As `prepare` and `constants_of` do.
+    """
+    start = perf_counter()
+    prepared = prepare(scene, design)
+    rastered = perf_counter()
+    pixels = design.compute(prepared.spans, constants_of(scene, design))
+    return Frame(
+        image=frame_buffer(scene, prepared.cut_raster, pixels.color),
+        prepared=prepared,
+        out_of_range_spans=pixels.out_of_range_spans,
+        seconds={"raster": rastered - start, "model": perf_counter() - rastered},
+    )

@@ -1,0 +1,108 @@
+"""Exact operands of lights along spans: N·L and 1 - N·H of points on the surface, perspective-correct."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.lighting import halfway_vector
+from blysk.golden.reference.raster import Raster
+from blysk.golden.reference.scene import Scene
+
+__all__ = ["CHUNK", "SurfacePoints", "along_spans", "chunks", "local_values"]
+
+CHUNK = 1 << 16
+"""Spans worked on at once; bounds the memory, changes no result."""
+
+
+def along_spans(raster: Raster, span: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Weights and normals, not of unit length, at t of each span; both are linear along a span."""
+    t = t[:, np.newaxis]
+    weights = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
+    left = raster.magnitude_left[span][:, np.newaxis] * raster.normal_left[span]
+    right = raster.magnitude_right[span][:, np.newaxis] * raster.normal_right[span]
+    return weights, (1 - t) * left + t * right
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """What places on the surface have: N and V (count, 3); f, u (count, lights); L (lights, count, 3)."""
+
+    normal: np.ndarray
+    viewer: np.ndarray
+    direction: np.ndarray
+    diffuse: np.ndarray
+    highlight: np.ndarray
+
+    @classmethod
+    def at(cls, scene: Scene, raster: Raster, span: np.ndarray, t: np.ndarray) -> "SurfacePoints":
+        """Those of spans, at t of each."""
+        weights, line = along_spans(raster, span, t)
+        # Between opposite normals the line passes through 0, where any normal is as good.
+        normal = np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left[span])
+        share = weights / weights.sum(axis=1, keepdims=True)
+        corners = scene.mesh.vertices[scene.mesh.faces[raster.triangle[span]]]
+        points = np.einsum("sn,snk->sk", share, corners)
+        viewer = np.broadcast_to(scene.view_vectors(points), points.shape)
+        direction = np.empty((len(scene.lights), *points.shape))
+        for index, light in enumerate(scene.lights):
+            direction[index] = light.towards(points)
+        halfway = halfway_vector(direction, viewer)
+        diffuse = np.einsum("sk,lsk->sl", normal, direction)
+        highlight = np.square(normal - halfway).sum(axis=2).T / 2
+        highlight = np.where(halfway.any(axis=2).T, highlight, 2.0)
+        return cls(normal, viewer, direction, np.clip(diffuse, -1, 1), np.clip(highlight, 0, 2))
+
+    def turned(self, other: "SurfacePoints", method: LocalChordInterpolator) -> np.ndarray:
+        """Whether a vector turns by more than the method allows from here to there; bool, shape (count,)."""
+        least = np.cos(np.radians(method.MAX_VECTOR_ANGLE))
+        result = np.einsum("sk,sk->s", self.normal, other.normal) < least
+        result |= np.einsum("sk,sk->s", self.viewer, other.viewer) < least
+        result |= (np.einsum("lsk,lsk->ls", self.direction, other.direction) < least).any(axis=0)
+        move = np.linalg.norm(self.viewer - other.viewer, axis=1)
+        move = move + np.linalg.norm(self.direction - other.direction, axis=2)
+        total = [np.linalg.norm(place.direction + place.viewer, axis=2) for place in (self, other)]
+        return result | (move > method.MAX_HALFWAY_CHANGE * np.minimum(*total)).any(axis=0)
+
+
+def chunks(count: int) -> Iterator[slice]:
+    """Slices of at most `CHUNK` of ``count`` spans."""
+    for start in range(0, count, CHUNK):
+        yield slice(start, start + CHUNK)
+
+
+def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> SpanValues:
+    """What the local chord method needs of each span: exact values of N·L and u at three places, as codes.
+
+    N, L and H are of unit length at each of the three. Where a point light is on the surface itself N·L is 0;
+    where there is no half-way vector (``L = -V``) u is 2. A span of two pixels has nothing in the middle: it
+    gets the mean, and no bend.
+
+    Parameters
+    ----------
+    scene : Scene
+        Mesh, lights and viewer.
+    raster : Raster
+        Spans from `cut_local_spans`, in any order.
+    lights : int, optional
+        Lights of the pipeline, by default those of the scene. Lights that the scene does not have have an
+        N·L of 0, and are dark.
+    """
+    count = len(scene.lights) if lights is None else lights
+    spans = np.arange(len(raster.length))
+    diffuse, highlight = np.zeros((2, len(spans), count, 3))
+    # Of a span of one pixel the first value is all three; of two, there is none in the middle.
+    for place, t, pixels in ((0, 0.0, 1), (2, 1.0, 2), (1, 0.5, 3)):
+        has = spans[raster.length >= pixels]
+        lacks = spans[raster.length < pixels]
+        for values in (diffuse, highlight):
+            values[lacks, :, place] = (
+                values[lacks, :, ::2].mean(axis=2) if place == 1 else values[lacks, :, 0]
+            )
+        for part in chunks(len(has)):
+            exact = SurfacePoints.at(scene, raster, has[part], np.full(len(has[part]), t))
+            diffuse[has[part], : len(scene.lights), place] = exact.diffuse
+            highlight[has[part], : len(scene.lights), place] = exact.highlight
+    return SpanValues.quantise(diffuse, highlight)

@@ -1,0 +1,114 @@
+"""The input of a pipeline for a frame: spans, cut, ordered and quantised, and frame constants."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.cut import cut_spans
+from blysk.golden.frames.local import local_values
+from blysk.golden.number.unit_vector import quantise
+from blysk.golden.pipeline import Design, Spans
+from blysk.golden.reference.raster import Raster, rasterise
+from blysk.golden.reference.scene import Scene
+
+__all__ = ["PreparedFrame", "constants_of", "prepare", "quantise_spans", "sort_by_material"]
+
+
+@dataclass(frozen=True)
+class PreparedFrame:
+    """Spans of a scene, before and after the steps that a pipeline needs.
+
+    Parameters
+    ----------
+    raster : Raster
+        The rasteriser's spans.
+    cut_raster : Raster
+        The same fragments in spans that are narrow enough for the method, in the order of their materials.
+    spans_cut : int
+        Spans of ``raster`` that were cut.
+    spans : Spans
+        Spans of ``cut_raster``, quantised: the pipeline's input.
+    """
+
+    raster: Raster
+    cut_raster: Raster
+    spans_cut: int
+    spans: Spans
+
+
+def prepare(scene: Scene, design: Design) -> PreparedFrame:
+    """Rasterise a scene, and cut, order and quantise its spans for a pipeline.
+
+    Raises
+    ------
+    ValueError
+        If the scene has point lights or a near viewer, and the method does not take values.
+    """
+    if scene.local and not design.takes_values:
+        raise ValueError("point lights and a near viewer need the method chord-local")
+    raster = rasterise(scene)
+    cut, count = cut_spans(scene, raster, design)
+    cut = sort_by_material(cut, scene.mesh.material)
+    spans = quantise_spans(cut, scene.mesh.material)
+    if design.takes_values:
+        spans = replace(spans, values=local_values(scene, cut, design.lights))
+    return PreparedFrame(raster, cut, count, spans)
+
+
+def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
+    """Frame constants of each material of a scene, for a pipeline.
+
+    Raises
+    ------
+    ValueError
+        If the scene has more lights or other materials than the design, or a term is brighter than 8.
+    """
+    if len(scene.materials) != design.materials:
+        raise ValueError(f"the pipeline has {design.materials} materials, the scene {len(scene.materials)}")
+    return [FrameConstants.of(scene, design.lights, index=index) for index in range(design.materials)]
+
+
+def sort_by_material(raster: Raster, material: np.ndarray) -> Raster:
+    """The same spans and fragments, spans of one material after the other.
+
+    Parameters
+    ----------
+    raster : Raster
+        Spans.
+    material : int array
+        Material of each triangle.
+    """
+    of_span = material[raster.triangle]
+    if not np.any(of_span[1:] < of_span[:-1]):
+        return raster
+    spans = np.argsort(of_span, kind="stable")
+    place = np.empty_like(spans)
+    place[spans] = np.arange(len(spans))
+    fragments = np.argsort(place[raster.span], kind="stable")
+    by_span = ("x", "y", "length", "triangle", "normal_left", "normal_right", "back")
+    by_span += ("magnitude_left", "magnitude_right", "weights_left", "weights_right")
+    kept = {name: getattr(raster, name) for name in by_span}
+    moved = {name: values[spans] if len(values) else values for name, values in kept.items()}
+    moved |= {name: getattr(raster, name)[fragments] for name in ("offset", "pixel", "visible")}
+    return replace(raster, **moved, span=place[raster.span][fragments].astype(raster.span.dtype))
+
+
+def quantise_spans(raster: Raster, material: np.ndarray) -> Spans:
+    """The pipeline's input beats for a raster, normals in codes of ``SQ(1, 17)``.
+
+    Parameters
+    ----------
+    raster : Raster
+        Spans.
+    material : int array
+        Material of each triangle.
+    """
+    return Spans(
+        x=raster.x,
+        y=raster.y,
+        length=raster.length,
+        normal_left=quantise(raster.normal_left),
+        normal_right=quantise(raster.normal_right),
+        material=material[raster.triangle],
+    )

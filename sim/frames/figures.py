@@ -1,0 +1,161 @@
+"""Figures of frames as plain values: counts, cycles, errors, and what a specialisation saves."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from blysk.golden.frames.compare import Comparison
+from blysk.golden.frames.frame import Frame
+from blysk.golden.pipeline import Design
+from blysk.golden.reference.scene import Scene
+from blysk.sim.frames.frame import SimulatedFrame
+from blysk.sim.frames.specialise import Specialisation
+
+__all__ = [
+    "ERRORS",
+    "animation_figures",
+    "difference_figures",
+    "frame_figures",
+    "saving_figures",
+    "worst_errors",
+]
+
+ERRORS = {
+    "arithmetic": "the same method and model in float64",
+    "method": "exactly normalised Phong interpolation, same model",
+    "total": "the exact Blinn frame, one viewing direction",
+}
+"""Name of each error, and the frame that it is against."""
+
+
+def frame_figures(
+    scene: Scene, design: Design, frame: SimulatedFrame, comparison: Comparison
+) -> dict[str, Any]:
+    """Figures of a frame, ready for `write_json`.
+
+    Parameters
+    ----------
+    scene, design
+        What was drawn, and by what.
+    frame : SimulatedFrame
+        The frame.
+    comparison : Comparison
+        Its errors.
+    """
+    raster = frame.raster
+    return {
+        "method": design.method,
+        "model": design.model,
+        "exponent": scene.materials[0].exponent,
+        "lights": design.lights,
+        "materials": design.materials,
+        "engine": frame.engine,
+        "width": scene.width,
+        "height": scene.height,
+        "triangles": raster.triangles,
+        "spans": frame.spans,
+        "pixels": frame.pixels,
+        "visible_pixels": int(np.count_nonzero(frame.cut_raster.visible)),
+        "cycles": frame.cycles,
+        "cycles_per_pixel": frame.cycles / frame.pixels if frame.pixels else math.nan,
+        "simulated_pixels_per_second": frame.pixels / frame.seconds["simulate"],
+        **{f"{name}_error": dataclasses.asdict(getattr(comparison, f"{name}_error")) for name in ERRORS},
+        "nmse": comparison.nmse,
+        "mnse_published": comparison.mnse_published,
+        "mnse_published_share": comparison.mnse_published_share,
+        "counts": {
+            "degenerate_triangles": raster.degenerate,
+            "culled_triangles": raster.culled,
+            "outside_triangles": raster.outside,
+            "uncovered_triangles": raster.uncovered,
+            "repaired_span_normals": raster.repaired_normals,
+            "hidden_spans": raster.hidden_spans,
+            "cut_spans": frame.prepared.spans_cut,
+            "out_of_range_spans": frame.out_of_range_spans,
+        },
+        "seconds": {**frame.seconds, "golden": comparison.seconds},
+    }
+
+
+def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Figures of several frames: sums, the worst errors, and those of each frame.
+
+    Parameters
+    ----------
+    frames : sequence of dict
+        Of `frame_figures`, of one scene and pipeline.
+    """
+    same = ("method", "model", "exponent", "lights", "materials", "engine", "width", "height", "triangles")
+    pixels, cycles = (sum(frame[key] for frame in frames) for key in ("pixels", "cycles"))
+    return {
+        **{key: frames[0][key] for key in same},
+        "frame_count": len(frames),
+        "visible_pixels": sum(frame["visible_pixels"] for frame in frames),
+        "pixels": pixels,
+        "cycles": cycles,
+        "cycles_per_pixel": cycles / pixels if pixels else math.nan,
+        **worst_errors(frames),
+        "counts": {key: sum(frame["counts"][key] for frame in frames) for key in frames[0]["counts"]},
+        "frames": list(frames),
+    }
+
+
+def worst_errors(figures: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
+    """The worst of each error over several frames: the largest, and of PSNR the least.
+
+    Frames that show no surface have no errors and do not count; if none does, every figure is NaN.
+
+    Parameters
+    ----------
+    figures : sequence of dict
+        Of `frame_figures`.
+    """
+    worst = {}
+    for name in ERRORS:
+        errors = [frame[f"{name}_error"] for frame in figures if frame["visible_pixels"]]
+        worst[f"{name}_error"] = {
+            key: (min if key == "psnr_db" else max)((error[key] for error in errors), default=math.nan)
+            for key in figures[0][f"{name}_error"]
+        }
+    return worst
+
+
+def saving_figures(specialisation: Specialisation) -> dict[str, Any]:
+    """Resources of a full pipeline and of its specialisation, and what each reduction saves.
+
+    Parameters
+    ----------
+    specialisation : Specialisation
+        The pipelines.
+
+    Returns
+    -------
+    dict
+        ``full`` and ``specialised``: number of each resource; ``reductions``: ``reason`` and ``saves`` of
+        each, on top of those before it.
+    """
+    full, steps = specialisation.costs()
+    before = [full, *steps]
+    return {
+        "full": full.totals,
+        "specialised": before[-1].totals,
+        "reductions": [
+            {
+                "reason": reduction.reason,
+                "saves": {name: count - after.totals[name] for name, count in cost.totals.items()},
+            }
+            for reduction, cost, after in zip(specialisation.reductions, before, steps, strict=False)
+        ],
+    }
+
+
+def difference_figures(frame: Frame, full_frame: Frame) -> dict[str, int]:
+    """Largest difference of a channel between two frames, and how many pixels differ."""
+    difference = np.abs(full_frame.image.astype(np.int16) - frame.image)
+    return {
+        "largest_difference": int(difference.max(initial=0)),
+        "different_pixels": int(np.count_nonzero(difference.any(axis=-1))),
+    }

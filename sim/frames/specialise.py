@@ -1,0 +1,236 @@
+"""Specialisation: the smallest pipeline that draws given scenes, and the reason of each reduction."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
+from itertools import accumulate
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import PreparedFrame, prepare
+from blysk.golden.number.unit_vector import values
+from blysk.golden.pipeline import Design
+from blysk.golden.presets import preset
+from blysk.golden.reference.scene import Scene
+from blysk.hdl.emit.cost import Cost, cost_of
+from blysk.hdl.pipeline import ShadingPipelineUnit
+
+__all__ = ["Reduction", "Specialisation", "specialise"]
+
+
+class Reduction(NamedTuple):
+    """A part of a pipeline that its scenes do not need.
+
+    Parameters
+    ----------
+    reason : str
+        What is left out, and why: one line.
+    changes : dict
+        Fields of `Design` without it; of a field that is itself a record, those of its fields.
+    """
+
+    reason: str
+    changes: dict[str, Any]
+
+
+def _without(design: Design, reduction: Reduction) -> Design:
+    changes = {
+        name: replace(getattr(design, name), **value) if isinstance(value, dict) else value
+        for name, value in reduction.changes.items()
+    }
+    return replace(design, **changes)
+
+
+@dataclass(frozen=True)
+class Specialisation:
+    """A pipeline for a scene, or for the frames of a turntable, beside the full one.
+
+    Parameters
+    ----------
+    full : Design
+        The pipeline with every part.
+    reductions : tuple of Reduction
+        The parts that the scenes do not need.
+    scenes : tuple of Scene
+        The scenes for `design`: without lights that give none, and with equal materials merged.
+    """
+
+    full: Design
+    reductions: tuple[Reduction, ...]
+    scenes: tuple[Scene, ...]
+
+    @cached_property
+    def design(self) -> Design:
+        """The smallest pipeline."""
+        return reduce(_without, self.reductions, self.full)
+
+    def costs(self) -> tuple[Cost, tuple[Cost, ...]]:
+        """Cost of the full pipeline, and of that without the first part, the first two, and so on."""
+        designs = accumulate(self.reductions, _without, initial=self.full)
+        costs = [cost_of(ShadingPipelineUnit(design)) for design in designs]
+        return costs[0], tuple(costs[1:])
+
+
+def specialise(
+    scenes: Scene | Sequence[Scene], full: Design | None = None, *, exact: bool = True
+) -> Specialisation:
+    """The smallest pipeline for a scene: every part of it is used.
+
+    Left out are: lights that light nothing; the specular path, where no span has specular light; the
+    highlight gate, where there is nothing to gate; the memory of materials, for equal ones; the PROM, for one
+    exponent; two of three channels, where all colours are grey; and the upper bits of coordinates and
+    lengths. No word of the arithmetic changes its width, so that no pixel does. If not ``exact``, the chord
+    method also has fewer terms in its polynomial where all spans are narrow, and fewer bits in its
+    differences where all are short: its error bound stays, its pixels may change.
+
+    Parameters
+    ----------
+    scenes : Scene or sequence of Scene
+        One scene, or several that differ in the camera.
+    full : Design, optional
+        Method and model, with as many lights and materials as the scene. By default, the chord method with a
+        highlight gate.
+    exact : bool
+        Whether the pixels must be those of the full pipeline to the bit.
+
+    Raises
+    ------
+    ValueError
+        If the scene has more lights or other materials than the full pipeline, or a term is brighter than 8.
+    """
+    scenes = (scenes,) if isinstance(scenes, Scene) else tuple(scenes)
+    if full is None:
+        lights, materials = max(len(scenes[0].lights), 1), len(scenes[0].materials)
+        full = preset("chord", lights=lights, materials=materials, gate=True)
+    scenes, unlit = _without_dark_lights(scenes, full)
+    scenes, merged = _without_equal_materials(scenes, full)
+    reductions = [*unlit, *merged]
+    design = Specialisation(full, tuple(reductions), scenes).design
+    constants = _constants(scenes[0], design.lights)
+    prepared = [prepare(scene, design) for scene in scenes]
+    reductions += _without_highlights(design, prepared, constants)
+    reductions += _with_fixed_values(constants, reductions)
+    longest = max(int(frame.spans.length.max(initial=0)) for frame in prepared)
+    reductions += _with_fewer_bits(full, scenes[0], longest)
+    if not exact and design.method == "chord" and design.lights:
+        reductions += _with_shorter_words(prepared, longest)
+    return Specialisation(full, tuple(reductions), scenes)
+
+
+def _constants(scene: Scene, lights: int | None) -> list[FrameConstants]:
+    return [FrameConstants.of(scene, lights, index=index) for index in range(len(scene.materials))]
+
+
+def _without_dark_lights(
+    scenes: tuple[Scene, ...], full: Design
+) -> tuple[tuple[Scene, ...], list[Reduction]]:
+    constants = _constants(scenes[0], full.lights)
+    bright = np.any([of.diffuse | of.specular for of in constants], axis=(0, 2))
+    # With values, spans are cut by every light's, dark or not.
+    if bright.all() or (full.takes_values and bright.any()):
+        return scenes, []
+    count = int(np.count_nonzero(bright))
+    kept = tuple(light for light, lit in zip(scenes[0].lights, bright, strict=False) if lit)
+    scenes = tuple(replace(scene, lights=kept) for scene in scenes)
+    if count:
+        reason = f"{full.lights - count} of {full.lights} lights: they light nothing"
+        return scenes, [Reduction(reason, {"lights": count})]
+    nothing = {"lights": 0, "specular": None, "gate": False}
+    return scenes, [Reduction("no light path: no light lights anything", nothing)]
+
+
+def _without_equal_materials(
+    scenes: tuple[Scene, ...], full: Design
+) -> tuple[tuple[Scene, ...], list[Reduction]]:
+    keys = [tuple(of.writes()["data"].tolist()) for of in _constants(scenes[0], None)]
+    first: dict[tuple, int] = {}
+    index = np.array([first.setdefault(key, len(first)) for key in keys])
+    if len(first) >= full.materials:
+        return scenes, []
+    used = [scenes[0].materials[keys.index(key)] for key in first]
+    scenes = tuple(
+        replace(
+            scene,
+            mesh=replace(scene.mesh, material=index[scene.mesh.material]),
+            material=used if len(used) > 1 else used[0],
+        )
+        for scene in scenes
+    )
+    what = "no memory of materials" if len(used) == 1 else "a smaller memory of materials"
+    reason = f"{what}: {len(used)} of {full.materials} differ"
+    return scenes, [Reduction(reason, {"materials": len(used)})]
+
+
+def _without_highlights(
+    design: Design, prepared: Sequence[PreparedFrame], constants: Sequence[FrameConstants]
+) -> list[Reduction]:
+    if design.specular is None or not design.lights:
+        return []
+    nothing = {"specular": None, "gate": False}
+    if not any(of.specular.any() for of in constants):
+        return [Reduction("no specular path: every k_s is 0", nothing)]
+    if not design.interpolator.serves_gate:
+        return []
+    lit = np.concatenate([design.lit_spans(frame.spans, constants) for frame in prepared])
+    shown = np.array([of.specular.any(axis=-1) for of in constants])
+    material = np.concatenate([frame.spans.material for frame in prepared])
+    if not (lit & shown[material]).any():
+        return [Reduction("no specular path: the gate proves that no span holds a highlight", nothing)]
+    if design.gate and lit.all():
+        return [Reduction("no highlight gate: every span may hold a highlight", {"gate": False})]
+    return []
+
+
+def _with_fixed_values(
+    constants: Sequence[FrameConstants], reductions: Sequence[Reduction]
+) -> list[Reduction]:
+    """One exponent, where specular light is left, and one channel."""
+    found = []
+    exponents = {of.exponent for of in constants}
+    has_specular = all(reduction.changes.get("specular", 0) is not None for reduction in reductions)
+    if len(exponents) == 1 and has_specular:
+        (exponent,) = exponents
+        reason = f"exponent fixed at {exponent}: PROM folded"
+        found.append(Reduction(reason, {"build": {"exponent": exponent}}))
+    colors = [np.reshape(x, (-1, 3)) for of in constants for x in (of.ambient, of.diffuse, of.specular)]
+    if np.all(np.ptp(np.concatenate(colors), axis=1) == 0):
+        found.append(Reduction("one channel of three: every colour is grey", {"grey": True}))
+    return found
+
+
+def _with_fewer_bits(full: Design, scene: Scene, longest: int) -> list[Reduction]:
+    """Coordinates of the picture's size, and lengths up to the longest span's."""
+    found = []
+    for name, side, what in (("x_bits", scene.width, "columns"), ("y_bits", scene.height, "rows")):
+        bits = max(int(side - 1).bit_length(), 1)
+        if bits < getattr(full, name):
+            found.append(Reduction(f"{name[0]} in {bits} bits: {side} {what}", {name: bits}))
+    bits = max(longest.bit_length(), 2)
+    if bits < full.length_bits:
+        reason = f"length in {bits} bits: the longest span has {longest} pixels"
+        found.append(Reduction(reason, {"length_bits": bits}))
+    return found
+
+
+def _with_shorter_words(prepared: Sequence[PreparedFrame], longest: int) -> list[Reduction]:
+    """What narrow and short spans allow the chord method."""
+    found = []
+    left, right = (
+        values(np.concatenate([getattr(frame.spans, name) for frame in prepared]))
+        for name in ("normal_left", "normal_right")
+    )
+    half = np.linalg.norm(left - right, axis=-1).max(initial=0) / 2
+    angle = float(np.degrees(2 * np.arcsin(min(half, 1.0))))
+    # A code may be off by some thousandths of a degree.
+    terms = [terms for terms, widest in ChordSetup.ANGLES.items() if angle < widest - 0.01]
+    if terms and min(terms) < 3:
+        reason = f"polynomial of {min(terms)} in place of 3 terms: the widest span has {angle:.2f} degrees"
+        found.append(Reduction(reason, {"interpolator": {"terms": min(terms)}}))
+    bits = min(bits for bits in range(36, 47, 2) if longest <= ChordSetup(fraction_bits=bits).longest)
+    if bits < 46:
+        reason = f"differences of {bits} in place of 46 fraction bits: the longest span has {longest} pixels"
+        found.append(Reduction(reason, {"interpolator": {"fraction_bits": bits}}))
+    return found

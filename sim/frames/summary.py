@@ -1,0 +1,115 @@
+"""Figures of frames as text, line by line."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from blysk.sim.frames.figures import ERRORS
+
+__all__ = ["animation_lines", "frame_lines", "specialisation_lines"]
+
+_COUNTS = {
+    "repaired_normals": "stored normals repaired",
+    "dropped_faces": "faces without area dropped",
+    "degenerate_triangles": "triangles without area on the screen",
+    "culled_triangles": "back faces left out",
+    "outside_triangles": "triangles outside the picture",
+    "uncovered_triangles": "triangles that hold no pixel centre",
+    "repaired_span_normals": "span ends whose normal was 0",
+    "hidden_spans": "spans wholly hidden, left out",
+    "cut_spans": "spans cut to the range of the method",
+    "out_of_range_spans": "spans out of range in the pipeline",
+}
+
+
+def _line(name: str, text: str) -> str:
+    return f"{name:<12}{text}"
+
+
+def frame_lines(figures: Mapping[str, Any]) -> Iterator[str]:
+    """Lines of a frame's figures: those of `frame_figures`, with the mesh's name and its own counts."""
+    materials = f", materials {figures['materials']}" if figures["materials"] > 1 else ""
+    yield _line("mesh", f"{figures['mesh']}, {figures['width']}x{figures['height']}")
+    model = f"{figures['model']}, exponent {figures['exponent']}, lights {figures['lights']}{materials}"
+    yield _line("model", model)
+    yield _line("method", figures["method"])
+    yield _line("engine", figures["engine"])
+    yield _line("triangles", f"{figures['triangles']:,}")
+    yield _line("spans", f"{figures['spans']:,}")
+    yield from _pixel_lines(figures)
+    if figures["pixels"]:
+        yield _line("simulated", f"{figures['simulated_pixels_per_second']:,.0f} pixels a second")
+    yield from _error_lines(figures)
+    if figures["visible_pixels"]:
+        published = f"MNSE as published {figures['mnse_published']:.3g}"
+        share = f"defined for {figures['mnse_published_share']:.1%}"
+        yield _line("NMSE", f"{figures['nmse']:.3g} ({published}, {share})")
+    yield from _count_lines(figures["counts"])
+    yield _second_line(figures["seconds"])
+
+
+def animation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
+    """Lines of an animation's figures: those of `animation_figures`, with the mesh's name and counts."""
+    size = f"{figures['width']}x{figures['height']}"
+    rate = figures["frame_count"] / figures["seconds"]["frames"]
+    yield _line("mesh", f"{figures['mesh']}, {size}, {figures['triangles']:,} triangles")
+    yield _line("model", f"{figures['model']}, exponent {figures['exponent']}, lights {figures['lights']}")
+    yield _line("method", figures["method"])
+    yield _line("engine", f"{figures['engine']}, {figures['workers']}")
+    yield _line("turntable", f"{figures['frame_count']:,} frames, {rate:.2f} a second")
+    yield from _pixel_lines(figures)
+    yield _line("errors", "the worst of every frame")
+    yield from _error_lines(figures)
+    yield from _count_lines(figures["counts"])
+    yield _second_line(figures["seconds"])
+
+
+def specialisation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
+    """Lines of `saving_figures`, with the cycles and `difference_figures` where both frames are known."""
+    for reduction in figures["reductions"]:
+        saves = [f"{count:,} {name.replace('_', ' ')}" for name, count in reduction["saves"].items() if count]
+        yield _line("left out", f"{reduction['reason']}; saves {', '.join(saves) or 'nothing'}")
+    full = figures["full"]
+    parts = [
+        f"{count:,} of {full[name]:,} {name.replace('_', ' ')}"
+        for name, count in figures["specialised"].items()
+    ]
+    if "full_cycles" in figures:
+        parts.append(f"{figures['cycles']:,} of {figures['full_cycles']:,} cycles")
+    yield _line("specialised", ", ".join(parts))
+    if "full_cycles" in figures:
+        text = "the frame is that of the full pipeline, to the bit"
+        if figures["different_pixels"]:
+            text = (
+                f"{figures['different_pixels']:,} pixels differ from the full pipeline's, by at most "
+                f"{figures['largest_difference']} of 255"
+            )
+        yield _line("", text)
+
+
+def _pixel_lines(figures: Mapping[str, Any]) -> Iterator[str]:
+    yield _line("pixels", f"{figures['pixels']:,} shaded, {figures['visible_pixels']:,} visible")
+    rate = f", {figures['cycles_per_pixel']:.3f} a pixel" if figures["pixels"] else ""
+    yield _line("cycles", f"{figures['cycles']:,}{rate}")
+
+
+def _error_lines(figures: Mapping[str, Any]) -> Iterator[str]:
+    if not figures["visible_pixels"]:
+        yield _line("error", "none, no pixel shows the surface")
+        return
+    yield _line("error, LSB", f"{'largest':>9}{'99.9 %':>9}{'RMSE':>9}{'PSNR, dB':>10}   against")
+    for name, against in ERRORS.items():
+        error = figures[f"{name}_error"]
+        yield (
+            f"  {name:<10}{error['max_lsb']:>9.3f}{error['p999_lsb']:>9.3f}{error['rmse_lsb']:>9.3f}"
+            f"{error['psnr_db']:>10.2f}   {against}"
+        )
+
+
+def _count_lines(counts: Mapping[str, int]) -> Iterator[str]:
+    for key, text in _COUNTS.items():
+        if counts[key]:
+            yield _line("counted", f"{text}: {counts[key]:,}")
+
+
+def _second_line(seconds: Mapping[str, float]) -> str:
+    return _line("seconds", ", ".join(f"{name} {value:.2f}" for name, value in seconds.items()))
