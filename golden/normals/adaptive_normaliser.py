@@ -15,42 +15,41 @@ __all__ = ["AdaptiveNormaliser"]
 
 @dataclass(frozen=True)
 class AdaptiveNormaliser:
-    """Normals of a span of m pixels by linear interpolation over ``2^k`` equal arcs of its great circle.
+    """Normals of a span of m pixels, by linear interpolation over ``2^k`` equal arcs of its great circle.
 
-    **Error block.** Over an arc a chord is too short by its sagitta at most:
+    **Number of levels.** Over an arc a chord is too short by its sagitta at most:
     ``d_k = 1 - cos(psi/2^(k+1))`` for ``2^k`` segments, and ``d_(k+1) = d_k/4`` nearly. With
-    ``q = (1 - cos psi)/4``, as the bisection unit gives it, ``d_k <= (q + q^2) / 4^k``: one square, then
-    wired shifts. The right side is over by at most 6.7 % (k = 0 at 90 degrees), never under, so that the
-    first k with ``(q + q^2) / 4^k <= threshold`` keeps its word. `depth` is the k of 90 degrees.
+    ``q = (1 - cos psi)/4``, which the bisection unit gives, ``d_k <= (q + q^2) / 4^k``: one square, then
+    wired shifts. The right side is too large by at most 6.7 % (k = 0 at 90 degrees), and never too small. k
+    is the first with ``(q + q^2) / 4^k <= threshold``; `depth` is that of 90 degrees.
 
     **Segment ends** ``E_j`` at ``psi j / 2^k``, from the bisection unit, level by level.
 
     **Linear interpolators.** Pixel i lies at ``i 2^k / (m - 1)`` of a segment's length. The integer part is
-    its segment j, exact by integer arithmetic, whatever m; the first pixel of a segment starts at
+    its segment j, exact by integer arithmetic for every m. The first pixel of a segment starts at
     ``E_j + phi (E_(j+1) - E_j)``, phi its fractional part, and every further one adds
-    ``(E_(j+1) - E_j) 2^k/(m - 1)``. The last pixel is a segment of its own, so that both ends come out as
-    they went in.
+    ``(E_(j+1) - E_j) 2^k/(m - 1)``. The last pixel is a segment of its own, so that both ends are exact.
 
-    The documents extrapolate instead: ``N_l + g (N_r - N_l)`` stands for the pixel at the next power of two,
-    g = 2^p/(m - 1), so that segments are whole pixels and divisions shifts. That is no variant here, because
-    it does not fit the bisection unit. The new end is not of unit length (up to 1.03 for 10 degrees, 1.47
-    for 45) and does not fit the word; `Renormaliser` has eight multipliers, this whole unit three; and 90
-    degrees become up to 116, too wide to bisect. Even normalised it stands on the chord's continuation, not
-    where the great circle has its pixel, so that the last pixel misses N_r, by up to 0.00015 degrees for 1,
-    0.15 for 10 and 8.2 for 45. Here it misses by nothing.
+    The published design extrapolates instead: ``N_l + g (N_r - N_l)`` is the normal of the pixel at the next
+    power of two, ``g = 2^p/(m - 1)``, so that segments are whole pixels and divisions are shifts. It is no
+    variant here, for these reasons. The new end is not of unit length (up to 1.03 for 10 degrees, 1.47 for
+    45), so the word of a component does not hold it; a `Renormaliser` has eight multipliers, this whole unit
+    three. 90 degrees become up to 116, out of the bisection's range. Even normalised, the new end lies on the
+    continuation of the chord, not at its pixel's position on the great circle: the last pixel misses N_r, by
+    up to 0.00015 degrees for 1, 0.15 for 10 and 8.2 for 45. Here it misses by nothing.
 
     A span wider than the bisection's `max_angle` is flagged and not divided: its normals lie on the straight
-    line between its ends (for ends further apart than 1 in a component, near the left one), and mean nothing
-    but at its first and last pixel. Ends must be of unit length, to 1/256 or so: a middle normal is made
-    as long as one, so that the normals between ends that are not are off by as much. An end of length 0
-    counts as 90 degrees away, and is not flagged.
+    line between its ends (for ends further apart than 1 in a component, near the left one), and only its
+    first and last pixel are defined. Ends must be of unit length, to 1/256 or so: a middle normal is made as
+    long as one, so that the normals between other ends are off by as much. An end of length 0 counts as 90
+    degrees away, and is not flagged.
 
     ================ ========== ==================================================================
     word             format     why
     ================ ========== ==================================================================
     q + q^2          SQ(2, 20)  a threshold of 2^-14 has 6 bits
     E_j              SQ(1, 17)  the bisection's results
-    E_(j+1) - E_j    SQ(1, 17)  operand; saturates, which a threshold up to 1/8 keeps from happening
+    E_(j+1) - E_j    SQ(1, 17)  operand; saturates; with a threshold up to 1/8 it never has to
     1/(m - 1)        UQ(0, 17)  table, with the shift of `reciprocal_address`
     phi              UQ(0, 17)  operand; cut
     N                SQ(2, 32)  cut; half a step of the result is added at the start; never wraps
@@ -60,10 +59,10 @@ class AdaptiveNormaliser:
 
     Arithmetic error of a component against straight lines between the exact ends, at most `error`: that of
     the ends (`end_error`); a difference of ends, at most ``sqrt(8.1 threshold)`` and 0.77, times the 2^-17 of
-    phi and of the reciprocal; drift; the last rounding. Of the ends, the bisection's model error makes them
-    too long or too short, and the next level, which reads their dot product, hands on ``1/(1 + cos)`` of
-    that, 0.586 at most; its arithmetic errors add up, in all levels by a factor of 1.12 at most. The first
-    and the last normal of a span are exact.
+    phi and of the reciprocal; drift; the last rounding. Of the ends: the bisection's model error makes them
+    too long or too short, and the next level, which reads their dot product, keeps ``1/(1 + cos)`` of that,
+    at most 0.586; its arithmetic errors add up, in all levels by a factor of at most 1.12. The first and the
+    last normal of a span are exact.
 
     Model error against the great circle: the length is short by at most ``threshold`` (and the 2^-19 of the
     rounding of q), never long; the direction is off by at most ``0.017 theta^3`` for a segment of angle
@@ -74,14 +73,14 @@ class AdaptiveNormaliser:
     threshold : float
         Largest length error, 2^-14 to 1/8; cut to 20 fraction bits.
     bisection : Bisection
-        Factor of the bisection unit.
+        Model of the bisection unit.
 
     Raises
     ------
     ValueError
         If the threshold is out of range.
 
-    Source: [T] 2.1, figure 2.7, appendix Г; blocks.md, "Adaptive normaliser".
+    Source: docs/theory/interpolation.md#adaptive-normaliser; [T] 2.1, figure 2.7, appendix Г.
     """
 
     threshold: float = 2.0**-10
@@ -99,7 +98,7 @@ class AdaptiveNormaliser:
 
     @property
     def limits(self) -> Fixed:
-        """``threshold 4^k`` for k under `depth`: each that ``q + q^2`` exceeds asks for one more level."""
+        """Limits ``threshold 4^k``, k under `depth`; each that ``q + q^2`` exceeds asks for a level."""
         code = int(np.floor(np.ldexp(self.threshold, self.SAGITTA_FORMAT.fraction_bits)))
         q = (1 - np.cos(np.radians(self.bisection.max_angle))) / 4
         largest = (q + q * q) / self.SAGITTA_FORMAT.step
@@ -114,11 +113,11 @@ class AdaptiveNormaliser:
         return len(self.limits.codes)
 
     def end_error(self, levels: int, first_step: bool) -> float:
-        """Bound on the error of a component of a segment end, in a span that asks for so many levels."""
+        """Bound on the error of a component of a segment end, in a span of so many levels."""
         p = self.bisection
         length = 0.0
         for level in range(1, levels + 1):
-            # Widest span of this level: a segment's angle, doubled back to it.
+            # Widest span of this level: the angle of a segment, doubled once for each level that follows.
             widest = np.degrees(np.sqrt(8.1 * self.threshold)) * 2.0 ** (levels - level + 1)
             first = first_step and level == 1
             length = max(length, 2 * p.model_error(first, widest) + 0.586 * length)
@@ -134,14 +133,19 @@ class AdaptiveNormaliser:
         return self.end_error(levels, first_step) + difference * 2.0**-16 + 4096 * 2.0**-32 + 2.0**-18
 
     def levels(self, one_minus_cosine: Fixed, out_of_range: np.ndarray) -> np.ndarray:
-        """Number of levels k of spans, from what the bisection unit says of their ends.
+        """Number of levels k of spans, from the bisection unit's results for their ends.
 
         Parameters
         ----------
         one_minus_cosine : Fixed, any shape, SQ(2, 17)
             ``1 - cos psi``.
-        wide : bool array, same shape
+        out_of_range : bool array, same shape
             Whether the span is too wide to be divided.
+
+        Returns
+        -------
+        int array, same shape
+            0 to `depth`; 0 where ``out_of_range``.
         """
         operand = one_minus_cosine.saturate(COMPONENT)
         square = (operand * operand).scale(-4).truncate(20)
@@ -152,7 +156,7 @@ class AdaptiveNormaliser:
     def compute(
         self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
     ) -> tuple[Fixed, np.ndarray, np.ndarray]:
-        """Bit-true normals, in raster order.
+        """Bit-accurate normals, in raster order.
 
         Parameters
         ----------
@@ -165,7 +169,7 @@ class AdaptiveNormaliser:
         -------
         normal : Fixed, shape (pixels, 3), SQ(1, 17)
             Normals of all spans, one after the other.
-        wide : bool array, shape (spans,)
+        out_of_range : bool array, shape (spans,)
             Whether the span is wider than the bisection's `max_angle`.
         levels : int array, shape (spans,)
             k.
@@ -188,18 +192,18 @@ class AdaptiveNormaliser:
             middle, _, _ = self.bisection.compute(Fixed(COMPONENT, before), Fixed(COMPONENT, after))
             ends[active, half :: 2 * half] = middle.codes
 
-        span, segment, place, index = self.places(length, levels)
+        span, segment, offset, index = self.positions(length, levels)
         spacing = whole >> levels[span]
         left = Fixed(COMPONENT, ends[span, segment * spacing])
         right = Fixed(COMPONENT, ends[span, np.minimum((segment + 1) * spacing, whole)])
         difference = (right - left).saturate(COMPONENT)
-        normal = self.walk(left, difference, length, levels, span, place, index)
+        normal = self.walk(left, difference, length, levels, span, offset, index)
         return normal.truncate(COMPONENT.fraction_bits).saturate(COMPONENT), out_of_range, levels
 
-    def places(
+    def positions(
         self, length: np.ndarray, levels: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Where the pixels of spans lie on their segments, in raster order.
+        """Positions of pixels on the segments of their spans, in raster order.
 
         Parameters
         ----------
@@ -210,10 +214,10 @@ class AdaptiveNormaliser:
         -------
         span, segment : int array, shape (pixels,)
             Span of each pixel, and j, 0 to ``2^k``.
-        place : int array, shape (pixels,)
-            Of the first pixel of the segment: ``phi (m - 1)``.
+        offset : int array, shape (pixels,)
+            ``phi (m - 1)`` of the first pixel of the segment.
         index : int array, shape (pixels,)
-            Pixels since that one.
+            Index of the pixel in its segment, from 0 on.
         """
         span, pixel = pixels_of(length)
         steps, level = np.maximum(length - 1, 1)[span], levels[span]
@@ -228,17 +232,17 @@ class AdaptiveNormaliser:
         length: np.ndarray,
         levels: np.ndarray,
         span: np.ndarray,
-        place: np.ndarray,
+        offset: np.ndarray,
         index: np.ndarray,
     ) -> Fixed:
-        """Bit-true sums of pixels along their segments.
+        """Bit-accurate sums of pixels along their segments.
 
         Parameters
         ----------
         left, difference : Fixed, shape (pixels, components), SQ(1, 17)
             ``E_j``, and ``E_(j+1) - E_j``.
-        length, levels, span, place, index
-            Of `places`.
+        length, levels, span, offset, index
+            As for `positions`, and its results.
 
         Returns
         -------
@@ -246,7 +250,7 @@ class AdaptiveNormaliser:
             With half a step of the result added.
         """
         reciprocal, shift = (x[span] for x in self.reciprocal(np.maximum(length - 1, 1)))
-        phi = Fixed(COMPONENT, ((place * reciprocal) << 1 >> shift)[:, np.newaxis])
+        phi = Fixed(COMPONENT, ((offset * reciprocal) << 1 >> shift)[:, np.newaxis])
         start = left + (difference * phi).truncate(32) + self.half_step
         slope = (difference * Fixed(COMPONENT, reciprocal[:, np.newaxis])).codes
         slope = Fixed(SQ(2, 34), slope >> np.maximum(shift - 1 - levels[span], 0)[:, np.newaxis]).truncate(32)

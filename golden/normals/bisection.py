@@ -12,34 +12,33 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 
 __all__ = ["Bisection"]
 
-_PRINTED = {1: (0.64, -0.07), 2: (0.681, -0.119, 0.014)}
-"""[T]: ``1/sqrt(2 + z)`` in ascending powers of z, by degree."""
+_PUBLISHED = {1: (0.64, -0.07), 2: (0.681, -0.119, 0.014)}
+"""Coefficients of ``1/sqrt(2 + z)`` as [T] prints them, in ascending powers of z, by degree."""
 
-_PRINTED_FIRST_STEP = (0.707, -0.341, 0.193, -0.059)
-"""[T]: ``h(r)`` in ascending powers of r."""
+_PUBLISHED_FIRST_STEP = (0.707, -0.341, 0.193, -0.059)
+"""Coefficients of ``h(r)`` as [T] prints them, in ascending powers of r."""
 
 
 @dataclass(frozen=True)
 class Bisection:
-    """``N = (N_a + N_b) / sqrt(2 + z)`` with ``z = 2 r``, ``r = N_a . N_b``.
+    """Normal half-way between two: ``N = (N_a + N_b) / sqrt(2 + z)``, ``z = 2 r``, ``r = N_a . N_b``.
 
-    Computed as ``N = (N_a + N_b)/2 + e (N_a + N_b)``, ``e = 1/sqrt(2 + z) - 1/2``, so that a word of e holds
-    its small part alone. e is one of two polynomials in Horner's form, chosen by ``u = 1 - r``:
+    Computed as ``N = (N_a + N_b)/2 + e (N_a + N_b)`` with ``e = 1/sqrt(2 + z) - 1/2``, so that a word of e
+    holds its small part alone. ``u = 1 - r`` chooses between two polynomials for e, in Horner's form:
 
-    - to 45 degrees (z in [sqrt 2, 2]): degree 1 or 2 in u, without a constant: exact at angle 0. In
-      numbers.md the variable is ``v = 2 - z = 2 u``, a wired shift;
-    - from 45 to 90 degrees, the first step of a wide span: ``h(r) = 1/sqrt(2 (1 + r))``, the same function,
-      as a cubic in r, fitted where it is used.
+    - up to 45 degrees (z in [sqrt 2, 2]) of degree 1 or 2 in u, without a constant: exact at angle 0;
+    - from 45 to 90 degrees, the first step of a wide span, a cubic in r for the same function, written
+      ``h(r) = 1/sqrt(2 (1 + r))``.
 
-    With ``as_published`` both are polynomials in r with the printed coefficients (those of z doubled once
+    With ``as_published`` both are polynomials in r with the published coefficients (those of z doubled once
     for every power of it).
 
-    A span wider than `max_angle` by more than the rounding of its normals is flagged; its result means
-    nothing.
+    A span wider than `max_angle` by more than the rounding of its normals is flagged; its result is
+    undefined.
 
-    Ends that are no unit vectors: of length ``1 + x`` they give a middle of length ``1 + x/(1 + r)``, so up
-    to 45 degrees a half to 0.59 of the error is left. An end of length 0 is taken for one at 90 degrees:
-    flagged where `max_angle` is 45, else the result is 0.7071 times the other end.
+    Ends of another length: of length ``1 + x`` they give a middle of length ``1 + x/(1 + r)``, so up to 45
+    degrees 0.5 to 0.59 of the error remains. An end of length 0 counts as one at 90 degrees: flagged where
+    `max_angle` is 45; else the result is 0.7071 times the other end.
 
     ============= ========== ================================================================
     word          format     why
@@ -48,29 +47,29 @@ class Bisection:
     u or r        SQ(1, 17)  operand of the multiplier, 18 bits
     c, sums       SQ(0, 18)  18 bits; under 0.35 where nothing is flagged; wrap
     e             SQ(-1, 19) 18 bits; at most 0.0412 at 45 degrees, 0.2072 at 90; wraps
-    N             SQ(1, 17)  so that a unit can bisect its own results; saturates
+    N             SQ(1, 17)  so that the unit can bisect its own results; saturates
     ============= ========== ================================================================
 
-    Both ends are scaled by one factor, so its error changes the length of N, never its direction
-    (but where a component saturates at 1).
+    One factor scales both ends. Its error changes the length of N and not its direction, unless a component
+    saturates at 1.
 
-    Model error of the factor, with the coefficients of the words above (`model_error`), and what it is as a
+    Model error of the factor, with the coefficients in the words above (`model_error`), and the same as a
     relative error of the length:
 
-    =================== ================ ==================== ================ ====================
-    variant             to 45 degrees    relative             45 to 90 degrees relative
-    =================== ================ ==================== ================ ====================
-    degree 1            8.3e-4           0.16 %, 0 at 0       1.1e-4           0.02 %
-    degree 2            2.5e-5           0.005 %, 0 at 0      1.1e-4           0.02 %
-    documented degree 1 1.1e-3           0.22 %, 0 at 0       6.2e-4           0.09 %
-    documented degree 2 1.0e-3           0.20 %, 0.20 % at 0  6.2e-4           0.09 %
-    =================== ================ ==================== ================ ====================
+    ====================== ================ ==================== ================ ====================
+    variant                to 45 degrees    relative             45 to 90 degrees relative
+    ====================== ================ ==================== ================ ====================
+    degree 1               8.3e-4           0.16 %, 0 at 0       1.1e-4           0.02 %
+    degree 2               2.5e-5           0.005 %, 0 at 0      1.1e-4           0.02 %
+    degree 1, as published 1.1e-3           0.22 %, 0 at 0       6.2e-4           0.09 %
+    degree 2, as published 1.0e-3           0.20 %, 0.20 % at 0  6.2e-4           0.09 %
+    ====================== ================ ==================== ================ ====================
 
     Arithmetic error of a component against the same polynomial (`arithmetic_error`): a component of
-    ``N_a + N_b``, at most 2, times the error of e; that is u rounded to 17 bits (2^-18, and as much again for
-    r, which is taken from it) times the slope of e (0.1585 at 45 degrees, 0.3536 at 90), the roundings of
-    the sums (2^-19 times u, or times r + r^2) and of e (2^-20); the half sum cut by up to 2^-18 times 2 e;
-    the product cut (2^-21); the result rounded (2^-18).
+    ``N_a + N_b``, at most 2, times the error of e; the half sum, cut by up to 2^-18, times 2 e; the product,
+    cut (2^-21); the result, rounded (2^-18). The error of e is that of u, rounded to 17 bits (2^-18, and as
+    much again for r, which is taken from it), times the slope of e (0.1585 at 45 degrees, 0.3536 at 90); the
+    roundings of the sums (2^-19 times u, or times r + r^2); and its own (2^-20).
 
     Parameters
     ----------
@@ -79,14 +78,14 @@ class Bisection:
     max_angle : int
         90, or 45 for a unit without the first step, which saves its multiplications.
     as_published : bool
-        Take the coefficients printed in [T].
+        Take the coefficients of [T].
 
     Raises
     ------
     ValueError
         If a parameter is none of those.
 
-    Source: [T] 2.1, figure 2.6; blocks.md; numbers.md, "Polynomials".
+    Source: docs/theory/interpolation.md#bisection; [T] 2.1, figure 2.6.
     """
 
     degree: int = 2
@@ -109,7 +108,7 @@ class Bisection:
 
     @property
     def steps(self) -> int:
-        """Multiplications of Horner's form: the larger degree of the two polynomials."""
+        """Multiplications of Horner's form, the larger degree of the two polynomials."""
         return self.degree if self.max_angle == 45 else 3
 
     @staticmethod
@@ -128,22 +127,19 @@ class Bisection:
         return self._limit(self.max_angle)
 
     def reads_cosine(self, first_step: bool) -> bool:
-        """Whether a polynomial is one in r (else in u)."""
+        """Whether a polynomial is one in r, not in u."""
         return first_step or self.as_published
 
     @cached_property
     def _polynomials(self) -> tuple[tuple[Fixed, Fixed], tuple[Fixed, Fixed]]:
-        # The hardware reads u and r in units of `ONE_SQUARED`.
+        # The words of u and r are u and r times `ONE_SQUARED`.
         one = ONE_SQUARED.values
-        narrow, out_of_range = self.widest_narrow.values, self._limit(90).values
+        narrow, widest = self.widest_narrow.values, self._limit(90).values
         if self.as_published:
-            printed = [
-                [c * 2.0**power for power, c in enumerate(_PRINTED[self.degree])],
-                _PRINTED_FIRST_STEP,
-            ]
+            of_cosine = [c * 2.0**power for power, c in enumerate(_PUBLISHED[self.degree])]
             fits = [
                 (c[0] - 0.5, [c[power] / one**power for power in range(1, len(c))])
-                for c in map(list, printed)
+                for c in (of_cosine, _PUBLISHED_FIRST_STEP)
             ]
         else:
             codes = minimax_quantised(
@@ -155,7 +151,7 @@ class Bisection:
             )
             first = minimax_quantised(
                 lambda r: half_angle_factor(1 - r / one),
-                one - out_of_range,
+                one - widest,
                 one - narrow,
                 {0: UQ(0, 19), 1: self.SUM_FORMAT, 2: self.SUM_FORMAT, 3: self.SUM_FORMAT},
             )
@@ -175,7 +171,7 @@ class Bisection:
         Parameters
         ----------
         first_step : bool
-            Of the polynomial for 45 to 90 degrees, else of that for spans up to 45 degrees.
+            Whether of the polynomial for 45 to 90 degrees, or of that for spans up to 45 degrees.
 
         Returns
         -------
@@ -191,6 +187,13 @@ class Bisection:
         """Largest error of the factor ``1/2 + e`` as a polynomial in exact arithmetic.
 
         Over the polynomial's domain, or its part up to ``widest`` degrees.
+
+        Parameters
+        ----------
+        first_step : bool
+            As for `polynomial`.
+        widest : float
+            Widest span in degrees.
         """
         one = ONE_SQUARED.values.item()
         low, high = (45, float(np.clip(widest, 45, 90))) if first_step else (0, min(widest, 45.0))
@@ -207,7 +210,7 @@ class Bisection:
         cosine = self.reads_cosine(first_step)
         slope, e = (0.3536, 0.2072) if first_step else (0.1585, 0.0412)
         x = (0.7072 if first_step else 1.0) if cosine else 0.2930
-        # The slopes of the printed polynomials differ from the function's by less than a fifth.
+        # The slopes of the published polynomials differ from the function's by less than a fifth.
         slope *= 1.2 if self.as_published else 1.0
         factor = 2.0**-18 * (1 + cosine) * slope + 2.0**-19 * (x + x * x) + 2.0**-20
         return 2 * factor + 2.0**-18 * 2 * e + 2.0**-21 + 2.0**-18
@@ -217,7 +220,7 @@ class Bisection:
         return 2 * self.model_error(first_step) + self.arithmetic_error(first_step)
 
     def factor(self, u: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Bit-true ``e`` and flag.
+        """Bit-accurate ``e`` and flag.
 
         Parameters
         ----------
@@ -228,28 +231,28 @@ class Bisection:
         -------
         e : Fixed, same shape, SQ(-1, 19)
             ``1/sqrt(2 + z) - 1/2``.
-        wide : bool array, same shape
+        out_of_range : bool array, same shape
             Whether the span is wider than `max_angle`.
         """
         first_step = (u > self.widest_narrow) & (self.max_angle == 90)
         cosine = (self.ONE - u).saturate(self.OPERAND_FORMAT)
-        (narrow_constant, narrow), (wide_constant, out_of_range) = map(self.polynomial, (False, True))
+        (constant, rest), (first_constant, first_rest) = map(self.polynomial, (False, True))
         x = np.where(first_step | self.as_published, cosine.codes, u.saturate(self.OPERAND_FORMAT).codes)
         x = Fixed(self.OPERAND_FORMAT, x)
 
         def coefficient(power: int) -> Fixed:
-            codes = np.where(first_step, out_of_range.codes[power - 1], narrow.codes[power - 1])
+            codes = np.where(first_step, first_rest.codes[power - 1], rest.codes[power - 1])
             return Fixed(self.SUM_FORMAT, codes)
 
         total = coefficient(self.steps)
         for power in range(self.steps - 1, 0, -1):
             total = ((x * total).round_half_up(18) + coefficient(power)).wrap(self.SUM_FORMAT)
-        constant = Fixed(self.FACTOR_FORMAT, np.where(first_step, wide_constant.codes, narrow_constant.codes))
+        constant = Fixed(self.FACTOR_FORMAT, np.where(first_step, first_constant.codes, constant.codes))
         e = ((x * total).round_half_up(19) + constant).wrap(self.FACTOR_FORMAT)
         return e, u > self.widest
 
     def compute(self, normal_a: Fixed, normal_b: Fixed) -> tuple[Fixed, Fixed, np.ndarray]:
-        """Bit-true middle normals.
+        """Bit-accurate middle normals.
 
         Parameters
         ----------
@@ -262,8 +265,8 @@ class Bisection:
             Normals half-way between them.
         one_minus_cosine : Fixed, shape (...), SQ(2, 17)
             ``u``.
-        wide : bool array, shape (...)
-            Whether the two are further apart than `max_angle`: the normal then means nothing.
+        out_of_range : bool array, shape (...)
+            Whether the two are further apart than `max_angle`: the normal is then undefined.
 
         Raises
         ------

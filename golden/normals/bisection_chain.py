@@ -1,4 +1,4 @@
-"""Chain of bisections towards the left end of a span, in closed form ([T] 2.1)."""
+"""Chain of bisections: repeated halving towards the left end of a span, in closed form ([T] 2.1)."""
 
 from dataclasses import dataclass, field
 
@@ -15,7 +15,7 @@ __all__ = ["BisectionChain"]
 
 @dataclass(frozen=True)
 class BisectionChain:
-    """``N_k = (L_k N_l + N_r) / M_k``: the normal at ``psi / 2^k`` from the left end of a span.
+    """Normal at ``psi / 2^k`` from the left end of a span: ``N_k = (L_k N_l + N_r) / M_k``.
 
     ``M_k = 2 M_(k-1) cos(psi/2^k)``, ``L_k = L_(k-1) + M_(k-1)``, ``M_0 = 1``, ``L_0 = 0``. M and L grow as
     2^k, so the unit holds the weights themselves, ``l = L/M`` and ``m = 1/M``. With
@@ -23,9 +23,9 @@ class BisectionChain:
 
     ``l_k = (l_(k-1) + 1) f_k``, ``m_k = m_(k-1) f_k``: no division, and both stay in [0, 1].
 
-    The cosine of half the angle comes from the same factor, ``u = 1 - cos``:
-    ``u_(k+1) = u_k/2 - (1 + cos) e``, so the two normals meet in one dot product, at the start, and in six
-    products, at the end.
+    The cosine of half the angle comes from the same factor: with ``u = 1 - cos``,
+    ``u_(k+1) = u_k/2 - (1 + cos) e``. One dot product of the two normals is needed at the start, and six
+    products at the end.
 
     ============= ========== ================================================================
     word          format     why
@@ -36,11 +36,11 @@ class BisectionChain:
     N             SQ(1, 17)  rounded, saturates
     ============= ========== ================================================================
 
-    Error statement (`error`). An error of f_k reaches l_k times ``l + 1 <= 2`` and m_k times m, and every
-    further step halves what it finds (times f, 1/2 to 0.54 after the first step), so errors do not grow
-    along the chain: `error` follows the recursion with every rounding at its worst. The error of u is halved
-    by each step too, and adds that of e twice at most; it counts in the next factor times the slope 0.1585.
-    Unlike one bisection, the chain can turn its result, as the errors of l and m differ.
+    Error bound (`error`): an error of f_k is multiplied by ``l + 1 <= 2`` in l_k and by m in m_k, and every
+    further step multiplies it by f, 1/2 to 0.54 after the first step: errors do not grow along the chain.
+    `error` follows the recursion with every rounding at its worst. The error of u is halved by each step
+    too, and adds that of e twice at most; the next factor has it times the slope 0.1585. Unlike one
+    bisection, the chain can also change the direction of its result, as the errors of l and m differ.
 
     ===== ============================ ============================
     level bound, to 45 degrees         bound, to 90 degrees
@@ -52,18 +52,18 @@ class BisectionChain:
     15    3.8e-5                       3.9e-5
     ===== ============================ ============================
 
-    With the documented coefficients of degree 2 the errors stay: every factor of a small angle is 0.2 % too
+    With the published coefficients of degree 2 the errors stay: every factor of a small angle is 0.2 % too
     small, and l tends to 0.9973 in place of 1.
 
-    Ends of length ``1 + x`` give normals whose length is off by x/2 to x; an end of length 0 is taken for one
-    at 90 degrees, as in `Bisection`.
+    Ends of length ``1 + x`` give normals whose length is off by x/2 to x. An end of length 0 counts as one at
+    90 degrees, as in `Bisection`.
 
     Parameters
     ----------
     bisection : Bisection
         The factor: degree, widest span, coefficients.
 
-    Source: [T] 2.1; blocks.md, "Bisection unit".
+    Source: docs/theory/interpolation.md#bisection; [T] 2.1.
     """
 
     bisection: Bisection = field(default_factory=Bisection)
@@ -80,7 +80,7 @@ class BisectionChain:
         level : int
             k, 1 to 15.
         first_step : bool
-            For spans of 45 to 90 degrees, else for spans up to 45 degrees.
+            Whether for spans of 45 to 90 degrees, or for spans up to 45 degrees.
         """
         p = self.bisection
         one = ONE_SQUARED.values.item()
@@ -88,26 +88,26 @@ class BisectionChain:
         u_error, l_error, m_error, cosine = half, 0.0, 0.0, 0.0 if first_step else np.sqrt(0.5)
         weight_l, weight_m = 0.0, 1.0
         for k in range(1, level + 1):
-            out_of_range = first_step and k == 1
-            constant, rest = p.polynomial(out_of_range)
+            first = first_step and k == 1
+            constant, rest = p.polynomial(first)
             # Angles of this step: all up to the widest, or those of the first step.
-            cosines = np.linspace(cosine, np.sqrt(0.5) if out_of_range else 1.0, 2001)
-            x = one * (cosines if p.reads_cosine(out_of_range) else 1 - cosines)
+            cosines = np.linspace(cosine, np.sqrt(0.5) if first else 1.0, 2001)
+            x = one * (cosines if p.reads_cosine(first) else 1 - cosines)
             exact = half_angle_factor(1 - cosines) - 0.5
             fitted = np.polynomial.polynomial.polyval(x, np.r_[constant.values, rest.values])
-            slope = (0.3536 if out_of_range else 0.1585) * (1.2 if p.as_published else 1)
-            # Of the fit, u or r in 17 bits, the sums and e itself; then what u brings.
+            slope = (0.3536 if first else 0.1585) * (1.2 if p.as_published else 1)
+            # Errors of the fit, of u or r in 17 bits, of the sums and of e itself; then that of u.
             own_error = (
                 np.abs(fitted - exact).max()
-                + slope * 2.0**-18 * (1 + p.reads_cosine(out_of_range))
+                + slope * 2.0**-18 * (1 + p.reads_cosine(first))
                 + 2.0**-19 * 1.21
                 + 2.0**-20
             )
             e_error = own_error + slope * u_error
             e = exact.max()
-            # e follows an error of u, so that a quarter of it is left (0.28; 0.37 in the first step). The
+            # A step leaves a quarter of an error of u, as e follows it (0.28; 0.37 in the first step). The
             # 17-bit r, 1 in place of `ONE_SQUARED` and the two roundings add to it.
-            u_error = (0.37 if out_of_range else 0.28) * u_error + 2 * own_error + e * 2.0**-15 + 2 * half
+            u_error = (0.37 if first else 0.28) * u_error + 2 * own_error + e * 2.0**-15 + 2 * half
             rounding = 2 * e * 2.0**-17 + 2.0**-21 + half
             l_error = (0.5 + e) * l_error + (weight_l + l_error + 1) * e_error + rounding
             m_error = (0.5 + e) * m_error + (weight_m + m_error) * e_error + rounding
@@ -117,7 +117,7 @@ class BisectionChain:
         return float(l_error + m_error + 3 * 2.0**-18)
 
     def compute(self, normal_left: Fixed, normal_right: Fixed, level: np.ndarray) -> tuple[Fixed, np.ndarray]:
-        """Bit-true normals.
+        """Bit-accurate normals.
 
         Parameters
         ----------
@@ -130,8 +130,8 @@ class BisectionChain:
         -------
         normal : Fixed, shape (spans, 3), SQ(1, 17)
             ``N_k``.
-        wide : bool array, shape (spans,)
-            Whether the span is wider than the bisection's `max_angle`: the normal then means nothing.
+        out_of_range : bool array, shape (spans,)
+            Whether the span is wider than the bisection's `max_angle`: the normal is then undefined.
 
         Raises
         ------

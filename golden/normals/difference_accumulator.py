@@ -13,7 +13,7 @@ __all__ = ["DifferenceAccumulator"]
 
 @dataclass(frozen=True)
 class DifferenceAccumulator:
-    """``N += W; W += 2 G dt^2`` once a pixel, from ``N = Q`` and ``W = W_0``.
+    """Normals by forward differences: ``N += W; W += 2 G dt^2`` once a pixel, from ``N = Q``, ``W = W_0``.
 
     ====== ============ =====================================================================
     word   format       why
@@ -22,14 +22,14 @@ class DifferenceAccumulator:
     normal SQ(1, 17)    18 bits for the multipliers that follow
     ====== ============ =====================================================================
 
-    These are the formats of a component of a normal; the parameters make it serve other quadratics.
+    These are the formats of a component of a normal; other formats serve other quadratics.
 
-    Half a step of the output is added to N once, at the start, so that rounding half up is a cut; a value
-    past the end of ``SQ(1, 17)`` saturates. The sums themselves are exact. Up to 45 degrees no value that is
-    used leaves ``SQ(2, 42)``; a wider, flagged span may wrap there.
+    Half a step of the output is added to N once, at the start: a cut then rounds half up. A value past the
+    end of ``SQ(1, 17)`` saturates. The sums themselves are exact. Up to 45 degrees no value that is used
+    leaves ``SQ(2, 42)``; in a wider span, which the middle normal flags, sums may wrap.
 
     Error of a normal against ``Q + k W_0 + k (k - 1)/2 (2 G dt^2)``: the last rounding, 2^-18, alone, unless
-    it saturates. Drift from the rounding of the differences is bounded in `DifferenceSetup`.
+    it saturates. `DifferenceSetup` bounds the drift from the rounding of the differences.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class DifferenceAccumulator:
     result_format : Format
         Of a pixel's value.
 
-    Source: [T] figure 2.10; numbers.md, "Recurrences in fixed point".
+    Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.10.
     """
 
     start_format: Format = COMPONENT
@@ -50,8 +50,10 @@ class DifferenceAccumulator:
     difference_format: Format = DifferenceSetup.FORMAT
     result_format: Format = COMPONENT
 
-    def compute(self, start: Fixed, first: Fixed, second: Fixed, span: np.ndarray, step: np.ndarray) -> Fixed:
-        """Bit-true normals, in closed form.
+    def compute(
+        self, start: Fixed, first: Fixed, second: Fixed, span: np.ndarray, index: np.ndarray
+    ) -> Fixed:
+        """Bit-accurate normals, in closed form.
 
         Parameters
         ----------
@@ -61,8 +63,8 @@ class DifferenceAccumulator:
             Differences.
         span : int array, shape (pixels,)
             Span of each pixel.
-        step : int array, shape (pixels,)
-            Place of each pixel in its span, 0 to 4094.
+        index : int array, shape (pixels,)
+            Index of each pixel in its span, 0 to 4094.
 
         Returns
         -------
@@ -78,13 +80,13 @@ class DifferenceAccumulator:
             raise ValueError(f"operands must be {', '.join(map(str, wanted))}")
         fraction_bits = self.format.fraction_bits
         shift = fraction_bits - self.start_format.fraction_bits
-        step = np.asarray(step, dtype=np.int64)[:, np.newaxis]
-        # An int64 wraps modulo 2^64, the hardware modulo its width: the low bits agree whatever the size.
+        index = np.asarray(index, dtype=np.int64)[:, np.newaxis]
+        # An int64 wraps modulo 2^64, the hardware modulo 2^width: the low bits agree.
         total = (
             (start.codes[span] << shift)
             + (1 << (fraction_bits - self.result_format.fraction_bits - 1))
-            + step * first.codes[span]
-            + step * (step - 1) // 2 * second.codes[span]
+            + index * first.codes[span]
+            + index * (index - 1) // 2 * second.codes[span]
         )
         result = self.result_format
         return Fixed(self.format, self.format.wrap(total)).truncate(result.fraction_bits).saturate(result)

@@ -15,14 +15,11 @@ __all__ = ["DifferenceSetup"]
 
 @dataclass(frozen=True)
 class DifferenceSetup:
-    """``W_0 = (G dt + P) dt`` and ``2 G dt^2`` with ``dt = 1/(m - 1)``, for spans of ``m`` pixels.
+    """First differences ``W_0 = P dt + G dt^2`` and ``2 G dt^2``, ``dt = 1/(m - 1)``, of spans of m pixels.
 
-    Written ``W_0 = P dt + G dt^2``, so that one multiplier does all: the square of dt, then three products
-    with P and three with G.
-
-    ``m - 1`` is shifted to ``f 2^s`` with f in [1, 2), and ``1/f`` read from a table of 2048 words
-    ``UQ(0, 17)``; a 1 itself is held as 1/2 and one shift less. ``dt^2`` is the rounded square of that word,
-    shifted up again when under 1/2. Products are shifted and rounded half up to 42 fraction bits.
+    [T] has ``W_0 = (G dt + P) dt``. As a sum of two products one multiplier serves all: the square of dt,
+    three products with P and three with G. dt and its square are those of `step_words`. Products are shifted
+    and rounded half up to 42 fraction bits.
 
     ======== ============ ===========================================================
     word     format       why
@@ -31,34 +28,34 @@ class DifferenceSetup:
     2 G dt^2 SQ(2, 42)    at most 1
     ======== ============ ===========================================================
 
-    Error over the span: dt is off by a relative 2^-17 at most, dt^2 by 2^-16 + 2^-17 + 2^-34, which moves
-    the end of the curve by under ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|``; the rounding of the
-    differences adds, at pixel k, at most ``2^-42 (k + k^2/2)``, 1.9e-6 after 4095 pixels.
+    Error over the span: dt is off by a relative 2^-17 at most, dt^2 by ``2^-16 + 2^-17 + 2^-34``; the end of
+    the curve moves by less than ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|``. The rounding of the differences
+    adds, at pixel k, at most ``2^-42 (k + k^2/2)``, 1.9e-6 after 4095 pixels.
 
     A span of one pixel has no dt; it gets dt = 1, which nothing reads.
 
     With ``as_published`` the order of figure 2.11 is kept, ``W_0 = (G dt + P) dt`` and ``2 (G dt) dt``: nine
-    products in place of seven. With ``dt = 2 f' 2^-s``, f' the word of the table, ``G f'`` is rounded to
+    products in place of seven. With ``dt = 2 f 2^-s``, f the word of the table, ``G f`` is rounded to
     ``SQ(0, 18)``, and ``G dt + P`` to ``SQ(1, 17)``, where it saturates; it is the mean slope of the first
-    step, under 0.84 up to 45 degrees. dt^2 then is the square of the same dt, off by 2^-16 + 2^-34.
-    Over the span the end moves by under ``2^-17 |P| + (2^-16 + 2^-34) |G|``, 2^-18 for the rounding of
-    ``G dt + P``, 2^-18 for that of ``G f'`` (each with 2^-17 of it), and the rounding of the differences.
+    step, under 0.84 up to 45 degrees. dt^2 then is the square of the same dt, off by ``2^-16 + 2^-34``.
+    Over the span the end moves by less than ``2^-17 |P| + (2^-16 + 2^-34) |G|``, 2^-18 for the rounding of
+    ``G dt + P``, 2^-18 for that of ``G f`` (each with 2^-17 of it), and the rounding of the differences.
 
     Parameters
     ----------
     as_published : bool
         Keep the order of the products of [T].
 
-    Source: [T] 2.3, figure 2.11; numbers.md, "Recurrences in fixed point".
+    Source: docs/theory/interpolation.md#forward-differences; [T] 2.3, figure 2.11.
     """
 
     as_published: bool = False
 
-    SLOPE_FORMAT = SQ(0, 18)
+    CURVATURE_FORMAT = SQ(0, 18)
     FORMAT = SQ(2, 42)
 
     def compute(self, g: Fixed, p: Fixed, length: np.ndarray) -> tuple[Fixed, Fixed]:
-        """Bit-true first and second difference.
+        """Bit-accurate first and second difference.
 
         Parameters
         ----------
@@ -84,21 +81,17 @@ class DifferenceSetup:
             )
         reciprocal, shift, square, square_shift = step_words(length)
         if self.as_published:
-            bend = g.extend(COMPONENT) * Fixed(reciprocal.format, reciprocal.codes[:, np.newaxis])
-            bend = bend.round_half_up(18).wrap(self.SLOPE_FORMAT)
-            step = Fixed(SQ(1, 29), (bend.codes << 12) >> shift[:, np.newaxis])
+            curvature = g.extend(COMPONENT) * Fixed(reciprocal.format, reciprocal.codes[:, np.newaxis])
+            curvature = curvature.round_half_up(18).wrap(self.CURVATURE_FORMAT)
+            step = Fixed(SQ(1, 29), (curvature.codes << 12) >> shift[:, np.newaxis])
             slope = (step + p).round_half_up(17).saturate(COMPONENT)
-            second_order = self._shifted(bend.scale(1), reciprocal, 2 * shift + 1)
-            return (
-                self._shifted(slope, reciprocal, shift + 1),
-                second_order.scale(1).extend(SQ(3, 42)).wrap(self.FORMAT),
-            )
-        first_order = self._shifted(p, reciprocal, shift + 1)
-        second_order = self._shifted(g.extend(COMPONENT), square, square_shift)
-        return (
-            (first_order + second_order).wrap(self.FORMAT),
-            second_order.scale(1).extend(SQ(3, 42)).wrap(self.FORMAT),
-        )
+            first = self._shifted(slope, reciprocal, shift + 1)
+            second_order = self._shifted(curvature.scale(1), reciprocal, 2 * shift + 1)
+        else:
+            first_order = self._shifted(p, reciprocal, shift + 1)
+            second_order = self._shifted(g.extend(COMPONENT), square, square_shift)
+            first = (first_order + second_order).wrap(self.FORMAT)
+        return first, second_order.scale(1).extend(SQ(3, 42)).wrap(self.FORMAT)
 
     def _shifted(self, operand: Fixed, factor: Fixed, shift: np.ndarray) -> Fixed:
         """``4 * operand * factor * 2**-shift``, rounded half up to 42 fraction bits."""

@@ -10,12 +10,14 @@ __all__ = ["DotProduct"]
 
 @dataclass(frozen=True)
 class DotProduct:
-    """``a . b = a0 b0 + a1 b1 + a2 b2``, exact: no rounding, so no arithmetic error.
+    """Dot product ``a . b = a0 b0 + a1 b1 + a2 b2``, exact: no rounding, no arithmetic error.
 
     Parameters
     ----------
     a_format, b_format : Format
         Number formats of the components, unit vectors by default.
+
+    Source: docs/theory/interpolation.md#dot-product; [T] figure 2.5.
     """
 
     a_format: Format = COMPONENT
@@ -28,7 +30,7 @@ class DotProduct:
         return product + product + product
 
     def compute(self, a: Fixed, b: Fixed) -> Fixed:
-        """Bit-true result.
+        """Bit-accurate result.
 
         Parameters
         ----------

@@ -11,13 +11,14 @@ __all__ = ["GPQ"]
 
 @dataclass(frozen=True)
 class GPQ:
-    """``G = 2 N_r - 4 N_c + 2 N_l``, ``P = 4 N_c - N_r - 3 N_l``, ``Q = N_l``: adders and wired shifts.
+    """Coefficients ``G = 2 N_r - 4 N_c + 2 N_l``, ``P = 4 N_c - N_r - 3 N_l``, ``Q = N_l``, exact.
 
     ``N(t) = G t^2 + P t + Q`` passes through the three normals at t = 0, 1/2 and 1. With 19 fraction bits of
-    ``N_c`` both coefficients have 17 and are exact: no arithmetic error. To 45 degrees |G| <= 0.305 and
-    |P| <= 0.83, so ``SQ(0, 17)`` and ``SQ(1, 17)`` hold them; a wider (flagged) span saturates.
+    ``N_c`` both coefficients have 17 and are exact: no arithmetic error. Up to 45 degrees |G| <= 0.305 and
+    |P| <= 0.83, so ``SQ(0, 17)`` and ``SQ(1, 17)`` hold them. The coefficients of a wider span, which the
+    middle normal flags, saturate.
 
-    Source: [T] 2.2, figure 2.8.
+    Source: docs/theory/interpolation.md#quadratic-normals; [T] 2.2, figure 2.8.
     """
 
     G_FORMAT = SQ(0, 17)
@@ -27,7 +28,7 @@ class GPQ:
     def compute(
         self, normal_left: Fixed, normal_middle: Fixed, normal_right: Fixed
     ) -> tuple[Fixed, Fixed, Fixed]:
-        """Bit-true ``G``, ``P``, ``Q``.
+        """Bit-accurate ``G``, ``P``, ``Q``.
 
         Parameters
         ----------
@@ -35,6 +36,11 @@ class GPQ:
             Normals at the ends.
         normal_middle : Fixed, shape (..., 3), SQ(1, 19)
             Normal in the middle.
+
+        Returns
+        -------
+        g, p, q : Fixed, shape (..., 3), SQ(0, 17), SQ(1, 17), SQ(1, 17)
+            Coefficients.
 
         Raises
         ------

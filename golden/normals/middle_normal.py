@@ -15,8 +15,8 @@ __all__ = ["MAX_SPAN_ANGLE", "MIDDLE_NORMAL_FITS", "MiddleNormal"]
 MIDDLE_NORMAL_FITS = ("exact", "as_published", "minimax_2", "minimax_3")
 """Names of the polynomials for h."""
 
-_PRINTED = (0.707, -0.341, 0.193, -0.059)
-"""[T]: ``h(r)`` in ascending powers of r."""
+_PUBLISHED = (0.707, -0.341, 0.193, -0.059)
+"""Coefficients of ``h(r)`` as [T] prints them, in ascending powers of r."""
 
 MAX_SPAN_ANGLE = 45.0
 """Largest angle between the end normals of a span, in degrees, for which the formats are made."""
@@ -24,61 +24,60 @@ MAX_SPAN_ANGLE = 45.0
 
 @dataclass(frozen=True)
 class MiddleNormal:
-    """``N_c = h(r) (N_l + N_r)`` with ``h = 1/sqrt(2 (1 + r))`` and ``r = N_l . N_r``.
+    """Middle normal ``N_c = h(r) (N_l + N_r)``, ``h = 1/sqrt(2 (1 + r))``, ``r = N_l . N_r``.
 
     Computed as ``N_c = (N_l + N_r)/2 + e(u) (N_l + N_r)`` with ``u = 1 - r``. The polynomial
-    ``e = h - 1/2 = u (c1 + u (c2 + u c3))`` is exact at angle 0, where neighbouring normals of a mesh live,
-    and fitted up to `MAX_SPAN_ANGLE`.
+    ``e = h - 1/2 = u (c1 + u (c2 + u c3))`` is exact at angle 0, as most spans of a mesh are narrow, and
+    fitted up to `MAX_SPAN_ANGLE`.
 
     ======== ============= ==========================================================
     word     format        why
     ======== ============= ==========================================================
     u        UQ(-1, 18)    17 bits for the multiplier; holds angles to 60 degrees
-    c, sums  UQ(-2, 19)    17 bits; the sums stay under 0.15
+    c, sums  UQ(-2, 19)    17 bits; the sums are less than 0.15
     e        UQ(-4, 21)    17 bits; at most 0.0412 at 45 degrees
-    E        F = 19        ``-4 E`` and ``4 E`` then have 17 fraction bits, exactly
-    N_c      SQ(1, 19)
+    N_c      SQ(1, 19)     ``4 N_c`` has 17 fraction bits, exactly
     ======== ============= ==========================================================
 
-    Arithmetic error of a component of ``N_c`` against the exact function of the same two code vectors, for
-    angles to 45 degrees, under `ERROR`: e is off by the fit (8.3e-7), by u cut to 18 fraction bits (times
-    the slope 0.18), by two roundings of sums (2^-20 u and 2^-20 u^2) and by its own (2^-22), and is
-    multiplied by a component of ``N_l + N_r``, at most 2; ``(N_l + N_r)/2`` is cut by up to 2^-18 and
+    Error of a component of ``N_c`` against the exact function of the same two code vectors, for angles up to
+    45 degrees, at most `ERROR`. The error of e has four parts: the fit (8.3e-7); u, cut to 18 fraction bits,
+    times the slope 0.18; two roundings of sums (2^-20 u and 2^-20 u^2); its own rounding (2^-22). It is
+    multiplied by a component of ``N_l + N_r``, at most 2. ``(N_l + N_r)/2`` is cut by up to 2^-18, which is
     multiplied by 2 e <= 0.0824; the last rounding adds 2^-20.
 
     A wider span is flagged; u and N_c then saturate.
 
-    Ends that are no unit vectors: of length ``1 + x`` they give a middle of length ``1 + x/(1 + r)``, or,
-    where u would be negative, half their sum, no longer than they are. A span with an end of length 0 is
-    flagged.
+    Ends of another length: of length ``1 + x`` they give a middle of length ``1 + x/(1 + r)``; where u would
+    be negative, half their sum, which is no longer than they are. A span with an end of length 0 is flagged.
 
-    Other fits are there for comparison, with the same hardware: their polynomials in r, rewritten in u, have
-    the same form. That of [T] has the constant 1/2 exactly: ``e = u (0.132 + u (0.016 + 0.059 u))``. A plain
-    minimax fit over r in [0, 1] has another constant, and makes every normal of a flat face too short or too
-    long by twice its error; e is then ``SQ(-3, 21)``, 18 bits. `model_error` of h, with coefficients in words
-    of the hardware, what it is as a relative error of the length, and both over all r in [0, 1]:
+    The other fits are for comparison. They need the same hardware, as their polynomials in r, rewritten in u,
+    have the same form. That of [T] has the constant 1/2 exactly: ``e = u (0.132 + u (0.016 + 0.059 u))``. A
+    plain minimax fit over r in [0, 1] has another constant, and makes every normal of a flat face too short
+    or too long by twice its error; e is then ``SQ(-3, 21)``, 18 bits. The table has `model_error` of h, with
+    the coefficients in the words above; the same as a relative error of the length; the relative error at
+    angle 0; and the first two over all r in [0, 1]:
 
-    ================= ============= ======== ============= ===============
-    fit               to 45 degrees relative at angle 0    over [0, 1]
-    ================= ============= ======== ============= ===============
-    ``exact``         8.2e-7        0.0002 % 0
+    ================ ============= ======== ============= ===============
+    fit              to 45 degrees relative at angle 0    over [0, 1]
+    ================ ============= ======== ============= ===============
+    ``exact``        8.2e-7        0.0002 % 0             -
     ``as_published`` 4.9e-4        0.093 %  0             6.1e-4, 0.093 %
-    ``minimax_2``     1.9e-3        0.38 %   0.38 % long   1.9e-3, 0.38 %
-    ``minimax_3``     2.9e-4        0.058 %  0.058 % short 2.9e-4, 0.058 %
-    ================= ============= ======== ============= ===============
+    ``minimax_2``    1.9e-3        0.38 %   0.38 % long   1.9e-3, 0.38 %
+    ``minimax_3``    2.9e-4        0.058 %  0.058 % short 2.9e-4, 0.058 %
+    ================ ============= ======== ============= ===============
 
     Parameters
     ----------
     fit : str
-        One of `MIDDLE_NORMAL_FITS`: exact at angle 0; the coefficients printed in [T]; a plain minimax fit of
-        degree 2 or 3.
+        One of `MIDDLE_NORMAL_FITS`: exact at angle 0; the coefficients of [T]; a plain minimax fit of degree
+        2 or 3.
 
     Raises
     ------
     ValueError
         If `fit` is none of those.
 
-    Source: [T] 2.2; numbers.md, "exact at zero angle" and "Polynomials".
+    Source: docs/theory/interpolation.md#middle-normal; [T] 2.2.
     """
 
     fit: str = "exact"
@@ -100,12 +99,12 @@ class MiddleNormal:
 
     @property
     def coefficients(self) -> Fixed:
-        """``c1, c2, c3``, in words of the hardware."""
+        """Coefficients ``c1, c2, c3``, shape (3,), UQ(-2, 19)."""
         return Fixed(self.SUM_FORMAT, _coefficients(self.fit)[1])
 
     @property
     def constant(self) -> Fixed:
-        """``e`` at angle 0: 0 but for the plain minimax fits."""
+        """Constant of ``e``, its value at angle 0: not 0 for the plain minimax fits alone."""
         return Fixed(self.factor_format, _coefficients(self.fit)[0])
 
     @property
@@ -115,7 +114,7 @@ class MiddleNormal:
 
     @property
     def model_error(self) -> float:
-        """Largest error of ``1/2 + e`` as a polynomial in exact arithmetic, to `MAX_SPAN_ANGLE`."""
+        """Largest error of ``1/2 + e`` as a polynomial in exact arithmetic, up to `MAX_SPAN_ANGLE`."""
         one = ONE_SQUARED.values.item()
         coefficients = np.r_[0.5 + self.constant.values, self.coefficients.values] * one ** np.arange(4)
         widest = 1 - np.cos(np.radians(MAX_SPAN_ANGLE))
@@ -124,7 +123,7 @@ class MiddleNormal:
     @property
     def error(self) -> float:
         """Bound on the error of a component against the exact function of the same two code vectors."""
-        # The half sum's cut counts times e, which may be too large by the fit's error.
+        # The cut of the half sum is multiplied by e, which may be too large by the fit's error.
         return 2 * (1 + 2.0**-18) * self.model_error + self.ARITHMETIC_ERROR
 
     @cached_property
@@ -134,7 +133,7 @@ class MiddleNormal:
         return Fixed.round(self.ANGLE_FORMAT, limit)
 
     def compute(self, normal_left: Fixed, normal_right: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Bit-true middle normals.
+        """Bit-accurate middle normals.
 
         Parameters
         ----------
@@ -145,8 +144,13 @@ class MiddleNormal:
         -------
         normal_middle : Fixed, shape (..., 3), SQ(1, 19)
             Middle normals.
-        wide : bool array, shape (...)
+        out_of_range : bool array, shape (...)
             Whether the span is wider than `MAX_SPAN_ANGLE`: the normal is then saturated.
+
+        Raises
+        ------
+        ValueError
+            If an operand has another format.
         """
         dot = DotProduct().compute(normal_left, normal_right)
         difference = (ONE_SQUARED - dot).truncate(self.ANGLE_FORMAT.fraction_bits)
@@ -165,7 +169,7 @@ class MiddleNormal:
 @cache
 def _coefficients(fit: str) -> tuple[int, np.ndarray]:
     """Code of the constant of e, and codes of c1, c2, c3."""
-    # The unit reads u in units of `ONE_SQUARED`.
+    # The word of u is u times `ONE_SQUARED`.
     one = ONE_SQUARED.values.item()
     if fit == "exact":
         codes = minimax_quantised(
@@ -177,7 +181,7 @@ def _coefficients(fit: str) -> tuple[int, np.ndarray]:
         )
         return 0, codes
     if fit == "as_published":
-        in_u = np.polynomial.Polynomial(_PRINTED)(np.polynomial.Polynomial([1, -1])).coef
+        in_u = np.polynomial.Polynomial(_PUBLISHED)(np.polynomial.Polynomial([1, -1])).coef
     else:
         in_u = minimax(half_angle_factor, 0.0, 1.0, int(fit[-1]))
     in_u = np.pad(in_u, (0, 4 - len(in_u))) / one ** np.arange(4)

@@ -19,16 +19,15 @@ QUADRATIC_FORMS = ("direct", "horner")
 
 @dataclass(frozen=True)
 class QuadraticEvaluator:
-    """``N(t) = G t^2 + P t + Q`` at ``t = k/(m - 1)`` for the pixels k = 0 ... m - 1 of a span.
+    """Normals ``N(t) = G t^2 + P t + Q`` at ``t = k/(m - 1)``, for the pixels k = 0 ... m - 1 of a span.
 
     ``direct`` adds the two products (figure 2.9 a); ``horner`` is ``(G t + P) t + Q`` (figure 2.9 b).
 
-    The word of the parameter is ``-t``, since ``SQ(1, 17)`` holds -1 and not 1; so does the word of
-    ``-t^2``. It is summed up from ``-dt``, and dt read from a table: ``m - 1`` is ``f 2^s`` with f in
-    [1, 2), and ``1/f`` a word of 18 bits, a 1 itself held as 1/2 and one shift less. Such a word is off by
-    less than a relative 2^-18, the shifted word and its sums are exact, and so the t of the last pixel,
-    rounded, is exactly 1: **the curve ends in** ``G + P + Q``, **which is** ``N_r``, **at every length**, as
-    it starts in ``N_l``.
+    The words of the parameter are ``-t`` and ``-t^2``, since ``SQ(1, 17)`` holds -1 and not 1. ``-t`` is
+    summed up from ``-dt``, and dt read from `reciprocal_table` in words of 18 bits. Such a word is off by at
+    most a relative 2^-18; the shifted word and its sums are exact. The t of the last pixel, rounded, is
+    therefore exactly 1: **the curve ends in** ``G + P + Q``, **which is** ``N_r``, **at every length**, as it
+    starts in ``N_l``.
 
     ============ =========== ============================================================
     word         format      why
@@ -45,9 +44,9 @@ class QuadraticEvaluator:
     ``|G| <= 0.305``, at most `error`: t is off by 2^-18 for its table and 2^-18 for its rounding, t^2 by
     2^-18 (``direct``) or the inner sum by 2^-18 (``horner``), the result by 2^-18.
 
-    Wider spans are flagged by the middle normal and must be cut in two before they come here. P saturates
-    from 53 degrees on and G from 57; the curve then keeps its start and misses its end, by up to 0.1 at 60
-    degrees, 0.48 at 90, 0.78 at 120 and 1.05 at 180 (length of the error vector), and stays in its words.
+    Wider spans are flagged by the middle normal; their sender must cut them. P saturates from 53 degrees on
+    and G from 57: the curve then keeps its start and misses its end, by up to 0.1 at 60 degrees, 0.48 at 90,
+    0.78 at 120 and 1.05 at 180 (length of the error vector), and stays in its words.
 
     Parameters
     ----------
@@ -59,7 +58,7 @@ class QuadraticEvaluator:
     ValueError
         If the form is unknown.
 
-    Source: [T] 2.2, figures 2.9 a and b.
+    Source: docs/theory/interpolation.md#quadratic-normals; [T] 2.2, figures 2.9 a and b.
     """
 
     form: Literal["direct", "horner"] = "direct"
@@ -76,11 +75,11 @@ class QuadraticEvaluator:
 
     @property
     def error(self) -> float:
-        """Bound of the error of a component against the exact polynomial, to 45 degrees."""
+        """Bound on the error of a component against the exact polynomial, up to 45 degrees."""
         return 2.0**-18 * (2 * 0.83 + (0.305 if self.form == "direct" else 1.0) + 1)
 
     def step(self, length: np.ndarray) -> Fixed:
-        """Bit-true ``dt = 1/(m - 1)``; 1 for a span of one pixel, which has no dt and reads none.
+        """Bit-accurate ``dt = 1/(m - 1)``; 1 for a span of one pixel, which has no dt and reads none.
 
         Parameters
         ----------
@@ -102,14 +101,14 @@ class QuadraticEvaluator:
         return Fixed(self.STEP_FORMAT, scaled.codes >> shift)
 
     def parameter(self, step: Fixed, index: np.ndarray) -> Fixed:
-        """Bit-true ``-t`` of pixels.
+        """Bit-accurate ``-t`` of pixels.
 
         Parameters
         ----------
         step : Fixed, any shape
             dt in ``UQ(1, 29)``.
         index : int array, same shape
-            Place of the pixel in its span, from 0 on.
+            Index of the pixel in its span, from 0 on.
 
         Returns
         -------
@@ -119,7 +118,7 @@ class QuadraticEvaluator:
         return Fixed(self.SUM_FORMAT, half - step.codes * index).truncate(17)
 
     def evaluate(self, g: Fixed, p: Fixed, q: Fixed, parameter: Fixed) -> Fixed:
-        """Bit-true normals of single pixels.
+        """Bit-accurate normals of single pixels.
 
         Parameters
         ----------
@@ -142,7 +141,7 @@ class QuadraticEvaluator:
     def compute(
         self, g: Fixed, p: Fixed, q: Fixed, length: np.ndarray, span: np.ndarray, index: np.ndarray
     ) -> Fixed:
-        """Bit-true normals.
+        """Bit-accurate normals.
 
         Parameters
         ----------
@@ -153,7 +152,7 @@ class QuadraticEvaluator:
         span : int array, shape (pixels,)
             Span of each pixel.
         index : int array, shape (pixels,)
-            Place of each pixel in its span, 0 to its length less one.
+            Index of each pixel in its span, 0 to its length less one.
 
         Returns
         -------

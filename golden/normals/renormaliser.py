@@ -1,4 +1,4 @@
-"""Direct renormaliser: a vector of about unit length brought to unit length, any pixel by itself."""
+"""Renormaliser: a vector of about unit length divided by its length, each pixel by itself."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,12 +15,12 @@ __all__ = ["Renormaliser"]
 
 @dataclass(frozen=True)
 class Renormaliser:
-    """``N = v/sqrt(s)`` with ``s = v . v``: what an expert would build without the documents.
+    """Unit vector ``N = v/sqrt(s)``, ``s = v . v``: the baseline, a normal divided by its length.
 
-    Computed as ``N = v + e v``. The factor ``e = (ONE/2^17)/sqrt(s) - 1``, small where v is nearly a unit
-    vector and made for the length of `unit_vector`, is a quadratic ``c0 - u (c1 - u c2)`` in each of
-    18 segments of s, 1/32 wide, u from the segment's start: the 16 from 1/2 to 1 that a linear interpolation
-    across spans to 90 degrees needs, and one on either side for the rounding of its ends.
+    Computed as ``N = v + e v`` with ``e = (ONE/2^17)/sqrt(s) - 1``, small where v is nearly a unit vector in
+    the codes of `unit_vector`. e is a quadratic ``c0 - u (c1 - u c2)`` in each of 18 segments of s, 1/32
+    wide, u from the start of the segment. Linear interpolation across spans up to 90 degrees needs the 16
+    segments from 1/2 to 1; one more on either side is for the rounding of the ends.
 
     ============ ========== =================================================================
     word         format     why
@@ -35,15 +35,15 @@ class Renormaliser:
     N            SQ(1, 17)  rounded; saturates
     ============ ========== =================================================================
 
-    Lengths from 0.685 to 1.0155 are served (`LOW` <= s < `HIGH`). Any other vector is flagged and passes as
+    Lengths from 0.685 to 1.0155 are in range (`LOW` <= s < `HIGH`). Any other vector is flagged and stays as
     it is.
 
     The length of N is off by at most `ERROR`, 2^-16.3: |v| times the error of e, which is that of the fit
     (|v| times it is at most `FIT`), the cut of u (2^-22 times c1, which is ``1/(2 |v|^3)``), the rounding of
     ``c1 - u c2`` (2^-17 times 1/32) and of e (2^-19); then the rounding of three components,
-    ``sqrt(3) 2^-18``, which alone turns the direction.
+    ``sqrt(3) 2^-18``, which alone changes the direction.
 
-    Source: numbers.md, "Rivals to measure against"; not in the documents.
+    Source: docs/theory/interpolation.md#renormaliser.
     """
 
     SEGMENT_BITS = 5
@@ -66,10 +66,10 @@ class Renormaliser:
 
     @cached_property
     def coefficients(self) -> tuple[Fixed, Fixed, Fixed]:
-        """``c0, c1, c2`` of every segment, shape (18,) each.
+        """Coefficients ``c0, c1, c2`` of every segment, shape (18,) each.
 
-        The Chebyshev series of a segment, all but a minimax fit when it is this short, gives c2; c1 follows
-        from its linear term and the rounded c2, and c0 halves the span of the error that is left.
+        The Chebyshev series of a segment, nearly a minimax fit as the segment is short, gives c2; c1 follows
+        from its linear term and the rounded c2, and c0 is the middle of the error that is left.
         """
         width = 2.0**-self.SEGMENT_BITS
         x = chebyshev.chebpts2(33)
@@ -79,11 +79,11 @@ class Renormaliser:
         # u^2 is (width/2)^2 (3/2 T0 + 2 T1 + 1/2 T2).
         c2 = Fixed.round(self.C2_FORMAT, 8 / width**2 * series[2])
         c1 = Fixed.round(self.C1_FORMAT, width * c2.values - 2 / width * series[1])
-        left = exact + u * (c1.values - u * c2.values)
-        return Fixed.round(self.C0_FORMAT, (left.min(axis=0) + left.max(axis=0)) / 2), c1, c2
+        rest = exact + u * (c1.values - u * c2.values)
+        return Fixed.round(self.C0_FORMAT, (rest.min(axis=0) + rest.max(axis=0)) / 2), c1, c2
 
     def correction(self, square: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Bit-true ``e`` of squared lengths.
+        """Bit-accurate ``e`` of squared lengths.
 
         Parameters
         ----------
@@ -93,24 +93,24 @@ class Renormaliser:
         Returns
         -------
         correction : Fixed, same shape, SQ(0, 18)
-            e; 0 for a length that is not served.
-        outside : bool array, same shape
-            Whether the length is not served.
+            e; 0 for a length out of range.
+        out_of_range : bool array, same shape
+            Whether the length is out of range.
         """
         low = Fixed(UQ(0, 22), UQ(0, 22).code(self.LOW))
         offset = (square.truncate(22) - low).codes
         bits = self.OFFSET_FORMAT.width
         segment = offset >> bits
-        outside = (segment < 0) | (segment >= self.SEGMENTS)
-        c0, c1, c2 = (c[np.where(outside, 0, segment)] for c in self.coefficients)
+        out_of_range = (segment < 0) | (segment >= self.SEGMENTS)
+        c0, c1, c2 = (c[np.where(out_of_range, 0, segment)] for c in self.coefficients)
         u = Fixed(self.OFFSET_FORMAT, offset & ((1 << bits) - 1))
         slope = (c1 - u * c2).round_half_up(16)
         slope = slope.wrap(self.C1_FORMAT)
         e = (c0 - u * slope).round_half_up(18).wrap(self.FACTOR_FORMAT)
-        return Fixed(e.format, np.where(outside, 0, e.codes)), outside
+        return Fixed(e.format, np.where(out_of_range, 0, e.codes)), out_of_range
 
     def compute(self, vector: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Bit-true unit vectors.
+        """Bit-accurate unit vectors.
 
         Parameters
         ----------
@@ -120,15 +120,15 @@ class Renormaliser:
         Returns
         -------
         normal : Fixed, shape (..., 3), SQ(1, 17)
-            N; v itself where ``outside``.
-        outside : bool array, shape (...)
-            Whether the length of v is not served.
+            N; v itself where ``out_of_range``.
+        out_of_range : bool array, shape (...)
+            Whether the length of v is out of range.
 
         Raises
         ------
         ValueError
             If the operand has another format.
         """
-        e, outside = self.correction(DotProduct().compute(vector, vector))
+        e, out_of_range = self.correction(DotProduct().compute(vector, vector))
         e = Fixed(e.format, e.codes[..., np.newaxis])
-        return (vector + e * vector).round_half_up(17).saturate(self.FORMAT), outside
+        return (vector + e * vector).round_half_up(17).saturate(self.FORMAT), out_of_range

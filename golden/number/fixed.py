@@ -2,12 +2,12 @@
 
 A format is ``SQ(i, f)`` (two's complement, the sign bit counted in ``i``) or ``UQ(i, f)`` (unsigned),
 with ``i`` integer bits and ``f`` fraction bits. A number is its integer *code* times ``2**-f``. Either
-count may be negative as long as the width ``i + f`` is 1 to 63 bits: ``UQ(-3, 20)`` holds 17 bits below
-one eighth.
+count may be negative as long as the width ``i + f`` is 1 to 63 bits: ``UQ(-3, 20)`` has 17 bits, for numbers
+less than one eighth.
 
-Every operation is exact: its result has a format that holds every outcome. Bits are lost only where the
-code says how: `Fixed.truncate`, `Fixed.round_half_up`, `Fixed.saturate`, `Fixed.wrap`. `fixed` has
-the same operations, under the same names and with the same result formats, for signals.
+Every operation is exact: its result has a format that holds every outcome. Only four operations lose bits:
+`Fixed.truncate`, `Fixed.round_half_up`, `Fixed.saturate`, `Fixed.wrap`. `blysk.hdl.core.fixed` has the same
+operations, with the same names and result formats, for signals.
 """
 
 from collections.abc import Callable
@@ -77,7 +77,7 @@ class Format:
         return 2.0**-self.fraction_bits
 
     def wrap(self, codes: np.ndarray) -> np.ndarray:
-        """Codes of the same low bits, of integers of any size; those of int64 may have overflowed."""
+        """Codes of the same low bits, for integers of any size; sums of int64 may have overflowed."""
         low = codes & ((1 << self.width) - 1)
         return low - ((low >> (self.width - 1)) << self.width) if self.signed else low
 
@@ -102,7 +102,7 @@ class Format:
             raise ValueError(f"{value} is not a number of {self}")
         return int(scaled)
 
-    # Result formats of the operations, shared by the NumPy twin and the hardware.
+    # Result formats of the operations, for arrays and for signals.
 
     def __add__(self, other: "Format") -> "Format":
         """Format of a sum: one more integer bit than the wider operand."""
@@ -134,7 +134,7 @@ class Format:
         return Format(True, self.integer_bits + 1, self.fraction_bits)
 
     def scaled(self, exponent: int) -> "Format":
-        """Format of the same code read ``2**exponent`` times as large: a wired shift."""
+        """Format of the same code for a number ``2**exponent`` times as large: a wired shift."""
         return Format(self.signed, self.integer_bits + exponent, self.fraction_bits - exponent)
 
     def truncated(self, fraction_bits: int) -> "Format":
@@ -162,7 +162,7 @@ def UQ(integer_bits: int, fraction_bits: int) -> Format:
 
 
 class Fixed:
-    """An array of fixed-point numbers: the bit-true twin of a fixed-point signal.
+    """An array of fixed-point numbers: the bit-accurate model of a fixed-point signal.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ class Fixed:
 
     @classmethod
     def _exact(cls, format: Format, codes: np.ndarray) -> "Fixed":
-        """Result of an operation whose format holds every outcome."""
+        """Result of an operation in a format that holds every outcome."""
         fixed = cls.__new__(cls)
         fixed.format = format
         fixed.codes = codes
@@ -198,7 +198,7 @@ class Fixed:
 
     @classmethod
     def round(cls, format: Format, values) -> "Fixed":
-        """Nearest numbers to float64 values, half up.
+        """Numbers nearest to float64 values, halves rounded up.
 
         Raises
         ------
@@ -255,7 +255,7 @@ class Fixed:
         return Fixed._exact(-self.format, -self.codes)
 
     def _compare(self, other: "Fixed", comparison: Callable) -> np.ndarray:
-        self.format - other.format  # refuses operands that cannot be aligned in 63 bits
+        self.format - other.format  # Refuses operands that cannot be aligned in 63 bits.
         a, b, _ = self._aligned(other)
         return comparison(a, b)
 
@@ -290,7 +290,7 @@ class Fixed:
     __hash__ = None
 
     def scale(self, exponent: int) -> "Fixed":
-        """Times ``2**exponent``, exactly: the binary point moves, the code stays."""
+        """Product with ``2**exponent``, exact: the binary point moves, the code stays."""
         return Fixed._exact(self.format.scaled(exponent), self.codes)
 
     def truncate(self, fraction_bits: int) -> "Fixed":

@@ -1,4 +1,7 @@
-"""Minimax polynomial fits, with coefficients that can be held or made exact numbers of a hardware format."""
+"""Minimax polynomial fits; coefficients may be given, or be numbers of a hardware format.
+
+Source: docs/theory/interpolation.md#bisection.
+"""
 
 from collections.abc import Callable, Mapping
 
@@ -10,10 +13,11 @@ from blysk.golden.number.fixed import Format
 __all__ = ["half_angle_factor", "largest_error", "minimax", "minimax_quantised", "reciprocal_root"]
 
 GRID = 4001
+"""Points of a domain on which a fit is found and judged."""
 
 
 def half_angle_factor(u: np.ndarray) -> np.ndarray:
-    """``h = 1/sqrt(2 (1 + r))`` with ``u = 1 - r``: the middle normal is ``h (N_l + N_r)`` ([T] 2.2).
+    """Factor ``h = 1/sqrt(2 (1 + r))``, ``u = 1 - r``: the middle normal is ``h (N_l + N_r)`` ([T] 2.2).
 
     Parameters
     ----------
@@ -24,12 +28,12 @@ def half_angle_factor(u: np.ndarray) -> np.ndarray:
 
 
 def reciprocal_root(z: np.ndarray) -> np.ndarray:
-    """``1/sqrt(2 + z)`` with ``z = 2 N_a . N_b``: the factor of the bisection unit ([T] 2.1)."""
+    """Factor ``1/sqrt(2 + z)`` of the bisection unit, ``z = 2 N_a . N_b`` ([T] 2.1)."""
     return 1 / np.sqrt(2 + np.asarray(z, dtype=np.float64))
 
 
 def _grid(low: float, high: float) -> np.ndarray:
-    # Chebyshev spacing: the error of a minimax fit turns fastest at the ends.
+    # Chebyshev spacing: the error of a minimax fit changes fastest at the ends.
     return low + (high - low) * (1 - np.cos(np.linspace(0, np.pi, GRID))) / 2
 
 
@@ -47,7 +51,7 @@ def minimax(
     Parameters
     ----------
     function : callable
-        What to fit, vectorised.
+        Function to fit, vectorised.
     low, high : float
         Domain.
     degree : int
@@ -69,7 +73,7 @@ def minimax(
     target = function(x) - powers @ coefficients
     # The programme is solved in units of the residual's size, to stay above the solver's tolerance.
     unit = np.abs(target).max() or 1.0
-    # On a narrow domain far from 0 the powers are all but parallel; solved in them, the fit would be poor.
+    # On a narrow domain far from 0 the powers are nearly parallel, and a fit in them is poor.
     basis, triangle = np.linalg.qr(powers[:, free])
     matrix = basis * np.sqrt(GRID)
     ones = np.ones((len(x), 1))
@@ -98,8 +102,8 @@ def minimax_quantised(
 ) -> np.ndarray:
     """Minimax coefficients that are numbers of a hardware format, refitted one after the other.
 
-    Each coefficient in turn, lowest power first, is rounded to its format and held; the rest are fitted again
-    and take up most of its rounding error.
+    Each coefficient, lowest power first, is rounded to its format and held; the others are fitted again and
+    compensate most of its rounding error.
 
     Parameters
     ----------

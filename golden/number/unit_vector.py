@@ -1,10 +1,11 @@
 """Unit vectors as fixed-point codes.
 
-A component is ``SQ(1, 17)``, 18 bits, so that it fits the signed operand of an 18x18 multiplier. The code
-of length 1 is ``ONE = 2**17 - 1`` (as in a signed-normalised texture format), so that 1 and -1 are both
-exact and a vector along an axis is exactly a unit vector. Read as fixed-point numbers all lengths are
-``ONE / 2**17``, so a dot product of two unit vectors of angle a is ``(ONE / 2**17)**2 * cos(a)``;
-`ONE_SQUARED` takes the place of 1.
+A component is ``SQ(1, 17)``, 18 bits, the signed operand of an 18 x 18 multiplier. The code of length 1 is
+``ONE = 2**17 - 1`` (as in a signed-normalised texture format): 1 and -1 are both exact, and a vector along an
+axis is exactly a unit vector. Read as fixed-point numbers all lengths are ``ONE / 2**17``, so a dot product
+of two unit vectors of angle a is ``(ONE / 2**17)**2 * cos(a)``; `ONE_SQUARED` stands for 1.
+
+Source: docs/theory/interpolation.md#spans.
 """
 
 import numpy as np
@@ -22,17 +23,16 @@ ONE = COMPONENT.max_code
 ONE_SQUARED = Fixed((COMPONENT * COMPONENT), ONE * ONE)
 """Dot product of a unit vector with itself."""
 
-
 CODE_LENGTH_ERROR = 3**0.5 * COMPONENT.step / 2 * (1 + 2.0**-10)
-"""Largest error of the length of what `quantise` gives: that of a vector of rounded components."""
+"""Largest error of the length of a vector of rounded components; `quantise` stays within it."""
 
 
 def quantise(vectors: np.ndarray) -> np.ndarray:
-    """Codes of unit vectors, with the length held closer than by rounding each component.
+    """Codes of unit vectors, whose length is closer to 1 than that of rounded components.
 
     Of the eight neighbours of a vector on the grid of codes, the one whose length is nearest to 1 is taken:
-    the specular term feels the length of the normal at first order, its direction near the highlight's peak
-    only at second order. A component is off by less than one step, ``2**-17``.
+    an error of the normal's length changes the specular term at first order, one of its direction near the
+    highlight's peak at second order only. A component is off by less than one step, ``2**-17``.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def quantise(vectors: np.ndarray) -> np.ndarray:
         raise ValueError("vectors must have unit length")
     scaled = vectors * ONE
     low = np.floor(scaled).astype(np.int64)
-    # A whole component stays: both its neighbours are itself.
+    # Both neighbours of a component that is a whole code are that code.
     high = np.ceil(scaled).astype(np.int64)
     best = np.empty_like(low)
     smallest = np.full(low.shape[:-1], np.iinfo(np.int64).max)

@@ -1,4 +1,4 @@
-"""Bisection unit ([T] figure 2.6) on shared multipliers."""
+"""Bisection unit on shared multipliers: the normal half-way between two others ([T] figure 2.6)."""
 
 from amaranth.hdl import Const, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data
@@ -14,26 +14,37 @@ __all__ = ["BisectionUnit", "coefficient"]
 
 
 def coefficient(parameters: Bisection, power: int, first_step: Value) -> FixedValue:
-    """Coefficient of a power of the factor's polynomial, or of that of the first step."""
+    """Coefficient of the factor's polynomial.
+
+    Parameters
+    ----------
+    parameters : Bisection
+        Model.
+    power : int
+        Power of the coefficient.
+    first_step : Value
+        Whether of the polynomial of the first step, for spans of 45 to 90 degrees; not read without one.
+    """
     codes = []
-    for which in (False, True):
-        constant, rest = parameters.polynomial(which)
+    for first in (False, True):
+        constant, rest = parameters.polynomial(first)
         number = rest[power - 1] if power else constant
         codes.append(Const(number.codes.item(), signed(number.format.width)))
-    narrow, out_of_range = codes
+    code, first_code = codes
     return FixedValue(
-        number.format, narrow if parameters.max_angle == 45 else Mux(first_step, out_of_range, narrow)
+        number.format, code if parameters.max_angle == 45 else Mux(first_step, first_code, code)
     )
 
 
 class BisectionUnit(PipelinedUnit):
-    """``N = (N_a + N_b) / sqrt(2 + z)`` with ``z = 2 N_a . N_b``, and a flag for spans too wide for it.
+    """Normal half-way between two: ``N = (N_a + N_b) / sqrt(2 + z)``, ``z = 2 N_a . N_b``.
 
-    Formats, variants, error bounds and the flag are those of `Bisection`, the bit-true twin.
+    `Bisection`, the bit-accurate model, has formats, variants, error bounds and the flag of spans that are
+    too wide.
 
     ``s + 6`` multiplications: three of the dot product, s Horner steps, three scalings. With an initiation
-    interval I, ``ceil((s + 6) / I)`` multipliers take turns at them (`dataflow`); with an interval of 1
-    each has one task. The results are the same to the bit.
+    interval I, ``ceil((s + 6) / I)`` multipliers share them (`blysk.hdl.core.dataflow`). The results do not
+    depend on I.
 
     Latency and multipliers by interval:
 
@@ -48,9 +59,9 @@ class BisectionUnit(PipelinedUnit):
     Parameters
     ----------
     parameters : Bisection
-        Degree, widest span, coefficients and formats.
+        Bit-accurate model, which knows degree, widest span and coefficients.
     initiation_interval : int or None
-        1 to ``s + 6``: distance in cycles of two inputs. ``None``: ``s + 3``.
+        Cycles from an input to the next, 1 to ``s + 6``. ``None``: ``s + 3``.
 
     Raises
     ------
@@ -62,13 +73,14 @@ class BisectionUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(StructLayout({"normal_a": ..., "normal_b": ...})))`
         Unit normals, three components ``SQ(1, 17)`` each.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
-        ``normal_middle``, three components ``SQ(1, 17)``; ``one_minus_cosine`` of the two normals in ``SQ(2,
-        17)``; ``out_of_range``: they are further apart than ``max_angle`` and the result means nothing.
+        ``normal_middle``, three components ``SQ(1, 17)``; ``one_minus_cosine`` of the two normals,
+        ``SQ(2, 17)``; ``out_of_range``: they are further apart than ``max_angle``, and the middle is
+        undefined.
 
-    Source: [T] 2.1, figure 2.6.
+    Source: docs/theory/interpolation.md#bisection; [T] 2.1, figure 2.6.
     """
 
-    def __init__(self, parameters: Bisection | None = None, initiation_interval: int | None = None):
+    def __init__(self, parameters: Bisection | None = None, *, initiation_interval: int | None = None):
         self.parameters = parameters or Bisection()
         steps = self.parameters.steps
         interval = checked_interval(initiation_interval, steps + 6, steps + 3)
@@ -88,7 +100,7 @@ class BisectionUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the age of its last word."""
+        """The graph, read at the stage of its last word."""
         value = self._graph.build(m, self, operands)
         read = {name: value(word, self.latency) for name, word in self._words.items()}
         result = Signal(self.o.payload.shape())
@@ -127,7 +139,7 @@ class BisectionUnit(PipelinedUnit):
             return FixedValue(p.OPERAND_FORMAT, Mux(first_step, cosine.as_value(), angle.as_value()))
 
         x = g.register("x", operand, first_step, cosine, angle)
-        # A multiplier takes 18 signed bits twice; wired shifts align what it is given.
+        # A multiplier has two signed operands of 18 bits; wired shifts align them.
         product = g.multiply(
             "product_top", x, first_step, right=lambda first: coefficient(p, p.steps, first).scale(1)
         )

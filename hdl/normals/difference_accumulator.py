@@ -16,21 +16,20 @@ __all__ = ["AccumulatorUnit", "DifferenceAccumulatorUnit"]
 
 
 class AccumulatorUnit(wiring.Component):
-    """Quadratics of a span by forward differences, one value of each a clock, first pixel first.
+    """Quadratics of a span by forward differences, a value of each in every cycle, first pixel first.
 
-    Formats, rounding and bounds are those of `DifferenceAccumulator`, the
-    bit-true twin of each.
+    `DifferenceAccumulator`, the bit-accurate model of each quadratic, has formats, rounding and bounds.
 
-    A span of m pixels taken in on one clock gives its first values 2 cycles later and more on each of the
-    m - 1 cycles after, unless the output waits; the next span is taken in on the clock that leaves no gap. A
-    span of length 0 takes one clock and gives nothing. No multipliers.
+    A span of m pixels gives its first values 2 cycles after it was taken in and others in each of the m - 1
+    cycles that follow, unless the output waits. The next span is taken in early enough to leave no gap. A
+    span of length 0 takes one cycle and gives nothing. No multipliers.
 
     Parameters
     ----------
     input_shape : StructLayout
-        Of a prepared span; has a field ``length``.
+        Shape of a prepared span; has a field ``length``.
     output_shape : ShapeLike
-        Of the values.
+        Shape of the values of a pixel.
 
     Members
     -------
@@ -39,7 +38,7 @@ class AccumulatorUnit(wiring.Component):
     o : :py:`Out(stream.Signature(output_shape))`
         Values.
 
-    Source: [T] figure 2.10.
+    Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.10.
     """
 
     latency = 2
@@ -50,7 +49,7 @@ class AccumulatorUnit(wiring.Component):
     def quadratics(
         self, values: ValueCastable
     ) -> Iterator[tuple[str, DifferenceAccumulator, tuple, FixedValue]]:
-        """Name, formats, (start, first, second) and place among the ``values`` of each quadratic."""
+        """Name, model, (start, first, second) and element of ``values`` of each quadratic."""
         raise NotImplementedError
 
     def elaborate(self, platform):
@@ -69,18 +68,18 @@ class AccumulatorUnit(wiring.Component):
         for name, p, (start, first, second), result in self.quadratics(values):
             value = Signal(FixedShape(p.format), name=name)
             difference = Signal(FixedShape(p.difference_format), name=f"{name}_difference")
-            bend = Signal(FixedShape(p.difference_format), name=f"{name}_second_difference")
+            second_difference = Signal(FixedShape(p.difference_format), name=f"{name}_second_difference")
             half_step = FixedValue.constant(p.format, p.result_format.step / 2)
             with m.If(load):
                 m.d.sync += [
                     value.eq((start + half_step).wrap(p.format)),
                     difference.eq(first),
-                    bend.eq(second),
+                    second_difference.eq(second),
                 ]
             with m.Elif(advance):
                 m.d.sync += [
                     value.eq((value + difference).wrap(p.format)),
-                    difference.eq((difference + bend).wrap(p.difference_format)),
+                    difference.eq((difference + second_difference).wrap(p.difference_format)),
                 ]
             with m.If(advance):
                 m.d.sync += result.eq(value.truncate(p.result_format.fraction_bits).saturate(p.result_format))
@@ -88,7 +87,9 @@ class AccumulatorUnit(wiring.Component):
 
 
 class DifferenceAccumulatorUnit(AccumulatorUnit):
-    """``N += W; W += 2 G dt^2``: the normals of a span, three quadratics; see `AccumulatorUnit`.
+    """Normals of a span by ``N += W; W += 2 G dt^2``, three quadratics; see `AccumulatorUnit`.
+
+    ``parameters``, a `DifferenceAccumulator`, is the bit-accurate model.
 
     Members
     -------
@@ -97,10 +98,11 @@ class DifferenceAccumulatorUnit(AccumulatorUnit):
     o : :py:`Out(stream.Signature(ArrayLayout(SQ(1, 17), 3)))`
         Normals.
 
-    Source: [T] figure 2.10.
+    Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.10.
     """
 
     def __init__(self):
+        self.parameters = DifferenceAccumulator()
         super().__init__(difference_shape(), normal_shape())
 
     def quadratics(self, values):
@@ -108,4 +110,4 @@ class DifferenceAccumulatorUnit(AccumulatorUnit):
         span = self.i.payload
         for c in range(3):
             operands = span.start[c], span.first[c], span.second[c]
-            yield f"normal_{c}", DifferenceAccumulator(), operands, values[c]
+            yield f"normal_{c}", self.parameters, operands, values[c]

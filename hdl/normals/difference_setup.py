@@ -7,7 +7,6 @@ from amaranth.hdl import Cat, Const, Signal, Value, unsigned
 from amaranth.lib import data
 
 from blysk.golden.normals.difference_setup import DifferenceSetup
-from blysk.golden.normals.gpq import GPQ
 from blysk.golden.number.fixed import SQ
 from blysk.golden.number.reciprocal import RECIPROCAL_FORMAT
 from blysk.golden.number.spans import LENGTH_BITS
@@ -17,12 +16,13 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.reciprocal import checked_length_bits, reciprocal_words, square_words
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.normals.gpq import curve_shapes
 
 __all__ = ["DifferenceSetupUnit", "difference_shape"]
 
 
 def difference_shape() -> data.StructLayout:
-    """Shape of a prepared span: start, first and second difference, length in pixels."""
+    """Shape of a prepared span: start, first and second difference, and length in pixels, 12 bits."""
     difference = data.ArrayLayout(FixedShape(DifferenceSetup.FORMAT), 3)
     return data.StructLayout(
         {"start": normal_shape(), "first": difference, "second": difference, "length": unsigned(12)}
@@ -30,14 +30,14 @@ def difference_shape() -> data.StructLayout:
 
 
 class DifferenceSetupUnit(PipelinedUnit):
-    """``W_0 = P dt + G dt^2`` and ``2 G dt^2`` with ``dt = 1/(m - 1)``.
+    """First differences ``W_0 = P dt + G dt^2`` and ``2 G dt^2`` of a span, ``dt = 1/(m - 1)``.
 
-    Formats and error bound are those of `DifferenceSetup`, the bit-true twin.
+    `DifferenceSetup`, the bit-accurate model, has formats and error bound.
 
     Seven multiplications: the square of dt, three products with P and three with G. With an initiation
-    interval I, ``ceil(7 / I)`` multipliers take turns at them (`dataflow`), each with its own shifter. By
-    default one does all; with an interval of 1 each has one task. The results are the same to the bit. A
-    table of ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals.
+    interval I, ``ceil(7 / I)`` multipliers share them (`blysk.hdl.core.dataflow`), each with its own shifter;
+    by default one does all. The results do not depend on I. A table of ``2^(length_bits - 1)`` words of 17
+    bits holds the reciprocals.
 
     =========== == == == == == == ==
     interval    1  2  3  4  5  6  7
@@ -46,7 +46,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     multipliers 7  4  3  2  2  2  1
     =========== == == == == == == ==
 
-    For a straight line, `order` 1, only three products with P are left:
+    For a straight line, `order` 1, there are three products alone, those with P:
 
     =========== == == == == == == ==
     interval    1  2  3  4  5  6  7
@@ -55,7 +55,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     multipliers 3  2  1  1  1  1  1
     =========== == == == == == == ==
 
-    With the products in the order of [T] there are nine, three of ``G dt`` first:
+    In the order of [T] there are nine products, the three of ``G dt`` first:
 
     =========== == == == == == == == == ==
     interval    1  2  3  4  5  6  7  8  9
@@ -67,13 +67,13 @@ class DifferenceSetupUnit(PipelinedUnit):
     Parameters
     ----------
     parameters : DifferenceSetup
-        Table, formats and order of the products.
+        Bit-accurate model, which knows the order of the products.
     initiation_interval : int or None
-        1 to 7, or to 9 in the order of [T]: distance in cycles of two inputs. ``None``: that of one busy
-        multiplier.
+        Cycles from an input to the next, 1 to 7, or to 9 in the order of [T]. ``None``: as many as there are
+        products.
     order : int
-        2; or 1 for a straight line, G = 0 and no port for it: three multiplications and a second difference
-        of 0.
+        Degree of the curve: 2; or 1 for a straight line, G = 0 without a port, of which the second difference
+        is 0.
     length_bits : int
         Bits of the length, 2 to 12: spans have at most ``2^length_bits - 1`` pixels.
 
@@ -89,12 +89,13 @@ class DifferenceSetupUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(difference_shape()))`
         The start ``q``, both differences in ``SQ(2, 42)``, the length.
 
-    Source: [T] figure 2.11.
+    Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.11.
     """
 
     def __init__(
         self,
         parameters: DifferenceSetup | None = None,
+        *,
         initiation_interval: int | None = None,
         order: Literal[1, 2] = 2,
         length_bits: int = LENGTH_BITS,
@@ -111,11 +112,7 @@ class DifferenceSetupUnit(PipelinedUnit):
         shapes = FixedShape(RECIPROCAL_FORMAT), FixedShape(COMPONENT), unsigned(5)
         self._multiplier = self._graph.share("multiplier", uses, shapes, MULTIPLIER_LATENCY + 3, _multiply)
         self._words = self._describe()
-        coefficients = {
-            "g": data.ArrayLayout(FixedShape(GPQ.G_FORMAT), 3),
-            "p": data.ArrayLayout(FixedShape(GPQ.P_FORMAT), 3),
-            "q": normal_shape(),
-        }
+        coefficients = curve_shapes()
         if order == 1:
             del coefficients["g"]
         super().__init__(
@@ -126,7 +123,7 @@ class DifferenceSetupUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the age of its last word."""
+        """The graph, read at the stage of its last word."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         for index, word in self._words.items():
@@ -147,7 +144,7 @@ class DifferenceSetupUnit(PipelinedUnit):
                     f"first_{c}", reciprocal, p, shift, lambda p, c=c: p[c], _plus_one
                 )
             return words
-        describe = self._documented if self.parameters.as_published else self._products
+        describe = self._as_published if self.parameters.as_published else self._products
         describe(words, p, g.input("g", lambda operands: operands.g), reciprocal, shift)
         return words
 
@@ -171,37 +168,37 @@ class DifferenceSetupUnit(PipelinedUnit):
             )
             words["second", c] = graph.register(f"second_{c}", _twice, second)
 
-    def _documented(self, words, p, g, reciprocal, shift) -> None:
-        """``(G dt + P) dt`` and ``2 (G dt) dt``."""
+    def _as_published(self, words, p, g, reciprocal, shift) -> None:
+        """``(G dt + P) dt`` and ``2 (G dt) dt``; of the curvature ``G dt`` a word without the shift of dt."""
         graph = self._graph
-        slope_format, step_format = DifferenceSetup.SLOPE_FORMAT, SQ(1, 29)
+        curvature_format, step_format = DifferenceSetup.CURVATURE_FORMAT, SQ(1, 29)
         products = [
-            self._product(f"bend_exact_{c}", reciprocal, g, lambda g, c=c: g[c].extend(COMPONENT))
+            self._product(f"curvature_exact_{c}", reciprocal, g, lambda g, c=c: g[c].extend(COMPONENT))
             for c in range(3)
         ]
-        bends = [
-            graph.register(f"bend_{c}", lambda x: x.round_half_up(18).wrap(slope_format), product)
+        curvatures = [
+            graph.register(f"curvature_{c}", lambda x: x.round_half_up(18).wrap(curvature_format), product)
             for c, product in enumerate(products)
         ]
-        for c, bend in enumerate(bends):
+        for c, curvature in enumerate(curvatures):
             second = self._shifted(
                 f"second_order_{c}",
                 reciprocal,
-                bend,
+                curvature,
                 shift,
-                lambda bend: bend.scale(1),
+                lambda curvature: curvature.scale(1),
                 lambda shift: Cat(Const(1, 1), shift),
             )
             words["second", c] = graph.register(f"second_{c}", _twice, second)
-        for c, bend in enumerate(bends):
-            # The step of the first pixel, exact with 29 fraction bits, in two stages.
+        for c, curvature in enumerate(curvatures):
+            # ``G dt``, exact with 29 fraction bits, shifted in two stages.
             step = graph.register(
                 f"step_coarse_{c}",
-                lambda bend, shift: FixedValue(
+                lambda curvature, shift: FixedValue(
                     step_format,
-                    Value.cast(bend.scale(1).extend(step_format)) >> Cat(Const(0, 2), shift[2:]),
+                    Value.cast(curvature.scale(1).extend(step_format)) >> Cat(Const(0, 2), shift[2:]),
                 ),
-                bend,
+                curvature,
                 shift,
             )
             step = graph.register(
@@ -246,18 +243,20 @@ class DifferenceSetupUnit(PipelinedUnit):
 
 
 def _plus_one(shift: Value) -> Value:
+    """Shift of a product with dt."""
     return shift + 1
 
 
 def _twice(second: FixedValue) -> FixedValue:
+    """Second difference: twice ``G dt^2``."""
     return second.scale(1).extend(SQ(3, 42)).wrap(DifferenceSetup.FORMAT)
 
 
 def _multiply(register, a: FixedValue, b: FixedValue, amount: Value) -> Sequence[FixedValue]:
     """Product; and ``4 product 2^-amount`` in two stages, rounded half up to 42 fraction bits."""
     product = registered_product(register, a, b)
-    for clock in range(MULTIPLIER_LATENCY):
-        amount = register(amount, f"amount_{clock}")
+    for cycle in range(MULTIPLIER_LATENCY):
+        amount = register(amount, f"amount_{cycle}")
     scaled = product.scale(2).extend(SQ(3, 43))
     coarse = FixedValue(scaled.format, Value.cast(scaled) >> Cat(Const(0, 3), amount[3:]))
     coarse, fine = register(coarse, "coarse"), register(amount[:3], "fine_amount")

@@ -12,15 +12,14 @@ __all__ = ["DotProductUnit"]
 class DotProductUnit(PipelinedUnit):
     """Exact dot product ``a0 b0 + a1 b1 + a2 b2``.
 
-    The sum keeps every bit (``SQ(4, 34)`` for unit vectors), so there is neither rounding nor overflow.
+    The sum keeps every bit (``SQ(4, 34)`` for unit vectors): no rounding, no overflow.
 
-    The latency is 3 cycles (products, first sum, second sum) and the initiation interval is 1. Three
-    multipliers.
+    The latency is 3 cycles (products, first sum, second sum), the initiation interval 1. Three multipliers.
 
     Parameters
     ----------
     parameters : DotProduct
-        Number formats; `DotProduct.compute` is the bit-true twin.
+        Bit-accurate model, which knows the number formats.
 
     Members
     -------
@@ -29,7 +28,7 @@ class DotProductUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(FixedShape))`
         Their dot product.
 
-    Source: [T] figure 2.5.
+    Source: docs/theory/interpolation.md#dot-product; [T] figure 2.5.
     """
 
     def __init__(self, parameters: DotProduct | None = None):

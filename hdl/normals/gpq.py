@@ -10,28 +10,42 @@ from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
 
-__all__ = ["GPQUnit"]
+__all__ = ["GPQUnit", "curve_shapes"]
+
+
+def curve_shapes() -> dict[str, data.ArrayLayout]:
+    """Shapes of the coefficients of a quadratic normal curve, by name: ``g``, ``p`` and ``q``."""
+    return {
+        "g": data.ArrayLayout(FixedShape(GPQ.G_FORMAT), 3),
+        "p": data.ArrayLayout(FixedShape(GPQ.P_FORMAT), 3),
+        "q": normal_shape(),
+    }
 
 
 class GPQUnit(PipelinedUnit):
-    """``G = 2 N_r - 4 N_c + 2 N_l``, ``P = 4 N_c - N_r - 3 N_l``, ``Q = N_l``.
+    """Coefficients ``G = 2 N_r - 4 N_c + 2 N_l``, ``P = 4 N_c - N_r - 3 N_l``, ``Q = N_l``.
 
-    Exact for spans up to 45 degrees, saturated beyond; `GPQ` is the bit-true twin.
+    Exact for spans up to 45 degrees, saturated beyond.
 
-    The latency is 3 cycles (first sums, second sums, saturation) and the initiation interval is 1. No
-    multipliers.
+    The latency is 3 cycles (first sums, second sums, saturation), the initiation interval 1. No multipliers.
+
+    Parameters
+    ----------
+    parameters : GPQ
+        Bit-accurate model.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"normal_left", "normal_middle", "normal_right"})))`
         Normals: ``SQ(1, 17)`` at the ends, ``SQ(1, 19)`` in the middle.
-    o : :py:`Out(stream.Signature(StructLayout({"g", "p", "q"})))`
+    o : :py:`Out(stream.Signature(StructLayout(curve_shapes())))`
         Coefficients: ``SQ(0, 17)``, ``SQ(1, 17)``, ``SQ(1, 17)``.
 
-    Source: [T] figure 2.8.
+    Source: docs/theory/interpolation.md#quadratic-normals; [T] figure 2.8.
     """
 
-    def __init__(self):
+    def __init__(self, parameters: GPQ | None = None):
+        self.parameters = parameters or GPQ()
         super().__init__(
             data.StructLayout(
                 {
@@ -40,18 +54,12 @@ class GPQUnit(PipelinedUnit):
                     "normal_right": normal_shape(),
                 }
             ),
-            data.StructLayout(
-                {
-                    "g": data.ArrayLayout(FixedShape(GPQ.G_FORMAT), 3),
-                    "p": data.ArrayLayout(FixedShape(GPQ.P_FORMAT), 3),
-                    "q": normal_shape(),
-                }
-            ),
+            data.StructLayout(curve_shapes()),
             latency=3,
         )
 
     def datapath(self, m, operands):
-        """Three components side by side."""
+        """Each component by itself."""
         register = self.register
         result = Signal(self.o.payload.shape())
         for c in range(3):

@@ -17,14 +17,14 @@ _MULTIPLICATIONS = 9
 
 
 class MiddleNormalUnit(PipelinedUnit):
-    """``N_c = h(r) (N_l + N_r)`` with ``h = 1/sqrt(2 (1 + r))`` as a polynomial.
+    """Middle normal ``N_c = h(r) (N_l + N_r)``, ``h = 1/sqrt(2 (1 + r))`` as a polynomial.
 
-    Formats, fits (that of the default is exact at angle 0), error bound and the flag are those of
-    `MiddleNormal`, the bit-true twin.
+    `MiddleNormal`, the bit-accurate model, has formats, fits (the default is exact at angle 0), error bound
+    and flag.
 
     Nine multiplications: three of the dot product, three Horner steps, three scalings. With an initiation
-    interval I, ``ceil(9 / I)`` multipliers take turns at them (`dataflow`); with an interval of 1 each
-    has one task. The results are the same to the bit.
+    interval I, ``ceil(9 / I)`` multipliers share them (`blysk.hdl.core.dataflow`). The results do not depend
+    on I.
 
     =========== == == == == == == == == ==
     interval    1  2  3  4  5  6  7  8  9
@@ -36,9 +36,9 @@ class MiddleNormalUnit(PipelinedUnit):
     Parameters
     ----------
     parameters : MiddleNormal
-        Fit of h and formats.
+        Bit-accurate model, which knows the fit of h.
     initiation_interval : int or None
-        1 to 9: distance in cycles of two inputs. ``None``: 6.
+        Cycles from an input to the next, 1 to 9. ``None``: 6.
 
     Raises
     ------
@@ -51,12 +51,12 @@ class MiddleNormalUnit(PipelinedUnit):
         Unit normals of the span's ends, three components ``SQ(1, 17)`` each.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
         The same two normals, ``normal_middle`` in ``SQ(1, 19)``, and ``out_of_range``: the span is wider than
-        45 degrees and its middle normal not to be trusted.
+        45 degrees, and its middle normal undefined.
 
-    Source: [T] 2.2; the fit of numbers.md.
+    Source: docs/theory/interpolation.md#middle-normal; [T] 2.2.
     """
 
-    def __init__(self, parameters: MiddleNormal | None = None, initiation_interval: int | None = None):
+    def __init__(self, parameters: MiddleNormal | None = None, *, initiation_interval: int | None = None):
         self.parameters = parameters or MiddleNormal()
         interval = checked_interval(initiation_interval, _MULTIPLICATIONS, 6)
         self._graph = Dataflow(interval, _MULTIPLICATIONS)
@@ -76,7 +76,7 @@ class MiddleNormalUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the age of its last word."""
+        """The graph, read at the stage of its last word."""
         value = self._graph.build(m, self, operands)
         read = {name: value(word, self.latency) for name, word in self._words.items()}
         result = Signal(self.o.payload.shape())
@@ -101,7 +101,7 @@ class MiddleNormalUnit(PipelinedUnit):
         widest = FixedValue.constant(p.ANGLE_FORMAT, p.widest.values.item())
         out_of_range = g.register("out_of_range", lambda u: u > widest, u)
 
-        # A multiplier takes at most 18 signed bits twice; wired shifts align what it is given.
+        # A multiplier has two signed operands of at most 18 bits; wired shifts align them.
         c1, c2, c3 = (FixedValue.constant(p.SUM_FORMAT, value) for value in p.coefficients.values.tolist())
         product = g.multiply("product_3", u, u, right=lambda _: c3)
         for power, c in ((2, c2), (1, c1)):
@@ -128,8 +128,10 @@ class MiddleNormalUnit(PipelinedUnit):
 
 
 def _cut(half_sum: FixedValue) -> FixedValue:
+    """Operand of a scaling."""
     return half_sum.truncate(17).saturate(COMPONENT)
 
 
 def _corrected(half_sum: FixedValue, product: FixedValue) -> FixedValue:
+    """Half sum and ``2 e`` times it."""
     return half_sum + product.scale(1).round_half_up(19)

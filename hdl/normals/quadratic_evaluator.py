@@ -4,48 +4,42 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.golden.number.reciprocal import reciprocal_table
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.reciprocal import reciprocal_words
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit, connect
+from blysk.hdl.normals.gpq import curve_shapes
 
 __all__ = ["QuadraticEvaluatorUnit"]
 
 
-def _coefficients() -> dict:
-    return {
-        "g": data.ArrayLayout(FixedShape(GPQ.G_FORMAT), 3),
-        "p": data.ArrayLayout(FixedShape(GPQ.P_FORMAT), 3),
-        "q": normal_shape(),
-    }
-
-
 class QuadraticEvaluatorUnit(wiring.Component):
-    """``N(t) = G t^2 + P t + Q``: the normals of a span in raster order, first pixel at t = 0, last at t = 1.
+    """Normals ``N(t) = G t^2 + P t + Q`` of a span in raster order, first pixel at t = 0, last at t = 1.
 
-    Formats, rounding and error bound are those of `QuadraticEvaluator`, the
-    bit-true twin. The table of reciprocals holds 2048 words of 18 bits.
+    `QuadraticEvaluator`, the bit-accurate model, has formats, rounding and error bound. The table of
+    reciprocals holds 2048 words of 18 bits.
 
     ``direct`` (figure 2.9 a): seven multipliers, t^2 once and two products a component (the figure draws one
-    component, with three). A span's first normal comes 14 cycles after it was taken in, then one a clock.
+    component, with three). The first normal comes 14 cycles after its span was taken in, then one in every
+    cycle.
 
     ``horner`` (figure 2.9 b): one multiplier, one adder and multiplexers a component, three multipliers in
     all. The first normal comes 17 cycles after its span, then one every two cycles.
 
-    The step of the next span is prepared while this one runs: spans are taken in 7 cycles apart at the
-    closest, and there is no gap between their pixels when they have 7 pixels (``horner``: 4) or more. A
-    span of length 0 gives nothing.
+    The step of the next span is prepared while this one runs. Spans are taken in at least 7 cycles apart, and
+    there is no gap between their pixels if they have 7 pixels (``horner``: 4) or more. A span of length 0
+    gives nothing.
 
     Parameters
     ----------
     parameters : QuadraticEvaluator
-        Form, table and formats.
+        Bit-accurate model, which knows the form.
 
     Members
     -------
@@ -54,7 +48,7 @@ class QuadraticEvaluatorUnit(wiring.Component):
     o : :py:`Out(stream.Signature(ArrayLayout(SQ(1, 17), 3)))`
         Normals.
 
-    Source: [T] figures 2.9 a and b.
+    Source: docs/theory/interpolation.md#quadratic-normals; [T] figures 2.9 a and b.
     """
 
     def __init__(self, parameters: QuadraticEvaluator | None = None):
@@ -62,15 +56,11 @@ class QuadraticEvaluatorUnit(wiring.Component):
         direct = self.parameters.form == "direct"
         self.latency = 14 if direct else 17
         self.cycles_per_pixel = 1 if direct else 2
-        super().__init__(
-            {
-                "i": In(stream.Signature(data.StructLayout({**_coefficients(), "length": unsigned(12)}))),
-                "o": Out(stream.Signature(normal_shape())),
-            }
-        )
+        span = data.StructLayout({**curve_shapes(), "length": unsigned(LENGTH_BITS)})
+        super().__init__({"i": In(stream.Signature(span)), "o": Out(stream.Signature(normal_shape()))})
 
     def elaborate(self, platform):
-        """Step of the span, sum of the steps with a pixel counter, then the polynomial pixel by pixel."""
+        """Step of the span, sum of its steps and pixel counter, then the polynomial pixel by pixel."""
         m = Module()
         p = self.parameters
         m.submodules.step = step = _StepUnit(p)
@@ -80,15 +70,15 @@ class QuadraticEvaluatorUnit(wiring.Component):
 
         span, pixel = step.o, polynomial.i
         total = Signal(FixedShape(p.SUM_FORMAT))
-        held = Signal(FixedShape(p.STEP_FORMAT))
-        coefficients = Signal(data.StructLayout(_coefficients()))
-        after = Signal(12)
+        step_held = Signal(FixedShape(p.STEP_FORMAT))
+        coefficients = Signal(data.StructLayout(curve_shapes()))
+        remaining = Signal(LENGTH_BITS)
         valid = Signal()
         advance = Signal()
         m.d.comb += [
             pixel.valid.eq(valid),
             advance.eq(~valid | pixel.ready),
-            span.ready.eq(advance & (after == 0)),
+            span.ready.eq(advance & (remaining == 0)),
             pixel.payload.minus_t.eq(total.truncate(17)),
             *(pixel.payload[name].eq(coefficients[name]) for name in ("g", "p", "q")),
         ]
@@ -97,26 +87,26 @@ class QuadraticEvaluatorUnit(wiring.Component):
             length = span.payload.length
             m.d.sync += [
                 valid.eq(length != 0),
-                after.eq(Mux(length == 0, 0, length - 1)),
+                remaining.eq(Mux(length == 0, 0, length - 1)),
                 total.eq(half_step),
-                held.eq(span.payload.step),
+                step_held.eq(span.payload.step),
             ]
             m.d.sync += [coefficients[name].eq(span.payload[name]) for name in ("g", "p", "q")]
         with m.Elif(advance):
             m.d.sync += [
-                valid.eq(after != 0),
-                after.eq(Mux(after == 0, 0, after - 1)),
-                total.eq((total - held).wrap(p.SUM_FORMAT)),
+                valid.eq(remaining != 0),
+                remaining.eq(Mux(remaining == 0, 0, remaining - 1)),
+                total.eq((total - step_held).wrap(p.SUM_FORMAT)),
             ]
         return m
 
 
 class _StepUnit(PipelinedUnit):
-    """``dt = 1/(m - 1)`` beside the coefficients. Latency 8, initiation interval 7: one register for all."""
+    """Step ``dt = 1/(m - 1)`` and the coefficients. Latency 8, initiation interval 7: one register each."""
 
     def __init__(self, parameters: QuadraticEvaluator):
         self.parameters = parameters
-        span = {**_coefficients(), "length": unsigned(12)}
+        span = {**curve_shapes(), "length": unsigned(LENGTH_BITS)}
         self._graph = Dataflow(7)
         self._words = self._describe(span)
         super().__init__(
@@ -127,7 +117,7 @@ class _StepUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the age of the step."""
+        """The graph, read at the stage of the step."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         m.d.comb += [result[name].eq(value(word, self.latency)) for name, word in self._words.items()]
@@ -151,11 +141,11 @@ class _StepUnit(PipelinedUnit):
 
 
 def _pixel_shape() -> data.StructLayout:
-    return data.StructLayout({**_coefficients(), "minus_t": FixedShape(COMPONENT)})
+    return data.StructLayout({**curve_shapes(), "minus_t": FixedShape(COMPONENT)})
 
 
 def _with_half(value: FixedValue) -> FixedValue:
-    """A component plus half its step, by a wire: a cut after the sum then rounds half up."""
+    """Component plus half its step, by a wire: a cut after the sum then rounds half up."""
     return FixedValue(SQ(1, 18), Cat(Const(1, 1), Value.cast(value)))
 
 
@@ -192,7 +182,7 @@ class _HornerUnit(PipelinedUnit):
         super().__init__(_pixel_shape(), normal_shape(), latency=8, initiation_interval=2)
 
     def datapath(self, m, operands):
-        """Ages: products issued at 1 and 4, sums at 3 and 6, so that two pixels share the parts at turns."""
+        """Products issued at stages 1 and 4, sums at 3 and 6: two pixels share the parts."""
         at, register = self.at, self.register
         held = register(m, operands, "operands_3", when=at(2))
         q = register(m, held.q, "q_5", when=at(4))

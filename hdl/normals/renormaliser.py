@@ -1,4 +1,4 @@
-"""Direct renormaliser: a vector of about unit length brought to unit length, one a clock."""
+"""Renormaliser: a vector of about unit length divided by its length, one in every cycle."""
 
 from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
 from amaranth.lib import data
@@ -16,40 +16,39 @@ __all__ = ["RenormaliserUnit"]
 
 
 class RenormaliserUnit(PipelinedUnit):
-    """``N = v/sqrt(v . v)`` by a reciprocal square root in 18 quadratic segments.
+    """Unit vector ``N = v/sqrt(v . v)``, by a reciprocal square root in 18 quadratic segments.
 
-    Segments, formats, error bound and the flag are those of `Renormaliser`, the bit-true
-    twin.
+    `Renormaliser`, the bit-accurate model, has segments, formats, error bound and flag.
 
     The latency is 12 cycles (dot product 3, segment, table, four for the polynomial, scaling, sum,
-    saturation) and the initiation interval is 1. Eight multipliers: three squares, two in the polynomial,
+    saturation), the initiation interval 1. Eight multipliers: three squares, two in the polynomial,
     three scalings. The table holds 18 words of 49 bits.
 
     Parameters
     ----------
     parameters : Renormaliser
-        Coefficients and formats.
+        Bit-accurate model.
 
     Members
     -------
     i : :py:`In(stream.Signature(ArrayLayout(SQ(1, 17), 3)))`
         Vectors.
-    o : :py:`Out(stream.Signature(StructLayout({"normal", "outside"})))`
-        Unit vector, ``SQ(1, 17)``; ``outside``: the length is not served, and the vector as it came.
+    o : :py:`Out(stream.Signature(StructLayout({"normal", "out_of_range"})))`
+        Unit vector, ``SQ(1, 17)``; ``out_of_range``: the length is, and the vector is that of the input.
 
-    Source: numbers.md, "Rivals to measure against".
+    Source: docs/theory/interpolation.md#renormaliser.
     """
 
     def __init__(self, parameters: Renormaliser | None = None):
         self.parameters = parameters or Renormaliser()
         super().__init__(
             normal_shape(),
-            data.StructLayout({"normal": normal_shape(), "outside": unsigned(1)}),
+            data.StructLayout({"normal": normal_shape(), "out_of_range": unsigned(1)}),
             latency=12,
         )
 
     def datapath(self, m, operands):
-        """Square, place in its segment, ``c0 - u (c1 - u c2)``, and ``v + e v``."""
+        """Square, segment and offset in it, ``c0 - u (c1 - u c2)``, and ``v + e v``."""
         p, register = self.parameters, self.register
         m.submodules.dot_product = dot_product = DotProductUnit()
         m.d.comb += [
@@ -67,8 +66,8 @@ class RenormaliserUnit(PipelinedUnit):
         offset = Value.cast(register(m, square - low, "offset"))
         bits = p.OFFSET_FORMAT.width
         segment = offset[bits:]
-        # A negative offset has high bits too.
-        outside = register(m, segment >= p.SEGMENTS, "outside_5")
+        # A negative offset has high bits, too.
+        out_of_range = register(m, segment >= p.SEGMENTS, "out_of_range_5")
         u = FixedValue(p.OFFSET_FORMAT, register(m, offset[:bits], "u_5"))
         c0, c1, c2 = self._coefficients(m, segment[: p.SEGMENT_BITS])
 
@@ -80,14 +79,14 @@ class RenormaliserUnit(PipelinedUnit):
         linear_term = register(m, u * slope, "linear_term")
         c0 = register(m, c0, "c0_8")
         for stage in range(6, 9):
-            outside = register(m, outside, f"outside_{stage}")
+            out_of_range = register(m, out_of_range, f"out_of_range_{stage}")
         e = (c0 - linear_term).truncate(18).wrap(p.FACTOR_FORMAT)
-        e = FixedValue(p.FACTOR_FORMAT, register(m, Mux(outside, 0, Value.cast(e)), "e"))
+        e = FixedValue(p.FACTOR_FORMAT, register(m, Mux(out_of_range, 0, Value.cast(e)), "e"))
         for stage in range(9, 13):
-            outside = register(m, outside, f"outside_{stage}")
+            out_of_range = register(m, out_of_range, f"out_of_range_{stage}")
 
         result = Signal(self.o.payload.shape())
-        m.d.comb += result.outside.eq(outside)
+        m.d.comb += result.out_of_range.eq(out_of_range)
         for c in range(3):
             scaled = register(m, e * vector[9][c], f"scaled_{c}")
             with_half = FixedValue(SQ(1, 18), Cat(Const(1, 1), Value.cast(vector[10][c])))
@@ -96,7 +95,7 @@ class RenormaliserUnit(PipelinedUnit):
         return result
 
     def _coefficients(self, m, segment):
-        """``c0``, ``c1`` and ``c2`` of the segment, one clock later; c0 with half a step of e added."""
+        """``c0``, ``c1`` and ``c2`` of the segment, one cycle later; c0 with half a step of e added."""
         p = self.parameters
         c0, c1, c2 = p.coefficients
         layout = data.StructLayout(

@@ -1,13 +1,15 @@
 """Operands for units: codes, unit vectors, spans and lengths, at random with their corner cases."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from amaranth.lib.wiring import Component
 
-from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.lighting.specular import MAX_EXPONENT, HighlightOperand
+from blysk.golden.normals.gpq import GPQ
+from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
 from blysk.golden.number.fixed import Fixed, Format
-from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.reference.geometry import normalise
 from blysk.sim.engines.beats import dtype_of
 
@@ -16,14 +18,22 @@ __all__ = [
     "LONG",
     "SPANS_45",
     "any_codes",
+    "any_curves",
     "any_lengths",
     "any_pairs",
+    "code_pairs_at",
     "component_words",
+    "curves",
+    "curves_of",
     "degrees_between",
     "dot",
+    "exact_middle",
     "exponents",
+    "highlight_codes",
     "light_constants",
     "log_lengths",
+    "pairs_at",
+    "pairs_chosen",
     "pixel_of",
     "setup_spans",
     "short_lengths",
@@ -91,6 +101,42 @@ def turned(rng: np.random.Generator, vectors: np.ndarray, degrees: np.ndarray) -
     return vectors * np.cos(angle) + across * np.sin(angle)
 
 
+def pairs_at(
+    rng: np.random.Generator, count: int, degrees: np.ndarray | float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of unit normals at given angles, uniform over the sphere."""
+    left = sphere(rng, count)
+    return left, turned(rng, left, degrees)
+
+
+def code_pairs_at(
+    rng: np.random.Generator, count: int, degrees: np.ndarray | float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Codes of pairs of unit normals at given angles, uniform over the sphere."""
+    left, right = pairs_at(rng, count, degrees)
+    return quantise(left), quantise(right)
+
+
+def pairs_chosen(
+    left: np.ndarray, right: np.ndarray, choose: Callable[[np.ndarray], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of each vector of codes with each of others whose ``1 - a . b`` is chosen.
+
+    For the few pairs whose word of ``1 - a . b`` is at the border of a rounding, among many.
+
+    Parameters
+    ----------
+    left, right : int64 array, shape (count, 3)
+        Codes of vectors.
+    choose : callable
+        Takes the codes of ``1 - a . b`` with 34 fraction bits, gives booleans.
+    """
+    # Products and sums have 36 bits, which float64 holds.
+    difference = ONE_SQUARED.codes - (left.astype(float) @ right.T.astype(float)).astype(np.int64)
+    first, second = np.nonzero(choose(difference))
+    return left[first], right[second]
+
+
 def spread_angles(rng: np.random.Generator, count: int, widest: float) -> np.ndarray:
     """Degrees: both ends, half spread evenly, half by their logarithm."""
     angles = rng.uniform(0, widest, count)
@@ -129,6 +175,12 @@ def degrees_between(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Angles between vectors of codes, as a column."""
     sine = np.linalg.norm(np.cross(left / ONE, right / ONE), axis=1)
     return np.degrees(np.arctan2(sine, dot(left, right) / ONE**2))[:, np.newaxis]
+
+
+def exact_middle(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Exact middle of two vectors of codes, as long as a unit vector, and their cosine."""
+    cosine = dot(left, right) / ONE**2
+    return (left + right) * COMPONENT.step / np.sqrt(2 + 2 * cosine)[:, np.newaxis], cosine
 
 
 def light_constants(unit: Component, direction: np.ndarray, halfway: np.ndarray) -> np.ndarray:
@@ -206,7 +258,49 @@ def setup_spans(
     return {"normal_left": left[order], "normal_right": right[order], "length": length[order]}
 
 
+def curves(rng: np.random.Generator, count: int) -> tuple[Fixed, Fixed, Fixed]:
+    """Coefficients G, P, Q of the quadratic curves of spans up to 45 degrees."""
+    return curves_of(*component_words(*span_ends(rng, count, MAX_SPAN_ANGLE)))
+
+
+def curves_of(left: Fixed, right: Fixed) -> tuple[Fixed, Fixed, Fixed]:
+    """Coefficients G, P, Q of the quadratic curves of spans between unit normals."""
+    middle, _ = MiddleNormal().compute(left, right)
+    return GPQ().compute(left, middle, right)
+
+
+def any_curves(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
+    """Codes of coefficients G, P, Q by name, anywhere in their words."""
+    formats = {"g": GPQ.G_FORMAT, "p": GPQ.P_FORMAT, "q": GPQ.Q_FORMAT}
+    return {name: any_codes(rng, format, count, 3) for name, format in formats.items()}
+
+
 # Highlights.
+
+
+def highlight_codes(
+    rng: np.random.Generator, parameters: HighlightOperand, count: int, exponent: int
+) -> np.ndarray:
+    """Operands of a specular unit: most where the term is not 0 or near its end, some at any 1 - cos gamma.
+
+    Of every fourth 1 - cos gamma is drawn by its logarithm, every third is any code, every sixteenth the code
+    of cos gamma = 1, 0 or -1, or one next to it.
+    """
+    format = parameters.operand_format
+    reach = 1.25 * parameters.last_lit_arguments[exponent] * 2.0**-25
+    distance = rng.uniform(0, min(reach, 2), count)
+    distance[1::4] = 10.0 ** rng.uniform(-9, 0.3, len(distance[1::4]))
+    if parameters.operand == "cosine":
+        one = ONE_SQUARED.codes.item()
+        codes = one - np.floor(distance * 2.0**34).astype(np.int64)
+        corners = [one, one - 1, one + 1, one + 10**6, 0, 1, -1, -one]
+    else:
+        codes = np.floor(distance * 2.0**25).astype(np.int64)
+        corners = [0, 1, 2, (1 << 25) - 1, 1 << 25, format.max_code - 1]
+    codes = np.clip(codes, format.min_code, format.max_code)
+    codes[2::3] = any_codes(rng, format, len(codes[2::3]))
+    codes[::16] = rng.choice(corners, len(codes[::16]))
+    return codes
 
 
 def exponents(rng: np.random.Generator, count: int) -> Iterator[tuple[int, int]]:

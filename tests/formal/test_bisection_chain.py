@@ -47,14 +47,14 @@ def test_spans(prove):
 
 
 BUGS = {
-    "it does not wait": ('m.State("done"), m.If(self.o.ready)', 'm.State("done")'),
-    "it offers another": ("self.o.valid.eq(0)", "self.o.valid.eq(self.i.valid)"),
-    "a round too few": ("remaining == 1", "1"),
+    "it does not wait": ("elaborate", 'm.State("done"), m.If(self.o.ready)', 'm.State("done")'),
+    "it offers another": ("elaborate", "self.o.valid.eq(0)", "self.o.valid.eq(self.i.valid)"),
+    "a round too few": ("_halve", "r.remaining == 1", "1"),
 }
 
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, plant, bug):
     """Planted in `BisectionChainUnit`, each refutes the claims."""
-    plant(BisectionChainUnit, "elaborate", *BUGS[bug])
+    plant(BisectionChainUnit, *BUGS[bug])
     refute(of_spans())

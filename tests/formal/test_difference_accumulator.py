@@ -135,7 +135,7 @@ def test_sums_are_exact(prove, name):
 
 BUGS = {
     "a bit too few": (
-        "difference + bend).wrap(p.difference_format)",
+        "difference + second_difference).wrap(p.difference_format)",
         "difference).wrap(p.difference_format)",
     ),
     "no half step": ("(start + half_step).wrap(p.format)", "start.extend(p.format)"),

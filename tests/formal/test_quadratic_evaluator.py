@@ -76,9 +76,12 @@ def test_pixels(prove, form):
 
 BUGS = {
     "it moves while the polynomial stands": ("advance.eq(~valid | pixel.ready)", "advance.eq(1)"),
-    "a span takes another's place": ("span.ready.eq(advance & (after == 0))", "span.ready.eq(advance)"),
-    "a span is lost while it stands": ("span.ready.eq(advance & (after == 0))", "span.ready.eq(after == 0)"),
-    "t stands": ("total - held", "total"),
+    "a span takes another's place": ("span.ready.eq(advance & (remaining == 0))", "span.ready.eq(advance)"),
+    "a span is lost while it stands": (
+        "span.ready.eq(advance & (remaining == 0))",
+        "span.ready.eq(remaining == 0)",
+    ),
+    "t stands": ("total - step_held", "total"),
     "a pixel too many": ("length - 1", "length"),
     "a span of no pixels has one": ("valid.eq(length != 0)", "valid.eq(1)"),
 }

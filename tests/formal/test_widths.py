@@ -7,9 +7,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from blysk.golden.cosines.arccos import HalfChord
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
@@ -30,8 +30,8 @@ from blysk.golden.number.reciprocal import reciprocal_address
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT, ONE_SQUARED
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.hdl.cosines.arccos import HalfChordUnit
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
+from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
@@ -74,7 +74,7 @@ def of_local_chord_setup():
 
 def of_chord_differences(fraction_bits):
     unit = ChordSetup(fraction_bits=fraction_bits)
-    slope, bend = word(unit.SLOPE_FORMAT, 1, 1), word(unit.BEND_FORMAT, 1, 1)
+    slope, bend = word(unit.SLOPE_FORMAT, 1, 1), word(unit.CURVATURE_FORMAT, 1, 1)
     unit.differences(None, slope, bend, *unit.steps(LENGTHS))
 
 
@@ -168,10 +168,10 @@ def of_segments(levels):
     )
     for lengths, *_ in parts_of_lengths():
         each = np.full(len(lengths), levels)
-        span, _, *places = unit.places(lengths, each)
+        span, _, *positions = unit.positions(lengths, each)
         for pair in ends:
             words = (Fixed(COMPONENT, rows(bounds, span)) for bounds in pair)
-            unit.walk(*words, lengths, each, span, *places)
+            unit.walk(*words, lengths, each, span, *positions)
 
 
 def of_chord_sums(name, fraction_bits, format=None):
@@ -182,12 +182,12 @@ def of_chord_sums(name, fraction_bits, format=None):
         sums = replace(sums, format=format)
     one = 1 << sums.start_format.fraction_bits
     start = unknown(*{"diffuse": (-one, one), "highlight": (0, 2.001 * one)}[name])
-    slope, bend = (unknown(f.min_code, f.max_code) for f in (setup.SLOPE_FORMAT, setup.BEND_FORMAT))
+    slope, bend = (unknown(f.min_code, f.max_code) for f in (setup.SLOPE_FORMAT, setup.CURVATURE_FORMAT))
     for lengths, span, step in parts_of_lengths():
         words = Fixed(sums.start_format, rows(start, lengths)), Fixed(setup.SLOPE_FORMAT, slope)
         walk(
             sums,
-            *setup.differences(*words, Fixed(setup.BEND_FORMAT, bend), *setup.steps(lengths)),
+            *setup.differences(*words, Fixed(setup.CURVATURE_FORMAT, bend), *setup.steps(lengths)),
             span,
             step,
         )
@@ -427,9 +427,9 @@ def test_shifts_of_the_recurrence_a_bit_too_short_are_found(bits):
 
 CUTS = {
     "blysk.hdl.core.reciprocal.reciprocal_words": "the leading one of m - 1; m is 1 or more",
-    "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._front": "2^levels - 1",
-    "blysk.hdl.cosines.arccos.normalised_words": "v: `test_angular_setup`",
-    "blysk.hdl.cosines.arccos.half_chord_words": "half a turn less psi, as the twin wraps it",
+    "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._prepare_segment": "2^levels - 1",
+    "blysk.hdl.cosines.half_chord.normalised_words": "v: `test_angular_setup`",
+    "blysk.hdl.cosines.half_chord.half_chord_words": "half a turn less psi, as the twin wraps it",
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._describe": "shifts: `of_recurrence_shifts`",
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._steps": "the same; and the leading one of m - 1",
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._normalised": "q; the twin refuses",
@@ -518,14 +518,14 @@ def test_bounds_hold():
         assert (codes.max(axis=1) - codes.min(axis=1) > 0.8 * (high - low)[:, 0]).all()
 
 
-FORMATS = ChordSetup.SLOPE_FORMAT, ChordSetup.BEND_FORMAT
+FORMATS = ChordSetup.SLOPE_FORMAT, ChordSetup.CURVATURE_FORMAT
 
 SHORTER_FORMATS = {
     "differences": (WHOLE["difference_setup"], DifferenceSetup, "FORMAT", SQ(1, 42)),
     "G of the documented order": (
         WHOLE["difference_setup-documented"],
         DifferenceSetup,
-        "SLOPE_FORMAT",
+        "CURVATURE_FORMAT",
         SQ(-1, 18),
     ),
     "t": (WHOLE["quadratic_evaluator-horner"], QuadraticEvaluator, "SUM_FORMAT", SQ(0, 29)),

@@ -8,9 +8,10 @@ import numpy as np
 from amaranth.lib.wiring import Component
 
 from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.arccos import Arccos, HalfChord
+from blysk.golden.cosines.arccos import Arccos
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.cosines.recurrence import Recurrence
@@ -38,9 +39,10 @@ from blysk.golden.presets import METHODS
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
-from blysk.hdl.cosines.arccos import ArccosUnit, HalfChordUnit
+from blysk.hdl.cosines.arccos import ArccosUnit
 from blysk.hdl.cosines.chord import ChordUnit
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
+from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
@@ -142,7 +144,7 @@ def _middle_normal(rng, count, fit, interval):
     beats = {"normal_left": left, "normal_right": right}
     middle, out_of_range = twin.compute(*_fixed(left, right))
     return Case(
-        MiddleNormalUnit(twin, interval),
+        MiddleNormalUnit(twin, initiation_interval=interval),
         beats,
         {**beats, "normal_middle": middle.codes, "out_of_range": out_of_range},
     )
@@ -169,7 +171,7 @@ def _difference_setup(rng, count, twin, interval):
     curves, length = _curves(rng, count), _any_lengths(rng, count)
     first, second = twin.compute(curves["g"], curves["p"], length)
     return Case(
-        DifferenceSetupUnit(twin, interval),
+        DifferenceSetupUnit(twin, initiation_interval=interval),
         {name: word.codes for name, word in curves.items()} | {"length": length},
         {"start": curves["q"].codes, "first": first.codes, "second": second.codes, "length": length},
     )
@@ -229,8 +231,8 @@ def _adaptive_normaliser(rng, count):
 def _renormaliser(rng, count):
     vector = np.rint(_vectors(rng, count) * rng.uniform(0.5, 1, (count, 1))).astype(np.int64)
     vector[::8] = _codes(rng, COMPONENT, *vector[::8].shape)
-    normal, outside = Renormaliser().compute(*_fixed(vector))
-    return Case(RenormaliserUnit(), vector, {"normal": normal.codes, "outside": outside})
+    normal, out_of_range = Renormaliser().compute(*_fixed(vector))
+    return Case(RenormaliserUnit(), vector, {"normal": normal.codes, "out_of_range": out_of_range})
 
 
 def _arccos(rng, count, form):
@@ -426,7 +428,7 @@ def _value_beats(unit, values, length) -> np.ndarray:
 
 
 def _local_chord_setup(rng, count):
-    unit, twin = LocalChordSetupUnit(_LIGHTS), LocalChordSetup()
+    unit, twin = LocalChordSetupUnit(None, _LIGHTS), LocalChordSetup()
     values, length = _values(rng, count), _any_lengths(rng, count)
     formats = twin.DIFFUSE_FORMAT, twin.HIGHLIGHT_FORMAT
     *words, out_of_range = twin.compute(*map(Fixed, formats, values), length)

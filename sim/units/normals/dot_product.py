@@ -1,8 +1,11 @@
 """Record of the dot-product unit."""
 
+from functools import partial
+
 import numpy as np
 
 from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.hdl.normals.dot_product import DotProductUnit
 from blysk.sim.units.operands import any_codes, component_words, dot
@@ -20,13 +23,14 @@ def _measure(rng, count):
 
 
 def _expect(unit, case):
-    a, b = case.beats["a"], case.beats["b"]
-    return unit.parameters.compute(*component_words(a, b)).codes
+    p = unit.parameters
+    return p.compute(Fixed(p.a_format, case.beats["a"]), Fixed(p.b_format, case.beats["b"])).codes
 
 
 def _words(unit, rng, count):
     """Words of every size, their ends among them."""
-    return Case({name: any_codes(rng, COMPONENT, count, 3) for name in "ab"})
+    p = unit.parameters
+    return Case({"a": any_codes(rng, p.a_format, count, 3), "b": any_codes(rng, p.b_format, count, 3)})
 
 
 def _corners(unit, rng, count):
@@ -40,7 +44,10 @@ RECORD = Record(
     name="dot_product",
     title="Product of two vectors",
     source="docs/theory/interpolation.md#dot-product; [T] figure 2.5",
-    variants={"": Variant(DotProductUnit, _measure, "all vectors of SQ(1, 17)", note="exact")},
+    variants={
+        "": Variant(DotProductUnit, _measure, "all vectors of SQ(1, 17)", note="exact"),
+        "SQ(2, 4)": Variant(partial(DotProductUnit, DotProduct(SQ(2, 4), SQ(2, 4)))),
+    },
     expect=_expect,
     stimuli={"words": Stimulus(_words, 2000), "corners": Stimulus(_corners)},
     axis="a · b",

@@ -1,0 +1,37 @@
+"""A multiplier that the steps of a sequential unit share."""
+
+from amaranth.hdl import Module, Signal, Value
+
+from blysk.golden.number.unit_vector import COMPONENT
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+
+__all__ = ["SteppedMultiplier"]
+
+
+class SteppedMultiplier:
+    """Multiplier with registers for its operands and its product, which the steps of a sequence share.
+
+    Operands that are given at a step are in their registers one cycle later, the exact product two cycles
+    later. Between steps the operands stay.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the registers ``factor`` and ``operand``, ``SQ(1, 17)``, and ``product``,
+        ``SQ(2, 34)``.
+    step : Value
+        Number of the step.
+    """
+
+    def __init__(self, m: Module, step: Value):
+        self._m, self._step = m, step
+        self._factor = Signal(FixedShape(COMPONENT), name="factor")
+        self._operand = Signal(FixedShape(COMPONENT), name="operand")
+        exact = self._factor * self._operand
+        self.product: FixedValue = Signal(exact.shape(), name="product")
+        m.d.sync += self.product.eq(exact)
+
+    def issue(self, at: int, factor: FixedValue, operand: FixedValue) -> None:
+        """Give two operands at a step, in the state or condition that is open in the module."""
+        with self._m.If(self._step == at):
+            self._m.d.sync += [self._factor.eq(factor), self._operand.eq(operand)]
