@@ -62,7 +62,7 @@ def test_reset_leaves_nothing_behind(name):
             engine="auto",
             idle_timeout=2000,
         )
-        cycles = run.total_cycles - run.input_cycles[0] + 5
+        cycles = run.total_cycles - int(run.input_cycles[0]) + 5
         befores = 1, cycles // 4, cycles // 2, 3 * cycles // 4
         expected = [cycle - run.input_cycles[0] for cycle in run.cycles.tolist()]
     found, *others = resets(unit, case, befores, cycles, count)
