@@ -23,7 +23,7 @@ from blysk.sim.units.operands import (
 )
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
-__all__ = ["RECORD", "straight_lines"]
+__all__ = ["RECORD", "spans_of", "straight_lines"]
 
 
 def straight_lines(left: np.ndarray, right: np.ndarray, levels: np.ndarray, t: np.ndarray) -> np.ndarray:
@@ -68,7 +68,8 @@ def _expect(unit, case):
     return {"normal": normal.codes, "out_of_range": out_of_range[span], "last": last}
 
 
-def _case(ends, length):
+def spans_of(ends, length):
+    """Input of spans with given ends, a pair of arrays, and lengths."""
     left, right = ends
     return Case({"normal_left": left, "normal_right": right, "length": length})
 
@@ -76,7 +77,7 @@ def _case(ends, length):
 def _spans(unit, rng, count):
     """Pairs of normals at any angle, of any size, any words; short spans, some without a pixel."""
     length = short_lengths(rng, count)
-    return _case(any_pairs(rng, len(length)), length)
+    return spans_of(any_pairs(rng, len(length)), length)
 
 
 def _corners(unit, rng, count):
@@ -86,7 +87,7 @@ def _corners(unit, rng, count):
     angles[::5] = 10.0 ** rng.uniform(-4, 1, len(angles[::5]))
     angles[20:24] = [0, 45, 90, 180]
     length, angles = np.r_[length, 4095], np.r_[angles, 44]
-    return _case(code_pairs_at(rng, len(length), angles), length)
+    return spans_of(code_pairs_at(rng, len(length), angles), length)
 
 
 def _last_bits(unit, rng, count):
@@ -102,7 +103,7 @@ def _last_bits(unit, rng, count):
         lambda u: (u < ONE_SQUARED.codes) & (abs(u % (1 << 17) - (1 << 16)) < 4),
     )
     left, right = (np.vstack(both) for both in zip(ends, border, strict=True))
-    return _case((left, right), np.r_[length, np.full(len(border[0]), 5)])
+    return spans_of((left, right), np.r_[length, np.full(len(border[0]), 5)])
 
 
 def _variants():

@@ -11,7 +11,7 @@ from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
 from blysk.sim.units.operands import SPANS_45, any_codes, curves, log_lengths, pixel_of, short_lengths
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
-__all__ = ["RECORD"]
+__all__ = ["RECORD", "spans_of"]
 
 
 def _measure(rng, count):
@@ -33,8 +33,8 @@ def _expect(unit, case):
     return model.compute(*words, *pixels_of(beats["length"])).codes
 
 
-def _case(unit, rng, length):
-    """Spans with starts and differences of any size; some second pixels about the border of a rounding."""
+def spans_of(unit, rng, length):
+    """Input of spans of given lengths, of any size; some second pixels near the border of a rounding."""
     model = unit.parameters
     start = any_codes(rng, model.start_format, len(length), 3)
     first, second = (any_codes(rng, model.difference_format, len(length), 3) for _ in range(2))
@@ -46,12 +46,12 @@ def _case(unit, rng, length):
 
 def _spans(unit, rng, count):
     """Starts and differences of any size; short spans and a few long ones, some without a pixel."""
-    return _case(unit, rng, short_lengths(rng, count))
+    return spans_of(unit, rng, short_lengths(rng, count))
 
 
 def _long_spans(unit, rng, count):
     """Spans of 3000 to 4095 pixels, where the last bits of the differences show."""
-    return _case(unit, rng, rng.integers(3000, 4096, count // 3500))
+    return spans_of(unit, rng, rng.integers(3000, 4096, count // 3500))
 
 
 RECORD = Record(

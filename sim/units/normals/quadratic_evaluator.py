@@ -23,7 +23,7 @@ from blysk.sim.units.operands import (
 )
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
-__all__ = ["RECORD"]
+__all__ = ["RECORD", "spans_of"]
 
 _FORMATS = {"g": GPQ.G_FORMAT, "p": GPQ.P_FORMAT, "q": GPQ.Q_FORMAT}
 
@@ -44,13 +44,14 @@ def _expect(unit, case):
     return unit.parameters.compute(*words, np.maximum(length, 1), *pixels_of(length)).codes
 
 
-def _case(rng, length):
+def spans_of(rng, length):
+    """Input of spans of given lengths, with coefficients of any size."""
     return Case(any_curves(rng, len(length)) | {"length": length})
 
 
 def _spans(unit, rng, count):
     """Coefficients of any size; short spans and a few long ones, some without a pixel."""
-    return _case(rng, short_lengths(rng, count))
+    return spans_of(rng, short_lengths(rng, count))
 
 
 def _corners(unit, rng, count):
@@ -69,7 +70,7 @@ def _corners(unit, rng, count):
 
 def _last_bits(unit, rng, count):
     """Lengths over their whole range and many short spans: the last bits of products and steps."""
-    return _case(rng, np.r_[rng.permutation(4096)[:60], rng.integers(0, 40, count // 20)])
+    return spans_of(rng, np.r_[rng.permutation(4096)[:60], rng.integers(0, 40, count // 20)])
 
 
 RECORD = Record(
