@@ -1,1 +1,1 @@
-"""Bit-accurate models of the units that make light of operands."""
+"""Bit-accurate models of the units that turn cosines into light."""

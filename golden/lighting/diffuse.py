@@ -1,4 +1,4 @@
-"""Diffuse unit: the Lambert term, and whether the light is behind the surface."""
+"""Bit-accurate model of the diffuse unit: the Lambert term, and whether the light is behind the surface."""
 
 from dataclasses import dataclass
 
@@ -14,15 +14,16 @@ __all__ = ["Diffuse"]
 class Diffuse:
     """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated to ``1 - 2^-17``.
 
-    17 bits, an operand of the colour multipliers. Unit vectors have the length ``ONE / 2^17``, so the term is
-    short by a relative 2^-16 (0.004 LSB of a full channel); the rounding adds 2^-18.
+    The result has 17 bits, as the operands of the colour multipliers. Codes of unit vectors have the length
+    ``ONE / 2^17``, so the term is too small by a relative 2^-16 (0.004 LSB of a full channel); the rounding
+    adds at most 2^-18.
 
     Parameters
     ----------
     operand_format : Format
         Of ``N . L``, signed.
 
-    Source: [B] 4, [T] 6.
+    Source: docs/theory/models.md#lighting; [B] 4, [T] 6.
     """
 
     operand_format: Format = DotProduct().result_format
@@ -30,7 +31,7 @@ class Diffuse:
     RESULT_FORMAT = UQ(0, 17)
 
     def compute(self, cosine: Fixed) -> Fixed:
-        """Bit-true diffuse terms.
+        """Bit-accurate diffuse terms.
 
         Parameters
         ----------
@@ -48,5 +49,5 @@ class Diffuse:
 
     @staticmethod
     def dark(cosine: Fixed) -> np.ndarray:
-        """Whether ``N . L <= 0``: no light at all, diffuse or specular, comes from behind the surface."""
+        """Whether ``N . L <= 0``: a light behind the surface gives no diffuse and no specular term."""
         return cosine.codes <= 0

@@ -1,4 +1,4 @@
-"""Highlight gate: which spans can hold a visible highlight ([T] 4.2, figure 4.10)."""
+"""Bit-accurate model of the highlight gate: which spans can hold a visible highlight."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,14 +17,14 @@ __all__ = ["HighlightGate"]
 
 @dataclass(frozen=True)
 class HighlightGate:
-    """Whether a span may be lit: from ``a = N_l . H``, ``b = N_r . H`` and ``u = 1 - N_l . N_r``.
+    """Whether a span may be lit, from ``a = N_l . H``, ``b = N_r . H`` and ``u = 1 - N_l . N_r``.
 
     Along the great circle from ``N_l`` to ``N_r``, psi apart, the largest ``N . H`` is at an end, or inside
     where ``b > a cos psi`` and ``a > b cos psi``, and then ``M = sqrt(a^2 + b^2 - 2 a b cos psi) / sin psi``.
     With ``cos psi = 1 - u`` and d = a - b that is ``M^2 = (d^2 + 2 a b u) / (u (2 - u))``, in which nothing
     cancels for psi tending to 0, and inside is ``max(a, b) u > |d|``. A span is lit where
 
-    - it is over 45 degrees, or wider than the method is meant for, or
+    - it is wider than 45 degrees, or than the method is meant for, or
     - ``max(a, b)^2 >= T``, or
     - ``max(a, b) u > |d|`` and ``d^2 >= u w``, with ``w = 2 T - 2 a b - T u``: that is ``M^2 >= T``.
 
@@ -52,9 +52,10 @@ class HighlightGate:
        rounding makes ``cos psi > 1``, the unit takes k = 0, and the sum is at most max(a', b').) A straight
        line has k = 0; points of the great circle, and straight lines between them, have factors like these.
     2. *It stays inside the unit circle.* For unit vectors e_l, e_r psi apart, ``alpha e_l + beta e_r`` is the
-       same curve; along and across the bisector it is ``1 - s^2 (1 - c)`` and ``s sin(psi/2)``, s = 2t - 1,
-       ``c = cos(psi/2)``. Its squared length is ``1 - (1-c)^2 s^2 (1 - s^2) <= 1`` and its direction turns
-       from e_l to e_r. With the vector p of their plane for which ``p.e_l = a'``, ``p.e_r = b'``:
+       same curve; its components parallel and perpendicular to the bisector are ``1 - s^2 (1 - c)`` and
+       ``s sin(psi/2)``, s = 2t - 1, ``c = cos(psi/2)``. Its squared length is
+       ``1 - (1-c)^2 s^2 (1 - s^2) <= 1`` and its direction turns from e_l to e_r. With the vector p of their
+       plane for which ``p.e_l = a'``, ``p.e_r = b'``:
        ``alpha a' + beta b' = p.(alpha e_l + beta e_r) <= max(0, m)``, m the maximum of p·e over the arc.
        This holds whatever the lengths of the codes.
     3. *The arc.* At a share x of it, ``p.e = (a' sin((1-x) psi) + b' sin(x psi)) / sin psi``. For a' and b'
@@ -68,38 +69,38 @@ class HighlightGate:
     4. *The comparison.* T and w are cut, everything else is exact, so not lit gives ``m^2 < T``, also where m
        is at an end. T is at most ``tau^2``, so ``m < tau`` and ``N(t).H < tau`` on the exact curve.
     5. *The pipeline.* Each method states how far its pixels may be brighter than m
-       (`Interpolator.highlight_excess`, from the errors of its devices; 4.4 steps of
-       2^-17 for quadratic normals): it has no N·H over ``m + excess``, no 1 - N·H under
-       ``shortest (1 - m) - excess``. x, the largest argument to which the specular unit may give a term, in
-       steps of 2^-25, follows from its PROM in integers (`HighlightOperand.last_lit_arguments`). So tau is
-       such that ``shortest (1 - tau) - excess`` is x and a step more, the excess rounded up to whole steps
-       (`margin`). The argument falls with N·H, and beyond x the term is 0. ∎
+       (`Interpolator.highlight_excess`, from the errors of its units; 4.4 steps of 2^-17 for quadratic
+       normals): it has no N·H over ``m + excess``, no 1 - N·H under ``shortest (1 - m) - excess``. Let x be
+       the largest argument for which the specular unit may give a term over 0, in steps of 2^-25; it follows
+       from the PROM in integers (`HighlightOperand.last_lit_arguments`). tau is such that
+       ``shortest (1 - tau) - excess`` is x and a step more, the excess rounded up to whole steps (`margin`).
+       The argument falls with N·H, and beyond x the term is 0. ∎
 
     The margins cost little: for quadratic normals, a span is let through only if
     ``M^2 >= tau^2 - 10 * 2^-17``.
 
     Ends must be unit vectors as `quantise` makes them. With N·H of straight or quadratic normals a search
-    over all models lost no highlight for ends up to 1/128 longer, or shorter; other methods lose some where
-    ends are 8 to 128 steps of 2^-17 too short or too long.
+    over all models lost no highlight for ends that were up to 1/128 too long or too short; other methods lose
+    some where ends are 8 to 128 steps of 2^-17 too short or too long.
 
-    An exponent under which the unit shades nothing 0 up to N·H = tau <= 0 (1; 2 and 3 for wide models) has
-    T = 0.
+    T is 0 for an exponent with which terms over 0 reach down to N·H = tau <= 0: 1, and 2 and 3 of models with
+    wide highlights.
 
     Parameters
     ----------
     specular : Specular or Power
-        The unit that is gated.
+        Model of the unit that is gated.
     fraction_bits : int
         F, 5 to 17.
     interpolator : Interpolator
-        The method that finds the pixels' operands.
+        Method that computes the operands of the pixels.
 
     Raises
     ------
     ValueError
         If the number of bits is out of range.
 
-    Source: [T] 4.2, figure 4.10.
+    Source: docs/theory/units.md#highlight-gate; [T] 4.2 and figure 4.10.
     """
 
     specular: HighlightOperand = field(default_factory=Specular)
@@ -112,7 +113,7 @@ class HighlightGate:
 
     @property
     def margin(self) -> float:
-        """The method's excess in whole steps of 2^-17."""
+        """Excess of the method, rounded up to whole steps of 2^-17."""
         return float(np.ceil(self.interpolator.highlight_excess * 2.0**17) * 2.0**-17)
 
     @property
@@ -143,7 +144,7 @@ class HighlightGate:
 
     @property
     def widest(self) -> Fixed:
-        """Largest cut ``u`` of which the exact one is under that of the method's `gate_angle` for certain."""
+        """Largest cut ``u`` for which the exact one is surely less than that of the method's `gate_angle`."""
         limit = self.one_squared.values * (1 - np.cos(np.radians(self.interpolator.gate_angle)))
         return Fixed(self.angle_format, int(limit / self.angle_format.step) - 1)
 
@@ -159,7 +160,7 @@ class HighlightGate:
         return Fixed(self.level_format, codes)
 
     def decide(self, a: Fixed, b: Fixed, u: Fixed, threshold: Fixed) -> np.ndarray:
-        """Whether the maximum over the arc may reach the threshold: the comparisons alone.
+        """The comparisons alone: whether the maximum over the arc may reach the threshold.
 
         Parameters
         ----------
@@ -186,7 +187,7 @@ class HighlightGate:
     def compute(
         self, normal_left: Fixed, normal_right: Fixed, halfway: Fixed, exponent: int | np.ndarray
     ) -> np.ndarray:
-        """Bit-true decisions.
+        """Bit-accurate decisions.
 
         Parameters
         ----------

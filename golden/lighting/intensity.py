@@ -1,4 +1,4 @@
-"""Intensity unit: ambient, diffuse and specular light of a pixel, in three channels ([T] figure 4.10)."""
+"""Bit-accurate model of the intensity units: the sum of ambient, diffuse and specular light of a pixel."""
 
 from dataclasses import dataclass
 
@@ -17,11 +17,12 @@ MAX_LIGHTS = 16
 
 @dataclass(frozen=True)
 class Intensity:
-    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` a channel, saturated to 255 and rounded half up.
+    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, rounded half up, saturated to 255.
 
     The products ``k I`` come as *colour operands* in LSB of the 8-bit channel: ``UQ(11, 6)``, 17 bits for
-    the multipliers, so a term may reach 2047.98 LSB, eight times the full channel. The sum is exact; the
-    only roundings are those of the operands, 2^-7 LSB each times a term of at most 1, and the last, 1/2 LSB.
+    the multipliers, so a term may reach 2047.98 LSB, eight times the full channel. The sum is exact. The
+    only roundings are those of the operands, 2^-7 LSB each times a term of at most 1, and that of the result,
+    1/2 LSB.
 
     Parameters
     ----------
@@ -30,14 +31,14 @@ class Intensity:
     has_specular : bool
         Whether there are specular terms; else they must be 0.
     channels : int
-        3, or 1: red's colour operands count for every channel.
+        3, or 1: the colour operands of red serve every channel.
 
     Raises
     ------
     ValueError
         If the number of lights or channels is out of range.
 
-    Source: [B] 4 and 5, [T] figure 4.10.
+    Source: docs/theory/units.md#intensity; [B] 4 and 5, [T] figure 4.10.
     """
 
     lights: int = 1
@@ -71,7 +72,7 @@ class Intensity:
     def compute(
         self, ambient: Fixed, diffuse_color: Fixed, specular_color: Fixed, diffuse: Fixed, specular: Fixed
     ) -> np.ndarray:
-        """Bit-true channels.
+        """Bit-accurate channels.
 
         Parameters
         ----------
@@ -106,7 +107,7 @@ class Intensity:
         return color if self.channels == 3 else np.repeat(color[:, :1], 3, axis=-1)
 
     def cycles(self, diffuse: Fixed, specular: Fixed) -> np.ndarray:
-        """Clocks that each pixel takes in the unit's compact style: ``channels max(1, terms not 0)``.
+        """Cycles that each pixel takes in the compact unit: ``channels max(1, T)``, T terms not 0.
 
         Parameters
         ----------

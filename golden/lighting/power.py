@@ -1,4 +1,4 @@
-"""Exact power unit: Blinn's highlight by square and multiply, the baseline of the approximations."""
+"""Bit-accurate model of the exact power unit: Blinn's highlight, the baseline of the approximations."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Literal
@@ -29,12 +29,12 @@ class Power(HighlightOperand):
     result  UQ(0, 17) operand of the colour multipliers; cut
     ======= ========= ====================================================================
 
-    Arithmetic error of the result for an exact argument, at most `ERROR`: a product of cut factors is off by
-    less than ``2^-17 (p + q)``, which reaches the result times the derivative of what is made of it. With the
-    final cut, the sum is largest at n = 513: ``5.96 * 2^-17``. It only makes the result smaller. As it comes
-    and goes with the factors' bits, the term may rise where the cosine falls: by 5 steps of 2^-17 at most,
-    0.01 LSB at intensity 1. Of operand ``cosine`` and n = 1, it is a step up to 2^-17 past the right angle,
-    as 1 is 2^-16 more than the square of a code's length.
+    The arithmetic error of the result for an exact argument is at most `ERROR`. A product of cut factors is
+    off by less than ``2^-17 (p + q)``, and that error reaches the result multiplied by the derivative of the
+    operations that follow. With the final cut, the sum is largest at n = 513: ``5.96 * 2^-17``. It only makes
+    the result smaller. As it depends on the factors' low bits, the term may rise where the cosine falls, by 5
+    steps of 2^-17 at most, 0.01 LSB at intensity 1. With the operand ``cosine`` and n = 1 the term is one
+    step up to 2^-17 past the right angle, as 1 is 2^-16 more than the square of a code's length.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Power(HighlightOperand):
     ValueError
         If the operand is unknown.
 
-    Source: [B] 3; numbers.md, "Rivals to measure against".
+    Source: docs/theory/units.md#exact-power; [B] 3.
     """
 
     operand: Literal["cosine", "one_minus_cosine"] = "cosine"
@@ -64,13 +64,13 @@ class Power(HighlightOperand):
 
     @property
     def last_lit_arguments(self):
-        """That of ``c^n = 2^-17``, as the result is never too large; one step more for float64."""
+        """Argument of ``c^n = 2^-17``, as the result is never too large; one step more for float64."""
         exponent = np.arange(1 << self.EXPONENT_BITS)
         argument = -np.expm1(-17 * np.log(2) / np.maximum(exponent, 1)) / self.ARGUMENT_FORMAT.step
         return np.where(exponent > 0, np.ceil(argument).astype(np.int64) + 1, 1 << 27)
 
     def compute(self, operand: Fixed, dark: np.ndarray, exponent: int) -> Fixed:
-        """Bit-true specular terms.
+        """Bit-accurate specular terms.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Specular unit: the cosine-quadratic model with its cutoff ([T] figures 3.6 and 3.7), and its kin."""
+"""Bit-accurate model of the specular unit: the cosine-quadratic model with its cutoff, and related models."""
 
 import math
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ MAX_EXPONENT = 1000
 
 
 class HighlightOperand:
-    """What the units of a highlight share: their operand, and what they refuse.
+    """Base of the models of specular units: format of the operand, range of the exponent.
 
     A subclass has a field ``operand``. ``"cosine"``: the unit takes ``N . H`` of two unit vectors in
     ``SQ(4, 34)`` and subtracts it from `ONE_SQUARED`. ``"one_minus_cosine"``: it takes ``1 - cos gamma`` in
@@ -72,14 +72,14 @@ class HighlightOperand:
 
 @dataclass(frozen=True)
 class Chords:
-    """A monotone function by chords: a table of starts and steps, between which 11 bits interpolate.
+    """A monotone function by chords: a table of starts and steps; 11 bits interpolate within a chord.
 
     Parameters
     ----------
     start, step : Fixed, shape (entries,)
-        Value at the start of each interval, and how far it is to the next; as many fraction bits.
+        Value at the start of each interval, and its distance to the next; equal fraction bits.
     rising : bool
-        Whether the steps are added, else subtracted.
+        Whether the steps are added; else they are subtracted.
     """
 
     start: Fixed
@@ -100,7 +100,7 @@ class Chords:
         )
 
     def compute(self, code: np.ndarray) -> Fixed:
-        """Bit-true values: the code's low 11 bits interpolate, those above are the address."""
+        """Bit-accurate values: the low 11 bits of the code interpolate, those above are the address."""
         format = self.INTERPOLATION_FORMAT
         address = code >> format.width
         way = self.step[address] * Fixed(format, code & format.max_code)
@@ -110,7 +110,7 @@ class Chords:
 
 
 def _lowered(function, entries: int) -> np.ndarray:
-    """Ends of chords of a convex function on [0, 1], lowered by half of what the chords are too high."""
+    """Ends of chords of a convex function on [0, 1], lowered by half of the largest error of the chords."""
     ends = function(np.arange(entries + 1) / entries)
     high = (ends[1:] + ends[:-1]) / 2 - function((np.arange(entries) + 0.5) / entries)
     return np.maximum(ends - (np.r_[high[0], high] + np.r_[high, high[-1]]) / 4, 0)
@@ -130,7 +130,7 @@ class Specular(HighlightOperand):
     root are smooth. ``gamma^2 = 2 x (1 + e)`` with ``x = 1 - cos gamma``, and e, 0 at the peak, comes from a
     table of 128 chords over x in [0, 2). So ``w = p + p e`` with ``p = k x``, ``k = 8 a^2 / pi^2``: by
     Taylor's rule ``4 n / pi^2`` and ``2 n / pi^2``, by equal integrals from a table of 1024 words. The base
-    is 64 chords over w in [0, 1); from w = 1 on the term is 0.
+    comes from 64 chords over w in [0, 1); from w = 1 on the term is 0.
 
     The slope is normalised to ``k = K 2^s`` with K in [1/2, 1), and ``1 - cos gamma`` shifted by s before
     the multiplier, so that both its operands keep their 17 bits at every exponent.
@@ -145,43 +145,43 @@ class Specular(HighlightOperand):
     base          UQ(0, 17)  ``1 - 2^-17 - p`` is the product p, cut, with its bits inverted
     squares       UQ(0, 17)  cut
     16 p          UQ(5, 17)  of ``exp``
-    table         UQ(0, 19)  chords of ``2^-f`` or the cosine, lowered by half of what they are too high
+    table         UQ(0, 19)  chords of ``2^-f`` or the cosine, lowered by half of their error
     e             UQ(1, 18)  chords; multiplier operand, cut to UQ(1, 16)
     p, w          UQ(0, 17)  of ``coscos``; cut
     result        UQ(0, 17)  operand of the colour multipliers; cut
     ============= ========== ===================================================================
 
     The PROM holds for each exponent the largest shifted argument whose base reaches the cutoff: `CUTOFF`
-    where the base is squared once, for the others what gives a term of 2^-14 too. A lit base has ``p < 1``
-    and ``w < 1``, so that nothing wraps. The comparison is made before the square, never on it, so the
-    parabola's second lobe cannot come through. What it drops is under ``CUTOFF^2 = 2^-14``: 1/64 LSB at
-    intensity 1, 1/8 LSB at the largest, 8.
+    where the base is squared once; for the other models the base whose term is 2^-14, too. A lit base has
+    ``p < 1`` and ``w < 1``, so that nothing wraps. The comparison is made before the square, never on it, so
+    the parabola's second lobe cannot come through. The terms that it drops are less than
+    ``CUTOFF^2 = 2^-14``: 1/64 LSB at intensity 1, 1/8 LSB at the largest, 8.
 
-    Arithmetic error of the result for an exact argument, at most `ERROR`: base is off by 2^-16 each from
-    the argument, its shift and K, and by 2^-17 from the product; the square doubles it; the result adds
-    2^-17. Each further square doubles what it gets and adds 2^-17: at most `error`, 2^-12 and 2^-11.
+    Arithmetic error of the result for an exact argument, at most `ERROR`: the base is off by 2^-16 each from
+    the argument, its shift and K, and by 2^-17 from the product; the square doubles that error; the result
+    adds 2^-17. Each further square doubles the error and adds 2^-17: at most `error`, 2^-12 and 2^-11.
 
-    Error of ``exp``: what is off by a share of p (K, the slope) is multiplied by ``p 2^(-16 p) <= 0.034``;
+    Error of ``exp``: errors relative to p (of K and the slope) are multiplied by ``p 2^(-16 p) <= 0.034``;
     the cuts of the argument and its shift, under ``2^-16 + 2^-18``, times ``16 ln 2``, are 2.2e-4; the chords
     add 7.3e-6, roundings and the rest under 2e-5: at most ``2^-12 + 2^-15``.
 
     Error of ``coscos``: every cut makes w smaller, together by less than ``2^-16 K (1 + e) + 2^-17 (1 + e) +
-    2^-17 w / K + 2^-16 p + 2^-17`` and what the slope is off by, which is 2^-15 at the peak. There the term
+    2^-17 w / K + 2^-16 p + 2^-17`` and the error of the slope, which is 2^-15 at the peak. There the term
     falls fastest with w, by 2.47 (k = 2) or 4.93 (k = 4); the chords of the base are too high by at most
     1.11e-5, which counts two or four times. The sum is largest next to the peak, 9.8e-5 and 2.0e-4: at most
     2^-13 and 2^-12. The chords of e make w larger, by less than 1.1e-5 up to a right angle and 8e-5 up to
-    x = 1.7, where the term falls slowly. Towards x = 2 they fail, as e has a root's end there; only n = 1
-    with k = 4 has light beyond 1.7, under 0.03, and the fourth power makes the error small again: measured,
-    8e-6.
+    x = 1.7, where the term falls slowly. Towards x = 2 they fail, as the derivative of e has no bound there;
+    only n = 1 with k = 4 has light beyond 1.7, under 0.03, and the fourth power makes the error small again:
+    measured, 8e-6.
 
     Parameters
     ----------
     model : ReflectionModel
-        A polynomial, an `AngleCosine` or an `Exponential`.
+        A `PolynomialModel`, an `AngleCosine` or an `Exponential`.
     operand : str
         ``"cosine"`` or ``"one_minus_cosine"``; see `HighlightOperand`.
     as_published : bool
-        The comparator of figure 3.6 as drawn, for polynomials that are squared once: it compares the
+        The comparator of figure 3.6 as published, for polynomials that are squared once: it compares the
         *square*, with 2^-14 at every exponent. Up to the base's zero the terms are those of the default to
         the bit. Past it the parabola rises again and its second lobe comes through; squares over 1 saturate,
         so that from ``k (1 - cos gamma) = 2`` on the surface is as bright as at the peak: at n = 20 from 37
@@ -190,10 +190,10 @@ class Specular(HighlightOperand):
     Raises
     ------
     ValueError
-        If the model is not one of those or not one that is documented so, or the operand is unknown.
+        If the model is none of those, ``as_published`` does not exist for it, or the operand is unknown.
 
-    Source: [T] 3.1 and 3.4, figures 3.6 and 3.7; [C] for ``cosquad_lin`` and ``cosquad_q``; Lyon 1993;
-    numbers.md, "Traps in the documents".
+    Source: docs/theory/units.md#specular-unit; [T] 3.1 and 3.4, figures 3.6 and 3.7; [C] for ``cosquad_lin``
+    and ``cosquad_q``; [Lyon93].
     """
 
     model: ReflectionModel = COSQUAD
@@ -206,7 +206,7 @@ class Specular(HighlightOperand):
     SLOPE_FORMAT = UQ(9, 18)
     SCALE_FORMAT = UQ(0, 17)
     SHIFTED_FORMAT = UQ(1, 16)
-    WIDE_FORMAT = UQ(2, 16)
+    PUBLISHED_FORMAT = UQ(2, 16)
     BASE_FORMAT = UQ(0, 17)
     CUTOFF = 1 / 128
     ERROR = 2.0**-13
@@ -250,7 +250,7 @@ class Specular(HighlightOperand):
 
     @property
     def cutoff(self) -> Fixed:
-        """Smallest base that is not cut off: what it leads to is 2^-14 at most."""
+        """Smallest base that is not cut off: its term is 2^-14 at most."""
         if self.is_exponential:
             return Fixed(self.BASE_FORMAT, self.BASE_FORMAT.code(1 / 8))
         return Fixed(self.BASE_FORMAT, math.floor(2.0 ** (17 - 14 / 2**self.squarings)))
@@ -303,14 +303,14 @@ class Specular(HighlightOperand):
 
     @cached_property
     def chords(self) -> Chords:
-        """Table of ``exp``, ``2^-f``, or of ``coscos``, ``cos(pi/2 sqrt w)``: 64 chords."""
+        """64 chords: for ``exp`` of ``2^-f``, for ``coscos`` of ``cos(pi/2 sqrt w)``."""
         if self.is_exponential:
             return Chords.of(_lowered(lambda f: 2.0**-f, 64), UQ(0, 19), UQ(-6, 19))
         return Chords.of(_lowered(lambda w: np.cos(math.pi / 2 * np.sqrt(w)), 64), UQ(0, 19), UQ(-5, 19))
 
     @cached_property
     def excess(self) -> Chords:
-        """Table of ``coscos``: ``e = gamma^2 / (2 x) - 1``, 128 chords over x in [0, 2)."""
+        """128 chords of ``e = gamma^2 / (2 x) - 1`` over x in [0, 2), for ``coscos``."""
         x = np.arange(1, 129) / 64
         return Chords.of(np.r_[0, np.arccos(1 - x) ** 2 / (2 * x) - 1], UQ(1, 18), UQ(-1, 18))
 
@@ -318,7 +318,7 @@ class Specular(HighlightOperand):
     def boundaries(self) -> Fixed:
         """The PROM: largest shifted argument that is not cut off, for exponents 0 to 1023.
 
-        As documented no argument is cut off for certain, and the unit has no PROM.
+        As published no argument is surely cut off, and the unit has no PROM.
         """
         format = self.SHIFTED_FORMAT
         exponent = np.arange(1 << self.EXPONENT_BITS)
@@ -329,7 +329,7 @@ class Specular(HighlightOperand):
             largest = self.BASE_FORMAT.max_code - self.cutoff.codes
             codes = (((largest + 1) << 16) - 1) // np.maximum(scale.codes, 1)
             return Fixed(format, np.minimum(codes, format.max_code))
-        # By halving: the base falls with the argument, of which the last that gives a shifted one counts.
+        # By bisection: the base falls with the argument; the last argument of each shifted one counts.
         boundary = np.zeros_like(exponent)
         for bit in reversed(range(format.width)):
             shifted = boundary | 1 << bit
@@ -340,7 +340,7 @@ class Specular(HighlightOperand):
 
     @property
     def last_lit_arguments(self):
-        """From the PROM, in integers."""
+        """Computed from the PROM, in integers."""
         _, shift = self.scale(np.arange(1 << self.EXPONENT_BITS))
         boundary = self.boundaries.codes
         arguments = (((boundary + 1) << 10) - 1) >> (shift + 1)
@@ -348,7 +348,7 @@ class Specular(HighlightOperand):
         return arguments
 
     def compute(self, operand: Fixed, dark: np.ndarray, exponent: int) -> Fixed:
-        """Bit-true specular terms.
+        """Bit-accurate specular terms.
 
         Parameters
         ----------
@@ -373,7 +373,7 @@ class Specular(HighlightOperand):
         shifted = Fixed(UQ(10, 26), argument.codes << (shift + 1)).truncate(16)
         lit = ~np.asarray(dark, dtype=bool)
         if self.as_published:
-            return self._drawn(shifted.saturate(self.WIDE_FORMAT) * scale, lit)
+            return self._as_published(shifted.saturate(self.PUBLISHED_FORMAT) * scale, lit)
         shifted = shifted.saturate(self.SHIFTED_FORMAT)
         lit &= shifted <= self.boundaries[exponent]
         product = shifted * scale
@@ -388,8 +388,8 @@ class Specular(HighlightOperand):
             base = (base * base).truncate(17)
         return base
 
-    def _drawn(self, product: Fixed, lit: np.ndarray) -> Fixed:
-        """Square of a base of either sign, where the square reaches the cutoff's."""
+    def _as_published(self, product: Fixed, lit: np.ndarray) -> Fixed:
+        """Square of a base of either sign; 0 where it is less than the cutoff's."""
         p, largest = product.truncate(17).codes, self.BASE_FORMAT.max_code
         base = np.where(p <= largest, largest - p, np.minimum(p - largest - 1, largest))
         base = Fixed(self.BASE_FORMAT, np.where(lit, base, 0))
@@ -397,7 +397,7 @@ class Specular(HighlightOperand):
         return Fixed(self.RESULT_FORMAT, np.where(square.values >= self.CUTOFF**2, square.codes, 0))
 
     def _cosine(self, argument: Fixed, product: Fixed) -> np.ndarray:
-        """Codes of ``cos(a gamma)``, from ``w = p + p e``; that of the largest w beyond it."""
+        """Codes of ``cos(a gamma)``, of ``w = p + p e`` saturated."""
         p = product.truncate(17).saturate(self.BASE_FORMAT)
         e = self.excess.compute(argument.codes >> 8).truncate(16)
         w = (p + p * e).truncate(17).saturate(self.BASE_FORMAT)

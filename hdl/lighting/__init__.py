@@ -1,1 +1,1 @@
-"""Units that make light of operands."""
+"""Units that turn cosines into light."""

@@ -9,16 +9,16 @@ __all__ = ["DiffuseUnit"]
 
 
 class DiffuseUnit(PipelinedUnit):
-    """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated; `Diffuse` is its twin.
+    """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated; bit-accurate model `Diffuse`.
 
-    The latency is ``latency`` cycles, of which 2 work (rounding, saturation; one more to take the operand in
-    where the initiation interval is over 1) and the rest wait, so that the term leaves together with that of
-    a longer unit beside it. A register for each interval that it waits, no multipliers.
+    The latency is ``latency`` cycles: one for rounding, one for saturation, one more to take the operand in
+    where the initiation interval is over 1, and a delay for the rest, so that the term leaves together with
+    that of a longer unit beside it. The delay costs a register for each interval; no multipliers.
 
     Parameters
     ----------
     parameters : Diffuse
-        Bit-accurate model, which knows the format of the operand.
+        Bit-accurate model: format of the operand.
     latency : int or None
         At least 2, or 3 where the initiation interval is over 1; ``None``: that.
     initiation_interval : int
@@ -36,7 +36,7 @@ class DiffuseUnit(PipelinedUnit):
     ValueError
         If the latency is too short or the interval under 1.
 
-    Source: [B] 4, [T] 6.
+    Source: docs/theory/models.md#lighting; [B] 4, [T] 6.
     """
 
     def __init__(
@@ -64,5 +64,5 @@ class DiffuseUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the age at which the beat leaves."""
+        """The graph; the result is read at the stage at which the beat leaves."""
         return self._graph.build(m, self, operands)(self._result, self.latency)

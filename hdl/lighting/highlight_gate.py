@@ -1,4 +1,4 @@
-"""Highlight gate ([T] figure 4.10): which spans can hold a visible highlight."""
+"""Highlight gate: which spans can hold a visible highlight; [T] figure 4.10."""
 
 from amaranth.hdl import Cat, Const, Mux, Value, unsigned
 from amaranth.lib import data
@@ -17,13 +17,12 @@ __all__ = ["HighlightGateUnit"]
 class HighlightGateUnit(PipelinedUnit):
     """Whether a span may be lit; 0 only where every pixel of it has a specular term of 0.
 
-    The comparisons, the formats and the proof are those of `HighlightGate`, the
-    bit-true twin.
+    Comparisons, formats and proof are those of the bit-accurate model `HighlightGate`.
 
-    Fifteen multiplications: three of each of ``N_l . N_r``, ``N_l . H`` and ``N_r . H``, and the six products
-    of the comparisons: ``T u``, ``a b``, ``u w``, the larger one's square and product with u, and d squared.
-    With an initiation interval I, ``ceil(15/I)`` multipliers take turns at them (`dataflow`). The
-    decisions are the same. Every further light takes twelve more.
+    There are fifteen multiplications: three for each of ``N_l . N_r``, ``N_l . H`` and ``N_r . H``, and six
+    products for the comparisons: ``T u``, ``a b``, ``u w``, ``max(a, b)^2``, ``max(a, b) u`` and ``d^2``.
+    With an initiation interval I they share ``ceil(15/I)`` multipliers (`dataflow`); the decisions are the
+    same. Every further light has twelve multiplications more.
 
     =================== == == == == == == == == == == == == == == ==
     initiation interval 1  2  3  4  5  6  7  8  9  10 11 12 13 14 15
@@ -43,12 +42,12 @@ class HighlightGateUnit(PipelinedUnit):
     initiation_interval : int or None
         Distance in cycles of two inputs, from 1 to the number of multiplications. ``None``: 6.
     exponent : int or None
-        An exponent for good, 1 to 1000: no PROM. ``None``: the exponent is a port.
+        Exponent that is fixed at build time, 1 to 1000: no PROM. ``None``: the exponent is a port.
 
     Raises
     ------
     ValueError
-        If `initiation_interval` or the exponent is none of those.
+        If `initiation_interval` or the exponent is out of range.
 
     Members
     -------
@@ -57,9 +56,9 @@ class HighlightGateUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(unsigned(lights)))`
         Whether the span may be lit, a bit for each light, the first lowest.
     constants : :py:`In(StructLayout({"halfway": ArrayLayout(..., lights), "exponent": 10}))`
-        Unit vectors H, and the exponent, 1 to 1000, where it is a port; stay while beats are inside.
+        Unit vectors H, and the exponent, 1 to 1000, where it is a port; constant while beats are inside.
 
-    Source: [T] 4.2, figure 4.10.
+    Source: docs/theory/units.md#highlight-gate; [T] 4.2 and figure 4.10.
     """
 
     def __init__(
@@ -91,7 +90,7 @@ class HighlightGateUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The PROM, which follows the exponent, and the graph."""
+        """The PROM, addressed by the exponent, and the graph."""
         p = self.parameters
         if self.exponent is not None:
             self._threshold = Const(p.thresholds.codes[self.exponent].item(), p.fraction_bits)

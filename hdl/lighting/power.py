@@ -17,36 +17,36 @@ __all__ = ["PowerUnit"]
 
 
 class PowerUnit(PipelinedUnit):
-    """``max(cos gamma, 0)^n``, 0 for a light behind the surface; ports and timing rules of `SpecularUnit`.
+    """``max(cos gamma, 0)^n``, 0 for a dark beat; ports as those of `SpecularUnit`.
 
-    Method, formats and the error bound are those of `Power`, the bit-true twin.
+    Method, formats and error bound are those of the bit-accurate model `Power`.
 
-    The pipelined form has a latency of 32 cycles (one minus, saturation, three for each bit of the exponent)
-    and an initiation interval of 1, with 18 multipliers. The sequential form has one, which makes nine
-    squares and ten products in turn: latency 44 cycles, initiation interval 42. All are 17 by 17 bits.
+    The pipelined form has a latency of 32 cycles (difference from 1, saturation, three for each bit of the
+    exponent), an initiation interval of 1 and 18 multipliers. The sequential form has one multiplier for nine
+    squares and ten products: latency 44 cycles, initiation interval 42. All are 17 by 17 bits.
 
     Parameters
     ----------
     parameters : Power
-        Kind of operand.
+        Bit-accurate model: kind of operand.
     form : str
         ``"pipelined"`` or ``"sequential"``.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"operand": ..., "dark": 1})))`
-        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``; whether the light is behind.
+        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``; whether the beat is dark.
     o : :py:`Out(stream.Signature(UQ(0, 17)))`
         Specular term.
     constants : :py:`In(StructLayout({"exponent": 10}))`
-        Exponent, 1 to 1000; stays while beats are inside.
+        Exponent, 1 to 1000; constant while beats are inside.
 
     Raises
     ------
     ValueError
         If the form is unknown.
 
-    Source: [B] 3.
+    Source: docs/theory/units.md#exact-power; [B] 3.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class PowerUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The complement of the cosine takes two cycles; then the bits of the exponent, lowest first."""
+        """Complement of the cosine, two cycles; then the bits of the exponent, lowest first."""
         p, register = self.parameters, self.register
         complement = one_minus(p, operands.operand).extend(SQ(5, 34))
         complement = register(m, complement, "one_minus_cosine")
@@ -76,7 +76,7 @@ class PowerUnit(PipelinedUnit):
         return FixedValue(p.RESULT_FORMAT, ~Value.cast(s)[17:])
 
     def _pipelined(self, m, start):
-        """Three cycles a bit: product, difference, saturation; for squares and products side by side."""
+        """Three cycles a bit: product, difference, saturation; squares and products in parallel."""
         p, register = self.parameters, self.register
         format = p.COMPLEMENT_FORMAT
         x = register(m, start, "x_0")
@@ -99,7 +99,7 @@ class PowerUnit(PipelinedUnit):
         return s
 
     def _products(self, m, p, q, name):
-        """Registered ``p + q - p q``, two cycles on, and ``p`` at that time."""
+        """``p + q - p q`` two cycles later, registered, and ``p`` at the same stage."""
         register = self.register
         product = register(m, p.truncate(17) * q.truncate(17), f"{name}_product")
         total = register(m, p + q, f"{name}_sum")
@@ -107,7 +107,7 @@ class PowerUnit(PipelinedUnit):
         return register(m, total - product, f"{name}_difference"), register(m, kept, f"{name}_late")
 
     def _sequential(self, m, start):
-        """Ages: bit j's square at 3 + 4j, its product at 4 + 4j, each in x or s four cycles later."""
+        """Bit j: its square starts at stage 3 + 4j, its product at 4 + 4j; both end four cycles later."""
         p, at, register = self.parameters, self.at, self.register
         format = p.COMPLEMENT_FORMAT
         bits = range(p.EXPONENT_BITS)

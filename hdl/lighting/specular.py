@@ -1,4 +1,4 @@
-"""Specular unit ([T] figures 3.6 and 3.7): the cosine-quadratic model with its PROM cutoff, and its kin."""
+"""Specular unit: the cosine-quadratic model with its PROM cutoff, and related models."""
 
 from collections.abc import Callable
 from typing import Any
@@ -21,12 +21,12 @@ _SHIFT_BITS = 4
 
 
 def highlight_shape(parameters: HighlightOperand) -> data.StructLayout:
-    """Shape of a unit's input: the operand, and whether the beat is dark, of which the term is 0."""
+    """Shape of a unit's input: the operand, and whether the beat is dark, so that its term is 0."""
     return data.StructLayout({"operand": FixedShape(parameters.operand_format), "dark": unsigned(1)})
 
 
 def slope_shape() -> data.StructLayout:
-    """Shape of what follows from the exponent: K, the shift s + 1, and the largest lit shifted argument."""
+    """Shape of the output of a `SlopeUnit`: K, the shift s + 1, and the largest lit shifted argument."""
     return data.StructLayout(
         {
             "scale": FixedShape(Specular.SCALE_FORMAT),
@@ -44,19 +44,19 @@ def one_minus(parameters: HighlightOperand, operand: FixedValue) -> FixedValue:
 
 
 class SlopeUnit(wiring.Component):
-    """What a `SpecularUnit` needs of the exponent: slope ``k = K 2^s``, and the PROM of the cutoff.
+    """Slope ``k = K 2^s`` and boundary of the cutoff: words of a `SpecularUnit` that the exponent determines.
 
-    Twins are `Specular.scale` and `Specular.boundaries`. ``slope`` follows
-    the exponent two cycles behind.
+    The bit-accurate models are `Specular.scale` and `Specular.boundaries`. ``slope`` follows the exponent
+    after two cycles.
 
-    One serves the units of all lights. It has a constant multiplier, a table of 1024 slopes of 27 bits in
-    its place for ``cosquad_q`` and the models by equal integrals, none for ``k = n / 2^j``; and a PROM of
-    1024 words of 17 bits, none as documented.
+    One unit serves all lights. The slope costs a multiplier by a constant, no multiplier for
+    ``k = n / 2^j``, and a table of 1024 words of 27 bits for ``cosquad_q`` and the models by equal integrals.
+    The PROM has 1024 words of 17 bits; as published there is none.
 
     Parameters
     ----------
     parameters : Specular
-        Model, and whether the structure is the documented one.
+        Bit-accurate model.
 
     Members
     -------
@@ -65,7 +65,7 @@ class SlopeUnit(wiring.Component):
     slope : :py:`Out(slope_shape())`
         K in ``UQ(0, 17)``, s + 1 from 0 to 10, boundary in ``UQ(1, 16)``.
 
-    Source: [T] figure 3.6; [C].
+    Source: docs/theory/units.md#specular-unit; [T] figure 3.6; [C].
     """
 
     def __init__(self, parameters: Specular | None = None):
@@ -73,7 +73,7 @@ class SlopeUnit(wiring.Component):
         super().__init__({"exponent": In(Specular.EXPONENT_BITS), "slope": Out(slope_shape())})
 
     def elaborate(self, platform):
-        """Slope and PROM, then normalisation, a clock each."""
+        """Slope and PROM, then normalisation, a cycle each."""
         p = self.parameters
         m = Module()
         if p.slope_terms is None:
@@ -83,7 +83,8 @@ class SlopeUnit(wiring.Component):
             a, b = (FixedValue.constant(term.format, term.values.item()) for term in p.slope_terms)
             code = Signal(p.SLOPE_FORMAT.width, name="slope_word")
             m.d.sync += code.eq(((a * exponent).truncate(18) + b).wrap(p.SLOPE_FORMAT).as_value())
-        scale, shift = Signal(FixedShape(p.SCALE_FORMAT)), Signal(_SHIFT_BITS)
+        scale = Signal(FixedShape(p.SCALE_FORMAT), name="scale")
+        shift = Signal(_SHIFT_BITS, name="shift")
         for s in range(-1, 10):
             with m.If(code[s + 17] if s >= 0 else 1):
                 m.d.sync += [Value.cast(scale).eq((code << (9 - s))[10:27]), shift.eq(s + 1)]
@@ -109,43 +110,42 @@ class SlopeUnit(wiring.Component):
 class SpecularUnit(PipelinedUnit):
     """``max(1 - k (1 - cos gamma), 0)^2`` or a higher power, 0 for a dark beat.
 
-    Models, formats, the PROM and the error bound are those of `Specular`, the bit-true twin.
-    A beat is dark where the light is behind the surface, or a highlight gate says that its span is. It works
-    as if its argument were 0, so nothing toggles from one dark beat to the next but its input and the first
-    register.
+    Models, formats, PROM and error bound are those of the bit-accurate model `Specular`. A beat is dark where
+    the light is behind the surface, or a highlight gate tells that its span has no highlight. A dark beat has
+    the argument 0, so that from one dark beat to the next only the input and the first register toggle.
 
-    With an initiation interval I of 1 the latency is 7 cycles (one minus, saturation, shift, saturation,
-    product, base, square), and each of M products has a multiplier: 17 by 17 bits, 17 by 11 and 14 by 11 in
-    the chords of ``coscos``, 13 by 11 in those of ``exp``. With a longer interval they take turns at
-    ``ceil(M / I)`` multipliers of 18 by 18 bits; a product then takes four cycles more, for its operands
-    and the registers beside the multiplier (`registered_product`), and waits for its turn.
+    With an initiation interval I of 1 the latency is 7 cycles (difference from 1, saturation, shift,
+    saturation, product, base, square), and each of M products has a multiplier: 17 by 17 bits, 17 by 11 and
+    14 by 11 in the chords of ``coscos``, 13 by 11 in those of ``exp``. With a longer interval the products
+    share ``ceil(M / I)`` multipliers of 18 by 18 bits. A product then takes four cycles more, for its
+    operands and the registers around the multiplier (`registered_product`), and the cycles until its slot.
 
     ============= = ===== == == == == =====================================================
     model         M I = 1 2  3  4  6  beside slope and square
     ============= = ===== == == == == =====================================================
-    cosquad, kin  2 7     17 17 16 17
+    line, squared 2 7     17 17 16 17
     lyon2         3 8     21 24 21 24 a square
     lyon3         4 9     27 26 27 31 two squares
     exp           2 9     19 19 18 19 64 words of 32 bits and a shift, no square
     coscos2       5 11    28 29 28 31 a product, 128 words of 36 bits, 64 of 33, and chords
     coscos4       6 12    33 35 33 38 those and a square
-    as documented 1 8     13 13 13 13 the slope's multiplier is of 18 by 17 bits, never shared
+    as published  1 8     13 13 13 13 the slope's multiplier is of 18 by 17 bits, never shared
     ============= = ===== == == == == =====================================================
 
-    What follows from the exponent costs what it does in a `SlopeUnit`.
+    Slope and PROM cost the same as in a `SlopeUnit`.
 
     Parameters
     ----------
     parameters : Specular
-        Model, kind of operand, and whether the structure is the documented one.
+        Bit-accurate model: reflection model, kind of operand, form.
     initiation_interval : int
         Distance in cycles of two inputs, at least 1.
     exponent : int or None
-        An exponent for good, 1 to 1000: no PROM, a constant shift, and the slope multiplier one by a
-        constant, so that M is one less. ``None``: the exponent is a port.
+        Exponent that is fixed at build time, 1 to 1000: no PROM, a constant shift, and the slope's multiplier
+        is one by a constant, so that M is one less. ``None``: the exponent is a port.
     shares_slope : bool
-        Whether a `SlopeUnit` outside works out what follows from the exponent. Else the unit has its own,
-        where ``exponent`` is ``None``.
+        Whether slope and boundary come from a `SlopeUnit` outside. Else the unit has its own, where
+        ``exponent`` is ``None``.
 
     Members
     -------
@@ -154,15 +154,15 @@ class SpecularUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(UQ(0, 17)))`
         Specular term.
     constants : :py:`In(StructLayout({"exponent": 10}))` or :py:`In(slope_shape())`
-        Exponent, 1 to 1000, or what a `SlopeUnit` gives; stays while beats are inside, and the slope from
-        two cycles after the first is taken. None with an exponent for good.
+        Exponent, 1 to 1000, or the output of a `SlopeUnit`; the exponent is constant while beats are inside,
+        the slope from two cycles after the first beat on. No such port where the exponent is fixed.
 
     Raises
     ------
     ValueError
-        If the interval or the exponent is out of range, or both an exponent and a shared slope are asked for.
+        If the interval or the exponent is out of range, or a unit with a fixed exponent is to share a slope.
 
-    Source: [T] figures 3.6 and 3.7; [C].
+    Source: docs/theory/units.md#specular-unit; [T] figures 3.6 and 3.7; [C].
     """
 
     def __init__(
@@ -179,7 +179,7 @@ class SpecularUnit(PipelinedUnit):
         if exponent is not None and shares_slope:
             raise ValueError("a unit with an exponent of its own shares no slope")
         self.exponent, self.shares_slope = exponent, shares_slope
-        self._has_slope_turn = exponent is None and not p.as_published
+        self._multiplies_slope = exponent is None and not p.as_published
         count = self.multiplications(p, exponent)
         self._graph = Dataflow(initiation_interval, count if initiation_interval > 1 else 0)
         self._result = self._describe()
@@ -198,18 +198,18 @@ class SpecularUnit(PipelinedUnit):
 
     @staticmethod
     def multiplications(parameters: Specular, exponent: int | None = None) -> int:
-        """M, of the table above: an initiation interval of as many cycles needs one multiplier."""
+        """M of the table above; with that initiation interval there is one multiplier."""
         chords = 3 if parameters.is_coscos else int(parameters.is_exponential)
         by_slope = exponent is None and not parameters.as_published
         return by_slope + parameters.squarings + chords
 
     def datapath(self, m, operands):
-        """The graph, read at the age of its last word."""
+        """The graph, and slope and boundary."""
         self._slope = self._frame_values(m)
         return self._graph.build(m, self, operands)(self._result, self.latency)
 
     def _frame_values(self, m: Module) -> tuple[FixedValue, Value, FixedValue]:
-        """K, s + 1 and the boundary: a constant, from outside, or two cycles behind the exponent."""
+        """K, s + 1 and the boundary: constants, from outside, or two cycles after the exponent."""
         p = self.parameters
         if self.exponent is not None:
             (scale, shift), boundary = p.scale(self.exponent), p.boundaries[self.exponent]
@@ -240,21 +240,21 @@ class SpecularUnit(PipelinedUnit):
             return FixedValue(UQ(10, 26), (Value.cast(argument) << self._slope[1])[:36]).truncate(16)
 
         def is_lit(wide, dark):
-            # The saturated argument is at most the boundary; it always is where that is the largest code.
+            # The saturated argument is at most the boundary; so it is where the boundary is the largest code.
             boundary = self._slope[2]
             return ((wide <= boundary) | Value.cast(boundary).all()) & ~dark
 
         argument = g.register("one_minus_cosine", lambda x: one_minus(p, x).truncate(25), operand)
         argument = g.register("argument", saturated, argument, dark)
         wide = g.register("shifted_wide", shifted, argument)
-        format = p.WIDE_FORMAT if p.as_published else p.SHIFTED_FORMAT
+        format = p.PUBLISHED_FORMAT if p.as_published else p.SHIFTED_FORMAT
         operand = g.register("shifted", lambda wide: wide.saturate(format), wide)
-        if self._has_slope_turn:
+        if self._multiplies_slope:
             product = self._multiply("product", operand, operand, right=lambda _: self._slope[0])
         else:
             product = g.register("product", lambda x: x * self._slope[0], operand)
         if p.as_published:
-            return self._drawn(product)
+            return self._as_published(product)
         lit = g.register("lit", is_lit, wide, dark)
         if p.is_exponential:
             return self._exponential(product, lit)
@@ -285,7 +285,7 @@ class SpecularUnit(PipelinedUnit):
         left: Callable[[Any], FixedValue] = lambda value: value,
         right: Callable[[Any], FixedValue] = lambda value: value,
     ) -> Word:
-        """Exact product: a clock with a multiplier of its own, two at a turn of a shared one."""
+        """Exact product: one cycle with a multiplier of its own, else issued to a shared one."""
         g = self._graph
         if g.interval == 1:
             return g.register(name, lambda x, y: left(x) * right(y), a, b)
@@ -301,8 +301,8 @@ class SpecularUnit(PipelinedUnit):
 
         return g.use(g.multiplier, name, (a, b, self._dark), operands, product)
 
-    def _drawn(self, product: Word) -> Word:
-        """Base of either sign, square, and the comparator on the square."""
+    def _as_published(self, product: Word) -> Word:
+        """Base of either sign, its square, and the comparator on the square."""
         p, g = self.parameters, self._graph
 
         def base(product, dark):
@@ -319,7 +319,7 @@ class SpecularUnit(PipelinedUnit):
         return g.register("result", result, self._multiply("square", base, base))
 
     def _cosine(self, argument: Word, product: Word, below_one: Callable, lit: Word) -> Word:
-        """Base of ``coscos``: e while the product p is made; ``p + p e``; the cosine."""
+        """Base of ``coscos``: e at the same time as the product p; ``p + p e``; the cosine."""
         p, g = self.parameters, self._graph
         code = g.wire("excess_code", lambda x: Value.cast(x)[8:], argument)
         e = self._interpolate("excess", p.excess, code)
@@ -331,7 +331,7 @@ class SpecularUnit(PipelinedUnit):
         return self._interpolate("chords", p.chords, code, lit)
 
     def _exponential(self, product: Word, lit: Word) -> Word:
-        """``2^-power``: three cycles of chords, shift."""
+        """``2^-power``: chords, then the shift."""
         p, g = self.parameters, self._graph
 
         def power(product):
@@ -348,7 +348,7 @@ class SpecularUnit(PipelinedUnit):
         return g.register("result", result, value, whole, lit)
 
     def _interpolate(self, name: str, chords: Chords, code: Word, lit: Word | None = None) -> Word:
-        """Twin of `Chords.compute`: table, product, sum; 0 where not ``lit``."""
+        """`Chords.compute`: table, product, sum; 0 where not ``lit``."""
         g = self._graph
         format, step_format = chords.start.format, chords.step.format
         words = (chords.start.codes | chords.step.codes << format.width).tolist()
@@ -372,5 +372,5 @@ class SpecularUnit(PipelinedUnit):
 
 
 def _cut(value: FixedValue) -> FixedValue:
-    """To the 17 fraction bits of a base and of the result."""
+    """Cut to 17 fraction bits, as a base and the result have."""
     return value.truncate(17)

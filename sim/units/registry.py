@@ -1,4 +1,7 @@
-"""Every record, found in its file: in the order of the rooms, within a room by name."""
+"""Every record, found in its file: in the order of the rooms, within a room by name.
+
+A file without a record holds parts that records share.
+"""
 
 import pkgutil
 from importlib import import_module
@@ -17,8 +20,9 @@ def _found() -> dict[str, Record]:
         package = import_module(".".join(part for part in ("blysk.sim.units", room) if part))
         for module in pkgutil.iter_modules(package.__path__):
             if not module.ispkg and (room or module.name not in ("operands", "record", "registry")):
-                record = import_module(f"{package.__name__}.{module.name}").RECORD
-                records[record.name] = record
+                found = import_module(f"{package.__name__}.{module.name}")
+                if record := getattr(found, "RECORD", None):
+                    records[record.name] = record
     return records
 
 

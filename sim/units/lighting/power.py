@@ -1,0 +1,49 @@
+"""Record of the exact power unit."""
+
+from functools import partial
+
+from blysk.golden.lighting.power import Power
+from blysk.hdl.lighting.power import PowerUnit
+from blysk.sim.units.lighting.specular import (
+    HIGHLIGHTS,
+    expect,
+    exponent_bits,
+    highlights,
+    measure_highlights,
+)
+from blysk.sim.units.record import Record, Stimulus, Variant
+
+__all__ = ["RECORD"]
+
+
+def _last_bits(unit, rng, count):
+    """Many operands: the last bits of products are rounded off, each decides once in thousands."""
+    return exponent_bits(unit, rng, count)
+
+
+def _variants():
+    measure = partial(measure_highlights, parameters=Power())
+    for form in ("pipelined", "sequential"):
+        yield form, Variant(partial(PowerUnit, form=form), measure, HIGHLIGHTS)
+    for form in ("pipelined", "sequential"):
+        yield f"{form}, of a chord", Variant(partial(PowerUnit, Power("one_minus_cosine"), form=form))
+
+
+_VARIANTS = dict(_variants())
+
+RECORD = Record(
+    name="power",
+    title="Exact power of N·H by square and multiply",
+    source="docs/theory/units.md#exact-power; [B] 3",
+    variants=_VARIANTS,
+    expect=expect,
+    stimuli={
+        "highlights": Stimulus(highlights, 500),
+        "exponents": Stimulus(exponent_bits, 200, stalled=False, repeats=20, variants=tuple(_VARIANTS)),
+        "last bits": Stimulus(_last_bits, 100_000, stalled=False, repeats=4, variants=("pipelined",)),
+    },
+    axis="n (1 - cos γ)",
+    logarithmic=True,
+    waivers={},
+    still={},
+)
