@@ -1,7 +1,7 @@
 """Bisection unit: the normal half-way between two others ([T] figure 2.6)."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -130,41 +130,6 @@ class Bisection:
         """Whether a polynomial is one in r, not in u."""
         return first_step or self.as_published
 
-    @cached_property
-    def _polynomials(self) -> tuple[tuple[Fixed, Fixed], tuple[Fixed, Fixed]]:
-        # The words of u and r are u and r times `ONE_SQUARED`.
-        one = ONE_SQUARED.values
-        narrow, widest = self.widest_narrow.values, self._limit(90).values
-        if self.as_published:
-            of_cosine = [c * 2.0**power for power, c in enumerate(_PUBLISHED[self.degree])]
-            fits = [
-                (c[0] - 0.5, [c[power] / one**power for power in range(1, len(c))])
-                for c in (of_cosine, _PUBLISHED_FIRST_STEP)
-            ]
-        else:
-            codes = minimax_quantised(
-                lambda u: half_angle_factor(u / one),
-                0.0,
-                narrow,
-                dict.fromkeys(range(1, self.degree + 1), self.SUM_FORMAT),
-                held={0: 0.5},
-            )
-            first = minimax_quantised(
-                lambda r: half_angle_factor(1 - r / one),
-                one - widest,
-                one - narrow,
-                {0: UQ(0, 19), 1: self.SUM_FORMAT, 2: self.SUM_FORMAT, 3: self.SUM_FORMAT},
-            )
-            step = self.SUM_FORMAT.step
-            fits = [(0.0, codes * step), (first[0] * self.FACTOR_FORMAT.step - 0.5, first[1:] * step)]
-        return tuple(
-            (
-                Fixed.round(self.FACTOR_FORMAT, constant),
-                Fixed.round(self.SUM_FORMAT, [*rest, *[0.0] * (3 - len(rest))]),
-            )
-            for constant, rest in fits
-        )
-
     def polynomial(self, first_step: bool) -> tuple[Fixed, Fixed]:
         """Coefficients of e.
 
@@ -180,7 +145,7 @@ class Bisection:
         rest : Fixed, shape (steps,), SQ(0, 18)
             Coefficients of the powers 1, 2, ... of u or r (`reads_cosine`), filled up with 0.
         """
-        constant, rest = self._polynomials[first_step]
+        constant, rest = _polynomials(self)[first_step]
         return constant, rest[: self.steps]
 
     def model_error(self, first_step: bool, widest: float = 90.0) -> float:
@@ -198,7 +163,7 @@ class Bisection:
         one = ONE_SQUARED.values.item()
         low, high = (45, float(np.clip(widest, 45, 90))) if first_step else (0, min(widest, 45.0))
         low, high = (1 - np.cos(np.radians(angle)) for angle in (low, high))
-        constant, rest = self._polynomials[first_step]
+        constant, rest = _polynomials(self)[first_step]
         coefficients = np.r_[constant.values + 0.5, rest.values]
         coefficients = coefficients * one ** np.arange(len(coefficients))
         if self.reads_cosine(first_step):
@@ -280,3 +245,40 @@ class Bisection:
         e = Fixed(e.format, e.codes[..., np.newaxis])
         correction = (e * half_sum.truncate(17)).scale(1).truncate(21)
         return (half_sum + correction).round_half_up(17).saturate(self.FORMAT), u, out_of_range
+
+
+@cache
+def _polynomials(bisection: Bisection) -> tuple[tuple[Fixed, Fixed], tuple[Fixed, Fixed]]:
+    """Coefficients of e of narrow spans and of the first step, as `Bisection.polynomial` has them."""
+    # The words of u and r are u and r times `ONE_SQUARED`.
+    one = ONE_SQUARED.values
+    narrow, widest = bisection.widest_narrow.values, bisection._limit(90).values
+    if bisection.as_published:
+        of_cosine = [c * 2.0**power for power, c in enumerate(_PUBLISHED[bisection.degree])]
+        fits = [
+            (c[0] - 0.5, [c[power] / one**power for power in range(1, len(c))])
+            for c in (of_cosine, _PUBLISHED_FIRST_STEP)
+        ]
+    else:
+        codes = minimax_quantised(
+            lambda u: half_angle_factor(u / one),
+            0.0,
+            narrow,
+            dict.fromkeys(range(1, bisection.degree + 1), bisection.SUM_FORMAT),
+            held={0: 0.5},
+        )
+        first = minimax_quantised(
+            lambda r: half_angle_factor(1 - r / one),
+            one - widest,
+            one - narrow,
+            {0: UQ(0, 19), 1: bisection.SUM_FORMAT, 2: bisection.SUM_FORMAT, 3: bisection.SUM_FORMAT},
+        )
+        step = bisection.SUM_FORMAT.step
+        fits = [(0.0, codes * step), (first[0] * bisection.FACTOR_FORMAT.step - 0.5, first[1:] * step)]
+    return tuple(
+        (
+            Fixed.round(bisection.FACTOR_FORMAT, constant),
+            Fixed.round(bisection.SUM_FORMAT, [*rest, *[0.0] * (3 - len(rest))]),
+        )
+        for constant, rest in fits
+    )

@@ -34,6 +34,7 @@ __all__ = [
     "log_lengths",
     "pairs_at",
     "pairs_chosen",
+    "pairs_of_length",
     "pixel_of",
     "setup_spans",
     "short_lengths",
@@ -44,6 +45,7 @@ __all__ = [
     "turned",
     "unit_codes",
     "vectors_near",
+    "word_corners",
     "word_ends",
 ]
 
@@ -78,6 +80,19 @@ def any_codes(rng: np.random.Generator, format: Format, *shape: int) -> np.ndarr
 def word_ends(rng: np.random.Generator, *shape: int) -> np.ndarray:
     """Components that are the smallest or largest code, 0, 1 or -1."""
     return rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], shape)
+
+
+def word_corners(*words: int) -> np.ndarray:
+    """Codes of pairs of vectors, each component one of some codes: all combinations, shape (2, count, 3).
+
+    Parameters
+    ----------
+    words : int
+        The codes; without them the smallest and the largest one, 0, 1 and -1.
+    """
+    words = words or (COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1)
+    pairs = np.stack(np.meshgrid(*[words] * 6), axis=-1).reshape(-1, 2, 3)
+    return np.moveaxis(pairs, 1, 0)
 
 
 # Unit vectors.
@@ -115,6 +130,15 @@ def code_pairs_at(
     """Codes of pairs of unit normals at given angles, uniform over the sphere."""
     left, right = pairs_at(rng, count, degrees)
     return quantise(left), quantise(right)
+
+
+def pairs_of_length(
+    rng: np.random.Generator, count: int, degrees: np.ndarray | float, length: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Codes of pairs of vectors of a given length, without those of components longer than a unit vector."""
+    pairs = np.stack(pairs_at(rng, count, degrees)) * length
+    left, right = np.rint(pairs[:, (np.abs(pairs) <= 1).all(axis=(0, 2))] * ONE).astype(np.int64)
+    return left, right
 
 
 def pairs_chosen(

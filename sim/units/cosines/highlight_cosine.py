@@ -11,7 +11,7 @@ from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 from blysk.sim.units.operands import any_codes, log_lengths, pixel_of, short_lengths
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
-__all__ = ["RECORD"]
+__all__ = ["RECORD", "spans_of"]
 
 FORMATS = {
     "phase": HighlightCosine.PHASE_FORMAT,
@@ -63,7 +63,8 @@ def _spans(unit, rng, count):
     return Case({**beats, "length": length})
 
 
-def _angles(rng, length) -> Case:
+def spans_of(rng: np.random.Generator, length: np.ndarray) -> Case:
+    """Input of spans of given lengths: peaks, ends of each quarter and of words, carries, cos beta to 2."""
     count = len(length)
     phase = rng.integers(-(1 << 39), 1 << 39, count)
     phase[1::4] = rng.normal(size=len(phase[1::4])) * 2.0**35
@@ -81,13 +82,13 @@ def _angles(rng, length) -> Case:
 
 def _corners(unit, rng, count):
     """Peaks, both ends of each quarter of the wave, ends of words, carries, cos beta to 2; short spans."""
-    return _angles(rng, rng.integers(0, 40, count // 20))
+    return spans_of(rng, rng.integers(0, 40, count // 20))
 
 
 def _last_bits(unit, rng, count):
     """Every bit of a length, and many spans: the last bits of products rarely matter."""
     powers = 1 << np.arange(12)
-    return _angles(rng, np.r_[powers, powers + 1, rng.integers(1, 4, count // 2)])
+    return spans_of(rng, np.r_[powers, powers + 1, rng.integers(1, 4, count // 2)])
 
 
 def _variant(interpolated, note):

@@ -1,4 +1,4 @@
-"""Adaptive normaliser: the twin against float64."""
+"""Adaptive normaliser: the bit-accurate model against float64."""
 
 import re
 
@@ -8,46 +8,51 @@ import pytest
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.golden.reference.curves import interpolate
+from blysk.sim.units.normals.adaptive_normaliser import straight_lines
+from blysk.sim.units.operands import code_pairs_at, component_words, pairs_of_length, word_ends
 
 VARIANTS = [
     AdaptiveNormaliser(t, b) for t in (1 / 8, 2.0**-10, 2.0**-14) for b in (Bisection(), Bisection(1, 45))
 ]
 LENGTHS = np.array([1, 2, 3, 4, 5, 9, 16, 17, 33, 64, 100, 129, 257, 1000, 4095])
+SCALE = ONE * COMPONENT.step
 
 
-def run(parameters, normal_pairs, seed, angles, lengths):
-    rng = np.random.default_rng(seed)
-    left, right = (quantise(normals) for normals in normal_pairs(rng, len(lengths), angles))
-    result = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right), lengths)
-    span = np.repeat(np.arange(len(lengths)), lengths)
-    pixel = np.arange(len(span)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    return left, right, span, pixel, *result
+def run(parameters, seed, angles, lengths):
+    left, right = code_pairs_at(np.random.default_rng(seed), len(lengths), angles)
+    result = parameters.compute(*component_words(left, right), lengths)
+    return left, right, *pixels_of(lengths), *result
 
 
-def lines(left, right, levels, t):
-    """Straight lines between points of the great circle, in float64 and in units of the word."""
-    scaled = t * 2.0**levels
-    segment = np.minimum(np.floor(scaled), 2.0**levels - 1)
-    before, after = (interpolate("slerp", left, right, (segment + k) / 2.0**levels) for k in (0, 1))
-    # The great circle has the length of its left end.
-    after = np.where((segment + 1 == 2.0**levels)[:, np.newaxis], right, after)
-    return before + (scaled - segment)[:, np.newaxis] * (after - before)
-
-
-@pytest.mark.parametrize("parameters", VARIANTS, ids=str)
-@pytest.mark.parametrize("first_step", [False, True])
-def test_error_under_its_bound(normal_pairs, parameters, first_step):
-    # A span that the unit does not divide shows its own arithmetic all the same.
-    low, high = (45.01, 90) if first_step and parameters.bisection.max_angle == 90 else (0.01, 44.99)
-    lengths = np.tile(LENGTHS, 12)
-    angles = np.random.default_rng(1).uniform(low, high, len(lengths))
-    left, right, span, pixel, normal, out_of_range, levels = run(parameters, normal_pairs, 2, angles, lengths)
-    assert not out_of_range.any()
+def errors(left, right, span, pixel, normal, levels, lengths):
+    """Largest component's distance of every pixel from the straight line of its segment."""
     t = pixel / np.maximum(lengths - 1, 1)[span]
-    exact = lines(left[span] / ONE, right[span] / ONE, levels[span], t) * (ONE * COMPONENT.step)
-    error = np.abs(normal.values - exact).max(axis=1)
+    exact = straight_lines(left[span] / ONE, right[span] / ONE, levels[span], t) * SCALE
+    return np.abs(normal.values - exact).max(axis=1)
+
+
+def assert_ends(normal, left, right, lengths):
+    """First and last pixels have the spans' own normals."""
+    last = np.cumsum(lengths) - 1
+    np.testing.assert_array_equal(normal.codes[last - lengths + 1], left)
+    np.testing.assert_array_equal(normal.codes[last][lengths > 1], right[lengths > 1])
+
+
+@pytest.mark.parametrize(
+    ("parameters", "low", "high"),
+    [(p, 0.01, 44.99) for p in VARIANTS] + [(p, 45.01, 90) for p in VARIANTS[::2]],
+    ids=str,
+)
+def test_error_under_its_bound(parameters, low, high):
+    # A span that the unit does not divide shows its own arithmetic all the same.
+    lengths = np.tile(LENGTHS, 8)
+    angles = np.random.default_rng(1).uniform(low, high, len(lengths))
+    left, right, span, pixel, normal, out_of_range, levels = run(parameters, 2, angles, lengths)
+    assert not out_of_range.any()
+    error = errors(left, right, span, pixel, normal, levels, lengths)
     bounds = np.array([parameters.error(k, low > 1) for k in range(parameters.depth + 1)])
     assert np.all(error <= bounds[levels][span])
     # Of every number of levels, the bound takes the widest span that asks for it.
@@ -55,12 +60,12 @@ def test_error_under_its_bound(normal_pairs, parameters, first_step):
 
 
 @pytest.mark.parametrize("parameters", VARIANTS, ids=str)
-def test_length_and_direction_keep_their_word(normal_pairs, parameters):
-    lengths = np.full(300, 1000)
-    angles = np.random.default_rng(3).uniform(0, parameters.bisection.max_angle - 0.01, 300)
-    left, right, span, pixel, normal, out_of_range, levels = run(parameters, normal_pairs, 4, angles, lengths)
+def test_length_and_direction_keep_their_word(parameters):
+    lengths = np.full(100, 1000)
+    angles = np.random.default_rng(3).uniform(0, parameters.bisection.max_angle - 0.01, 100)
+    left, right, span, pixel, normal, out_of_range, levels = run(parameters, 4, angles, lengths)
     assert not out_of_range.any()
-    vectors = normal.values / (ONE * COMPONENT.step)
+    vectors = normal.values / SCALE
     length = np.linalg.norm(vectors, axis=1)
     # Three components off by the arithmetic error, and the code vectors at the ends by their own rounding.
     rounding = np.sqrt(3) * parameters.error(parameters.depth, bool(angles.max() > 45)) + 2.0**-17
@@ -69,16 +74,16 @@ def test_length_and_direction_keep_their_word(normal_pairs, parameters):
     exact = interpolate("slerp", left[span] / ONE, right[span] / ONE, pixel / 999)
     theta = np.radians(angles)[span] / 2.0 ** levels[span]
     assert np.all(theta**2 <= 8.1 * parameters.threshold + 2.0**-15)
-    across = np.linalg.norm(np.cross(vectors, exact), axis=1)
-    assert np.all(across <= 0.017 * theta**3 + 1.1 * rounding)
+    turned = np.linalg.norm(np.cross(vectors, exact), axis=1)
+    assert np.all(turned <= 0.017 * theta**3 + 1.1 * rounding)
 
 
 @pytest.mark.parametrize("threshold", [1 / 8, 2.0**-6, 2.0**-10, 2.0**-14])
-def test_levels_are_the_fewest(normal_pairs, threshold):
+def test_levels_are_the_fewest(threshold):
     parameters = AdaptiveNormaliser(threshold)
     angles = np.random.default_rng(5).uniform(0, 89.99, 40_000)
-    left, right = (quantise(normals) for normals in normal_pairs(np.random.default_rng(6), 40_000, angles))
-    _, u, out_of_range = parameters.bisection.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    words = component_words(*code_pairs_at(np.random.default_rng(6), 40_000, angles))
+    _, u, out_of_range = parameters.bisection.compute(*words)
     levels = parameters.levels(u, out_of_range)
 
     def sagitta(k):
@@ -91,8 +96,7 @@ def test_levels_are_the_fewest(normal_pairs, threshold):
     divided = levels > 0
     fewer = np.maximum(levels - 1, 0)
     assert np.all(sagitta(fewer)[divided] * 1.068 + 4 * slack[divided] + 2.0**-20 >= threshold)
-    assert levels.min() == 0
-    assert levels.max() == parameters.depth
+    assert (levels.min(), levels.max()) == (0, parameters.depth)
 
 
 def test_sagitta_is_never_under():
@@ -105,22 +109,20 @@ def test_sagitta_is_never_under():
         assert ratio.max() <= 1.0671
 
 
+@pytest.mark.parametrize("threshold", [2.0**-10, 2.0**-14])
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90])
-def test_stiff_ends_are_exact(normal_pairs, angle):
-    lengths = np.r_[np.arange(1, 70), 127, 128, 129, 255, 256, 257, 1023, 1024, 1025, 4093, 4094, 4095]
-    for parameters in (AdaptiveNormaliser(), AdaptiveNormaliser(2.0**-14)):
-        left, right, _, _, normal, out_of_range, _ = run(parameters, normal_pairs, 7, angle, lengths)
-        assert not out_of_range.any()
-        last = np.cumsum(lengths) - 1
-        np.testing.assert_array_equal(normal.codes[last - lengths + 1], left)
-        np.testing.assert_array_equal(normal.codes[last][lengths > 1], right[lengths > 1])
+def test_stiff_ends_are_exact(threshold, angle):
+    parameters = AdaptiveNormaliser(threshold)
+    lengths = np.r_[np.arange(1, 70), 127, 128, 129, 255, 256, 257, 1023, 1024, 1025, 4095]
+    left, right, _, _, normal, out_of_range, _ = run(parameters, 7, angle, lengths)
+    assert not out_of_range.any()
+    assert_ends(normal, left, right, lengths)
 
 
 def test_stiff_equal_normals_stay():
     axes = np.vstack([np.eye(3), -np.eye(3)]).astype(np.int64) * ONE
     lengths = np.array([1, 2, 3, 16, 4095, 100])
-    ends = Fixed(COMPONENT, axes)
-    normal, out_of_range, levels = AdaptiveNormaliser().compute(ends, ends, lengths)
+    normal, out_of_range, levels = AdaptiveNormaliser().compute(*component_words(axes, axes), lengths)
     assert not out_of_range.any()
     assert not levels.any()
     np.testing.assert_array_equal(normal.codes, np.repeat(axes, lengths, axis=0))
@@ -129,7 +131,7 @@ def test_stiff_equal_normals_stay():
 @pytest.mark.parametrize(
     ("degrees", "miss", "length"), [(1, 0.00015, 1.0003), (10, 0.15, 1.03), (45, 8.2, 1.47)]
 )
-def test_what_the_documented_extrapolation_costs(degrees, miss, length):
+def test_cost_of_the_published_extrapolation(degrees, miss, length):
     """The end on the chord's continuation at the next power of two, then normalised without an error."""
     psi = np.radians(degrees)
     steps = np.arange(1, 4095)
@@ -140,35 +142,30 @@ def test_what_the_documented_extrapolation_costs(degrees, miss, length):
     last = np.degrees(np.arctan2(end[1], end[0])) / g
     assert (degrees - last).max() == pytest.approx(miss, rel=0.03)
     assert np.degrees(np.arctan2(2.0, 1 - 2.0)) == pytest.approx(116.6, abs=0.1)
-    # Ours gives the right end itself, to the bit: test_stiff_ends_are_exact.
+    # Ours gives the right end itself, to the bit.
     ends = quantise(np.array([[1.0, 0, 0], [np.cos(psi), np.sin(psi), 0]]))
-    length = np.r_[2:300, 513:516, 4095]
-    normal, _, _ = AdaptiveNormaliser().compute(
-        *(Fixed(COMPONENT, np.tile(end, (len(length), 1))) for end in ends), length
-    )
-    assert np.all(normal.codes[np.cumsum(length) - 1] == ends[1])
+    length = np.r_[2:100, 513:516, 4095]
+    left, right = (np.tile(end, (len(length), 1)) for end in ends)
+    normal, _, _ = AdaptiveNormaliser().compute(*component_words(left, right), length)
+    assert_ends(normal, left, right, length)
 
 
 @pytest.mark.parametrize("angle", [90.01, 120, 180])
-def test_stiff_too_wide_is_flagged(normal_pairs, angle):
-    left, right, _, _, normal, out_of_range, levels = run(
-        AdaptiveNormaliser(), normal_pairs, 8, angle, np.full(200, 33)
-    )
+def test_stiff_spans_out_of_range_are_flagged(angle):
+    lengths = np.full(200, 33)
+    left, right, _, _, normal, out_of_range, levels = run(AdaptiveNormaliser(), 8, angle, lengths)
     assert out_of_range.all()
     assert not levels.any()
-    np.testing.assert_array_equal(normal.codes[::33], left)
-    np.testing.assert_array_equal(normal.codes[32::33], right)
+    assert_ends(normal, left, right, lengths)
 
 
 @pytest.mark.parametrize("threshold", [1 / 8, 2.0**-10, 2.0**-14])
 @pytest.mark.parametrize("angle", [1, 44.9, 89.9])
-def test_stiff_drift_over_4095_pixels(normal_pairs, threshold, angle):
+def test_stiff_drift_over_4095_pixels(threshold, angle):
     """A step is cut by under 2^-32: over a segment of n pixels its end is low by under n 2^-32."""
-    parameters = AdaptiveNormaliser(threshold)
-    lengths = np.full(6, 4095)
-    left, right, span, pixel, normal, _, levels = run(parameters, normal_pairs, 9, angle, lengths)
-    exact = lines(left[span] / ONE, right[span] / ONE, levels[span], pixel / 4094) * (ONE * COMPONENT.step)
-    error = np.abs(normal.values - exact).max()
+    parameters, lengths = AdaptiveNormaliser(threshold), np.full(6, 4095)
+    left, right, span, pixel, normal, _, levels = run(parameters, 9, angle, lengths)
+    error = errors(left, right, span, pixel, normal, levels, lengths).max()
     assert error <= parameters.error(int(levels.max()), angle > 45)
     # One segment, the longest way to drift, keeps within a step of the word and what its factors round off.
     if not levels.any():
@@ -180,55 +177,44 @@ def test_stiff_drift_over_4095_pixels(normal_pairs, threshold, angle):
 def test_stiff_peaks(length, angle):
     """N.H with H on a pixel and between two: the sagitta and the rounding are lost, no more."""
     parameters, half = AdaptiveNormaliser(), np.radians(angle) / 2
-    ends = quantise(np.array([[np.cos(half), -np.sin(half), 0], [np.cos(half), np.sin(half), 0]]))
-    operands = (Fixed(COMPONENT, end[np.newaxis]) for end in ends)
-    normal, _, levels = parameters.compute(*operands, np.array([length]))
+    ends = quantise(np.array([[[np.cos(half), sign * np.sin(half), 0]] for sign in (-1, 1)]))
+    normal, _, levels = parameters.compute(*component_words(*ends), np.array([length]))
     bound = parameters.threshold + 2.0**-19 + 2 * parameters.error(int(levels[0]), angle > 45) + 2.0**-16
-    for place in ((length - 1) / 2, (length - 1) // 2 + 0.5, 1):
-        turn = (2 * place / (length - 1) - 1) * half
+    for pixel in ((length - 1) / 2, (length - 1) // 2 + 0.5, 1):
+        turn = (2 * pixel / (length - 1) - 1) * half
         found = normal.values @ np.array([np.cos(turn), np.sin(turn), 0])
         ideal = np.cos((2 * np.arange(length) / (length - 1) - 1) * half - turn)
         theta = 2 * half / 2.0 ** levels[0]
         assert np.abs(found - ideal).max() <= bound + 0.017 * theta**3
 
 
-def test_stiff_normals_of_no_unit_length(normal_pairs):
+def test_stiff_normals_of_no_unit_length():
     """Words of any size come out at both ends as they went in, unless flagged; nothing fails in between."""
     rng = np.random.default_rng(10)
-    left, right = normal_pairs(rng, 300, 5.0)
     parameters, lengths = AdaptiveNormaliser(), np.resize([2, 3, 16, 100], 300)
-    corners = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (2, 300, 3))
-    scaled = [[np.rint(v * (1 - 1 / 256) * ONE) for v in (left, right)], np.zeros((2, 300, 3)), corners]
-    for ends in scaled:
-        before, after = (Fixed(COMPONENT, np.asarray(end).astype(np.int64)) for end in ends)
-        normal, out_of_range, _ = parameters.compute(before, after, lengths)
-        last = np.cumsum(lengths) - 1
-        np.testing.assert_array_equal(normal.codes[last - lengths + 1], before.codes)
-        np.testing.assert_array_equal(normal.codes[last], after.codes)
-    # Of the short ones, which are not wide, every normal is as short as they are, and by its sagitta.
-    before, after = (Fixed(COMPONENT, end.astype(np.int64)) for end in scaled[0])
-    normal, out_of_range, _ = parameters.compute(before, after, lengths)
+    short = pairs_of_length(rng, 300, 5.0, 1 - 1 / 256)
+    for ends in (np.zeros((2, 300, 3), np.int64), word_ends(rng, 2, 300, 3), short):
+        normal, out_of_range, _ = parameters.compute(*component_words(*ends), lengths)
+        assert_ends(normal, *ends, lengths)
+    # Every normal between short ones is as short as they are, and by its sagitta.
     assert not out_of_range.any()
     size = np.linalg.norm(normal.values, axis=1)
     assert 1 - 3 / 256 < size.min() < 1 - 1 / 256
 
 
 @pytest.mark.long
-def test_every_length(normal_pairs):
+def test_every_length():
     parameters = AdaptiveNormaliser(2.0**-12)
     for low in range(1, 4096, 128):
         lengths = np.arange(low, min(low + 128, 4096))
         angles = np.random.default_rng(low).uniform(0, 90, len(lengths))
-        left, right, span, pixel, normal, _, levels = run(parameters, normal_pairs, low, angles, lengths)
-        last = np.cumsum(lengths) - 1
-        np.testing.assert_array_equal(normal.codes[last - lengths + 1], left)
-        np.testing.assert_array_equal(normal.codes[last][lengths > 1], right[lengths > 1])
-        t = pixel / np.maximum(lengths - 1, 1)[span]
-        exact = lines(left[span] / ONE, right[span] / ONE, levels[span], t) * (ONE * COMPONENT.step)
-        assert np.abs(normal.values - exact).max() <= parameters.error(parameters.depth, True)
+        left, right, span, pixel, normal, _, levels = run(parameters, low, angles, lengths)
+        assert_ends(normal, left, right, lengths)
+        error = errors(left, right, span, pixel, normal, levels, lengths)
+        assert error.max() <= parameters.error(parameters.depth, True)
 
 
-def test_refuses(normal_pairs):
+def test_refuses():
     for threshold in (0.0, 2.0**-15, 0.2, float("nan")):
         text = f"threshold must be 2^-14 to 1/8, not {threshold!r}"
         with pytest.raises(ValueError, match=f"^{re.escape(text)}$"):

@@ -1,4 +1,4 @@
-"""Bisection: the twin against float64, and the figures of numbers.md."""
+"""Bisection: the bit-accurate model against float64, and the published polynomials."""
 
 import re
 
@@ -8,7 +8,17 @@ import pytest
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax, reciprocal_root
-from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.golden.number.unit_vector import COMPONENT, ONE
+from blysk.sim.units.normals.bisection import factor_of
+from blysk.sim.units.operands import (
+    code_pairs_at,
+    component_words,
+    dot,
+    exact_middle,
+    pairs_of_length,
+    unit_codes,
+    word_corners,
+)
 
 VARIANTS = [
     Bisection(degree, max_angle, as_published)
@@ -19,17 +29,12 @@ VARIANTS = [
 
 
 def bisect(parameters, left, right):
-    """Result of the twin and the exact middle of the same two code vectors, in units of the word."""
-    middle, u, out_of_range = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
-    a, b = left / ONE, right / ONE
-    r = np.einsum("ij,ij->i", a, b)
-    exact = (a + b) / np.sqrt(2 + 2 * r)[:, np.newaxis] * (ONE * COMPONENT.step)
-    return middle, u, out_of_range, exact, r
+    """Result of the model, and the exact middle of the same two code vectors."""
+    return *parameters.compute(*component_words(left, right)), *exact_middle(left, right)
 
 
-def codes(normal_pairs, seed, angles):
-    rng = np.random.default_rng(seed)
-    return (quantise(normals) for normals in normal_pairs(rng, len(angles), angles))
+def codes(seed, angles):
+    return code_pairs_at(np.random.default_rng(seed), len(angles), angles)
 
 
 @pytest.mark.parametrize(
@@ -42,11 +47,11 @@ def codes(normal_pairs, seed, angles):
     ],
     ids=str,
 )
-def test_error_under_its_bound(normal_pairs, parameters, first_step):
+def test_error_under_its_bound(parameters, first_step):
     low, high = (45.01, 90) if first_step else (0, 44.99)
     rng = np.random.default_rng(3)
     angles = np.r_[rng.uniform(low, high, 40_000), np.full(1000, low), np.full(1000, high)]
-    left, right = codes(normal_pairs, 4, angles)
+    left, right = codes(4, angles)
     # Along an axis both components of a sum are as large as they get.
     left[:20] = [0, 0, ONE]
     right[:20] = left[:20] if not first_step else [0, ONE, 0]
@@ -61,15 +66,11 @@ def test_error_under_its_bound(normal_pairs, parameters, first_step):
 
 @pytest.mark.parametrize("parameters", [Bisection(), Bisection(as_published=True)], ids=str)
 @pytest.mark.parametrize("first_step", [False, True])
-def test_arithmetic_error_under_its_bound(normal_pairs, parameters, first_step):
+def test_arithmetic_error_under_its_bound(parameters, first_step):
     low, high = (45.01, 90) if first_step else (0, 44.99)
-    left, right = codes(normal_pairs, 5, np.random.default_rng(6).uniform(low, high, 50_000))
+    left, right = codes(5, np.random.default_rng(6).uniform(low, high, 50_000))
     middle, _, _, _, r = bisect(parameters, left, right)
-    constant, rest = parameters.polynomial(first_step)
-    x = r * (ONE * COMPONENT.step) ** 2
-    if not parameters.reads_cosine(first_step):
-        x = (ONE * COMPONENT.step) ** 2 - x
-    factor = 0.5 + np.polynomial.polynomial.polyval(x, np.r_[constant.values, rest.values])
+    factor = 0.5 + factor_of(parameters, r, np.full(len(r), first_step))
     same = (left + right) * COMPONENT.step * factor[:, np.newaxis]
     # A factor that is too large takes a component near 1 out of the word.
     same = np.clip(same, -1, ONE * COMPONENT.step)
@@ -77,9 +78,9 @@ def test_arithmetic_error_under_its_bound(normal_pairs, parameters, first_step):
     assert parameters.arithmetic_error(first_step) / 3 <= worst <= parameters.arithmetic_error(first_step)
 
 
-def test_direction_is_exact(normal_pairs):
+def test_direction_is_exact():
     # Only rounding turns the middle: by no more than two roundings of 2^-18 a component.
-    left, right = codes(normal_pairs, 7, np.random.default_rng(8).uniform(0, 90, 50_000))
+    left, right = codes(7, np.random.default_rng(8).uniform(0, 90, 50_000))
     for parameters in VARIANTS:
         if parameters.max_angle == 90:
             middle, _, _, exact, _ = bisect(parameters, left, right)
@@ -90,23 +91,22 @@ def test_direction_is_exact(normal_pairs):
 
 
 @pytest.mark.parametrize("degree", [1, 2])
-def test_equal_normals_stay(normal_pairs, degree):
-    left, _ = codes(normal_pairs, 9, np.zeros(20_000))
-    middle, u, out_of_range = Bisection(degree).compute(Fixed(COMPONENT, left), Fixed(COMPONENT, left))
+def test_equal_normals_stay(degree):
+    axes = np.vstack([np.eye(3), -np.eye(3)]).astype(np.int64) * ONE
+    normals = np.vstack([axes, unit_codes(np.random.default_rng(9), 20_000)])
+    middle, u, out_of_range = Bisection(degree).compute(*component_words(normals, normals))
     assert not out_of_range.any()
     # The length of a code vector is off by rounding, and the unit corrects it where it can.
     assert np.abs(u.codes).max() <= 2
-    assert np.abs(middle.codes - left).max() <= 1
-    axes = np.vstack([np.eye(3), -np.eye(3)]).astype(np.int64) * ONE
-    middle, u, _ = Bisection(degree).compute(Fixed(COMPONENT, axes), Fixed(COMPONENT, axes))
-    np.testing.assert_array_equal(middle.codes, axes)
-    assert not u.codes.any()
+    assert np.abs(middle.codes - normals).max() <= 1
+    np.testing.assert_array_equal(middle.codes[:6], axes)
+    assert not u.codes[:6].any()
 
 
 @pytest.mark.parametrize("parameters", [Bisection(), Bisection(1), Bisection(as_published=True)], ids=str)
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 44.9, 45, 45.1, 89.9, 90])
-def test_stiff_angles_within_the_bound(normal_pairs, parameters, angle):
-    left, right = codes(normal_pairs, 11, np.full(4000, angle))
+def test_stiff_angles_within_the_bound(parameters, angle):
+    left, right = codes(11, np.full(4000, angle))
     middle, _, out_of_range, exact, _ = bisect(parameters, left, right)
     assert not out_of_range.any()
     # At 45 degrees the rounding of the normals decides which polynomial is taken.
@@ -117,16 +117,13 @@ def test_stiff_angles_within_the_bound(normal_pairs, parameters, angle):
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("excess", [-1 / 256, 1 / 256])
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 20, 44])
-def test_stiff_lengths_of_the_ends(normal_pairs, degree, angle, excess):
+def test_stiff_lengths_of_the_ends(degree, angle, excess):
     """Ends of length 1 +- 1/256: the bound holds, and the error of the middle's length is halved.
 
     u may then be negative, to -2/256, where the fit goes on as smoothly as the function.
     """
     parameters = Bisection(degree)
-    left, right = normal_pairs(np.random.default_rng(12), 4000, angle)
-    left, right = (np.rint(n * (1 + excess) * ONE).astype(np.int64) for n in (left, right))
-    kept = (np.abs(left) <= ONE).all(axis=1) & (np.abs(right) <= ONE).all(axis=1)
-    left, right = left[kept], right[kept]
+    left, right = pairs_of_length(np.random.default_rng(12), 4000, angle, 1 + excess)
     middle, _, out_of_range, exact, _ = bisect(parameters, left, right)
     assert not out_of_range.any()
     assert np.abs(middle.values - np.clip(exact, -1, ONE * COMPONENT.step)).max() <= parameters.error(False)
@@ -138,9 +135,9 @@ def test_stiff_lengths_of_the_ends(normal_pairs, degree, angle, excess):
     assert np.abs(length - expected).max() <= slack
 
 
-def test_stiff_normals_of_length_zero(normal_pairs):
+def test_stiff_normals_of_length_zero():
     """Such a normal is taken for one at 90 degrees: a unit up to 45 flags it, one up to 90 scales by h(0)."""
-    (left, _), zero = codes(normal_pairs, 13, np.zeros(2000)), np.zeros((2000, 3), dtype=np.int64)
+    left, zero = unit_codes(np.random.default_rng(13), 2000), np.zeros((2000, 3), dtype=np.int64)
     for a, b in ((left, zero), (zero, left), (zero, zero)):
         assert bisect(Bisection(2, 45), a, b)[2].all()
         middle, u, out_of_range, exact, _ = bisect(Bisection(), a, b)
@@ -152,19 +149,17 @@ def test_stiff_normals_of_length_zero(normal_pairs):
 @pytest.mark.parametrize("parameters", VARIANTS, ids=str)
 def test_stiff_every_code_without_silent_wrap(parameters):
     """Vectors of the words' ends: flagged, or a middle on the side of the sum, of 0.25 to 0.75 of it."""
-    ends = [COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1]
-    corners = np.stack(np.meshgrid(*[ends] * 6), axis=-1).reshape(-1, 6)
-    left, right = corners[:, :3], corners[:, 3:]
-    middle, _, out_of_range = parameters.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
-    dot = (left * right).sum(axis=1) / ONE**2
-    np.testing.assert_array_equal(out_of_range, dot < np.cos(np.radians(parameters.max_angle)) - 1e-3)
+    left, right = word_corners()
+    middle, _, out_of_range = parameters.compute(*component_words(left, right))
+    cosine = dot(left, right) / ONE**2
+    np.testing.assert_array_equal(out_of_range, cosine < np.cos(np.radians(parameters.max_angle)) - 1e-3)
     total, found = (left + right)[~out_of_range], middle.codes[~out_of_range]
     low, high = np.minimum(0.25 * total, 0.75 * total) - 1, np.maximum(0.25 * total, 0.75 * total) + 1
     low, high = np.minimum(low, COMPONENT.max_code), np.maximum(high, COMPONENT.min_code)
     assert np.all((low <= found) & (found <= high))
 
 
-def test_documented_degree_two_shortens_a_flat_face():
+def test_published_degree_two_shortens_a_flat_face():
     axis = Fixed(COMPONENT, np.array([[0, 0, ONE]]))
     middle, _, _ = Bisection(as_published=True).compute(axis, axis)
     # 0.499 in place of 0.5.
@@ -173,16 +168,15 @@ def test_documented_degree_two_shortens_a_flat_face():
 
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90, 90.01, 120, 180])
 @pytest.mark.parametrize("max_angle", [45, 90])
-def test_stiff_angles_flag(normal_pairs, angle, max_angle):
-    left, right = codes(normal_pairs, 10, np.full(3000, angle))
-    *_, out_of_range = Bisection(2, max_angle).compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+def test_stiff_angles_flag(angle, max_angle):
+    left, right = codes(10, np.full(3000, angle))
+    *_, out_of_range = Bisection(2, max_angle).compute(*component_words(left, right))
     assert np.all(out_of_range == (angle > max_angle))
 
 
 @pytest.mark.parametrize(
     ("parameters", "first_step", "error"),
     [
-        # numbers.md: 2.5e-5 for the fit that is exact at zero angle, unquantised.
         (Bisection(2), False, "2.5e-05"),
         (Bisection(1), False, "8.3e-04"),
         (Bisection(2), True, "1.1e-04"),
@@ -216,8 +210,8 @@ def test_published_polynomials():
     fit = minimax(h, 0, 1, 2)
     assert fit == pytest.approx([0.70519, -0.310337, 0.107064], abs=1e-6)
     assert largest_error(h, fit, 0, 1) == pytest.approx((1.92e-3, 0.00383), abs=5e-6)
-    printed = errors(h, [0.707, -0.341, 0.193, -0.059], 0, 1)
-    assert printed == pytest.approx((6.1e-4, 0.00093), abs=5e-6)
+    published = errors(h, [0.707, -0.341, 0.193, -0.059], 0, 1)
+    assert published == pytest.approx((6.1e-4, 0.00093), abs=5e-6)
     fit = minimax(h, 0, 1, 3)
     assert fit == pytest.approx([0.70681854, -0.34255322, 0.19682175, -0.06137531], abs=2e-7)
     assert largest_error(h, fit, 0, 1) == pytest.approx((2.88e-4, 0.00058), abs=5e-6)

@@ -1,11 +1,12 @@
-"""Dot product twin against integers of any size."""
+"""Dot product: the bit-accurate model against integers of any size."""
 
 import numpy as np
 import pytest
 
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, UQ, Fixed
-from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.golden.number.unit_vector import COMPONENT, ONE
+from blysk.sim.units.operands import code_pairs_at, component_words, pairs_of_length, word_corners
 
 
 def exact(a, b):
@@ -15,11 +16,10 @@ def exact(a, b):
 
 def test_stiff_is_exact_over_the_whole_word():
     rng = np.random.default_rng(1)
-    a, b = rng.integers(COMPONENT.min_code, COMPONENT.max_code + 1, (2, 100_000, 3))
-    ends = [COMPONENT.min_code, COMPONENT.max_code, 0, -1]
-    corners = np.stack(np.meshgrid(*[ends] * 6), axis=-1).reshape(-1, 6)
-    a, b = np.vstack([a, corners[:, :3]]), np.vstack([b, corners[:, 3:]])
-    result = DotProduct().compute(Fixed(COMPONENT, a), Fixed(COMPONENT, b))
+    words = rng.integers(COMPONENT.min_code, COMPONENT.max_code + 1, (2, 100_000, 3))
+    corners = word_corners(COMPONENT.min_code, COMPONENT.max_code, 0, -1)
+    a, b = np.concatenate([words, corners], axis=1)
+    result = DotProduct().compute(*component_words(a, b))
     assert result.format == DotProduct().result_format == SQ(4, 34)
     assert (result.codes == exact(a, b)).all()
     assert result.codes.max() == 3 * 2**34 <= result.format.max_code
@@ -37,13 +37,13 @@ def test_other_formats_and_broadcast():
 
 
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90, 90.01, 120, 180])
-def test_stiff_angles(normal_pairs, angle):
+def test_stiff_angles(angle):
     """Of two unit vectors rounded by under a step a component: the cosine, within two times sqrt(3) steps.
 
     Along the vectors the rounding is far smaller, as `quantise` holds their length.
     """
-    left, right = (quantise(n) for n in normal_pairs(np.random.default_rng(3), 20_000, angle))
-    cosine = DotProduct().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right)).values * 2**34 / ONE**2
+    words = component_words(*code_pairs_at(np.random.default_rng(3), 20_000, angle))
+    cosine = DotProduct().compute(*words).values * 2**34 / ONE**2
     slack = 2 * np.sqrt(3) / ONE * (1 + np.sqrt(3) / ONE)
     assert np.abs(cosine - np.cos(np.radians(angle))).max() <= slack
     if angle in (0, 180):
@@ -51,16 +51,12 @@ def test_stiff_angles(normal_pairs, angle):
 
 
 @pytest.mark.parametrize("length", [0, 1 - 1 / 256, 1, 1 + 1 / 256])
-def test_stiff_lengths_of_the_vectors(normal_pairs, length):
+def test_stiff_lengths_of_the_vectors(length):
     """A vector of another length counts with its length: no normalisation, and no error of its own."""
-    left, right = (n * length * ONE for n in normal_pairs(np.random.default_rng(4), 5000, 30.0))
-    left, right = (
-        np.clip(np.rint(n), COMPONENT.min_code, COMPONENT.max_code).astype(int) for n in (left, right)
-    )
-    result = DotProduct().compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    left, right = pairs_of_length(np.random.default_rng(4), 5000, 30.0, length)
+    result = DotProduct().compute(*component_words(left, right))
     assert (result.codes == exact(left, right)).all()
-    if length == 0:
-        assert not result.codes.any()
+    assert length > 0 or not result.codes.any()
 
 
 def test_other_operands_are_refused():

@@ -1,6 +1,5 @@
 # amaranth: UnusedElaboratable=no
-# Above: a component that is refused is never elaborated.
-"""Angular setup: RTL against its twin, clock by clock, and with the highlight-cosine unit behind it."""
+"""Angular setup: its times and parts, and the highlight-cosine unit behind it."""
 
 import numpy as np
 import pytest
@@ -9,95 +8,34 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.arccos import Arccos
-from blysk.golden.cosines.highlight_cosine import HighlightCosine
-from blysk.golden.number.fixed import Fixed
-from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.hdl.core.stream import connect
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 from blysk.hdl.emit.cost import cost_of
 from blysk.sim.engines.simulate import simulate
-
-VARIANTS = {
-    "half_chord": AngularSetup(),
-    "arccos": AngularSetup("arccos"),
-    "arccos_printed": AngularSetup("arccos", Arccos("as_published")),
-}
+from blysk.sim.units.operands import any_pairs, unit_codes
+from blysk.sim.units.record import Case
+from blysk.sim.units.registry import RECORDS
 
 
-def beats_of(left, right, vector, length, parameters=VARIANTS["half_chord"]):
-    operands = (Fixed(COMPONENT, codes) for codes in (left, right, vector))
-    angle, phase, step, cos_beta, out_of_range = parameters.compute(*operands, length)
-    return (
-        {"normal_left": left, "normal_right": right, "vector": vector, "length": length},
-        {
-            "angle": angle.codes,
-            "phase": phase.codes,
-            "step": step.codes,
-            "cos_beta": cos_beta.codes,
-            "length": length,
-            "out_of_range": out_of_range,
-        },
-    )
-
-
+@pytest.mark.long
 @pytest.mark.parametrize(
-    ("variant", "interval"),
+    ("angle", "latencies", "counts", "longest"),
     [
-        ("half_chord", None),
-        *(
-            pytest.param(*variant, marks=pytest.mark.long)
-            for variant in (("half_chord", 4), ("half_chord", 26), ("arccos", 4), ("arccos_printed", None))
-        ),
-    ],
-)
-def test_equals_twin(verify, normal_pairs, variant, interval):
-    check(verify, normal_pairs, VARIANTS[variant], interval)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("variant", VARIANTS)
-@pytest.mark.parametrize("interval", [1, 2, 3, 5])
-def test_equals_twin_with_every_interval(verify, normal_pairs, variant, interval):
-    check(verify, normal_pairs, VARIANTS[variant], interval)
-
-
-def check(verify, normal_pairs, parameters, interval):
-    rng = np.random.default_rng(2)
-    angles = [np.zeros(20), 10.0 ** rng.uniform(-5, 1, 500), rng.uniform(0, 180, 700), np.full(20, 90)]
-    angles = np.concatenate([*angles, 180 - 10.0 ** rng.uniform(-5, 1, 100), np.full(20, 180)])
-    rng.shuffle(angles)
-    left, right = (quantise(normals) for normals in normal_pairs(rng, len(angles), angles))
-    vector, near = normal_pairs(rng, len(angles), 180 * rng.random(len(angles)))
-    vector = quantise(np.where(rng.random((len(angles), 1)) < 0.5, vector, near))
-    vector[::3] = left[::3]
-    # Not only unit vectors: every word at its ends must not upset what follows.
-    corners = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (300, 9))
-    left, right, vector = (
-        np.vstack([unit, corners[:, k : k + 3]]) for k, unit in ((0, left), (3, right), (6, vector))
-    )
-    length = rng.integers(1, 4096, len(left))
-    length[:40] = np.tile([1, 2, 3, 4, 5, 2048, 2049, 2050, 4094, 4095], 4)
-    beats, expected = beats_of(left, right, vector, length, parameters)
-    assert 100 < expected["out_of_range"].sum() < 500
-    verify(AngularSetupUnit(parameters, interval), beats, expected)
-
-
-@pytest.mark.long
-def test_times_and_multipliers_as_stated():
-    for variant, latencies, counts, longest in (
         ("half_chord", [59, 60, 62, 67, 71, 64], [26, 13, 9, 7, 6, 5], 26),
         ("arccos", [59, 60, 63, 63, 66, 66], [23, 13, 9, 8, 7, 6], 21),
-    ):
-        units = [AngularSetupUnit(VARIANTS[variant], interval) for interval in range(1, 7)]
-        assert [unit.latency for unit in units] == latencies
-        assert [cost_of(unit).multiplier_count for unit in units] == counts
-        for interval in (0, longest + 1):
-            message = rf"^initiation_interval must be 1 to {longest}, not {interval}$"
-            with pytest.raises(ValueError, match=message):
-                AngularSetupUnit(VARIANTS[variant], interval)
-    assert AngularSetupUnit().initiation_interval == 6
+    ],
+)
+def test_times_and_parts(angle, latencies, counts, longest):
+    parameters = AngularSetup(angle)
+    units = [AngularSetupUnit(parameters, initiation_interval=interval) for interval in range(1, 7)]
+    assert [unit.latency for unit in units] == latencies
+    assert [cost_of(unit).multiplier_count for unit in units] == counts
+    for interval in (0, longest + 1):
+        message = rf"^initiation_interval must be 1 to {longest}, not {interval}$"
+        with pytest.raises(ValueError, match=message):
+            AngularSetupUnit(parameters, initiation_interval=interval)
+    assert AngularSetupUnit(parameters).initiation_interval == 6
 
 
 class Chain(wiring.Component):
@@ -120,22 +58,14 @@ class Chain(wiring.Component):
 
 
 @pytest.mark.long
-def test_with_the_highlight_cosine_unit(normal_pairs):
-    rng = np.random.default_rng(3)
-    count = 120
-    left, right = (quantise(n) for n in normal_pairs(rng, count, 10.0 ** rng.uniform(-3, 2, count)))
-    vector, _ = normal_pairs(rng, count, 0)
-    length = rng.integers(1, 60, count)
-    length[3] = 4095
-    beats, prepared = beats_of(left, right, quantise(vector), length)
-    span = np.repeat(np.arange(count), length)
-    index = np.arange(len(span)) - np.repeat(np.cumsum(length) - length, length)
-    formats = {
-        name: getattr(AngularSetup, f"{name.upper()}_FORMAT") for name in ("phase", "step", "cos_beta")
-    }
-    operands = (Fixed(format, prepared[name]) for name, format in formats.items())
-    expected = HighlightCosine().compute(*operands, span, index).codes
-    for output_share in (0, 0.4):
-        stalls = rng.random(1009) < output_share
-        run = simulate(Chain(), beats, count=len(expected), engine="auto", output_stalls=stalls)
+def test_with_the_highlight_cosine_unit():
+    rng, chain = np.random.default_rng(3), Chain()
+    left, right = any_pairs(rng, 120)
+    length = np.r_[4095, rng.integers(1, 60, 119)]
+    beats = {"normal_left": left, "normal_right": right, "vector": unit_codes(rng, 120), "length": length}
+    prepared = RECORDS["angular_setup"].expect(chain.setup, Case(beats))
+    expected = RECORDS["highlight_cosine"].expect(chain.wave, Case(prepared))
+    for share in (0, 0.4):
+        stalls = rng.random(1009) < share
+        run = simulate(chain, beats, count=len(expected), engine="auto", output_stalls=stalls)
         np.testing.assert_array_equal(run.beats, expected)

@@ -7,8 +7,12 @@ from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
 from blysk.hdl.emit.cost import cost_of
 
+from ..variants import mostly_long
 
-@pytest.mark.parametrize(("lights", "interval"), [*((1, i) for i in (1, 2, 3, 4, 5, 7, 13, 26)), (2, 4)])
+
+@pytest.mark.parametrize(
+    ("lights", "interval"), mostly_long([*((1, i) for i in (1, 2, 3, 4, 5, 7, 13, 26)), (2, 4)], (1, 4))
+)
 def test_multipliers(lights, interval):
     """7 products a span and 19 a light, as even as the interval allows; all of 18 bits."""
     unit = ChordSetupUnit(None, lights, initiation_interval=interval)
@@ -25,12 +29,15 @@ def test_default_interval():
     assert (unit.lights, unit.initiation_interval, unit.multipliers) == (1, 4, 7)
 
 
-@pytest.mark.parametrize(("terms", "fraction_bits", "interval"), [(1, 36, 4), (2, 46, 5), (3, 40, 1)])
+@pytest.mark.parametrize(
+    ("terms", "fraction_bits", "interval"), mostly_long([(1, 36, 4), (2, 46, 5), (3, 40, 1)], ())
+)
 def test_each_term_is_a_product(terms, fraction_bits, interval):
     unit = ChordSetupUnit(ChordSetup(terms, fraction_bits), initiation_interval=interval)
     assert cost_of(unit).multiplier_count == -(-(4 + terms + 19) // interval)
 
 
+@pytest.mark.long
 def test_shorter_spans_need_a_smaller_table():
     assert cost_of(ChordSetupUnit(length_bits=9)).rom_bits == 17 << 8
 

@@ -11,6 +11,7 @@ from blysk.sim.units.normals.adaptive_normaliser import RECORD, spans_of
 from blysk.sim.units.operands import code_pairs_at, component_words
 
 from ...checks import assert_beats_equal, resets
+from ..variants import mostly_long
 
 
 def run_of(unit, angles, lengths, **stalls):
@@ -22,7 +23,7 @@ def run_of(unit, angles, lengths, **stalls):
     return run, unit.parameters.compute(*ends, lengths)[2]
 
 
-@pytest.mark.parametrize("variant", RECORD.variants)
+@pytest.mark.parametrize("variant", mostly_long(RECORD.variants, RECORD.default))
 def test_one_normal_in_every_cycle_of_a_span(variant):
     unit = RECORD.variants[variant].unit()
     rng = np.random.default_rng(2)

@@ -6,11 +6,13 @@ import pytest
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.normals.middle_normal import MiddleNormalUnit
 
+from ..variants import mostly_long
+
 # Latency and multipliers for the initiation intervals 1 to 9, as the unit's text states them.
 STATED = [(36, 9), (37, 5), (40, 3), (39, 3), (40, 2), (40, 2), (40, 2), (44, 2), (52, 1)]
 
 
-@pytest.mark.parametrize("interval", range(1, 10))
+@pytest.mark.parametrize("interval", mostly_long(range(1, 10), 6))
 def test_intervals_and_parts(interval):
     unit = MiddleNormalUnit(initiation_interval=interval)
     cost = cost_of(unit)
