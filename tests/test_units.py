@@ -1,67 +1,98 @@
 # amaranth: UnusedElaboratable=no
-"""Every unit, by its record: RTL equal to the bit-accurate model under stalls, pauses and resets."""
+"""Every unit, by its record: RTL equal to the bit-accurate model under stalls, pauses and resets.
+
+The quick run has all stimuli of the default variants, compiled, and some beats of every variant in Amaranth's
+simulator; the long run all variants, compiled.
+"""
 
 import inspect
+from functools import cache
 
+import numpy as np
 import pytest
 
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.record import Case, first
+from blysk.sim.units.record import STALLS, Case, UnitRun, first
 from blysk.sim.units.registry import RECORDS
 
 from .checks import assert_equals_model, resets
+
+FEW = 24
+"""Beats in Amaranth's simulator; spans are as short as for 200 pixels."""
+
+
+@cache
+def unit_of(name, variant):
+    """A component, the same for all its stimuli: it is translated once."""
+    return RECORDS[name].variants[variant].unit()
 
 
 def _runs():
     for name, record in RECORDS.items():
         for variant, given in record.variants.items():
-            for stimulus, sent in record.stimuli_of(variant).items():
-                marks = [pytest.mark.long] if given.long or sent.long else []
+            stimuli = record.stimuli_of(variant)
+            for stimulus, sent in stimuli.items():
+                quick = variant == record.default and not (given.long or sent.long)
                 # The default variant gets every stimulus, the others the first and those that name them.
-                is_first = stimulus == next(iter(record.stimuli_of(variant)))
-                if not (variant == record.default or is_first or variant in sent.variants):
-                    continue
-                yield pytest.param(name, variant, stimulus, marks=marks, id=f"{name}-{variant}-{stimulus}")
+                if variant == record.default or stimulus == next(iter(stimuli)) or variant in sent.variants:
+                    marks = [] if quick else [pytest.mark.long]
+                    yield pytest.param(
+                        name, variant, stimulus, marks=marks, id=f"{name}-{variant}-{stimulus}"
+                    )
 
 
 @pytest.mark.parametrize(("name", "variant", "stimulus"), list(_runs()))
 def test_equals_model(name, variant, stimulus):
     """Beat by beat, and where the unit states them cycle by cycle, under every pattern of stalls."""
-    record = RECORDS[name]
-    unit = record.variants[variant].unit()
-    for run in record.runs(unit, stimulus):
+    unit = unit_of(name, variant)
+    for run in RECORDS[name].runs(unit, stimulus):
         assert_equals_model(unit, run)
 
 
-def first_case(record, unit, count):
-    """The first beats of a unit's first stimulus."""
-    stimulus = next(iter(record.stimuli_of(record.default)))
-    run = next(record.runs(unit, stimulus))
-    return Case(first(run.case.beats, count), run.case.constants, run.case.write)
+@pytest.mark.parametrize(
+    ("name", "variant"),
+    [pytest.param(name, v, id=f"{name}-{v}") for name, record in RECORDS.items() for v in record.variants],
+)
+def test_few_beats_equal_model(name, variant):
+    """Of every variant, under stalls, in Amaranth's simulator; the default one's also on the same cycles."""
+    record, unit = RECORDS[name], unit_of(name, variant)
+    case = few_of(record, variant, unit)
+    rng = np.random.default_rng(2026)
+    stalls = {
+        end: rng.random(997) < share
+        for end, share in zip(("input_stalls", "output_stalls"), STALLS[1], strict=True)
+    }
+    status = None if record.status is None else record.status(unit, case)
+    run = UnitRun(case, record.expect(unit, case), status, stalls)
+    slow = assert_equals_model(unit, run, engine="pysim")
+    if variant == record.default:
+        fast = assert_equals_model(unit, run)
+        for cycles in ("cycles", "input_cycles"):
+            np.testing.assert_array_equal(getattr(slow, cycles), getattr(fast, cycles))
+
+
+def few_of(record, variant, unit):
+    """Some beats of a variant's first stimulus."""
+    make = next(iter(record.stimuli_of(variant).values())).make
+    case = make(unit, np.random.default_rng(2026), 200)
+    return Case(first(case.beats, FEW), case.constants, case.write)
 
 
 @pytest.mark.parametrize("name", RECORDS)
 def test_reset_leaves_nothing_behind(name):
     """Reset with beats inside: the unit then answers as from power-up, on the same cycles."""
     record = RECORDS[name]
-    unit = record.variants[record.default].unit()
-    case, count = first_case(record, unit, 24), 12
+    unit = unit_of(name, record.default)
+    case, count = few_of(record, record.default, unit), 12
     if isinstance(unit, PipelinedUnit):
         interval, count = unit.initiation_interval, 6
         cycles, befores = unit.latency + 6 * interval, (1, 2 * interval + 1, unit.latency + 2)
         expected = [unit.latency + interval * k for k in range(6)]
     else:
         beats = first(case.beats, count)
-        run = simulate(
-            unit,
-            beats,
-            count=None,
-            constants=case.constants,
-            write=case.write,
-            engine="auto",
-            idle_timeout=2000,
-        )
+        options = {"constants": case.constants, "write": case.write, "idle_timeout": 2000}
+        run = simulate(unit, beats, count=None, engine="auto", **options)
         cycles = run.total_cycles - int(run.input_cycles[0]) + 5
         befores = 1, cycles // 4, cycles // 2, 3 * cycles // 4
         expected = [cycle - run.input_cycles[0] for cycle in run.cycles.tolist()]

@@ -111,7 +111,8 @@ class LightUnit(wiring.Component):
         self._specular = SPECULAR_KINDS[type(p)].unit(
             p, initiation_interval=initiation_interval, exponent=exponent, shares_slope=shares_slope
         )
-        constants = self._specular.signature.members.get("constants")
+        ports = self._specular.signature.members
+        constants = ports["constants"] if "constants" in ports else None
         # Of a unit that is not built for a fixed exponent.
         self._exponent = exponent if constants is not None else None
         self.latency = self._specular.latency

@@ -84,12 +84,12 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit, parameters=LinearInterpolat
         ]
         first, far = self._flags_of_pixels(m, far)
         # Whether an earlier pixel of this span was out of range.
-        flagged, outside = Signal(), Signal()
+        flagged, flag = Signal(), Signal()
         before = flagged & ~first
-        m.d.comb += outside.eq((first & far) | renormaliser.o.payload.outside)
+        m.d.comb += flag.eq((first & far) | renormaliser.o.payload.out_of_range)
         m.d.sync += out_of_range.eq(0)
         with m.If(normals.valid & normals.ready):
-            m.d.sync += [out_of_range.eq(outside & ~before), flagged.eq(outside | before)]
+            m.d.sync += [out_of_range.eq(flag & ~before), flagged.eq(flag | before)]
         return normals, out_of_range
 
     def _flags_of_pixels(self, m, far):

@@ -1,0 +1,39 @@
+"""Record of the quadratic interpolator."""
+
+from dataclasses import replace
+
+from blysk.golden.methods.quadratic_interpolator import METHODS, PUBLISHED, QuadraticInterpolator
+from blysk.sim.units.methods.interpolator import STIMULI, expect, measured, options, status
+from blysk.sim.units.record import Record
+
+__all__ = ["RECORD"]
+
+_CURVE = QuadraticInterpolator()
+_OF_CHORD = QuadraticInterpolator("one_minus_cosine")
+
+
+def _variants():
+    figures = {"direct": "[T] figure 2.9 a", "horner": "[T] figure 2.9 b"}
+    for method in METHODS:
+        facts = {}
+        if method.form in figures:
+            source = f"docs/theory/interpolation.md#quadratic-normals; {figures[method.form]}"
+            facts = {"source": source, "long": True}
+        yield method.name, measured(method, **facts)
+    yield "quadratic, interval 1, of a chord", options(_OF_CHORD, 2, setup_interval=1, length_bits=9)
+    yield "quadratic, interval 3, no highlights", options(_CURVE, setup_interval=3, highlights=False)
+    yield "quadratic, interval 7, compact", options(_CURVE, setup_interval=7, product_interval=3)
+    for method in METHODS[1:]:
+        yield f"{method.name}, of a chord", options(replace(method, operand="one_minus_cosine"), 2)
+    yield "quadratic-published", options(PUBLISHED[0], as_published=True)
+
+
+RECORD = Record(
+    name="quadratic_interpolator",
+    title="Normals on a quadratic through the exact middle normal",
+    source="docs/theory/interpolation.md#quadratic-normals; [T] 2.2, figures 2.8, 2.10 and 2.11",
+    variants=dict(_variants()),
+    expect=expect,
+    status=status,
+    stimuli=STIMULI,
+)

@@ -1,0 +1,25 @@
+"""Record of the recurrence interpolator."""
+
+from blysk.golden.methods.recurrence_interpolator import PUBLISHED, RecurrenceInterpolator
+from blysk.sim.units.cosines.recurrence_setup import RECORD as SETUP
+from blysk.sim.units.methods.interpolator import STIMULI, expect, measured, of_setup, options, status
+from blysk.sim.units.record import Record
+
+__all__ = ["RECORD"]
+
+_RECURRENCE = RecurrenceInterpolator()
+
+RECORD = Record(
+    name="recurrence_interpolator",
+    title="Cosines of equal steps on the great circle, one product each",
+    source="docs/theory/interpolation.md#recurrence; [T] 3.3, figure 3.5",
+    variants={
+        "recurrence": measured(_RECURRENCE),
+        "recurrence, interval 1": options(_RECURRENCE, 2, setup_interval=1),
+        "recurrence, interval 46, no highlights": options(_RECURRENCE, setup_interval=46, highlights=False),
+        "recurrence-direct": options(PUBLISHED[0], as_published=True),
+    },
+    expect=expect,
+    status=status,
+    stimuli=STIMULI | {"corners": of_setup(SETUP)},
+)
