@@ -149,12 +149,13 @@ def _variants():
         ),
     )
     for interval in (1, 2, 3, 5, 8, 15):
-        yield f"interval {interval}", Variant(partial(HighlightGateUnit, initiation_interval=interval))
+        unit = partial(HighlightGateUnit, initiation_interval=interval)
+        yield f"interval {interval}", Variant(unit, long=interval != 1)
     p = HighlightGate(Specular(REFLECTION_MODELS["lyon2"]))
-    yield "lyon2, interval 4", Variant(partial(HighlightGateUnit, p, initiation_interval=4))
+    yield "lyon2, interval 4", Variant(partial(HighlightGateUnit, p, initiation_interval=4), long=True)
     for bits in (5, 6, 9):
         p = HighlightGate(fraction_bits=bits)
-        yield f"{bits} fraction bits", Variant(partial(HighlightGateUnit, p))
+        yield f"{bits} fraction bits", Variant(partial(HighlightGateUnit, p), long=bits != 6)
     for lights, exponent, interval in ((2, 60, 27), (3, None, 4), (1, 60, 6)):
         unit = partial(HighlightGateUnit, None, lights, initiation_interval=interval, exponent=exponent)
         name = f"{lights} lights, interval {interval}" + f", exponent {exponent}" * (exponent is not None)

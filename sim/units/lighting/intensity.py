@@ -94,12 +94,12 @@ def _variants():
         yield f"1 light, {style}", Variant(unit, _measure, "all terms", "LSB")
     for style, unit in styles.items():
         for lights in (2, 3, 16):
-            yield (
-                f"{lights} lights, {style}",
-                Variant(partial(unit, Intensity(lights)), long=(lights, style) == (16, "throughput")),
-            )
-        yield f"1 channel, {style}", Variant(partial(unit, Intensity(2, channels=1)))
-        yield f"no highlights, {style}", Variant(partial(unit, Intensity(2, has_specular=False)))
+            is_long = (lights, style) not in ((2, "throughput"), (3, "compact"))
+            yield f"{lights} lights, {style}", Variant(partial(unit, Intensity(lights)), long=is_long)
+        p = Intensity(2, channels=1)
+        yield f"1 channel, {style}", Variant(partial(unit, p), long=style != "compact")
+        p = Intensity(2, has_specular=False)
+        yield f"no highlights, {style}", Variant(partial(unit, p), long=style != "throughput")
 
 
 RECORD = Record(

@@ -99,16 +99,18 @@ def _variants():
     yield "cosquad", Variant(LightUnit, _measure, "n 1 to 1000, N.V > 0")
     for gated in (False, True):
         unit = partial(LightUnit, initiation_interval=3, gated=gated)
-        yield "cosquad, interval 3" + ", gated" * gated, Variant(unit)
+        yield "cosquad, interval 3" + ", gated" * gated, Variant(unit, long=not gated)
     for name, interval, gated in (("cosquad", 1, False), ("coscos2", 1, True), ("coscos4", 6, True)):
         p = Specular(REFLECTION_MODELS[name], "one_minus_cosine")
         unit = partial(LightUnit, p, _CHORD, initiation_interval=interval, gated=gated)
-        yield f"{name} of a chord, interval {interval}" + ", gated" * gated, Variant(unit)
+        is_long = name != "coscos2"
+        yield f"{name} of a chord, interval {interval}" + ", gated" * gated, Variant(unit, long=is_long)
     for interval, gated in ((1, False), (42, True)):
         unit = partial(
             LightUnit, Power("one_minus_cosine"), _CHORD, initiation_interval=interval, gated=gated
         )
-        yield f"exact power of a chord, interval {interval}" + ", gated" * gated, Variant(unit)
+        variant = f"exact power of a chord, interval {interval}" + ", gated" * gated
+        yield variant, Variant(unit, long=not gated)
     for name, p in (("cosquad", Specular()), ("exact power", Power())):
         yield f"{name}, exponent 77", Variant(partial(LightUnit, p, exponent=77), long=True)
 

@@ -24,9 +24,11 @@ def _last_bits(unit, rng, count):
 def _variants():
     measure = partial(measure_highlights, parameters=Power())
     for form in ("pipelined", "sequential"):
-        yield form, Variant(partial(PowerUnit, form=form), measure, HIGHLIGHTS)
+        unit = partial(PowerUnit, form=form)
+        yield form, Variant(unit, measure, HIGHLIGHTS, long=form == "sequential")
     for form in ("pipelined", "sequential"):
-        yield f"{form}, of a chord", Variant(partial(PowerUnit, Power("one_minus_cosine"), form=form))
+        unit = partial(PowerUnit, Power("one_minus_cosine"), form=form)
+        yield f"{form}, of a chord", Variant(unit, long=form == "pipelined")
 
 
 _VARIANTS = dict(_variants())

@@ -93,6 +93,8 @@ def expect(unit, case):
 
 _SERVED = tuple(model for model in REFLECTION_MODELS.values() if isinstance(model, Specular.SERVED))
 _PUBLISHED = ("cosquad", "cosquad7", "cosquad_lin")
+_QUICK = ("cosquad", "exp", "coscos2")
+"""A model of each structure; another number of squares is that of a variant below."""
 
 
 def _models():
@@ -105,6 +107,7 @@ def _models():
                 partial(measure_highlights, parameters=p),
                 HIGHLIGHTS,
                 source=model.source,
+                long=model.name not in _QUICK,
             ),
         )
 
@@ -118,6 +121,7 @@ def _others():
             partial(measure_highlights, parameters=p),
             HIGHLIGHTS,
             source=p.model.source,
+            long=True,
         ),
     )
     for name in _PUBLISHED:
@@ -131,6 +135,7 @@ def _others():
                 note="comparator on the square, so that the parabola's second lobe shows",
                 source=p.model.source,
                 as_published=True,
+                long=name != "cosquad",
             ),
         )
     for name, as_published in (("lyon3", False), ("cosquad_lin", True)):
@@ -138,7 +143,7 @@ def _others():
         unit = partial(SpecularUnit, p)
         yield (
             f"{name}, of a chord" + ", as published" * as_published,
-            Variant(unit, as_published=as_published),
+            Variant(unit, as_published=as_published, long=as_published),
         )
     for name, interval, as_published in (
         ("cosquad", 3, False),
@@ -150,11 +155,12 @@ def _others():
         p = Specular(REFLECTION_MODELS[name], as_published=as_published)
         unit = partial(SpecularUnit, p, initiation_interval=interval)
         variant = f"{name}, interval {interval}" + ", as published" * as_published
-        yield variant, Variant(unit, as_published=as_published)
+        is_long = name != "coscos4" and not as_published
+        yield variant, Variant(unit, as_published=as_published, long=is_long)
     for name, interval in (("cosquad", 1), ("coscos4", 3)):
         p = Specular(REFLECTION_MODELS[name])
         unit = partial(SpecularUnit, p, initiation_interval=interval, shares_slope=True)
-        yield f"{name}, interval {interval}, shared slope", Variant(unit)
+        yield f"{name}, interval {interval}, shared slope", Variant(unit, long=interval == 1)
     for name, exponent, interval in (
         ("cosquad", 20, 1),
         ("cosquad", 1, 2),
@@ -164,7 +170,10 @@ def _others():
     ):
         p = Specular(REFLECTION_MODELS[name])
         unit = partial(SpecularUnit, p, initiation_interval=interval, exponent=exponent)
-        yield f"{name}, interval {interval}, exponent {exponent}", Variant(unit, long=exponent in (1, 1000))
+        yield (
+            f"{name}, interval {interval}, exponent {exponent}",
+            Variant(unit, long=exponent not in (20, 300)),
+        )
 
 
 _VARIANTS = dict(_models()) | dict(_others())

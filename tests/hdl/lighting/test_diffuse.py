@@ -1,31 +1,15 @@
 # amaranth: UnusedElaboratable=no
-"""Diffuse unit: RTL against its twin, clock by clock."""
+"""Diffuse unit: cost of its delay, and refusals; `tests.test_units` holds it against its model."""
 
-import numpy as np
 import pytest
 
 from blysk.golden.lighting.diffuse import Diffuse
-from blysk.golden.number.fixed import Fixed
-from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 
 
-@pytest.mark.parametrize(("latency", "interval"), [(2, 1), (7, 1), (3, 2), (10, 2), (11, 3), (10, 6)])
-def test_equals_twin(verify, latency, interval):
-    rng = np.random.default_rng(6)
-    format, one = Diffuse().operand_format, int(ONE_SQUARED.codes)
-    edges = [0, 1, -1, one, one + 1, one - 1, 1 << 34, (1 << 34) - 1, (1 << 34) - (1 << 16), 1 << 16]
-    edges += [(1 << 16) - 1, format.min_code, format.max_code]
-    codes = np.r_[edges, rng.integers(-one, one, 1500), rng.integers(format.min_code, format.max_code, 100)]
-    unit = DiffuseUnit(latency=latency, initiation_interval=interval)
-    verify(unit, codes, Diffuse().compute(Fixed(format, codes)).codes)
-
-
-def test_waits_in_a_register_an_interval():
-    """Ages; operand, turn and ready at more than an interval of 1; rounded, result, one that waits; then a
-    copy for each interval begun.
-    """
+def test_delay_costs_a_register_for_each_interval():
+    """Stages; operand, slot and ready where the interval is over 1; rounded, result; a copy an interval."""
     assert DiffuseUnit().latency == 2
     assert DiffuseUnit(initiation_interval=4).latency == 3
     width, rounded = Diffuse().operand_format.width, 22
@@ -37,6 +21,6 @@ def test_waits_in_a_register_an_interval():
 
 
 @pytest.mark.parametrize(("interval", "least"), [(1, 2), (2, 3)])
-def test_latency_must_hold_the_work(interval, least):
+def test_latency_must_hold_the_registers(interval, least):
     with pytest.raises(ValueError, match=rf"^latency must be at least {least}, not {least - 1}$"):
         DiffuseUnit(latency=least - 1, initiation_interval=interval)
