@@ -1,1 +1,73 @@
-"""blysk: Phong and Blinn shading as RTL in Amaranth, simulated beside a NumPy golden renderer."""
+"""blysk: Phong and Blinn shading as RTL in Amaranth, simulated beside a NumPy golden renderer.
+
+::
+
+    import blysk
+
+    frame = blysk.render("teapot", method="chord", exponent=200)
+    frame.save("teapot.png")
+    print(frame.error.max_lsb, frame.cycles)
+    text = blysk.verilog(blysk.design(method="chord"))
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from blysk.golden.pipeline import Design
+    from blysk.golden.reference.camera import Camera
+    from blysk.golden.reference.geometry import Mesh
+    from blysk.golden.reference.lighting import Light, Material
+    from blysk.golden.reference.scene import Scene
+    from blysk.sim.api.design import design, verilog
+    from blysk.sim.api.render import RenderedFrame, render
+    from blysk.sim.api.scene import scene
+    from blysk.sim.engines.engine import CompilerMissing, SimulationError
+    from blysk.sim.errors import InputError
+
+__all__ = [
+    "Camera",
+    "CompilerMissing",
+    "Design",
+    "InputError",
+    "Light",
+    "Material",
+    "Mesh",
+    "RenderedFrame",
+    "Scene",
+    "SimulationError",
+    "design",
+    "render",
+    "scene",
+    "verilog",
+]
+
+# Imported when asked for: the simulators take a second.
+_MODULES = {
+    "Camera": "golden.reference.camera",
+    "CompilerMissing": "sim.engines.engine",
+    "Design": "golden.pipeline",
+    "InputError": "sim.errors",
+    "Light": "golden.reference.lighting",
+    "Material": "golden.reference.lighting",
+    "Mesh": "golden.reference.geometry",
+    "RenderedFrame": "sim.api.render",
+    "Scene": "golden.reference.scene",
+    "SimulationError": "sim.engines.engine",
+    "design": "sim.api.design",
+    "render": "sim.api.render",
+    "scene": "sim.api.scene",
+    "verilog": "sim.api.design",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module 'blysk' has no attribute {name!r}")
+    value = getattr(import_module(f"blysk.{_MODULES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

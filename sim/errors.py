@@ -1,6 +1,6 @@
-"""The one exception for bad input: a thing, a reason, a remedy."""
+"""Exceptions for bad input: a thing, a reason, a remedy."""
 
-__all__ = ["InputError", "one_line"]
+__all__ = ["InputError", "OptionError", "one_line"]
 
 
 def one_line(text: str, most: int = 1000) -> str:
@@ -42,4 +42,31 @@ class InputError(Exception):
 
     def __reduce__(self):
         """How it crosses from one process to another."""
-        return type(self), (self.thing, self.reason, self.remedy)
+        return InputError, (self.thing, self.reason, self.remedy)
+
+
+class OptionError(InputError):
+    """Bad value of an option, by the option's name in Python.
+
+    The value may come from a scene file or from the command line, which `at` makes the message name.
+
+    Parameters
+    ----------
+    option : str
+        Name of the option.
+    value : object
+        Its value; of an empty text only the name is shown.
+    reason, remedy : str
+        As of `InputError`.
+    """
+
+    def __init__(self, option: str, value: object, reason: str, remedy: str):
+        self.option = option
+        if isinstance(value, tuple | list):
+            value = ",".join(f"{part:g}" for part in value)
+        self.value = str(value)
+        super().__init__(f"{option} {self.value}".strip(), reason, remedy)
+
+    def at(self, place: str) -> InputError:
+        """The same error of a thing with another name."""
+        return InputError(place, self.reason, self.remedy)

@@ -27,10 +27,25 @@ from blysk.golden.reference.lighting import Material, Triple
 from blysk.sim.errors import InputError, one_line
 from blysk.sim.meshes.teapot import teapot
 
-__all__ = ["MAX_FACES", "SUFFIXES", "FileMaterial", "LoadedMesh", "load_mesh", "surfaces"]
+__all__ = [
+    "DEFAULT_CREASE",
+    "DEFAULT_TRIANGLES",
+    "MAX_FACES",
+    "SUFFIXES",
+    "FileMaterial",
+    "LoadedMesh",
+    "load_mesh",
+    "surfaces",
+]
 
 SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf")
 MAX_FACES = 20_000_000
+
+DEFAULT_TRIANGLES = 10_000
+"""Triangles of the teapot, about."""
+
+DEFAULT_CREASE = 40.0
+"""Degrees over which an edge is sharp, where a mesh has no normals."""
 
 # The largest error of a stored normal's length that counts as rounding, itself stored in float32.
 _LENGTH_TOLERANCE = 1 / 256 + 1e-6
@@ -102,7 +117,11 @@ class LoadedMesh:
 
 
 def load_mesh(
-    source: str, *, triangles: int = 10_000, crease_angle: float = 40.0, materials: bool = True
+    source: str,
+    *,
+    triangles: int = DEFAULT_TRIANGLES,
+    crease_angle: float = DEFAULT_CREASE,
+    materials: bool = True,
 ) -> LoadedMesh:
     """Load a mesh from a file, or build the teapot.
 

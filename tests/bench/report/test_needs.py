@@ -13,7 +13,7 @@ from blysk.golden.frames.frame import model_frame
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.raster import face_normals
 from blysk.hdl.emit.cost import Cost
-from blysk.sim.cli.scene_file import read_scene_file
+from blysk.sim.api.scene_file import read_scene_file
 from blysk.sim.frames.frame import SimulatedFrame
 from blysk.sim.frames.specialise import Specialisation
 from blysk.sim.meshes.mesh import load_mesh
@@ -127,7 +127,7 @@ def test_scenes_of_the_examples(file, name):
     scene = build(*values["size"], 1000)
     assert scene.material.exponent == values["exponent"]
     assert scene.camera.position == tuple(values["position"])
-    assert len(scene.lights) == len(values["lights"]) + len(values.get("point_lights", ()))
+    assert len(scene.lights) == len(values["lights"])
     assert (options["method"], options["model"]) == (values["method"], values["model"])
 
 

@@ -31,8 +31,11 @@ import click
 import numpy as np
 import trimesh
 
+import blysk.sim.api.render
 import blysk.sim.cli.main
 from blysk.golden.frames.frame import model_frame
+from blysk.sim.frames.frame import SimulatedFrame
+from blysk.sim.value_types import OutputFile
 
 MEMORY = 1 << 30
 SECONDS = 10
@@ -103,7 +106,7 @@ method = "chord-local"
 model = "cosquad"
 setup_interval = 4
 gate = false
-words = false
+short_words = false
 """
 
 
@@ -529,8 +532,9 @@ _OF_TYPE = {
     "_Count": _BAD_NUMBERS,
     "_Error": [*_split("|nan|inf|0|-1|256|x|1,5|ż|1\n2"), _LONG],
     "Size": [*_split("|16|16x|x12|0x0|-1x5|16x12x3|4096x1|1e3x5|16X12|nanx1|٣x٣"), _LONG],
-    "_Numbers": [*_BAD_VECTORS, "," * 5000, _LONG],
-    "_Color": [*_BAD_COLORS, _LONG],
+    "Number": [*_split("|x|nan|inf|-1|1,2|ż|1e999"), _LONG],
+    "Vector": [*_BAD_VECTORS, "," * 5000, _LONG],
+    "Color": [*_BAD_COLORS, _LONG],
     "Choice": [*_ODD, "1", "LINEAR", "linear,chord"],
     "_Some": [*_ODD, ",", "linear,,chord", "1.5", "17,x"],
     "Path": _BAD_FOLDERS,
@@ -550,7 +554,7 @@ _SUFFIXES = {"output": ".png", "comparison": ".png", "figures": ".json", "vcd": 
 def _bad_values(option: click.Parameter) -> list[str]:
     if option.name in _SUFFIXES:
         values = [value.format(_SUFFIXES[option.name]) for value in _BAD_FILES]
-        return ["", *values] if isinstance(option.type, blysk.sim.cli.main.OutputFile) else values
+        return ["", *values] if isinstance(option.type, OutputFile) else values
     return _OF_NAME.get(option.name) or _OF_TYPE.get(type(option.type).__name__, _ODD)
 
 
@@ -665,17 +669,19 @@ def attempt(case: Case, root: Path) -> dict[str, Any]:
     }
 
 
-def _simulate_by_twin() -> None:
-    """Draw by the bit-true twin: what is tried is what stands before the pipeline, and behind it."""
+def _simulate_by_model() -> None:
+    """Draw by the bit-accurate model: what is tried is what comes before the pipeline, and behind it."""
 
-    class Twin:
+    class Stub:
         def __init__(self, design, *_):
             self.design = design
 
         def render(self, scene, progress=None, vcd=None):
-            return model_frame(scene, self.design)
+            frame = model_frame(scene, self.design)
+            seconds = {"raster": 1.0, "simulate": 1.0}
+            return SimulatedFrame(frame.image, frame.prepared, frame.out_of_range_spans, seconds, 1, "model")
 
-    blysk.sim.cli.main.FrameSimulator = Twin
+    blysk.sim.api.render.FrameSimulator = Stub
 
 
 def _warm_up(root: Path, cases: list[Case]) -> None:
@@ -694,7 +700,7 @@ def _warm_up(root: Path, cases: list[Case]) -> None:
 
 def run(root: Path, seed: int, count: int, every: int) -> None:
     """Try the good files, malformed files and bad options, and print what came of each."""
-    _simulate_by_twin()
+    _simulate_by_model()
     # The hardest: names come out of it in some form all the same.
     sys.stdout.reconfigure(encoding="ascii")
     for path in (root / "temporary", root / "cache"):

@@ -24,8 +24,8 @@ from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
+from blysk.sim.api.scene_file import read_scene_file
 from blysk.sim.cli.main import main
-from blysk.sim.cli.scene_file import read_scene_file
 from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.mesh import load_mesh
 
@@ -161,10 +161,10 @@ KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS | PUBLISHED)}"
         (["--back-faces", "hide"], "--back-faces hide", "flip, show, cull"),
         (["--triangles", "63"], "--triangles 63", "from 64 to 4000000"),
         (["--crease", "181"], "--crease 181", "0 to 180"),
-        (["--crease", "sharp"], "--crease sharp", "not an angle"),
+        (["--crease", "sharp"], "--crease sharp", "not a number"),
         (["--view", "0,0,0"], "--view 0,0,0", "no direction"),
         (["--view", "1,2"], "--view 1,2", "not a direction; give X,Y,Z"),
-        (["--view", "1,nan,2"], "--view 1,nan,2", "not a direction"),
+        (["--view", "1,nan,2"], "--view 1,nan,2", "out of range"),
         (["--light", "0,0,0"], "--light 0,0,0", "a direction other than 0"),
         (["--light", "1,2,3,4"], "--light 1,2,3,4", "give X,Y,Z or X,Y,Z,R,G,B"),
         (["--light", "1,1,1,-1,0,0"], "--light 1,1,1,-1,0,0", "colours of 0 or more"),
@@ -175,7 +175,7 @@ KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS | PUBLISHED)}"
         (["--specular", "0.1,0.2"], "--specular 0.1,0.2", "not a colour; give #rrggbb"),
         (["--background", "#12345"], "--background #12345", "not a colour"),
         (["--vcd", "a.vcd", "--engine", "cxxrtl"], "--vcd", "use --engine pysim"),
-        (["--highlight", "cross"], "--highlight cross", "use one of dot, chord"),
+        (["--operand", "cross"], "--operand cross", "use one of cosine, one_minus_cosine"),
         (["--setup-interval", "0"], "--setup-interval 0", "from 1 to 46"),
         (["--frames", "0"], "--frames 0", "from 1 to 9999"),
         (["--frames", "2", "--jobs", "0"], "--jobs 0", "from 1 to 1024"),
@@ -200,7 +200,7 @@ def test_design_that_cannot_be(refused, command):
     says = "the pipeline finds N.H, not R.V; use one of cosquad, "
     refused(*command, "--model", "phong", thing="--model phong", says=says)
     says = "method chord finds no normals"
-    refused(*command, "--method", "chord", "--highlight", "dot", thing="--highlight dot", says=says)
+    refused(*command, "--method", "chord", "--operand", "cosine", thing="--operand cosine", says=says)
     says = "method linear is not built for it; "
     refused(*command, "--method", "linear", "--setup-interval", "26", thing="--setup-interval 26", says=says)
 
@@ -396,9 +396,9 @@ def test_no_light(capsys):
         ("mesh.file = 'teapot'\nexponent = 3", [], "a.toml, exponent", "unknown key"),
         ("mesh.file = 'teapot'\nsize = ]", [], "a.toml", "is no TOML"),
         (
-            "pipeline = {method = 'chord', highlight = 'dot'}",
+            "pipeline = {method = 'chord', operand = 'cosine'}",
             [],
-            "a.toml, pipeline.highlight",
+            "a.toml, pipeline.operand",
             "leave it out",
         ),
         (
@@ -569,7 +569,7 @@ def test_output_over_the_mesh(refused):
 
 @pytest.mark.long
 def test_fit_says_what_it_leaves_out(folder, capsys):
-    options = ["--method", "chord", "--gate", "--fit", "--size", "64x48", "--specular", "0"]
+    options = ["--method", "chord", "--gate", "--specialise", "--size", "64x48", "--specular", "0"]
     options += ["--engine", "pysim", "--triangles", "64"]
     assert main(["render", "teapot", *options, "-o", "a.png", "--json", "a.json"]) == 0
     output = capsys.readouterr().out
@@ -590,9 +590,9 @@ def test_fit_says_what_it_leaves_out(folder, capsys):
 
 @pytest.mark.long
 def test_fitted_turntable(folder, capsys):
-    options = ["--method", "chord", "--fit", "--size", "32x24", "--frames", "2", "--jobs", "1"]
+    options = ["--method", "chord", "--specialise", "--size", "32x24", "--frames", "2", "--jobs", "1"]
     assert main(["render", "teapot", *options, "-o", "a.gif"]) == 0
-    assert main(["render", "teapot", *[o for o in options if o != "--fit"], "-o", "b.gif"]) == 0
+    assert main(["render", "teapot", *[o for o in options if o != "--specialise"], "-o", "b.gif"]) == 0
     for number in (1, 2):
         np.testing.assert_array_equal(picture(f"a-000{number}.png"), picture(f"b-000{number}.png"))
 
@@ -608,7 +608,7 @@ def test_point_lights(folder, refused, capsys):
     )
     assert main(["render", "a.toml", "--size", "48x36", "-o", "b.png"]) == 0
     np.testing.assert_array_equal(picture("a.png"), picture("b.png"))
-    fitted = ["--fit", "--engine", "pysim", "--triangles", "64", "--size", "16x12", "--json", "c.json"]
+    fitted = ["--specialise", "--engine", "pysim", "--triangles", "64", "--size", "16x12", "--json", "c.json"]
     assert main(["render", "teapot", *local, *fitted, "-o", "c.png"]) == 0
     assert json.loads(Path("c.json").read_text())["specialisation"]["different_pixels"] == 0
     capsys.readouterr()
@@ -617,7 +617,7 @@ def test_point_lights(folder, refused, capsys):
     refused("render", "a.toml", "--method", "chord", thing="--method chord", says=what)
     refused("render", "teapot", *local, "--projection", "orthographic", thing="--viewer near", says="distant")
     refused("render", "teapot", *local, "--gate", thing="--gate", says="has no normals for one")
-    refused("render", "teapot", "--words", thing="--words", says="nothing is fitted; give --fit, too")
+    refused("render", "teapot", "--short-words", thing="--short-words", says="nothing is specialised")
 
 
 def test_verilog_with_a_gate(capsys):
@@ -855,14 +855,16 @@ def test_fallback_without_compiler(capsys, monkeypatch):
     Path("shared").mkdir()
     Path("shared").chmod(0o777)
     monkeypatch.setenv("BLYSK_CACHE", "shared")
-    monkeypatch.setattr("blysk.sim.cli.main.SLOW_SIZE", (24, 18))
+    monkeypatch.setattr("blysk.sim.api.render.SLOW_SIZE", (24, 18))
     assert main(["render", "teapot", "--triangles", "100", "--size", "48x18", "--json", "a.json"]) == 0
     output, errors = capsys.readouterr()
     warning, line = errors.splitlines()
     assert re.match(
         r"blysk: warning: cache folder \S+/shared can be written by others \(chmod go-w\): ", warning
     )
-    assert re.fullmatch(r"blysk: pysim at 24x9 instead of cxxrtl, no working C\+\+ compiler .+", line)
+    assert re.fullmatch(
+        r"blysk: warning: pysim at 24x9 instead of cxxrtl, no working C\+\+ compiler .+", line
+    )
     figures = json.loads(Path("a.json").read_text())
     assert (figures["engine"], figures["width"], figures["height"]) == ("pysim", 24, 9)
     assert picture("teapot-blysk.png").shape == (9, 24, 3)

@@ -1,0 +1,302 @@
+"""Every option of scenes and designs: its type, default, help text and key in a scene file."""
+
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NamedTuple, TypedDict, get_args
+
+from blysk.golden.frame_constants import MAX_MATERIALS
+from blysk.golden.lighting.intensity import MAX_LIGHTS
+from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.methods.interpolator import Operand
+from blysk.golden.pipeline import STYLES
+from blysk.golden.presets import METHODS, PUBLISHED
+from blysk.golden.reference.camera import PROJECTIONS
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.lighting import Light, Triple
+from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.golden.reference.scene import BACK_FACES, VIEWERS
+from blysk.sim.meshes.mesh import DEFAULT_CREASE, DEFAULT_TRIANGLES
+from blysk.sim.meshes.teapot import MAX_TRIANGLES, MIN_TRIANGLES
+from blysk.sim.value_types import Choice, Color, Number, Size, Truth, Value, Vector, Whole, shown
+
+__all__ = [
+    "COEFFICIENTS",
+    "COUNTS",
+    "DESIGN",
+    "RENDERING",
+    "SCENE",
+    "SLOW_SIZE",
+    "ColorLike",
+    "DesignOptions",
+    "Lights",
+    "Option",
+    "PartError",
+    "RenderOptions",
+    "SceneOptions",
+    "Source",
+]
+
+SLOW_SIZE = (160, 120)
+"""Largest picture of the slow engine where it stands in for the compiled one, and its default size."""
+
+COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent")
+"""Options of a material."""
+
+ColorLike = str | float | Triple
+"""``"#rrggbb"``, one number, or three."""
+
+Source = str | os.PathLike[str] | Mesh
+"""``"teapot"``, a mesh file, a scene file (``.toml``), or a mesh."""
+
+
+class Option(NamedTuple):
+    """An option of the command line, of Python and of scene files.
+
+    Parameters
+    ----------
+    kind : Value
+        Its type.
+    default : object
+        Its value where neither the caller nor a scene file gives one.
+    help : str
+        What it says, for the command line's help.
+    key : str
+        Its key in a scene file; empty if it has none.
+    """
+
+    kind: Value
+    default: Any
+    help: str
+    key: str = ""
+
+
+class PartError(ValueError):
+    """A reason and a remedy for a part of a value, which ``key`` names: ``[2].color``."""
+
+    def __init__(self, key: str, reason: str, remedy: str):
+        super().__init__(reason)
+        self.key, self.remedy = key, remedy
+
+
+class Lights(Value):
+    """Lights: objects, or tables of a direction or a position and a colour."""
+
+    name = "lights"
+    remedy = "write [[lights]] and its direction and color below, for each light"
+    parts: Mapping[str, Value] = {
+        "direction": Vector("three numbers", direction=True),
+        "position": Vector("three numbers"),
+        "color": Color(math.inf),
+    }
+
+    def check(self, value):
+        """A tuple of `Light`."""
+        if not isinstance(value, list | tuple):
+            raise ValueError("no array of tables")
+        if len(value) > MAX_LIGHTS:
+            raise PartError("", f"{len(value)} lights", f"give at most {MAX_LIGHTS}")
+        return tuple(
+            entry if isinstance(entry, Light) else self._light(entry, f"[{number}]")
+            for number, entry in enumerate(value, 1)
+        )
+
+    def _light(self, entry: object, key: str) -> Light:
+        if not isinstance(entry, Mapping):
+            raise PartError(key, f"{shown(entry)} is no table", self.remedy)
+        parts = {}
+        for name, part in entry.items():
+            if name not in self.parts:
+                raise PartError(
+                    f"{key}.{shown_key(name)}", "unknown key", f"use one of {', '.join(self.parts)}"
+                )
+            try:
+                parts[name] = self.parts[name].check(part)
+            except ValueError as error:
+                reason = f"{shown(part)} is {error}"
+                raise PartError(f"{key}.{name}", reason, self.parts[name].remedy) from None
+        if "direction" not in parts and "position" not in parts:
+            remedy = "give three numbers, from the mesh to the light, or a position"
+            raise PartError(f"{key}.direction", "is missing", remedy)
+        if "direction" in parts and "position" in parts:
+            raise PartError(key, "holds both direction and position", "leave one of them out")
+        return Light(**parts)
+
+
+def shown_key(name: str) -> str:
+    """A key of a file in a message."""
+    return name if re.fullmatch("[A-Za-z0-9_-]{1,40}", name) else shown(name)
+
+
+SCENE: dict[str, Option] = {
+    "size": Option(Size(), (640, 480), "Of the picture.", "size"),
+    "background": Option(Color(), "#1a1c20", "Where no surface is.", "background"),
+    "ambient_light": Option(Color(8), 1.0, "Intensity I_a.", "ambient_light"),
+    "back_faces": Option(
+        Choice("treatment of back faces", BACK_FACES),
+        "flip",
+        "Shade them with their normals turned, as they are, or not at all.",
+        "back_faces",
+    ),
+    "triangles": Option(
+        Whole(MIN_TRIANGLES, MAX_TRIANGLES), DEFAULT_TRIANGLES, "Of the teapot, about.", "mesh.triangles"
+    ),
+    "crease": Option(
+        Number(0, 180, "degrees"),
+        DEFAULT_CREASE,
+        "Degrees over which an edge is sharp, in a mesh without normals.",
+        "mesh.crease",
+    ),
+    "materials": Option(
+        Choice("source of materials", ("file", "one")),
+        "file",
+        "Colours of the mesh file, where it has some and no option gives them, or of the options alone.",
+        "mesh.materials",
+    ),
+    "projection": Option(
+        Choice("projection", PROJECTIONS), "perspective", "Of the camera.", "camera.projection"
+    ),
+    "view": Option(
+        Vector("a direction", direction=True),
+        (0.4, 0.5, 1.0),
+        "Direction from the mesh to the viewer: the camera shows all of the mesh.",
+        "camera.view",
+    ),
+    "position": Option(
+        Vector("three numbers"),
+        None,
+        "Of the camera, in place of --view, in the mesh's units.",
+        "camera.position",
+    ),
+    "target": Option(
+        Vector("three numbers"),
+        None,
+        "With --position: the middle of the picture.  [default: of the mesh]",
+        "camera.target",
+    ),
+    "up": Option(
+        Vector("a direction", direction=True), (0.0, 1.0, 0.0), "Upright in the picture.", "camera.up"
+    ),
+    "field_of_view": Option(
+        Number(1, 179, "degrees"), 30.0, "Vertical angle of the picture, degrees.", "camera.field_of_view"
+    ),
+    "viewer": Option(
+        Choice("viewer", VIEWERS),
+        "distant",
+        "Highlights as seen from one direction, or from the camera: near needs --method chord-local.",
+        "camera.viewer",
+    ),
+    "lights": Option(
+        Lights(),
+        (Light((-0.5, 0.8, 0.7)),),
+        "Direction to a light, and its colour, 1,1,1 if left out; repeat for more lights.",
+        "lights",
+    ),
+    "ambient": Option(Color(), (0.08, 0.05, 0.03), "Reflection k_a.", "material.ambient"),
+    "diffuse": Option(Color(), (0.75, 0.42, 0.2), "Reflection k_d.", "material.diffuse"),
+    "specular": Option(Color(), 0.6, "Reflection k_s.", "material.specular"),
+    "exponent": Option(Whole(1, MAX_EXPONENT), 50, "Of the highlight.", "material.exponent"),
+}
+"""Options of a scene."""
+
+DESIGN: dict[str, Option] = {
+    "method": Option(
+        Choice("method", METHODS | PUBLISHED),
+        "quadratic",
+        "Interpolation along a span.",
+        "pipeline.method",
+    ),
+    "model": Option(
+        Choice("reflection model", REFLECTION_MODELS),
+        "cosquad",
+        "Reflection model; every method serves all but phong.",
+        "pipeline.model",
+    ),
+    "operand": Option(
+        Choice("operand", get_args(Operand)),
+        None,
+        "Operand of the specular unit, for methods that find normals.  [default: the method's]",
+        "pipeline.operand",
+    ),
+    "gate": Option(
+        Truth(),
+        False,
+        "A highlight gate: spans without a highlight pass the specular units by.",
+        "pipeline.gate",
+    ),
+    "setup_interval": Option(
+        Whole(1, 46),
+        None,
+        "Least cycles from a span to the next; fewer take more multipliers.  [default: 4; compact: the most]",
+        "pipeline.setup_interval",
+    ),
+    "style": Option(
+        Choice("style", STYLES), "throughput", "One pixel a cycle, or few multipliers.", "pipeline.style"
+    ),
+}
+"""Options of a design, but for its counts."""
+
+COUNTS: dict[str, Option] = {
+    "lights": Option(Whole(1, MAX_LIGHTS), 1, "Number of lights."),
+    "materials": Option(Whole(1, MAX_MATERIALS), 1, "Number of materials."),
+}
+"""Counts of a design, which a scene gives where there is one."""
+
+RENDERING: dict[str, Option] = {
+    "specialise": Option(
+        Truth(),
+        False,
+        "Build only what the scene needs, say what is left out, and compare with the full pipeline.",
+        "pipeline.specialise",
+    ),
+    "short_words": Option(
+        Truth(),
+        False,
+        "With --specialise: shorter words, too, where the error bound stays; pixels may change by a step.",
+        "pipeline.short_words",
+    ),
+}
+"""Options of a rendering."""
+
+
+class SceneOptions(TypedDict, total=False):
+    """Options of a scene, by their names in Python: those of `SCENE`."""
+
+    size: tuple[int, int]
+    background: ColorLike
+    ambient_light: ColorLike
+    back_faces: Literal["flip", "show", "cull"]
+    triangles: int
+    crease: float
+    materials: Literal["file", "one"]
+    projection: Literal["perspective", "orthographic"]
+    view: Triple
+    position: Triple
+    target: Triple
+    up: Triple
+    field_of_view: float
+    viewer: Literal["distant", "near"]
+    lights: Sequence[Light]
+    ambient: ColorLike
+    diffuse: ColorLike
+    specular: ColorLike
+    exponent: int
+
+
+class DesignOptions(TypedDict, total=False):
+    """Options of a design, by their names in Python: those of `DESIGN`."""
+
+    method: str
+    model: str
+    operand: Operand
+    gate: bool
+    setup_interval: int
+    style: Literal["throughput", "compact"]
+
+
+class RenderOptions(SceneOptions, DesignOptions, total=False):
+    """Options of a rendering, by their names in Python."""
+
+    specialise: bool
+    short_words: bool

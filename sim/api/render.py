@@ -1,0 +1,406 @@
+"""Frames of simulated pipelines, from a mesh or a scene in one call."""
+
+import base64
+import html
+import io
+import os
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Literal, Unpack
+
+import numpy as np
+from PIL import Image
+
+from blysk.golden.frames.compare import Comparison, compare
+from blysk.golden.pipeline import Design
+from blysk.golden.reference.metrics import ErrorFigures
+from blysk.golden.reference.scene import Scene
+from blysk.sim.api.design import design_of
+from blysk.sim.api.options import DESIGN, RENDERING, SCENE, SLOW_SIZE, RenderOptions, Source
+from blysk.sim.api.scene import load, scenes_of
+from blysk.sim.api.settings import Settings, read_settings
+from blysk.sim.engines.engine import CompilerMissing
+from blysk.sim.errors import OptionError
+from blysk.sim.frames.figures import difference_figures, frame_figures, saving_figures
+from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
+from blysk.sim.frames.picture import write_comparison, write_image
+from blysk.sim.frames.specialise import Specialisation, specialise
+from blysk.sim.frames.summary import frame_lines, specialisation_lines
+from blysk.sim.meshes.mesh import LoadedMesh
+from blysk.sim.output import atomic_writer
+
+__all__ = ["Engine", "RenderedFrame", "Rendering", "prepare_rendering", "render", "rendering_settings"]
+
+Engine = Literal["auto", "cxxrtl", "pysim"]
+"""``"auto"``: compiled, or Amaranth's simulator where no C++ compiler works."""
+
+Progress = Callable[[int, int], object]
+
+
+@dataclass(frozen=True)
+class RenderedFrame:
+    """A frame of a simulated pipeline; a notebook shows its picture and its figures.
+
+    Parameters
+    ----------
+    scene : Scene
+        What was drawn.
+    design : Design
+        The pipeline; of a specialised one the full pipeline.
+    simulated : SimulatedFrame
+        The frame with its spans, as the pipeline gave it.
+    name : str
+        Of the mesh.
+    details : dict
+        Further figures: ``counts`` of the mesh, ``seconds`` of loading and building, and perhaps
+        ``specialisation``.
+    """
+
+    scene: Scene
+    design: Design
+    simulated: SimulatedFrame
+    name: str
+    details: dict[str, Any]
+
+    @property
+    def image(self) -> np.ndarray:
+        """The picture, uint8, shape (height, width, 3)."""
+        return self.simulated.image
+
+    @property
+    def error(self) -> ErrorFigures:
+        """Errors against exactly normalised Phong interpolation with the same model, in LSB and dB."""
+        return self.comparison.method_error
+
+    @property
+    def cycles(self) -> int:
+        """Cycles from the first write of a constant to the last pixel."""
+        return self.simulated.cycles
+
+    @property
+    def spans(self) -> int:
+        """Number of spans that went into the pipeline."""
+        return self.simulated.spans
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels that came out of it, hidden ones included."""
+        return self.simulated.pixels
+
+    @property
+    def engine(self) -> str:
+        """Simulator that ran: ``"cxxrtl"`` or ``"pysim"``."""
+        return self.simulated.engine
+
+    @cached_property
+    def comparison(self) -> Comparison:
+        """The golden frame, and the errors against three references."""
+        return compare(self.scene, self.design, self.simulated)
+
+    @cached_property
+    def figures(self) -> dict[str, Any]:
+        """Every figure that the command line prints, by name."""
+        figures = frame_figures(self.scene, self.design, self.simulated, self.comparison)
+        return {
+            "mesh": self.name,
+            **figures,
+            **self.details,
+            "counts": {**self.details["counts"], **figures["counts"]},
+            "seconds": {**self.details["seconds"], **figures["seconds"]},
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the picture; the suffix chooses the format.
+
+        Raises
+        ------
+        InputError
+            If the suffix names no picture format, or the file cannot be written.
+        """
+        write_image(path, self.image)
+
+    def save_comparison(self, path: str | os.PathLike[str]) -> None:
+        """Write one picture of the simulated frame, the golden frame and the error map; see `save`."""
+        exponent = self.scene.materials[0].exponent
+        subtitle = "no pixel shows the surface"
+        if self.figures["visible_pixels"]:
+            subtitle = (
+                "simulated RTL beside normalised Phong interpolation in float64: largest error "
+                f"{self.error.max_lsb:.2f} LSB, {self.cycles:,} cycles for {self.pixels:,} pixels"
+            )
+        title = f"{self.name}: {self.design.method}, {self.design.model}, exponent {exponent}"
+        write_comparison(path, self.image, self.comparison.golden, title=title, subtitle=subtitle)
+
+    def lines(self) -> Iterator[str]:
+        """The figures as the command line prints them."""
+        yield from frame_lines(self.figures)
+        if "specialisation" in self.figures:
+            yield from specialisation_lines(self.figures["specialisation"])
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    def __repr__(self) -> str:
+        height, width, _ = self.image.shape
+        return (
+            f"<RenderedFrame {self.name} {width}x{height}, {self.design.method}, {self.design.model}, "
+            f"{self.cycles:,} cycles>"
+        )
+
+    def _repr_png_(self) -> bytes:
+        file = io.BytesIO()
+        Image.fromarray(self.image).save(file, format="PNG")
+        return file.getvalue()
+
+    def _repr_html_(self) -> str:
+        picture = base64.b64encode(self._repr_png_()).decode()
+        rows = {
+            "method": f"{self.design.method}, {self.design.model}",
+            "cycles": f"{self.cycles:,}",
+            "spans": f"{self.spans:,}",
+            "pixels": f"{self.pixels:,}",
+            "largest error": f"{self.error.max_lsb:.3f} LSB",
+            "PSNR": f"{self.error.psnr_db:.2f} dB",
+        }
+        table = "".join(
+            f"<tr><th>{key}</th><td>{html.escape(value)}</td></tr>" for key, value in rows.items()
+        )
+        alternative = html.escape(f"{self.name}, simulated")
+        return (
+            f'<figure><img alt="{alternative}" src="data:image/png;base64,{picture}">'
+            f"<figcaption><table>{table}</table></figcaption></figure>"
+        )
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """A pipeline that is ready to draw its scenes: one, or those of a turntable.
+
+    Parameters
+    ----------
+    loaded : LoadedMesh
+        The mesh.
+    scenes : tuple of Scene
+        What is drawn.
+    specialisation : Specialisation
+        The full pipeline, and what is left out of it: nothing, unless asked for.
+    is_specialised : bool
+        Whether it was.
+    engine : str
+        ``"cxxrtl"`` or ``"pysim"``.
+    simulator : FrameSimulator or None
+        The pipeline's simulator; ``None`` where there is no compiler and none is needed.
+    seconds : dict
+        Of loading and building.
+    """
+
+    loaded: LoadedMesh
+    scenes: tuple[Scene, ...]
+    specialisation: Specialisation
+    is_specialised: bool
+    engine: str
+    simulator: FrameSimulator | None
+    seconds: dict[str, float]
+
+    @property
+    def design(self) -> Design:
+        """The full pipeline."""
+        return self.specialisation.full
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """What had to be mended in the mesh."""
+        loaded = self.loaded
+        return {"repaired_normals": loaded.repaired_normals, "dropped_faces": loaded.dropped_faces}
+
+    def render(self, progress: Progress | None = None, vcd: str | None = None) -> RenderedFrame:
+        """Draw the first scene.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called now and then with the number of pixels so far and in all.
+        vcd : str, optional
+            File for the waveforms, of the engine ``"pysim"``.
+        """
+        assert self.simulator is not None
+        frame = self.simulator.render(self.specialisation.scenes[0], progress=progress, vcd=vcd)
+        details: dict[str, Any] = {"counts": self.counts, "seconds": self.seconds}
+        if self.is_specialised:
+            details["specialisation"] = {**saving_figures(self.specialisation), "cycles": frame.cycles}
+            if vcd is None:
+                whole = FrameSimulator(self.design, self.engine).render(self.scenes[0])
+                details["specialisation"]["full_cycles"] = whole.cycles
+                details["specialisation"] |= difference_figures(frame, whole)
+        return RenderedFrame(self.scenes[0], self.design, frame, self.loaded.name, details)
+
+
+def rendering_settings(
+    source: Source | Scene, options: dict[str, Any], vcd: str | os.PathLike[str] | None = None
+) -> Settings:
+    """All options of a rendering; see `read_settings`."""
+    slow = {"size": SLOW_SIZE} if vcd else {}
+    settings = read_settings(source, options, {**SCENE, **DESIGN, **RENDERING}, **slow)
+    with settings.located():
+        if settings["short_words"] and not settings["specialise"]:
+            raise settings.refuse("short_words", "nothing is specialised", "give specialise, too", "")
+    return settings
+
+
+def prepare_rendering(
+    settings: Settings,
+    *,
+    design: Design | None = None,
+    engine: Engine | str = "auto",
+    frames: int = 1,
+    remote: bool = False,
+    stage: Callable[[str], object] = lambda text: None,
+) -> Rendering:
+    """Load the mesh, choose the engine, and build the pipeline.
+
+    Parameters
+    ----------
+    settings : Settings
+        Of `rendering_settings`.
+    design : Design, optional
+        The pipeline, in place of the settings' own.
+    engine : {"auto", "cxxrtl", "pysim"}
+        Where ``"auto"`` finds no compiler, pictures are at most `SLOW_SIZE`, with a warning; those of a scene
+        that is given keep their size.
+    frames : int
+        Of a turntable.
+    remote : bool
+        Whether others draw the frames, so that a missing compiler does not matter here.
+    stage : callable
+        Is told what is done next.
+    """
+    start = perf_counter()
+    with settings.located():
+        made = design or _design(settings)
+        stage("loading the mesh")
+        loaded = load(settings)
+        seconds = {"load": perf_counter() - start}
+        simulator = None
+        while True:
+            scenes = tuple(scenes_of(loaded, settings, frames))
+            if design is None:
+                made = replace(made, materials=len(scenes[0].materials))
+            stage("finding out what the scene needs" if settings["specialise"] else "")
+            smallest = _specialised(scenes, made, settings)
+            stage("building the model")
+            try:
+                simulator = FrameSimulator(smallest.design, "pysim" if engine == "pysim" else "cxxrtl")
+                break
+            except CompilerMissing as error:
+                if remote:
+                    break
+                if engine != "auto":
+                    raise
+                engine = "pysim"
+                _shrink(settings, error)
+    seconds["build"] = perf_counter() - start - seconds["load"]
+    used = "pysim" if engine == "pysim" else "cxxrtl"
+    return Rendering(loaded, scenes, smallest, settings["specialise"], used, simulator, seconds)
+
+
+def _design(settings: Settings) -> Design:
+    """The design of the settings, for the scene's lights and one material."""
+    source = settings.source
+    lights = source.lights if isinstance(source, Scene) else settings["lights"]
+    viewer = source.viewer if isinstance(source, Scene) else settings["viewer"]
+    made = design_of(settings, max(1, len(lights)))
+    local = viewer == "near" or any(light.position is not None for light in lights)
+    if local and not made.takes_values:
+        reason = "point lights and a near viewer need the values of a span"
+        raise settings.refuse("method", reason, "use chord-local")
+    return made
+
+
+def _specialised(scenes: Sequence[Scene], design: Design, settings: Settings) -> Specialisation:
+    if settings["specialise"]:
+        return specialise(scenes, design, exact=not settings["short_words"])
+    return Specialisation(design, (), tuple(scenes))
+
+
+def _shrink(settings: Settings, error: CompilerMissing) -> None:
+    """The slow engine's own size, with a warning."""
+    if isinstance(settings.source, Scene):
+        warnings.warn(f"pysim instead of cxxrtl, {error}", RuntimeWarning, stacklevel=4)
+        return
+    size = settings["size"]
+    share = min(1.0, *(most / side for most, side in zip(SLOW_SIZE, size, strict=True)))
+    width, height = (max(1, round(side * share)) for side in size)
+    settings.values["size"] = width, height
+    text = f"pysim at {width}x{height} instead of cxxrtl, {error}"
+    warnings.warn(text, RuntimeWarning, stacklevel=4)
+
+
+def render(
+    source: Source | Scene = "teapot",
+    *,
+    design: Design | None = None,
+    engine: Engine = "auto",
+    vcd: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    **options: Unpack[RenderOptions],
+) -> RenderedFrame:
+    """Draw a mesh or a scene by a simulated pipeline.
+
+    The frame is checked on the way: the pipeline's first pixels are those of its bit-accurate model, and no
+    pixel is lost or doubled.
+
+    Parameters
+    ----------
+    source : str or path or Mesh or Scene
+        ``"teapot"``, a mesh file, a scene file (``.toml``), a mesh, or a scene as `scene` makes it.
+    design : Design, optional
+        The pipeline, as `design` makes it; in place of options of a design.
+    engine : {"auto", "cxxrtl", "pysim"}
+        Simulator: the compiled one, or Amaranth's own; ``"auto"`` takes the first where a C++ compiler works,
+        else the second, with a warning and at most 160 x 120 pixels.
+    vcd : path, optional
+        File for the waveforms; the engine is ``"pysim"``, and 160 x 120 the default size.
+    progress : callable, optional
+        Called now and then with the number of pixels so far and in all.
+    **options
+        Those of `scene` and of `design`, by the names of the command line; ``specialise``: whether to build
+        only what the scene needs; ``short_words``: with words as short as the error bound allows.
+
+    Raises
+    ------
+    InputError
+        If the source cannot be read, or a value is not accepted.
+    SimulationError
+        If the pipeline breaks the rules of its streams; `CompilerMissing` if ``engine="cxxrtl"`` finds no
+        compiler.
+    """
+    if design is not None:
+        for name in DESIGN.keys() & options.keys():
+            raise OptionError(name, "", "the design has its own", "leave out one of them")
+    if vcd is not None and engine == "cxxrtl":
+        raise OptionError("vcd", "", "the engine cxxrtl writes no waveforms", 'use engine="pysim"')
+    settings = rendering_settings(source, dict(options), vcd)
+    with _refused_counts(design):
+        ready = prepare_rendering(settings, design=design, engine="pysim" if vcd else engine)
+        if vcd is None:
+            return ready.render(progress)
+        with atomic_writer(Path(vcd)) as waves:
+            return ready.render(progress, vcd=str(waves))
+
+
+@contextmanager
+def _refused_counts(design: Design | None) -> Iterator[None]:
+    """Turn the refusal of a scene by the caller's own design into an `OptionError`."""
+    try:
+        yield
+    except ValueError as error:
+        if design is None:
+            raise
+        raise OptionError(
+            "design", "", str(error), "make another for the scene's lights and materials"
+        ) from error

@@ -1,0 +1,206 @@
+"""Scenes with a default for everything."""
+
+import math
+import os
+from dataclasses import replace
+from typing import Unpack
+
+import numpy as np
+
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.scene import Scene
+from blysk.sim.api.options import COEFFICIENTS, SCENE, SceneOptions, Source
+from blysk.sim.api.settings import Settings, read_settings
+from blysk.sim.errors import InputError
+from blysk.sim.frames.animation import equal_distance, turned, turntable
+from blysk.sim.meshes.mesh import LoadedMesh, load_mesh, surfaces
+
+__all__ = ["load", "scene", "scenes_of"]
+
+
+def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
+    """A scene with the defaults of the command line.
+
+    The mesh is scaled by a power of two, and camera and lights with it, so that no product of its coordinates
+    overflows; the picture is the same to the bit. Colours are ``"#rrggbb"``, one number or three.
+
+    Parameters
+    ----------
+    source : str or path or Mesh
+        ``"teapot"``, a mesh file (see `load_mesh`), a scene file (``.toml``), or a mesh.
+    size : two ints
+        Width and height in pixels, 1 to 4095; by default 640 and 480.
+    background, ambient_light, back_faces
+        See `Scene`; by default ``"#1a1c20"``, 1 and ``"flip"``.
+    triangles : int
+        Of the teapot, about; by default 10,000.
+    crease : float
+        Degrees over which an edge is sharp, in a mesh file without normals; by default 40.
+    materials : {"file", "one"}
+        Whether the mesh file's materials count.
+    projection : {"perspective", "orthographic"}
+        Of the camera.
+    view : three floats
+        Direction from the mesh to the viewer: the camera shows all of the mesh. By default (0.4, 0.5, 1).
+    position, target : three floats
+        The camera, in place of ``view``, and the point in the middle of its picture, by default the middle of
+        the mesh; in the mesh's units.
+    up, field_of_view
+        See `Camera`; by default (0, 1, 0) and 30.
+    viewer : {"distant", "near"}
+        See `Scene`; ``"near"`` needs the method ``chord-local``.
+    lights : sequence of Light
+        At most 16; by default one from (-0.5, 0.8, 0.7). Those with a position need the method
+        ``chord-local``.
+    ambient, diffuse, specular, exponent
+        See `Material`; by default those of the mesh file's materials, else copper and 50.
+
+    Raises
+    ------
+    InputError
+        If the mesh cannot be read, or a value is out of range.
+    """
+    settings = read_settings(source, options, SCENE)
+    with settings.located():
+        return scenes_of(load(settings), settings)[0]
+
+
+def load(settings: Settings) -> LoadedMesh:
+    """The mesh of a scene, with its materials.
+
+    Raises
+    ------
+    InputError
+        As `load_mesh`; of a mesh that a scene file names, with file and key.
+    """
+    source = settings.source
+    if isinstance(source, Mesh | Scene):
+        mesh = source if isinstance(source, Mesh) else source.mesh
+        return LoadedMesh(mesh, type(source).__name__.lower(), 0, 0)
+    try:
+        return load_mesh(
+            os.fspath(source),
+            triangles=settings["triangles"],
+            crease_angle=settings["crease"],
+            materials=settings["materials"] == "file",
+        )
+    except InputError as error:
+        if "mesh" not in settings.origins:
+            raise
+        reason = f"{error.thing}, {error.reason}"
+        raise InputError(settings.origins["mesh"], reason, error.remedy) from error
+
+
+def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Scene]:
+    """The scene of a mesh, or the scenes of a turntable, which differ in the camera only.
+
+    Parameters
+    ----------
+    loaded : LoadedMesh
+        The mesh.
+    settings : Settings
+        All options of `scene`; or a scene, which is the first.
+    count : int
+        Frames of a turntable; the first is the scene itself, where there is one.
+
+    Raises
+    ------
+    OptionError
+        If a value is out of range, or a term is too bright for the pipeline.
+    """
+    if isinstance(settings.source, Scene):
+        made = settings.source
+        cameras = turntable(made.camera, count)
+    else:
+        made, cameras = _made(loaded, settings, count)
+    try:
+        for index in range(len(made.materials)):
+            FrameConstants.of(made, index=index)
+    except ValueError as error:
+        raise settings.refuse("lights", str(error), "make the light darker", "") from None
+    return [replace(made, camera=camera) for camera in cameras]
+
+
+def _made(loaded: LoadedMesh, settings: Settings, count: int) -> tuple[Scene, list[Camera]]:
+    """The first scene, and the cameras of all."""
+    mesh = loaded.mesh
+    # The camera frames the mesh whatever its unit is; products of huge or tiny coordinates would overflow.
+    shift = -int(np.frexp(np.abs(mesh.vertices).max())[1])
+    mesh = replace(mesh, vertices=np.ldexp(mesh.vertices, shift))
+    width, height = settings["size"]
+    cameras = _cameras(mesh.vertices, shift, settings, count)
+    made = Scene(
+        mesh=mesh,
+        camera=cameras[0],
+        width=width,
+        height=height,
+        material=_materials(loaded, settings),
+        lights=tuple(_scaled(light, shift) for light in settings["lights"]),
+        **{name: settings[name] for name in ("viewer", "back_faces", "ambient_light", "background")},
+    )
+    return made, cameras
+
+
+def _materials(loaded: LoadedMesh, settings: Settings) -> tuple[Material, ...]:
+    """Those of the file, but for the coefficients that are given."""
+    default = Material(*(settings[name] for name in COEFFICIENTS))
+    return surfaces(loaded.materials, default, settings.given.intersection(COEFFICIENTS))
+
+
+def _scaled(light: Light, shift: int) -> Light:
+    """A light in a mesh whose unit has been multiplied by ``2**shift``."""
+    if light.position is None:
+        return light
+    return replace(light, position=tuple(np.ldexp(light.position, shift).tolist()))
+
+
+def _cameras(vertices: np.ndarray, shift: int, settings: Settings, count: int) -> list[Camera]:
+    """Cameras of a mesh whose unit has been multiplied by ``2**shift``."""
+    by_position = settings["position"] is not None
+    try:
+        if by_position:
+            return turntable(_placed(vertices, shift, settings), count)
+        return _framing(vertices, settings, count)
+    except OverflowError:
+        reason, remedy = "the camera is too far away for the mesh", "move it nearer"
+    except ValueError as error:
+        reason, remedy = str(error), "choose another direction or position for the camera"
+    raise settings.refuse("position" if by_position else "view", reason, remedy)
+
+
+def _framing(vertices: np.ndarray, settings: Settings, count: int) -> list[Camera]:
+    """Cameras that show all of the mesh."""
+    width, height = settings["size"]
+    view, up = settings["view"], settings["up"]
+    # The first direction is the same to the bit, however many there are.
+    views = [view, *turned(normalise(view), up, count)[1:].tolist()]
+    kind = settings["projection"], width / height, settings["field_of_view"]
+    return equal_distance([Camera.framing(vertices, view, *kind, up=up) for view in views])
+
+
+def _placed(vertices: np.ndarray, shift: int, settings: Settings) -> Camera:
+    """The camera at its position."""
+    position = tuple(math.ldexp(value, shift) for value in settings["position"])
+    if settings["target"] is not None:
+        target = tuple(math.ldexp(value, shift) for value in settings["target"])
+    else:
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        target = tuple((low + (high - low) / 2).tolist())
+    distance = math.dist(position, target)
+    if not 1e-12 < distance < 1e12:
+        raise ValueError(
+            "the camera is at its target" if distance < 1 else "the camera is too far away for the mesh"
+        )
+    field_of_view = settings["field_of_view"]
+    return Camera(
+        position,
+        target,
+        settings["up"],
+        settings["projection"],
+        height=2 * distance * math.tan(math.radians(field_of_view) / 2),
+        field_of_view=field_of_view,
+        near=distance / 1000,
+    )

@@ -1,0 +1,205 @@
+"""Scene files: everything that a picture depends on, in TOML."""
+
+import os
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from blysk.sim.api.options import DESIGN, RENDERING, SCENE, Lights, PartError, shown_key
+from blysk.sim.errors import InputError
+from blysk.sim.value_types import Value, shown
+
+__all__ = ["MAX_BYTES", "SceneFile", "key_lines", "read_scene_file"]
+
+MAX_BYTES = 100_000
+"""Largest scene file; a mesh is a file of its own."""
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """What a scene file says.
+
+    Parameters
+    ----------
+    path : str
+        The file.
+    values : dict
+        What the file sets and nothing else, by the names of the options, in their types; and ``mesh``, which
+        is ``teapot`` or a path: one that is not absolute starts at the scene file's folder.
+    keys : dict
+        The key of each value, for messages: ``material.exponent``.
+    """
+
+    path: str
+    values: dict[str, Any]
+    keys: dict[str, str]
+
+
+def read_scene_file(path: str | os.PathLike) -> SceneFile:
+    """Read a scene file.
+
+    The keys, all of them optional but ``mesh.file``::
+
+        size = [640, 480]
+        background = "#1a1c20"              # or [r, g, b], or one number, each 0 to 1
+        ambient_light = [1, 1, 1]           # up to 8
+        back_faces = "flip"                 # "show", "cull"
+
+        [mesh]
+        file = "teapot"                     # or a mesh file, from this file's folder
+        triangles = 10000                   # of the teapot
+        crease = 40                         # degrees, of a mesh without normals
+        materials = "file"                  # those of the mesh file, or "one"
+
+        [camera]
+        projection = "perspective"          # "orthographic"
+        view = [0.4, 0.5, 1]                # from the mesh to the viewer: the camera shows all of the mesh
+        up = [0, 1, 0]
+        field_of_view = 30                  # degrees, vertical, 1 to 179
+        # position, target                  # in place of view, in the mesh's own units
+        viewer = "distant"                  # "near": highlights as seen from a perspective camera
+
+        [[lights]]                          # one table a light, none: lights = []
+        direction = [-0.5, 0.8, 0.7]        # to the light
+        # position                          # of a point light, in place of direction, in the mesh's own units
+        color = [1, 1, 1]                   # or "#rrggbb"; may exceed 1
+
+        [material]
+        ambient = [0.08, 0.05, 0.03]        # colours, as background
+        diffuse = [0.75, 0.42, 0.2]
+        specular = 0.6
+        exponent = 50
+
+        [pipeline]
+        method = "quadratic"
+        model = "cosquad"
+        operand = "cosine"                  # "one_minus_cosine"
+        setup_interval = 4
+        style = "throughput"                # "compact"
+        gate = false                        # the highlight gate
+        specialise = false                  # only what the scene needs
+        short_words = false                 # with specialise: words as short as the error bound allows
+
+    The values' ranges are those of the command line. The mesh, and values that exclude each other, are not
+    looked at.
+
+    Parameters
+    ----------
+    path : path
+        The file, in UTF-8, at most 100,000 bytes.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is no TOML, or holds an unknown key, a value of another type or out of
+        range, or no mesh. The message names the file and the key.
+    """
+    values: dict[str, Any] = {}
+    keys: dict[str, str] = {}
+    try:
+        _read_table(_parse(Path(path)), _SCHEMA, "", values, keys)
+        if "mesh" not in values:
+            raise PartError("mesh.file", "is missing", "name a mesh file, or teapot")
+    except PartError as error:
+        thing = f"{os.fspath(path)}, {error.key}" if error.key else os.fspath(path)
+        raise InputError(thing, str(error), error.remedy) from error.__cause__
+    if values["mesh"] != "teapot":
+        values["mesh"] = os.path.join(os.path.dirname(os.fspath(path)), values["mesh"])
+    return SceneFile(os.fspath(path), values, keys)
+
+
+def _parse(path: Path) -> dict:
+    try:
+        if not path.exists():
+            raise PartError("", "there is no such file", "check the path")
+        if path.is_dir():
+            raise PartError("", "is a folder", "name a scene file in it")
+        if not path.is_file():
+            raise PartError("", "is not a regular file", "name a scene file")
+        with open(path, "rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise PartError("", f"cannot be opened ({reason})", "check the path and its permissions") from error
+    if len(data) > MAX_BYTES:
+        raise PartError(
+            "", f"is over {MAX_BYTES:,} bytes", "keep the mesh in a file of its own, and name it by mesh.file"
+        )
+    try:
+        return tomllib.loads(data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise PartError("", f"is not UTF-8 (line {line})", "save it as UTF-8 text") from error
+    except RecursionError as error:
+        raise PartError("", "is nested too deeply", "see blysk render --help for the keys") from error
+    # A syntax error, or a whole number of more than 4300 digits.
+    except ValueError as error:
+        text = str(error).split("\n")[0]
+        raise PartError("", f"is no TOML ({text})", "mend it there; text stands in quotes") from error
+
+
+def _read_table(table: dict, schema: dict, prefix: str, values: dict, keys: dict) -> None:
+    for name, value in table.items():
+        key = prefix + shown_key(name)
+        if name not in schema:
+            if not prefix and name == "materials":
+                raise PartError(key, "several materials come from the mesh file", "give one [material]")
+            raise PartError(key, "unknown key", f"use one of {', '.join(schema)}")
+        expected = schema[name]
+        if isinstance(expected, dict):
+            if not isinstance(value, dict):
+                raise PartError(key, f"{shown(value)} is no table", f"write [{key}], and its keys below")
+            _read_table(value, expected, f"{key}.", values, keys)
+            continue
+        option, kind = expected
+        try:
+            values[option] = kind.check(value)
+        except PartError as error:
+            raise PartError(key + error.key, str(error), error.remedy) from None
+        except ValueError as error:
+            raise PartError(key, f"{shown(value)} is {error}", kind.remedy) from None
+        keys[option] = key
+
+
+class _MeshFile(Value):
+    """Name of a mesh file."""
+
+    name = "mesh"
+    remedy = "give a mesh file's name, or teapot"
+
+    def check(self, value):
+        """The name."""
+        if not isinstance(value, str):
+            raise ValueError("not text")
+        if not (value.isprintable() and Path(value).stem):
+            raise ValueError("no file's name")
+        return value
+
+
+def _schema() -> dict[str, Any]:
+    """Tables of keys, nested as in a file; of each key its option's name and type."""
+    schema: dict[str, Any] = {}
+    options = {**SCENE, **DESIGN, **RENDERING}
+    keys = {"mesh": (_MeshFile(), "mesh.file")} | {name: (of.kind, of.key) for name, of in options.items()}
+    for name in sorted(keys, key=lambda name: "." in keys[name][1]):
+        kind, key = keys[name]
+        table, _, last = key.rpartition(".")
+        (schema.setdefault(table, {}) if table else schema)[last] = name, kind
+    return schema
+
+
+_SCHEMA = _schema()
+
+
+def key_lines() -> Iterator[str]:
+    """The keys of a scene file, table by table, for the command line's help."""
+    yield ", ".join(
+        name for name, entry in _SCHEMA.items() if not isinstance(entry, dict) and name != "lights"
+    )
+    for table, entry in _SCHEMA.items():
+        if isinstance(entry, dict):
+            yield f"{f'[{table}]':<12}{', '.join(entry)}"
+        elif table == "lights":
+            yield f"{'[[lights]]':<12}{', '.join(Lights.parts)}"

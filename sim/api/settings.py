@@ -1,0 +1,145 @@
+"""Values of options: those that a caller gives, over those of a scene file, over the defaults."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.scene import Scene
+from blysk.sim.api.options import SCENE, Option, PartError, Source
+from blysk.sim.api.scene_file import read_scene_file
+from blysk.sim.errors import OptionError
+from blysk.sim.value_types import shown
+
+__all__ = ["Settings", "checked", "read_settings"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Values of options, and where each comes from.
+
+    Parameters
+    ----------
+    source : str or path or Mesh or Scene
+        The mesh, or a whole scene.
+    values : dict
+        Value of every option.
+    given : frozenset of str
+        Names of the options that are no defaults.
+    origins : dict
+        File and key of each value that a scene file gives, ``mesh`` among them.
+    """
+
+    source: Source | Scene
+    values: dict[str, Any]
+    given: frozenset[str]
+    origins: dict[str, str]
+
+    def __getitem__(self, name: str) -> Any:
+        return self.values[name]
+
+    def refuse(self, name: str, reason: str, remedy: str, value: object = None) -> OptionError:
+        """The error of a value; without a ``value``, the option's own is shown."""
+        return OptionError(name, self.values[name] if value is None else value, reason, remedy)
+
+    @contextmanager
+    def located(self) -> Iterator[None]:
+        """Within the block, the error of a value that a scene file gives names file and key."""
+        try:
+            yield
+        except OptionError as error:
+            if error.option in self.origins:
+                raise error.at(self.origins[error.option]) from None
+            raise
+
+
+def checked(options: Mapping[str, Any], table: Mapping[str, Option]) -> dict[str, Any]:
+    """Values of options as their types have them; those that are ``None`` left out.
+
+    Raises
+    ------
+    OptionError
+        If a value is not accepted.
+    TypeError
+        If there is no option of a name.
+    """
+    result = {}
+    for name, value in options.items():
+        if name not in table:
+            raise TypeError(f"there is no option {name!r}; use one of {', '.join(table)}")
+        if value is None:
+            continue
+        kind = table[name].kind
+        try:
+            result[name] = kind.check(value.tolist() if hasattr(value, "tolist") else value)
+        except PartError as error:
+            reason = f"{error.key}, {error}" if error.key else str(error)
+            raise OptionError(name, "", reason, error.remedy) from None
+        except ValueError as error:
+            raise OptionError(name, shown(value), str(error), kind.remedy) from None
+    return result
+
+
+def read_settings(
+    source: Source | Scene, options: Mapping[str, Any], table: Mapping[str, Option], **defaults: Any
+) -> Settings:
+    """Options over those of the scene file, if the source is one, over the defaults.
+
+    Parameters
+    ----------
+    source : str or path or Mesh or Scene
+        What is drawn.
+    options : dict
+        Some options of the table; ``None`` is none.
+    table : dict
+        The options that there are.
+    **defaults
+        In place of those of the table.
+
+    Raises
+    ------
+    InputError
+        If a value or the scene file is not accepted, or two values exclude each other.
+    TypeError
+        If there is no option of a name.
+    """
+    given = checked(options, table)
+    values: dict[str, Any] = {}
+    origins: dict[str, str] = {}
+    if not isinstance(source, Mesh | Scene) and Path(source).suffix.lower() == ".toml":
+        file = read_scene_file(source)
+        dropped = set(given).union(*(_INSTEAD.get(name, ()) for name in given))
+        names = ({"mesh"} | table.keys()) - dropped
+        values = {name: value for name, value in file.values.items() if name in names}
+        origins = {name: f"{file.path}, {file.keys[name]}" for name in values}
+        source = values.pop("mesh")
+    every = checked({**{name: option.default for name, option in table.items()}, **defaults}, table)
+    merged = dict.fromkeys(table) | every | values | given
+    settings = Settings(source, merged, frozenset(given) | frozenset(values), origins)
+    with settings.located():
+        _check_pairs(settings)
+    return settings
+
+
+_INSTEAD = {"view": ("position", "target"), "position": ("view", "target")}
+"""Options of a scene file that a given one takes the place of."""
+
+
+def _check_pairs(settings: Settings) -> None:
+    """Refuse values that exclude each other."""
+    given = settings.given
+    if isinstance(settings.source, Scene):
+        for name in SCENE:
+            if name in given:
+                raise settings.refuse(name, "the scene has its own", "leave it out, or change the scene")
+        return
+    if "position" in given and "view" in given:
+        raise settings.refuse("view", "the camera has a position, too", "leave one of them out")
+    if "target" in given and "position" not in given:
+        raise settings.refuse("target", "the camera has no position", "give a position, too")
+    if "triangles" in given and settings.source != "teapot":
+        raise settings.refuse("triangles", "only the teapot is tessellated", "leave it out for a file")
+    if settings.values.get("viewer") == "near" and settings["projection"] != "perspective":
+        raise settings.refuse("viewer", "an orthographic camera is distant", "use a perspective one")

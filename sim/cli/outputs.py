@@ -1,0 +1,62 @@
+"""Checks of output files before long work."""
+
+import os
+from collections.abc import Mapping, Sequence
+
+from blysk.sim.errors import InputError
+from blysk.sim.frames.picture import check_image_path
+from blysk.sim.output import check_writable
+
+__all__ = ["animation_paths", "check_outputs"]
+
+
+def check_outputs(
+    inputs: Sequence[str], pictures: Sequence[str | None], others: Sequence[str | None]
+) -> None:
+    """Refuse an output that cannot be written, or that is an input or another output.
+
+    Parameters
+    ----------
+    inputs : sequence of str
+        Files that are read.
+    pictures, others : sequences of str or None
+        Files to be written.
+
+    Raises
+    ------
+    InputError
+        If one cannot be.
+    """
+    seen = {os.path.realpath(path) for path in inputs}
+    for path in [*pictures, *others]:
+        if path:
+            if os.path.realpath(path) in seen:
+                raise InputError(path, "is the mesh or another output", "choose another file")
+            seen.add(os.path.realpath(path))
+            (check_image_path if path in pictures else check_writable)(path)
+
+
+def animation_paths(output: str, count: int, others: Mapping[str, str | None]) -> tuple[list[str], str]:
+    """Files of a turntable's frames, and of the animation.
+
+    Parameters
+    ----------
+    output : str
+        Name that theirs are made of.
+    count : int
+        Frames.
+    others : dict
+        By option, output files that are for one frame only.
+
+    Raises
+    ------
+    InputError
+        If there is one of the latter, or the name has another suffix than ``.gif`` or ``.png``.
+    """
+    for option, path in others.items():
+        if path:
+            raise InputError(f"{option} {path}", "is for one frame", "leave it out, or --frames")
+    stem, suffix = os.path.splitext(output)
+    if suffix.lower() not in (".gif", ".png"):
+        raise InputError(output, "the frames are PNG, the animation GIF", "use .gif or .png")
+    return [f"{stem}-{number:04}.png" for number in range(1, count + 1)], f"{stem}.gif"

@@ -1,0 +1,53 @@
+"""``blysk verilog``: the pipeline as Verilog."""
+
+import click
+
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.api.design import design, header_of, verilog
+from blysk.sim.api.options import COUNTS, DESIGN
+from blysk.sim.cli.options import given_options, options_of
+from blysk.sim.cli.outputs import check_outputs
+from blysk.sim.frames.testbench import check_folder, write_testbench
+from blysk.sim.output import write_text
+from blysk.sim.value_types import OutputFile
+
+__all__ = ["command"]
+
+
+@click.command(short_help="Emit the pipeline as Verilog.")
+@options_of(DESIGN)
+@options_of(COUNTS)
+@click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
+@click.option(
+    "-o", "--output", type=OutputFile(), help="Verilog file.  [default: standard output; --testbench: none]"
+)
+@click.option(
+    "--testbench",
+    metavar="DIR",
+    type=click.Path(),
+    help="New or empty folder for the Verilog with a cocotb test bench, which needs nothing of blysk.",
+)
+@click.pass_context
+def command(context, name, output, testbench, **_):
+    """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
+
+    A test bench holds it against the pixels of a small frame, in Icarus Verilog or Verilator: pip install
+    cocotb, then python DIR/run.py. DIR/README.md tells the rest.
+
+    \b
+    Examples:
+        blysk verilog --model cosquad_lin --lights 2 -o core.v
+        blysk verilog --method chord --testbench bench
+    """
+    made = design(**given_options(context, [*DESIGN, *COUNTS]))
+    check_outputs([testbench] if testbench else [], pictures=[], others=[output])
+    if testbench is not None:
+        check_folder(testbench)
+    text = verilog(made, name)
+    if output:
+        write_text(output, text)
+    if testbench is not None:
+        unit = ShadingPipelineUnit(made)
+        write_testbench(testbench, unit, name, text, header_of(unit))
+    elif not output:
+        click.echo(text, nl=False)

@@ -1,0 +1,236 @@
+"""Types of options and of the keys of scene files: how a text is read, and which values are accepted."""
+
+import math
+import re
+from collections.abc import Iterable
+from typing import Any
+
+import click
+
+from blysk.golden.reference.scene import LARGEST_SIDE
+from blysk.sim.errors import InputError, one_line
+
+__all__ = ["Choice", "Color", "Number", "OutputFile", "Size", "Truth", "Value", "Vector", "Whole", "shown"]
+
+
+class Value(click.ParamType):
+    """A type whose values come as text from the command line, and as numbers, lists and texts from a file.
+
+    Attributes
+    ----------
+    remedy : str
+        What to give instead of a refused value: "give a whole number from 1 to 9".
+    """
+
+    remedy: str
+
+    def parse(self, text: str) -> Any:
+        """Value of a text of the command line, not yet checked; `ValueError` if it is none."""
+        return text
+
+    def check(self, value: Any) -> Any:
+        """The value as the option takes it; `ValueError` with the reason if it is not accepted."""
+        raise NotImplementedError
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str | None:
+        """Placeholder of a value in the help text."""
+        return self.name
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Checked value of a text; `InputError` with the option and the text."""
+        try:
+            return self.check(self.parse(value) if isinstance(value, str) else value)
+        except ValueError as error:
+            option = param.opts[0] if param else self.name
+            reason = f"unknown {self.name}" if str(error) == "unknown" else str(error)
+            raise InputError(f"{option} {value}", reason, self.remedy) from None
+
+
+def shown(value: Any) -> str:
+    """A value in a message: in one line, and not too long."""
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return one_line(f"[{', '.join(shown(part) for part in value[:7])}]", 40)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int) and abs(value) >= 10**18:
+        return "a huge number"
+    return one_line(repr(value) if isinstance(value, str) else str(value), 40)
+
+
+def _finite(value: Any, least: float = -math.inf, most: float = math.inf) -> float:
+    """A number between two others, both included; up to 1e300, so that squares of thousandths are finite."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError("not a number")
+    # Comparison comes before the conversion, which a huge whole number would overflow.
+    if not (least <= value <= most and -1e300 <= value <= 1e300):
+        raise ValueError("out of range")
+    return float(value)
+
+
+def _floats(text: str, reason: str) -> list[float]:
+    """Numbers of a text with commas between them."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(reason) from None
+
+
+class Whole(Value):
+    """A whole number in a range, both ends included."""
+
+    name = "NUMBER"
+
+    def __init__(self, least: int, most: int):
+        self.least, self.most = least, most
+        self.remedy = f"give a whole number from {least} to {most}"
+
+    def parse(self, text):
+        """Digits and a sign, nothing else."""
+        return int(text) if re.fullmatch(r"[+-]?[0-9]{1,18}", text) else text
+
+    def check(self, value):
+        """An `int` in the range."""
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise ValueError("not a whole number")
+        if not self.least <= value <= self.most:
+            raise ValueError("out of range")
+        return value
+
+
+class Number(Value):
+    """A finite number in a range, both ends included."""
+
+    name = "NUMBER"
+
+    def __init__(self, least: float, most: float, unit: str = ""):
+        self.least, self.most = least, most
+        self.remedy = f"give {least:g} to {most:g}{unit and f' {unit}'}"
+
+    def parse(self, text):
+        """As Python reads a `float`."""
+        return _floats(text, "not a number")[0] if "," not in text else text
+
+    def check(self, value):
+        """A `float` in the range."""
+        return _finite(value, self.least, self.most)
+
+
+class Vector(Value):
+    """Finite numbers, as many as one of the counts; a direction is not 0."""
+
+    def __init__(
+        self, kind: str, counts: tuple[int, ...] = (3,), metavar: str = "X,Y,Z", direction: bool = False
+    ):
+        self.name, self.kind, self.counts, self.direction = metavar, kind, counts, direction
+        self.remedy = f"give {metavar}" + (", a vector other than 0" if direction else "")
+
+    def parse(self, text):
+        """Numbers with commas between them."""
+        return _floats(text, f"not {self.kind}")
+
+    def check(self, value):
+        """A tuple of `float`."""
+        if not isinstance(value, list | tuple) or len(value) not in self.counts:
+            raise ValueError(f"not {self.kind}")
+        vector = tuple(_finite(part) for part in value)
+        if self.direction and not any(vector[:3]):
+            raise ValueError("no direction")
+        return vector
+
+
+class Color(Value):
+    """``#rrggbb``, three numbers or one: as three numbers."""
+
+    name = "COLOR"
+
+    def __init__(self, most: float = 1.0):
+        self.most = most
+        limits = "of 0 or more" if math.isinf(most) else f"from 0 to {most:g}"
+        self.remedy = f"give #rrggbb, red, green and blue, or one number, each {limits}"
+
+    def parse(self, text):
+        """A number, or numbers with commas between them; ``#rrggbb`` stays."""
+        if text.startswith("#"):
+            return text
+        numbers = _floats(text, "not a colour")
+        return numbers if len(numbers) > 1 else numbers[0]
+
+    def check(self, value):
+        """Three numbers of type `float`."""
+        if isinstance(value, str) and re.fullmatch("#[0-9a-fA-F]{6}", value):
+            return tuple(int(value[k : k + 2], 16) / 255 for k in (1, 3, 5))
+        channels = value if isinstance(value, list | tuple) else [value] * 3
+        if isinstance(value, str) or len(channels) != 3:
+            raise ValueError("not a colour")
+        return tuple(_finite(part, 0, self.most) for part in channels)
+
+
+class Size(Value):
+    """Width and height of a picture."""
+
+    name = "WIDTHxHEIGHT"
+    remedy = f"give WIDTHxHEIGHT, 1 to {LARGEST_SIDE} each"
+
+    def parse(self, text):
+        """Two numbers with an x between them."""
+        match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
+        return [int(match[1]), int(match[2])] if match else text
+
+    def check(self, value):
+        """Two numbers of type `int`."""
+        if not isinstance(value, list | tuple) or len(value) != 2:
+            raise ValueError("not a size")
+        side = Whole(1, LARGEST_SIDE)
+        return side.check(value[0]), side.check(value[1])
+
+
+class Truth(Value):
+    """True or false, of a file or of Python; a flag on the command line."""
+
+    name = "boolean"
+    remedy = "give true or false"
+
+    def check(self, value):
+        """A `bool`."""
+        if not isinstance(value, bool):
+            raise ValueError("neither true nor false")
+        return value
+
+
+class Choice(Value):
+    """One of a few names.
+
+    Parameters
+    ----------
+    kind : str
+        What they are names of, for the message.
+    names : iterable of str
+        The names.
+    """
+
+    def __init__(self, kind: str, names: Iterable[str]):
+        self.name = kind
+        self.names = tuple(names)
+        self.remedy = f"use one of {', '.join(self.names)}"
+
+    def get_metavar(self, param, ctx=None):
+        """The names."""
+        return f"[{'|'.join(self.names)}]"
+
+    def check(self, value):
+        """The name."""
+        if not isinstance(value, str) or value not in self.names:
+            raise ValueError("unknown")
+        return value
+
+
+class OutputFile(click.Path):
+    """Name of a file to write; an empty one, as of a shell's variable that is not set, is none."""
+
+    def convert(self, value, param, ctx):
+        """The name."""
+        if not value:
+            raise InputError(f"{param.opts[-1]} ''", "is no file's name", "give one, or leave it out")
+        return super().convert(value, param, ctx)
