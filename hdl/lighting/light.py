@@ -111,10 +111,7 @@ class LightUnit(wiring.Component):
         self._specular = SPECULAR_KINDS[type(p)].unit(
             p, initiation_interval=initiation_interval, exponent=exponent, shares_slope=shares_slope
         )
-        ports = self._specular.signature.members
-        constants = ports["constants"] if "constants" in ports else None
-        # Of a unit that is not built for a fixed exponent.
-        self._exponent = exponent if constants is not None else None
+        self.exponent = exponent
         self.latency = self._specular.latency
         self.initiation_interval = self._specular.initiation_interval
         self.skips_dark = self.initiation_interval > 1
@@ -130,9 +127,14 @@ class LightUnit(wiring.Component):
             "i": In(stream.Signature(data.StructLayout(operands))),
             "o": Out(stream.Signature(data.StructLayout(terms))),
         }
-        if constants is not None and self._exponent is None:
-            members["constants"] = constants
+        if exponent is None and self._has_constants:
+            members["constants"] = self._specular.signature.members["constants"]
         super().__init__(members)
+
+    @property
+    def _has_constants(self) -> bool:
+        """Whether the specular unit has constants."""
+        return "constants" in self._specular.signature.members
 
     def elaborate(self, platform):
         """Two units side by side."""
@@ -148,8 +150,9 @@ class LightUnit(wiring.Component):
             specular.i.payload.operand.eq(self.i.payload.highlight),
             specular.i.payload.dark.eq(dark),
         ]
-        if self._exponent is not None:
-            m.d.comb += specular.constants.exponent.eq(self._exponent)
+        if self.exponent is not None and self._has_constants:
+            # A specular unit that is not built for a fixed exponent.
+            m.d.comb += specular.constants.exponent.eq(self.exponent)
         elif "constants" in self.signature.members:
             m.d.comb += Value.cast(specular.constants).eq(Value.cast(self.constants))
         if self.skips_dark:
