@@ -1,14 +1,12 @@
-"""arccos and half chord against float64 mathematics, and the figures of the literature."""
+"""arccos: the bit-accurate model against float64, and the published figures."""
 
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from blysk.golden.cosines.arccos import ARCCOS_TABLES, PRINTED_COEFFICIENTS, SEGMENT_BOUNDS, Arccos, HalfChord
-from blysk.golden.normals.dot_product import DotProduct
-from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.cosines.arccos import ARCCOS_TABLES, PUBLISHED_COEFFICIENTS, SEGMENT_BOUNDS, Arccos
+from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.polynomials import largest_error, minimax
-from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED, quantise
 
 EVERY = np.arange(Arccos.OPERAND_FORMAT.min_code, Arccos.OPERAND_FORMAT.max_code + 1)
 X = EVERY / 2.0**16
@@ -22,27 +20,39 @@ def segment_errors(error):
     return np.array([np.abs(error[INSIDE])[segment == s].max() for s in range(5)])
 
 
+MODEL_ERRORS = {
+    "as_published": [0.0012, 0.0011, 0.0019, 0.0012, 0.174],
+    "corrected": [0.0012, 0.0011, 0.0019, 0.0012, 0.084],
+    "refitted": [0.00092, 0.00054, 0.00082, 0.00052, 0.019],
+}
+"""The table of the docstring, by segment."""
+HALF_DIGITS = 0.51 * np.array([1e-4] * 4 + [1e-3])
+
+
+def angle_of(table, codes):
+    return Arccos(table).compute(Fixed(Arccos.OPERAND_FORMAT, codes))
+
+
 def percent(value, digits):
     assert 100 * value == pytest.approx(float(digits), abs=0.5001 * 10.0 ** -len(digits.partition(".")[2]))
 
 
-# numbers.md, "arccos, table 3.1".
 @pytest.mark.parametrize(
     ("segment", "absolute", "relative"),
     [(0, 0.0012, "0.10"), (1, 0.0011, "0.13"), (2, 0.0019, "0.37"), (3, 0.0012, "0.42")],
 )
-def test_printed_segments(segment, absolute, relative):
+def test_published_segments(segment, absolute, relative):
     x = np.linspace(*SEGMENT_BOUNDS[segment : segment + 2], 100001)
-    error = np.abs(np.polynomial.polynomial.polyval(x, PRINTED_COEFFICIENTS[segment]) - np.arccos(x))
+    error = np.abs(np.polynomial.polynomial.polyval(x, PUBLISHED_COEFFICIENTS[segment]) - np.arccos(x))
     assert round(error.max(), 4) == absolute
     percent((error / np.arccos(x)).max(), relative)
 
 
 def test_misprint_of_the_last_segment():
-    printed, corrected = Arccos("as_published").coefficients[4], Arccos("corrected").coefficients[4]
-    assert printed[1] == 74.547
+    published, corrected = Arccos("as_published").coefficients[4], Arccos("corrected").coefficients[4]
+    assert published[1] == 74.547
     assert corrected[1] == 74.457
-    at_start = [np.polynomial.polynomial.polyval(0.96, c) - np.arccos(0.96) for c in (printed, corrected)]
+    at_start = [np.polynomial.polynomial.polyval(0.96, c) - np.arccos(0.96) for c in (published, corrected)]
     assert round(abs(at_start[0]), 3) == 0.086
     assert round(abs(at_start[1]), 5) == 0.00013
     x = np.linspace(0.96, 1, 40001)[:-1]
@@ -104,60 +114,31 @@ def test_short_cosine_costs_angle():
 
 
 @pytest.mark.parametrize("table", ARCCOS_TABLES)
-def test_arithmetic_error_over_every_input(table):
+def test_every_operand(table):
+    """The arithmetic error within its bound, the model error as stated, together within their sum."""
     unit = Arccos(table)
-    angle, outside = unit.compute(Fixed(unit.OPERAND_FORMAT, EVERY))
+    angle, outside = angle_of(table, EVERY)
     np.testing.assert_array_equal(outside, ~INSIDE)
     clamped = np.clip(X, -1, 1)
-    error = segment_errors(angle.values - unit.polynomial(clamped))
-    assert np.all(error <= unit.arithmetic_error)
+    arithmetic = segment_errors(angle.values - unit.polynomial(clamped))
+    assert np.all(arithmetic <= unit.arithmetic_error)
     # The bound is one that a word comes near to.
-    assert np.all(error >= 0.75 * unit.arithmetic_error)
-
-
-@pytest.mark.parametrize("table", ARCCOS_TABLES)
-def test_stiff_past_one_is_one(table):
-    unit = Arccos(table)
+    assert np.all(arithmetic >= 0.75 * unit.arithmetic_error)
+    model = segment_errors(unit.polynomial(clamped) - np.arccos(clamped))
+    np.testing.assert_array_less(np.abs(model - MODEL_ERRORS[table]), HALF_DIGITS)
+    total = segment_errors(angle.values - np.arccos(clamped))
+    assert np.all(total <= model + unit.arithmetic_error)
+    if table == "refitted":
+        corrected = segment_errors(angle_of("corrected", EVERY)[0].values - np.arccos(clamped))
+        assert np.all(total < 0.82 * corrected)
+    # Below 0 the supplement: two roundings of 2^-17.
+    sums = angle.values[EVERY > 0] + angle.values[EVERY < 0][:0:-1]
+    assert np.abs(sums - np.pi).max() <= 2.0**-16
+    # Past 1 as at 1, and flagged.
     for sign in (1, -1):
-        x = sign * np.array([1 << 16, (1 << 16) + 1, (1 << 17) - 1])
-        angle, outside = unit.compute(Fixed(unit.OPERAND_FORMAT, x))
-        assert set(angle.codes) == {angle.codes[0]}
+        past, outside = angle_of(table, sign * np.array([1 << 16, (1 << 16) + 1, (1 << 17) - 1]))
+        assert set(past.codes) == {past.codes[0]}
         assert outside.tolist() == [False, True, True]
-
-
-# The table of the docstring, with the arithmetic error on top.
-@pytest.mark.parametrize(
-    ("table", "model"),
-    [
-        ("as_published", [0.0012, 0.0011, 0.0019, 0.0012, 0.174]),
-        ("corrected", [0.0012, 0.0011, 0.0019, 0.0012, 0.084]),
-        ("refitted", [0.00092, 0.00054, 0.00082, 0.00052, 0.019]),
-    ],
-)
-def test_model_error_by_segment(table, model):
-    unit = Arccos(table)
-    found = segment_errors(unit.polynomial(np.clip(X, -1, 1)) - np.arccos(np.clip(X, -1, 1)))
-    np.testing.assert_array_less(np.abs(found - model), 0.51 * np.array([1e-4] * 4 + [1e-3]))
-    angle, _ = unit.compute(Fixed(unit.OPERAND_FORMAT, EVERY))
-    total = segment_errors(angle.values - np.arccos(np.clip(X, -1, 1)))
-    assert np.all(total <= found + unit.arithmetic_error)
-
-
-def test_refitted_is_better_everywhere():
-    total = {}
-    for table in ("corrected", "refitted"):
-        angle, _ = Arccos(table).compute(Fixed(Arccos.OPERAND_FORMAT, EVERY))
-        total[table] = segment_errors(angle.values - np.arccos(np.clip(X, -1, 1)))
-    assert np.all(total["refitted"] < 0.82 * total["corrected"])
-
-
-def test_negative_is_the_supplement():
-    for table in ARCCOS_TABLES:
-        positive, negative = (
-            Arccos(table).compute(Fixed(SQ(2, 16), sign * EVERY[EVERY > 0]))[0].values for sign in (1, -1)
-        )
-        # Two roundings of 2^-17.
-        assert np.abs(positive + negative - np.pi).max() <= 2.0**-16
 
 
 @pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45, 89.9, 90, 120, 180])
@@ -168,94 +149,19 @@ def test_stiff_angles(degrees, table):
     x = Fixed.round(SQ(2, 16), np.cos([psi]))
     found = unit.compute(x)[0].values
     around = np.clip(np.cos(psi) + np.array([-1, 1]) * 2.0**-17, -1, 1)
-    model = np.array(
-        {
-            "as_published": [0.0012, 0.0011, 0.0019, 0.0012, 0.1745],
-            "corrected": [0.0012, 0.0011, 0.0019, 0.0012, 0.0845],
-            "refitted": [0.00093, 0.00055, 0.00083, 0.00053, 0.0195],
-        }[table]
-    ) + np.array([5e-5] * 4 + [0])
+    model = np.add(MODEL_ERRORS[table], HALF_DIGITS)
     segments = np.minimum(np.searchsorted(SEGMENT_BOUNDS, np.abs(around), side="right") - 1, 4)
     bound = np.abs(np.arccos(around) - psi).max() + (model + unit.arithmetic_error)[segments].max()
     assert np.abs(found - psi).max() <= bound
-    # At 1 and -1, where a mesh lives, nothing of the angle is left: 1 degree is 0.0175.
+    # At 1 and -1, the angles of a smooth mesh, nothing of the angle is left: 1 degree is 0.0175.
     if degrees in (0, 180):
         assert np.abs(found - psi).max() > 0.015
 
 
-def chords(left, right):
-    """Squared chord of codes, the smaller of the two, exact; and whether it is the supplement's."""
-    a, b = Fixed(COMPONENT, left), Fixed(COMPONENT, right)
-    dot = DotProduct()
-    own = dot.compute(a, a).codes + dot.compute(b, b).codes
-    cross = dot.compute(a, b).codes
-    return Fixed(UQ(2, 34), own - 2 * np.abs(cross)), cross < 0
-
-
-def half_chord_exact(chord, supplement):
-    half = np.sqrt(chord.values / ONE_SQUARED.values) / 2
-    angle = 2 * np.arcsin(half) / (2 * np.pi)
-    return angle, np.where(supplement, 0.5 - angle, angle)
-
-
-def test_half_chord_relative_error():
-    rng = np.random.default_rng(7)
-    largest = ONE_SQUARED.codes * 2
-    codes = np.r_[np.arange(1, 5000), largest - np.arange(5000)]
-    codes = np.r_[codes, np.trunc(2.0 ** rng.uniform(0, np.log2(largest), 4 * 10**5)).astype(np.int64)]
-    chord = Fixed(UQ(2, 34), codes)
-    unit = HalfChord()
-    for flag in (False, True):
-        supplement = np.full(len(codes), flag)
-        angle, exact = half_chord_exact(chord, supplement)
-        error = np.abs(unit.compute(chord, supplement).values - exact) - 2.0**-36
-        assert np.all(error <= unit.RELATIVE_ERROR * angle)
-        assert (error / angle).max() > 0.6 * unit.RELATIVE_ERROR
-    assert unit.compute(Fixed(UQ(2, 34), [0, 0]), np.array([False, True])).values.tolist() == [0, 0.5]
-
-
-@pytest.mark.parametrize("degrees", [0, 1e-4, 1e-2, 1, 45, 89.9, 90, 120, 179, 179.99, 180])
-def test_stiff_half_chord_of_normals(degrees, normal_pairs):
-    rng = np.random.default_rng(8)
-    left, right = (quantise(n) for n in normal_pairs(rng, 1500, degrees))
-    chord, supplement = chords(left, right)
-    angle = 360 * HalfChord().compute(chord, supplement).values
-    cross = np.linalg.norm(np.cross(left, right), axis=1)
-    exact = np.degrees(np.arctan2(cross, np.einsum("ij,ij->i", left, right)))
-    # A length is off by 2^-18 at most, a chord of normals of unequal length by their difference.
-    lengths = np.abs(np.linalg.norm(left, axis=1) - np.linalg.norm(right, axis=1)) / 2.0**17
-    bound = HalfChord.RELATIVE_ERROR * np.minimum(exact, 180 - exact) + np.degrees(2 * lengths + 2.0**-17)
-    assert np.all(np.abs(angle - exact) <= bound)
-    # What the quantised normals themselves allow: each is off by under sqrt 3 steps.
-    assert np.abs(angle - degrees).max() <= np.degrees(2 * np.sqrt(3) * 2.0**-17) + bound.max()
-
-
-def test_half_chord_keeps_what_arccos_loses(normal_pairs):
-    rng = np.random.default_rng(9)
-    left, right = (quantise(n) for n in normal_pairs(rng, 1500, 1.0))
-    a, b = Fixed(COMPONENT, left), Fixed(COMPONENT, right)
-    cosine = DotProduct().compute(a, b).round_half_up(16)
-    by_arccos, _ = Arccos().compute(cosine.wrap(SQ(2, 16)))
-    by_chord = HalfChord().compute(*chords(left, right))
-    off = [np.abs(angle - 1).max() for angle in (np.degrees(by_arccos.values), 360 * by_chord.values)]
-    assert off[0] > 0.2
-    assert off[1] < 0.003
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Arccos("best"), "the arccos table must be as_published, corrected, refitted, not 'best'"),
-        (
-            lambda: Arccos().compute(Fixed(SQ(1, 17), [0])),
-            r"operand must be SQ\(2, 16\), not SQ\(1, 17\)",
-        ),
-        (
-            lambda: HalfChord().compute(Fixed(UQ(3, 34), [0]), np.array([False])),
-            r"operand must be UQ\(2, 34\), not UQ\(3, 34\)",
-        ),
-    ],
-)
-def test_refusals(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
+def test_refuses():
+    with pytest.raises(
+        ValueError, match="the arccos table must be as_published, corrected, refitted, not 'best'"
+    ):
+        Arccos("best")
+    with pytest.raises(ValueError, match=r"operand must be SQ\(2, 16\), not SQ\(1, 17\)"):
+        Arccos().compute(Fixed(SQ(1, 17), [0]))

@@ -5,27 +5,27 @@ import pytest
 
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.number.fixed import SQ, Fixed
-from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
-
-ENDS = [COMPONENT.min_code, COMPONENT.min_code + 1, -1, 0, 1, COMPONENT.max_code]
+from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED
+from blysk.sim.units.operands import code_pairs_at, component_words, pairs_at, word_ends
 
 
 def compute(a, b):
-    return Chord().compute(Fixed(COMPONENT, a), Fixed(COMPONENT, b))
+    return Chord().compute(*component_words(a, b))
 
 
 def exact(a, b):
     """``|a - b|^2 / 2`` in codes of 35 fraction bits: the sum of the squares of whole differences."""
-    return ((a.astype(object) - b.astype(object)) ** 2).sum(axis=-1)
+    return ((a - b) ** 2).sum(axis=-1)
 
 
-def pairs(rng, normal_pairs):
+@pytest.fixture(scope="module")
+def pairs():
     """Unit vectors of every angle, any vectors, and the ends of the word."""
+    rng = np.random.default_rng(1)
     angles = np.r_[np.zeros(100), 10.0 ** rng.uniform(-5, 0, 20_000), rng.uniform(0, 180, 60_000), 180.0]
-    left, right = (quantise(v) for v in normal_pairs(rng, len(angles), angles))
     anything = rng.integers(COMPONENT.min_code, COMPONENT.max_code, (2, 20_000, 3), endpoint=True)
-    ends = rng.choice(ENDS, (2, 5_000, 3))
-    return np.vstack([left, anything[0], ends[0]]), np.vstack([right, anything[1], ends[1]])
+    units = np.stack(code_pairs_at(rng, len(angles), angles))
+    return np.concatenate([units, anything, word_ends(rng, 2, 5_000, 3)], axis=1)
 
 
 def is_near(a, b):
@@ -33,38 +33,29 @@ def is_near(a, b):
     return np.all((a - b >= COMPONENT.min_code) & (a - b <= COMPONENT.max_code), axis=-1)
 
 
-def test_exact_where_no_component_reaches_one(normal_pairs):
-    a, b = pairs(np.random.default_rng(1), normal_pairs)
-    near = is_near(a, b)
+def test_exact_where_no_component_reaches_one(pairs):
+    near = is_near(*pairs)
     assert 40_000 < np.count_nonzero(near) < 90_000
-    assert np.array_equal(compute(a, b).codes[near], exact(a, b)[near])
+    assert np.array_equal(compute(*pairs).codes[near], exact(*pairs)[near])
+    # ``u < 1/2`` is a distance under 1.
+    assert near[exact(*pairs) < 1 << 34].all()
 
 
-def test_exact_below_one_half(normal_pairs):
-    """``u < 1/2`` is a distance under 1."""
-    a, b = pairs(np.random.default_rng(2), normal_pairs)
-    short = exact(a, b) < 1 << 34
-    assert is_near(a, b)[short].all()
-
-
-def test_error_of_halving(normal_pairs):
+def test_error_of_halving(pairs):
     """``sqrt(3) 2^-17 |a - b| + 3 * 2^-35``; what is cut makes u smaller or, below 0, larger."""
-    a, b = pairs(np.random.default_rng(3), normal_pairs)
-    far = ~is_near(a, b)
-    whole = np.minimum(exact(a, b), Chord.FORMAT.max_code)[far].astype(float)
-    error = (compute(a, b).codes[far] - whole) * Chord.FORMAT.step
-    distance = np.sqrt(exact(a, b)[far].astype(float) * 2.0**-34)
-    assert np.all(np.abs(error) <= np.sqrt(3) * 2.0**-17 * distance + 3 * 2.0**-35)
-    unit = distance <= 2
-    assert np.abs(error[unit]).max() <= 2.7e-5
-    assert np.abs(error[unit]).max() > 1e-5
+    far = ~is_near(*pairs)
+    squares = exact(*pairs)[far]
+    whole = np.minimum(squares, Chord.FORMAT.max_code).astype(float)
+    error = np.abs(compute(*pairs).codes[far] - whole) * Chord.FORMAT.step
+    distance = np.sqrt(squares * 2.0**-34)
+    assert np.all(error <= np.sqrt(3) * 2.0**-17 * distance + 3 * 2.0**-35)
+    assert 1e-5 < error[distance <= 2].max() <= 2.7e-5
 
 
 @pytest.mark.parametrize("difference", [2**17 - 1, 2**17, 2**17 + 1, 2**18 - 2])
 def test_border_of_halving(difference):
-    """The largest difference that is no number of 18 bits yet, and those about it, of either sign."""
-    a = np.array([[ONE, 0, 0]])
-    b = np.array([[ONE - difference, 0, 0]])
+    """The largest difference that is no number of 18 bits yet, and those next to it, of either sign."""
+    a, b = np.array([[ONE, 0, 0]]), np.array([[ONE - difference, 0, 0]])
     assert compute(a, b).codes[0] == (difference & ~1 if difference > ONE else difference) ** 2
     low = difference if difference <= 2**17 else difference + 1 & ~1
     assert compute(b, a).codes[0] == low**2
@@ -73,21 +64,18 @@ def test_border_of_halving(difference):
 def test_extremes_saturate():
     """Opposite corners of the cube are 12 apart in the square: u is 6, and the word ends at 4."""
     corner = np.full((1, 3), COMPONENT.min_code)
-    u = Chord().compute(Fixed(COMPONENT, corner), Fixed(COMPONENT, -corner - 1))
-    assert u.codes[0] == Chord.FORMAT.max_code
-    operand = Chord().operand(Fixed(COMPONENT, corner), Fixed(COMPONENT, -corner - 1))
-    assert operand.codes[0] == Chord.ARGUMENT_FORMAT.max_code
+    assert compute(corner, -corner - 1).codes[0] == Chord.FORMAT.max_code
 
 
 @pytest.mark.parametrize("stretch", [-1 / 256, -1e-4, 0.0, 1e-4, 1 / 256])
-def test_length_is_felt_at_second_order(normal_pairs, stretch):
+def test_length_is_felt_at_second_order(stretch):
     """A length error e gives ``e^2/2 + e u``; the dot product is wrong by e.
 
     Rounding moves each vector by up to half a diagonal of its grid.
     """
     rng = np.random.default_rng(4)
     angles = rng.uniform(0, 60, 20_000)
-    left, right = normal_pairs(rng, len(angles), angles)
+    left, right = pairs_at(rng, len(angles), angles)
     shorter = 0.99
     codes = [np.rint(v * shorter * ONE).astype(np.int64) for v in (left * (1 + stretch), right)]
     one = float(ONE_SQUARED.values) * shorter**2
@@ -98,15 +86,14 @@ def test_length_is_felt_at_second_order(normal_pairs, stretch):
     rounding = (distance * moved + moved**2 / 2) / one
     halving = np.where(u > 0.48, 2.7e-5, 0)
     assert np.all(error <= stretch**2 / 2 + abs(stretch) * u + rounding + halving + 1e-12)
-    peak = u < 1e-3
-    assert error[peak].max() <= stretch**2 / 2 + 1e-3 * abs(stretch) + 1e-6
+    assert error[u < 1e-3].max() <= stretch**2 / 2 + 1e-3 * abs(stretch) + 1e-6
 
 
-def test_operand_is_cut(normal_pairs):
-    a, b = pairs(np.random.default_rng(5), normal_pairs)
-    operand = Chord().operand(Fixed(COMPONENT, a), Fixed(COMPONENT, b))
+def test_operand_is_cut(pairs):
+    operand = Chord().operand(*component_words(*pairs))
     assert operand.format == Chord.ARGUMENT_FORMAT
-    expected = np.minimum(compute(a, b).codes >> 10, Chord.ARGUMENT_FORMAT.max_code)
+    expected = np.minimum(compute(*pairs).codes >> 10, Chord.ARGUMENT_FORMAT.max_code)
+    assert expected.max() == Chord.ARGUMENT_FORMAT.max_code
     np.testing.assert_array_equal(operand.codes, expected)
 
 

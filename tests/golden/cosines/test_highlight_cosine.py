@@ -32,32 +32,34 @@ def exact(phase, cos_beta):
     return np.minimum(total, UNIT.RESULT_FORMAT.max_code / 2.0**25)
 
 
-@pytest.mark.parametrize("cos_beta", [1.0, 0.999, 0.5, 0.0])
-def test_arithmetic_error_over_every_angle(cos_beta):
-    # Every value of the bits that the unit looks at, with what lies below them at its middle.
-    phase = (np.arange(-(1 << 20), 1 << 20) << 19) + (1 << 18)
-    code = int(cos_beta * 2**25)
-    error = np.abs(values(phase, code)[:, 0] - exact(phase, code))
+def assert_errors_under_bounds(phase, cos_beta):
+    """Near the peak and anywhere; gives the shares of the bounds that the errors reach."""
+    error = np.abs(values(phase, cos_beta)[:, 0] - exact(phase, cos_beta))
     # The last step before 1/32 may round to either side.
     near = 1 - np.abs(np.cos(2 * np.pi * phase / TURN)) < 1 / 32 - 2.0**-20
     assert error[near].max() <= UNIT.NEAR_ERROR
     assert error.max() <= UNIT.ERROR
-    if cos_beta == 0.999:
-        assert error[near].max() > 0.5 * UNIT.NEAR_ERROR, error[near].max() / UNIT.NEAR_ERROR
-        assert error.max() > 0.5 * UNIT.ERROR, error.max() / UNIT.ERROR
+    return error[near].max() / UNIT.NEAR_ERROR, error.max() / UNIT.ERROR
+
+
+@pytest.mark.parametrize(
+    "cos_beta", [0.999, *(pytest.param(share, marks=pytest.mark.long) for share in (1.0, 0.5, 0.0))]
+)
+def test_arithmetic_error_over_every_angle(cos_beta):
+    # Every value of the bits that the unit looks at, with the bits below them at their middle.
+    phase = (np.arange(-(1 << 20), 1 << 20) << 19) + (1 << 18)
+    shares = assert_errors_under_bounds(phase, int(cos_beta * 2**25))
+    assert cos_beta != 0.999 or min(shares) > 0.5
 
 
 def test_random_operands():
     rng = np.random.default_rng(1)
-    phase = rng.integers(-(1 << 39), 1 << 39, 300000)
-    cos_beta = rng.integers(0, (1 << 25) + 1, len(phase))
-    error = np.abs(values(phase, cos_beta)[:, 0] - exact(phase, cos_beta))
-    near = 1 - np.abs(np.cos(2 * np.pi * phase / TURN)) < 1 / 32 - 2.0**-20
-    assert error[near].max() <= UNIT.NEAR_ERROR
-    assert error.max() <= UNIT.ERROR
+    cos_beta = rng.integers(0, (1 << 25) + 1, 300_000)
+    cos_beta[::4] = 1 << 25
+    assert_errors_under_bounds(rng.integers(-(1 << 39), 1 << 39, len(cos_beta)), cos_beta)
 
 
-def test_what_interpolation_buys():
+def test_gain_of_interpolation():
     phase = np.arange(-(1 << 17), 1 << 17) << 22
     width = np.pi / 1024
     drawn, interpolated = (
@@ -89,7 +91,7 @@ def test_table_fits_one_block_ram():
 
 @pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45, 89.9, 90, 120, 179])
 @pytest.mark.parametrize("position", [-0.7, 0.0, 0.3, 0.5, 1.0, 1.6])
-@pytest.mark.parametrize("length", [2, 3, 16, 37, 4095])
+@pytest.mark.parametrize("length", [2, 3, 37, 4095])
 def test_stiff_spans_follow_the_great_circle(degrees, position, length):
     """Against slerp of the normals; the highlight inside the span, at its ends and outside."""
     psi = np.radians(degrees)
@@ -127,17 +129,13 @@ def test_stiff_peak_narrower_than_a_pixel():
     assert found.min() > 0.1
 
 
-def test_stiff_peak_on_a_pixel_is_exact():
+def test_stiff_peak_on_a_pixel_is_exact_and_between_pixels_even():
     step = 1234567890
     for cos_beta in (1 << 25, 30000001, 12345):
         found = values(7 * step, cos_beta, step=step, length=15)[0]
-        assert found[7] == 1 - cos_beta / 2.0**25
+        assert found[7] == found.min() == 1 - cos_beta / 2.0**25
         # Inverted bits may put the two sides of the wave a step of the table's fraction apart.
         assert found[:7] == pytest.approx(found[:7:-1], abs=2.0**-21)
-        assert found[7] == found.min()
-
-
-def test_stiff_peak_between_pixels():
     step = 1 << 30
     found = values(7 * step + step // 2, 1 << 25, step=step, length=16)[0]
     assert found[7] == pytest.approx(found[8], abs=2.0**-21)
@@ -175,18 +173,10 @@ def test_stiff_overlong_cos_beta():
     assert np.abs(values(phase, code)[:, 0] - target).max() <= 1.42 * UNIT.ERROR
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: HighlightCosine(address_bits=3), "address_bits must be 4 to 12, not 3"),
-        (
-            lambda: UNIT.compute(
-                Fixed(SQ(1, 39), [0]), Fixed(SQ(0, 40), [0]), Fixed(SQ(0, 40), [0]), [0], [0]
-            ),
-            r"operands must be SQ\(0, 40\), UQ\(0, 40\), UQ\(1, 25\), not SQ\(1, 39\)",
-        ),
-    ],
-)
-def test_refusals(make, message):
+def test_refuses():
+    with pytest.raises(ValueError, match=r"^address_bits must be 4 to 12, not 3$"):
+        HighlightCosine(address_bits=3)
+    operands = (Fixed(format, [0]) for format in (SQ(1, 39), SQ(0, 40), SQ(0, 40)))
+    message = r"^operands must be SQ\(0, 40\), UQ\(0, 40\), UQ\(1, 25\), not SQ\(1, 39\)"
     with pytest.raises(ValueError, match=message):
-        make()
+        UNIT.compute(*operands, [0], [0])

@@ -1,4 +1,4 @@
-"""Recurrence unit against float64 cosines, and the figures of numbers.md."""
+"""Recurrence unit against float64 cosines, and the published figures."""
 
 import numpy as np
 import pytest
@@ -10,6 +10,8 @@ INTERLEAVES = (1, 4)
 
 LARGEST = 1 - 2.0**-16
 """Amplitude of two equal unit vectors."""
+PEAKS = np.linspace(-1, 2, 31)
+"""Positions of the highlight, in spans from the left end."""
 
 
 def run(recurrence, length, angle, phase, amplitude):
@@ -24,7 +26,7 @@ def run(recurrence, length, angle, phase, amplitude):
 
 
 def worst_state(recurrence, length, degrees, peak):
-    """Largest error of the state itself, as numbers.md has it, with the peak in this place of the span."""
+    """Largest error of the state itself; the peak lies at this part of the span."""
     angle = np.radians(degrees)
     states, _, exact = run(recurrence, length, angle, np.atleast_1d(peak) * angle, 1.0)
     half = 2.0 ** -(recurrence.fraction_bits + 1) if recurrence.form == "reinsch" else 0
@@ -36,7 +38,7 @@ def worst_state(recurrence, length, degrees, peak):
     [(64, 10, 16, 0.015), (256, 60, 16, 0.40), (4095, 60, 24, 0.40), (4095, 60, 32, 1.5e-3)],
 )
 def test_published_errors_of_the_direct_form(length, degrees, fraction_bits, published):
-    # The place of the peak is not published; this one gives all four figures.
+    # The position of the peak is not published; this one gives all four figures.
     error = worst_state(Recurrence("direct", fraction_bits), length, degrees, 0.79)
     half_digit = 0.05 * 10.0 ** np.floor(np.log10(published))
     assert error == pytest.approx(published, abs=half_digit)
@@ -45,8 +47,7 @@ def test_published_errors_of_the_direct_form(length, degrees, fraction_bits, pub
 @pytest.mark.parametrize(("fraction_bits", "published"), [(16, 6e-5), (24, 3e-7)])
 def test_published_errors_of_the_reinsch_form(fraction_bits, published):
     recurrence = Recurrence("reinsch", fraction_bits, guard_bits=20)
-    peaks = np.linspace(-1, 2, 31)
-    errors = [worst_state(recurrence, *span, peaks) for span in ((64, 10), (256, 60), (4095, 60))]
+    errors = [worst_state(recurrence, *span, PEAKS) for span in ((64, 10), (256, 60), (4095, 60))]
     assert published / 2 < max(errors) < published
 
 
@@ -58,19 +59,25 @@ def test_shortcut_cosine():
         assert 1 - (1 - shortcut_cosine(angle, steps)) / exact == pytest.approx(published, abs=0.0005)
 
 
+def assert_keeps_the_bound(recurrence, length, angle, phase, amplitude=LARGEST):
+    """Every result within `Recurrence.error`; gives the largest error."""
+    _, results, exact = run(recurrence, length, angle, phase, amplitude)
+    worst = np.abs(results - exact).max()
+    assert worst <= recurrence.error(length, angle)
+    return worst
+
+
 @pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45, 60, 89.9, 90])
 @pytest.mark.parametrize("length", [1, 2, 3, 4, 5, 8, 9, 16, 257, 4095])
-@pytest.mark.parametrize("interleave", INTERLEAVES)
-def test_stiff_spans_keep_the_bound(length, degrees, interleave):
+def test_stiff_spans_keep_the_bound(length, degrees):
     """The peak on a pixel, between two, inside and outside the span; every length and angle."""
     rng = np.random.default_rng(length)
-    recurrence = Recurrence(interleave=interleave)
     angle = np.radians(degrees) if length > 1 else 0.0
     peaks = np.r_[0, 0.5, 1, 0.5 + 0.5 / max(length - 1, 1), rng.uniform(-1, 2, 20)]
     phase = np.r_[peaks * angle, rng.uniform(-np.pi, np.pi, 40)]
     amplitude = np.r_[np.full(34, LARGEST), np.full(10, -LARGEST), rng.uniform(-LARGEST, LARGEST, 20)]
-    _, results, exact = run(recurrence, length, angle, phase, amplitude)
-    assert np.abs(results - exact).max() <= recurrence.error(length, angle)
+    for interleave in INTERLEAVES:
+        assert_keeps_the_bound(Recurrence(interleave=interleave), length, angle, phase, amplitude)
 
 
 @pytest.mark.parametrize("degrees", [120, 180])
@@ -78,23 +85,20 @@ def test_stiff_spans_keep_the_bound(length, degrees, interleave):
 @pytest.mark.parametrize("interleave", INTERLEAVES)
 def test_stiff_wide_spans_keep_the_bound(length, degrees, interleave):
     """The recurrence knows no span angle: past 90 degrees it goes on."""
-    recurrence, angle = Recurrence(interleave=interleave), np.radians(degrees)
-    _, results, exact = run(recurrence, length, angle, np.linspace(-1, 2, 31) * angle, LARGEST)
-    assert np.abs(results - exact).max() <= recurrence.error(length, angle)
+    angle = np.radians(degrees)
+    assert_keeps_the_bound(Recurrence(interleave=interleave), length, angle, PEAKS * angle)
 
 
 @pytest.mark.parametrize("interleave", INTERLEAVES)
-def test_stiff_peaks(interleave):
+@pytest.mark.parametrize("degrees", [1, 45, 90])
+def test_stiff_peaks(interleave, degrees):
     """On a pixel: the value that A rounds to; half-way between two: equal neighbours, both under it."""
-    recurrence, length = Recurrence(interleave=interleave), 33
-    for degrees in (1, 45, 90):
-        step = np.radians(degrees) / 32
-        bound = recurrence.error(length, 32 * step)
-        _, on, _ = run(recurrence, length, 32 * step, np.array([16 * step]), LARGEST)
-        assert abs(on[16, 0] - LARGEST) <= bound
-        _, between, _ = run(recurrence, length, 32 * step, np.array([15.5 * step]), LARGEST)
-        assert abs(between[15, 0] - between[16, 0]) <= 2 * bound
-        assert abs(between[15, 0] - LARGEST * np.cos(step / 2)) <= bound
+    recurrence, step = Recurrence(interleave=interleave), np.radians(degrees) / 32
+    bound = recurrence.error(33, 32 * step)
+    _, found, _ = run(recurrence, 33, 32 * step, np.array([16, 15.5]) * step, LARGEST)
+    assert abs(found[16, 0] - LARGEST) <= bound
+    assert abs(found[15, 1] - found[16, 1]) <= 2 * bound
+    assert abs(found[15, 1] - LARGEST * np.cos(step / 2)) <= bound
 
 
 def worst_words(recurrence, length, low, high):
@@ -138,40 +142,33 @@ def test_cut_alone_drifts_as_stated(interleave, stated):
     states = recurrence.states(first, second, coefficient, shift, 4095)
     np.testing.assert_array_equal(states.codes, states.codes[0, 0])
     steps = 4096 // interleave - 1 - (interleave == 1)
-    bend = coefficient.values[0] * 2.0**-44 * LARGEST * steps * (steps - 1) / 2
-    assert bend == pytest.approx(stated, rel=0.02)
-    assert 0.99 < bend / (format.step * steps * (steps - 1) / 2) < 1
+    drift = coefficient.values[0] * 2.0**-44 * LARGEST * steps * (steps - 1) / 2
+    assert drift == pytest.approx(stated, rel=0.02)
+    assert 0.99 < drift / (format.step * steps * (steps - 1) / 2) < 1
 
 
-def test_direct_form_is_unstable():
-    recurrence = Recurrence("direct")
-    for length in (16, 64, 200):
-        for degrees in (1, 10, 45):
-            angle = np.radians(degrees)
-            _, results, exact = run(recurrence, length, angle, np.linspace(0, 1, 21) * angle, LARGEST)
-            bound = recurrence.error(length, angle)
-            assert np.abs(results - exact).max() <= bound < 1.5
+@pytest.mark.parametrize(
+    ("interleave", "spans", "largest", "drift"),
+    [
+        (1, [(length, degrees) for length in (16, 64, 200) for degrees in (1, 10, 45)], 1.5, 0.25),
+        (4, [(64, 10), (256, 10), (800, 45)], 2, 0.02),
+    ],
+)
+def test_direct_form_is_unstable(interleave, spans, largest, drift):
+    """Interleaved its error is that of a quarter of the steps; in long spans no bound holds for either."""
+    recurrence, plain = Recurrence("direct", interleave=interleave), Recurrence("direct")
+    peaks = np.linspace(0, 1, 21)
+    for length, degrees in spans:
+        angle = np.radians(degrees)
+        bound = recurrence.error(length, angle)
+        assert_keeps_the_bound(recurrence, length, angle, peaks * angle)
+        assert bound < largest
+        limit = plain.error(length, angle)
+        assert interleave == 1 or bound < limit / 4 or limit == 3
     # Beyond, no bound but that of its words, and the error says why.
     angle = np.radians(45)
     assert recurrence.error(4095, angle) == 3
-    _, results, exact = run(recurrence, 4095, angle, np.linspace(0, 1, 21) * angle, LARGEST)
-    assert np.abs(results - exact).max() > 0.25
-
-
-def test_interleaved_direct_form_is_a_little_better():
-    """Its error is that of a quarter of the steps; beyond 1200 pixels there is no bound for it either."""
-    plain, interleaved = Recurrence("direct"), Recurrence("direct", interleave=4)
-    for length, degrees in ((64, 10), (256, 10), (800, 45)):
-        angle = np.radians(degrees)
-        _, results, exact = run(interleaved, length, angle, np.linspace(0, 1, 21) * angle, LARGEST)
-        error = np.abs(results - exact).max()
-        bound = interleaved.error(length, angle)
-        assert error <= bound < 2
-        assert bound < plain.error(length, angle) / 4 or plain.error(length, angle) == 3
-    angle = np.radians(45)
-    assert interleaved.error(4095, angle) == 3
-    _, results, exact = run(interleaved, 4095, angle, np.linspace(0, 1, 21) * angle, LARGEST)
-    assert np.abs(results - exact).max() > 0.02
+    assert assert_keeps_the_bound(recurrence, 4095, angle, peaks * angle) > drift
 
 
 @pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45, 89.9, 90])
@@ -200,9 +197,9 @@ def test_prologue_gives_what_start_gives():
     single, interleaved = Recurrence(), Recurrence(interleave=4)
     step, phase = np.radians(np.geomspace(1e-5, 11, 500)), np.linspace(-3, 3, 500)
     found = interleaved.prologue(*single.start(LARGEST, phase, step), *single.coefficient(step))
-    bend = (1.01 * step**2 + 2.0**-47) * 2.0**-16 + 2.0**-44
-    for word, exact, bends in zip(found, interleaved.start(LARGEST, phase, step), (3, 18), strict=True):
-        assert np.all(np.abs(word.values - exact.values).max(axis=1) <= bends * bend + 2.0**-42)
+    error = (1.01 * step**2 + 2.0**-47) * 2.0**-16 + 2.0**-44
+    for word, exact, factor in zip(found, interleaved.start(LARGEST, phase, step), (3, 18), strict=True):
+        assert np.all(np.abs(word.values - exact.values).max(axis=1) <= factor * error + 2.0**-42)
 
 
 def test_start_values_from_short_sines():
@@ -210,9 +207,9 @@ def test_start_values_from_short_sines():
     recurrence, length, angle = Recurrence(interleave=4), 4095, np.radians(60)
     step = np.full(100, angle / 4094)
     phase = np.linspace(-1, 2, 100) * angle
-    place = np.arange(4)
-    sine = np.floor(np.sin(phase[:, np.newaxis] - (place + 2) * step[:, np.newaxis]) * 2.0**17) * 2.0**-17
-    first = np.floor(np.cos(phase[:, np.newaxis] - place * step[:, np.newaxis]) * 2.0**17) * 2.0**-17
+    phases = np.arange(4)
+    sine = np.floor(np.sin(phase[:, np.newaxis] - (phases + 2) * step[:, np.newaxis]) * 2.0**17) * 2.0**-17
+    first = np.floor(np.cos(phase[:, np.newaxis] - phases * step[:, np.newaxis]) * 2.0**17) * 2.0**-17
     first, second = (
         Fixed.round(recurrence.state_format, LARGEST * word)
         for word in (first, 2 * np.sin(2 * step)[:, np.newaxis] * sine)
@@ -280,28 +277,32 @@ def test_stiff_steps_past_those_of_an_interleaved_span():
 def test_result_of_more_bits(form, length, degrees):
     """The bound without the last rounding holds; in the stable form it says more than that of 17 bits."""
     short, long = (Recurrence(form, result_format=format) for format in (SQ(1, 17), SQ(2, 25)))
-    angle = np.radians(degrees) if length > 1 else 0.0
-    _, results, exact = run(long, length, angle, np.linspace(-1, 2, 31) * angle, LARGEST)
-    bound = long.error(length, angle)
-    assert np.abs(results - exact).max() <= bound
+    angle = np.radians(degrees)
+    assert_keeps_the_bound(long, length, angle, PEAKS * angle)
     if form == "reinsch" and degrees <= 1:
-        assert bound < short.error(length, angle) / 4
+        assert long.error(length, angle) < short.error(length, angle) / 4
 
 
-def test_refusals():
-    for format in (UQ(1, 25), SQ(2, 45)):
-        with pytest.raises(ValueError, match=r"^result_format must be signed, of at most 44 fraction bits, "):
-            Recurrence(result_format=format)
-    with pytest.raises(ValueError, match=r"^interleave must be 1 or 4, not 2$"):
-        Recurrence(interleave=2)
-    with pytest.raises(ValueError, match=r"^form must be one of reinsch, direct, not 'sine'$"):
-        Recurrence("sine")
-    for bits in (7, 33):
-        with pytest.raises(ValueError, match=rf"^fraction_bits must be 8 to 32, not {bits}$"):
-            Recurrence("direct", bits)
-    for bits in (9, 29):
-        with pytest.raises(ValueError, match=rf"^guard_bits must be 10 to 28, not {bits}$"):
-            Recurrence(guard_bits=bits)
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"result_format": UQ(1, 25)}, "result_format must be signed, of at most 44 fraction bits, "),
+        ({"result_format": SQ(2, 45)}, "result_format must be signed, of at most 44 fraction bits, "),
+        ({"interleave": 2}, "interleave must be 1 or 4, not 2$"),
+        ({"form": "sine"}, "form must be one of reinsch, direct, not 'sine'$"),
+        *(
+            ({"form": "direct", "fraction_bits": bits}, f"fraction_bits must be 8 to 32, not {bits}$")
+            for bits in (7, 33)
+        ),
+        *(({"guard_bits": bits}, f"guard_bits must be 10 to 28, not {bits}$") for bits in (9, 29)),
+    ],
+)
+def test_refuses(arguments, message):
+    with pytest.raises(ValueError, match=f"^{message}"):
+        Recurrence(**arguments)
+
+
+def test_refuses_operands():
     recurrence = Recurrence()
     for step in (-1e-9, 1.58, np.nan):
         with pytest.raises(ValueError, match=r"^steps must be 0 to 90 degrees$"):
