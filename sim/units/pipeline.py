@@ -1,0 +1,356 @@
+"""Record of the shading pipeline."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.number.spans import pixels_of
+from blysk.golden.number.unit_vector import ONE, quantise
+from blysk.golden.pipeline import Build, Design, Spans
+from blysk.golden.presets import METHODS, preset
+from blysk.golden.reference.curves import interpolate
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.frames.frame import beats_of
+from blysk.sim.frames.testbench import pixel_beats
+from blysk.sim.units.cosines.local_chord_setup import values_of
+from blysk.sim.units.methods.interpolator import SPAN
+from blysk.sim.units.operands import (
+    degrees_between,
+    short_lengths,
+    span_lengths,
+    sphere,
+    spread_angles,
+    turned,
+)
+from blysk.sim.units.pipeline_spans import (
+    any_constants,
+    any_spans,
+    axes_about,
+    constants_written,
+    flat_spans,
+    joined,
+    operands_of,
+    spans_about,
+    spans_at_rounding,
+    spans_in_highlight,
+    spans_near_terminator,
+)
+from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
+
+__all__ = ["DESIGNS", "LONG_DESIGNS", "RECORD", "case_of", "spans_of"]
+
+_GROUPS = 8
+"""Exponents of a measurement: so many parts of the spans have one each."""
+
+_COUNTED = (1 << 16) + 2
+"""Spans that a counter of 16 bits does not hold."""
+
+
+# Errors.
+
+
+def _measure(rng, count, design):
+    """A channel of grey pixels, of 255."""
+    interpolator, model = design.interpolator, design.specular.model
+    reflection = {"ambient": 0.1, "diffuse": 0.5, "specular": 0.4}
+    ambient, k_d, k_s = reflection.values()
+    grey = {name: np.tile(Intensity.color(k), 3) for name, k in reflection.items()}
+    exponents = [1, 10, 100, MAX_EXPONENT]
+    exponents += np.floor((MAX_EXPONENT + 1) ** rng.random(_GROUPS - len(exponents))).astype(int).tolist()
+
+    def samples():
+        for exponent, length in zip(
+            exponents, np.array_split(span_lengths(rng, count), _GROUPS), strict=True
+        ):
+            viewer = sphere(rng, 1)
+            light = turned(rng, viewer, rng.uniform(0, 120, 1))
+            halfway = normalise(light + viewer)
+            largest = min(interpolator.widest_span(exponent), 45.0)
+            around = np.repeat(halfway, len(length), axis=0)
+            left = turned(rng, around, rng.permutation(spread_angles(rng, len(length), 60.0)))
+            right = turned(rng, left, rng.permutation(spread_angles(rng, len(length), largest)))
+            left, right, light, halfway = (quantise(v) for v in (left, right, light, halfway))
+            colors = (grey[name][np.newaxis] for name in ("diffuse", "specular"))
+            constants = FrameConstants(exponent, grey["ambient"], light, halfway, *colors)
+            zero = np.zeros_like(length)
+            found = design.compute(Spans(zero, zero, length, left, right), constants).color[:, 0]
+            span, pixel = pixels_of(length)
+            t = pixel / np.maximum(length - 1, 1)[span]
+            ends = [normalise(end / ONE)[span] for end in (left, right)]
+            shades = []
+            for normal, reflect in (
+                (interpolate("normalised", *ends, t), REFLECTION_MODELS["blinn"].reflect),
+                (interpolator.exact_normals(*ends, t), model.reflect),
+            ):
+                cosine = normal @ light[0] / ONE
+                highlight = reflect(normal @ halfway[0] / ONE, exponent) * (cosine > 0)
+                shades.append(255 * np.minimum(ambient + k_d * np.maximum(cosine, 0) + k_s * highlight, 1))
+            # Behind the light the highlight is cut off at once, wherever rounding puts that.
+            kept = cosine > 1 / 16
+            angle = degrees_between(left, right)[span[kept], 0]
+            yield Sample(found[kept].astype(np.float64), shades[0][kept], shades[1][kept], angle)
+
+    return Sample.joined(samples())
+
+
+# Expected results.
+
+
+def spans_of(beats) -> Spans:
+    """Spans that input beats of a pipeline carry."""
+    none = np.zeros((len(beats["length"]), 3), dtype=np.int64)
+    normals = (beats.get(name, none) for name in ("normal_left", "normal_right"))
+    values = values_of(beats) if "values" in beats else None
+    return Spans(beats["x"], beats["y"], beats["length"], *normals, beats.get("material"), values)
+
+
+def _pixels(unit, case):
+    design = unit.parameters
+    return design.compute(spans_of(case.beats), constants_written(design, case.write))
+
+
+def _expect(unit, case):
+    return pixel_beats(_pixels(unit, case))
+
+
+def _status(unit, case):
+    length, most = case.beats["length"], 65535
+    return {
+        "out_of_range_spans": min(_pixels(unit, case).out_of_range_spans, most),
+        "empty_spans": min(int(np.count_nonzero(length == 0)), most),
+        "overrun": int(np.any(case.beats["x"] + length > 1 << unit.parameters.x_bits)),
+    }
+
+
+# Stimuli.
+
+
+def case_of(unit, spans: Spans, constants, *before: int) -> Case:
+    """Spans under the constants of each material, which are written over others of these codes."""
+    write = writes_of(constants if isinstance(constants, list) else [constants])
+    parts = [{"address": write["address"], "data": np.full_like(write["data"], code)} for code in before]
+    write = {name: np.concatenate([part[name] for part in (*parts, write)]) for name in write}
+    return Case(beats_of(unit, spans), write=write)
+
+
+def _spans(unit, rng, count):
+    """Spans of every length and angle, some empty, some out of range; the highlights are on some of them."""
+    design = unit.parameters
+    spans = any_spans(rng, design, short_lengths(rng, count))
+    return case_of(unit, spans, any_constants(rng, design, spans, rng.choice([1.0, 8.0])))
+
+
+def _every_setup(unit, rng, count):
+    """Spans of a pixel in a row, which wait for the setup; then long ones."""
+    design = unit.parameters
+    length = np.r_[np.full(count, 1), rng.integers(1, 12, count), rng.integers(600, 4096, 8), np.full(9, 1)]
+    spans = any_spans(rng, design, length)
+    return case_of(unit, spans, any_constants(rng, design, spans))
+
+
+def _border(design, rng):
+    """Constants of eight times the full light, steep at the terminator; and the light's vector."""
+    light, peak = (quantise(v)[np.newaxis] for v in sphere(rng, 2))
+    colors = (Intensity.color(np.array([color])) for color in ((8, 7, 6), (0.03, 0.5, 0.1)))
+    return FrameConstants(1, np.zeros(3, dtype=int), light, peak, *colors), light[0]
+
+
+def _terminator(unit, rng, count):
+    """Spans on the terminator of eight times the full light: there the last bits of N.L show."""
+    constants, light = _border(unit.parameters, rng)
+    spans = spans_near_terminator(rng, unit.parameters.interpolator.MAX_ANGLE - 0.01, light)
+    return case_of(unit, spans, constants, 0x3FFFF)
+
+
+def _roundings(unit, rng, count):
+    """Spans whose 1 - cosine is next to the border of a rounding, and normals along the axes."""
+    constants, light = _border(unit.parameters, rng)
+    largest = unit.parameters.interpolator.MAX_ANGLE - 0.01
+    spans = joined(rng, spans_at_rounding(rng, largest, normalise(light)), axes_about(rng, largest))
+    return case_of(unit, spans, constants, 0x3FFFF)
+
+
+def _long_spans(unit, rng, count):
+    """Long spans of large angles in a row, on the terminator: setups wait; last bits of differences show."""
+    constants, light = _border(unit.parameters, rng)
+    largest = unit.parameters.interpolator.MAX_ANGLE - 0.01
+    normals = normalise(np.cross(rng.normal(size=(304, 3)), light))
+    row = spans_about(rng, largest, normals[4:], 4095, decades=1)
+    farthest = spans_about(rng, largest, normals[:4], 4095, decades=0)
+    farthest.x[:], farthest.length[:] = 0, 4095
+    return case_of(unit, joined(rng, row[row.length > 600][:60], farthest), constants, 0x3FFFF)
+
+
+def _highlights(unit, rng, count, *, exponent, invert):
+    """Spans inside a steep highlight of H, or of its opposite: every bit of H is 0 once, and 1 once."""
+    peak = sphere(rng, 1)[0]
+    direction = normalise(sphere(rng, 1)[0] + 3 * peak)
+    peak, direction = (quantise(v) ^ -invert for v in (peak, direction))
+    colors = (Intensity.color(np.array([color])) for color in ((0, 0.01, 0), (8, 7, 6)))
+    vectors = direction[np.newaxis], peak[np.newaxis]
+    constants = FrameConstants(exponent, np.zeros(3, dtype=int), *vectors, *colors)
+    largest = unit.parameters.interpolator.MAX_ANGLE - 0.01
+    spans = spans_in_highlight(rng, largest, normalise(peak), exponent)
+    return case_of(unit, spans, constants, 0x3FFFF)
+
+
+def _halves(unit, rng, count):
+    """Channels of a half, and of the least step less: there every bit of either term's product counts."""
+    # For a pixel's terms d and s and a diffuse colour c the specular colour is
+    # (2^22 - 0 or 1 - 2^17 ambient - c d) / s modulo 2^23, where it is a colour.
+    design, candidates = unit.parameters, 8192
+    halfway = sphere(rng, 1)[0]
+    spans = flat_spans(quantise(halfway)[np.newaxis])
+    constants = replace(
+        any_constants(rng, design, spans, 0.5)[0],
+        exponent=int(1000 ** rng.uniform()),
+        direction=quantise(normalise(halfway + 0.5 * rng.normal(size=3)))[np.newaxis],
+    )
+    away = rng.normal(size=(candidates, 3)) / np.sqrt(constants.exponent)
+    flat = flat_spans(quantise(normalise(halfway + away)))
+    cosine, highlight, dark = operands_of(design, flat, constants)
+    d = Diffuse(cosine.format).compute(cosine).codes
+    s = design.specular.compute(highlight, dark, constants.exponent).codes
+    # The inverse of an odd number: each step doubles its bits, of which three are right at the start.
+    inverse = s
+    for _ in range(3):
+        inverse = inverse * (2 - s * inverse % (1 << 23)) % (1 << 23)
+    others = (constants.ambient << 17) + constants.diffuse * d
+    half = (1 << 22) - rng.integers(0, 2, (candidates, 3))
+    color = (half - others) * inverse % (1 << 23)
+    fits = (s % 2 == 1) & (color <= Intensity.color(8.0)) & (others + color * s < 255 << 23)
+    chosen = [rng.choice(np.flatnonzero(fits[:, channel])) for channel in range(3)]
+    constants.specular[0] = color[chosen, range(3)]
+    return case_of(unit, flat[np.repeat(chosen, -(-count // 3))], constants)
+
+
+def _brightest(unit, rng, count):
+    """Three terms of eight times the full channel, written over constants of all bits 1 and 0."""
+    design = unit.parameters
+    spans = any_spans(rng, design, short_lengths(rng, count))
+    (constants,) = any_constants(rng, design, spans)
+    constants.direction[:] = constants.halfway
+    for color in (constants.ambient, constants.diffuse, constants.specular):
+        color[...] = Intensity.color(np.array(8.0))
+    return case_of(unit, spans, constants, 0x3FFFF, 0, 0x3FFFF)
+
+
+def _counters(unit, rng, count):
+    """More spans that are out of range, and more empty ones, than the counters hold; one past the last x."""
+    design = unit.parameters
+    kinds = any_spans(rng, design, np.array([1, 0, 2]))
+    kinds.normal_right[:] = -kinds.normal_left
+    kinds.x[2] = (1 << design.x_bits) - 1
+    spans = kinds[np.r_[np.repeat([0, 1], _COUNTED), 2]]
+    return case_of(unit, spans, any_constants(rng, design, kinds))
+
+
+# Variants.
+
+
+_CHORD = preset("chord")
+_FULL = preset("chord", lights=2, gate=True)
+_LESS = {"x_bits": 9, "y_bits": 8, "length_bits": 5}
+
+DESIGNS: dict[str, Design] = {
+    "3 lights": preset(model="cosquad7", lights=3),
+    "3 materials": preset(lights=2, materials=3, operand="one_minus_cosine"),
+    "compact": preset("chord", "lyon3", 2, style="compact"),
+    "compact, normals and a power": preset("linear", "blinn", style="compact"),
+    "gate": preset("chord", "coscos2", gate=True),
+    "gate, compact": preset("quadratic", "lyon3", gate=True, style="compact"),
+    "exponent": preset("chord", "coscos4", 2, exponent=60),
+    "no specular light, grey, few bits": replace(_FULL, specular=None, gate=False, grey=True, **_LESS),
+    "without lights": preset(lights=0, materials=2),
+}
+"""Pipelines by name that differ from those of the methods and models in what they have."""
+
+LONG_DESIGNS: dict[str, Design] = {
+    "16 lights": preset(lights=16),
+    "linear of a chord": preset("linear", "lyon3", operand="one_minus_cosine"),
+    "bisection of a chord": preset("bisection", lights=2, operand="one_minus_cosine"),
+    "quadratic of a chord": preset("quadratic", "coscos2", 2, operand="one_minus_cosine"),
+    "quadratic-eval of a chord": preset("quadratic-eval", "exp", operand="one_minus_cosine"),
+    "quadratic-horner of a chord": preset("quadratic-horner", operand="one_minus_cosine"),
+    "renormalise of a chord": preset("renormalise", lights=2, operand="one_minus_cosine"),
+    "quadratic, power": preset("quadratic", "blinn"),
+    "values, 2 lights": preset("chord-local", lights=2),
+    "values, compact, 3 materials": preset("chord-local", materials=3, style="compact"),
+    "compact, chord": preset("chord", style="compact"),
+    "compact, exponent": preset("quadratic", "exp", exponent=20, style="compact"),
+    "gate, 2 lights, compact": preset("chord", lights=2, gate=True, style="compact"),
+    "gate, quadratic": preset("quadratic", lights=2, gate=True),
+    "gate, linear of a chord": preset("linear", "lyon3", operand="one_minus_cosine", gate=True),
+    "gate, bisection": preset("bisection", "exp", gate=True),
+    "gate, angular": preset("angular", gate=True),
+    "gate, recurrence": preset("recurrence", lights=2, gate=True),
+    "gate, renormalise": preset("renormalise", "blinn", gate=True),
+    "gate, compact, power": preset("quadratic-horner", "blinn", gate=True, style="compact"),
+    "gate, exponent": replace(_FULL, build=Build(exponent=20)),
+    "grey": preset("chord", None, grey=True),
+    "few bits": replace(_FULL, **_LESS),
+}
+"""Further ones, of the long run."""
+
+
+def _variants():
+    designs = [("quadratic", model) for model in ("cosquad", "cosquad7", "cosquad_lin")]
+    designs += [(method, "cosquad") for method in METHODS if method not in ("quadratic", "chord-local")]
+    designs += [("chord", "exp"), ("chord", "blinn")]
+    for method, model in designs:
+        design = preset(method, model)
+        note = "; the bisection's fit counts as arithmetic" * (method == "bisection")
+        yield (
+            f"{method}, {model}",
+            Variant(
+                partial(ShadingPipelineUnit, design),
+                partial(_measure, design=design),
+                "spans to what the method asks for, 45 degrees at most, 1 to 4095 pixels, n 1 to 1000, "
+                "N.L > 1/16",
+                "LSB",
+                beat=SPAN,
+                note=f"one light, against normalised Phong interpolation with Blinn's power{note}",
+                long=model != "cosquad",
+            ),
+        )
+    yield "chord-local", Variant(partial(ShadingPipelineUnit, preset("chord-local")))
+    for name, design in DESIGNS.items():
+        yield name, Variant(partial(ShadingPipelineUnit, design))
+    for name, design in LONG_DESIGNS.items():
+        yield name, Variant(partial(ShadingPipelineUnit, design), long=True)
+
+
+RECORD = Record(
+    name="pipeline",
+    title="Raster spans to pixels: an interpolator, light units and colours",
+    source="docs/theory/units.md#pipeline; [T] figure 4.10",
+    variants=dict(_variants()),
+    expect=_expect,
+    status=_status,
+    stimuli={
+        "spans": Stimulus(_spans, 3000),
+        "setups": Stimulus(_every_setup, 60, stalled=False),
+        "terminator": Stimulus(_terminator),
+        "roundings": Stimulus(_roundings),
+        "long spans": Stimulus(_long_spans, stalled=False),
+        "highlights": Stimulus(partial(_highlights, exponent=1000, invert=0)),
+        "highlights, inverted": Stimulus(partial(_highlights, exponent=30, invert=1)),
+        "halves": Stimulus(_halves, 30, repeats=12),
+        "brightest": Stimulus(_brightest, 800, stalled=False),
+        "counters": Stimulus(_counters, stalled=False),
+    },
+    waivers={
+        "multiplier_1_0": "While the output is stalled, the register holds no factor that is still read.",
+        "g_1": "It is for the saturation of G, which between unit normals is less than 0.45.",
+        "constants": "A slope, n of 10 bits normalised to 17, ends in seven zeros: the bit is 0.",
+        "cosine_2": "2^-34 of the cosine of a span's ends counts only within that of a border of 18 bits.",
+    },
+    still={},
+)

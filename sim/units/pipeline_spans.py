@@ -1,0 +1,240 @@
+"""Spans and constants for the pipeline: anywhere, and where the last bits of a result decide a pixel."""
+
+import numpy as np
+
+from blysk.golden.frame_constants import (
+    FIELDS_OF_A_FRAME,
+    FIELDS_OF_A_LIGHT,
+    LIGHT_STRIDE,
+    MATERIAL_ADDRESS,
+    FrameConstants,
+)
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, quantise
+from blysk.golden.pipeline import Design, Spans
+from blysk.golden.reference.geometry import normalise
+from blysk.sim.units.cosines.local_chord_setup import any_values
+from blysk.sim.units.operands import pairs_at, pairs_chosen, turned, unit_codes
+
+__all__ = [
+    "any_constants",
+    "any_spans",
+    "axes_about",
+    "constants_written",
+    "flat_spans",
+    "joined",
+    "operands_of",
+    "spans_about",
+    "spans_at_rounding",
+    "spans_in_highlight",
+    "spans_near_terminator",
+]
+
+_LONG_AND_SHORT = ((200, 4095), (3000, 12))
+"""Numbers of spans, and their longest."""
+
+
+# Constants.
+
+
+def any_constants(
+    rng: np.random.Generator, design: Design, spans: Spans, brightness: float = 1.0
+) -> list[FrameConstants]:
+    """Constants of each material; L and H are normals of spans, so that highlights are among the pixels."""
+    lights = design.lights
+    direction, halfway = (unit_codes(rng, lights) for _ in range(2))
+    if lights and len(spans) and not design.takes_values:
+        direction[:] = spans.normal_right[rng.integers(0, len(spans), lights)]
+        halfway[:] = spans.normal_left[rng.integers(0, len(spans), lights)]
+    found = []
+    for _ in range(design.materials):
+        exponent = design.build.exponent or int(rng.choice([1, 20, 200, 1000, rng.integers(1, 1001)]))
+        colors = [Intensity.color(rng.uniform(0, brightness, (lights, 3))) for _ in range(2)]
+        if design.specular is None:
+            colors[1][:] = 0
+        ambient = Intensity.color(rng.uniform(0, 0.2, 3))
+        found.append(FrameConstants(exponent, ambient, direction, halfway, *colors))
+    return found
+
+
+def constants_written(design: Design, write: dict[str, np.ndarray]) -> list[FrameConstants]:
+    """Constants of each material after so many writes, of a pipeline in which all were 0."""
+    words = np.zeros((design.materials, (design.lights + 1) * LIGHT_STRIDE), dtype=np.int64)
+    index = 0
+    for address, data in zip(write["address"].tolist(), write["data"].tolist(), strict=True):
+        if design.materials > 1 and address == MATERIAL_ADDRESS:
+            index = data
+        elif address < words.shape[1]:
+            # L and H are those of the frame.
+            of_frame = address >= LIGHT_STRIDE and address % LIGHT_STRIDE < FIELDS_OF_A_LIGHT["diffuse"][0]
+            words[slice(None) if of_frame else index, address] = data
+    by_light = words.reshape(design.materials, -1, LIGHT_STRIDE)[:, 1:]
+    found = []
+    for material, lights in zip(words, by_light, strict=True):
+        fields = {name: lights[:, first : first + n] for name, (first, n) in FIELDS_OF_A_LIGHT.items()}
+        for name in ("direction", "halfway"):
+            fields[name] = (fields[name] ^ 1 << 17) - (1 << 17)
+        for name in ("diffuse", "specular"):
+            fields[name] = fields[name] & Intensity.COLOR_FORMAT.max_code
+        first, count = FIELDS_OF_A_FRAME["ambient"]
+        ambient = material[first : first + count] & Intensity.COLOR_FORMAT.max_code
+        found.append(FrameConstants(int(material[0]) & 0x3FF, ambient, **fields))
+    return found
+
+
+# Spans.
+
+
+def any_spans(rng: np.random.Generator, design: Design, length: np.ndarray) -> Spans:
+    """Spans of such lengths; some flat, some of a larger angle than the method serves; by material."""
+    count = len(length)
+    largest = min(design.interpolator.MAX_ANGLE, 179.0)
+    angles = np.where(rng.random(count) < 0.1, rng.uniform(largest, 180, count), largest * rng.random(count))
+    angles[::20] = 0
+    left, right = (quantise(normals) for normals in pairs_at(rng, count, angles))
+    length = length % (1 << design.length_bits)
+    return Spans(
+        x=rng.integers(0, np.maximum((1 << design.x_bits) - length, 1)),
+        y=rng.integers(0, 1 << design.y_bits, count),
+        length=length,
+        normal_left=left,
+        normal_right=right,
+        material=np.sort(rng.integers(0, design.materials, count)),
+        values=any_values(rng, count, design.lights) if design.takes_values else None,
+    )
+
+
+def flat_spans(normals: np.ndarray) -> Spans:
+    """Spans of a pixel each, with normals of these codes."""
+    zero = np.zeros(len(normals), dtype=np.int64)
+    return Spans(zero, zero, zero + 1, normals, normals)
+
+
+def joined(rng: np.random.Generator, *kinds: Spans) -> Spans:
+    """All spans of several kinds, mixed."""
+    names = ("x", "y", "length", "normal_left", "normal_right")
+    spans = Spans(*(np.concatenate([getattr(kind, name) for kind in kinds]) for name in names))
+    return spans[rng.permutation(len(spans))]
+
+
+def spans_about(
+    rng: np.random.Generator, largest: float, middles: np.ndarray, longest: int, decades: int = 4
+) -> Spans:
+    """Spans whose middle normals are given, of angles and lengths by their logarithm.
+
+    Parameters
+    ----------
+    rng : Generator
+        Of the random numbers.
+    largest : float
+        Largest angle, degrees.
+    middles : array, shape (spans, 3)
+        Unit vectors.
+    longest : int
+        Pixels.
+    decades : int
+        Of the angles.
+    """
+    count = len(middles)
+    across = normalise(np.cross(middles, rng.normal(size=middles.shape)))
+    angles = np.radians(largest * 10.0 ** rng.uniform(-decades, 0, (count, 1)))
+    left, right = (
+        quantise(middles * np.cos(angles / 2) + side * across * np.sin(angles / 2)) for side in (-1, 1)
+    )
+    length = ((longest + 1) ** rng.uniform(0, 1, count)).astype(int)
+    return Spans(rng.integers(0, 4097 - length), rng.integers(0, 4096, count), length, left, right)
+
+
+def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.ndarray) -> Spans:
+    """Spans on the terminator, the border of light and shade, of a light with a vector of this code.
+
+    Among them those that start within some last bits of it, as whether there is a highlight depends on the
+    sign of N.L, of 34 bits or rounded to 25; those that cross it as slowly as they can; and those along which
+    N.L rises by half a step of 18 bits more than a whole number of them, to which the chord method rounds.
+    """
+    light = normalise(code)
+
+    def normals(count, least=0.0, most=0.0):
+        height = rng.uniform(least, most, (count, 1))
+        return normalise(normalise(np.cross(rng.normal(size=(count, 3)), light)) + height * light)
+
+    moves = np.stack(np.mgrid[-30:31, -30:31, -30:31], axis=-1).reshape(-1, 3)
+    moves = moves[np.argsort(moves @ code)]
+    rises = moves @ code
+    border, tie = (spans_about(rng, 0.1, normals(count), 60) for count in (6000, 1500))
+    crossing = spans_about(rng, 0.01, normals(250), 4095, decades=1)
+    away = rng.choice([0, 1 << 8], len(border)) + rng.integers(-16, 17, len(border))
+    away -= border.normal_left @ code
+    nearest = np.searchsorted(rises[:-1], away)
+    border.normal_left[:] += moves[nearest]
+    border = border[np.argsort(np.abs(away - rises[nearest]))[:600]]
+    halves = np.argsort(np.abs((rises & 0xFFFF) - 0x8000))[:40]
+    tie.normal_right[:] = tie.normal_left + moves[rng.choice(halves, len(tie))]
+    # Among short ones some are out of range.
+    lit = (
+        spans_about(rng, most, normals(count, -0.02, 0.12), longest)
+        for most, (count, longest) in zip((largest, 180.0), _LONG_AND_SHORT, strict=True)
+    )
+    return joined(rng, *lit, border, tie, crossing)
+
+
+def spans_at_rounding(rng: np.random.Generator, largest: float, light: np.ndarray) -> Spans:
+    """Spans along the terminator whose 1 - cosine depends on its last bits.
+
+    Either it is at the border of its rounding, or the number of segments into which bisection divides the
+    span is about to change.
+    """
+    normaliser = AdaptiveNormaliser()
+    across = normalise(np.cross(light, rng.normal(size=3)))
+    angle = np.radians(rng.uniform(-largest / 2, largest / 2, (3000, 1)))
+    height = rng.uniform(0, 0.1, (3000, 1))
+    arc = np.cos(angle) * across + np.sin(angle) * np.cross(light, across) + height * light
+    left, right = np.split(quantise(normalise(arc)), 2)
+
+    def levels(u, move):
+        return normaliser.levels(
+            Fixed(normaliser.bisection.ANGLE_FORMAT, (u + (1 << 16) >> 17) + move), False
+        )
+
+    chosen = (
+        (500, lambda u: abs((u + (1 << 15)) % (1 << 16) - (1 << 15)) < 8),
+        (200, lambda u: levels(u, -1) != levels(u, 1)),
+    )
+    kinds = []
+    for count, choose in chosen:
+        pairs = np.stack(pairs_chosen(left, right, choose), axis=1)
+        kinds.append(rng.choice(pairs, count))
+    first, second = np.concatenate(kinds).swapaxes(0, 1)
+    length, (x, y) = rng.integers(3, 60, len(first)), rng.integers(0, 4000, (2, len(first)))
+    return Spans(x, y, length, first, second)
+
+
+def spans_in_highlight(rng: np.random.Generator, largest: float, halfway: np.ndarray, exponent: int) -> Spans:
+    """Spans inside a highlight, 1 - N.H up to 2/n; most where it is an eighth of its peak and less."""
+    kinds = []
+    for count, longest in _LONG_AND_SHORT:
+        least = np.where(rng.random(count) < 0.2, 0.0, 0.6)
+        cosine = 1 - rng.uniform(least, 0.9) * 2 / exponent
+        middles = turned(rng, np.tile(halfway, (count, 1)), np.degrees(np.arccos(cosine)))
+        kinds.append(spans_about(rng, largest, middles, longest))
+    return joined(rng, *kinds)
+
+
+def axes_about(rng: np.random.Generator, largest: float) -> Spans:
+    """Spans whose normals are components of 1, which are rounded to the largest word."""
+    axes = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 40, axis=0)
+    return spans_about(rng, largest, axes, 60)
+
+
+# Operands.
+
+
+def operands_of(design: Design, spans: Spans, constants: FrameConstants) -> tuple[Fixed, Fixed, np.ndarray]:
+    """N.L, the specular operand, and whether the light is behind, by the bit-accurate model."""
+    vectors = (spans.normal_left, spans.normal_right, constants.direction, constants.halfway)
+    left, right, direction, halfway = (Fixed(COMPONENT, codes) for codes in vectors)
+    operands = design.interpolator.compute(left, right, spans.length, direction, halfway)
+    return operands.cosine, operands.highlight, Diffuse(operands.cosine.format).dark(operands.cosine)
