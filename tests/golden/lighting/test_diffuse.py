@@ -1,4 +1,4 @@
-"""Diffuse twin against the exact cosine."""
+"""Model of the diffuse unit against the exact cosine."""
 
 import numpy as np
 import pytest

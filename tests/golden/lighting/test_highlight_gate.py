@@ -1,24 +1,19 @@
-"""Highlight gate: every decision at reduced width, spans at full width through the pipeline's twin."""
+"""Highlight gate: every decision at reduced width, spans at full width through the pipeline's model."""
 
 import numpy as np
 import pytest
 
-from blysk.golden.cosines.chord import Chord
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.interpolator import NormalInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
-from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
-from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.dot_product import DotProduct
-from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
-from blysk.golden.presets import preset
-from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.sim.units.lighting.highlight_gate import spans_about
+from blysk.sim.units.operands import code_pairs_at, component_words, pairs_at, sphere, unit_codes
 
 from ...lists import FURTHER_MODELS, SPECULAR_MODELS
 
@@ -93,40 +88,21 @@ def test_every_pair_of_unit_codes_at_reduced_width():
 
 def random_spans(rng, count, exponent, gate):
     """Normals and H about which the largest N·H of the arc is near the threshold, inside or at an end."""
-    angle = np.radians(
-        rng.choice([0.0, 1e-4, 0.1, 1.0, 44.99, -1.0], count, p=[0.05, 0.05, 0.1, 0.1, 0.1, 0.6])
-    )
-    angle = np.where(angle < 0, np.radians(rng.uniform(0, 45, count)), angle)
-    left = normalise(rng.normal(size=(count, 3)))
-    side = np.cross(left, normalise(rng.normal(size=(count, 3))))
-    side = normalise(side)
-    across = np.cross(left, side)
-    right = left * np.cos(angle)[:, np.newaxis] + side * np.sin(angle)[:, np.newaxis]
+    degrees = rng.choice([0.0, 1e-4, 0.1, 1.0, 44.99, -1.0], count, p=[0.05, 0.05, 0.1, 0.1, 0.1, 0.6])
+    degrees = np.where(degrees < 0, rng.uniform(0, 45, count), degrees)
     tau = np.sqrt(gate.thresholds.values[exponent])
-    width = 10.0 ** rng.uniform(-5.3, -1, count) * (1 - tau)
-    level = np.minimum(tau + rng.choice([-1, 1], count, p=[0.8, 0.2]) * width, 1.0)
-    # The highest point of the great circle, at most as far out as the level allows.
-    turn = rng.choice([0.0, 0.5, 1.0, -1.0], count, p=[0.1, 0.2, 0.1, 0.6]) * angle
-    turn = np.where(turn < 0, rng.uniform(-0.2, 1.2, count) * angle, turn)
-    outside = np.maximum(np.maximum(-turn, turn - angle), 0)
-    projection = np.minimum(level / np.cos(outside), 1.0)[:, np.newaxis]
-    top = left * np.cos(turn)[:, np.newaxis] + side * np.sin(turn)[:, np.newaxis]
-    halfway = top * projection + across * np.sqrt(1 - projection**2)
-    return quantise(left), quantise(right), quantise(normalise(halfway))
+    halfway = sphere(rng, count)
+    near = spans_about(rng, halfway, tau, degrees, 10.0 ** rng.uniform(-5.3, -1, count) * (1 - tau))
+    return *(quantise(ends) for ends in near), quantise(halfway)
 
 
-def largest_cosine(left, right, halfway, length, middle_normal=None):
-    """Largest code of N·H over the pixels of each span, by the pipeline's twin."""
-    left, right = (Fixed(COMPONENT, codes) for codes in (left, right))
-    middle, out_of_range = (middle_normal or MiddleNormal()).compute(left, right)
-    g, p, q = GPQ().compute(left, middle, right)
-    first, second = DifferenceSetup().compute(g, p, length)
-    span = np.repeat(np.arange(len(length)), length)
-    start = np.cumsum(length) - length
-    step = np.arange(len(span)) - np.repeat(start, length)
-    normals = DifferenceAccumulator().compute(q, first, second, span, step)
-    cosine = DotProduct().compute(normals, Fixed(COMPONENT, halfway[span]))
-    return Fixed(cosine.format, np.maximum.reduceat(cosine.codes, start)), out_of_range
+def largest_cosine(interpolator, left, right, halfway, length):
+    """Largest code of N·H over the pixels of each span, by the method's bit-accurate model."""
+    normals, out_of_range = interpolator.normals(*component_words(left, right), length)
+    assert not out_of_range.any()
+    span, pixel = pixels_of(length)
+    cosine = DotProduct().compute(normals, *component_words(halfway[span]))
+    return Fixed(cosine.format, np.maximum.reduceat(cosine.codes, np.flatnonzero(pixel == 0)))
 
 
 def check_spans(gate, rng, count, shaded_share=1 / 20):
@@ -135,10 +111,8 @@ def check_spans(gate, rng, count, shaded_share=1 / 20):
     for exponent in EXPONENTS:
         left, right, halfway = random_spans(rng, count // len(EXPONENTS), exponent, gate)
         length = rng.choice([1, 2, 3, 5, 8, 16], len(left), p=[0.1, 0.3, 0.3, 0.2, 0.08, 0.02])
-        operands = (Fixed(COMPONENT, codes) for codes in (left, right, halfway))
-        lit = gate.compute(*operands, exponent)
-        cosine, out_of_range = largest_cosine(left, right, halfway, length, gate.interpolator.middle_normal)
-        assert not out_of_range.any()
+        lit = gate.compute(*component_words(left, right, halfway), exponent)
+        cosine = largest_cosine(gate.interpolator, left, right, halfway, length)
         # The specular term falls with N·H: that of the largest is the largest.
         term = gate.specular.compute(cosine, np.zeros(len(lit), bool), exponent)
         assert not term.codes[~lit].any()
@@ -171,13 +145,12 @@ def test_no_pixel_is_suppressed_with_other_middle_normals():
 
 def test_margin_of_the_default_fit_is_not_enough_for_others():
     """With a normal that is 0.38 % too long the default's margin would lose highlights."""
-    gate, fit = HighlightGate(), MiddleNormal("minimax_2")
+    gate, other = HighlightGate(), QuadraticInterpolator(middle_normal=MiddleNormal("minimax_2"))
     rng = np.random.default_rng(11)
     left, right, halfway = random_spans(rng, 20_000, 300, gate)
-    operands = (Fixed(COMPONENT, codes) for codes in (left, right, halfway))
-    cosine, _ = largest_cosine(left, right, halfway, np.full(20_000, 5), fit)
+    cosine = largest_cosine(other, left, right, halfway, np.full(20_000, 5))
     term = gate.specular.compute(cosine, np.zeros(20_000, bool), 300)
-    assert term.codes[~gate.compute(*operands, 300)].any()
+    assert term.codes[~gate.compute(*component_words(left, right, halfway), 300)].any()
 
 
 @pytest.mark.long
@@ -193,17 +166,17 @@ def test_long_spans():
     for exponent in (10, 1000):
         left, right, halfway = random_spans(rng, 150, exponent, gate)
         length = np.full(150, 4095)
-        lit = gate.compute(*(Fixed(COMPONENT, codes) for codes in (left, right, halfway)), exponent)
-        cosine, _ = largest_cosine(left, right, halfway, length)
+        lit = gate.compute(*component_words(left, right, halfway), exponent)
+        cosine = largest_cosine(gate.interpolator, left, right, halfway, length)
         assert not gate.specular.compute(cosine, np.zeros(150, bool), exponent).codes[~lit].any()
         assert 10 < np.count_nonzero(lit) < 140
 
 
-def test_steps_1_and_2_of_the_proof(normal_pairs):
+def test_steps_1_and_2_of_the_proof():
     """The curve by the weights of its ends, its length inside the unit circle, and the bound on N.H."""
     rng = np.random.default_rng(7)
     angle = np.r_[1e-3, rng.uniform(0, 45, 1998), 45]
-    left, right = normal_pairs(rng, 2000, angle)
+    left, right = pairs_at(rng, 2000, angle)
     psi, t = np.radians(angle)[:, np.newaxis], np.linspace(0, 1, 101)
     h = 1 / np.sqrt(2 * (1 + np.cos(psi)))
     k = 4 * h - 2
@@ -293,14 +266,14 @@ def test_margin_covers_the_pipeline():
     worst = 0
     for exponent in (10, 1000):
         left, right, halfway = random_spans(rng, 20_000, exponent, gate)
-        cosine, _ = largest_cosine(left, right, halfway, rng.integers(1, 20, len(left)))
+        cosine = largest_cosine(gate.interpolator, left, right, halfway, rng.integers(1, 20, len(left)))
         one = ONE_SQUARED.values
         a, b = (np.einsum("ij,ij->i", end, halfway) * 2.0**-34 for end in (left, right))
         r = np.einsum("ij,ij->i", left, right) * 2.0**-34 / one
         maximum = np.maximum(arc_maximum(a, b, np.arccos(np.minimum(r, 1 - 1e-12)), 101), np.maximum(a, b))
         worst = max(worst, (cosine.values - maximum).max())
         # What is let through is near the threshold, so the margins cost little.
-        lit = gate.compute(*(Fixed(COMPONENT, codes) for codes in (left, right, halfway)), exponent)
+        lit = gate.compute(*component_words(left, right, halfway), exponent)
         assert (maximum[lit] ** 2 > gate.thresholds.values[exponent] - 9 * 2.0**-17).all()
     assert MARGIN / 8 < worst < MARGIN
 
@@ -327,20 +300,20 @@ def test_thresholds_lie_under_what_the_unit_shades():
                 assert tau**2 - 2.0**-17 < lowest[exponent] <= tau**2
 
 
-def test_stiff_spans(normal_pairs):
-    """Equal normals, wide and opposite ones; corners of the words; the highlight wholly inside one span."""
+def test_stiff_spans():
+    """Equal and opposite normals, spans out of range, corners of the words, a highlight inside one span."""
     gate, rng = HighlightGate(), np.random.default_rng(6)
 
     def lit(left, right, halfway, exponent):
-        return gate.compute(*(Fixed(COMPONENT, np.asarray(v)) for v in (left, right, halfway)), exponent)
+        return gate.compute(*component_words(*map(np.asarray, (left, right, halfway))), exponent)
 
     for angle in (45.1, 89.9, 90.0, 90.1, 180.0):
-        left, right = (quantise(n) for n in normal_pairs(rng, 300, angle))
-        halfway = quantise(normalise(rng.normal(size=(300, 3))))
+        left, right = code_pairs_at(rng, 300, angle)
+        halfway = unit_codes(rng, 300)
         for exponent in (1, 10, 1000):
             assert lit(left, right, halfway, exponent).all()
     # Away from H nothing is lit, at H everything is.
-    left, right = (quantise(n) for n in normal_pairs(rng, 300, rng.choice([0, 1e-4, 1, 30], 300)))
+    left, right = code_pairs_at(rng, 300, rng.choice([0, 1e-4, 1, 30], 300))
     assert not lit(left, right, -left, 3).any()
     assert lit(left, right, left, 1000).all()
     assert lit(left, right, right, 1000).all()
@@ -354,180 +327,6 @@ def test_stiff_spans(normal_pairs):
     assert lit(left, right, -left, 1).all()
     corners = rng.choice([-(2**17), 2**17 - 1, 0], (3, 500, 3))
     lit(*corners, 10)
-
-
-def suppressed(model, left, right, halfway, length, exponent, method="quadratic", operand=None):
-    """Which spans are not lit, and which of these have a term other than 0 in the pipeline of a method."""
-    pipeline = preset(method, model, operand=operand)
-    interpolator = pipeline.interpolator
-    gate = HighlightGate(pipeline.specular, interpolator=interpolator)
-    left, right, halfway = (Fixed(COMPONENT, codes) for codes in (left, right, halfway))
-    lit = gate.compute(left, right, halfway, exponent)
-    span, _ = pixels_of(length)
-    if isinstance(interpolator, NormalInterpolator):
-        normals, _ = interpolator.normals(left, right, length)
-        product = Chord().operand if interpolator.uses_chord else DotProduct().compute
-        highlight = product(normals, halfway[span])
-    else:
-        # One span at a time, as H is that of all spans of a call.
-        found = [
-            interpolator.compute(left[k], right[k], length[k], halfway[k], halfway[k]).highlight
-            for k in (slice(k, k + 1) for k in range(len(length)))
-        ]
-        highlight = Fixed(found[0].format, np.concatenate([part.codes[:, 0] for part in found]))
-    term = pipeline.specular.compute(highlight, np.zeros(len(span), bool), exponent).codes
-    lost = np.bincount(span, weights=(term > 0) & ~lit[span], minlength=len(lit)) > 0
-    return ~lit, lost
-
-
-def codes_of(vectors):
-    """Codes of vectors of any length, saturated."""
-    codes = np.floor(vectors * ONE + 0.5).astype(np.int64)
-    return np.clip(codes, COMPONENT.min_code, COMPONENT.max_code)
-
-
-def spans_of_length(rng, count, low, high, threshold):
-    """Ends of the given lengths, 0 to 60 degrees apart, and H a little farther away than a threshold."""
-    angle = np.radians(rng.choice([0, 1e-4, 1, -1], count, p=[0.1, 0.1, 0.1, 0.7]))
-    angle = np.where(angle < 0, np.radians(rng.uniform(0, 60, count)), angle)[:, np.newaxis]
-    left = normalise(rng.normal(size=(count, 3)))
-    side = normalise(np.cross(left, rng.normal(size=(count, 3))))
-    right = left * np.cos(angle) + side * np.sin(angle)
-    lengths = rng.uniform(low, high, (2, count, 1))
-    lengths[:, ::3] = high
-    turn = rng.uniform(-0.2, 1.2, (count, 1)) * angle
-    top = left * np.cos(turn) + side * np.sin(turn)
-    along = side * np.cos(turn) - left * np.sin(turn)
-    level = threshold / lengths.max(axis=0) - 10.0 ** rng.uniform(-5, -1, (count, 1))
-    away = np.arccos(np.clip(level, -1, 1))
-    around = rng.uniform(0, 2 * np.pi, (count, 1))
-    across = np.cross(left, side) * np.cos(around) + along * np.sin(around)
-    halfway = normalise(top * np.cos(away) + across * np.sin(away))
-    return codes_of(left * lengths[0]), codes_of(right * lengths[1]), quantise(halfway)
-
-
-def saturating_spans(rng, count, excess, threshold):
-    """Ends ``(1, y, z)`` and ``(1, y, -z)``, too long by up to ``excess``, and H near the y axis.
-
-    The middle normal would have a first component over 1. It saturates, and where H leans the other way, the
-    pixels in the middle are nearer to H than the curve is. Only for y over the threshold can H be near it.
-    """
-    beyond = np.sqrt((1 + excess * rng.uniform(0.9, 1, count)) ** 2 - 1)
-    share = rng.uniform(0, np.pi / 2, count)
-    y, z = beyond * np.sin(share), beyond * np.cos(share)
-    y, z = y[y > threshold], z[y > threshold]
-    one, other = np.ones(len(y)), z * rng.uniform(0.8, 1, len(y))
-    level = threshold - 10.0 ** rng.uniform(-5.5, -3, len(y))
-    lean = np.arccos(np.clip(level / np.hypot(y, 1), -1, 1)) - np.arctan2(1, y)
-    halfway = quantise(np.stack([-np.sin(lean), np.cos(lean), np.zeros(len(y))], axis=1))
-    return codes_of(np.stack([one, y, z], axis=1)), codes_of(np.stack([one, y, -other], axis=1)), halfway
-
-
-@pytest.mark.parametrize("exponent", [1, 2, 3, 10, 100, 500, 1000])
-def test_stiff_normals_of_wrong_length(exponent):
-    """Off by up to 1/256, or short by any amount, at every angle: no suppressed span has a term.
-
-    Steps 1 to 4 of the proof hold for ends of any length: they follow the codes. What a wrong length changes
-    is step 5. G and P stay in their words up to a length of 1.075. Before that, a component of the middle
-    normal over 1 saturates, for ends over 1 alone: see `test_stiff_normals_too_long`.
-    """
-    rng, threshold = np.random.default_rng(exponent), np.sqrt(HighlightGate().thresholds.values[exponent])
-    dark = 0
-    for low, high in ((1 - 1 / 256, 1 - 1 / 256), (1 - 1 / 256, 1 + 1 / 256), (0.5, 1.0)):
-        spans = spans_of_length(rng, 20_000, low, high, threshold)
-        not_lit, lost = suppressed("cosquad", *spans, rng.choice([1, 2, 3, 5, 9], 20_000), exponent)
-        assert not lost.any()
-        dark += np.count_nonzero(not_lit)
-    assert (dark > 5000) == (exponent > 1)
-    # Opposite, right and nearly right angles, of wrong length too: all over 45 degrees, so lit.
-    left = normalise(rng.normal(size=(900, 3)))
-    side = normalise(np.cross(left, rng.normal(size=(900, 3))))
-    angle = np.radians(np.repeat([89.9, 90, 180], 300))[:, np.newaxis]
-    out_of_range = (left, left * np.cos(angle) + side * np.sin(angle))
-    for scale in (1 - 1 / 256, 1 + 1 / 256):
-        not_lit, _ = suppressed(
-            "cosquad", *(codes_of(n * scale) for n in out_of_range), quantise(left), np.full(900, 3), exponent
-        )
-        assert not not_lit.any()
-
-
-@pytest.mark.parametrize("method", ["linear", "quadratic-eval", "quadratic-horner"])
-def test_stiff_normals_of_wrong_length_by_other_methods(method):
-    """As the quadratic method by differences, where N.H is taken of normals that follow the ends' lengths."""
-    rng = np.random.default_rng(13)
-    for exponent in (2, 10, 100, 1000):
-        threshold = np.sqrt(HighlightGate().thresholds.values[exponent])
-        for low, high in ((1 - 1 / 256, 1 + 1 / 256), (0.5, 1.0)):
-            spans = spans_of_length(rng, 3000, low, high, threshold)
-            not_lit, lost = suppressed("cosquad", *spans, rng.choice([3, 5], 3000), exponent, method)
-            assert not lost.any()
-            assert np.count_nonzero(not_lit) > 150
-
-
-@pytest.mark.parametrize(
-    ("method", "operand", "short", "long"),
-    [
-        ("renormalise", None, True, False),
-        ("bisection", None, True, False),
-        ("quadratic", "one_minus_cosine", True, False),
-        ("chord", None, True, False),
-        ("angular", None, False, True),
-        ("recurrence", None, False, True),
-    ],
-)
-def test_stiff_normals_of_wrong_length_lose_highlights(method, operand, short, long):
-    """Where the gate does not hold for lengths off by 1/256: these methods count on unit normals.
-
-    The gate goes by the N.H of the codes. A renormaliser or a bisection makes short normals longer, and a
-    chord does not feel that they are short: a pixel is up to 1/256 nearer to H than the gate knows. Too long
-    ones make the angle of a chord wider than that of the dot product. The other way round nothing is lost,
-    nor with unit normals.
-    """
-    few = method in ("angular", "recurrence", "chord")
-    count = 500 if few else 4000
-    threshold = np.sqrt(HighlightGate().thresholds.values[100])
-    for scale, loses in ((1 - 1 / 256, short), (1.0, False), (1 + 1 / 256, long)):
-        rng = np.random.default_rng(14)
-        spans = spans_of_length(rng, count, scale, scale, threshold)
-        if scale == 1:
-            spans = [quantise(normalise(codes.astype(float))) for codes in spans]
-        not_lit, lost = suppressed("cosquad", *spans, rng.choice([3, 5], count), 100, method, operand)
-        assert np.count_nonzero(not_lit) > count / 10
-        assert lost.any() == loses
-
-
-@pytest.mark.parametrize("exponent", [1, 2, 3, 10, 100, 500, 1000])
-def test_stiff_normals_of_length_0_and_corners(exponent):
-    """A vector 0 counts as 90 degrees; every corner, edge and face of the words' cube, in N_l, N_r and H."""
-    rng = np.random.default_rng(exponent)
-    unit = quantise(normalise(rng.normal(size=(500, 3))))
-    zero = np.zeros_like(unit)
-    for left, right in ((zero, zero), (zero, unit), (unit, zero)):
-        not_lit, _ = suppressed("cosquad", left, right, unit, np.full(500, 3), exponent)
-        assert not not_lit.any()
-    codes = [COMPONENT.min_code, 0, COMPONENT.max_code]
-    ends = np.stack(np.meshgrid(codes, codes, codes), axis=-1).reshape(-1, 3)
-    vectors = (ends[k.ravel()] for k in np.indices((27, 27, 27)))
-    not_lit, lost = suppressed("cosquad", *vectors, np.full(27**3, 5), exponent)
-    assert not lost.any()
-    assert np.count_nonzero(not_lit) == (3532 if exponent > 1 else 0)
-
-
-@pytest.mark.parametrize(("model", "exponent"), [("cosquad", 2), ("lyon3", 6), ("exp", 10)])
-def test_stiff_normals_too_long(model, exponent):
-    """The bound on lengths: none is lost to 1 + 1/128, and some are at 1 + 1/16.
-
-    Where the middle normal saturates, the three wide models with the lowest threshold over 0 suffer first.
-    """
-    threshold = np.sqrt(HighlightGate(Specular(REFLECTION_MODELS[model])).thresholds.values[exponent])
-    assert 0 < threshold < 0.07
-    rng = np.random.default_rng(12)
-    for excess, safe in ((1 / 256, True), (1 / 128, True), (1 / 16, False)):
-        spans = saturating_spans(rng, 40_000, excess, threshold)
-        length = rng.choice([3, 5, 9], len(spans[0]))
-        not_lit, lost = suppressed(model, *spans, length, exponent)
-        assert np.count_nonzero(not_lit) > 3000
-        assert lost.any() != safe
 
 
 def test_bad_arguments_are_refused():

@@ -1,4 +1,4 @@
-"""Intensity twin against exact integers of any size."""
+"""Model of the intensity unit against exact integers of any size."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Exact power twin against float64 and exact integers."""
+"""Model of the exact power unit against float64 and exact integers."""
 
 from fractions import Fraction
 
