@@ -1,4 +1,4 @@
-"""Model of the specular unit against float64: every model at every exponent, every argument of some, the second lobe."""
+"""Model of the specular unit against float64: every model and exponent, every argument of some."""
 
 import math
 from fractions import Fraction

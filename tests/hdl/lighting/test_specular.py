@@ -36,7 +36,12 @@ TIMING = {
 }
 
 
-@pytest.mark.parametrize("model", TIMING)
+def quick(models, chosen):
+    """Models, of which only the chosen ones are in the short run."""
+    return [pytest.param(m, marks=[pytest.mark.long] * (m not in chosen)) for m in models]
+
+
+@pytest.mark.parametrize("model", quick(TIMING, ("cosquad", "coscos4", "as_published")))
 def test_times_and_multipliers_at_every_interval(model):
     products, *latencies = TIMING[model]
     as_published = model == "as_published"
@@ -68,9 +73,7 @@ def test_cost_of_coscos():
         assert cost.rom_bits == 1024 * (17 + 27 * slopes) + 128 * 36 + 64 * 33
 
 
-@pytest.mark.parametrize(
-    "model", [*SPECULAR_MODELS, "cosquad_q", "lyon3", "exp", "coscos4", "coscos2_integral"]
-)
+@pytest.mark.parametrize("model", quick(MODELS, ("cosquad_lin", "cosquad_q", "exp")))
 def test_slopes_of_every_exponent(model):
     """Every word that a unit needs of an exponent, two cycles after it, against the model's tables."""
     parameters = Specular(REFLECTION_MODELS[model])
@@ -94,8 +97,9 @@ def test_slopes_of_every_exponent(model):
     np.testing.assert_array_equal(seen, expected)
 
 
-@pytest.mark.parametrize("interval", [1, 3])
-@pytest.mark.parametrize(("model", "tables"), [("cosquad", 0), ("coscos4", 128 * 36 + 64 * 33)])
+@pytest.mark.parametrize(
+    ("model", "tables", "interval"), [("cosquad", 0, 1), ("coscos4", 128 * 36 + 64 * 33, 3)]
+)
 def test_shared_slope_saves_the_prom(model, tables, interval):
     """The slope from outside: at the same cycles, and no PROM in the unit."""
     parameters = Specular(REFLECTION_MODELS[model])
@@ -105,18 +109,18 @@ def test_shared_slope_saves_the_prom(model, tables, interval):
     assert cost_of(SlopeUnit(parameters)).rom_bits == 1024 * 17
 
 
-def test_fixed_exponent_costs_less():
+@pytest.mark.parametrize("model", quick(("cosquad", "cosquad_q", "lyon3", "exp"), ("cosquad_q", "exp")))
+def test_fixed_exponent_costs_less(model):
     """No PROM, and one multiplier less: that of the slope is by a constant. No cycle more."""
-    for model, tables in (("cosquad", 0), ("cosquad_q", 0), ("lyon3", 0), ("exp", 64 * 32)):
-        parameters = Specular(REFLECTION_MODELS[model])
-        unit, fixed = SpecularUnit(parameters), SpecularUnit(parameters, exponent=37)
-        assert fixed.latency == unit.latency
-        assert not hasattr(fixed, "constants")
-        cost, full = cost_of(fixed), cost_of(unit)
-        assert cost.multiplier_count == full.multiplier_count - 1
-        assert (cost.constant_multipliers, cost.rom_bits) == (1, tables)
-        # Slope, its normal form, and the boundary.
-        assert full.register_bits - cost.register_bits == 17 + 4 + 17 + (0 if model == "cosquad_q" else 27)
+    parameters = Specular(REFLECTION_MODELS[model])
+    unit, fixed = SpecularUnit(parameters), SpecularUnit(parameters, exponent=37)
+    assert fixed.latency == unit.latency
+    assert not hasattr(fixed, "constants")
+    cost, full = cost_of(fixed), cost_of(unit)
+    assert cost.multiplier_count == full.multiplier_count - 1
+    assert (cost.constant_multipliers, cost.rom_bits) == (1, 64 * 32 if model == "exp" else 0)
+    # Slope, its normal form, and the boundary.
+    assert full.register_bits - cost.register_bits == 17 + 4 + 17 + (0 if model == "cosquad_q" else 27)
 
 
 def test_bad_options_are_refused():
