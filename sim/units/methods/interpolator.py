@@ -177,7 +177,7 @@ def _angles(unit, rng, count):
     """Equal normals, every angle up to the largest and over it, ends of the words; short spans."""
     largest = min(unit.parameters.MAX_ANGLE, 179)
     spans = setup_spans(rng, count, largest, largest)
-    return case_of(unit, rng, spans["normal_left"], spans["normal_right"], rng.integers(1, 8, count + 40))
+    return case_of(unit, rng, spans["normal_left"], spans["normal_right"], rng.integers(1, 8, count))
 
 
 def _long_spans(unit, rng, count):
