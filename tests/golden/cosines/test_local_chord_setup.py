@@ -1,4 +1,4 @@
-"""Local chord setup: quadratics through three given values, against float64 and exact integers."""
+"""Local chord setup: quadratics through three given values, against float64."""
 
 import numpy as np
 import pytest
@@ -7,9 +7,16 @@ from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.number.fixed import SQ, Fixed
-from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.golden.number.unit_vector import ONE
+from blysk.golden.reference.geometry import normalise
+from blysk.sim.units.cosines.chord_setup import value_at
+from blysk.sim.units.cosines.local_chord_setup import any_values
+from blysk.sim.units.operands import code_pairs_at, component_words, unit_codes
 
 P = LocalChordSetup()
+FORMATS = P.DIFFUSE_FORMAT, P.HIGHLIGHT_FORMAT
+SCALE = (ONE / 2**17) ** 2
+"""Product of two unit vectors."""
 
 
 def setup(diffuse, highlight, length):
@@ -18,51 +25,44 @@ def setup(diffuse, highlight, length):
     return P.compute(Fixed(P.DIFFUSE_FORMAT, diffuse), Fixed(P.HIGHLIGHT_FORMAT, highlight), length)
 
 
-def at(differences, step, light=0):
-    """Values of the quadratic at a pixel of each span, by exact integers."""
-    start, first, second = (d.codes[:, light].astype(object) for d in differences)
-    shift = ChordSetup().format.fraction_bits - differences.start.format.fraction_bits
-    step = step.astype(object)
-    total = (start << shift) + step * first + step * (step - 1) // 2 * second
-    return total.astype(float) * ChordSetup().format.step
+def at(differences, step):
+    """Values of the quadratic at a pixel of each span."""
+    return SCALE * value_at(differences, step)
 
 
 def curves(rng, count, size, low, high):
     """Start, P and G of random quadratics that stay in a range."""
     slope = rng.uniform(-0.49, 0.49, count) * size
-    bend = rng.uniform(-0.12, 0.12, count) * size
-    room = np.abs(slope) + np.abs(bend) + 1e-3
-    return rng.uniform(low + room, high - room), slope, bend
+    curvature = rng.uniform(-0.12, 0.12, count) * size
+    room = np.abs(slope) + np.abs(curvature) + 1e-3
+    return rng.uniform(low + room, high - room), slope, curvature
 
 
-def three(curve):
-    start, slope, bend = curve
-    return np.stack([start + t * (slope + t * bend) for t in (0, 0.5, 1)], axis=1)
+def two_curves(rng, count, size):
+    """Quadratics of f and of u, and the codes of their three values."""
+    both = curves(rng, count, size, -1, 1), curves(rng, count, size, 0, 2)
+    codes = []
+    for (start, slope, curvature), format in zip(both, FORMATS, strict=True):
+        values = np.stack([start + t * (slope + t * curvature) for t in (0, 0.5, 1)], axis=1)
+        codes.append(np.floor(values / format.step + 0.5).astype(np.int64))
+    return both, codes
 
 
 @pytest.mark.parametrize("size", [1e-4, 1e-2, 0.1, 1.0])
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095, None])
 def test_error(size, length):
     """At random pixels and the last: within the bounds, and not far from them where lengths are random."""
-    rng = np.random.default_rng(int(1e4 * size))
-    count = 20_000
-    f, u = curves(rng, count, size, -1, 1), curves(rng, count, size, 0, 2)
-    codes = [
-        np.floor(three(curve) / format.step + 0.5).astype(np.int64)
-        for curve, format in ((f, P.DIFFUSE_FORMAT), (u, P.HIGHLIGHT_FORMAT))
-    ]
-    length = rng.integers(2, 4095, count, endpoint=True) if length is None else np.full(count, length)
-    diffuse, highlight, out_of_range = setup(*codes, length)
+    rng, count = np.random.default_rng(int(1e4 * size)), 10_000
+    both, codes = two_curves(rng, count, size)
+    length = rng.integers(2, 4096, count) if length is None else np.full(count, length)
+    *functions, out_of_range = setup(*codes, length)
     assert not out_of_range.any()
     step = np.where(rng.random(count) < 0.5, length - 1, rng.integers(0, length))
     t = step / np.maximum(length - 1, 1)
-    for differences, (start, slope, bend), bound in (
-        (diffuse, f, P.diffuse_error),
-        (highlight, u, P.highlight_error),
-    ):
-        error = np.abs(at(differences, step) - (start + t * (slope + t * bend)))
-        allowed = bound(np.abs(slope), np.abs(bend))
-        assert (error <= allowed).all()
+    bounds = P.diffuse_error, P.highlight_error
+    for differences, (start, slope, curvature), bound in zip(functions, both, bounds, strict=True):
+        error = np.abs(at(differences, step) - (start + t * (slope + t * curvature)))
+        assert (error <= bound(np.abs(slope), np.abs(curvature))).all()
         if length.min() < length.max():
             assert error.max() > bound(0.49 * size, 0.12 * size) / 8
 
@@ -71,14 +71,12 @@ def test_error(size, length):
 def test_stiff_equal_values_stay(length):
     """No difference at all, at the ends of the ranges, too."""
     rng = np.random.default_rng(length)
-    formats = P.DIFFUSE_FORMAT, P.HIGHLIGHT_FORMAT
-    codes = [rng.integers(f.min_code, f.max_code, (500, 1), endpoint=True) for f in formats]
-    for value, format in zip(codes, formats, strict=True):
-        value[:2, 0] = format.min_code, format.max_code
-    codes = [np.repeat(value, 3, axis=1) for value in codes]
-    diffuse, highlight, out_of_range = setup(*codes, np.full(500, length))
+    codes = [value[:, 0, :1].repeat(3, axis=1) for value in any_values(rng, 500, 1)]
+    for value, format in zip(codes, FORMATS, strict=True):
+        value[:2] = [[format.min_code], [format.max_code]]
+    *functions, out_of_range = setup(*codes, np.full(500, length))
     assert not out_of_range.any()
-    for differences, value, format in zip((diffuse, highlight), codes, formats, strict=True):
+    for differences, value, format in zip(functions, codes, FORMATS, strict=True):
         np.testing.assert_array_equal(differences.start.values[:, 0], value[:, 0] * format.step)
         assert not differences.first.codes.any()
         assert not differences.second.codes.any()
@@ -87,23 +85,16 @@ def test_stiff_equal_values_stay(length):
 @pytest.mark.parametrize("length", [2, 3, 5, 9, 17, 4097 // 2 + 1])
 def test_stiff_values_are_met(length):
     """Where dt is a power of two nothing but G, for f also P, is rounded: 2^-23 in the middle, 2^-19."""
-    rng = np.random.default_rng(length)
-    count = 2000
-    f, u = curves(rng, count, 0.9, -1, 1), curves(rng, count, 0.9, 0, 2)
-    codes = [
-        np.rint(three(curve) / format.step).astype(np.int64)
-        for curve, format in ((f, P.DIFFUSE_FORMAT), (u, P.HIGHLIGHT_FORMAT))
-    ]
-    diffuse, highlight, _ = setup(*codes, np.full(count, length))
-    for place, step in ((0, 0), (1, (length - 1) // 2), (2, length - 1)):
-        if length == 2 and place == 1:
-            continue
-        step = np.full(count, step)
-        drift = 2.0**-46 * (length + length**2 / 2)
-        error = np.abs(at(highlight, step) - codes[1][:, place] * P.HIGHLIGHT_FORMAT.step)
-        assert error.max() <= (2.0**-23 if place == 1 else 0) + drift
-        error = np.abs(at(diffuse, step) - codes[0][:, place] * P.DIFFUSE_FORMAT.step)
-        assert error.max() <= (2.0**-23 if place == 1 else 0) + 2.0**-19 * place / 2 + drift
+    _, codes = two_curves(np.random.default_rng(length), 2000, 0.9)
+    diffuse, highlight, _ = setup(*codes, np.full(2000, length))
+    drift = 2.0**-46 * (length + length**2 / 2)
+    for column, step in ((0, 0), (1, (length - 1) // 2), (2, length - 1)):
+        if length > 2 or column != 1:
+            middle, step = 2.0**-23 if column == 1 else 0, np.full(2000, step)
+            error = np.abs(at(highlight, step) - codes[1][:, column] * P.HIGHLIGHT_FORMAT.step)
+            assert error.max() <= middle + drift
+            error = np.abs(at(diffuse, step) - codes[0][:, column] * P.DIFFUSE_FORMAT.step)
+            assert error.max() <= middle + 2.0**-19 * column / 2 + drift
 
 
 def test_flag():
@@ -116,8 +107,8 @@ def test_flag():
     # u: P of 26 fraction bits with its end at about 1/2; v_m in the middle, so that G is 0 or half a step.
     end = half + offset
     highlight = np.stack([0 * end, end >> 1, end], axis=1)
-    bend = (2 * (end - 2 * (end >> 1)) / 2.0**26 * 2**20 + 0.5) // 1
-    assert not bend.any()
+    curvature = (2 * (end - 2 * (end >> 1)) / 2.0**26 * 2**20 + 0.5) // 1
+    assert not curvature.any()
     _, _, out_of_range = setup(zero, highlight, length)
     np.testing.assert_array_equal(out_of_range, end >= half)
     # The other way -1/2 itself fits.
@@ -129,8 +120,8 @@ def test_flag():
     for sign in (1, -1):
         highlight = np.stack([half + 0 * bump, half - sign * bump, half + 0 * bump], axis=1)
         _, _, out_of_range = setup(zero, highlight, length)
-        bend = np.floor(sign * 4 * bump / 2.0**26 * 2**20 + 0.5)
-        np.testing.assert_array_equal(out_of_range, (bend >= 2**17) | (bend < -(2**17)))
+        curvature = np.floor(sign * 4 * bump / 2.0**26 * 2**20 + 0.5)
+        np.testing.assert_array_equal(out_of_range, (curvature >= 2**17) | (curvature < -(2**17)))
         assert 0 < np.count_nonzero(out_of_range) < count
 
     # f: P rounded to 18 fraction bits.
@@ -143,10 +134,8 @@ def test_flag():
 
 def test_sums_never_wrap():
     """Any codes, flagged or not: the accumulators' sums stay within -4 to 4."""
-    rng = np.random.default_rng(7)
-    count = 20_000
-    codes = []
-    for format in (P.DIFFUSE_FORMAT, P.HIGHLIGHT_FORMAT):
+    rng, count, codes = np.random.default_rng(7), 20_000, []
+    for format in FORMATS:
         ends = rng.choice([format.min_code, format.max_code, 0], (count, 3))
         anywhere = rng.integers(format.min_code, format.max_code, (count, 3), endpoint=True)
         codes.append(np.where(rng.random((count, 1)) < 0.5, ends, anywhere))
@@ -162,27 +151,20 @@ def test_sums_never_wrap():
     assert {unit.format for unit in ChordInterpolator().accumulators.values()} == {SQ(3, 46)}
 
 
-def test_a_distant_light_gives_what_chord_setup_gives(normal_pairs):
-    """The same quadratics from exact values as `ChordSetup` finds from normals, in the bounds of both."""
+def test_a_distant_light_gives_the_quadratics_of_chord_setup():
+    """From exact values as `ChordSetup` finds them from normals, in the bounds of both."""
     rng = np.random.default_rng(8)
-    left, right = (quantise(v) for v in normal_pairs(rng, 3000, rng.uniform(0, 20, 3000)))
-    direction, halfway = (quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2))
+    left, right = code_pairs_at(rng, 3000, rng.uniform(0, 20, 3000))
+    direction, halfway = unit_codes(rng, 1), unit_codes(rng, 1)
     length = rng.integers(2, 4096, 3000)
-    vectors = (Fixed(COMPONENT, v) for v in (left, right, direction, halfway))
-    theirs = ChordSetup().compute(*vectors, length)
-    ends = [v / np.linalg.norm(v, axis=1, keepdims=True) for v in (left, right)]
-    middle = ends[0] + ends[1]
-    normals = ends[0], middle / np.linalg.norm(middle, axis=1, keepdims=True), ends[1]
-    d, h = (v[0] / np.linalg.norm(v[0]) for v in (direction, halfway))
-    one = (ONE / 2**17) ** 2
-    f = np.stack([one * (n @ d) for n in normals], axis=1)
-    u = np.stack([one * ((n - h) ** 2).sum(axis=1) / 2 for n in normals], axis=1)
-    fit = u[:, 0] + u[:, 2] <= 3.5
-    ours = setup(
-        np.rint(f / P.DIFFUSE_FORMAT.step).astype(np.int64),
-        np.rint(u / P.HIGHLIGHT_FORMAT.step).astype(np.int64),
-        length,
-    )
+    theirs = ChordSetup().compute(*component_words(left, right, direction, halfway), length)
+    ends = normalise(left / ONE), normalise(right / ONE)
+    normals = np.stack([ends[0], normalise(ends[0] + ends[1]), ends[1]], axis=1)
+    d, h = (normalise(v[0] / ONE) for v in (direction, halfway))
+    values = SCALE * (normals @ d), SCALE * ((normals - h) ** 2).sum(axis=2) / 2
+    fit = values[1][:, 0] + values[1][:, 2] <= 3.5
+    codes = [np.rint(v / format.step).astype(np.int64) for v, format in zip(values, FORMATS, strict=True)]
+    ours = setup(*codes, length)
     assert not ours[2].any()
     step = rng.integers(0, length)
     bound = ChordSetup().diffuse_error(20.01) + P.diffuse_error(0.5, 0.125)

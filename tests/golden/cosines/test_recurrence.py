@@ -286,20 +286,19 @@ def test_result_of_more_bits(form, length, degrees):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"result_format": UQ(1, 25)}, "result_format must be signed, of at most 44 fraction bits, "),
-        ({"result_format": SQ(2, 45)}, "result_format must be signed, of at most 44 fraction bits, "),
-        ({"interleave": 2}, "interleave must be 1 or 4, not 2$"),
-        ({"form": "sine"}, "form must be one of reinsch, direct, not 'sine'$"),
-        *(
-            ({"form": "direct", "fraction_bits": bits}, f"fraction_bits must be 8 to 32, not {bits}$")
-            for bits in (7, 33)
-        ),
-        *(({"guard_bits": bits}, f"guard_bits must be 10 to 28, not {bits}$") for bits in (9, 29)),
+        (("reinsch", 16, 28, 1, UQ(1, 25)), "result_format must be signed, of at most 44 fraction bits, "),
+        (("reinsch", 16, 28, 1, SQ(2, 45)), "result_format must be signed, of at most 44 fraction bits, "),
+        (("reinsch", 16, 28, 2), "interleave must be 1 or 4, not 2$"),
+        (("sine",), "form must be one of reinsch, direct, not 'sine'$"),
+        (("direct", 7), "fraction_bits must be 8 to 32, not 7$"),
+        (("direct", 33), "fraction_bits must be 8 to 32, not 33$"),
+        (("reinsch", 16, 9), "guard_bits must be 10 to 28, not 9$"),
+        (("reinsch", 16, 29), "guard_bits must be 10 to 28, not 29$"),
     ],
 )
 def test_refuses(arguments, message):
     with pytest.raises(ValueError, match=f"^{message}"):
-        Recurrence(**arguments)
+        Recurrence(*arguments)
 
 
 def test_refuses_operands():

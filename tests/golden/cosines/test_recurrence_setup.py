@@ -9,7 +9,9 @@ from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.reciprocal import reciprocal_address
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise, values
 from blysk.golden.reference.curves import interpolate
+from blysk.sim.units.operands import component_words, dot, pairs_at, sphere, word_ends
 
+SETUP = RecurrenceSetup()
 LENGTHS = [1, 2, 3, 4, 5, 8, 9, 16, 257, 4095]
 ANGLES = [0, 1e-4, 0.01, 0.1, 1, 5, 20, 45, 59, 61, 89.9, 90]
 
@@ -17,8 +19,8 @@ ANGLES = [0, 1e-4, 0.01, 0.1, 1, 5, 20, 45, 59, 61, 89.9, 90]
 def curve(left, right, vector, length):
     """``(a sin(psi - k d) + b sin(k d))/sin psi`` of codes, shape (pixels, spans)."""
     left, right, vector = (values(v) for v in (left, right, vector))
-    a, b = (left * vector).sum(axis=-1), (right * vector).sum(axis=-1)
-    q = np.minimum(np.square(right - left).sum(axis=-1) / 2, 1)
+    a, b = dot(left, vector), dot(right, vector)
+    q = np.minimum(dot(right - left, right - left) / 2, 1)
     psi = 2 * np.arcsin(np.sqrt(q / 2))
     t = np.arange(length)[:, np.newaxis] / max(length - 1, 1)
 
@@ -29,15 +31,21 @@ def curve(left, right, vector, length):
 
 
 def states_of(setup, left, right, vector, length):
-    left, right, vector = (Fixed(COMPONENT, codes) for codes in (left, right, vector))
-    *start, out_of_range = setup.compute(left, right, vector, np.full(len(left.codes), length))
+    *start, out_of_range = setup.compute(*component_words(left, right, vector), np.full(len(left), length))
     return setup.recurrence.states(*start, length), out_of_range
 
 
-def make_spans(rng, normal_pairs, count, degrees):
+def error_of(setup, spans, length):
+    """Largest error of the results along spans of one length, none of which is out of range."""
+    states, out_of_range = states_of(setup, *spans, length)
+    assert not out_of_range.any()
+    return np.abs(setup.recurrence.result(states).values - curve(*spans, length)).max()
+
+
+def make_spans(rng, count, degrees):
     """Spans, and vectors of which half lie near them, so that the peak is inside."""
-    left, right = normal_pairs(rng, count, degrees)
-    vector = normal_pairs(rng, count, 0.0)[0]
+    left, right = pairs_at(rng, count, degrees)
+    vector = sphere(rng, count)
     near = slice(0, count // 2)
     t = rng.uniform(0, 1, count // 2)
     vector[near] = interpolate("normalised", left[near], right[near], t)
@@ -46,86 +54,69 @@ def make_spans(rng, normal_pairs, count, degrees):
 
 @pytest.mark.parametrize("degrees", ANGLES)
 @pytest.mark.parametrize("length", LENGTHS)
-def test_stiff_spans_keep_the_bound(normal_pairs, length, degrees):
-    rng = np.random.default_rng(length)
-    setup = RecurrenceSetup()
-    spans = make_spans(rng, normal_pairs, 300, degrees)
-    states, out_of_range = states_of(setup, *spans, length)
-    error = np.abs(setup.recurrence.result(states).values - curve(*spans, length)).max()
-    assert not out_of_range.any()
-    assert error <= setup.error(length, np.radians(degrees))
+def test_stiff_spans_keep_the_bound(length, degrees):
+    spans = make_spans(np.random.default_rng(length), 200 if length < 4095 else 60, degrees)
+    assert error_of(SETUP, spans, length) <= SETUP.error(length, np.radians(degrees))
 
 
 @pytest.mark.parametrize(("degrees", "stated"), [(0, 0.016), (1, 0.3), (10, 2.7), (45, 12), (90, 25)])
-def test_largest_errors_are_as_stated(normal_pairs, degrees, stated):
-    """In units of 1e-6; and the bound is no more than 7.5 times what many spans show."""
-    rng = np.random.default_rng(1)
-    setup = RecurrenceSetup()
-    found = []
-    for length in (2, 3, 4, 5, 9, 16, 17, 33, 100, 1000):
-        spans = make_spans(rng, normal_pairs, 2000, degrees)
-        states, _ = states_of(setup, *spans, length)
-        found.append(np.abs(setup.recurrence.result(states).values - curve(*spans, length)).max())
-    assert stated * 0.75e-6 <= max(found) <= stated * 1e-6
-    assert setup.error(4095, np.radians(degrees)) < 7.5 * max(found)
+def test_largest_errors_are_as_stated(degrees, stated):
+    """In units of 1e-6; and the bound is no more than 7.5 times the error of many spans."""
+    rng, lengths = np.random.default_rng(1), (2, 3, 4, 5, 9, 16, 17, 33, 100, 1000)
+    worst = max(error_of(SETUP, make_spans(rng, 2000, degrees), length) for length in lengths)
+    assert stated * 0.75e-6 <= worst <= stated * 1e-6
+    assert SETUP.error(4095, np.radians(degrees)) < 7.5 * worst
 
 
-def test_curve_is_slerp(normal_pairs):
-    """What the setup stands for is the great circle."""
+def test_curve_is_slerp():
+    """The curve of the setup is the great circle."""
     rng = np.random.default_rng(2)
-    left, right, vector = make_spans(rng, normal_pairs, 200, rng.uniform(1, 90, 200))
+    left, right, vector = make_spans(rng, 200, rng.uniform(1, 90, 200))
     t = np.linspace(0, 1, 50)[:, np.newaxis]
     normals = interpolate("slerp", values(left), values(right), t)
-    exact = (normals * values(vector)).sum(axis=-1)
+    exact = dot(normals, values(vector))
     # The codes are not quite of unit length, and the curve follows that of either end.
     assert np.abs(curve(left, right, vector, 50) - exact).max() < 2e-5
 
 
 @pytest.mark.parametrize("length", [1, 2, 5, 16, 4095])
-def test_stiff_equal_normals_stay_to_the_bit(normal_pairs, length):
+def test_stiff_equal_normals_stay_to_the_bit(length):
     rng = np.random.default_rng(3)
-    left, _, vector = make_spans(rng, normal_pairs, 300, 0)
-    states, _ = states_of(RecurrenceSetup(), left, left, vector, length)
+    left, _, vector = make_spans(rng, 300, 0)
+    states, _ = states_of(SETUP, left, left, vector, length)
     np.testing.assert_array_equal(states.codes, np.broadcast_to(states.codes[0], states.shape))
 
 
-def test_stiff_normals_a_step_apart(normal_pairs):
+@pytest.mark.parametrize("length", [2, 16, 4095])
+def test_stiff_normals_a_step_apart(length):
     """The chord is of a few codes, its direction arbitrary, and its length along H far from a sine."""
     rng = np.random.default_rng(4)
-    left, _, vector = make_spans(rng, normal_pairs, 2000, 0)
+    left, _, vector = make_spans(rng, 400, 0)
     right = np.clip(left + rng.integers(-1, 2, left.shape), -ONE, ONE)
-    for length in (2, 16, 4095):
-        setup = RecurrenceSetup()
-        states, _ = states_of(setup, left, right, vector, length)
-        error = np.abs(setup.recurrence.result(states).values - curve(left, right, vector, length)).max()
-        assert error <= setup.error(length, 2e-5)
+    assert error_of(SETUP, (left, right, vector), length) <= SETUP.error(length, 2e-5)
 
 
-def test_stiff_peaks(normal_pairs):
+@pytest.mark.parametrize("degrees", [1, 20, 90])
+@pytest.mark.parametrize(("length", "at"), [(17, 0), (17, 0.5), (17, 1), (16, 0.5)])
+def test_stiff_peaks(degrees, length, at):
     """On a pixel, the first, the middle and the last one; and between two."""
-    rng = np.random.default_rng(5)
-    setup = RecurrenceSetup()
-    for degrees in (1, 20, 90):
-        left, right = normal_pairs(rng, 200, degrees)
-        for length, at in ((17, 0), (17, 0.5), (17, 1), (16, 0.5)):
-            codes = [quantise(v) for v in (left, right, interpolate("slerp", left, right, np.full(200, at)))]
-            states, _ = states_of(setup, *codes, length)
-            bound = setup.error(length, np.radians(degrees))
-            found = setup.recurrence.result(states).values
-            assert np.abs(found - curve(*codes, length)).max() <= bound
-            step = np.radians(degrees) / (length - 1)
-            peak = np.cos(step / 2) if length == 16 else 1
-            # The codes lie off the great circle by under 2^-17 each, which the cosine feels at second order,
-            # and are of unit length to within 2^-18 or so.
-            assert np.abs(found.max(axis=0) - peak).max() <= bound + 2.0**-17
+    left, right = pairs_at(np.random.default_rng(5), 200, degrees)
+    codes = [quantise(v) for v in (left, right, interpolate("slerp", left, right, np.full(200, at)))]
+    bound = SETUP.error(length, np.radians(degrees))
+    found = SETUP.recurrence.result(states_of(SETUP, *codes, length)[0]).values
+    assert np.abs(found - curve(*codes, length)).max() <= bound
+    peak = np.cos(np.radians(degrees) / (length - 1) / 2) if length == 16 else 1
+    # The codes lie off the great circle by under 2^-17 each, which the cosine feels at second order,
+    # and are of unit length to within 2^-18 or so.
+    assert np.abs(found.max(axis=0) - peak).max() <= bound + 2.0**-17
 
 
-def test_wide_spans_are_flagged(normal_pairs):
-    rng = np.random.default_rng(6)
-    for degrees, flagged in ((89.99, False), (90, False), (90.02, True), (120, True), (180, True)):
-        spans = make_spans(rng, normal_pairs, 500, degrees)
-        _, out_of_range = states_of(RecurrenceSetup(), *spans, 2)
-        assert np.all(out_of_range == flagged)
+@pytest.mark.parametrize(
+    ("degrees", "flagged"), [(89.99, False), (90, False), (90.02, True), (120, True), (180, True)]
+)
+def test_spans_out_of_range_are_flagged(degrees, flagged):
+    _, out_of_range = states_of(SETUP, *make_spans(np.random.default_rng(6), 500, degrees), 2)
+    assert np.all(out_of_range == flagged)
 
 
 @pytest.mark.parametrize("length", [2, 3, 5, 16, 2049, 4095])
@@ -136,16 +127,15 @@ def test_stiff_words_at_their_ends(length):
     chord of the span, within the relative error that `RecurrenceSetup.error` counts.
     """
     rng = np.random.default_rng(7)
-    left, right, vector = rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], (3, 3000, 3))
-    setup, step = RecurrenceSetup(), 2.0**-34
-    first, _, coefficient, shift, out_of_range = setup.compute(
-        *(Fixed(COMPONENT, codes) for codes in (left, right, vector)), np.full(3000, length)
-    )
+    left, right, vector = word_ends(rng, 3, 3000, 3)
+    setup, step = SETUP, 2.0**-34
+    words = component_words(left, right, vector)
+    first, _, coefficient, shift, out_of_range = setup.compute(*words, np.full(3000, length))
     unit = 1 + 2.0**-16
-    chord = np.square(right - left).sum(axis=1) / 2 * step * unit
+    chord = dot(right - left, right - left) / 2 * step * unit
     np.testing.assert_array_equal(out_of_range, chord >= 1 + 2.0**-13)
     assert 900 < np.count_nonzero(out_of_range) < 2100
-    cosine = (left * vector).sum(axis=1) * step * unit
+    cosine = dot(left, vector) * step * unit
     assert np.count_nonzero(np.abs(cosine) >= 2) > 20
     assert np.abs(first.values[:, 0] - np.clip(cosine, -2, 2 - step)).max() < step
     angle = 4 * 2 * np.arcsin(np.sqrt(np.minimum(chord, 1) / 2)) / (length - 1)
@@ -159,31 +149,27 @@ def test_stiff_words_at_their_ends(length):
 
 
 def test_tables():
-    setup = RecurrenceSetup()
+    """Lines between the words of each table: the words' rounding and the fit together in their bound."""
+
+    def assert_lines(tables, x, words, functions):
+        for (table, changes), exact in zip(tables, functions, strict=True):
+            address, rest = (x * words).astype(int), x * words % 1
+            line = table.values[address] + changes.values[address] * rest
+            assert np.abs(line - exact).max() <= SETUP.TABLE_ERROR - 2.0**-22
+
     x = np.linspace(0, 1, 200_001)[1:-1]
     psi = 2 * np.arcsin(np.sqrt(x / 2))
-    for (values_, changes), exact in zip(
-        setup.chord_tables, (psi**2 / (2 * x) - 1, psi / np.sin(psi) - 1), strict=True
-    ):
-        place = x * 512
-        line = values_.values[place.astype(int)] + changes.values[place.astype(int)] * (place % 1)
-        assert np.abs(line - exact).max() <= setup.TABLE_ERROR - 2.0**-22
+    assert_lines(SETUP.chord_tables, x, 512, (psi**2 / (2 * x) - 1, psi / np.sin(psi) - 1))
     x = np.linspace(0, np.square(np.pi / 2), 200_001)[1:]
     d = np.sqrt(x)
-    for (values_, changes), exact in zip(
-        setup.step_tables, (1 - (2 * np.sin(d / 2) / d) ** 2, 1 - np.sin(d) / d), strict=True
-    ):
-        place = x * 128
-        line = values_.values[place.astype(int)] + changes.values[place.astype(int)] * (place % 1)
-        assert np.abs(line - exact).max() <= setup.TABLE_ERROR - 2.0**-22
+    assert_lines(SETUP.step_tables, x, 128, (1 - (2 * np.sin(d / 2) / d) ** 2, 1 - np.sin(d) / d))
 
 
 def test_reciprocals():
     """Of every length: a relative 2^-17, and the square as exact."""
-    setup = RecurrenceSetup()
     steps = np.arange(1, 4095)
     address, shift = reciprocal_address(steps)
-    reciprocal, square, small = (word[address] for word in setup.reciprocals)
+    reciprocal, square, small = (word[address] for word in SETUP.reciprocals)
     assert np.abs(reciprocal.values * 2.0 ** (1 - shift) * steps - 1).max() <= 2.0**-17
     assert np.abs(square.values * 2.0 ** (2 - 2 * shift - small) * steps**2 - 1).max() <= 2.0**-17
     assert min(reciprocal.values.min(), square.values.min()) >= 0.5
@@ -191,28 +177,23 @@ def test_reciprocals():
 
 @pytest.mark.parametrize("degrees", [1, 20, 90])
 @pytest.mark.parametrize("length", [1, 3, 5, 16, 64])
-def test_direct_form(normal_pairs, length, degrees):
+def test_direct_form(length, degrees):
     """Start values and coefficient as from `Recurrence.start`, so its own error bound holds."""
-    rng = np.random.default_rng(8)
-    setup = RecurrenceSetup(Recurrence("direct", interleave=4))
-    spans = make_spans(rng, normal_pairs, 300, degrees)
-    states, _ = states_of(setup, *spans, length)
-    error = np.abs(setup.recurrence.result(states).values - curve(*spans, length)).max()
-    angle = np.radians(degrees)
-    own = RecurrenceSetup().error(length, angle)
+    setup, angle = RecurrenceSetup(Recurrence("direct", interleave=4)), np.radians(degrees)
+    error = error_of(setup, make_spans(np.random.default_rng(8), 300, degrees), length)
+    own = SETUP.error(length, angle)
     # An error of a start value comes back as often as steps follow it; that of the coefficient is 2^-16.
     steps = np.ceil(length / 4)
     assert error <= setup.recurrence.error(length, angle) + own * (1 + 2 * steps)
 
 
-def test_refusals(normal_pairs):
+def test_refuses():
     for recurrence in (Recurrence(), Recurrence("direct"), Recurrence(interleave=4, fraction_bits=20)):
         with pytest.raises(ValueError, match=r"^the recurrence must be "):
             RecurrenceSetup(recurrence)
-    setup = RecurrenceSetup()
     normals = Fixed(COMPONENT, np.array([[ONE, 0, 0]]))
     for length in (0, 4096):
         with pytest.raises(ValueError, match=r"^lengths must be 1 to 4095$"):
-            setup.compute(normals, normals, normals, np.array([length]))
+            SETUP.compute(normals, normals, normals, np.array([length]))
     with pytest.raises(ValueError, match=r"^operands must be SQ\(1, 17\)$"):
-        setup.compute(normals, normals, Fixed(SQ(2, 16), np.zeros((1, 3), int)), np.array([1]))
+        SETUP.compute(normals, normals, Fixed(SQ(2, 16), np.zeros((1, 3), int)), np.array([1]))
