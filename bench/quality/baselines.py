@@ -1,11 +1,11 @@
-"""Baselines: what each device and pipeline takes, and the cycles of a fixed set of frames, as they were.
+"""Baselines: what each unit and pipeline takes, and the cycles of a fixed set of frames, as they were.
 
 The figures stand in ``bench/quality/baselines.json``, and a test fails when one moves by more than 2 % either
 way. ``python -m blysk.bench.quality.baselines`` measures all of them and prints what moved; the exit status
 is 1 if a figure did by more than that, or an entry is missing or not measured any more. ``--update`` writes
 the file.
 
-Clocks do not depend on the engine; here they are Amaranth's own simulator's, which compiles nothing.
+Cycles do not depend on the engine; here they are Amaranth's own simulator's, which compiles nothing.
 """
 
 import json
@@ -23,19 +23,20 @@ from tqdm import tqdm
 from blysk.bench.accuracy import scene_for
 from blysk.bench.command import run
 from blysk.bench.store import Task, results_of
-from blysk.bench.tools.blocks import BLOCKS, Block
+from blysk.bench.tools.blocks import ENTRIES as UNITS
+from blysk.bench.tools.blocks import Entry
 from blysk.golden.pipeline import STYLES, Design
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.sim.cli.main import Whole
 from blysk.sim.errors import InputError
 from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.meshes.teapot import teapot
 from blysk.sim.output import check_writable, write_json
+from blysk.sim.value_types import Whole
 
 __all__ = [
     "ENTRIES",
@@ -78,7 +79,7 @@ def _scenes() -> dict[str, Scene]:
 
 
 def cycles_of(design: Design, style: str = "throughput") -> dict[str, int]:
-    """Clocks of a pipeline from the first write of a constant to the last pixel.
+    """Cycles of a pipeline from the first write of a constant to the last pixel.
 
     Parameters
     ----------
@@ -120,8 +121,8 @@ class _Pipeline:
         return cycles_of(self.design, self.style)
 
 
-def _parts_of_block(block: Block) -> dict[str, int]:
-    return cost_of(block.unit()).totals
+def _parts_of_unit(entry: Entry) -> dict[str, int]:
+    return cost_of(entry.variant.unit()).totals
 
 
 def _entries() -> dict[str, Callable[[], dict[str, int]]]:
@@ -132,9 +133,9 @@ def _entries() -> dict[str, Callable[[], dict[str, int]]]:
     # In this style a model moves the cycles by its latency alone.
     pipelines += [_Pipeline(model=model) for model in MODELS if model != "cosquad"]
     entries |= {f"parts: {pipeline.name}": pipeline.parts for pipeline in pipelines}
-    for block in BLOCKS:
-        if block.device != "pipeline":
-            entries[f"parts: {block.device} {block.variant}".rstrip()] = partial(_parts_of_block, block)
+    # Pipelines have lines of their own, with styles and gates.
+    of_units = [entry for entry in UNITS if entry.record.kind is not ShadingPipelineUnit]
+    entries |= {f"parts: {entry.title}": partial(_parts_of_unit, entry) for entry in of_units}
     return entries
 
 
@@ -142,7 +143,7 @@ ENTRIES: dict[str, Callable[[], dict[str, int]]] = _entries()
 """What is measured: for each entry a function that gives its figures.
 
 ``frames``: `cycles_of` the pipelines of each method in both styles, and of some with a gate. ``parts``:
-`Cost.totals` of these, of a pipeline of each model, and of every device of `BLOCKS`.
+`Cost.totals` of these, of a pipeline of each model, and of every measured variant of every other unit.
 """
 
 

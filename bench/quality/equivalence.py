@@ -9,7 +9,7 @@ from collections.abc import Iterator, Set
 from importlib.util import find_spec
 from pathlib import Path
 
-from blysk.bench.tools.fpga import _YOSYS, ToolError
+from blysk.bench.tools.place_and_route import _YOSYS, ToolError
 
 __all__ = ["Miter", "yosys"]
 

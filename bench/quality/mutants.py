@@ -5,7 +5,7 @@ stuck, inverted, or inverted by a neighbour: Yosys' pass ``mutate``), and gives 
 record, which `tests/test_units.py` holds against the bit-accurate model. A mutant is killed if an output
 beat, or its cycle, is not that of the unit; in a run without stalls the cycles of the inputs count, too. Of
 the others, those are equivalent that no stimulus could tell from the unit, as Yosys and ABC (package pyosys)
-prove; they count for nothing. The *score* is the share of the rest that is killed. Clocks are not mutated,
+prove; they count for nothing. The *score* is the share of the rest that is killed. Cycles are not mutated,
 and reset stays low: tests and proofs of their own hold each unit to it.
 
 All mutants are one compiled model, an input of which chooses. The exit status is 1 when a unit's score is
@@ -29,11 +29,11 @@ from blysk.bench.command import run
 from blysk.bench.quality.equivalence import Miter
 from blysk.bench.quality.mutation import Mutants, killed, mutate, vectors_of
 from blysk.bench.store import Task, results_of, version_of
-from blysk.sim.cli.main import Whole
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.output import check_writable, write_json
 from blysk.sim.units.registry import RECORDS
+from blysk.sim.value_types import Whole
 
 __all__ = ["LEAST", "Score", "main", "measure", "scores", "table", "waived"]
 

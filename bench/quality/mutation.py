@@ -16,7 +16,7 @@ from amaranth.hdl import Module, Mux, Value, unsigned
 from amaranth.lib.wiring import Component, In, Member, Out
 
 from blysk.bench.quality.equivalence import yosys
-from blysk.bench.tools.fpga import ToolError
+from blysk.bench.tools.place_and_route import ToolError
 from blysk.sim.engines import cxxrtl
 from blysk.sim.engines.engine import CompilerMissing, Ports, Stimulus, Trace
 from blysk.sim.engines.simulate import stimulus_of
@@ -264,7 +264,7 @@ def killed(model: Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants: I
 
 
 def _seen(stimulus: Stimulus, trace: Trace) -> tuple:
-    """What a test sees of a run. Clocks of the inputs follow from those of the outputs, but under stalls."""
+    """What a test sees of a run. Cycles of the inputs follow from those of the outputs, but under stalls."""
     free = not (stimulus.input_stalls.any() or stimulus.output_stalls.any())
     cycles = (trace.input_cycles,) if free else ()
     return trace.end, trace.clock, trace.output, trace.cycles, trace.status, *cycles

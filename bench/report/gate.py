@@ -4,7 +4,7 @@
 chord method with one light, for the models cosquad, coscos4 and blinn and the exponents 2, 10, 50, 200 and
 1000, in the compact and the throughput style, without and with the gate. It prints three tables in Markdown:
 how many spans and pixels are gated, the cycles, and the register bits that change. The exit status is 1 when
-a frame is not the same, to the bit, in all four simulations and by the twin; 2 for bad input.
+a frame is not the same, to the bit, in all four simulations and by the model; 2 for bad input.
 
 Toggles are those of registers: what happens inside a multiplier between two of them is not counted. The gate
 works once a span and saves once a pixel, so it is the frame's spans that decide which is more.
@@ -34,12 +34,12 @@ from blysk.golden.presets import MODELS as ALL_MODELS
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.sim.cli.main import Size
 from blysk.sim.engines.simulate import Run, simulate
 from blysk.sim.engines.toggles import ToggleCounter
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.output import check_writable, write_json
+from blysk.sim.value_types import Size
 
 __all__ = [
     "EXPONENTS",
@@ -62,7 +62,7 @@ _GATE = ("highlight_gate", "undecided", "lengths", "decisions")
 
 @dataclass(frozen=True)
 class Shares:
-    """How much of a frame the gate keeps from the specular unit, and how much it could, by the twin.
+    """How much of a frame the gate keeps from the specular unit, and how much it could, by the model.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class GateRow:
     activity : pair of Activity
         Of the throughput style.
     identical : bool
-        Whether the pixels of all four simulations, hidden ones too, are those of the twin.
+        Whether the pixels of all four simulations, hidden ones too, are those of the model.
     """
 
     mesh: str
@@ -189,7 +189,7 @@ def frames(
 
 
 def same_pixels(run: Run, expected: Pixels) -> bool:
-    """Whether a run gave such pixels: place, colour and mark of a span's end of each, in their order."""
+    """Whether a run gave such pixels: view, colour and mark of a span's end of each, in their order."""
     fields = {name: getattr(expected, name) for name in ("x", "y", "last")}
     fields |= {name: expected.color[:, channel] for channel, name in enumerate("rgb")}
     return all(np.array_equal(run.beats[name], codes) for name, codes in fields.items())
@@ -319,12 +319,12 @@ _TABLES: tuple[tuple[str, tuple[str, ...], Callable[[GateRow], tuple[str, ...]]]
         _share_cells,
     ),
     (
-        "Clocks of the frame, gate off and on: compact style, then one pixel a clock.",
+        "Cycles of the frame, gate off and on: compact style, then one pixel a cycle.",
         ("off", "on", "saved", "off", "on", "saved"),
         _clock_cells,
     ),
     (
-        "Toggled register bits a pixel, one pixel a clock: specular unit, gate; saved in the specular unit, "
+        "Toggled register bits a pixel, one pixel a cycle: specular unit, gate; saved in the specular unit, "
         "and less what the gate takes; whole pipeline, gate included.",
         ("specular off", "on", "gate", "saved", "net", "pipeline off", "on", "saved"),
         _activity_cells,

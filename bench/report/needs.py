@@ -8,7 +8,7 @@ import numpy as np
 
 from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
 from blysk.bench.store import Task
-from blysk.bench.tools.pages import svg
+from blysk.bench.svg import svg
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera

@@ -1,4 +1,4 @@
-"""Every method with every reflection model: simulated pixels beside those of the twin.
+"""Every method with every reflection model: simulated pixels beside those of the model.
 
 ``python -m blysk.bench.report.pairs [MESH ...]`` renders each mesh (the teapot by default) at 96x72 and
 exponents 1, 30 and 1000 with each pair, without specular light too, in the compiled engine, and compares
@@ -44,7 +44,7 @@ class Pair:
     frames, pixels : int
         What was compared.
     mismatches : int
-        Pixels that differ from the twin's in place, colour or mark of a span's end.
+        Pixels that differ from the model's in view, colour or mark of a span's end.
     failure : str
         One line that says why frames are missing; empty where none are.
     """
@@ -60,7 +60,7 @@ class Pair:
 def mismatches(
     unit: ShadingPipelineUnit, mesh: Mesh, exponent: int, width: int, height: int
 ) -> tuple[int, int]:
-    """Pixels of a frame, and how many of the simulated ones are not the twin's.
+    """Pixels of a frame, and how many of the simulated ones are not the model's.
 
     Parameters
     ----------

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.report.cosine_quadratic import panels
 from blysk.bench.report.section import Drawing, Section, Table
-from blysk.bench.report.thesis import Counted, dot, fastest
+from blysk.bench.report.thesis_figures import fastest
+from blysk.bench.report.thesis_ways import Counted, dot
 from blysk.bench.speed.throughput import measure, spans_of
 from blysk.bench.store import Task
-from blysk.bench.tools.pages import svg
+from blysk.bench.svg import panels, svg
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.presets import preset
 from blysk.golden.reference.raster import rasterise
@@ -179,7 +179,7 @@ def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[s
 
 
 def hardware_cycles(model: str, triangles: int, width: int, height: int) -> dict[str, int]:
-    """Clocks of the same frame in the simulated pipeline, method chord.
+    """Cycles of the same frame in the simulated pipeline, method chord.
 
     Parameters
     ----------
@@ -345,14 +345,14 @@ def _frames_table(timed: Sequence[tuple[dict, dict]], simulated: Sequence[tuple[
         "[P] figure 8: time of a frame with Phong's and with Blinn's model",
         (
             *("triangles", "visible pixels", "Phong, ns a visible pixel", "Blinn, ns a visible pixel"),
-            *("less time with Blinn, frame", "less time with Blinn, shading", "printed, at most"),
+            *("less time with Blinn, frame", "less time with Blinn, shading", "published, at most"),
             "share of geometry",
             *("hardware cycles", "pixels shaded in hardware", "cycles a pixel"),
         ),
         rows,
         f"Teapot at {width}x{height}, exponent {_EXPONENT}. Times: processor time of the golden renderer, "
         "NumPy in float64, both models in one run; they are of the machine that made this report, the "
-        f"ratios are not. Clocks: simulated pipeline, method {_METHOD}, model {_HARDWARE_MODELS[0]}, hidden "
+        f"ratios are not. Cycles: simulated pipeline, method {_METHOD}, model {_HARDWARE_MODELS[0]}, hidden "
         "pixels included.",
     )
 

@@ -5,7 +5,8 @@ from typing import Any
 
 from blysk.bench.report.section import Cell, Section, Table
 from blysk.bench.store import Task
-from blysk.bench.tools.fpga import ECP5, FAMILIES, SEEDS, TooLarge, lay_out, tool_versions
+from blysk.bench.tools.families import ECP5, FAMILIES
+from blysk.bench.tools.place_and_route import SEEDS, TooLarge, lay_out, tool_versions
 from blysk.golden.presets import METHODS, preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 
@@ -54,7 +55,7 @@ def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, s
 
 
 def task(method: str, model: str = MODEL, family: str = "ecp5") -> Task:
-    """`measure` of a pipeline; one seed for printed methods and other models than `MODEL`.
+    """`measure` of a pipeline; one seed for published methods and other models than `MODEL`.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         return Section(name, title, ["Left out of a quick report; `blysk fpga` does it alone."], [])
     text = [
         f"The pipeline, {MODEL}, one light, three channels, out of context. Placement starts from a seed; "
-        "clock rates are over some of them. At one pixel a clock, 1920x1080 pixels 60 times a second ask for "
+        "clock rates are over some of them. At one pixel a cycle, 1920x1080 pixels 60 times a second ask for "
         f"{1920 * 1080 * 60 / 1e6:.0f} MHz."
     ]
     tables = []

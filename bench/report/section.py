@@ -65,7 +65,7 @@ class Drawing:
     svg : str
         The drawing; see `svg`.
     note : str
-        What a reader should see in it; where the printed figure is.
+        What a reader should see in it; where the published figure is.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Speed of the engines and of their rival, on the same component and beats, in one run.
+"""Speed of the engines and of their baseline, on the same component and beats, in one run.
 
 ``python -m blysk.bench.speed.engines`` sends the longer spans of a teapot at 4000x3000 through the chord
 pipeline of one light in both engines and in Verilator's model of the emitted Verilog, and through the same
@@ -75,18 +75,18 @@ _WAIT = 1000
 
 @dataclass(frozen=True)
 class Speed:
-    """Speed of the two engines, with all of their overhead but the building of the model, and of the rival.
+    """Speed of both engines, with all overhead but the building of the model, and of the baseline.
 
     Parameters
     ----------
     cxxrtl, pysim : float
-        Clocks a second.
+        Cycles a second.
     cxxrtl_beats, pysim_beats : float
         Output beats a second.
     build : float
         Seconds on the clock to the compiled model and its first, short run; less with a warm cache.
     cycles : int
-        Clocks of the compiled run, up to the last transfer.
+        Cycles of the compiled run, up to the last transfer.
     verilator_beats : float or None
         Output beats a second of Verilator's model, ``None`` where it was not asked for.
     """
@@ -124,7 +124,7 @@ def measure(
     expected: Mapping[str, np.ndarray] | None = None,
     pysim_beats: int = 200,
     repeats: int = 3,
-    rival: bool = False,
+    baseline: bool = False,
 ) -> Speed:
     """Run both engines, and compare what they give.
 
@@ -147,7 +147,7 @@ def measure(
         Input beats for the interpreted engine.
     repeats : int
         Runs of the compiled engine.
-    rival : bool
+    baseline : bool
         Whether to run Verilator's model too; not for a component with ``constants``.
 
     Returns
@@ -157,7 +157,7 @@ def measure(
     Raises
     ------
     ValueError
-        If the engines differ in a beat or a clock, the compiled one gives other than expected, or Verilator's
+        If the engines differ in a beat or a cycle, the compiled one gives other than expected, or Verilator's
         model other beats or cycles than the compiled one.
     SimulationError
         If there is no Verilator, or it fails.
@@ -184,10 +184,10 @@ def measure(
     for name in ("beats", "cycles", "input_cycles", "total_cycles", "status"):
         if not np.array_equal(getattr(compiled, name), getattr(interpreted, name)):
             raise ValueError(f"the engines differ in {name}")
-    times, runs, rival_times = [], [], []
+    times, runs, baseline_times = [], [], []
     with ExitStack() as stack:
         model = None
-        if rival:
+        if baseline:
             folder = stack.enter_context(tempfile.TemporaryDirectory(ignore_cleanup_errors=True))
             model = Verilated(component, Path(folder))
         for _ in range(repeats):
@@ -197,7 +197,7 @@ def measure(
             if model is not None:
                 stimulus = free_stimulus(model.ports, beats, write, len(run.beats), _WAIT)
                 seconds, (output, cycles) = _timed(lambda stimulus=stimulus: model.run(stimulus))
-                rival_times.append(seconds)
+                baseline_times.append(seconds)
                 same = _digest(output) == _digest(pack(model.ports.o, run.beats))
                 if not same or not np.array_equal(cycles, run.cycles):
                     raise ValueError("Verilator's model and the compiled engine differ")
@@ -212,7 +212,7 @@ def measure(
         pysim_beats=len(interpreted.beats) / pysim_time,
         build=build,
         cycles=cycles,
-        verilator_beats=len(runs[0].beats) / min(rival_times) if rival_times else None,
+        verilator_beats=len(runs[0].beats) / min(baseline_times) if baseline_times else None,
     )
 
 
@@ -304,7 +304,7 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
                 expected=expected,
                 pysim_beats=50,
                 repeats=repeats,
-                rival=not gate,
+                baseline=not gate,
             )
             for gate, unit in units.items()
         )

@@ -1,4 +1,4 @@
-"""Clocks a pixel of real frames: the lengths of their spans, and what the setup of a span costs.
+"""Cycles a pixel of real frames: the lengths of their spans, and what the setup of a span costs.
 
 ``python -m blysk.bench.speed.throughput [TRIANGLES ...]`` draws teapots of 1,000, 10,000, 100,000 and
 1,000,000 triangles at 1920x1080, and sends their spans through the simulated pipelines of the methods chord
@@ -84,7 +84,7 @@ class Lengths:
 
 @dataclass(frozen=True)
 class Throughput:
-    """Clocks of a frame through the simulated pipeline.
+    """Cycles of a frame through the simulated pipeline.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class Throughput:
     method : str
         Method of interpolation.
     setup_interval : int
-        Clocks from a span to the next at the closest.
+        Cycles from a span to the next at the closest.
     pixels, cycles : int
         Pixels of the frame, and cycles from the first write of a constant to the last pixel.
     long_pixels, long_cycles : int
@@ -110,7 +110,7 @@ class Throughput:
 
     @property
     def cycles_per_pixel(self) -> float:
-        """Clocks a pixel; NaN without pixels."""
+        """Cycles a pixel; NaN without pixels."""
         return self.cycles / self.pixels if self.pixels else float("nan")
 
     @property
@@ -120,7 +120,7 @@ class Throughput:
 
     @property
     def long_cycles_per_pixel(self) -> float | None:
-        """Clocks a pixel of long spans; ``None`` where there are none."""
+        """Cycles a pixel of long spans; ``None`` where there are none."""
         return self.long_cycles / self.long_pixels if self.long_pixels else None
 
 

@@ -1,4 +1,4 @@
-"""The rival of the compiled engine: Verilator's model of the emitted Verilog, driven with the same beats.
+"""The baseline of the compiled engine: Verilator's model of the emitted Verilog, driven with the same beats.
 
 Verilator is that of the Python package ``verilator``. Its C++ gets the compiler and the optimisation level of
 the compiled engine, and runs inside this process like it. The driver evaluates twice a clock, as Verilator
@@ -46,7 +46,7 @@ static inline void place(uint32_t *words, int offset, int width, uint64_t value)
 		words[n] |= uint32_t(at < 0 ? value << -at : value >> at);
 }}
 
-// Clocks up to the last beat out, or -1.
+// Cycles up to the last beat out, or -1.
 extern "C" int64_t run(
 		const uint32_t *write, int64_t writes, const uint32_t *input, int64_t inputs,
 		uint32_t *output, int64_t *cycles, int64_t outputs, int64_t idle_timeout) {{
@@ -164,7 +164,7 @@ def free_stimulus(
     count : int
         Output beats.
     idle_timeout : int
-        Clocks without one after which the component counts as stuck.
+        Cycles without one after which the component counts as stuck.
     """
     return Stimulus(
         input=pack(ports.i, beats),

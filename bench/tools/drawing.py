@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch, PathPatch
 from matplotlib.path import Path
 
-from blysk.bench.tools.structure import Graph, Node, layers
+from blysk.bench.tools.graph import Graph, Node, layers
 
 __all__ = ["draw_structure"]
 

@@ -27,19 +27,19 @@ _CLOCK, _ROW = 22.0, 22.0
 _MARGIN = 58.0
 _INK, _FILLS = "#222222", ("#cfe0f3", "#f9dcc0", "#d5ecd5", "#eadcf2")
 QUIET = 7
-"""Clocks without a change above which a diagram leaves them out."""
+"""Cycles without a change above which a diagram leaves them out."""
 
 
 @dataclass(frozen=True)
 class Waves:
-    """The handshakes of a simulation, clock by clock, as they stand before the rising edge.
+    """The handshakes of a simulation, cycle by cycle, as they stand before the rising edge.
 
     Parameters
     ----------
     levels : dict of str to bool array
         ``i.valid``, ``i.ready``, ``o.valid`` and ``o.ready``.
     inputs, outputs : list of (str or None)
-        Name of the beat that each stream offers on a clock.
+        Name of the beat that each stream offers in a cycle.
     """
 
     levels: dict[str, np.ndarray]
@@ -48,7 +48,7 @@ class Waves:
 
     @property
     def cycles(self) -> int:
-        """Clocks shown."""
+        """Cycles shown."""
         return len(self.inputs)
 
 
@@ -125,13 +125,13 @@ def _letter(k: int) -> str:
 
 
 def _offered(valid: np.ndarray, ready: np.ndarray, names: list[str]) -> list[str | None]:
-    """Name of the beat on each clock: as many have moved before as it stands in the row."""
+    """Name of the beat on each cycle: as many have moved before as it stands in the row."""
     moved = np.cumsum(valid & ready) - (valid & ready)
     return [names[k] if is_valid else None for k, is_valid in zip(moved, valid, strict=True)]
 
 
 def _shown(waves: Waves) -> list[int | None]:
-    """Clocks of the diagram; `None` for a stretch that is left out."""
+    """Cycles of the diagram; `None` for a stretch that is left out."""
     states = [
         (
             waves.levels["i.valid"][k],
@@ -155,9 +155,9 @@ def _shown(waves: Waves) -> list[int | None]:
 
 
 def draw_timing(waves: Waves) -> Figure:
-    """Draw the handshakes clock by clock.
+    """Draw the handshakes cycle by cycle.
 
-    A beat moves at the end of a clock, the rising edge of ``clk``, when valid and ready are both high.
+    A beat moves at the end of a cycle, the rising edge of ``clk``, when valid and ready are both high.
     """
     shown = _shown(waves)
     rows = ["clk", "i.valid", "i.ready", "i.payload", "o.valid", "o.ready", "o.payload"]

@@ -17,12 +17,12 @@ from click.testing import CliRunner
 from matplotlib.figure import Figure
 from PIL import Image
 
-from blysk.bench.report import points
+from blysk.bench.report import frames, points
 from blysk.bench.report.report import command
 from blysk.bench.report.section import Drawing, Section, Table
 from blysk.bench.speed.web_speed import OPTIONS, find_chromium
 from blysk.bench.store import Task
-from blysk.bench.tools.pages import svg
+from blysk.bench.svg import svg
 
 DESIGNS = [*points.DESIGNS[:10], ("chord", "exp"), ("renormalise", "blinn"), points.DESIGNS[-1]]
 EXPONENTS = [10, 100]
@@ -132,7 +132,7 @@ def picture(value):
 def frame(rng, task, exponent, simulated):
     """What `frames` would give, of random figures."""
     settings = task.settings
-    errors = {axis["key"]: float(10 ** rng.uniform(-1.5, 2)) for axis in points.ERRORS}
+    errors = {axis["key"]: float(10 ** rng.uniform(-1.5, 2)) for axis in frames.ERRORS}
     if exponent == 10 and settings.get("model") == "exp":
         errors |= {"arithmetic_max_lsb": 0.0, "arithmetic_rmse_lsb": 0.0}
     for key in [key for key in errors if key.endswith("psnr_db")]:
@@ -141,12 +141,12 @@ def frame(rng, task, exponent, simulated):
     pixels = int(rng.integers(5000, 9000))
     return {
         "settings": {
-            **settings["place"],
+            **settings["view"],
             "exponent": exponent,
             **{"ambient": 0.1, "diffuse": 0.4, "specular": 0.5, "light": [0.0, 0.6, 0.8]},
             "method": settings.get("method", settings.get("shading")),
             "model": settings.get("model", "blinn"),
-            "engine": "cxxrtl" if simulated else "twin",
+            "engine": "cxxrtl" if simulated else "model",
         },
         "errors": errors,
         "verdicts": {
@@ -165,14 +165,14 @@ def frame(rng, task, exponent, simulated):
 def points_section():
     """The section of the points, from made-up results."""
     rng = np.random.default_rng(3)
-    place = {"source": "teapot", "triangles": 100, "digest": "0" * 64, "width": 160, "height": 120}
-    where = {"place": place, "exponents": EXPONENTS}
+    view = {"source": "teapot", "triangles": 100, "digest": "0" * 64, "width": 160, "height": 120}
+    where = {"view": view, "exponents": EXPONENTS}
     tasks, results = [], []
     for k, (method, model) in enumerate(DESIGNS):
         simulated = k % 4 != 3
         settings = {"method": method, "model": model, **where, "simulated": simulated}
-        tasks += [Task(points.frames, settings), Task(points.speeds, settings, timed=True)]
-        tasks.append(Task(points.hardware, {"method": method, "model": model}))
+        tasks += [Task(frames.frames, settings), Task(frames.speeds, settings, timed=True)]
+        tasks.append(Task(frames.hardware, {"method": method, "model": model}))
         results.append([frame(rng, tasks[-3], exponent, simulated) for exponent in EXPONENTS])
         speed = rng.uniform(1e5, 1e7, (2, 2)) if simulated else [[None, 1.5e3]] * 2
         names = ("simulated_pixels_per_second", "golden_ns_per_pixel")
@@ -193,7 +193,7 @@ def plain_section():
         "A <plain> section",
         ["Some *text* with `code` and a <b>tag</b>."],
         [
-            Drawing("squares", "Squares against numbers", svg(figure), "As *printed*."),
+            Drawing("squares", "Squares against numbers", svg(figure), "As *published*."),
             Table(
                 "graded",
                 "Grades",

@@ -1,10 +1,13 @@
 """Frames of the exponents asked for, and their errors."""
 
+import pytest
+
 from blysk.bench.accuracy import measure
 from blysk.golden.presets import preset
 from blysk.sim.meshes.teapot import teapot
 
 
+@pytest.mark.long
 def test_measures_every_exponent():
     rows = list(measure(teapot(500), preset(), (1, 100), 64, 48))
     assert [row[0] for row in rows] == [1, 100]

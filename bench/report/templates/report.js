@@ -148,10 +148,10 @@
   }
 
   const SHAPES = {
-    documented: (r) => `M${-r} 0a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0Z`,
+    documents: (r) => `M${-r} 0a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0Z`,
     own: (r) => `M0 ${-1.35 * r}L${1.35 * r} 0L0 ${1.35 * r}L${-1.35 * r} 0Z`,
-    rival: (r) => `M0 ${-1.25 * r}L${1.2 * r} ${0.9 * r}L${-1.2 * r} ${0.9 * r}Z`,
-    printed: (r) => `M${-r} ${-r}L${r} ${r}M${-r} ${r}L${r} ${-r}`,
+    baseline: (r) => `M0 ${-1.25 * r}L${1.2 * r} ${0.9 * r}L${-1.2 * r} ${0.9 * r}Z`,
+    published: (r) => `M${-r} ${-r}L${r} ${r}M${-r} ${r}L${r} ${-r}`,
     software: (r) => `M${-r} ${-r}H${r}V${r}H${-r}Z`,
   };
 

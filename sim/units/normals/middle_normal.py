@@ -69,7 +69,8 @@ def _last_bits(unit, rng, count):
 def _variants():
     for fit in MIDDLE_NORMAL_FITS:
         model = MiddleNormal(fit)
-        yield fit, Variant(partial(MiddleNormalUnit, model), partial(_measure, model=model), SPANS_45)
+        unit, measure = partial(MiddleNormalUnit, model), partial(_measure, model=model)
+        yield fit, Variant(unit, measure, SPANS_45, as_published=fit == "as_published")
     for interval in (1, 2, 3, 4, 5, 7, 8, 9):
         unit = partial(MiddleNormalUnit, MiddleNormal(), initiation_interval=interval)
         measured = (partial(_measure, model=MiddleNormal()), SPANS_45) if interval == 1 else ()

@@ -17,7 +17,7 @@ from blysk.bench.quality.baselines import (
     measure,
     read,
 )
-from blysk.bench.tools.blocks import BLOCKS
+from blysk.bench.tools.blocks import ENTRIES as UNITS
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import STYLES
@@ -31,16 +31,15 @@ from blysk.sim.errors import InputError
 BASELINES = read()
 
 
-def quick(name):
-    """Pipelines of every method but one in the usual style, and the compact one of one; devices take long."""
-    usual = "cosquad, throughput" in name and "gate" not in name
-    return name != "frames: pipeline bisection, cosquad, throughput" and (
-        usual or name.endswith("pipeline chord, cosquad, compact")
-    )
+QUICK = (
+    "frames: pipeline linear, cosquad, throughput",
+    *("parts: pipeline linear, cosquad, throughput", "parts: dot_product", "parts: chord_setup interval 4"),
+)
+"""Of pipelines and units; all of them take minutes."""
 
 
 @pytest.mark.parametrize(
-    "name", [n if quick(n) else pytest.param(n, marks=pytest.mark.long) for n in ENTRIES]
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in ENTRIES]
 )
 def test_nothing_moved(name):
     old = {name: BASELINES[name]} if name in BASELINES else {}
@@ -53,10 +52,8 @@ def test_every_entry_has_a_baseline_and_every_baseline_an_entry():
     assert not missing | extra, f"missing: {missing}; too many: {extra}; update by {UPDATE}"
 
 
-def test_entries_are_every_block_method_model_and_style():
-    for block in BLOCKS:
-        if block.device != "pipeline":
-            assert f"parts: {block.device} {block.variant}".rstrip() in ENTRIES
+def test_entries_are_every_unit_method_model_and_style():
+    assert {f"parts: {entry.title}" for entry in UNITS if entry.record.name != "pipeline"} <= set(ENTRIES)
     for method in METHODS:
         for style in STYLES:
             assert {f"{kind}: pipeline {method}, cosquad, {style}" for kind in ("frames", "parts")} <= set(

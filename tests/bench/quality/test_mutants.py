@@ -1,10 +1,15 @@
-"""Mutants: known faults and known equivalents, scores, the list of reasons, bad input."""
+"""Mutants: known faults and known equivalents, scores, waivers, bad input."""
+
+from dataclasses import replace
 
 import pytest
 
 from blysk.bench.quality import mutants
-from blysk.bench.quality.mutants import DEVICES, LEAST, Score, main, scores, table
+from blysk.bench.quality.equivalence import Miter
+from blysk.bench.quality.mutants import LEAST, Score, main, scores, table, waived
+from blysk.bench.quality.mutation import Mutants, killed, mutate, vectors_of
 from blysk.sim.frames.workers import local_executor
+from blysk.sim.units.registry import RECORDS
 
 ROWS = [
     Score("one", 10, ("a", "b"), ("c", "d")),
@@ -13,22 +18,9 @@ ROWS = [
 ]
 
 
-@pytest.fixture(scope="module")
-def diffuse_vectors():
-    return mutants.vectors_of("diffuse")
-
-
-def measured(names, count=mutants.COUNT):
-    with local_executor(2) as executor:
-        return scores(names, count, executor=executor)
-
-
 def test_score_leaves_the_equivalent_out():
     assert [row.killed for row in ROWS] == [6, 4, 0]
     assert [row.score for row in ROWS] == [6 / 8, 1, 1]
-
-
-def test_table_has_a_line_a_device():
     assert table(ROWS).splitlines()[2:] == [
         "| one | 10 | 2 | 6 | 2 | 75.0% |",
         "| two | 5 | 1 | 4 | 0 | 100.0% |",
@@ -36,58 +28,45 @@ def test_table_has_a_line_a_device():
     ]
 
 
-def test_survivors_want_a_reason(monkeypatch):
-    monkeypatch.setattr(mutants, "_argued", lambda: {"one": {"c": "for a reason"}, "two": {"d": "another's"}})
-    assert ROWS[0].open == ("d",)
+def test_waivers_are_of_a_signal_and_its_copies(monkeypatch):
+    record = replace(RECORDS["diffuse"], waivers={"datapath.sum": "for a reason", "last_?": "for another"})
+    monkeypatch.setitem(mutants.RECORDS, "diffuse", record)
+    for signal in ("unit.datapath.sum", "unit.datapath.sum_3", "unit.inner.datapath.sum", "unit.last_1"):
+        assert waived("diffuse", f"stuck-at-0 -> {signal}")
+    for signal in ("unit.datapath.summand", "unit.sum", "unit.last"):
+        assert not waived("diffuse", f"stuck-at-0 -> {signal}")
+    row = Score("diffuse", 3, (), ("inv -> unit.last_1", "inv -> unit.other"))
+    assert row.open == ("inv -> unit.other",)
 
 
-def test_proofs_tell_faults_from_the_unit(tmp_path, diffuse_vectors):
+def test_proofs_tell_faults_from_the_unit(tmp_path):
     """No killed mutant is equivalent, and the unit is equivalent to itself."""
-    unit = DEVICES["diffuse"].unit()
-    known = mutants._mutate(unit, "", 20, 3, tmp_path)
-    killed = mutants._killed(mutants._Mutants(unit, tmp_path), diffuse_vectors, known)
-    miter = mutants._Miter(tmp_path)
-    assert len(killed) > 10
-    assert [miter.is_equivalent(mutant) for mutant in sorted(killed)] == [False] * len(killed)
+    record = RECORDS["diffuse"]
+    unit = record.variants[record.default].unit()
+    known = mutate(unit, 20, 3, tmp_path)
+    found = killed(Mutants(unit, tmp_path), vectors_of(record)[:3], known)
+    miter = Miter(tmp_path)
+    assert len(found) > 10
+    assert not any(miter.is_equivalent(mutant) for mutant in sorted(found)[:5])
     assert miter.is_equivalent(0)
 
 
-def test_vectors_are_those_of_the_tests(diffuse_vectors):
-    """The same beats without stalls, with three kinds of them, and few."""
-    stimuli = [stimulus for stimulus, _ in diffuse_vectors]
-    lengths = [len(stimulus.input) for stimulus in stimuli]
-    assert (min(lengths), len(set(lengths)), len(stimuli)) == (60, 2, 10)
-    assert sum(not (s.input_stalls.any() or s.output_stalls.any()) for s in stimuli) == 1
-
-
 @pytest.mark.long
-def test_small_device():
-    (row,) = measured(["diffuse"], 60)
-    assert row.mutants > 50
+@pytest.mark.parametrize("unit", RECORDS)
+def test_mutants_are_killed(unit):
+    with local_executor(2) as executor:
+        (row,) = scores([unit], executor=executor)
     assert row.score >= LEAST
     assert not row.open
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("device", DEVICES)
-def test_mutants_are_killed(device):
-    (row,) = measured([device])
-    assert row.score >= LEAST
-    assert not row.open
-    # Nothing is argued that is killed; a quick machine may prove what another has to argue.
-    assert set(mutants._argued().get(device, {})) <= {*row.survived, *row.equivalent}
 
 
 def test_bad_input_is_told_in_one_line(capsys, tmp_path):
-    assert main(["tea"]) == 2
-    assert capsys.readouterr().err.startswith(
-        "blysk.bench.quality.mutants: tea: is no device; choose from dot_product, "
-    )
-    assert main(["--count", "0"]) == 2
-    assert len(capsys.readouterr().err.splitlines()) == 1
-    assert main(["diffuse", "--json", str(tmp_path)]) == 2
-    assert (
-        capsys.readouterr().err
-        == f"blysk.bench.quality.mutants: {tmp_path}: cannot be written, it is a folder; "
-        "give the name of a file\n"
-    )
+    name = "blysk.bench.quality.mutants"
+    for arguments, text in (
+        (["tea"], f"{name}: tea: is no unit; choose from "),
+        (["--count", "0"], f"{name}: "),
+        (["diffuse", "--json", str(tmp_path)], f"{name}: {tmp_path}: cannot be written, it is a folder; "),
+    ):
+        assert main(arguments) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith(text)

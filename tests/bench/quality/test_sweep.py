@@ -82,7 +82,7 @@ def test_switched_pixels_are_told_apart(side):
     normals = np.cos(turn) * across + np.sin(turn) * np.cross(light, across)
     normals = normalise(normals + side * 1e-9 * light)
     product = quantise(normals) @ quantise(light)
-    # The twin's N·L is cut to 25 of these 34 fraction bits.
+    # The model's N·L is cut to 25 of these 34 fraction bits.
     (normal, *_) = normals[side * product < -(2**10)]
     (point,) = Frame(flat(normal), 16, 12).points(1, ["blinn"])
     assert point.over == point.switched == point.pixels > 20

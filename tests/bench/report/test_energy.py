@@ -45,8 +45,9 @@ def test_inner_submodules_count():
     }
 
 
+@pytest.mark.long
 def test_counts_of_a_small_frame():
-    """The pixels are the twin's, and every block has something to do."""
+    """The pixels are the model's, and every block has something to do."""
     [found] = measure("cosquad", True, [50], [20, 15, 64], "pysim")
     assert found["same"]
     assert 20 < found["spans"] <= found["pixels"] < found["cycles"]

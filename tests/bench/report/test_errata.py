@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from blysk.bench.report.errata import ERRATA, FACTOR_PRINTED, OWN, ROOT_PRINTED, evidence, section, tasks
+from blysk.bench.report.errata import ERRATA, OWN, evidence, section, tasks
+from blysk.bench.report.errata_evidence import FACTOR_PUBLISHED, ROOT_PUBLISHED
 from blysk.golden.normals import bisection, middle_normal
 from blysk.sim.meshes.teapot import teapot
 
@@ -23,7 +24,7 @@ def own():
 
 
 @pytest.mark.parametrize(
-    ("name", "printed", "right"),
+    ("name", "published", "right"),
     [
         ("arccos-misprint", "0.086", "0.00013"),
         ("arccos-claim", "0.002", "0.0042"),
@@ -39,10 +40,10 @@ def own():
         ("recurrence-4095", "0.4", None),
     ],
 )
-def test_published_figures(found, name, printed, right):
+def test_published_figures(found, name, published, right):
     """numbers.md, to the digits shown there."""
     values = [f"{value:.2g}" for value in found[name]]
-    assert values[0] == printed
+    assert values[0] == published
     assert right is None or values[1] == right
 
 
@@ -130,14 +131,14 @@ def test_equal_normals(found):
 
 
 def test_energy(found):
-    """Right factors keep all energy; the printed ones are off by their ratio to those."""
+    """Right factors keep all energy; the published ones are off by their ratio to those."""
     assert found["energy-phong"] == [pytest.approx(math.pi / 10), pytest.approx(1)]
     ratio = math.pi * (2**-5 + 10) / (10 * (2**5 + 10))
     assert found["energy-blinn"] == [pytest.approx(ratio), pytest.approx(1)]
 
 
 def test_mirror(found):
-    """(L x N) x N is (L·N) N - L, so that what is printed is 2 (L·N) N - 3 L."""
+    """(L x N) x N is (L·N) N - L, so that what is published is 2 (L·N) N - 3 L."""
     assert found["mirror"] == [pytest.approx(math.sqrt(9 - 8 / 3)), pytest.approx(1)]
 
 
@@ -159,9 +160,9 @@ def test_four_times(found):
 
 def test_every_entry_shows_a_difference(found):
     assert found.keys() == ERRATA.keys()
-    for name, (printed, right) in found.items():
+    for name, (published, right) in found.items():
         if name != "zone":
-            assert abs(printed - right) > 2e-3 * max(abs(printed), abs(right)), name
+            assert abs(published - right) > 2e-3 * max(abs(published), abs(right)), name
 
 
 def test_own_figures(own):
@@ -177,8 +178,8 @@ def test_own_figures(own):
 
 
 def test_printed_coefficients_are_those_of_the_devices():
-    assert bisection._PRINTED == ROOT_PRINTED
-    assert middle_normal._PRINTED == FACTOR_PRINTED
+    assert bisection._PUBLISHED == ROOT_PUBLISHED
+    assert middle_normal._PUBLISHED == FACTOR_PUBLISHED
 
 
 def test_section(found, own):
@@ -190,4 +191,4 @@ def test_section(found, own):
     assert len(figures.rows) == len(OWN)
     first = errata.records()[0]
     assert first["right"] == "74.457"
-    assert [first["as printed"], first["as it should be"]] == found["arccos-misprint"]
+    assert [first["as published"], first["as it should be"]] == found["arccos-misprint"]

@@ -94,7 +94,7 @@ def test_times():
 
 @pytest.mark.long
 def test_hardware_cycles():
-    """A pixel a clock at most."""
+    """A pixel a cycle at most."""
     found = hardware_cycles("cosquad", 200, 64, 48)
     assert found["cycles"] > found["pixels"] >= render(scene_for(teapot(200), 50, 64, 48)).mask.sum()
 
@@ -148,8 +148,8 @@ def test_frames_table(made):
     assert first["less time with Blinn, shading"] == pytest.approx(0.25)
     assert first["share of geometry"] == pytest.approx(10 / 16)
     assert first["Phong, ns a visible pixel"] == pytest.approx(0.018 / 20_000 * 1e9)
-    assert first["printed, at most"] is None
-    assert last["printed, at most"] == 0.45
+    assert first["published, at most"] is None
+    assert last["published, at most"] == 0.45
     assert last["cycles a pixel"] == 4
     assert last["hardware cycles"] == 100_000
 

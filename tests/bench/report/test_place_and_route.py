@@ -4,7 +4,8 @@ import pytest
 
 from blysk.bench.report import place_and_route
 from blysk.bench.report.place_and_route import OTHERS, OTHERS_SEEDS, measure, section, tasks
-from blysk.bench.tools.fpga import FAMILIES, Layout, Parts, Place, TooLarge, ToolError
+from blysk.bench.tools.families import FAMILIES, Parts, Place
+from blysk.bench.tools.place_and_route import Layout, TooLarge, ToolError
 from blysk.golden.presets import METHODS
 
 

@@ -14,25 +14,21 @@ from click.testing import CliRunner
 from PIL import Image
 
 from blysk.bench import accuracy
+from blysk.bench.report import frames as frames_module
 from blysk.bench.report import place_and_route, points
-from blysk.bench.report.points import (
-    DESIGNS,
+from blysk.bench.report.frames import (
     ERRORS,
     EXPONENTS,
-    GROUPS,
-    QUICK_SIMULATED,
     STEPS,
     TIMES,
     frames,
-    front,
     hardware,
-    readme_table,
-    section,
     software_frames,
     software_speeds,
     speeds,
-    tasks,
 )
+from blysk.bench.report.points import DESIGNS, GROUPS, QUICK_SIMULATED, section, tasks
+from blysk.bench.report.points_text import front, readme_table
 from blysk.bench.store import Task
 from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.reflection import REFLECTION_MODELS
@@ -49,7 +45,7 @@ SIMULATED = ("chord-local", "cosquad")
 
 
 def task(function, timed=False, exponents=(10, 100), **settings):
-    return Task(function, {**settings, "place": PLACE, "exponents": list(exponents)}, timed)
+    return Task(function, {**settings, "view": PLACE, "exponents": list(exponents)}, timed)
 
 
 def design(method, model="cosquad", simulated=False):
@@ -100,8 +96,8 @@ def test_quick_tasks():
     assert [one.settings["shading"] for one in chosen if one.function is software_frames] == [*SHADINGS]
     assert all(one.timed == (one.function in (speeds, software_speeds)) for one in chosen)
     assert place_and_route.measure not in {one.function for one in chosen}
-    (place,) = {json.dumps(s["place"]) for s in of_frames(chosen)}
-    assert len(teapot(json.loads(place)["triangles"]).faces) == 992
+    (view,) = {json.dumps(s["view"]) for s in of_frames(chosen)}
+    assert len(teapot(json.loads(view)["triangles"]).faces) == 992
     json.dumps([one.settings for one in chosen])
 
 
@@ -123,11 +119,11 @@ def test_further_meshes(tmp_path):
     mesh = tmp_path / "mesh.obj"
     mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     (first,) = {
-        s["place"]["digest"] for s in of_frames(tasks(True, [str(mesh)])) if s["place"]["source"] != "teapot"
+        s["view"]["digest"] for s in of_frames(tasks(True, [str(mesh)])) if s["view"]["source"] != "teapot"
     }
     mesh.write_text("v 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\n")
-    points._mesh.cache_clear()
-    digests = {s["place"]["digest"] for s in of_frames(tasks(True, [str(mesh), str(mesh)]))}
+    frames_module._mesh.cache_clear()
+    digests = {s["view"]["digest"] for s in of_frames(tasks(True, [str(mesh), str(mesh)]))}
     # The teapot's and another: the file has changed.
     assert len(digests) == 2
     assert first not in digests
@@ -138,11 +134,11 @@ def test_further_meshes(tmp_path):
 def test_mesh_that_does_not_show(tmp_path):
     mesh = tmp_path / "needle.obj"
     mesh.write_text("v 0 0 0\nv 1000 1000 0\nv 1000 1000.0001 0\nf 1 2 3\n")
-    place = {**PLACE, "source": str(mesh), "triangles": None}
+    view = {**PLACE, "source": str(mesh), "triangles": None}
     with pytest.raises(InputError, match="no pixel shows the surface at 64x48"):
-        software_frames("flat", place, [10])
+        software_frames("flat", view, [10])
     with pytest.raises(InputError, match="no pixel shows the surface at 64x48"):
-        frames("linear", "cosquad", place, [10], False)
+        frames("linear", "cosquad", view, [10], False)
 
 
 def test_simulated_point_is_that_of_the_frame_runner(found):
@@ -296,8 +292,8 @@ def test_section(measured):
     groups = {point["label"]: point["group"] for point in made.figures["points"]}
     assert groups == {
         "chord-local, cosquad": "own",
-        "linear, cosquad": "rival",
-        "angular-published, cosquad": "printed",
+        "linear, cosquad": "baseline",
+        "angular-published, cosquad": "published",
         "chord, exp": "own",
         "chord, blinn": "own",
         "gouraud, software": "software",
@@ -346,14 +342,14 @@ def test_pictures_hold_the_frame_and_its_errors(found, measured):
 def test_smaller_pictures_keep_the_largest_error():
     values = np.zeros((7, 11))
     values[6, 10], values[2, 3] = 5, 7
-    small = points._largest(values, 3)
+    small = frames_module._largest(values, 3)
     assert small.shape == (3, 4)
     assert (small[2, 3], small[0, 1], small.sum()) == (5, 7, 12)
     rng = np.random.default_rng(3)
     image = np.repeat(rng.integers(0, 256, (50, 900, 1), dtype=np.uint8), 3, axis=-1)
     exact = image / 255.0
     exact[30, 600] = 1 - exact[30, 600].round()
-    made = points._pictures(image, {"error": exact}, np.ones((50, 900), dtype=bool))
+    made = frames_module._pictures(image, {"error": exact}, np.ones((50, 900), dtype=bool))
     frame, error = picture(made["frame"]), picture(made["error"])
     assert frame.size == error.size == (225, 13)
     assert np.argwhere(np.asarray(error)).tolist() == [[30 // 4, 600 // 4]]
@@ -431,20 +427,3 @@ def test_readme_table_of_no_report(tmp_path):
         found = CliRunner().invoke(points._print, [str(tmp_path / name)])
         assert isinstance(found.exception, InputError)
         assert "is no full report; give the report.json of `blysk bench`" in str(found.exception)
-
-
-@pytest.mark.parametrize(
-    ("method", "model"),
-    [
-        pytest.param(*design, marks=() if design == ("chord", "cosquad") else pytest.mark.long)
-        for design in accuracy.DESIGNS
-    ],
-)
-def test_readme_states_what_is_measured(method, model):
-    place = points.place_of("teapot", 10_000, 640, 480)
-    settings = {"method": method, "model": model, "place": place, "simulated": True}
-    chosen = [Task(function, {**settings, "exponents": [*EXPONENTS]}) for function in (frames, speeds)]
-    made = section(chosen, [one.run() for one in chosen])
-    line = readme_table(made.figures["points"]).splitlines()[2]
-    # The last column is a time.
-    assert line.rsplit("|", 2)[0] in (Path(__file__).parents[3] / "README.md").read_text()

@@ -11,8 +11,9 @@ from html.parser import HTMLParser
 import pytest
 from click.testing import CliRunner
 
-from blysk.bench.report import devices, points, report
-from blysk.bench.report.report import AXES, SECTIONS, about, check_folder, command, page, shown, write_report
+from blysk.bench.report import frames, report, units
+from blysk.bench.report.page import AXES, environment, page, shown
+from blysk.bench.report.report import SECTIONS, about, check_folder, command, write_report
 from blysk.bench.report.section import Section, Table
 from blysk.bench.store import Task
 from blysk.sim.errors import InputError
@@ -122,10 +123,10 @@ def test_figures_cannot_end_their_script(points_section):
 
 
 def test_every_axis_is_explained():
-    for axis in points.ERRORS:
+    for axis in frames.ERRORS:
         kind, figure = axis["key"].split("_", 1)
         assert {kind, figure} <= set(AXES)
-    assert {axis["key"] for axis in points.TIMES} <= set(AXES)
+    assert {axis["key"] for axis in frames.TIMES} <= set(AXES)
     assert all(text.endswith(".") and "\n" not in text for text in AXES.values())
 
 
@@ -199,12 +200,12 @@ class Fake:
 
     def tasks(self, quick, **further):
         assert further in ({}, {"meshes": ("a.obj", "b.obj")})
-        settings = {"device": "dot_product", "variant": ""}
-        return [Task(devices.measure, {**settings, "samples": 1000 + k}) for k in range(self._count)]
+        settings = {"unit": "dot_product", "variant": ""}
+        return [Task(units.measure, {**settings, "samples": 1000 + k}) for k in range(self._count)]
 
     def section(self, tasks, results):
         assert [task.settings["samples"] for task in tasks] == [1000 + k for k in range(self._count)]
-        assert [result["device"] for result in results] == ["dot_product"] * self._count
+        assert [result["unit"] for result in results] == ["dot_product"] * self._count
         return self._section
 
 
@@ -255,7 +256,7 @@ def test_bad_options(run, tmp_path, arguments, message):
 
 @pytest.mark.parametrize("module", ["jinja2", "markdown_it", "flip_evaluator", "skimage"])
 def test_missing_library_is_named_before_the_work(run, tmp_path, monkeypatch, module):
-    report.environment.cache_clear()
+    environment.cache_clear()
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda n, *rest: None if n == module else find(n, *rest))
     if module in ("jinja2", "markdown_it"):
@@ -263,7 +264,7 @@ def test_missing_library_is_named_before_the_work(run, tmp_path, monkeypatch, mo
     monkeypatch.setattr(report, "results_of", lambda *_: pytest.fail("work was begun"))
     result = run(tmp_path / "report")
     assert str(result.exception) == f"bench: {module} is not installed; pip install 'blysk[report]'"
-    report.environment.cache_clear()
+    environment.cache_clear()
 
 
 def test_folder_is_checked_before_the_work(run, tmp_path, monkeypatch):

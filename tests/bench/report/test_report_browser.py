@@ -6,7 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from blysk.bench.report.report import about, shown, write_report
+from blysk.bench.report.page import shown
+from blysk.bench.report.report import about, write_report
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
@@ -104,6 +105,7 @@ def test_a_point_opens_its_figures(open_page, figures):
     assert not page.locator("#panel").is_visible()
 
 
+@pytest.mark.long
 def test_axes_and_front(open_page, figures):
     page = open_page()
     for error, time, exponent in [
@@ -137,18 +139,20 @@ def test_axes_and_front(open_page, figures):
         assert page.locator("#plot text", has_text=re.compile("^0$")).count() == zero
 
 
+@pytest.mark.long
 def test_groups(open_page, figures):
     page = open_page()
-    page.locator("#groups input[value=rival]").uncheck()
+    page.locator("#groups input[value=baseline]").uncheck()
     points = drawn(figures, "total_max_lsb", "cycles_per_pixel")
-    assert set(dots(page)) == {name for name, point in points.items() if point["group"] != "rival"}
+    assert set(dots(page)) == {name for name, point in points.items() if point["group"] != "baseline"}
     rows = page.locator("#every-point tbody tr:visible")
     groups = set(rows.locator("td:nth-child(2)").all_inner_texts())
-    assert groups == {point["group"] for point in figures["points"]} - {"rival"}
+    assert groups == {point["group"] for point in figures["points"]} - {"baseline"}
     shown = page.locator(".shot:visible").count()
-    assert shown == rows.count() == sum(point["group"] != "rival" for point in figures["points"]) / 2
+    assert shown == rows.count() == sum(point["group"] != "baseline" for point in figures["points"]) / 2
 
 
+@pytest.mark.long
 def test_keyboard(open_page, figures):
     page = open_page()
     places = dots(page)
@@ -213,6 +217,7 @@ def test_table_of_points_has_all_columns(open_page, points_section):
     assert visible.count() == len(points_section.parts[0].columns)
 
 
+@pytest.mark.long
 def test_other_tables_sort_and_filter(open_page):
     page = open_page()
     heading, cells = column(page, "#part-long", "<text>")
@@ -225,6 +230,7 @@ def test_other_tables_sort_and_filter(open_page):
     assert page.locator("#part-long .rows").inner_text() == "1 of 30 rows"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_page_fits_its_window(open_page, width, scheme):
@@ -254,6 +260,7 @@ def brightness(color):
     return sum(int(color.strip()[k : k + 2], 16) for k in (1, 3, 5)) / 3 / 255
 
 
+@pytest.mark.long
 def test_touch(open_page, figures):
     page = open_page("phone", has_touch=True)
     place = next(iter(dots(page).values()))
@@ -261,6 +268,7 @@ def test_touch(open_page, figures):
     assert page.locator("#panel").is_visible()
 
 
+@pytest.mark.long
 def test_print(open_page):
     page = open_page()
     page.emulate_media(media="print", color_scheme="dark")

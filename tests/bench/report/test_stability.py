@@ -8,29 +8,29 @@ from functools import cache
 import numpy as np
 import pytest
 
-from blysk.bench.report import stability
+from blysk.bench.report import stability_streams
 from blysk.bench.report.section import Drawing, Table
-from blysk.bench.report.stability import (
+from blysk.bench.report.stability import QUICK_METHODS, section, tasks
+from blysk.bench.report.stability_cases import (
     ANGLES,
     EXPONENTS,
-    GOOD,
     GROUPS,
     LENGTHS,
-    QUICK_METHODS,
-    RANGE_EXPONENTS,
     STREAM_GROUP,
-    SWEEP,
     Case,
     arcs,
     cases_of,
+)
+from blysk.bench.report.stability_errors import (
+    GOOD,
+    RANGE_EXPONENTS,
+    SWEEP,
     grade_of,
     measure,
     measure_case,
     measure_ranges,
-    measure_stream,
-    section,
-    tasks,
 )
+from blysk.bench.report.stability_streams import measure_stream
 from blysk.bench.store import Task
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.number.unit_vector import quantise
@@ -105,7 +105,7 @@ def test_wrong_pixels_of_a_stream_are_counted(monkeypatch):
         return dataclasses.replace(pixels, color=color)
 
     monkeypatch.setattr(Design, "compute", inverted)
-    monkeypatch.setattr(stability, "stream_patterns", lambda unit: [("back to back", {})])
+    monkeypatch.setattr(stability_streams, "stream_patterns", lambda unit: [("back to back", {})])
     assert [case["wrong"] for case in measure_stream("linear", quick=True)] == [2, 2]
 
 

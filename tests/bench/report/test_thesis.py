@@ -10,32 +10,29 @@ import pytest
 from amaranth.hdl import Fragment
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.report import thesis
-from blysk.bench.report.errata import FACTOR_PRINTED, ROOT_PRINTED
-from blysk.bench.report.thesis import (
-    CLAIMS,
-    DEVICES,
-    SPANS,
-    WAYS,
-    Counted,
+from blysk.bench.report import thesis, thesis_figures, thesis_ways
+from blysk.bench.report.errata_evidence import FACTOR_PUBLISHED, ROOT_PUBLISHED
+from blysk.bench.report.thesis import section, tasks
+from blysk.bench.report.thesis_figures import (
+    UNITS,
+    _entry,
     clock_rate,
     fastest,
     frame_cycles,
     hardware,
     prices,
-    section,
     shading_share,
     software,
     square_errors,
-    tasks,
 )
+from blysk.bench.report.thesis_ways import CLAIMS, SPANS, WAYS, Counted
 from blysk.bench.speed.renderer import Timing
-from blysk.bench.tools.fpga import TooLarge
+from blysk.bench.tools.place_and_route import TooLarge
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.renderer import render
 from blysk.sim.meshes.teapot import teapot
 
-LEFT, RIGHT, VECTORS = thesis._operands()
+LEFT, RIGHT, VECTORS = thesis_ways.random_operands()
 COSINE = (LEFT * RIGHT).sum(axis=0)
 
 
@@ -75,9 +72,9 @@ def test_ways_by_angles(way):
 
 
 def test_middle_by_the_polynomial():
-    """As long as the printed polynomial makes it, in the right direction."""
+    """As long as the published polynomial makes it, in the right direction."""
     (found,) = results("middle by h(r)", 1)
-    length = np.polynomial.polynomial.polyval(COSINE, FACTOR_PRINTED) * np.sqrt(2 + 2 * COSINE)
+    length = np.polynomial.polynomial.polyval(COSINE, FACTOR_PUBLISHED) * np.sqrt(2 + 2 * COSINE)
     np.testing.assert_allclose(found, curve("slerp", [0.5])[0] * length, atol=1e-14)
 
 
@@ -86,9 +83,9 @@ def test_bisection_by_the_polynomial(way):
     """The first middle has the polynomial's length, by z; the others point along the circle, nearly."""
     found = results(way, 16)
     z = 2 * COSINE
-    length = np.polynomial.polynomial.polyval(z, ROOT_PRINTED[2]) * np.sqrt(2 + z)
+    length = np.polynomial.polynomial.polyval(z, ROOT_PUBLISHED[2]) * np.sqrt(2 + z)
     np.testing.assert_allclose(np.linalg.norm(found[7], axis=0), length, atol=1e-14)
-    # The printed digits make each of the four levels up to 0.2 % shorter or longer.
+    # The published digits make each of the four levels up to 0.2 % shorter or longer.
     assert np.abs(found - curve("slerp", np.arange(1, 16) / 16)).max() < 4 * 0.0021
 
 
@@ -117,7 +114,7 @@ def test_counted():
 def test_operations():
     """By hand: what a middle normal takes, and what a long span's pixel takes without its setup."""
     middle = software("middle by h(r)", "middle, normalised, one division", 1, 1)
-    assert middle["rival_operations"] == {"multiplications": 6, "additions": 5, "divisions": 1, "roots": 1}
+    assert middle["baseline_operations"] == {"multiplications": 6, "additions": 5, "divisions": 1, "roots": 1}
     # Sum 3, dot product 3 and 2, cubic 3 and 3, scaling 3.
     assert middle["operations"] == {"multiplications": 9, "additions": 8}
     long = software("forward differences", "line, normalised, three divisions", 256, 1)
@@ -126,7 +123,7 @@ def test_operations():
     assert "roots" not in long["operations"]
     turns = software("recurrence", "a cosine of each angle", 256, 1)
     assert turns["operations"]["multiplications"] == pytest.approx(2, abs=0.1)
-    assert turns["rival_operations"]["functions"] == pytest.approx(2, abs=0.1)
+    assert turns["baseline_operations"]["functions"] == pytest.approx(2, abs=0.1)
     assert turns["difference"] < 1e-10
     for result in (middle, long, turns):
         assert 0 < result["ratio"] < math.inf
@@ -139,7 +136,7 @@ def test_fastest_runs_in_turn(monkeypatch):
     def timed(action, repeats):
         return Timing(99.0, next(cpu)), action()
 
-    monkeypatch.setattr(thesis, "timed", timed)
+    monkeypatch.setattr(thesis_figures, "timed", timed)
     assert fastest([lambda: order.append("a"), lambda: order.append("b")], 3) == [2.0, 10.0]
     assert order == ["a", "b"] * 3
 
@@ -151,7 +148,7 @@ def test_prices():
 
 
 def test_hardware():
-    """numbers.md: the direct renormaliser gives a normal a clock and has 8 multipliers."""
+    """numbers.md: the direct renormaliser gives a normal a cycle and has 8 multipliers."""
     found = hardware("renormaliser")
     assert (found["interval"], found["multipliers"]) == (1, 8)
     found = hardware("forward differences")
@@ -163,16 +160,16 @@ def test_hardware():
 
 @pytest.mark.long
 def test_frame_cycles():
-    """A pixel a clock at most, and spans of one pixel four cycles at most."""
+    """A pixel a cycle at most, and spans of one pixel four cycles at most."""
     assert 1 < frame_cycles("renormalise interpolator", 500, 64, 48) < 5
 
 
-def test_devices_are_in_the_table():
-    for name in DEVICES:
-        assert (thesis._block(name).device, thesis._block(name).variant) == DEVICES[name]
+def test_units_are_in_the_table():
+    for name in UNITS:
+        assert (_entry(name).record.name, _entry(name).name) == UNITS[name]
     for claim in CLAIMS:
-        assert {*claim.devices, *claim.rival_devices} <= DEVICES.keys()
-        assert {*claim.ways, *claim.rivals} <= WAYS.keys()
+        assert {*claim.units, *claim.baseline_units} <= UNITS.keys()
+        assert {*claim.ways, *claim.baselines} <= WAYS.keys()
 
 
 def test_without_place_and_route(monkeypatch):
@@ -185,7 +182,7 @@ def test_without_place_and_route(monkeypatch):
         Fragment.get(unit, None)
         raise TooLarge("does not fit")
 
-    monkeypatch.setattr(thesis, "lay_out", refused)
+    monkeypatch.setattr(thesis_figures, "lay_out", refused)
     assert clock_rate("forward differences", 1, {"pyosys": "1"}) == {"fmax": None, "reason": "does not fit"}
 
 
@@ -219,7 +216,7 @@ def test_square_errors():
 
 @pytest.fixture(scope="module")
 def made():
-    """The quick section, of fewer devices and smaller frames."""
+    """The quick section, of fewer units and smaller frames."""
     chosen = []
     for task in tasks(quick=True):
         settings = dict(task.settings)
@@ -239,13 +236,13 @@ def test_software_table(made):
     table = by_name["thesis-software"]
     speeds = [result for task, result in zip(chosen, found, strict=True) if task.function is software]
     assert len(table.rows) == len(speeds)
-    printed = {claim.name: claim.printed for claim in CLAIMS}
-    assert sorted(printed.values()) == [1.7, 2.4, 2.5, 3.6]
+    published = {claim.name: claim.published for claim in CLAIMS}
+    assert sorted(published.values()) == [1.7, 2.4, 2.5, 3.6]
     for row, grades, result in zip(table.records(), table.grades, speeds, strict=True):
         assert row["measured ratio"] == result["ratio"]
-        assert row["printed ratio"] == printed[row["claim"]]
-        assert row["reaches it"] == (result["ratio"] >= row["printed ratio"])
-        good, fair = result["ratio"] >= row["printed ratio"], result["ratio"] > 1
+        assert row["published ratio"] == published[row["claim"]]
+        assert row["reaches it"] == (result["ratio"] >= row["published ratio"])
+        good, fair = result["ratio"] >= row["published ratio"], result["ratio"] > 1
         assert grades[6] == ("good" if good else "fair" if fair else "bad")
     for claim in CLAIMS:
         ratios = [row["measured ratio"] for row in table.records() if row["claim"] == claim.name]
@@ -253,51 +250,51 @@ def test_software_table(made):
 
 
 def test_price_of_a_root(made):
-    """With roots and divisions at that price the counts give the printed ratio."""
+    """With roots and divisions at that price the counts give the published ratio."""
     for task, result in zip(*made[:2], strict=True):
         if task.function is not software:
             continue
-        claim = thesis._CLAIM_OF[task.settings["way"], task.settings["rival"]]
-        price = thesis._price(claim.printed, result)
+        claim = thesis._CLAIM_OF[task.settings["way"], task.settings["baseline"]]
+        price = thesis._price(claim.published, result)
         costs = [
             sum(
                 count * (1 if kind in ("multiplications", "additions") else price)
                 for kind, count in of.items()
             )
-            for of in (result["operations"], result["rival_operations"])
+            for of in (result["operations"], result["baseline_operations"])
         ]
         if price > 0:
-            assert costs[1] / costs[0] == pytest.approx(claim.printed)
+            assert costs[1] / costs[0] == pytest.approx(claim.published)
         else:
-            assert costs[1] / costs[0] >= claim.printed
+            assert costs[1] / costs[0] >= claim.published
 
 
 def test_hardware_tables(made):
     by_name = {part.name: part for part in made[2].parts}
-    devices = {row["device"]: row for row in by_name["thesis-devices"].records()}
-    assert devices.keys() == {"renormaliser", "forward differences"}
+    units = {row["unit"]: row for row in by_name["thesis-units"].records()}
+    assert units.keys() == {"renormaliser", "forward differences"}
     (row,) = by_name["thesis-hardware"].records()
     assert row["cycles a result"] == 1
-    # A device without multipliers has no ratio.
+    # A unit without multipliers has no ratio.
     assert row["multipliers"] is None
-    assert row["cells"] == devices["renormaliser"]["cells"] / devices["forward differences"]["cells"]
-    assert "place and route" in by_name["thesis-devices"].note
+    assert row["cells"] == units["renormaliser"]["cells"] / units["forward differences"]["cells"]
+    assert "place and route" in by_name["thesis-units"].note
 
 
 def test_ratios_of_interpolators():
-    """The rival's cycles a pixel over the device's; no figure without both."""
+    """The baseline's cycles a pixel over the unit's; no figure without both."""
     one = {"interval": 1, "multipliers": 2, "cells": 3, "register_bits": 4}
-    devices = {
+    units = {
         "quadratic interpolator": {**one, "frame": 2.0},
         "bisection interpolator": {**one, "frame": None},
         "renormalise interpolator": {**one, "frame": 1.5},
     }
-    rates = {name: {"fmax": fmax} for name, fmax in zip(devices, (90.0, None, 120.0), strict=True)}
-    rows = {row["device"]: row for row in thesis._ratios_table(devices, rates).records()}
+    rates = {name: {"fmax": fmax} for name, fmax in zip(units, (90.0, None, 120.0), strict=True)}
+    rows = {row["unit"]: row for row in thesis._ratios_table(units, rates).records()}
     assert rows["quadratic interpolator"]["cycles a pixel of a frame"] == 0.75
-    assert rows["quadratic interpolator"]["Fmax (device over rival)"] == 0.75
+    assert rows["quadratic interpolator"]["Fmax (unit over baseline)"] == 0.75
     assert rows["bisection interpolator"]["cycles a pixel of a frame"] is None
-    assert rows["bisection interpolator"]["Fmax (device over rival)"] is None
+    assert rows["bisection interpolator"]["Fmax (unit over baseline)"] is None
 
 
 def test_parts_and_text(made):
@@ -306,7 +303,7 @@ def test_parts_and_text(made):
         "thesis-software",
         "thesis-speed",
         "thesis-operations",
-        "thesis-devices",
+        "thesis-units",
         "thesis-hardware",
         "thesis-shading-share",
         "thesis-mnse",
@@ -324,11 +321,13 @@ def test_where_a_claim_is_reached():
     def told(*ratios):
         results = [
             (
-                {"way": claim.ways[0], "rival": rival, "pixels": pixels},
-                {"ratio": ratio, "operations": {}, "rival_operations": {"roots": 1}, "difference": 0},
+                {"way": claim.ways[0], "baseline": baseline, "pixels": pixels},
+                {"ratio": ratio, "operations": {}, "baseline_operations": {"roots": 1}, "difference": 0},
             )
-            for (rival, pixels), ratio in zip(
-                [(rival, pixels) for rival in claim.rivals for pixels in (8, 64)], ratios, strict=True
+            for (baseline, pixels), ratio in zip(
+                [(baseline, pixels) for baseline in claim.baselines for pixels in (8, 64)],
+                ratios,
+                strict=True,
             )
         ]
         return thesis._reached(claim, thesis._software_table(results))
@@ -344,7 +343,7 @@ def test_a_turned_order_is_told():
     def squares(*rows):
         return thesis._squares_table(
             [
-                ({"method": name}, {"printed": p, "defined": 1, "nmse": n, "max_lsb": 9, "p999_lsb": 8})
+                ({"method": name}, {"published": p, "defined": 1, "nmse": n, "max_lsb": 9, "p999_lsb": 8})
                 for name, p, n in rows
             ]
         )

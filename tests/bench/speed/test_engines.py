@@ -89,7 +89,7 @@ def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, seconds, missed)
 
     def measured(unit, beats, **others):
         gate = unit.gate
-        assert others["rival"] is not gate
+        assert others["baseline"] is not gate
         if gate:
             assert others["expected"] is asked["expected"]
             return Speed(6e6, 2000.0, 6e6, 2000.0, build=4.5, cycles=9000)
@@ -105,7 +105,7 @@ def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, seconds, missed)
     lines = capsys.readouterr().out.splitlines()
     pixels = asked["beats"]["length"].sum()
     assert asked["beats"]["length"].min() >= blysk.bench.speed.engines.LEAST_LENGTH
-    assert asked["rival"]
+    assert asked["baseline"]
     assert pixels == len(asked["expected"]["r"]) > 1000
     spans = len(asked["beats"]["x"])
     assert lines[0] == f"teapot at 1000x750, {spans:,} spans: {pixels:,} pixels, 9,000 cycles"
@@ -117,6 +117,7 @@ def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, seconds, missed)
     assert lines[-1] == ("every target met" if missed is None else f"missed: {missed}")
 
 
+@pytest.mark.long
 def test_picture_seconds(monkeypatch):
     """The command is run as a user would, and the first picture, which builds the model, does not count."""
     calls = []
@@ -134,7 +135,7 @@ def test_picture_seconds(monkeypatch):
     assert wall > 0.01
 
 
-class Rival:
+class Baseline:
     """Stands for Verilator's model: what the engine gives, and one beat or clock changed."""
 
     def __init__(self, component, beat, clock):
@@ -149,17 +150,17 @@ class Rival:
         return output, cycles
 
 
-def test_rival(monkeypatch):
+def test_baseline(monkeypatch):
     beats = np.arange(200)
     component = Pair()
-    monkeypatch.setattr(blysk.bench.speed.engines, "Verilated", lambda unit, folder: Rival(unit, 0, 0))
-    assert measure(component, beats, rival=True).verilator_beats > 0
+    monkeypatch.setattr(blysk.bench.speed.engines, "Verilated", lambda unit, folder: Baseline(unit, 0, 0))
+    assert measure(component, beats, baseline=True).verilator_beats > 0
     for beat, clock in ((1, 0), (0, 1)):
         monkeypatch.setattr(
-            blysk.bench.speed.engines, "Verilated", lambda unit, folder, c=(beat, clock): Rival(unit, *c)
+            blysk.bench.speed.engines, "Verilated", lambda unit, folder, c=(beat, clock): Baseline(unit, *c)
         )
         with pytest.raises(ValueError, match=r"^Verilator's model and the compiled engine differ$"):
-            measure(component, beats, rival=True)
+            measure(component, beats, baseline=True)
 
 
 def test_other_beats_than_expected_are_no_measure():

@@ -29,9 +29,11 @@ def spans(lengths):
     return Spans(places, places, lengths, normal, normal)
 
 
-@pytest.mark.parametrize(("method", "interval"), [("chord", 4), ("quadratic", 7)])
+@pytest.mark.parametrize(
+    ("method", "interval"), [("chord", 4), pytest.param("quadratic", 7, marks=pytest.mark.long)]
+)
 def test_clocks_are_those_of_the_arithmetic(method, interval, monkeypatch):
-    """A span takes the larger of its pixels and the setup interval, one pixel a clock."""
+    """A span takes the larger of its pixels and the setup interval, one pixel a cycle."""
     runs = []
 
     def simulated(*arguments, **options):

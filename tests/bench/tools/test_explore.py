@@ -17,23 +17,20 @@ from click.testing import CliRunner
 
 from blysk.bench import store
 from blysk.bench.quality import baselines
-from blysk.bench.tools import explore
-from blysk.bench.tools.explore import (
+from blysk.bench.tools import design_space, explore
+from blysk.bench.tools.design_space import (
     COSTS,
-    EXPONENT,
     Candidate,
     Explored,
     Sweep,
     cheapest,
-    command,
     costs_of,
     errors_of,
     explored,
     front_of,
-    section,
-    tasks,
     tasks_of,
 )
+from blysk.bench.tools.explore import EXPONENT, command, section, tasks
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.prepare import prepare
@@ -57,8 +54,8 @@ def own_cache(monkeypatch, tmp_path):
     monkeypatch.setattr(explore, "_TRIANGLES", SMALL["triangles"])
 
 
-def place(width=40, height=30):
-    return explore.place_of("teapot", SMALL["triangles"], width, height)
+def view(width=40, height=30):
+    return explore.view_of("teapot", SMALL["triangles"], width, height)
 
 
 def run(*arguments):
@@ -144,7 +141,7 @@ def test_command_of_a_design_makes_it(candidate, is_plain, monkeypatch, capsys):
     """Run as it stands, but for the Verilog; the unit that it would emit is the candidate's."""
     made = []
     monkeypatch.setattr("blysk.hdl.emit.verilog.emit", lambda unit, name, **_: made.append(unit) or "module")
-    monkeypatch.setattr("blysk.sim.cli.main.emit", lambda unit, name, **_: made.append(unit) or "module")
+    monkeypatch.setattr("blysk.sim.api.design.emit", lambda unit, name, **_: made.append(unit) or "module")
     words = shlex.split(candidate.command)
     assert (words[0] == "blysk") == is_plain
     if is_plain:
@@ -169,9 +166,9 @@ def test_command_of_a_design_makes_it(candidate, is_plain, monkeypatch, capsys):
 
 def test_errors_are_those_of_the_simulated_frame():
     candidate = Candidate("chord", degree=2, fraction_bits=38)
-    (scene,) = explore.scenes_of(place(16, 12), [EXPONENT])
+    (scene,) = explore.scenes_of(view(16, 12), [EXPONENT])
     frame = FrameSimulator(candidate.design, "pysim").render(scene)
-    result = errors_of({"method": "chord", "degree": 2, "fraction_bits": 38}, place(16, 12), EXPONENT)
+    result = errors_of({"method": "chord", "degree": 2, "fraction_bits": 38}, view(16, 12), EXPONENT)
     expected = compare(scene, candidate.design, frame)
     for name in ERRORS:
         figures = getattr(expected, f"{name}_error")
@@ -183,15 +180,15 @@ def test_errors_are_those_of_the_simulated_frame():
 
 
 def test_narrow_polynomials_flag_wide_spans():
-    narrow, usual = (errors_of({"method": "chord", "degree": degree}, place(), EXPONENT) for degree in (1, 3))
+    narrow, usual = (errors_of({"method": "chord", "degree": degree}, view(), EXPONENT) for degree in (1, 3))
     assert narrow["out_of_range_spans"] > 0
     assert usual["out_of_range_spans"] == 0
 
 
 def test_several_lights_are_as_bright_as_one_and_all_used():
-    (scene,) = explore.scenes_of(place(), [EXPONENT])
-    assert explore._lit(scene, 1) == scene
-    lit = explore._lit(scene, 3)
+    (scene,) = explore.scenes_of(view(), [EXPONENT])
+    assert design_space._lit(scene, 1) == scene
+    lit = design_space._lit(scene, 3)
     constants = FrameConstants.of(lit, 3)
     assert (constants.diffuse.sum(axis=0) - FrameConstants.of(scene).diffuse.sum(axis=0) <= 3).all()
     assert len(np.unique(constants.direction, axis=0)) == 3
@@ -278,7 +275,7 @@ def test_front_without_designs_that_are_given_values():
 
 def test_designs_of_two_styles_share_the_errors_and_not_the_costs():
     candidates = [Candidate("linear"), Candidate("linear", style="compact")]
-    todo = tasks_of(candidates, place(), EXPONENT)
+    todo = tasks_of(candidates, view(), EXPONENT)
     assert [task.function for task in todo] == [costs_of, errors_of, costs_of]
     frame = {
         "errors": {name: {"max_lsb": 0.5} for name in ERRORS},
@@ -333,8 +330,18 @@ def test_stated_clocks_are_a_bound_of_those_of_frames():
 def test_sweep_of_four_designs_and_again(tmp_path, monkeypatch):
     """The listed ones against brute force over all; the second run measures nothing."""
     path = tmp_path / "designs.json"
-    options = ("--methods", "linear,chord", "--models", "cosquad", "--highlights", "chord", "--degrees", "2")
-    options += ("--fraction-bits", "46", "--json", path, "--largest-error", "1.5", "--limit", "3")
+    options = (
+        "--methods",
+        "linear,chord",
+        "--models",
+        "cosquad",
+        "--operands",
+        "one_minus_cosine",
+        "--degrees",
+        "2",
+    )
+    options += ("--operands", "one_minus_cosine", "--fraction-bits", "46", "--json", path)
+    options += ("--largest-error", "1.5", "--limit", "3")
     result = run(*options)
     assert result.exit_code == 0, result.output
     saved = json.loads(path.read_text())
@@ -364,8 +371,8 @@ def test_sweep_of_four_designs_and_again(tmp_path, monkeypatch):
     def forbidden(*_):
         raise AssertionError("measured again")
 
-    monkeypatch.setattr(explore, "model_frame", forbidden)
-    monkeypatch.setattr(explore, "cost_of", forbidden)
+    monkeypatch.setattr(design_space, "model_frame", forbidden)
+    monkeypatch.setattr(design_space, "cost_of", forbidden)
     again = run(*options)
     assert again.output == result.output
     assert path.read_text() == before
@@ -382,9 +389,9 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
 
     monkeypatch.setattr(Candidate, "unit", unit)
     costs = SimpleNamespace(totals=dict.fromkeys(COSTS.values(), 1))
-    monkeypatch.setattr(explore, "cost_of", lambda unit: costs)
+    monkeypatch.setattr(design_space, "cost_of", lambda unit: costs)
     options = ("--methods", "linear,renormalise,chord", "--models", "cosquad", "--degrees", "3")
-    options += ("--fraction-bits", "46", "--styles", "throughput", "--highlights", "chord")
+    options += ("--fraction-bits", "46", "--styles", "throughput", "--operands", "one_minus_cosine")
     stopped = run(*options)
     assert stopped.exit_code == 130
     assert stopped.output == "blysk: stopped; 4 of 6 measurements are kept, run again to go on\n"
@@ -404,7 +411,7 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
         (["--lights", "0"], "--lights 0: '0' is none of the choices; use some of 1,2,"),
         (["--fraction-bits", "41"], "use some of 36,38,40,42,44,46"),
         (["--degrees", "4"], "use some of 1,2,3"),
-        (["--highlights", "cosine"], "use some of dot,chord"),
+        (["--operands", "sine"], "use some of cosine,one_minus_cosine"),
         (["--largest-error", "0"], "--largest-error 0: no such error"),
         (["--largest-error", "nan"], "--largest-error nan: no such error"),
         (["--cost", "area"], "--cost area: unknown cost; use one of cells, multipliers, registers, memory"),
@@ -416,7 +423,7 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
         (["--cluster", "nowhere"], "--cluster nowhere: not the address of a Dask scheduler"),
         (["--json", "missing/folder.json"], "missing/folder.json: cannot be written"),
         (
-            ["--methods", "chord", "--highlights", "dot"],
+            ["--methods", "chord", "--operands", "cosine"],
             "the sweep: holds no possible design, 36 of chord: finds no normals",
         ),
     ],
@@ -491,7 +498,7 @@ def test_a_mesh_without_a_pixel_is_refused(monkeypatch):
 @pytest.mark.long
 def test_processes_and_a_cluster_give_the_same(monkeypatch, tmp_path):
     distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
-    options = ["--size", "40x30", "--methods", "linear", "--models", "cosquad", "--highlights", "dot"]
+    options = ["--size", "40x30", "--methods", "linear", "--models", "cosquad", "--operands", "cosine"]
     options += ["--largest-error", "200"]
     outputs = []
 

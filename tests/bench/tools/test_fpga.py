@@ -15,21 +15,17 @@ from amaranth.hdl import Module, Signal, signed
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from blysk.bench.tools import fpga
-from blysk.bench.tools.fpga import (
-    ECP5,
-    FAMILIES,
-    NEXUS,
+from blysk.bench.tools import fpga, place_and_route
+from blysk.bench.tools.families import ECP5, FAMILIES, NEXUS, Parts, Place
+from blysk.bench.tools.fpga import table
+from blysk.bench.tools.place_and_route import (
     Layout,
-    Parts,
-    Place,
     Registered,
     TooLarge,
     ToolError,
     lay_out,
     parts_of,
     read_report,
-    table,
 )
 from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS
 from blysk.hdl.emit.cost import cost_of
@@ -37,7 +33,7 @@ from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.sim.cli.main import main
 
 tools = pytest.mark.skipif(
-    any(None in fpga.tool_versions(family).values() for family in FAMILIES.values()),
+    any(None in place_and_route.tool_versions(family).values() for family in FAMILIES.values()),
     reason="the extra fpga is not installed",
 )
 
@@ -144,7 +140,7 @@ NEXUS_REPORT = {
                 step("routing", 0.25, WIDE, "WCK0", "unit.places$3.storage.0.1$lutram_ramw$"),
                 step("setup", 0.25, "unit.places$3.storage.0.1$lutram_ramw$", "D0"),
             ],
-        },
+        }
     ],
 }
 
@@ -190,10 +186,7 @@ def test_report_of_something_else(change):
 
 def netlist(*cells):
     """Yosys's JSON of some cells: kind, parameters, and the nets of D and Q."""
-    ports = {
-        "i": {"direction": "input", "bits": [2]},
-        "o": {"direction": "output", "bits": [5, "0"]},
-    }
+    ports = {"i": {"direction": "input", "bits": [2]}, "o": {"direction": "output", "bits": [5, "0"]}}
     cells = {
         str(k): {"type": kind, "parameters": parameters, "connections": {"DI": [d], "Q": [q]}}
         for k, (kind, parameters, d, q) in enumerate(cells)
@@ -233,8 +226,8 @@ def test_what_nextpnr_does_not_time_is_not_placed(family, cell, name, cache, mon
         assert tool == "Yosys"
         (folder / "netlist.json").write_text(json.dumps(netlist(("LUT4", {}, 3, 4), cell)))
 
-    monkeypatch.setattr(fpga._Runner, "run", run)
-    monkeypatch.setattr(fpga, "_versions", lambda family: {})
+    monkeypatch.setattr(place_and_route._Runner, "run", run)
+    monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
     with pytest.raises(ToolError, match=f"has a cell {name}, which nextpnr does not time paths through"):
         lay_out("counter", Counter(), 1, family=family)
 
@@ -259,8 +252,8 @@ def test_what_does_not_fit_is_not_placed(family, cell, most, name, cache, monkey
         else:
             raise ToolError("it is placed")
 
-    monkeypatch.setattr(fpga._Runner, "run", run)
-    monkeypatch.setattr(fpga, "_versions", lambda family: {})
+    monkeypatch.setattr(place_and_route._Runner, "run", run)
+    monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
     with pytest.raises(ToolError, match=r"^it is placed$"):
         lay_out("counter", Counter(), 1, family=family)
     count += 1
@@ -269,7 +262,7 @@ def test_what_does_not_fit_is_not_placed(family, cell, most, name, cache, monkey
 
 
 def test_what_finds_no_place_does_not_fit(calls, cache, monkeypatch):
-    run = fpga._Runner.run
+    run = place_and_route._Runner.run
 
     def fails(self, name, *arguments):
         if name == "nextpnr":
@@ -278,7 +271,7 @@ def test_what_finds_no_place_does_not_fit(calls, cache, monkeypatch):
             )
         run(self, name, *arguments)
 
-    monkeypatch.setattr(fpga._Runner, "run", fails)
+    monkeypatch.setattr(place_and_route._Runner, "run", fails)
     with pytest.raises(
         TooLarge, match=r"^does not fit: from seed 1 nextpnr ends with status 125: ERROR: Unable"
     ):
@@ -286,7 +279,6 @@ def test_what_finds_no_place_does_not_fit(calls, cache, monkeypatch):
 
 
 def test_command_goes_on_after_what_does_not_fit(calls, cache, tmp_path, capsys, monkeypatch):
-    lay_out = fpga.lay_out
 
     def refuses(name, *arguments):
         layout = lay_out(name, *arguments)
@@ -296,13 +288,13 @@ def test_command_goes_on_after_what_does_not_fit(calls, cache, tmp_path, capsys,
 
     monkeypatch.setattr(fpga, "lay_out", refuses)
     path = tmp_path / "out.json"
-    assert main(["fpga", "--device", "diffuse", "--device", "gpq", "--seeds", "1", "--json", str(path)]) == 0
+    assert main(["fpga", "--unit", "diffuse", "--unit", "gpq", "--seeds", "1", "--json", str(path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[2].startswith("gpq ")
     assert lines[3] == "diffuse: does not fit: 30 multipliers"
     assert json.loads(path.read_text())["too_large"] == {"diffuse": "does not fit: 30 multipliers"}
     # Alone it is an error.
-    assert main(["fpga", "--device", "diffuse", "--seeds", "1"]) == 1
+    assert main(["fpga", "--unit", "diffuse", "--seeds", "1"]) == 1
     assert capsys.readouterr().err == "blysk: does not fit: 30 multipliers\n"
 
 
@@ -351,8 +343,9 @@ def calls(monkeypatch):
             }
             (folder / f"{seed}.json").write_text(json.dumps(report))
 
-    monkeypatch.setattr(fpga._Runner, "run", run)
-    monkeypatch.setattr(fpga, "_versions", lambda family: {"pyosys": "1", family.package: "2"})
+    monkeypatch.setattr(place_and_route._Runner, "run", run)
+    for module in (fpga, place_and_route):
+        monkeypatch.setattr(module, "versions_of", lambda family: {"pyosys": "1", family.package: "2"})
     return calls
 
 
@@ -384,7 +377,9 @@ def test_what_is_cached_runs_no_tool(calls, cache):
     assert len(list(cache.iterdir())) == 4
 
 
-@pytest.mark.parametrize(("luts", "placer"), [(fpga._MANY - 1, ()), (fpga._MANY, ECP5.large)])
+@pytest.mark.parametrize(
+    ("luts", "placer"), [(place_and_route._MANY - 1, ()), (place_and_route._MANY, ECP5.large)]
+)
 def test_placer_by_size(luts, placer, cache, monkeypatch):
     """Hardly any logic would never end in the static placer."""
     given = []
@@ -396,8 +391,8 @@ def test_placer_by_size(luts, placer, cache, monkeypatch):
             given.extend(arguments)
             (folder / "1.json").write_text(json.dumps(REPORT))
 
-    monkeypatch.setattr(fpga._Runner, "run", run)
-    monkeypatch.setattr(fpga, "_versions", lambda family: {})
+    monkeypatch.setattr(place_and_route._Runner, "run", run)
+    monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
     lay_out("counter", Counter(), 1)
     place = given.index("--placer") if placer else 0
     assert ("--placer" in given) == bool(placer)
@@ -408,14 +403,14 @@ def test_another_design_family_or_tool_is_another_entry(calls, cache, monkeypatc
     lay_out("counter", Counter(), 1)
     lay_out("counter", Counter(23), 1)
     lay_out("counter", Counter(), 1, family=NEXUS)
-    monkeypatch.setattr(fpga, "_versions", lambda family: {"pyosys": "1", family.package: "3"})
+    monkeypatch.setattr(place_and_route, "versions_of", lambda family: {"pyosys": "1", family.package: "3"})
     lay_out("counter", Counter(), 1)
     assert calls == [("Yosys",), ("nextpnr", "1")] * 4
     assert len(list(cache.iterdir())) == 4
 
 
 def test_seeds_that_are_done_stay_when_one_fails(calls, cache, monkeypatch):
-    run = fpga._Runner.run
+    run = place_and_route._Runner.run
 
     def fails(self, name, code, arguments, folder, text=""):
         if arguments[-1:] == ["2"]:
@@ -423,14 +418,14 @@ def test_seeds_that_are_done_stay_when_one_fails(calls, cache, monkeypatch):
         run(self, name, code, arguments, folder, text)
 
     with monkeypatch.context() as patch:
-        patch.setattr(fpga._Runner, "run", fails)
+        patch.setattr(place_and_route._Runner, "run", fails)
         with pytest.raises(ToolError, match="no place"):
             lay_out("counter", Counter(), 3)
     assert [path.name[-6] for path in cache.iterdir()] == ["1"]
 
 
 def test_runner_names_the_tools_own_error(tmp_path):
-    runner = fpga._Runner()
+    runner = place_and_route._Runner()
     code = "import sys; print('INFO: x'); print('ERROR: no such cell'); print('more'); sys.exit(3)"
     with pytest.raises(ToolError, match=r"^Yosys ends with status 3: ERROR: no such cell$"):
         runner.run("Yosys", code, [], tmp_path)
@@ -441,8 +436,8 @@ def test_runner_names_the_tools_own_error(tmp_path):
 
 
 def test_stopped_runner_ends_what_runs(tmp_path):
-    runner = fpga._Runner()
-    pool = fpga.ThreadPoolExecutor(1)
+    runner = place_and_route._Runner()
+    pool = place_and_route.ThreadPoolExecutor(1)
     waiting = pool.submit(runner.run, "nextpnr", "import time; time.sleep(600)", [], tmp_path)
     while not runner._running:
         time.sleep(0.01)
@@ -476,7 +471,7 @@ def test_table():
 @pytest.mark.parametrize(("options", "family"), [([], ECP5), (["--family", "nexus"], NEXUS)])
 def test_command(options, family, calls, cache, tmp_path, capsys):
     path = tmp_path / "out.json"
-    arguments = ["--device", "diffuse", "--device", "gpq", "--seeds", "2", "--json", str(path)]
+    arguments = ["--unit", "diffuse", "--unit", "gpq", "--seeds", "2", "--json", str(path)]
     assert main(["fpga", *options, *arguments]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith(f"{family.device} ")
@@ -497,15 +492,13 @@ def test_designs():
         return [name for name, _ in designs]
 
     gates = ["middle_normal exact", "diffuse"]
-    assert names(fpga._devices(gates)) == gates
-    forms = names(fpga._devices(["quadratic_evaluator"]))
+    assert names(fpga._units(gates)) == gates
+    forms = names(fpga._units(["quadratic_evaluator"]))
     assert forms == [f"quadratic_evaluator {form}" for form in QUADRATIC_FORMS]
-    settings = {"method": "chord", "model": "cosquad", "highlight": None}
-    full = {**settings, "style": "compact", "setup_interval": 7, "gate": True}
+    full = {"method": "chord", "style": "compact", "setup_interval": 7, "gate": True}
     whole = "pipeline chord, cosquad, 2 lights, compact, interval 7, gate"
     assert names(fpga._pipelines(full, 2, False)) == [whole]
-    plain = {**settings, "style": "throughput", "setup_interval": None, "gate": False}
-    assert names(fpga._pipelines(plain, 1, True)) == [f"pipeline {m}, cosquad, 1 light" for m in fpga.METHODS]
+    assert names(fpga._pipelines({}, 1, True)) == [f"pipeline {m}, cosquad, 1 light" for m in fpga.METHODS]
 
 
 @pytest.mark.parametrize(
@@ -514,11 +507,11 @@ def test_designs():
         (["--seeds", "0"], "blysk: --seeds 0: out of range; give a whole number from 1 to 100"),
         (["--jobs", "no"], "blysk: --jobs no: not a whole number; give"),
         (
-            ["--device", "fuse"],
-            "blysk: --device fuse: unknown device; use a name of the table of blysk blocks",
+            ["--unit", "fuse"],
+            "blysk: --unit fuse: unknown unit; use a name of the table of blysk blocks",
         ),
-        (["--device", "gpq", "--method", "chord"], "blysk: --method: is for the pipeline; leave it out, or"),
-        (["--device", "gpq", "--every-method"], "blysk: --every-method: is for the pipeline; leave it out"),
+        (["--unit", "gpq", "--method", "chord"], "blysk: --method: is for the pipeline; leave it out, or"),
+        (["--unit", "gpq", "--every-method"], "blysk: --every-method: is for the pipeline; leave it out"),
         (["--method", "chord", "--every-method"], "blysk: --method: is one of every method; leave it out"),
         (["--family", "ice40"], "blysk: --family ice40: unknown family; use one of ecp5, nexus"),
         (["--method", "none"], "blysk: --method none: unknown method; use one of"),
@@ -540,8 +533,8 @@ def test_bad_input_is_one_line(arguments, line, capsys, tmp_path, monkeypatch):
 def test_missing_tools_are_one_line_that_names_the_extra(which, family, capsys, monkeypatch):
     # Whether or not they are installed here.
     missing = [("pyosys", FAMILIES[family].package)[k] for k in which]
-    monkeypatch.setattr(fpga, "version_of", lambda package: None if package in missing else "1")
-    assert main(["fpga", "--device", "gpq", "--family", family]) == 2
+    monkeypatch.setattr(place_and_route, "version_of", lambda package: None if package in missing else "1")
+    assert main(["fpga", "--unit", "gpq", "--family", family]) == 2
     output, errors = capsys.readouterr()
     assert output == ""
     text = f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not installed"
@@ -576,7 +569,7 @@ def test_parts_and_time_of_a_counter(family, kinds, cache, monkeypatch):
         reports.append(report)
         return parts_of(netlist, report, family)
 
-    monkeypatch.setattr(fpga, "parts_of", parts)
+    monkeypatch.setattr(place_and_route, "parts_of", parts)
     counter = lay_out("counter", Counter(), 1, family=family)
     assert counter.parts.flip_flops == 24
     assert 24 <= counter.parts.luts <= 24 + 8
@@ -631,7 +624,7 @@ def test_a_multiplier_with_an_adder_is_refused(cache):
 
 @tools
 def test_what_the_tools_refuse_is_one_line(cache, monkeypatch):
-    monkeypatch.setattr(fpga, "_BEFORE", "read_rtlil nothing.il\n")
+    monkeypatch.setattr(place_and_route, "_BEFORE", "read_rtlil nothing.il\n")
     with pytest.raises(ToolError, match=r"^Yosys ends with status .*nothing\.il"):
         lay_out("none", Counter(), 1)
 

@@ -1,78 +1,18 @@
-"""Pages of the devices: text as the docstrings have it, and the committed pages as the code has it."""
+"""Pages of the units: text as docstrings and records have it, drawings of what was measured."""
 
-import re
 from collections import Counter
-from dataclasses import replace
-from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
-from blysk.bench.tools.blocks import BLOCKS, SEED, Sample, row_of, sample_of
-from blysk.bench.tools.pages import (
-    DEVICES,
-    SAMPLES,
-    draw_errors,
-    likeness,
-    markdown,
-    svg,
-    write_pages,
-)
-from blysk.bench.tools.structure import Graph, Node
-from blysk.sim.cli.main import main
-
-FOLDER = Path(__file__).parents[3] / "docs" / "blocks"
-# Whole pages that every run of the tests makes again, and error figures: what takes least time.
-QUICK = ("dot_product", "gpq", "diffuse", "chord")
-MEASURED_QUICKLY = (
-    *QUICK,
-    "difference_setup",
-    "difference_accumulator",
-    "renormaliser",
-    "highlight_cosine",
-    "specular",
-    "power",
-    "light",
-    "intensity",
-    "linear_interpolator",
-    "chord_interpolator",
-)
-
-
-def committed(device):
-    return (FOLDER / f"{device}.md").read_text(encoding="utf-8")
-
-
-def error_cells(text):
-    """Variants and error cells of a page."""
-    _, _, rows = text.partition("| variant | model error |")
-    lines = rows.partition("\n\n")[0].splitlines()[2:]
-    return [tuple(cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:5]) for line in lines]
-
-
-@cache
-def measured(device):
-    """Samples of a device's entries, as its page has them."""
-    return [sample_of(block, SAMPLES, SEED) for block in DEVICES[device]]
-
-
-@cache
-def row_of_parts():
-    """A line of whatever times and parts."""
-    return row_of(DEVICES["dot_product"][0], None)
-
-
-def rows_of(device):
-    return [row_of(block, sample) for block, sample in zip(DEVICES[device], measured(device), strict=True)]
-
-
-def texts(picture):
-    """What is written in a drawing."""
-    return re.findall(r"<text[^>]*>([^<]*)</text>", picture)
-
+from blysk.bench.tools.blocks import ENTRIES, Entry, sample_of
+from blysk.bench.tools.docstrings import markdown
+from blysk.bench.tools.error_plot import draw_errors
+from blysk.bench.tools.graph import Graph, Node, likeness
+from blysk.bench.tools.pages import PROJECT, entries_shown, write_pages
+from blysk.sim.units.record import Decisions, Record, Sample, Variant
+from blysk.sim.units.registry import RECORDS
 
 # Docstrings.
 
@@ -80,7 +20,9 @@ def texts(picture):
 def test_literals():
     assert markdown("``a*b`` and `Unit`, of :py:`In(x)`") == "`a*b` and `Unit`, of `In(x)`"
     assert markdown("``a +\n    b``") == "`a + b`"
-    assert markdown("a * b < c, 3*18, *so* and **this**") == r"a \* b \< c, 3\*18, *so* and **this**"
+    assert markdown("a * b < c, 3*18, *so* and **this**") == r"a * b \< c, 3\*18, *so* and **this**".replace(
+        "a * b", r"a \* b"
+    )
 
 
 def test_table():
@@ -98,14 +40,8 @@ N, M   -
 
 After."""
     assert markdown(text).splitlines() == [
-        "Words:",
-        "",
-        "| word | format | why |",
-        "| --- | --- | --- |",
-        r"| u | SQ(2, 17) | `\|x\|` up to 2 |",
-        "| N, M | - |  |",
-        "",
-        "After.",
+        *("Words:", "", "| word | format | why |", "| --- | --- | --- |"),
+        *(r"| u | SQ(2, 17) | `\|x\|` up to 2 |", "| N, M | - |  |", "", "After."),
     ]
 
 
@@ -133,41 +69,16 @@ Source: [T] 2.1."""
     )
 
 
-# Pictures.
+# Drawings of errors.
 
 
-def test_svg_is_small_and_the_same_each_time():
-    def drawn():
-        figure = Figure(figsize=(2, 1))
-        axes = figure.subplots()
-        axes.plot(np.linspace(0, 1, 50), np.linspace(0, 1, 50) ** 2)
-        return svg(figure)
-
-    first = drawn()
-    assert first == drawn()
-    assert "<metadata" not in first
-    assert not re.search(r"\d\.\d{2}", first.split("<g>", 1)[1])
-    assert len(first) < 10_000
-
-
-def test_svg_keeps_what_is_written():
-    figure = Figure(figsize=(2, 1))
-    figure.subplots().set_yticks([0.001, 0.125])
-    assert {"0.001", "0.125"} <= set(texts(svg(figure)))
-
-
-def test_svg_is_the_same_drawing_with_classes():
-    """Every element keeps its style, as its own or as that of its class."""
-    figure = Figure(figsize=(2, 1))
-    axes = figure.subplots()
-    axes.plot([0, 1], color="#123456", linestyle="--")
-    axes.plot([1, 0], color="#123456", linestyle="--")
-    text = svg(figure)
-    rules = dict(re.findall(r"^\.(\w+)\{([^}]*)\}$", text, flags=re.MULTILINE))
-    used = re.findall(r' class="(\w+)"', text)
-    assert set(used) == set(rules)
-    assert all(used.count(name) > 1 for name in rules)
-    assert sum("#123456" in rules[name] for name in used) + text.count(' style="fill: none; stroke-d') == 2
+def drawn(samples, names=("",), axis="angle"):
+    """Visible panels of a drawing of errors, and its curves by name, a dictionary a panel."""
+    variants = {name: Variant(None, as_published="as published" in name) for name in names}
+    record = Record("made_up", "", "", variants, None, {}, axis=axis)
+    figure = draw_errors([Entry(record, name) for name in names], samples)
+    panels = [axes for axes in figure.axes if axes.get_visible()]
+    return figure, panels, [{line.get_label(): line for line in axes.lines} for axes in panels]
 
 
 def test_error_plot_shows_the_largest_error():
@@ -175,40 +86,35 @@ def test_error_plot_shows_the_largest_error():
     exact = np.zeros(1000)
     found = np.where(at > 0.5, 1e-3, 1e-5)
     found[700] = 0.25
-    block = DEVICES["bisection"][0]
-    figure = draw_errors([block], [Sample(found, exact, exact + 1e-5, at)])
-    lines = {line.get_label(): line.get_ydata() for line in figure.axes[0].lines}
+    _, _, (lines,) = drawn([Sample(found, exact, exact + 1e-5, at)])
     assert set(lines) == {"model", "arithmetic", "total"}
-    assert np.nanmax(lines["total"]) == 0.25
-    assert np.count_nonzero(lines["total"] == 0.25) == 1
-    np.testing.assert_allclose(lines["model"], 1e-5)
-    # An entry measured twice is drawn once.
-    sample = Sample(found, exact, None, at)
-    twice = draw_errors(DEVICES["arccos"][:2], [sample, sample])
-    assert len([axes for axes in twice.axes if axes.get_visible()]) == 1
-    assert twice.axes[0].get_title() == DEVICES["arccos"][0].variant.split(", ")[0]
+    total = lines["total"].get_ydata()
+    assert np.nanmax(total) == 0.25
+    assert np.count_nonzero(total == 0.25) == 1
+    np.testing.assert_allclose(lines["model"].get_ydata(), 1e-5)
+    # Results that two variants share are drawn once, under what their names share.
+    _, panels, _ = drawn(
+        [Sample(found, exact, None, at)] * 2, ("refitted, pipelined", "refitted, sequential")
+    )
+    assert [axes.get_title() for axes in panels] == ["refitted"]
 
 
-def test_documented_variant_is_drawn_beside_the_default():
+def test_published_variant_is_drawn_beside_the_default():
     at = np.linspace(1, 9, 900)
     samples = [Sample(np.full(900, error), np.zeros(900), None, at) for error in (1e-3, 2e-3, 5e-2)]
-    variants = ("one", "two", "two, as published")
-    blocks = [replace(DEVICES["bisection"][0], variant=variant) for variant in variants]
-    figure = draw_errors(blocks, samples)
-    one, two = (axes for axes in figure.axes if axes.get_visible())
-    assert (one.get_title(), two.get_title()) == ("one", "two")
-    assert [line.get_label() for line in one.lines] == ["total"]
-    lines = {line.get_label(): line.get_ydata() for line in two.lines}
-    np.testing.assert_array_equal(lines["total"], np.full(90, 2e-3))
-    np.testing.assert_array_equal(lines["total, as documented"], np.full(90, 5e-2))
+    figure, panels, (one, two) = drawn(samples, ("one", "two", "two, as published"))
+    assert [axes.get_title() for axes in panels] == ["one", "two"]
+    assert list(one) == ["total"]
+    np.testing.assert_array_equal(two["total"].get_ydata(), np.full(90, 2e-3))
+    np.testing.assert_array_equal(two["total, as published"].get_ydata(), np.full(90, 5e-2))
     (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == list(lines)
+    assert [text.get_text() for text in legend.get_texts()] == list(two)
 
 
 def test_intervals_have_several_spans():
     at = np.repeat(np.arange(40.0), 100)
-    figure = draw_errors(DEVICES["gpq"], [Sample(np.ones(4000), np.zeros(4000), None, at)])
-    assert len(figure.axes[0].lines[0].get_xdata()) == 40 // 8
+    _, _, (lines,) = drawn([Sample(np.ones(4000), np.zeros(4000), None, at)])
+    assert len(lines["total"].get_xdata()) == 40 // 8
 
 
 def test_decisions_are_drawn_as_shares():
@@ -217,11 +123,20 @@ def test_decisions_are_drawn_as_shares():
     found = exact.copy()
     found[11:15:2] = True
     found[16] = False
-    block = replace(DEVICES["bisection"][0], axis="angle")
-    (axes,) = draw_errors([block], [Sample(found, exact, None, at)]).axes
-    lines = {line.get_label(): line.get_ydata() for line in axes.lines}
-    np.testing.assert_allclose(lines["yes by mistake"], [0, 0.2])
-    np.testing.assert_allclose(lines["no by mistake"], [0, 0.1])
+    _, _, (lines,) = drawn([Decisions.of(found, exact, at)])
+    np.testing.assert_allclose(lines["yes by mistake"].get_ydata(), [0, 0.2])
+    np.testing.assert_allclose(lines["no by mistake"].get_ydata(), [0, 0.1])
+
+
+@pytest.mark.parametrize("unit", dict.fromkeys(entry.record.name for entry in ENTRIES))
+def test_every_measured_unit_has_an_axis(unit):
+    if unit != "pipeline":
+        sample = sample_of(entries_shown(unit)[0], 1000)
+        assert RECORDS[unit].axis
+        assert np.ptp(np.broadcast_to(sample.at, np.shape(sample.found))) > 0
+
+
+# Drawings of structures.
 
 
 def chain(*operations, width=18, suffix=""):
@@ -247,23 +162,10 @@ def test_structures_of_one_kind_share_a_drawing():
     assert likeness(constant) == first
 
 
-# The committed pages.
-
-
-def test_every_measured_device_has_an_axis():
-    for block in BLOCKS:
-        assert bool(block.axis) == (block.measure is not None)
-    for device, blocks in DEVICES.items():
-        if blocks[0].measure and device not in ("pipeline", "arccos"):
-            sample = sample_of(blocks[0], 1000)
-            at = np.broadcast_to(sample.at, np.shape(sample.found))
-            assert np.ptp(at) > 0
-
-
 # Writing.
 
 
-def test_same_bytes_each_time(tmp_path):
+def test_a_page_has_all_of_its_record_and_the_same_bytes_each_time(tmp_path):
     written = []
     for name in ("one", "two"):
         folder = tmp_path / name
@@ -274,36 +176,27 @@ def test_same_bytes_each_time(tmp_path):
         write_pages(folder, ["diffuse"], samples=1000)
         written.append({path.name: path.read_bytes() for path in folder.iterdir()})
     assert written[0] == written[1]
-    assert set(written[0]) == {
-        "README.md",
-        "diffuse.md",
-        "diffuse-structure.svg",
-        "diffuse-timing.svg",
-        "diffuse-errors.svg",
-        "diffuse_2-structure.svg",
-        "diffuse-own.svg",
-    }
+    pictures = {f"diffuse-{kind}.svg" for kind in ("structure", "timing", "errors", "own")}
+    assert set(written[0]) == {"README.md", "diffuse.md", "diffuse_2-structure.svg", *pictures}
+    text, record = written[0]["diffuse.md"].decode(), RECORDS["diffuse"]
+    for stimulus in record.stimuli.values():
+        assert stimulus.covers in text
+    assert all(reason in text for reason in (*record.waivers.values(), *record.still))
+    assert all(
+        f"[`{path}`]" in text for path in ("golden/lighting/diffuse.py", "sim/units/lighting/diffuse.py")
+    )
+    assert "(../theory/models.md#lighting)" in text
+    index = written[0]["README.md"].decode()
+    assert all(f"({unit}.md)" in index for unit in RECORDS)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "line"),
-    [
-        (["nowhere"], "blysk: nowhere/README.md: cannot be written, there is no folder nowhere; make"),
-        (["file"], "blysk: file/README.md: cannot be written, file is no folder; choose"),
-        ([".", "--device", "x"], "blysk: --device x: unknown device; use one of dot_product, "),
-    ],
-)
-def test_bad_input_is_one_line(arguments, line, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("file").touch()
-    assert main(["pages", *arguments]) == 2
-    output, errors = capsys.readouterr()
-    assert output == ""
-    assert errors.startswith(line)
-    assert errors.count("\n") == 1
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
-def test_help_has_an_example(capsys):
-    assert main(["pages", "--help"]) == 0
-    assert re.search(r"Example:\n +blysk pages ", capsys.readouterr().out)
+@pytest.mark.long
+def test_every_unit_has_a_page(tmp_path):
+    write_pages(tmp_path, samples=1000)
+    for unit in RECORDS:
+        text = (tmp_path / f"{unit}.md").read_text(encoding="utf-8")
+        assert all(
+            (tmp_path / name).is_file() for name in text.split("](")[1:] if name.startswith(f"{unit}-")
+        )
+        assert f"{unit}-structure.svg" in text
+        assert (PROJECT / "docs").is_dir()

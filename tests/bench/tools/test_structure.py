@@ -10,7 +10,9 @@ from amaranth.lib import data, memory, stream
 from amaranth.lib.wiring import Component, In, Out
 
 from blysk.bench.tools.drawing import _WIDEST, _bands, _Layout, draw_structure
-from blysk.bench.tools.structure import Graph, Node, describe_shape, graph_of, layers
+from blysk.bench.tools.graph import Graph, Node, layers
+from blysk.bench.tools.netlist import describe_shape
+from blysk.bench.tools.structure import graph_of
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
 from blysk.hdl.core.fixed import SQ
 from blysk.hdl.emit.cost import cost_of

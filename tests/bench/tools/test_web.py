@@ -14,9 +14,10 @@ from amaranth.hdl import Fragment
 from click.testing import CliRunner
 
 from blysk.bench.report.report import chosen_tasks
-from blysk.bench.tools import web
+from blysk.bench.tools import web, web_data
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
+from blysk.golden.pipeline import Spans
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import main
@@ -33,7 +34,7 @@ def unpacked(data):
     raw = zlib.decompress(data)
     count, fragments = np.frombuffer(raw[:8], "<u4").tolist()
     at, codes = 8, {}
-    for column in json.loads(json.dumps(web.COLUMNS)):
+    for column in json.loads(json.dumps(web_data.COLUMNS)):
         values = np.zeros(count, dtype=np.int64)
         for byte in range(column["bytes"]):
             values += np.frombuffer(raw, np.uint8, count, at).astype(np.int64) << 8 * byte
@@ -49,11 +50,11 @@ def unpacked(data):
     return codes, visible.astype(bool)
 
 
-@pytest.mark.parametrize("mesh", web.MESHES)
+@pytest.mark.parametrize("mesh", web_data.MESHES)
 def test_spans_as_they_are_sent(mesh):
-    scene = web.scene_of(web.START | {"mesh": mesh, "view": web.MESHES[mesh].views - 1})
+    scene = web_data.scene_of(web_data.START | {"mesh": mesh, "view": web_data.MESHES[mesh].views - 1})
     frame = prepare(scene, preset("chord"))
-    codes, visible = unpacked(web.encode(frame.spans, frame.cut_raster.visible))
+    codes, visible = unpacked(web_data.encode(frame.spans, frame.cut_raster.visible))
     for name in ("x", "y", "length"):
         np.testing.assert_array_equal(codes[name], getattr(frame.spans, name))
     for c in range(3):
@@ -67,8 +68,8 @@ def test_extreme_codes_are_kept():
     most = (1 << 17) - 1
     ends = np.array([[most, -most, 0], [-most, most, -1], [0, 0, most]])
     place = np.array([0, 4095, 0])
-    spans = web.Spans(place, place[::-1], np.array([4095, 0, 1]), ends, ends[::-1])
-    codes, visible = unpacked(web.encode(spans, np.array([True] * 4095 + [False])))
+    spans = Spans(place, place[::-1], np.array([4095, 0, 1]), ends, ends[::-1])
+    codes, visible = unpacked(web_data.encode(spans, np.array([True] * 4095 + [False])))
     np.testing.assert_array_equal(codes["x"], spans.x)
     np.testing.assert_array_equal(codes["length"], spans.length)
     for c in range(3):
@@ -79,26 +80,26 @@ def test_extreme_codes_are_kept():
 
 def test_streams_of_a_view():
     methods = ["chord", "linear", "quadratic", "angular"]
-    found = web.streams_of("teapot", 0, methods)
+    found = web_data.streams_of("teapot", 0, methods)
     assert json.loads(json.dumps(found)) == found
     axes = np.array(found["axes"])
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
     # Methods that take the same spans share them; narrower ones for high exponents are the chord's alone.
-    assert len(found["data"]) < len(methods) * len(web.BANDS)
+    assert len(found["data"]) < len(methods) * len(web_data.BANDS)
     assert found["streams"]["linear"] == found["streams"]["quadratic"]
     counts = {
         method: [len(unpacked(base64.b64decode(found["data"][k]))[0]["x"]) for k in numbers]
         for method, numbers in found["streams"].items()
     }
     assert counts["chord"][0] < counts["chord"][1]
-    for k, exponent in enumerate(web.BANDS):
-        frame = prepare(web.scene_of(web.START | {"exponent": exponent}), preset("chord"))
+    for k, exponent in enumerate(web_data.BANDS):
+        frame = prepare(web_data.scene_of(web_data.START | {"exponent": exponent}), preset("chord"))
         assert counts["chord"][k] == len(frame.spans)
 
 
 def test_addresses_are_those_of_the_write_port():
-    tables = json.loads(json.dumps(web.tables()))
-    constants = FrameConstants.of(web.scene_of(web.START), 1)
+    tables = json.loads(json.dumps(web_data.tables()))
+    constants = FrameConstants.of(web_data.scene_of(web_data.START), 1)
     beats = []
     for fields, base in ((tables["frame"], 0), (tables["light"], tables["stride"])):
         for name, (first, count) in fields.items():
@@ -115,7 +116,11 @@ def test_addresses_are_those_of_the_write_port():
 @pytest.fixture(scope="module")
 def probes():
     """Of all modules of the page."""
-    return [probe for pair in web.DESIGNS for probe in probes_of(ShadingPipelineUnit(web.design_of(*pair)))]
+    return [
+        probe
+        for pair in web_data.DESIGNS
+        for probe in probes_of(ShadingPipelineUnit(web_data.design_of(*pair)))
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -154,8 +159,8 @@ def test_every_block_has_a_stage(script, probes, monkeypatch):
         Fragment.get(component, None)
         return b""
 
-    monkeypatch.setattr(web, "build", uncompiled)
-    stages = {stage["name"] for stage in web.module_of("chord", "cosquad")["stages"]}
+    monkeypatch.setattr(web_data, "build", uncompiled)
+    stages = {stage["name"] for stage in web_data.module_of("chord", "cosquad")["stages"]}
     (braces,) = re.findall(r"const stageOf = (\{.*?\})", script)
     stage_of = dict(re.findall(r'(\w+): "(\w+)"', braces))
     assert list(stage_of) == names_in(braces)
@@ -176,7 +181,7 @@ def work():
 def results(work):
     module = {"wasm": "eJw=", "bytes": 65_432, "ports": {}, "probes": [{"exact": "</script>"}], "stages": []}
     view = {"axes": np.eye(3).tolist(), "streams": {"chord": [0, 1], "linear": [0, 0]}, "data": ["a", "b"]}
-    return [module if task.function is web.module_of else view for task in work]
+    return [module if task.function is web_data.module_of else view for task in work]
 
 
 @pytest.fixture
@@ -221,16 +226,16 @@ def test_files_of_the_site(site):
     page = Addresses((site / "index.html").read_text())
     assert len(page.ids) == len(set(page.ids))
     text = " ".join((site / "index.html").read_text().split())
-    *lower, highest = web.BANDS
+    *lower, highest = web_data.BANDS
     assert f"cut for the exponent {', '.join(map(str, lower))} or {highest}, the smallest" in text
     data = json.loads(page.data)
     assert list(data["designs"]) == ["chord-cosquad", "linear-exp"]
-    assert data["start"] == {**web.START, "method": "chord", "model": "cosquad"}
+    assert data["start"] == {**web_data.START, "method": "chord", "model": "cosquad"}
     assert [len(mesh["views"]) for mesh in data["meshes"].values()] == [1, 2]
     for mesh in data["meshes"].values():
         for view in mesh["views"]:
             for names in view["streams"].values():
-                assert len(names) == len(web.BANDS)
+                assert len(names) == len(web_data.BANDS)
                 assert all((site / "spans" / f"{name}.js").is_file() for name in names)
     script = (site / "modules" / "chord-cosquad.js").read_text()
     assert script.startswith('blysk.given("chord-cosquad",{')
@@ -312,7 +317,7 @@ def test_command(tmp_path, monkeypatch, work, results):
         asked.extend(tasks)
         for _ in tasks:
             progress()
-        return [results[0] if task.function is web.module_of else results[-1] for task in tasks]
+        return [results[0] if task.function is web_data.module_of else results[-1] for task in tasks]
 
     # Of the report that is measured with it, one quick section.
     monkeypatch.setattr(web, "chosen_tasks", lambda quick: chosen_tasks(quick, names=["errata"]))
@@ -323,9 +328,9 @@ def test_command(tmp_path, monkeypatch, work, results):
     assert report["quick"]
     assert list(report["sections"]) == ["errata"]
     assert found.output.split() == ["site", str(tmp_path / "site" / "index.html")]
-    modules = [task.settings for task in asked if task.function is web.module_of]
+    modules = [task.settings for task in asked if task.function is web_data.module_of]
     assert modules == [{"method": method, "model": model} for method, model in DESIGNS]
-    assert len(asked) - len(modules) == sum(body.views for body in web.MESHES.values())
+    assert len(asked) - len(modules) == sum(body.views for body in web_data.MESHES.values())
 
 
 def test_command_is_registered(capsys):
@@ -377,7 +382,7 @@ def test_interrupt_leaves_nothing_behind(interrupted):
     """A worker in the midst of a program of its own, with files of its own."""
     status, text = interrupted(
         "import subprocess, sys, tempfile\n"
-        "from bench import web\n"
+        "from blysk.bench.tools import web\n"
         "from blysk.bench.store import Task\n"
         "def sleep(seconds):\n"
         "    with tempfile.TemporaryDirectory(prefix='blysk-'):\n"

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from blysk.bench.store import results_of
-from blysk.bench.tools import web
+from blysk.bench.tools import web, web_data
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.frame import frame_buffer
 from blysk.golden.frames.prepare import prepare
@@ -31,6 +31,7 @@ from blysk.sim.frames.frame import FrameSimulator, beats_of
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 pytest.importorskip("ziglang", reason="ziglang is not installed")
+pytestmark = pytest.mark.long
 
 
 def has_compiler():
@@ -111,7 +112,7 @@ def picture_of(page, name="frame"):
         return btoa(text);
     }"""
     data = np.frombuffer(base64.b64decode(page.evaluate(script, name)), dtype=np.uint8)
-    return data.reshape(web.HEIGHT, web.WIDTH, 4)[..., :3]
+    return data.reshape(web_data.HEIGHT, web_data.WIDTH, 4)[..., :3]
 
 
 def digest(image):
@@ -120,9 +121,9 @@ def digest(image):
 
 def prepared(state):
     """Scene, design and spans of the page's settings."""
-    design = web.design_of(state["method"], state["model"])
-    band = next(most for most in web.BANDS if state["exponent"] <= most)
-    return web.scene_of(state), design, prepare(web.scene_of(state | {"exponent": band}), design)
+    design = web_data.design_of(state["method"], state["model"])
+    band = next(most for most in web_data.BANDS if state["exponent"] <= most)
+    return web_data.scene_of(state), design, prepare(web_data.scene_of(state | {"exponent": band}), design)
 
 
 UNITS = {}
@@ -143,7 +144,7 @@ def natively(state):
     return frame_buffer(scene, frame.cut_raster, colors), run
 
 
-def by_twin(state):
+def by_model(state):
     scene, design, frame = prepared(state)
     pixels = design.compute(frame.spans, FrameConstants.of(scene, 1))
     return frame_buffer(scene, frame.cut_raster, pixels.color)
@@ -167,16 +168,17 @@ def test_first_frame_is_that_of_the_native_engine(open_page):
     assert 0.3 < figure(page, "largest") < 1
 
 
-@pytest.mark.long
 @pytest.mark.skipif(not has_compiler(), reason="no C++ compiler: pysim would take hours")
 def test_every_module_gives_the_frame_of_the_native_engine(open_page, tmp_path):
     """All that the command builds by itself: fourteen modules to compile, in both engines."""
-    work = web.tasks(web.DESIGNS, {"teapot": 1})
+    work = web.tasks(web_data.DESIGNS, {"teapot": 1})
     web.write_site(tmp_path / "site", work, results_of(work))
     page = open_page(folder=tmp_path / "site")
-    assert page.evaluate("() => Object.keys(blysk.site.designs)") == ["-".join(pair) for pair in web.DESIGNS]
+    assert page.evaluate("() => Object.keys(blysk.site.designs)") == [
+        "-".join(pair) for pair in web_data.DESIGNS
+    ]
     digests = set()
-    for method, model in web.DESIGNS:
+    for method, model in web_data.DESIGNS:
         page.locator("#method").select_option(method)
         change(page, "model", model)
         state = state_of(page)
@@ -188,7 +190,7 @@ def test_every_module_gives_the_frame_of_the_native_engine(open_page, tmp_path):
         assert figure(page, "gated") == run.status["gated_spans"], (method, model)
         digests.add(shown)
     # Those that differ by their arithmetic do so in some pixel: none is shown for another.
-    assert len(digests) > len(web.DESIGNS) // 2
+    assert len(digests) > len(web_data.DESIGNS) // 2
 
 
 def test_drag_moves_the_light(open_page):
@@ -204,7 +206,7 @@ def test_drag_moves_the_light(open_page):
     settle(page)
     state = state_of(page)
     assert not page.locator("#inside").is_visible()
-    axes = web.streams_of("teapot", 0, ["chord"])["axes"]
+    axes = web_data.streams_of("teapot", 0, ["chord"])["axes"]
     right, up, towards = np.array(axes) @ state["direction"]
     assert right > 0.4
     assert up > 0.2
@@ -230,7 +232,7 @@ def test_every_control_changes_the_frame(open_page):
         digests.add(digest(image))
         state = state_of(page)
         assert state["view" if control == "view-number" else control] == value
-        assert digest(by_twin(state)) == digest(image), control
+        assert digest(by_model(state)) == digest(image), control
     # A method without the model takes one that it has; the page offers no other.
     assert state["model"] == "cosquad"
     assert page.locator("#model option[value=exp]").is_disabled()
@@ -239,17 +241,18 @@ def test_every_control_changes_the_frame(open_page):
         assert page.locator(f"output[for={control}]").inner_text() == f"{state[control]:g}"
     page.locator("#again").click()
     settle(page)
-    assert digest(picture_of(page)) == digest(by_twin(state_of(page)))
+    assert digest(picture_of(page)) == digest(by_model(state_of(page)))
 
 
-@pytest.mark.long
 def test_same_frame_as_the_command_renders(open_page):
     """Where the exponent is that of the spans, the frame is that of `blysk render` for the scene."""
     page = open_page()
-    change(page, "exponent", web.BANDS[0])
+    change(page, "exponent", web_data.BANDS[0])
     state = state_of(page)
-    frame = FrameSimulator(web.design_of("chord", "cosquad"), engine="cxxrtl" if has_compiler() else "pysim")
-    rendered = frame.render(web.scene_of(state))
+    frame = FrameSimulator(
+        web_data.design_of("chord", "cosquad"), engine="cxxrtl" if has_compiler() else "pysim"
+    )
+    rendered = frame.render(web_data.scene_of(state))
     assert digest(rendered.image) == digest(picture_of(page))
     assert figure(page, "cycles") == rendered.cycles
 
@@ -264,7 +267,7 @@ def test_constants_are_those_of_python(open_page):
         colors = [f"#{rng.integers(0, 1 << 24):06x}" for _ in range(2)]
         ks = rng.integers(0, 101, 3) / 100
         states.append(
-            web.START
+            web_data.START
             | {
                 "mesh": "teapot",
                 "view": k % 2,
@@ -275,7 +278,7 @@ def test_constants_are_those_of_python(open_page):
             | {"exponent": int(rng.integers(1, 1001)), "ambient": ks[0], "diffuse": ks[1], "specular": ks[2]}
         )
     # A light straight behind: there is no half-way vector.
-    viewer = web.scene_of(states[0]).camera.viewer
+    viewer = web_data.scene_of(states[0]).camera.viewer
     states.append(states[0] | {"direction": list(-viewer)})
     script = """async states => {
         const found = [];
@@ -292,19 +295,16 @@ def test_constants_are_those_of_python(open_page):
     }"""
     kept = {"method": "chord", "model": "cosquad", "reference": "method"}
     found = page.evaluate(script, [json.loads(json.dumps(state | kept, default=float)) for state in states])
-    shape = ObservedPipeline(web.design_of("chord", "cosquad")).write.payload.shape()
+    shape = ObservedPipeline(web_data.design_of("chord", "cosquad")).write.payload.shape()
     for state, of_page in zip(states, found, strict=True):
-        expected = FrameConstants.of(web.scene_of(state), 1)
+        expected = FrameConstants.of(web_data.scene_of(state), 1)
         for name, codes in of_page["constants"].items():
             np.testing.assert_array_equal(np.ravel(getattr(expected, name)), codes, err_msg=name)
         np.testing.assert_array_equal(pack(shape, writes_of([expected]))[:, 0], of_page["words"])
     assert not np.any(found[-1]["constants"]["halfway"])
 
 
-@pytest.mark.parametrize(
-    "reference",
-    [pytest.param(name, marks=() if name == "total" else pytest.mark.long) for name in web.REFERENCES],
-)
+@pytest.mark.parametrize("reference", web_data.REFERENCES)
 def test_reference_is_that_of_golden(open_page, reference):
     page = open_page()
     for method, model, exponent in (
@@ -318,7 +318,7 @@ def test_reference_is_that_of_golden(open_page, reference):
         change(page, "reference", reference)
         state = state_of(page)
         scene, design, frame = prepared(state)
-        entry = web.REFERENCES[reference]
+        entry = web_data.REFERENCES[reference]
         raster = dataclasses.replace(
             frame.cut_raster,
             normal_left=frame.spans.normal_left / ONE,
@@ -328,7 +328,7 @@ def test_reference_is_that_of_golden(open_page, reference):
         golden = shade_spans(
             scene, raster, curve, REFLECTION_MODELS[entry["model"] or model], design.interpolator.uses_chord
         )
-        mask = np.zeros((web.HEIGHT, web.WIDTH), dtype=bool)
+        mask = np.zeros((web_data.HEIGHT, web_data.WIDTH), dtype=bool)
         mask.reshape(-1)[raster.pixel[raster.visible]] = True
         figures = error_figures(picture_of(page), golden * 255, mask)
         assert figure(page, "largest") == pytest.approx(figures.max_lsb, abs=1e-9)
@@ -374,7 +374,7 @@ def test_every_curve_and_model_in_float64(open_page):
     }"""
     for model in MODELS:
         for exponent in (1, 7, 100, 1000):
-            found = page.evaluate(script, [web.model_table(model), cosine.tolist(), exponent])
+            found = page.evaluate(script, [web_data.model_table(model), cosine.tolist(), exponent])
             np.testing.assert_allclose(
                 found, REFLECTION_MODELS[model].reflect(cosine, exponent), atol=1e-9, err_msg=model
             )
@@ -396,8 +396,8 @@ def looked_at(page):
     page.locator("#frame").scroll_into_view_if_needed()
     box = page.locator("#frame").bounding_box()
     at = (
-        box["x"] + (x + 0.5) * box["width"] / web.WIDTH,
-        box["y"] + (y + 0.5) * box["height"] / web.HEIGHT,
+        box["x"] + (x + 0.5) * box["width"] / web_data.WIDTH,
+        box["y"] + (y + 0.5) * box["height"] / web_data.HEIGHT,
     )
     page.mouse.click(*at)
     page.wait_for_selector(f'body[data-inside^="{x},{y},"]')
@@ -436,7 +436,7 @@ def traced(page, component):
 def test_waveform_is_that_of_pysim(open_page):
     page = open_page()
     x, y = looked_at(page)
-    component = ObservedPipeline(web.design_of("chord", "cosquad"))
+    component = ObservedPipeline(web_data.design_of("chord", "cosquad"))
     inside, stimulus, status = traced(page, component)
     run = Model(component).run(stimulus)
     own = slice(inside["start"], inside["start"] + inside["length"])
@@ -559,7 +559,7 @@ def test_keyboard(open_page):
         page.keyboard.press(key)
     settle(page)
     assert state_of(page)["direction"] != before
-    assert digest(picture_of(page)) == digest(by_twin(state_of(page)))
+    assert digest(picture_of(page)) == digest(by_model(state_of(page)))
     page.keyboard.press("Enter")
     page.wait_for_selector("body[data-inside]")
     assert page.locator("#inside").is_visible()
@@ -597,7 +597,7 @@ def test_light_goes_round(open_page):
     assert page.locator("#orbit").get_attribute("aria-pressed") == "true"
     page.locator("#orbit").click()
     settle(page)
-    assert digest(picture_of(page)) == digest(by_twin(state_of(page)))
+    assert digest(picture_of(page)) == digest(by_model(state_of(page)))
 
 
 def test_page_stays_free_while_the_worker_simulates(open_page):
@@ -606,7 +606,7 @@ def test_page_stays_free_while_the_worker_simulates(open_page):
     assert len(page.workers) == 1
     _, _, frame = prepared(state_of(page))
     often = np.tile(np.arange(len(frame.spans)), 50)
-    data = web.encode(frame.spans[often], np.tile(frame.cut_raster.visible, 50))
+    data = web_data.encode(frame.spans[often], np.tile(frame.cut_raster.visible, 50))
     script = """async data => {
         const bytes = await blysk.core.unpacked(data);
         await blysk.ask('spans', {name: 'long', bytes});
@@ -666,7 +666,7 @@ def test_coarse_clock(open_page):
     settle(page)
     rate = page.locator("[data-figure=rate]").inner_text()
     assert rate == "–" or 0 < float(rate) < 1000
-    assert digest(picture_of(page)) == digest(by_twin(state_of(page)))
+    assert digest(picture_of(page)) == digest(by_model(state_of(page)))
 
 
 def test_watch_it_being_shaded(open_page):
@@ -718,7 +718,7 @@ def test_from_a_web_server(browser, site):
         context.close()
         server.shutdown()
     assert errors == []
-    assert digest(image) == digest(by_twin(state))
+    assert digest(image) == digest(by_model(state))
 
 
 def test_without_webassembly(open_page):

@@ -306,7 +306,7 @@ const blysk = (() => {
   }
   byId("orbit").addEventListener("click", () => setOrbit(!orbiting));
 
-  // The same frame as its pixels came, clock by clock.
+  // The same frame as its pixels came, cycle by cycle.
 
   let slow = 0;
 
@@ -397,7 +397,7 @@ const blysk = (() => {
     changed();
   });
 
-  // Look inside: the span of a pixel, with its neighbours, clock by clock.
+  // Look inside: the span of a pixel, with its neighbours, cycle by cycle.
 
   async function look(x, y) {
     setOrbit(false);
@@ -496,7 +496,7 @@ const blysk = (() => {
     };
   }
 
-  // A word on a clock: code, value, the pixel it belongs to, and what it would be exactly.
+  // A word in a cycle: code, value, the pixel it belongs to, and what it would be exactly.
   function wordAt(inside, probe, clock) {
     const field = inside.design.ports.status.fields[probe.name];
     const code = inside.code(probe.name, clock);

@@ -326,7 +326,7 @@ const blyskCore = () => {
       };
     }
 
-    // The same with the status after each clock, and the cycles on which spans went in and pixels came out.
+    // The same with the status after each cycle, and the cycles on which spans went in and pixels came out.
     trace(settings, viewer) {
       const size = this.design.ports.status.words;
       const limit = 4096;

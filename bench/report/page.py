@@ -1,0 +1,192 @@
+"""The report as one page of HTML: its template, and values as a reader wants them."""
+
+import base64
+import functools
+import importlib.util
+import json
+import math
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import Any
+
+from blysk.bench.report.section import Cell, Section, Table
+from blysk.sim.errors import InputError
+
+__all__ = [
+    "AXES",
+    "embedded",
+    "environment",
+    "page",
+    "shown",
+    "without_pictures",
+]
+
+
+AXES = {
+    "total": "Against the exact frame: Phong shading as on a GPU, with Blinn's model.",
+    "method": "Against exactly normalised interpolation along the spans with the same model.",
+    "arithmetic": "Against the same method and model in float64: what the words' widths cost.",
+    "model": "The reflection model against Blinn's, both exact, in float64: no arithmetic cures it.",
+    "max_lsb": "The largest over all pixels and channels; 1 LSB is a step of an 8-bit channel.",
+    "p999_lsb": "One value in a thousand is further off; 1 LSB is a step of an 8-bit channel.",
+    "rmse_lsb": "Root of the mean square over pixels and channels; 1 LSB is a step of an 8-bit channel.",
+    "psnr_db": "Peak signal to noise ratio: more is better, so the axis runs the other way.",
+    "flip_p99": "FLIP, a difference as seen by an eye, 0 to 1; one pixel in a hundred has more.",
+    "flip_max": "FLIP, a difference as seen by an eye, 0 to 1; the worst pixel.",
+    "ciede2000_p99": "CIEDE2000 colour difference, of which about 2.3 is just noticed; one pixel in a "
+    "hundred has more.",
+    "ciede2000_max": "CIEDE2000 colour difference, of which about 2.3 is just noticed; the worst pixel.",
+    "cycles_per_pixel": "Cycles of the simulated pipeline from the first write of a constant to the last "
+    "pixel, over its pixels.",
+    "ns_per_pixel": "Cycles a pixel at the clock rate that place and route achieves.",
+    "simulated_pixels_per_second": "How fast this machine simulates the hardware: more is better, so the "
+    "axis runs the other way.",
+    "golden_ns_per_pixel": "Time of the same method and model in float64 NumPy on this machine, over the "
+    "pixels that show.",
+}
+"""What the measures of a point mean: by kind of error, by figure, and by run time. A sentence each."""
+
+_DIGITS = 4
+"""That count, of a number as the page has it."""
+
+
+# The page.
+
+
+def shown(value: Cell) -> str:
+    """A value as a reader wants it: numbers with four digits that count, thousands apart.
+
+    Parameters
+    ----------
+    value : text, number or None
+        A cell of a table.
+    """
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", "\u202f") if abs(value) >= 10_000 else str(value)
+    if not isinstance(value, float):
+        return str(value)
+    if not math.isfinite(value):
+        return str(value).replace("inf", "∞")
+    if value == 0 or 1e-3 <= abs(value) < 1e6:
+        digits = _DIGITS - 1 - (math.floor(math.log10(abs(value))) if value else 0)
+        text = f"{round(value, digits):,.{max(digits, 0)}f}" if value else "0"
+        text = text.rstrip("0").rstrip(".") if "." in text else text
+        return text.replace(",", "" if abs(value) < 10_000 else "\u202f").replace("-", "−")
+    mantissa, exponent = f"{value:.{_DIGITS - 1}e}".split("e")
+    power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{mantissa.replace('-', '−')}·10{power}"
+
+
+def _is_number(value: Cell) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _kinds(table: Table) -> list[str]:
+    """Class of each column: a number, a short text or a long one."""
+    kinds = []
+    for cells in zip(*table.rows, strict=True) if table.rows else [()] * len(table.columns):
+        there = [cell for cell in cells if cell is not None]
+        long = max((len(shown(cell)) for cell in there), default=0) > 40
+        kinds.append("number" if all(map(_is_number, there)) else "long" if long else "text")
+    return kinds
+
+
+def _data_uri(svg: str) -> str:
+    """A drawing on its own: class names in it mean nothing outside."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
+
+
+def embedded(value: Any) -> str:
+    """JSON that may stand in a script element.
+
+    Parameters
+    ----------
+    value
+        Of what JSON has.
+    """
+    return json.dumps(value, allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
+
+
+def without_pictures(value: Any) -> Any:
+    """Figures without the pictures in them, which are in the page."""
+    if isinstance(value, Mapping):
+        return {
+            key: without_pictures(item)
+            for key, item in value.items()
+            if not (isinstance(item, str) and item.startswith("data:"))
+        }
+    return [without_pictures(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def _missing(name: str) -> InputError:
+    return InputError("bench", f"{name} is not installed", "pip install 'blysk[report]'")
+
+
+@functools.cache
+def environment() -> Any:
+    """Jinja's environment of the pages, with their filters.
+
+    Raises
+    ------
+    InputError
+        If a library of the ``report`` extra is missing.
+    """
+    try:
+        from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+        from markdown_it import MarkdownIt
+        from markupsafe import Markup
+    except ImportError as error:
+        raise _missing(error.name) from None
+    for name in ("flip_evaluator", "skimage"):
+        if importlib.util.find_spec(name) is None:
+            raise _missing(name)
+    markdown = MarkdownIt("commonmark", {"html": False})
+    found = Environment(
+        loader=ChoiceLoader([PackageLoader("blysk.bench.report"), PackageLoader("blysk.bench.tools")]),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+    )
+    found.filters |= {
+        "markdown": lambda text: Markup(markdown.render(text)),
+        "inline": lambda text: Markup(markdown.renderInline(text)),
+        "shown": shown,
+        "kinds": _kinds,
+        "data_uri": _data_uri,
+        "embedded": lambda value: Markup(embedded(value)),
+    }
+    found.tests["table"] = lambda part: isinstance(part, Table)
+    found.tests["number"] = _is_number
+    return found
+
+
+def page(sections: Sequence[Section], about: Mapping[str, Any]) -> str:
+    """The report as one page of HTML.
+
+    Parameters
+    ----------
+    sections : sequence of Section
+        In their order. One with ``points`` among its figures (see `section`) has the drawing of
+        error against run time.
+    about : dict
+        See `about`.
+
+    Raises
+    ------
+    InputError
+        If a library of the ``report`` extra is missing.
+    """
+    texts = {
+        name: resources.files(__package__).joinpath("templates", f"report.{name}").read_text(encoding="utf-8")
+        for name in ("css", "js")
+    }
+    (explored,) = [section for section in sections if "points" in section.figures] or (None,)
+    figures = without_pictures(explored.figures) if explored else None
+    template = environment().get_template("report.html")
+    return template.render(
+        sections=sections, about=about, explored=explored, figures=figures, axes=AXES, **texts
+    )

@@ -1,0 +1,274 @@
+"""Tables and text of the report's section on error against run time."""
+
+from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blysk.bench import accuracy
+from blysk.bench.report import place_and_route
+from blysk.bench.report.frames import ERRORS, TIMES
+from blysk.bench.report.perception import (
+    CIEDE2000_MAX,
+    CIEDE2000_P99,
+    FLIP_MAX,
+    FLIP_P99,
+    LARGEST_LSB,
+)
+from blysk.bench.report.section import Cell, Grade, Table
+from blysk.bench.tools.families import DEVICE
+
+__all__ = [
+    "front",
+    "front_table",
+    "fronts_of",
+    "readme_table",
+    "table",
+    "text",
+]
+
+
+# The section.
+
+
+def front(error: Sequence[float | None], time: Sequence[float | None]) -> np.ndarray:
+    """Which points are on the Pareto front: no other is better in one measure and at least as good in both.
+
+    Parameters
+    ----------
+    error, time : sequences of float
+        Of each point; less is better. A point without one of them (``None`` or NaN) is not on the front, and
+        beats none.
+
+    Returns
+    -------
+    bool array
+        By point.
+    """
+    values = np.array([error, time], dtype=np.float64)
+    values[:, np.isnan(values).any(axis=0)] = np.nan
+    # [k, i, j]: measure k of point j against that of point i.
+    no_worse = (values[:, np.newaxis] <= values[:, :, np.newaxis]).all(axis=0)
+    better = (values[:, np.newaxis] < values[:, :, np.newaxis]).any(axis=0)
+    return ~(no_worse & better).any(axis=1) & ~np.isnan(values).any(axis=0)
+
+
+def _by_scene(points: Sequence[Mapping[str, Any]]) -> dict[tuple[str, int], list[Mapping[str, Any]]]:
+    """Points by mesh and exponent: no others can be compared."""
+    found: dict[tuple[str, int], list] = {}
+    for point in points:
+        found.setdefault((point["settings"]["source"], point["settings"]["exponent"]), []).append(point)
+    return found
+
+
+def _measured(points: Sequence[Mapping[str, Any]], kind: str, axis: Mapping[str, str]) -> list[float | None]:
+    """A measure of points, made so that less is better."""
+    # PSNR falls as RMSE grows, and equal images have no PSNR that JSON could hold.
+    values = [point[kind][axis["key"].replace("psnr_db", "rmse_lsb")] for point in points]
+    if axis["better"] == "less" or axis["key"].endswith("psnr_db"):
+        return values
+    return [None if value is None else -value for value in values]
+
+
+def fronts_of(points: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
+    """Ids on the front of each pair of measures, over the meshes and exponents."""
+    found = {}
+    scenes = _by_scene(points).values()
+    for error in ERRORS:
+        for time in TIMES:
+            found[f"{error['key']}|{time['key']}"] = [
+                scene[index]["id"]
+                for scene in scenes
+                for index in np.flatnonzero(
+                    front(_measured(scene, "errors", error), _measured(scene, "times", time))
+                )
+            ]
+    return found
+
+
+def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the points say, and what they are."""
+    of_error = (
+        "Errors are steps (LSB) of an 8-bit channel, over the pixels that show the surface. *Model*: the "
+        "reflection model against Blinn's, both in float64 with exact normals: no arithmetic cures it. "
+        "*Arithmetic*: the frame against the same method and model in float64; 0.5 is a correctly rounded "
+        "frame, and the coefficients of a published variant count as arithmetic. *Method*: against exactly "
+        "normalised interpolation along the spans with the same model. *Total*: against the exact "
+        "frame, Phong shading as on a GPU with Blinn's model. FLIP and CIEDE2000 tell what an eye sees of "
+        "an error; *identical to the eye* is a largest error "
+        f"of {LARGEST_LSB:g} LSB, or FLIP to {FLIP_P99:g} in 99 % of the pixels and {FLIP_MAX:g} in all, and "
+        f"CIEDE2000 to {CIEDE2000_P99:g} and {CIEDE2000_MAX:g}."
+    )
+    placed = any(point["hardware"]["fmax_mhz"] for point in points)
+    of_time = (
+        "Run times: cycles a pixel from the simulation, first write of a constant to last pixel; nanoseconds "
+        + (
+            f"at the clock rate after place and route on an {DEVICE}, the median of some seeds, of one for "
+            f"published methods and other models than `{place_and_route.MODEL}`; "
+            if placed
+            else "in a full report; "
+        )
+        + "pixels that the simulation of the hardware does in a second; and nanoseconds a shown pixel of the "
+        "same method and model in float64 NumPy, spans at hand, vectorised over the pixels. White light on a "
+        "grey, glossy surface. The golden renderer's own shadings have software times alone; their frames "
+        "are rounded to 8 bits."
+    )
+    simulated = [point for point in points if point["settings"]["engine"] == "cxxrtl"]
+    modelled = [point for point in points if point["settings"]["engine"] == "model"]
+    engines = f"{len(simulated):,} frames went through the simulated RTL"
+    if modelled:
+        engines += f", {len(modelled):,} through its bit-accurate model, which has no cycles"
+    return [*map(_glance, _by_scene(points).values()), of_error, of_time, f"{engines}."]
+
+
+def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
+    """The trade of a mesh and an exponent in a few sentences."""
+    settings = scene[0]["settings"]
+    hardware = [point for point in scene if point["group"] != "software"]
+    alike = sum(point["verdicts"]["total"] for point in hardware)
+    text = (
+        f"**{Path(settings['source']).stem}, exponent {settings['exponent']}**: {alike} of {len(hardware)} "
+        "hardware designs look identical to the exact frame."
+    )
+    for point in scene:
+        if point["settings"]["engine"] == "float64" and point["settings"]["method"] == "phong":
+            apart = point["errors"]["method_max_lsb"]
+            text += (
+                " The exact frame interpolates normals over triangles, the hardware along spans: that alone "
+                f"is up to {apart:.1f} LSB (`{point['label']}`)."
+            )
+    for title, kind, key in (
+        ("Fewest cycles", "times", "cycles_per_pixel"),
+        ("Smallest total error", "errors", "total_max_lsb"),
+        ("Smallest method error", "errors", "method_max_lsb"),
+    ):
+        measured = [point for point in hardware if point[kind][key] is not None]
+        if measured:
+            best = measured[int(np.argmin([point[kind][key] for point in measured]))]
+            errors, cycles = best["errors"], best["times"]["cycles_per_pixel"]
+            speed = "not simulated here" if cycles is None else f"{cycles:.3f} cycles a pixel"
+            text += (
+                f" {title}: `{best['label']}`, {speed}, largest total error "
+                f"{errors['total_max_lsb']:.1f} LSB, method error {errors['method_max_lsb']:.2f}."
+            )
+    return text
+
+
+def _heading(axis: Mapping[str, str]) -> str:
+    return f"{axis['title']}, {axis['unit']}" if axis["unit"] else axis["title"]
+
+
+def table(points: Sequence[Mapping[str, Any]]) -> Table:
+    """Every point with every measure."""
+    largest = [axis for axis in ERRORS if axis["key"].endswith("max_lsb")]
+    others = [axis for axis in ERRORS if axis not in largest]
+    hardware = {
+        "multipliers": "multipliers",
+        "cells": "cells",
+        "register_bits": "register bits",
+        "memory_bits": "memory bits",
+        "fmax_mhz": "clock rate, MHz",
+    }
+    columns: dict[str, Callable[[Mapping[str, Any]], Cell]] = {
+        "design": itemgetter("label"),
+        "group": itemgetter("group"),
+        "mesh": lambda point: Path(point["settings"]["source"]).stem,
+        "exponent": lambda point: point["settings"]["exponent"],
+        "identical to the eye": lambda point: point["verdicts"]["total"],
+        **{_heading(axis): _getter("errors", axis["key"]) for axis in largest},
+        **{_heading(axis): _getter("times", axis["key"]) for axis in TIMES},
+        **{title: _getter("hardware", key) for key, title in hardware.items()},
+        **{_heading(axis): _getter("errors", axis["key"]) for axis in others},
+        "identical to exact interpolation": lambda point: point["verdicts"]["method"],
+        "identical to the same in float64": lambda point: point["verdicts"]["arithmetic"],
+        "model identical to Blinn's": lambda point: point["verdicts"]["model"],
+        **{name: _getter("settings", name) for name in ("method", "model", "engine")},
+    }
+    rows = [[value(point) for value in columns.values()] for point in points]
+    graded: dict[Cell, Grade] = {True: "good", False: "bad"}
+    return Table(
+        name="points",
+        title="Every point",
+        columns=list(columns),
+        rows=rows,
+        note="Engine cxxrtl: simulated RTL; model: its bit-accurate model; float64: the golden renderer, "
+        "rounded to 8 bits. Multipliers, cells, register and memory bits are counted before technology "
+        "mapping. Identical to the eye: to the exact frame, to exact interpolation with the same model, and "
+        "to the same method and model in float64; good: yes, bad: no.",
+        grades=[[graded[cell] if isinstance(cell, bool) else "" for cell in row] for row in rows],
+    )
+
+
+def _getter(kind: str, key: str) -> Callable[[Mapping[str, Any]], Cell]:
+    return lambda point: point[kind][key]
+
+
+def front_table(points: Sequence[Mapping[str, Any]], fronts: Mapping[str, Sequence[str]]) -> Table:
+    """Designs on the fronts of the largest total and method error."""
+    rows = []
+    for (source, exponent), scene in _by_scene(points).items():
+        for error in (axis for axis in ERRORS if axis["key"] in ("total_max_lsb", "method_max_lsb")):
+            for time in TIMES:
+                ids = set(fronts[f"{error['key']}|{time['key']}"])
+                rows += [
+                    [
+                        Path(source).stem,
+                        exponent,
+                        _heading(error),
+                        _heading(time),
+                        point["label"],
+                        point["errors"][error["key"]],
+                        point["times"][time["key"]],
+                    ]
+                    for point in scene
+                    if point["id"] in ids
+                ]
+    return Table(
+        name="fronts",
+        title="Pareto fronts",
+        columns=["mesh", "exponent", "error", "run time", "design", "its error", "its run time"],
+        rows=rows,
+        note="Designs that no other beats: for each, all that err less take longer, and all that are faster "
+        "err more.",
+    )
+
+
+def readme_table(points: Sequence[Mapping[str, Any]]) -> str:
+    """README's table of accuracy, as Markdown: the designs of `DESIGNS`.
+
+    Largest arithmetic and method error in LSB at each exponent; largest total error, cycles a pixel and
+    millions of simulated pixels a second at exponent 100.
+
+    Parameters
+    ----------
+    points : sequence of dict
+        Those of `section`; every design was simulated, and exponent 100 is among the exponents.
+    """
+    points = [point for point in points if point["group"] != "software"]
+    exponents = sorted({point["settings"]["exponent"] for point in points})
+    lines = [
+        "| mesh | method | model | "
+        + " | ".join(f"n = {exponent}" for exponent in exponents)
+        + " | total | cycles a pixel | Mpixel/s simulated |",
+        f"|---|---|---|{'---:|' * (len(exponents) + 3)}",
+    ]
+    rows = {
+        (point["settings"]["source"], point["settings"]["method"], point["settings"]["model"]): {}
+        for point in points
+    }
+    for point in points:
+        settings = point["settings"]
+        rows[settings["source"], settings["method"], settings["model"]][settings["exponent"]] = point
+    for (source, method, model), row in rows.items():
+        if (method, model) not in accuracy.DESIGNS:
+            continue
+        errors = [row[exponent]["errors"] for exponent in exponents]
+        times = row[100]["times"]
+        cells = [Path(source).stem, method, model]
+        cells += [f"{error['arithmetic_max_lsb']:.2f} / {error['method_max_lsb']:.2f}" for error in errors]
+        cells += [f"{row[100]['errors']['total_max_lsb']:.1f}", f"{times['cycles_per_pixel']:.3f}"]
+        cells += [f"{times['simulated_pixels_per_second'] / 1e6:.1f}"]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join([*lines, ""])

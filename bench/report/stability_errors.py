@@ -1,0 +1,319 @@
+"""Errors of every method in stiff and extreme cases, and their grades."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from blysk.bench.report.section import Grade
+from blysk.bench.report.stability_cases import (
+    GROUPS,
+    HALFWAY,
+    STREAM_GROUP,
+    Case,
+    arcs,
+    cases_of,
+    single_spans,
+)
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.cut import cut_spans
+from blysk.golden.frames.local import local_values
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.methods.interpolator import Operands
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.golden.pipeline import Design, Spans
+from blysk.golden.presets import METHODS, preset
+from blysk.golden.reference.curves import interpolate
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.lighting import halfway_vector, intensity_of_cosines, saturate
+from blysk.golden.reference.raster import Raster
+from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.golden.reference.renderer import shade_operands, shade_spans
+
+__all__ = [
+    "FACTORS",
+    "GOOD",
+    "LENGTH_TOLERANCE",
+    "MODEL",
+    "RANGE_EXPONENTS",
+    "SWEEP",
+    "SWEEP_EXPONENT",
+    "grade_of",
+    "measure",
+    "measure_case",
+    "measure_ranges",
+    "spans_of",
+    "widest_span",
+]
+
+
+RANGE_EXPONENTS = (1, 10, 100, 1000)
+"""Exponents of the table of safe ranges."""
+
+MODEL = "cosquad"
+
+SWEEP_EXPONENT = 50
+"""Exponent of the spans of `measure_ranges`."""
+
+SWEEP = tuple(np.geomspace(1, 180, 40).round(2).tolist())
+"""Their angles in degrees."""
+
+FACTORS = (1.0, 1.2, 2.0)
+"""Multiples of the widest span at which a method is tried."""
+
+GOOD = 1.0
+"""Largest error in LSB that is good."""
+
+LENGTH_TOLERANCE = 1 / 256
+"""How far the length of a normal may be from 1, by the methods' documentation."""
+
+_STEP = COMPONENT.step
+
+# Degrees by which rounding makes a span wider.
+_SLACK = 1e-3
+
+# LSB: rounding of an ambient, diffuse and specular colour operand.
+_COLOR_ERROR = 3 * Intensity.COLOR_FORMAT.step / 2
+
+
+class _Shaded(NamedTuple):
+    """By pixel that shows: largest error of a channel in LSB, what is stated, span; by span: flagged."""
+
+    error: np.ndarray
+    stated: np.ndarray
+    span: np.ndarray
+    out_of_range: np.ndarray
+
+
+def _design(case: Case, method: str) -> Design:
+    return preset(method, MODEL, lights=len(case.scene.lights))
+
+
+def spans_of(case: Case, design: Design, raster: Raster, codes: Sequence[np.ndarray]) -> Spans:
+    """Spans of a case as a design takes them."""
+    spans = Spans(raster.x, raster.y, raster.length, *codes)
+    return replace(spans, values=local_values(case.scene, raster)) if design.takes_values else spans
+
+
+def _operands(design: Design, spans: Spans, constants: FrameConstants) -> Operands:
+    if design.takes_values:
+        return design.interpolator.compute_values(spans.values, spans.length)
+    vectors = (spans.normal_left, spans.normal_right, constants.direction, constants.halfway)
+    left, right, direction, halfway = (Fixed(COMPONENT, codes) for codes in vectors)
+    return design.interpolator.compute(left, right, spans.length, direction, halfway)
+
+
+def _shade(case: Case, design: Design, raster: Raster, codes: Sequence[np.ndarray]) -> _Shaded:
+    """Errors of the model against exactly normalised interpolation in float64."""
+    scene, material = case.scene, case.scene.materials[0]
+    spans, constants = spans_of(case, design, raster, codes), FrameConstants.of(scene)
+    color = design.compute(spans, constants).color
+    out_of_range = _operands(design, spans, constants).out_of_range
+
+    degrees = np.minimum(_angles(raster), design.interpolator.MAX_ANGLE).max(initial=0)
+    error = design.interpolator.operand_error(int(raster.length.max(initial=1)), float(degrees))
+    error += min(_length_excess(codes), LENGTH_TOLERANCE)
+    shown, whole = raster.visible, case.raster
+    t = whole.offset / np.maximum(whole.length[whole.span] - 1, 1)
+    normals = interpolate("normalised", whole.normal_left[whole.span], whole.normal_right[whole.span], t)
+    direction = np.array([light.direction for light in scene.lights])
+    halfway = halfway_vector(direction, scene.camera.viewer)
+    cosine, highlight = (normals[shown] @ vectors.T for vectors in (direction, halfway))
+    # Where N·L is 0 but for the arithmetic, either side of the terminator is right.
+    near = np.abs(cosine) <= error + 3 * _STEP
+    exact = [
+        saturate(
+            intensity_of_cosines(
+                material,
+                scene.lights,
+                scene.ambient_light,
+                np.where(near, side, cosine),
+                highlight,
+                REFLECTION_MODELS[MODEL],
+            )
+        )
+        for side in (0.0, 2.0**-60)
+    ]
+
+    if design.takes_values:
+        cosine, u = design.interpolator.exact_operands(spans.values, spans.length)
+        own = shade_operands(scene, raster, cosine, 1 - u, REFLECTION_MODELS[MODEL])
+    else:
+        # From the codes on.
+        given = replace(raster, normal_left=normalise(codes[0]), normal_right=normalise(codes[1]))
+        uses_chord = design.interpolator.uses_chord
+        own = shade_spans(
+            scene, given, design.interpolator.exact_normals, REFLECTION_MODELS[MODEL], uses_chord
+        )
+    own = own.reshape(-1, 3)[raster.pixel[shown]] * 255
+    light = np.sum([light.color for light in scene.lights], axis=0)
+    terms = np.multiply(material.diffuse, error)
+    terms = terms + np.multiply(material.specular, material.exponent * error + design.specular.error)
+    arithmetic = 0.5 + _COLOR_ERROR * len(direction) + 255 * (light * terms).max()
+    found, stated = (
+        np.min([np.abs(of - one * 255).max(axis=1) for one in exact], axis=0) for of in (color[shown], own)
+    )
+    return _Shaded(found, stated + arithmetic, raster.span[shown], out_of_range)
+
+
+def _angles(raster: Raster) -> np.ndarray:
+    """Angles of spans in degrees."""
+    half = np.linalg.norm(raster.normal_right - raster.normal_left, axis=1) / 2
+    return np.degrees(2 * np.arcsin(np.minimum(half, 1)))
+
+
+def _length_excess(codes: Sequence[np.ndarray]) -> float:
+    """How far the length of a normal is from 1, but for its rounding."""
+    lengths = np.linalg.norm(np.concatenate(codes) / ONE, axis=1)
+    excess = float(np.abs(lengths - 1).max(initial=0))
+    return excess if excess > 2 * _STEP else 0.0
+
+
+def grade_of(grades: Sequence[Grade]) -> Grade:
+    """The worst of some grades; none, of none."""
+    order: tuple[Grade, ...] = ("bad", "fair", "good", "")
+    return min(grades, key=order.index, default="")
+
+
+def _figures(shaded: _Shaded, inside: np.ndarray) -> dict[str, Any]:
+    """Largest error of a case, that in spans that are not flagged, and its grades."""
+    flagged, served = shaded.out_of_range[shaded.span], inside[shaded.span]
+    large = shaded.error > GOOD
+    bad = large & ~flagged & (~served | (shaded.error > shaded.stated))
+
+    def grade(chosen) -> Grade:
+        if not chosen.any():
+            return ""
+        return "bad" if (bad & chosen).any() else "fair" if (large & chosen).any() else "good"
+
+    return {
+        "error": float(shaded.error.max(initial=0)),
+        "silent": float(shaded.error[~flagged].max(initial=0)),
+        "safe": float(shaded.error[served].max(initial=0)),
+        "flagged": int(np.count_nonzero(shaded.out_of_range)),
+        "grade": grade(np.ones_like(large)),
+        "safe_grade": grade(served),
+    }
+
+
+def measure_case(case: Case, method: str) -> dict[str, Any]:
+    """Errors of a method in a case, by the bit-accurate model.
+
+    The error is the largest of a channel against exactly normalised interpolation in float64 with the same
+    model, in LSB; 0.5 is a correctly rounded pixel. Where N·L is 0 but for the stated errors, lit and dark
+    are both right. An error is
+
+    - good to `GOOD`;
+    - fair where it is larger but the pipeline flags the span, or the method serves the span and states such
+      an error: its own curve in float64 is as far off, and the error bounds of its units, times the
+      exponent in a highlight, come to the rest;
+    - bad otherwise: nothing tells of it.
+
+    A method serves spans that `spans` leaves whole, with normals of length 1 within `LENGTH_TOLERANCE`.
+
+    Returns
+    -------
+    dict
+        ``case``; ``spans``; ``inside``, how many of them the method serves; ``cut``, how many are cut; for
+        the spans ``given`` as they are, and ``prepared``, cut where need be, dictionaries of ``error``,
+        ``silent``, that in spans without a flag, ``safe``, that in the spans that the method serves,
+        ``flagged`` spans, ``grade`` and ``safe_grade``, that of the spans that the method serves.
+        ``prepared`` is ``None`` where the spans are refused.
+    """
+    design = _design(case, method)
+    # The normals along a span are those of its ends, whatever the perspective.
+    ones = np.ones(len(case.raster.length))
+    raster = replace(case.raster, magnitude_left=ones, magnitude_right=ones)
+    cut, _ = cut_spans(case.scene, case.raster, design)
+    first = np.flatnonzero(cut.offset == 0)
+    parts = np.bincount(raster.span[first], minlength=len(raster.length))
+    codes = case.codes or (quantise(raster.normal_left), quantise(raster.normal_right))
+    lengths = np.stack([np.linalg.norm(end / ONE, axis=1) for end in codes])
+    inside = parts == 1
+    if not design.takes_values:
+        widest = design.interpolator.widest_span(case.scene.materials[0].exponent)
+        inside = _angles(raster) <= widest + _SLACK
+    inside &= (np.abs(lengths - 1) <= LENGTH_TOLERANCE + _STEP).all(axis=0)
+    prepared = None
+    if case.codes is None:
+        ends = quantise(cut.normal_left), quantise(cut.normal_right)
+        prepared = _figures(_shade(case, design, cut, ends), np.ones(len(cut.length), dtype=bool))
+    return {
+        "case": case.name,
+        "spans": len(raster.length),
+        "inside": int(np.count_nonzero(inside)),
+        "cut": int(np.count_nonzero(parts > 1)),
+        "given": _figures(_shade(case, design, raster, codes), inside),
+        "prepared": prepared,
+    }
+
+
+def measure(method: str) -> dict[str, list[dict[str, Any]]]:
+    """`measure_case` of a method in the cases of every group but `STREAM_GROUP`, by group."""
+    return {
+        str(group): [measure_case(case, method) for case in cases_of(group)]
+        for group in GROUPS
+        if group != STREAM_GROUP
+    }
+
+
+def _span_case(degrees: float, exponent: int, count: int = 30) -> Case:
+    rng = np.random.default_rng(exponent)
+    off = rng.uniform(0, 100 / exponent**0.5, count) * (exponent > 10)
+    ends = arcs(rng, HALFWAY, np.full(count, degrees), rng.uniform(0, 1, count), off)
+    return single_spans(2, f"{degrees:g} degrees", ends, 16, exponent)
+
+
+def _flags(method: str, degrees: np.ndarray) -> np.ndarray:
+    """Which spans of such angles the pipeline flags."""
+    rng = np.random.default_rng(0)
+    ends = arcs(rng, HALFWAY, degrees, rng.uniform(0, 1, len(degrees)), rng.uniform(0, 30, len(degrees)))
+    case = single_spans(2, "", ends, 5, SWEEP_EXPONENT)
+    design = _design(case, method)
+    spans = spans_of(case, design, case.raster, [quantise(end) for end in ends])
+    return _operands(design, spans, FrameConstants.of(case.scene)).out_of_range
+
+
+def widest_span(method: str, exponent: int) -> float:
+    """Widest span in degrees that is left whole: of ``chord-local``, none of a sample is cut."""
+    if not preset(method, MODEL).takes_values:
+        return METHODS[method].widest_span(exponent)
+    low, high = 0.0, 45.0
+    while high - low > 0.05:
+        middle = (low + high) / 2
+        case = _span_case(middle, exponent)
+        _, cut = cut_spans(case.scene, case.raster, _design(case, method))
+        low, high = (low, middle) if cut else (middle, high)
+    return low
+
+
+def measure_ranges(method: str) -> dict[str, Any]:
+    """Which spans a method serves, and what it does with wider ones.
+
+    Returns
+    -------
+    dict
+        ``widest``, the widest span by each of `RANGE_EXPONENTS`; ``none_flagged`` and ``all_flagged``, the
+        last whole number of degrees to which no span is flagged, and the first from which all are; ``sweep``,
+        for each angle of `SWEEP`, `measure_case` of spans at `SWEEP_EXPONENT`; ``outside``, the same at
+        `FACTORS` times the widest span, with ``factor`` and ``degrees``.
+    """
+    sweep = [measure_case(_span_case(degrees, SWEEP_EXPONENT), method) for degrees in SWEEP]
+    angles = np.arange(181)
+    flagged = np.count_nonzero(_flags(method, np.repeat(angles, 20)).reshape(-1, 20), axis=1)
+    widest = {str(exponent): widest_span(method, exponent) for exponent in RANGE_EXPONENTS}
+    outside = []
+    for factor in FACTORS:
+        degrees = factor * widest_span(method, SWEEP_EXPONENT)
+        if degrees <= 180:
+            found = measure_case(_span_case(degrees, SWEEP_EXPONENT), method)
+            outside.append({"factor": factor, "degrees": degrees} | found)
+    return {
+        "widest": widest,
+        "none_flagged": int(np.argmax(flagged > 0)) - 1,
+        "all_flagged": int(angles[flagged < 20].max()) + 1,
+        "sweep": sweep,
+        "outside": outside,
+    }

@@ -1,0 +1,333 @@
+"""Ways in software to the normals, or to N·L and N·H, of a span, and the claims of [T] on their speed."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+
+from blysk.bench.report.errata_evidence import FACTOR_PUBLISHED, ROOT_PUBLISHED
+
+__all__ = [
+    "CLAIMS",
+    "SPANS",
+    "WAYS",
+    "WIDEST",
+    "Claim",
+    "Counted",
+    "dot",
+    "finish",
+    "random_operands",
+]
+
+
+SPANS = 4096
+"""Spans that the ways in software work on together: few enough for their arrays to stay in a cache."""
+
+WIDEST = 45.0
+
+# The ways in software. Each takes the spans' ends and L and H, as arrays of three rows, and gives one array
+# after the other: the pixels of all spans at one place. The loops are over places in a span, where each value
+# follows from the one before; all spans are worked on at once.
+
+Way = Callable[[np.ndarray, np.ndarray, np.ndarray, int], Iterator[np.ndarray]]
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Dot products of columns, of arrays of three rows; operations that `Counted` counts."""
+    product = a * b
+    return product[0] + product[1] + product[2]
+
+
+def _divided(vector: np.ndarray) -> np.ndarray:
+    return vector / np.sqrt(dot(vector, vector))
+
+
+def _scaled(vector: np.ndarray) -> np.ndarray:
+    return vector * (1 / np.sqrt(dot(vector, vector)))
+
+
+def _polynomial(coefficients: Sequence[float], x: np.ndarray) -> np.ndarray:
+    """Horner's rule; coefficients in ascending order."""
+    *rest, total = coefficients
+    for coefficient in reversed(rest):
+        total = total * x + coefficient
+    return total
+
+
+def _middle(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Middle normal by the h polynomial ([T] 2.2)."""
+    return (left + right) * _polynomial(FACTOR_PUBLISHED, dot(left, right))
+
+
+def _lines(normalised, left, right, vectors, pixels):
+    step = (right - left) / (pixels - 1)
+    vector = left
+    for _ in range(pixels):
+        yield normalised(vector)
+        vector = vector + step
+
+
+def _forward_differences(left, right, vectors, pixels):
+    """[T] 2.2 and figure 2.10."""
+    middle = 4 * _middle(left, right)
+    dt = 1 / (pixels - 1)
+    bend = (2 * (left + right) - middle) * dt
+    first = (bend + (middle - right - 3 * left)) * dt
+    second = 2 * dt * bend
+    normal = left
+    for _ in range(pixels):
+        yield normal
+        normal = normal + first
+        first = first + second
+
+
+def _middles(normalised, left, right, vectors, pixels):
+    yield normalised(left + right)
+
+
+def _middles_by_factor(left, right, vectors, pixels):
+    yield _middle(left, right)
+
+
+def _halves(half, left, right, pixels):
+    """Normals between two others by bisection, from left to right; half takes both and the level."""
+    levels = pixels.bit_length() - 1
+
+    def between(left, right, level):
+        if level == levels:
+            return
+        middle = half(left, right, level)
+        yield from between(left, middle, level + 1)
+        yield middle
+        yield from between(middle, right, level + 1)
+
+    return between(left, right, 0)
+
+
+def _bisection_normalised(normalised, left, right, vectors, pixels):
+    return _halves(lambda a, b, level: normalised(a + b), left, right, pixels)
+
+
+def _bisection(left, right, vectors, pixels):
+    """[T] 2.1: ``(N_a + N_b) p(z)``, ``z = 2 N_a·N_b``."""
+    folded = [coefficient * 2.0**power for power, coefficient in enumerate(ROOT_PUBLISHED[2])]
+    return _halves(lambda a, b, level: (a + b) * _polynomial(folded, dot(a, b)), left, right, pixels)
+
+
+def _bisection_by_levels(left, right, vectors, pixels):
+    """The same with one factor for all arcs of a level: ``z`` becomes ``sqrt(2 + z)``."""
+    z = 2 * dot(left, right)
+    factors = []
+    for _ in range(pixels.bit_length() - 1):
+        factors.append(_polynomial(ROOT_PUBLISHED[2], z))
+        z = np.sqrt(2 + z)
+    return _halves(lambda a, b, level: (a + b) * factors[level], left, right, pixels)
+
+
+def _cosines_normalised(normalised, left, right, vectors, pixels):
+    direction, halfway = vectors
+    for normal in _lines(normalised, left, right, vectors, pixels):
+        yield np.stack([dot(normal, direction), dot(normal, halfway)])
+
+
+def _turn(left, right, vectors):
+    """Angle across the spans, and of both vectors: cosines to the left end, and to what follows it."""
+    cosine = dot(left, right)
+    angle = np.arccos(cosine)
+    first, last = (np.stack([dot(end, vector) for vector in vectors]) for end in (left, right))
+    return angle, first, (last - cosine * first) / np.sin(angle)
+
+
+def _cosines_by_angles(left, right, vectors, pixels):
+    """[T] 3.1: ``cos beta cos(lambda - t psi)``."""
+    angle, along, across = _turn(left, right, vectors)
+    amplitude = np.sqrt(along * along + across * across)
+    phase = np.arctan2(across, along)
+    step = angle / (pixels - 1)
+    for _ in range(pixels):
+        yield amplitude * np.cos(phase)
+        phase = phase - step
+
+
+def _recurrence(left, right, vectors, pixels):
+    """[T] 3.3: ``x(t+1) = 2 cos d x(t) - x(t-1)``."""
+    angle, before, across = _turn(left, right, vectors)
+    step = angle / (pixels - 1)
+    cosine = np.cos(step)
+    now = before * cosine + across * np.sin(step)
+    twice = 2 * cosine
+    for _ in range(pixels):
+        yield before
+        before, now = now, twice * now - before
+
+
+_DIVIDED = "normalised, three divisions"
+
+_SCALED = "normalised, one division"
+
+WAYS: dict[str, Way] = {
+    f"middle, {_DIVIDED}": partial(_middles, _divided),
+    f"middle, {_SCALED}": partial(_middles, _scaled),
+    "middle by h(r)": _middles_by_factor,
+    f"bisection, {_DIVIDED}": partial(_bisection_normalised, _divided),
+    f"bisection, {_SCALED}": partial(_bisection_normalised, _scaled),
+    "bisection, a factor each": _bisection,
+    "bisection, a factor a level": _bisection_by_levels,
+    f"line, {_DIVIDED}": partial(_lines, _divided),
+    f"line, {_SCALED}": partial(_lines, _scaled),
+    "forward differences": _forward_differences,
+    f"line, {_DIVIDED}, N·L and N·H": partial(_cosines_normalised, _divided),
+    f"line, {_SCALED}, N·L and N·H": partial(_cosines_normalised, _scaled),
+    "a cosine of each angle": _cosines_by_angles,
+    "recurrence": _recurrence,
+}
+"""Ways to the normals, or to N·L and N·H, of a span's pixels: functions of both ends, (L, H) and the pixels.
+
+Vectors are arrays of shape (3, spans), or (3, 1); a way gives an array of shape (3, spans), or of N·L and N·H
+(2, spans), after the other.
+"""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A speed claim of [T].
+
+    Parameters
+    ----------
+    name : str
+        What is said to be faster.
+    source : str
+        Where.
+    published : float
+        How many times.
+    ways, baselines : tuple of str
+        Of `WAYS`, to be compared each with each.
+    units, baseline_units : tuple of str
+        The same in hardware, of `UNITS`.
+    in_pixels : bool
+        Whether it depends on how long spans are.
+    """
+
+    name: str
+    source: str
+    published: float
+    ways: tuple[str, ...]
+    baselines: tuple[str, ...]
+    units: tuple[str, ...]
+    baseline_units: tuple[str, ...]
+    in_pixels: bool = True
+
+
+CLAIMS = (
+    Claim(
+        "bisection, polynomial of degree 2",
+        "[T] 2.1",
+        2.4,
+        ("bisection, a factor each", "bisection, a factor a level"),
+        (f"bisection, {_DIVIDED}", f"bisection, {_SCALED}"),
+        ("bisection", "bisection interpolator"),
+        ("renormaliser", "renormalise interpolator"),
+    ),
+    Claim(
+        "middle normal, polynomial h",
+        "[T] 2.2",
+        2.5,
+        ("middle by h(r)",),
+        (f"middle, {_DIVIDED}", f"middle, {_SCALED}"),
+        ("middle normal", "middle normal, one a cycle"),
+        ("renormaliser",),
+        in_pixels=False,
+    ),
+    Claim(
+        "forward differences of the normal",
+        "[T] 2.2",
+        3.6,
+        ("forward differences",),
+        (f"line, {_DIVIDED}", f"line, {_SCALED}"),
+        ("forward differences", "quadratic interpolator"),
+        ("renormaliser", "renormalise interpolator"),
+    ),
+    Claim(
+        "spherical-angular recurrence",
+        "[T] 3.3",
+        1.7,
+        ("recurrence",),
+        (
+            f"line, {_DIVIDED}, N·L and N·H",
+            f"line, {_SCALED}, N·L and N·H",
+            "a cosine of each angle",
+        ),
+        ("recurrence", "recurrence interpolator"),
+        ("renormaliser", "renormalise interpolator"),
+    ),
+)
+"""Speed claims of [T], all made for software."""
+
+
+class Counted(np.ndarray):
+    """An array that counts the operations done with it, and with what comes of it, in `counts`.
+
+    An operation on arrays counts once an element. Made by `Counted.of`.
+    """
+
+    counts: Counter[str]
+
+    _KINDS: ClassVar[dict[str, str]] = {
+        "multiply": "multiplications",
+        "add": "additions",
+        "subtract": "additions",
+        "negative": "additions",
+        "divide": "divisions",
+        "sqrt": "roots",
+        "cos": "functions",
+        "sin": "functions",
+        "arccos": "functions",
+        "arctan2": "functions",
+        "power": "functions",
+        "maximum": "comparisons",
+    }
+
+    @classmethod
+    def of(cls, values: np.ndarray, counts: Counter[str]) -> "Counted":
+        """Values that count in ``counts``: multiplications, additions (subtractions are), divisions, roots,
+        functions, and comparisons.
+        """
+        counted = np.asarray(values, dtype=np.float64).view(cls)
+        counted.counts = counts
+        return counted
+
+    def __array_finalize__(self, source):
+        self.counts = getattr(source, "counts", Counter())
+
+    def __array_function__(self, function, types, arguments, options):
+        """Keep counting in what arrays are joined to."""
+        result = super().__array_function__(function, types, arguments, options)
+        return self.of(result, self.counts) if isinstance(result, np.ndarray) else result
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **options):
+        """Count, and work on plain arrays."""
+        plain = [x.view(np.ndarray) if isinstance(x, Counted) else x for x in inputs]
+        counts = next(x.counts for x in inputs if isinstance(x, Counted))
+        result = getattr(ufunc, method)(*plain, **options)
+        counts[self._KINDS[ufunc.__name__]] += np.size(result)
+        return self.of(result, counts)
+
+
+def random_operands(seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Ends of random spans, up to `WIDEST` degrees, and a unit L and H."""
+    rng = np.random.default_rng(seed)
+    left, across = rng.normal(size=(2, 3, SPANS))
+    left = _divided(left)
+    across = _divided(across - dot(across, left) * left)
+    angle = np.radians(rng.uniform(0.1, WIDEST, SPANS))
+    vectors = rng.normal(size=(2, 3, 1))
+    return left, left * np.cos(angle) + across * np.sin(angle), np.stack([_divided(v) for v in vectors])
+
+
+def finish(way: Way, operands: tuple, pixels: int) -> None:
+    """Run a way to its end."""
+    for _ in way(*operands, pixels):
+        pass

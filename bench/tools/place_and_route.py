@@ -1,0 +1,440 @@
+"""Place and route of a component: mapping by Yosys, placement by nextpnr, and what its report says."""
+
+import contextlib
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from amaranth.back import rtlil
+from amaranth.hdl import Const, Module, Shape, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.wiring import Out
+
+from blysk.bench.store import version_of
+from blysk.bench.tools.families import ECP5, Family, Parts, Place, kind_of_cell, signal_name
+from blysk.sim.engines.cxxrtl import cache_folder
+from blysk.sim.engines.engine import SimulationError
+from blysk.sim.errors import InputError
+from blysk.sim.output import write_json
+
+__all__ = [
+    "SEEDS",
+    "Layout",
+    "Registered",
+    "TooLarge",
+    "ToolError",
+    "lay_out",
+    "parts_of",
+    "read_report",
+    "tool_versions",
+    "versions_of",
+]
+
+
+SEEDS = 5
+
+_REMEDY = "pip install 'blysk[fpga]'"
+
+# Names of registers stay: cells are named by them. Amaranth's other names are aliases, of which abc9 makes
+# two cells of one name.
+_BEFORE = """\
+read_rtlil top.il
+hierarchy -top top
+proc
+flatten
+opt_clean -purge
+select -set registers t:$*dff* %co1:+[Q] w:* %i
+rename -hide w:* @registers %d
+"""
+
+# With the ports, to be counted; without, to be placed: there are more of them than pins.
+_AFTER = """
+write_json netlist.json
+delete -port w:*
+write_json top.json"""
+
+_YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
+
+_MOUNT = "/job"
+"""What the tool in its sandbox calls the folder it runs in, the only one it sees."""
+
+_MANY = 1000
+"""Look-up tables from which on a design is large."""
+
+
+class ToolError(SimulationError):
+    """Yosys or nextpnr failed, or made what cannot be timed."""
+
+
+class TooLarge(ToolError):
+    """A design takes more than the FPGA has."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A design, its parts, and its places from several seeds.
+
+    Parameters
+    ----------
+    name : str
+        The design.
+    parts : Parts
+        The same from every seed.
+    places : tuple of Place
+        By seed.
+    """
+
+    name: str
+    parts: Parts
+    places: tuple[Place, ...]
+
+    @property
+    def fmax(self) -> tuple[float, float, float]:
+        """Smallest, median and largest clock rate in MHz."""
+        rates = [place.fmax for place in self.places]
+        return min(rates), median(rates), max(rates)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The figures under stable names."""
+        low, middle, high = self.fmax
+        return {
+            "design": self.name,
+            **asdict(self.parts),
+            "fmax_min_mhz": low,
+            "fmax_median_mhz": middle,
+            "fmax_max_mhz": high,
+            "seeds": [asdict(place) for place in self.places],
+        }
+
+
+class Registered(wiring.Component):
+    """A component with a register at every port; clock and reset are its own.
+
+    Handshakes do not survive it: it is there to be timed, not to be run.
+
+    Parameters
+    ----------
+    component : wiring.Component
+        Component in the clock domain ``sync``.
+
+    Members
+    -------
+    The component's ports, flat, each a plain word.
+    """
+
+    def __init__(self, component: wiring.Component):
+        self._component = component
+        self._ports = {
+            "__".join(map(str, path)): (member.flow, Value.cast(value))
+            for path, member, value in component.signature.flatten(component)
+            # The `valid` or `ready` of a stream that always is.
+            if not isinstance(Value.cast(value), Const) and len(Value.cast(value))
+        }
+        super().__init__({name: flow(Shape(len(value))) for name, (flow, value) in self._ports.items()})
+
+    def elaborate(self, platform) -> Module:
+        """Put the registers between."""
+        m = Module()
+        m.submodules.unit = self._component
+        for name, (flow, value) in self._ports.items():
+            port, register = getattr(self, name), Signal(len(value), name=name, reset_less=True)
+            if flow is Out:
+                m.d.sync += register.eq(value)
+                m.d.comb += port.eq(register)
+            else:
+                m.d.sync += register.eq(port)
+                m.d.comb += value.eq(register)
+        return m
+
+
+# The tools.
+
+
+def tool_versions(family: Family = ECP5) -> dict[str, str | None]:
+    """Version of each tool by its package, ``None`` for one that is not installed; nothing is imported."""
+    return {package: version_of(package) for package in ("pyosys", family.package)}
+
+
+def versions_of(family: Family) -> dict[str, str]:
+    """Versions of the tools, all of which must be there."""
+    versions = tool_versions(family)
+    missing = [package for package, version in versions.items() if version is None]
+    if missing:
+        verb = "is" if len(missing) == 1 else "are"
+        raise InputError("fpga", f"{' and '.join(missing)} {verb} not installed", _REMEDY)
+    return versions
+
+
+class _Runner:
+    """Runs the tools, several at once, and ends them all when told."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._running: set[subprocess.Popen] = set()
+        self._stopped = False
+
+    def run(self, name: str, code: str, arguments: Sequence[str], folder: Path, text: str = "") -> None:
+        """Run Python code in a folder."""
+        # Python's own warnings are none of the tool's.
+        command = [sys.executable, "-W", "ignore", "-c", code, *arguments]
+        with tempfile.TemporaryFile(dir=folder) as log:
+            with self._lock:
+                if self._stopped:
+                    raise ToolError(f"{name} was stopped")
+                process = subprocess.Popen(
+                    command,
+                    cwd=folder,
+                    env={**os.environ, "YOWASP_MOUNT": f"{_MOUNT}=."},
+                    stdin=subprocess.PIPE,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                )
+                self._running.add(process)
+            try:
+                process.communicate(text.encode())
+            finally:
+                process.kill()
+                process.wait()
+                with self._lock:
+                    self._running.discard(process)
+            if process.returncode:
+                log.seek(0)
+                lines = log.read().decode(errors="replace").strip().splitlines()
+                errors = [line for line in lines if line.startswith("ERROR")] or lines[-1:] or ["no message"]
+                raise ToolError(f"{name} ends with status {process.returncode}: {errors[0].strip()}")
+
+    def stop(self) -> None:
+        """End what runs, and start no more."""
+        with self._lock:
+            self._stopped = True
+            for process in self._running:
+                process.kill()
+
+
+def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any], family: Family = ECP5) -> Parts:
+    """Parts of a mapped netlist; its look-up tables are those that nextpnr reports.
+
+    Parameters
+    ----------
+    netlist : dict
+        Yosys's JSON of a `Registered` component.
+    report : dict
+        nextpnr's, JSON.
+    family : Family
+        That it is mapped to.
+    """
+    top = netlist["modules"]["top"]
+    cells = top["cells"].values()
+    # Nets are numbers, constants are not.
+    ports = {bit for port in top["ports"].values() for bit in port["bits"] if isinstance(bit, int)}
+
+    def at_port(cell: Mapping[str, Any]) -> bool:
+        return any(ports & {*cell["connections"].get(pin, ())} for pin in ("D", "DI", "Q"))
+
+    def count(pattern: str) -> int:
+        return sum(bool(re.fullmatch(pattern, cell["type"])) for cell in cells)
+
+    return Parts(
+        luts=int(report["utilization"][family.look_up_tables]["used"]),
+        # With a register at a port nothing else is there.
+        flip_flops=sum(
+            bool(re.fullmatch(family.flip_flop, cell["type"])) and not at_port(cell) for cell in cells
+        ),
+        multipliers=count(family.multiplier),
+        block_rams=count(family.block_ram),
+        distributed_rams=count(family.distributed_ram),
+    )
+
+
+def _refuse_untimed(netlist: Mapping[str, Any], family: Family) -> None:
+    """Refuse a netlist with a cell that nextpnr does not time paths through."""
+    for cell in netlist["modules"]["top"]["cells"].values():
+        kind = cell["type"]
+        for name in (kind, *(f"{kind}.{key}={value}" for key, value in cell["parameters"].items())):
+            if re.fullmatch(family.untimed, name):
+                raise ToolError(f"the netlist has a cell {name}, which nextpnr does not time paths through")
+
+
+def _refuse_too_large(kinds: Mapping[str, int], family: Family) -> None:
+    """Refuse a netlist, of so many cells by kind, that does not fit: the placer would try for ever."""
+    for name, pattern, most in (
+        ("flip-flops", family.flip_flop, family.capacity.flip_flops),
+        ("multipliers", family.multiplier, family.capacity.multipliers),
+        ("block RAMs", family.block_ram, family.capacity.block_rams),
+        ("look-up tables", "LUT4", family.capacity.luts),
+    ):
+        count = sum(number for kind, number in kinds.items() if re.fullmatch(pattern, kind))
+        if count > most:
+            raise TooLarge(f"does not fit: {count:,} {name}, ports too, on {most:,} of the {family.device}")
+
+
+def read_report(report: Mapping[str, Any], seed: int, family: Family = ECP5) -> Place:
+    """What nextpnr's report says of the one clock.
+
+    Parameters
+    ----------
+    report : dict
+        The report, JSON.
+    seed : int
+        That it was made from.
+    family : Family
+        That it is of.
+
+    Raises
+    ------
+    ToolError
+        If the report has not one clock, or no path between its edges.
+    """
+    try:
+        ((clock, rate),) = report["fmax"].items()
+        edge = f"posedge {clock}"
+        (path,) = (
+            path["path"] for path in report["critical_paths"] if path["from"] == edge and path["to"] == edge
+        )
+        logic = sum(step["delay"] for step in path if step["type"] != "routing")
+        routing = sum(step["delay"] for step in path if step["type"] == "routing")
+        # A multiplier of several stages is one cell.
+        passed = dict.fromkeys(
+            step["from"]["cell"].partition("/")[0] for step in path if step["type"] == "logic"
+        )
+        return Place(
+            seed=seed,
+            fmax=float(rate["achieved"]),
+            start=signal_name(path[0]["from"]["cell"], family),
+            end=f"{signal_name(path[-1]['to']['cell'], family)}.{path[-1]['to']['port']}",
+            logic=logic,
+            routing=routing,
+            kinds=dict(Counter(kind_of_cell(cell, family) for cell in passed)),
+        )
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise ToolError(f"nextpnr's report is not as expected: {error!r}") from error
+
+
+# The cache: a file for each netlist, tools and seed.
+
+
+def _load(path: Path) -> tuple[Parts, Place] | None:
+    try:
+        entry = json.loads(path.read_text(encoding="utf-8"))
+        return Parts(**entry["parts"]), Place(**entry["place"])
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError):
+        # No entry of ours, or of another release.
+        return None
+
+
+def _store(path: Path, parts: Parts, place: Place) -> None:
+    # A cache that fills up or goes away costs the next run its time, no more.
+    with contextlib.suppress(InputError, OSError):
+        write_json(path, {"parts": asdict(parts), "place": asdict(place)})
+
+
+def lay_out(
+    name: str,
+    component: wiring.Component,
+    seeds: int = SEEDS,
+    jobs: int = 1,
+    progress: Callable[[], object] = lambda: None,
+    family: Family = ECP5,
+) -> Layout:
+    """Synthesise a component, then place and route it from seeds 1, 2, ....
+
+    Results come from the cache, by the netlist, the tools and their options; a seed's is there as soon as it
+    is done, so that an interrupted run goes on where it was.
+
+    Parameters
+    ----------
+    name : str
+        Of the design.
+    component : wiring.Component
+        In the clock domain ``sync``.
+    seeds : int
+        How many.
+    jobs : int
+        Processes at once.
+    progress : callable
+        Called after each seed.
+    family : Family
+        What of.
+
+    Raises
+    ------
+    InputError
+        If a tool is not installed.
+    TooLarge
+        If it does not fit.
+    ToolError
+        If a tool fails, or the netlist cannot be timed.
+    """
+    tools = versions_of(family)
+    netlist = rtlil.convert(Registered(component), name="top", emit_src=False)
+    parts = (netlist, _BEFORE, _AFTER, _YOSYS, repr(family), repr(tools))
+    key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
+    folder = cache_folder() / "fpga"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = {}
+    for seed in range(1, seeds + 1):
+        entry = _load(folder / f"{key}-{seed}.json")
+        if entry is not None:
+            found[seed] = entry
+            progress()
+    missing = [seed for seed in range(1, seeds + 1) if seed not in found]
+    if missing:
+        with contextlib.closing(_run(netlist, missing, jobs, family)) as results:
+            for seed, entry in results:
+                _store(folder / f"{key}-{seed}.json", *entry)
+                found[seed] = entry
+                progress()
+    return Layout(name, found[1][0], tuple(found[seed][1] for seed in range(1, seeds + 1)))
+
+
+def _run(
+    netlist: str, seeds: Sequence[int], jobs: int, family: Family
+) -> Iterator[tuple[int, tuple[Parts, Place]]]:
+    """Run the tools; each seed as soon as it is done."""
+    runner = _Runner()
+    module = family.package.replace("-", "_")
+    nextpnr = f"import sys, {module} as n; sys.exit(n.{module.replace('yowasp', 'run')}(sys.argv[1:]))"
+    with tempfile.TemporaryDirectory(prefix="blysk-") as name, ThreadPoolExecutor(jobs) as pool:
+        folder = Path(name)
+        try:
+            (folder / "top.il").write_text(netlist, encoding="utf-8")
+            script = _BEFORE + family.synthesis + _AFTER
+            pool.submit(runner.run, "Yosys", _YOSYS, [], folder, script).result()
+            mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
+            _refuse_untimed(mapped, family)
+            kinds = Counter(cell["type"] for cell in mapped["modules"]["top"]["cells"].values())
+            _refuse_too_large(kinds, family)
+            options = (*family.options, *(family.large if kinds["LUT4"] >= _MANY else ()))
+
+            def route(seed: int) -> tuple[int, tuple[Parts, Place]]:
+                path = folder / f"{seed}.json"
+                files = ["--json", f"{_MOUNT}/top.json", "--report", f"{_MOUNT}/{path.name}"]
+                try:
+                    runner.run("nextpnr", nextpnr, [*options, *files, "--seed", str(seed)], folder)
+                except ToolError as error:
+                    if "legal placement" in str(error):
+                        raise TooLarge(f"does not fit: from seed {seed} {error}") from None
+                    raise
+                report = json.loads(path.read_text(encoding="utf-8"))
+                return seed, (parts_of(mapped, report, family), read_report(report, seed, family))
+
+            waiting = [pool.submit(route, seed) for seed in seeds]
+            for done in as_completed(waiting):
+                yield done.result()
+        finally:
+            runner.stop()
+            pool.shutdown(cancel_futures=True)

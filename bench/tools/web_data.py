@@ -1,0 +1,348 @@
+"""Data of the live page: meshes and views, spans, WebAssembly modules, tables of formats and models."""
+
+import base64
+import inspect
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from blysk.bench import accuracy
+from blysk.bench.report.cosine_quadratic_figures import sphere
+from blysk.golden.frame_constants import FIELDS_OF_A_FRAME, FIELDS_OF_A_LIGHT, LIGHT_STRIDE
+from blysk.golden.frames.prepare import prepare
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.number.unit_vector import COMPONENT, ONE
+from blysk.golden.pipeline import Design, Spans
+from blysk.golden.presets import METHODS, MODELS, preset
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.reflection import (
+    REFLECTION_MODELS,
+    AngleCosine,
+    PolynomialModel,
+    PowerModel,
+)
+from blysk.golden.reference.scene import Scene
+from blysk.sim.engines.engine import StopReason
+from blysk.sim.engines.probes import ObservedPipeline, probes_of
+from blysk.sim.engines.wasm import build, format_of, ports_of
+from blysk.sim.frames.animation import turntable
+from blysk.sim.meshes.teapot import teapot
+
+__all__ = [
+    "BACKGROUND",
+    "BANDS",
+    "COLUMNS",
+    "DESIGNS",
+    "HEIGHT",
+    "MESHES",
+    "REFERENCES",
+    "START",
+    "WIDTH",
+    "Body",
+    "design_of",
+    "encode",
+    "method",
+    "model_table",
+    "module_of",
+    "scene_of",
+    "streams_of",
+    "tables",
+]
+
+
+WIDTH, HEIGHT = 320, 240
+"""Of the pictures."""
+
+BANDS = (100, MAX_EXPONENT)
+"""Spans are cut for these exponents; a frame has those of the smallest that is not under its own."""
+
+DESIGNS = tuple(pair for pair in accuracy.DESIGNS if not preset(pair[0]).takes_values)
+"""Method and model of each module. Where spans carry values of the light, it cannot be moved without them."""
+
+BACKGROUND = "#1a1c20"
+
+START = {
+    "mesh": "teapot",
+    "view": 0,
+    "method": "chord",
+    "model": "cosquad",
+    "reference": "method",
+    "direction": [-0.5, 0.8, 0.7],
+    "exponent": 50,
+    "ambient": 0.08,
+    "diffuse": 0.75,
+    "specular": 0.6,
+    "color": "#ff8f44",
+    "light": "#ffffff",
+}
+"""What the page shows first."""
+
+REFERENCES = {
+    "method": {
+        "title": "exact normals, same model",
+        "text": "Normals interpolated along the spans and brought to unit length exactly, with the same "
+        "reflection model: the error of the method and of its arithmetic.",
+        "curve": "normalised",
+        "model": None,
+    },
+    "arithmetic": {
+        "title": "same method and model",
+        "text": "The same method and model in float64: what the words' widths cost. 0.5 LSB is correct "
+        "rounding.",
+        "curve": None,
+        "model": None,
+    },
+    "total": {
+        "title": "exact normals, Blinn's power",
+        "text": "Exact normals along the spans, with the power that the reflection model stands for.",
+        "curve": "normalised",
+        "model": "blinn",
+    },
+}
+"""What the frame is held against; ``None``: the design's own."""
+
+
+# What is drawn.
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mesh of the page.
+
+    Parameters
+    ----------
+    title : str
+        What it is called.
+    make : callable
+        Makes it.
+    views : int
+        Cameras of the turntable.
+    margin : float
+        See `Camera.framing`.
+    """
+
+    title: str
+    make: Callable[[], Mesh]
+    views: int
+    margin: float = 0.05
+
+
+def _square() -> Mesh:
+    """Two triangles with normals that bend outwards: spans from side to side."""
+    corners = np.array([(x, y, 0.0) for y in (-1, 1) for x in (-1, 1)])
+    return Mesh(corners, np.array([(0, 1, 3), (0, 3, 2)]), normalise(corners * 0.3 + (0, 0, 1)))
+
+
+MESHES = {
+    "teapot": Body("Utah teapot", lambda: teapot(3000), 8),
+    "sphere": Body("sphere", lambda: sphere(24), 1, 0.15),
+    "square": Body("bent square", _square, 8, 0.1),
+}
+"""Meshes of the page, by name."""
+
+
+def design_of(method: str, model: str) -> Design:
+    """The pipeline of a module: one light, and a highlight gate."""
+    return preset(method, model, gate=True)
+
+
+@cache
+def _cameras(mesh: str) -> list[Camera]:
+    body = MESHES[mesh]
+    camera = Camera.framing(
+        body.make().vertices, (0.4, 0.5, 1.0), "perspective", WIDTH / HEIGHT, margin=body.margin
+    )
+    return turntable(camera, body.views)
+
+
+def _channels(color: str) -> tuple[float, ...]:
+    return tuple(int(color[k : k + 2], 16) / 255 for k in (1, 3, 5))
+
+
+def scene_of(settings: Mapping[str, Any]) -> Scene:
+    """Scene of the page's settings.
+
+    Parameters
+    ----------
+    settings : mapping
+        As `START`.
+    """
+    color = np.array(_channels(settings["color"]))
+    return Scene(
+        mesh=MESHES[settings["mesh"]].make(),
+        camera=_cameras(settings["mesh"])[settings["view"]],
+        width=WIDTH,
+        height=HEIGHT,
+        material=Material(
+            tuple(settings["ambient"] * color),
+            tuple(settings["diffuse"] * color),
+            (settings["specular"],) * 3,
+            settings["exponent"],
+        ),
+        lights=[Light(tuple(settings["direction"]), _channels(settings["light"]))],
+        background=_channels(BACKGROUND),
+    )
+
+
+# Data of the page.
+
+COLUMNS = (
+    *({"name": name, "bytes": 2, "bias": 1 << 15, "running": True} for name in ("x", "y")),
+    {"name": "length", "bytes": 2, "bias": 0},
+    *({"name": f"normal_left.{c}", "bytes": 3, "bias": 1 << 17} for c in range(3)),
+    *(
+        {"name": f"normal_right.{c}", "bytes": 3, "bias": 1 << 18, "from": f"normal_left.{c}"}
+        for c in range(3)
+    ),
+)
+"""Codes of the spans in a file, a column a field: as they are, or the change from the span before
+(``running``) or from another column (``from``); plus ``bias``, so that none is negative; in so many
+``bytes``."""
+
+
+def encode(spans: Spans, visible: np.ndarray) -> bytes:
+    """Spans of a view, and which of their fragments show, as bytes.
+
+    Two counts in 32 bits, of spans and fragments; `COLUMNS`, the lowest byte of all codes first; a bit a
+    fragment, the first lowest. Compressed by zlib.
+
+    Parameters
+    ----------
+    spans : Spans
+        With normals.
+    visible : bool array
+        Of the fragments in their order.
+    """
+    codes = {"x": spans.x, "y": spans.y, "length": spans.length}
+    for c in range(3):
+        codes |= {f"normal_left.{c}": spans.normal_left[:, c], f"normal_right.{c}": spans.normal_right[:, c]}
+    parts = [np.array([len(spans), len(visible)], dtype="<u4").tobytes()]
+    for column in COLUMNS:
+        values = np.asarray(codes[column["name"]], dtype=np.int64)
+        if "from" in column:
+            values = values - codes[column["from"]]
+        elif "running" in column:
+            values = np.diff(values, prepend=0)
+        split = (values + column["bias"]).astype("<u4").view(np.uint8).reshape(-1, 4)
+        parts += [split[:, byte].tobytes() for byte in range(column["bytes"])]
+    parts.append(np.packbits(visible, bitorder="little").tobytes())
+    return zlib.compress(b"".join(parts), 9)
+
+
+def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
+    """Spans of a view for methods and `BANDS` of exponents.
+
+    Parameters
+    ----------
+    mesh : str
+        Of `MESHES`.
+    view : int
+        Of its turntable.
+    methods : sequence of str
+        Of `METHODS`.
+
+    Returns
+    -------
+    dict
+        ``axes``: of the camera, to the right, up, and to the viewer; ``streams``: for each method a number
+        for each of the bands; ``data``: `encode`, in base 64, by those numbers.
+    """
+    camera = _cameras(mesh)[view]
+    found: list[str] = []
+    streams: dict[str, list[int]] = {}
+    cuts: dict[tuple, int] = {}
+    for method in methods:
+        design = preset(method)
+        streams[method] = []
+        for exponent in BANDS:
+            cut = design.interpolator.widest_span(exponent), design.interpolator.largest_deviation(exponent)
+            if cut not in cuts:
+                frame = prepare(scene_of(START | {"mesh": mesh, "view": view, "exponent": exponent}), design)
+                text = base64.b64encode(encode(frame.spans, frame.cut_raster.visible)).decode()
+                if text not in found:
+                    found.append(text)
+                cuts[cut] = found.index(text)
+            streams[method].append(cuts[cut])
+    axes = [*camera.axes[:2].tolist(), camera.viewer.tolist()]
+    return {"axes": axes, "streams": streams, "data": found}
+
+
+def module_of(method: str, model: str) -> dict[str, Any]:
+    """The WebAssembly module of a pipeline, and what must be known to use it.
+
+    Parameters
+    ----------
+    method, model : str
+        Of `METHODS` and `MODELS`.
+
+    Returns
+    -------
+    dict
+        ``wasm``, compressed by zlib, in base 64, and its ``bytes``; ``ports``: see `ports_of`;
+        ``probes``: those of `probes_of`; ``stages``: names, titles and ages at which a pixel comes
+        and goes.
+    """
+    component = ObservedPipeline(design_of(method, model))
+    binary, ports, probes = build(component), ports_of(component), probes_of(component.unit)
+    ages = {probe.name: probe.age for probe in probes}
+    first, lit, done = min(0, *ages.values()), ages["diffuse"], ages["r"]
+    stages = (
+        ("interpolator", "Interpolator: normals, or N·L and N·H", first - 1, 0),
+        ("light", "Light: diffuse and specular term", 0, lit),
+        ("intensity", "Intensity: products and sums", lit, done - 1),
+        ("output", "Pixel", done - 1, done),
+    )
+    return {
+        "wasm": base64.b64encode(zlib.compress(binary, 9)).decode(),
+        "bytes": len(binary),
+        "ports": ports,
+        "probes": [
+            {name: getattr(probe, name) for name in ("name", "title", "block", "age", "exact", "unit")}
+            for probe in probes
+        ],
+        "stages": [dict(zip(("name", "title", "from", "to"), stage, strict=True)) for stage in stages],
+    }
+
+
+@cache
+def model_table(model: str) -> dict[str, Any]:
+    """What float64 needs of a reflection model: its ``kind``; slopes or scales for exponents 1 to 1000."""
+    exponents = range(1, MAX_EXPONENT + 1)
+    unit, reflection = MODELS[model], REFLECTION_MODELS[model]
+    if isinstance(reflection, PowerModel):
+        return {"kind": "power"}
+    if isinstance(reflection, PolynomialModel):
+        slopes = [reflection.slope(exponent) for exponent in exponents]
+        return {"kind": "line", "power": 1 << unit.squarings, "slopes": slopes}
+    found = {"slopes": unit.slopes.values[1 : MAX_EXPONENT + 1].tolist()}
+    if isinstance(reflection, AngleCosine):
+        scales = [reflection.scale(exponent) for exponent in exponents]
+        return found | {"kind": "coscos", "power": reflection.power, "scales": scales}
+    return found | {"kind": "exp"}
+
+
+def tables() -> dict[str, Any]:
+    """Formats and addresses of the frame constants, as JSON."""
+    return {
+        "one": ONE,
+        "component": format_of(COMPONENT),
+        "color": format_of(Intensity.COLOR_FORMAT),
+        "frame": FIELDS_OF_A_FRAME,
+        "light": FIELDS_OF_A_LIGHT,
+        "stride": LIGHT_STRIDE,
+        "done": int(StopReason.DONE),
+    }
+
+
+def method(name: str) -> dict[str, Any]:
+    """What the page needs of a method."""
+    interpolator = METHODS[name]
+    text = inspect.getdoc(type(interpolator)).split("\n\n")[0]
+    return {"curve": interpolator.CURVE, "chord": interpolator.uses_chord, "text": " ".join(text.split())}
