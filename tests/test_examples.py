@@ -1,0 +1,48 @@
+"""The examples run, and show what they say."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def test_script(tmp_path):
+    done = subprocess.run(
+        [sys.executable, EXAMPLES / "render.py", tmp_path], capture_output=True, text=True, check=True
+    )
+    cycles, error = re.match(r"([\d,]+) cycles, largest error ([\d.]+) LSB", done.stdout).groups()
+    assert int(cycles.replace(",", "")) > 20_000
+    assert float(error) < 1
+    with Image.open(tmp_path / "teapot.png") as picture:
+        assert picture.size == (320, 240)
+    assert "\nmodule teapot_core (" in (tmp_path / "core.v").read_text()
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.ipynb")), ids=lambda path: path.name)
+def test_notebook(path, capsys):
+    """Code cells in one namespace, without a kernel; a last expression shows itself as a notebook shows it."""
+    document = json.loads(path.read_text(encoding="utf-8"))
+    cells = ["".join(cell["source"]) for cell in document["cells"] if cell["cell_type"] == "code"]
+    assert not any(cell.get("outputs") for cell in document["cells"])
+    namespace = {}
+    for cell in cells:
+        exec(compile(cell, path.name, "exec"), namespace)
+    frame = namespace["frame"]
+    assert frame.cycles > frame.pixels > frame.spans > 0
+    assert frame.error.max_lsb < 1
+    assert frame.image.shape == (240, 320, 3)
+    assert frame._repr_png_().startswith(b"\x89PNG")
+    assert "data:image/png;base64," in frame._repr_html_()
+    drawn = capsys.readouterr().out
+    rows = [line.split()[0] for line in drawn.splitlines() if "cycles, largest" in line]
+    assert rows == ["linear", "chord"]
+    assert namespace["text"].startswith("//")
+    assert namespace["scene"].width == 160
+    assert np.unique(frame.image.reshape(-1, 3), axis=0).shape[0] > 100
