@@ -16,7 +16,8 @@ from blysk.sim.api.options import COEFFICIENTS, SCENE, SceneOptions, Source
 from blysk.sim.api.settings import Settings, read_settings
 from blysk.sim.errors import InputError
 from blysk.sim.frames.animation import equal_distance, turned, turntable
-from blysk.sim.meshes.mesh import LoadedMesh, load_mesh, surfaces
+from blysk.sim.meshes.materials import surfaces
+from blysk.sim.meshes.mesh import LoadedMesh, load_mesh
 
 __all__ = ["load", "scene", "scenes_of"]
 

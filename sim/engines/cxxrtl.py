@@ -5,17 +5,13 @@ the cycles; Python is called once in a million cycles. The first run of a newly 
 pysim over its first cycles, before the model goes into the cache.
 """
 
-import atexit
 import contextlib
 import ctypes
-import functools
 import gc
 import hashlib
-import importlib.util
 import os
 import platform
 import re
-import shlex
 import shutil
 import subprocess
 import sys
@@ -23,18 +19,19 @@ import tempfile
 import warnings
 import weakref
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import metadata, resources
 from pathlib import Path
 
 import numpy as np
-import platformdirs
 from amaranth._toolchain.yosys import YosysError, YosysWarning, _BuiltinYosys
 from amaranth.back import rtlil
 from amaranth.lib.wiring import Component
 
 from blysk.sim.engines.beats import word_count
-from blysk.sim.engines.engine import CompilerMissing, Ports, SimulationError, Stimulus, StopReason, Trace
+from blysk.sim.engines.cache import cache_folder, private_folder, warn_of_cache
+from blysk.sim.engines.compilers import Compiler, compiler_missing, find_compilers
+from blysk.sim.engines.engine import Ports, SimulationError, Stimulus, StopReason, Trace
 from blysk.sim.engines.guards import group_registers
 from blysk.sim.engines.pysim import Model as Interpreted
 from blysk.sim.errors import InputError
@@ -50,159 +47,6 @@ _ROOM = 1 << 24
 _CHECK_BEATS = 64
 _CHECK_CYCLES = 512
 _TELLING = re.compile("error|failed|No space left")
-_REMEDY = "install one, or pip install 'blysk[native]', or use the engine pysim"
-
-
-@dataclass(frozen=True)
-class Compiler:
-    """A C++ compiler that answers.
-
-    Parameters
-    ----------
-    name : str
-        What a message calls it.
-    compile, link : tuple of str
-        Commands, to which the source and ``-o`` the result are added. ``link`` is empty when ``compile``
-        makes the shared library at once.
-    identity : str
-        Path and version: what a cached model depends on.
-    """
-
-    name: str
-    compile: tuple[str, ...]
-    link: tuple[str, ...]
-    identity: str
-
-
-def _ask(command: list[str]) -> str | None:
-    """Standard output of a command that succeeds, or ``None``."""
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=60)
-    except (OSError, subprocess.TimeoutExpired):
-        return None
-    return done.stdout if done.returncode == 0 else None
-
-
-def _system_compiler(command: list[str]) -> Compiler | None:
-    path = shutil.which(command[0])
-    version = _ask([path, *command[1:], "--version"]) if path else None
-    if version is None:
-        return None
-    path = os.path.abspath(path)  # The build runs elsewhere.
-    return Compiler(
-        name=shlex.join(command),
-        compile=(path, *command[1:], "-std=c++17", "-O2", "-DCXXRTL_NDEBUG", "-fPIC", "-shared"),
-        link=(),
-        identity=f"{os.path.realpath(path)} {version}",
-    )
-
-
-def _zig() -> Compiler | None:
-    if importlib.util.find_spec("ziglang") is None:
-        return None
-    zig = [sys.executable, "-m", "ziglang"]
-    version = _ask([*zig, "version"])
-    if version is None:
-        return None
-    # Zig compiles its own C++ library for 40 s on first use; a model does without one. Zig's default is the
-    # processor at hand; a cache may be shared by several.
-    shared = (
-        ("-shared", "-nostdlib") if sys.platform != "darwin" else ("-shared", "-undefined", "dynamic_lookup")
-    )
-    flags = ("-std=c++17", "-O2", "-mcpu=baseline", "-fno-exceptions", "-fno-rtti", "-fPIC")
-    return Compiler(
-        name="ziglang",
-        compile=(
-            *zig,
-            "c++",
-            *flags,
-            "-DCXXRTL_NDEBUG",
-            "-DBLYSK_FREESTANDING",
-            "-D_LIBCPP_VERBOSE_ABORT(...)=__builtin_abort()",
-            "-c",
-        ),
-        link=(*zig, "cc", *shared),
-        identity=f"ziglang {version}",
-    )
-
-
-def find_compilers() -> Iterator[Compiler]:
-    """Compilers of this machine, best first: ``c++``, ``g++``, ``clang++``, ziglang; ``$CXX`` alone if set.
-
-    Yields
-    ------
-    Compiler
-        Each that is there and prints its version.
-    """
-    chosen = os.environ.get("CXX", "").strip()
-    for command in [shlex.split(chosen)] if chosen else [["c++"], ["g++"], ["clang++"]]:
-        compiler = _system_compiler(command)
-        if compiler:
-            yield compiler
-    if not chosen:
-        compiler = _zig()
-        if compiler:
-            yield compiler
-
-
-def _missing(failures: list[str]) -> CompilerMissing:
-    chosen = os.environ.get("CXX", "").strip()
-    if failures:
-        reason = "; ".join(failures)
-    elif chosen:
-        reason = f"CXX={chosen} is not found or prints no version"
-    else:
-        reason = "tried c++, g++, clang++ and the package ziglang"
-    return CompilerMissing(f"no working C++ compiler ({reason}): {_REMEDY}")
-
-
-def _unsafe(folder: Path) -> str | None:
-    """Why no model may be loaded from a folder, or ``None``."""
-    try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        status = folder.stat()
-    except OSError as error:
-        return f"cannot be made ({error.strerror})"
-    if hasattr(os, "getuid"):
-        if status.st_uid != os.getuid():
-            return "belongs to another user"
-        if status.st_mode & 0o022:
-            return "can be written by others (chmod go-w)"
-    if not os.access(folder, os.W_OK | os.X_OK):
-        return "cannot be written"
-    return None
-
-
-@functools.cache
-def _private_folder() -> Path:
-    folder = Path(tempfile.mkdtemp(prefix="blysk-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
-
-
-def cache_folder() -> Path:
-    """Folder of the compiled models: ``$BLYSK_CACHE``, or the user's cache folder.
-
-    A model is code that gets run, so a folder that belongs to another user, or that others can write, is not
-    used: a warning says so, and the models live in a private temporary folder until the process ends.
-
-    Returns
-    -------
-    Path
-        An existing folder.
-    """
-    chosen = os.environ.get("BLYSK_CACHE")
-    folder = Path(chosen).absolute() if chosen else platformdirs.user_cache_path("blysk")
-    reason = _unsafe(folder)
-    if reason is None:
-        return folder
-    _warn(folder, reason)
-    return _private_folder()
-
-
-def _warn(folder: Path, reason: str) -> None:
-    text = f"cache folder {folder} {reason}: compiled models are kept for this run only"
-    warnings.warn(text, RuntimeWarning, stacklevel=3)
 
 
 class _Job(ctypes.Structure):
@@ -385,8 +229,8 @@ def _kept(built: Path, folder: Path, key: str) -> Path:
     try:
         return _copied(built, folder, key)
     except OSError as error:
-        _warn(folder, f"cannot be written ({error.strerror})")
-    return _copied(built, _private_folder(), key)
+        warn_of_cache(folder, f"cannot be written ({error.strerror})")
+    return _copied(built, private_folder(), key)
 
 
 def _copied(built: Path, folder: Path, key: str) -> Path:
@@ -469,7 +313,7 @@ class Model:
                 self._unchecked = component, target, folder / f"{key}-{_digest(target)}.model"
                 return
             failures.append(failure)
-        raise _missing(failures)
+        raise compiler_missing(failures)
 
     def run(self, stimulus: Stimulus, progress: Callable[[int], object] | None = None) -> Trace:
         """Drive a stimulus from power-up; see `engine.Model`.

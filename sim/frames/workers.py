@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from blysk.sim.engines.cxxrtl import cache_folder
+from blysk.sim.engines.cache import cache_folder
 from blysk.sim.errors import InputError
 
 if TYPE_CHECKING:

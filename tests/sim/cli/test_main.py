@@ -19,7 +19,6 @@ import pytest
 import trimesh
 from PIL import Image
 
-import blysk.sim.meshes.mesh
 from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
@@ -119,7 +118,7 @@ def test_bad_mesh(refused, monkeypatch, name):
     data, reason = BAD_MESHES[name]
     find_spec = importlib.util.find_spec
     monkeypatch.setattr(
-        blysk.sim.meshes.mesh.importlib.util,
+        importlib.util,
         "find_spec",
         lambda name: None if name == "DracoPy" else find_spec(name),
     )

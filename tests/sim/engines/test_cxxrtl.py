@@ -24,7 +24,8 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Component, In, Out
 
 import blysk.sim.engines.simulate
-from blysk.sim.engines import cxxrtl
+from blysk.sim.engines import cache as cache_module
+from blysk.sim.engines import compilers, cxxrtl
 from blysk.sim.engines.engine import CompilerMissing, SimulationError
 from blysk.sim.engines.simulate import simulate
 
@@ -356,7 +357,7 @@ class Buffer(Component):
     importlib.util.find_spec("ziglang") is None, reason="the package ziglang is not installed"
 )
 def test_zig(monkeypatch, cache):
-    monkeypatch.setattr(cxxrtl, "_system_compiler", lambda command: None)
+    monkeypatch.setattr(compilers, "_system_compiler", lambda command: None)
     assert [compiler.name for compiler in cxxrtl.find_compilers()] == ["ziglang"]
     beats = np.arange(100) << 28
     stalls = np.random.default_rng(2).random(30) < 0.6
@@ -499,7 +500,7 @@ def test_cache_that_others_can_write_is_not_used(filled, builds):
         (planted,) = entries(cache)
         before = planted.read_bytes()
         built = builds()
-        cxxrtl._private_folder.cache_clear()
+        cache_module.private_folder.cache_clear()
         warning = (
             rf"^cache folder {re.escape(str(cache))} can be written by others \(chmod go-w\): compiled models"
         )
@@ -559,7 +560,7 @@ def test_relative_paths(monkeypatch, tmp_path):
 
 def test_default_cache_is_the_users(monkeypatch, tmp_path):
     monkeypatch.delenv("BLYSK_CACHE")
-    monkeypatch.setattr(cxxrtl.platformdirs, "user_cache_path", lambda name: tmp_path / "home" / name)
+    monkeypatch.setattr(cache_module.platformdirs, "user_cache_path", lambda name: tmp_path / "home" / name)
     assert cxxrtl.cache_folder() == tmp_path / "home" / "blysk"
 
 

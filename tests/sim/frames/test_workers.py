@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from blysk.sim.engines.cxxrtl import cache_folder
+from blysk.sim.engines.cache import cache_folder
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import check_address, cluster_executor, local_executor, processors
 

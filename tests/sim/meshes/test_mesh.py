@@ -1,6 +1,7 @@
 """Mesh loading against analytic shapes, facts about trimesh, and damaged files of every kind."""
 
 import base64
+import importlib.util
 import io
 import json
 import logging
@@ -16,6 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import blysk.sim.meshes.mesh
+import blysk.sim.meshes.obj
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import normalise
@@ -23,7 +25,8 @@ from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
 from blysk.sim.errors import InputError
-from blysk.sim.meshes.mesh import SUFFIXES, FileMaterial, LoadedMesh, load_mesh, surfaces
+from blysk.sim.meshes.materials import FileMaterial, surfaces
+from blysk.sim.meshes.mesh import SUFFIXES, LoadedMesh, load_mesh
 
 DATA = Path(__file__).parents[2] / "data"
 
@@ -396,9 +399,9 @@ def draco_glb():
 def test_draco_without_its_decoder(tmp_path, monkeypatch):
     path = tmp_path / "a.glb"
     path.write_bytes(draco_glb())
-    find_spec = blysk.sim.meshes.mesh.importlib.util.find_spec
+    find_spec = importlib.util.find_spec
     monkeypatch.setattr(
-        blysk.sim.meshes.mesh.importlib.util,
+        importlib.util,
         "find_spec",
         lambda name: None if name == "DracoPy" else find_spec(name),
     )
@@ -409,7 +412,7 @@ def test_draco_that_does_not_decode_is_no_mesh(tmp_path, monkeypatch):
     # The fact: trimesh then leaves zeros and only logs it.
     path = tmp_path / "a.glb"
     path.write_bytes(draco_glb())
-    monkeypatch.setattr(blysk.sim.meshes.mesh.importlib.util, "find_spec", lambda name: object())
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
     check_refused(path, "all its vertices are at one point")
 
 
@@ -1284,7 +1287,7 @@ def test_odd_material_files(tmp_path, monkeypatch):
     assert loaded("x" * 5000 + ".mtl").ignored[0].endswith("x...', which does not exist")
     (tmp_path / "c.mtl").write_bytes(b"newmtl a\nKd 1 0 0\n# f\xfcr\n")
     assert loaded("c.mtl").materials == (FileMaterial("a", RED),)
-    monkeypatch.setattr(blysk.sim.meshes.mesh, "_MAX_LIBRARY", 10)
+    monkeypatch.setattr(blysk.sim.meshes.obj, "_MAX_LIBRARY", 10)
     path.write_text(f"mtllib c.mtl\n{vertices}usemtl a\n{faces[0]}")
     check_refused(path, "its material file 'c.mtl' is over 10 bytes")
 

@@ -1,0 +1,158 @@
+"""GLB and glTF files: checks of what trimesh does not check, materials, and the files that they refer to."""
+
+import importlib.util
+import json
+import os
+import struct
+from functools import partial
+from pathlib import Path
+from urllib.parse import unquote
+
+from blysk.sim.meshes.materials import FileMaterial, Found, color_of
+from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, Refused, inside, shown
+
+__all__ = ["check_gltf", "find_gltf_materials", "gltf_document", "gltf_references", "plain_gltf"]
+
+_NEEDS_DECODER = {"EXT_meshopt_compression", "KHR_meshopt_compression"}
+
+
+def gltf_document(data: bytes, suffix: str) -> dict:
+    """The JSON part of a GLB or glTF file."""
+    if suffix == ".glb":
+        if len(data) < 20 or data[:4] != b"glTF":
+            raise Refused("it is no GLB file")
+        length, json_length = struct.unpack_from("<II", data, 8)
+        if len(data) < (said := max(length, 20 + json_length)):
+            raise Refused(f"it is cut short: the header says {said} bytes, there are {len(data)}")
+        data = data[20 : 20 + json_length]
+    try:
+        document = json.loads(data.decode("utf-8-sig"))
+    except ValueError as error:
+        raise Refused(f"its JSON is damaged ({error})") from error
+    if not isinstance(document, dict):
+        raise Refused("its JSON is no glTF document")
+    return document
+
+
+def check_gltf(document: dict) -> None:
+    """Refuse geometry that trimesh would load as zeros, and counts that would exhaust the memory."""
+    for extension in sorted(_NEEDS_DECODER.intersection(document.get("extensionsUsed", []))):
+        raise Refused(
+            f"it is compressed with {extension}, for which there is no decoder", "export it uncompressed"
+        )
+    _check_nodes(document)
+    accessors = document.get("accessors", [])
+    for accessor in accessors:
+        if accessor["count"] > 3 * MAX_FACES:
+            raise Refused(f"it has an array of {accessor['count']} elements; the limit is {3 * MAX_FACES}")
+    for mesh in document.get("meshes", []):
+        for primitive in mesh["primitives"]:
+            attributes = primitive["attributes"]
+            used = [attributes[k] for k in ("POSITION", "NORMAL") if k in attributes]
+            used += [primitive["indices"]] if "indices" in primitive else []
+            if any("sparse" in accessors[index] for index in used):
+                raise Refused("it has sparse accessors, which are not supported", "export it without them")
+            draco = "KHR_draco_mesh_compression" in primitive.get("extensions", {})
+            if not all("bufferView" in accessors[index] for index in used):
+                if not draco:
+                    raise Refused("a mesh has no data")
+                if importlib.util.find_spec("DracoPy") is None:
+                    raise Refused(
+                        "it is Draco-compressed and the decoder DracoPy is not installed",
+                        "pip install DracoPy",
+                    )
+
+
+def _check_nodes(document: dict) -> None:
+    """Refuse nodes that are no trees: trimesh would draw one of several places, or none, or never end."""
+    nodes = document.get("nodes", [])
+    children = [node.get("children", []) for node in nodes]
+    roots = [scene.get("nodes", []) for scene in document.get("scenes", [])]
+    below = [child for row in children for child in row]
+    for index in [*below, *(root for row in roots for root in row)]:
+        if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(nodes):
+            raise Refused(f"it refers to node {shown(str(index))} (from 0), there are {len(nodes)}")
+    if len(set(below)) < len(below):
+        raise Refused("one of its nodes hangs on two others", "export it with one parent a node")
+    reached = list(set(range(len(nodes))).difference(below))
+    for index in reached:
+        reached += children[index]
+    if len(reached) < len(nodes):
+        raise Refused("its nodes hang on each other in a circle")
+    if any(len(set(row)) < len(row) or not set(row).isdisjoint(below) for row in roots):
+        raise Refused("one of its nodes is twice in a scene", "export it with the roots alone in the scene")
+
+
+def find_gltf_materials(document: dict, materials: bool, found: Found) -> None:
+    """Put numbers of materials in place of the materials, and leave out what hangs on textures.
+
+    trimesh then tells the number of each part of a mesh, and there is no image that it could look for.
+    """
+    texts = document.pop("materials", None) or []
+    for unread in ("images", "textures", "samplers"):
+        document.pop(unread, None)
+    colored = False
+    for mesh in document.get("meshes", []):
+        for primitive in mesh["primitives"]:
+            attributes = primitive["attributes"]
+            for name in list(attributes):
+                if name.startswith(("COLOR_", "TEXCOORD_")):
+                    colored |= name.startswith("COLOR_")
+                    del attributes[name]
+            index = primitive.pop("material", None)
+            if index is None or not materials:
+                continue
+            if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(texts):
+                raise Refused(
+                    f"a mesh refers to material {shown(str(index))} (from 0), there are {len(texts)}",
+                    ONE_MATERIAL,
+                )
+            primitive["material"] = index
+    if colored:
+        found.ignored.append("vertex colours")
+    if materials and texts:
+        if not isinstance(texts, list) or not all(isinstance(text, dict) for text in texts):
+            raise Refused("its materials are no list of objects", ONE_MATERIAL)
+        found.names += [str(text.get("name", "")) for text in texts]
+        for number, (name, text) in enumerate(zip(found.names[-len(texts) :], texts, strict=True)):
+            given = shown(name)
+            found.readers.append(partial(_gltf_material, text, given or f"number {number}", given))
+        document["materials"] = [{"name": str(number)} for number in range(1, len(texts) + 1)]
+
+
+def _gltf_material(text: dict, name: str, given_name: str) -> tuple[FileMaterial, int]:
+    """A material of a glTF document, and how many textures it has."""
+    look = text.get("pbrMetallicRoughness", {})
+    factor = look.get("baseColorFactor", [1, 1, 1, 1]) if isinstance(look, dict) else look
+    numbers = factor if isinstance(factor, list) and len(factor) == 4 else []
+    usable = all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers)
+    color = color_of(numbers[:3] if usable else [], "baseColorFactor", name, str(factor))
+    textures = sum(key.endswith("Texture") for part in (look, text) for key in part)
+    return FileMaterial(given_name, color), textures
+
+
+def plain_gltf(document: dict, data: bytes, suffix: str) -> bytes:
+    """A GLB or glTF file with another document, without cameras: trimesh would lose what hangs on one."""
+    for node in document.get("nodes", []):
+        node.pop("camera", None)
+    text = json.dumps(document).encode()
+    if suffix == ".gltf":
+        return text
+    text += b" " * (-len(text) % 4)
+    length, old = struct.unpack_from("<II", data, 8)
+    rest = data[20 + old : length]
+    return data[:8] + struct.pack("<II", 20 + len(text) + len(rest), len(text)) + data[16:20] + text + rest
+
+
+def gltf_references(document: dict, folder: Path) -> dict[str, bytes]:
+    """The files that a glTF document takes its buffers from, by the URI it calls them; all in its folder."""
+    references = {}
+    for buffer in document.get("buffers", []):
+        uri = buffer.get("uri")
+        if uri is None or uri.startswith("data:"):
+            continue
+        target = inside(folder, uri, unquote(uri))
+        if not os.path.isfile(target):
+            raise Refused(f"it refers to {uri!r}, which does not exist", "put that file beside it")
+        references[uri] = target.read_bytes()
+    return references

@@ -1,0 +1,38 @@
+"""PLY and STL files that are cut short, which trimesh would load in part."""
+
+import re
+import struct
+
+from blysk.sim.meshes.refusal import Refused, utf8
+
+__all__ = ["tidy_ply", "tidy_stl"]
+
+
+def tidy_ply(data: bytes) -> bytes:
+    """Refuse an ASCII PLY with fewer lines than its header says; trimesh would load a part of it."""
+    head, mark, body = data.partition(b"end_header")
+    if not mark:
+        raise Refused("the PLY header has no end")
+    rows = sum(int(count) for count in re.findall(rb"^[ \t]*element[ \t]+\S+[ \t]+(\d+)", head, re.MULTILINE))
+    if b"format ascii" in head:
+        lines = sum(1 for line in body.splitlines()[1:] if line.strip())
+        if lines < rows:
+            raise Refused(f"it is cut short: the header says {rows} lines of data, there are {lines}")
+    return utf8(head) + mark + body
+
+
+def tidy_stl(data: bytes) -> bytes:
+    """Refuse an STL that is cut short: of a binary one trimesh would only say that it is empty."""
+    if data[:5].lower() == b"solid" and b"\0" not in data:
+        if b"endsolid" not in data.lower():
+            raise Refused("it is cut short: the end of the solid is missing")
+        return utf8(data)
+    if len(data) < 84:
+        raise Refused(f"it is cut short: a binary STL has at least 84 bytes, there are {len(data)}")
+    count = struct.unpack_from("<I", data, 80)[0]
+    if len(data) != 84 + 50 * count:
+        raise Refused(
+            f"its size is wrong: the header says {count} triangles, which take {84 + 50 * count} bytes, "
+            f"there are {len(data)}"
+        )
+    return data

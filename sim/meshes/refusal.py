@@ -1,0 +1,45 @@
+"""What the readers of mesh files share: refusals, names in messages, and files beside a file."""
+
+import os
+import re
+from pathlib import Path
+
+from blysk.sim.errors import one_line
+
+__all__ = ["MAX_FACES", "ONE_MATERIAL", "REEXPORT", "Refused", "inside", "shown", "utf8"]
+
+MAX_FACES = 20_000_000
+"""Most triangles of a mesh."""
+
+REEXPORT = "check the file or export it again"
+ONE_MATERIAL = "mend it, or shade the mesh with one material"
+
+
+class Refused(Exception):
+    """A reason and a remedy, before the file's name is put to them."""
+
+    def __init__(self, reason: str, remedy: str = REEXPORT):
+        super().__init__(reason)
+        self.reason = reason
+        self.remedy = remedy
+
+
+def shown(text: str) -> str:
+    """Text of a file in a message."""
+    return one_line(text, 60)
+
+
+def utf8(text: bytes) -> bytes:
+    """Text with the names and comments of another encoding made harmless."""
+    return text.decode("utf-8", "replace").encode()
+
+
+def inside(folder: Path, reference: str, name: str | None = None) -> Path:
+    """The file that a reference means, in the folder or one below; it need not exist."""
+    name = reference if name is None else name
+    # Of a name that is too long, or links in a circle, `Path` has exceptions to tell.
+    target = Path(os.path.realpath(folder / name))
+    outside = re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", reference) or reference.startswith(("/", "\\"))
+    if outside or ".." in Path(name).parts or not target.is_relative_to(folder.resolve()):
+        raise Refused(f"it refers to {reference!r}, outside its folder", "put that file beside it")
+    return target
