@@ -1,4 +1,4 @@
-"""Middle normal twin against the exact function of the same codes."""
+"""Middle normal: the bit-accurate model against the exact function of the same codes."""
 
 import re
 
@@ -6,28 +6,32 @@ import numpy as np
 import pytest
 
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
-from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax
-from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
+from blysk.golden.number.unit_vector import ONE, ONE_SQUARED, quantise
 from blysk.golden.reference.geometry import normalise
+from blysk.sim.units.operands import (
+    code_pairs_at,
+    component_words,
+    dot,
+    exact_middle,
+    pairs_of_length,
+    unit_codes,
+    word_corners,
+)
 
 UNIT = MiddleNormal()
+ONE_VALUE = float(ONE_SQUARED.values)
 
 
 def compute(left, right, unit=UNIT):
-    return unit.compute(Fixed(COMPONENT, left), Fixed(COMPONENT, right))
+    return unit.compute(*component_words(left, right))
 
 
-def exact(left, right):
-    """``(N_l + N_r) / sqrt(2 (1 + r))`` of unit vectors of length ``ONE / 2^17``, in float64."""
-    r = np.einsum("ij,ij->i", left, right) / ONE**2
-    return (left + right) / np.sqrt(2 * (1 + r))[:, np.newaxis] / 2**17
-
-
-def largest(left, right):
-    middle, out_of_range = compute(left, right)
+def largest(left, right, unit=UNIT):
+    """Largest error of spans, none of which is out of range."""
+    middle, out_of_range = compute(left, right, unit)
     assert not out_of_range.any()
-    return np.abs(middle.values - exact(left, right)).max()
+    return np.abs(middle.values - exact_middle(left, right)[0]).max()
 
 
 def test_error_at_every_angle():
@@ -45,11 +49,11 @@ def test_error_at_every_angle():
 
 
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 20, 45, None])
-def test_stiff_angles_within_the_bound(angle, normal_pairs):
+def test_stiff_angles_within_the_bound(angle):
     """Measured: 0.35 of the bound up to 20 degrees, 0.80 at 45."""
     rng = np.random.default_rng(1)
-    angles = rng.uniform(0, 45, 200_000) if angle is None else angle
-    left, right = (quantise(normals) for normals in normal_pairs(rng, 200_000, angles))
+    angles = rng.uniform(0, 45, 50_000) if angle is None else angle
+    left, right = code_pairs_at(rng, 50_000, angles)
     worst = largest(left, right)
     assert MiddleNormal.ERROR / 20 < worst <= MiddleNormal.ERROR
     # Half of the span's angle, to the direction that the error of a vector can turn.
@@ -63,8 +67,7 @@ def test_stiff_angles_within_the_bound(angle, normal_pairs):
 
 def test_equal_ends_give_that_normal_exactly():
     """A flat face keeps its normal, also near the axes, where codes are up to half a step short."""
-    rng = np.random.default_rng(2)
-    everywhere = quantise(normalise(rng.normal(size=(300_000, 3))))
+    everywhere = unit_codes(np.random.default_rng(2), 100_000)
     side = np.arange(-300, 301) / ONE
     near = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     near = quantise(np.column_stack([near, np.sqrt(1 - (near**2).sum(axis=1))]))
@@ -75,81 +78,69 @@ def test_equal_ends_give_that_normal_exactly():
         assert not out_of_range.any()
 
 
-def test_order_of_the_ends_does_not_matter(normal_pairs):
+def test_order_of_the_ends_does_not_matter():
     rng = np.random.default_rng(3)
-    left, right = (quantise(n) for n in normal_pairs(rng, 50_000, rng.uniform(0, 180, 50_000)))
-    (a, wide_a), (b, wide_b) = compute(left, right), compute(right, left)
+    left, right = code_pairs_at(rng, 50_000, rng.uniform(0, 180, 50_000))
+    (a, flags_a), (b, flags_b) = compute(left, right), compute(right, left)
     np.testing.assert_array_equal(a.codes, b.codes)
-    np.testing.assert_array_equal(wide_a, wide_b)
+    np.testing.assert_array_equal(flags_a, flags_b)
 
 
-def test_stiff_angles_beyond_are_flagged(normal_pairs):
+@pytest.mark.parametrize("angle", [45.0, 45.01, 60, 89.9, 90, 180, None])
+def test_stiff_angles_beyond_are_flagged(angle):
     """Every span over 45.01 degrees, to opposite normals; none up to 45, quantisation or not."""
     rng = np.random.default_rng(4)
-    for angle, flag in ((45.0, False), (45.01, True), (60, True), (89.9, True), (90, True), (180, True)):
-        left, right = (quantise(normals) for normals in normal_pairs(rng, 50_000, angle))
-        middle, out_of_range = compute(left, right)
-        assert (out_of_range == flag).all()
-        assert UNIT.FORMAT.min_code <= middle.codes.min() <= middle.codes.max() <= UNIT.FORMAT.max_code
-    angles = rng.uniform(45.01, 180, 100_000)
-    assert compute(*(quantise(normals) for normals in normal_pairs(rng, 100_000, angles)))[1].all()
+    angles = rng.uniform(45.01, 180, 50_000) if angle is None else angle
+    middle, out_of_range = compute(*code_pairs_at(rng, 50_000, angles))
+    assert (out_of_range == (angle != 45.0)).all()
+    assert UNIT.FORMAT.min_code <= middle.codes.min() <= middle.codes.max() <= UNIT.FORMAT.max_code
 
 
 def test_coefficients():
     """The fit's share of the error is 8.3e-7, and each word keeps its place: no sum wraps to 60 degrees."""
-    one = float(ONE_SQUARED.values)
     c1, c2, c3 = UNIT.coefficients.values
-    u = np.linspace(0, one * (1 - np.cos(np.radians(45))), 100_001)
-    error = np.abs(0.5 + u * (c1 + u * (c2 + u * c3)) - half_angle_factor(u / one))
+    u = np.linspace(0, ONE_VALUE * (1 - np.cos(np.radians(45))), 100_001)
+    error = np.abs(0.5 + u * (c1 + u * (c2 + u * c3)) - half_angle_factor(u / ONE_VALUE))
     assert 8.3e-7 / 2 < error.max() < 8.3e-7
     assert error[0] == 0
     assert 0.25 > c1 + 0.5 * (c2 + 0.5 * c3) > c1 > c2 > c3 > 0
     assert u[-1] * (c1 + u[-1] * (c2 + u[-1] * c3)) < 0.0412
+    # The fit comes from a solver of another library: a release that finds other words must be noticed.
+    assert UNIT.coefficients.codes.tolist() == [65565, 24018, 13317]
 
 
 def test_stiff_every_code_is_accepted():
     """Vectors that are no unit vectors give some number of the format, and a flag when far apart."""
-    ends = [COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1]
-    corners = np.stack(np.meshgrid(*[ends] * 6), axis=-1).reshape(-1, 6)
-    middle, out_of_range = compute(corners[:, :3], corners[:, 3:])
+    left, right = word_corners()
+    middle, out_of_range = compute(left, right)
     assert UNIT.FORMAT.min_code <= middle.codes.min() <= middle.codes.max() <= UNIT.FORMAT.max_code
-    dot = (corners[:, :3] * corners[:, 3:]).sum(axis=1) / ONE**2
-    np.testing.assert_array_equal(out_of_range, dot < np.cos(np.radians(45)) - 1e-3)
-
-
-def test_coefficients_are_the_known_words():
-    """The fit comes from a solver of another library: a release that finds other words must be noticed."""
-    assert MiddleNormal().coefficients.codes.tolist() == [65565, 24018, 13317]
+    np.testing.assert_array_equal(out_of_range, dot(left, right) / ONE**2 < np.cos(np.radians(45)) - 1e-3)
 
 
 @pytest.mark.parametrize("excess", [-1 / 256, 1 / 256])
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 20, 44])
-def test_stiff_lengths_of_the_ends(angle, excess, normal_pairs):
+def test_stiff_lengths_of_the_ends(angle, excess):
     """Ends of length 1 +- 1/256: no flag, and the middle no further off than they are.
 
     The exact function halves an error of the length. Where both ends are so long that u would be negative it
     is 0, and the middle is the half sum: as long as the ends at angle 0, shorter at any other.
     """
-    rng = np.random.default_rng(5)
-    left, right = (n * (1 + excess) * ONE for n in normal_pairs(rng, 20_000, angle))
-    kept = (np.abs(left) <= ONE).all(axis=1) & (np.abs(right) <= ONE).all(axis=1)
-    left, right = (np.rint(n[kept]).astype(np.int64) for n in (left, right))
+    left, right = pairs_of_length(np.random.default_rng(5), 20_000, angle, 1 + excess)
     middle, out_of_range = compute(left, right)
     assert not out_of_range.any()
-    r = np.einsum("ij,ij->i", left, right) / ONE**2
+    r = dot(left, right) / ONE**2
     exact = (left + right) / np.sqrt(2 * (1 + np.minimum(r, 1)))[:, np.newaxis] / 2**17
     # A middle longer than 1 saturates along an axis.
-    exact = np.clip(exact, -1, 1)
-    assert np.abs(middle.values - exact).max() <= MiddleNormal.ERROR
+    assert np.abs(middle.values - np.clip(exact, -1, 1)).max() <= MiddleNormal.ERROR
     length = np.linalg.norm(middle.values, axis=1) * 2**17 / ONE
     low, high = sorted((1.0, 1 + excess))
     slack = 3 * 2.0**-17 + np.sqrt(3) * MiddleNormal.ERROR
     assert low - slack <= length.min() <= length.max() <= high + slack
 
 
-def test_stiff_normals_of_length_zero(normal_pairs):
-    """Such an end stands at no angle: its dot product is 0, as at 90 degrees, and the span is flagged."""
-    left = quantise(normal_pairs(np.random.default_rng(6), 1000, 0)[0])
+def test_stiff_normals_of_length_zero():
+    """Such an end has no angle: its dot product is 0, as at 90 degrees, and the span is flagged."""
+    left = unit_codes(np.random.default_rng(6), 1000)
     zero = np.zeros_like(left)
     for ends in ((left, zero), (zero, left), (zero, zero)):
         assert compute(*ends)[1].all()
@@ -169,70 +160,61 @@ def test_model_error_of_every_fit(fit, error, relative):
     unit = MiddleNormal(fit)
     assert f"{unit.model_error:.1e}" == error
     u = np.linspace(0, 1 - np.cos(np.radians(MAX_SPAN_ANGLE)), 20_001)
-    e = np.polynomial.polynomial.polyval(
-        u * float(ONE_SQUARED.values), np.r_[unit.constant.values, unit.coefficients.values]
-    )
-    h = half_angle_factor(u)
-    assert f"{100 * np.abs((0.5 + e) / h - 1).max():.4f}" == relative
-    # What the words were made for.
+    coefficients = np.r_[unit.constant.values, unit.coefficients.values]
+    e = np.polynomial.polynomial.polyval(u * ONE_VALUE, coefficients)
+    assert f"{100 * np.abs((0.5 + e) / half_angle_factor(u) - 1).max():.4f}" == relative
+    # The range of the words.
     assert unit.factor_format.min_code <= e.min() * 2**21
     assert e.max() < 0.0432
 
 
 def test_published_polynomials():
-    """numbers.md: 6.1e-4 and 0.093 % as printed, exact at r = 1; 1.92e-3 and 2.88e-4 for the plain fits."""
+    """6.1e-4 and 0.093 % as published, exact at r = 1; 1.92e-3 and 2.88e-4 for the plain fits."""
 
     def h(r):
         return half_angle_factor(1 - r)
 
-    printed = np.array([0.707, -0.341, 0.193, -0.059])
-    assert largest_error(h, printed, 0, 1) == pytest.approx((6.1e-4, 0.00093), abs=5e-6)
-    assert printed.sum() == pytest.approx(0.5, abs=1e-15)
-    for degree, figures in ((2, (1.92e-3, 0.00383)), (3, (2.88e-4, 0.00058))):
-        assert largest_error(h, minimax(h, 0, 1, degree), 0, 1) == pytest.approx(figures, abs=5e-6)
-    # The unit's words are those polynomials, written in u.
+    published = np.array([0.707, -0.341, 0.193, -0.059])
+    assert published.sum() == pytest.approx(0.5, abs=1e-15)
     r = np.linspace(0, 1, 1001)
-    one = float(ONE_SQUARED.values)
-    for fit, coefficients in (
-        ("as_published", printed),
-        ("minimax_2", minimax(h, 0, 1, 2)),
-        ("minimax_3", minimax(h, 0, 1, 3)),
+    for fit, coefficients, figures in (
+        ("as_published", published, (6.1e-4, 0.00093)),
+        ("minimax_2", minimax(h, 0, 1, 2), (1.92e-3, 0.00383)),
+        ("minimax_3", minimax(h, 0, 1, 3), (2.88e-4, 0.00058)),
     ):
+        assert largest_error(h, coefficients, 0, 1) == pytest.approx(figures, abs=5e-6)
+        # The unit's words are those polynomials, written in u.
         unit = MiddleNormal(fit)
-        words = np.r_[0.5 + unit.constant.values, unit.coefficients.values] * one ** np.arange(4)
+        words = np.r_[0.5 + unit.constant.values, unit.coefficients.values] * ONE_VALUE ** np.arange(4)
         ours = np.polynomial.polynomial.polyval(1 - r, words)
         # Each coefficient is rounded to half a step; the linear programme finds each to 2e-7.
         assert np.abs(ours - np.polynomial.polynomial.polyval(r, coefficients)).max() < 4 * 2.0**-20 + 1e-6
 
 
 @pytest.mark.parametrize("fit", MIDDLE_NORMAL_FITS)
-def test_error_of_every_fit(fit, normal_pairs):
-    unit = MiddleNormal(fit)
-    rng = np.random.default_rng(7)
-    angles = np.r_[rng.uniform(0, 45, 100_000), np.zeros(10_000), np.full(10_000, 45)]
-    left, right = (quantise(normals) for normals in normal_pairs(rng, len(angles), angles))
+def test_error_of_every_fit(fit):
+    unit, rng = MiddleNormal(fit), np.random.default_rng(7)
+    angles = np.r_[rng.uniform(0, 45, 50_000), np.zeros(5_000), np.full(5_000, 45)]
+    left, right = code_pairs_at(rng, len(angles), angles)
     # Along an axis a component of the sum is as large as it gets.
     left[:100, :] = right[:100, :] = [0, -ONE, 0]
-    middle, out_of_range = compute(left, right, unit)
-    assert not out_of_range.any()
-    worst = np.abs(middle.values - exact(left, right)).max()
-    assert unit.error / 3 < worst <= unit.error
-    if fit == "exact":
-        assert unit.error <= MiddleNormal.ERROR
+    assert unit.error / 3 < largest(left, right, unit) <= unit.error
+    assert fit != "exact" or unit.error <= MiddleNormal.ERROR
 
 
-def test_flat_faces_feel_the_plain_fit(normal_pairs):
-    """The default and the printed polynomial keep a normal; the plain cubic makes it 0.06 % short."""
-    normals = quantise(normal_pairs(np.random.default_rng(8), 20_000, 0)[0])
-    for fit in ("exact", "as_published"):
-        np.testing.assert_array_equal(compute(normals, normals, MiddleNormal(fit))[0].codes, 4 * normals)
-    length = np.linalg.norm(normals, axis=1) * 4
-    for fit, change in (("minimax_2", 3.83e-3), ("minimax_3", -5.76e-4)):
-        middle, _ = compute(normals, normals, MiddleNormal(fit))
-        # A component that a fit makes longer than 1 saturates there.
-        inside = np.abs(middle.codes).max(axis=1) < MiddleNormal.FORMAT.max_code
-        ratio = (np.linalg.norm(middle.codes, axis=1) / length)[inside]
-        np.testing.assert_allclose(ratio - 1, change, rtol=0, atol=1.1e-5)
+@pytest.mark.parametrize(
+    ("fit", "change"), [("exact", 0), ("as_published", 0), ("minimax_2", 3.83e-3), ("minimax_3", -5.76e-4)]
+)
+def test_flat_faces_feel_the_plain_fit(fit, change):
+    """The default and the published polynomial keep a normal; the plain cubic makes it 0.06 % short."""
+    normals = unit_codes(np.random.default_rng(8), 20_000)
+    middle, _ = compute(normals, normals, MiddleNormal(fit))
+    if not change:
+        np.testing.assert_array_equal(middle.codes, 4 * normals)
+    # A component that a fit makes longer than 1 saturates there.
+    inside = np.abs(middle.codes).max(axis=1) < MiddleNormal.FORMAT.max_code
+    ratio = (np.linalg.norm(middle.codes, axis=1) / np.linalg.norm(4 * normals, axis=1))[inside]
+    np.testing.assert_allclose(ratio - 1, change, rtol=0, atol=1.1e-5)
 
 
 def test_refuses_another_fit():
