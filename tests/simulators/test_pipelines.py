@@ -1,48 +1,34 @@
-"""Pipelines as Verilog, in Icarus Verilog and in Verilator, against their twin, pixel by pixel, under stalls.
+"""Pipelines as Verilog, in Icarus Verilog and in Verilator, against the model, pixel by pixel, under stalls.
 
-A frame of each in the long run, and a small one of a few in the quick one.
+A frame of each in the long run, and a small one of one in the quick run.
 """
 
 import numpy as np
 import pytest
 
 from blysk.golden.frame_constants import writes_of
-from blysk.golden.presets import METHODS, preset
-from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats, teapot_frame
+from blysk.sim.units.registry import RECORDS
 
 from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool
 
-PIPELINES = {
-    **{method: (preset(method), "throughput") for method in METHODS},
-    "compact": (preset("chord"), "compact"),
-    "compact, normals and a power": (preset("linear", "blinn"), "compact"),
-    "gate": (preset("chord", "exp", gate=True), "throughput"),
-    "gate, compact": (preset("quadratic", "lyon3", gate=True), "compact"),
-    "lights and materials": (
-        preset("quadratic", "cosquad_lin", lights=3, materials=4, operand="one_minus_cosine"),
-        "throughput",
-    ),
-    "exponent": (preset("chord", "coscos4", lights=2, exponent=60), "throughput"),
-    "grey": (preset("chord", None, grey=True), "throughput"),
-    "without lights": (preset(lights=0, materials=2), "throughput"),
-}
-QUICK = ("chord",)
+PIPELINES = {name: given.unit for name, given in RECORDS["pipeline"].variants.items() if not given.long}
+QUICK = ("chord, cosquad",)
 FRAME = (640, 480), 10_000
 """Size of the picture, and triangles, of the long run."""
 
 
 @pytest.fixture
 def check(tmp_path):
-    """Hold a pipeline's Verilog against its twin."""
+    """Hold a pipeline's Verilog against its model."""
 
     def check(name, simulator, *size, **options):
         if missing_tool(simulator):
             pytest.skip(missing_tool(simulator))
-        design, style = PIPELINES[name]
+        unit = PIPELINES[name]()
+        design = unit.parameters
         spans, constants, pixels = teapot_frame(design, *size)
-        unit = ShadingPipelineUnit(design.built(style=style))
         rng = np.random.default_rng(2026)
         found = VerilogBench(unit, tmp_path, **options).run(
             simulator,
@@ -62,7 +48,7 @@ def check(tmp_path):
     return check
 
 
-@pytest.mark.parametrize("simulator", SIMULATORS)
+@pytest.mark.parametrize("simulator", ["icarus", pytest.param("verilator", marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", QUICK)
 def test_pipeline(check, name, simulator):
     check(name, simulator)

@@ -1,6 +1,6 @@
 # amaranth: UnusedElaboratable=no
 # Above: the register is Verilog as it stands, and never elaborated.
-"""The bench itself: it drives and reads as the engine does, and finds what is planted."""
+"""The bench itself: it drives and reads as the engine does, and finds injected faults."""
 
 import numpy as np
 import pytest
@@ -83,9 +83,9 @@ endmodule
 GOOD = {"PAYLOAD": "held", "VALID": "full", "READY": "!full || o_ready"}
 
 
-def register(**planted):
+def register(**injected):
     text = REGISTER
-    for name, value in (GOOD | planted).items():
+    for name, value in (GOOD | injected).items():
         text = text.replace(name, value)
     return text
 
@@ -128,7 +128,7 @@ def test_beats_clocks_and_status_are_those_of_the_engine(simulator, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("plant", "says"),
+    ("fault", "says"),
     [
         ({"PAYLOAD": "held ^ (!o_ready && count[3:0] == 0)"}, "changed"),
         ({"VALID": "full && count[3:0] != 0"}, "withdrawn"),
@@ -139,11 +139,11 @@ def test_beats_clocks_and_status_are_those_of_the_engine(simulator, tmp_path):
         ({"READY": "full ? o_ready : 1'bx"}, "undefined"),
     ],
 )
-def test_breaks_of_the_rules_end_a_run(tmp_path, plant, says):
+def test_breaks_of_the_rules_end_a_run(tmp_path, fault, says):
     """In Icarus Verilog, whose bits may be undefined; the bench is the same in Verilator."""
     if missing_tool("icarus"):
         pytest.skip(missing_tool("icarus"))
-    bench = VerilogBench(Register(), tmp_path, register(**plant))
+    bench = VerilogBench(Register(), tmp_path, register(**fault))
     with pytest.raises(BenchError, match=rf"^{says} at clock \d+, output beat \d+ of 100$"):
         bench.run("icarus", np.arange(100), 100, idle_timeout=500, **pauses(1))
 
