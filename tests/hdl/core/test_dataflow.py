@@ -18,6 +18,7 @@ from blysk.hdl.emit.cost import cost_of
 OPERAND = SQ(1, 17)
 INPUTS = data.StructLayout({"a": FixedShape(OPERAND), "b": FixedShape(OPERAND), "n": unsigned(5)})
 SQUARES = [k * k for k in range(32)]
+INTERVALS = [1, 3, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 4, 5, 6))]
 
 
 class GraphUnit(PipelinedUnit):
@@ -126,7 +127,7 @@ def copies(g, a, b, n):
     }
 
 
-@pytest.mark.parametrize("interval", range(1, 7))
+@pytest.mark.parametrize("interval", INTERVALS)
 def test_copies_hold_values(verify, interval):
     beats = beats_of(np.random.default_rng(interval))
     unit = GraphUnit(interval, copies)
@@ -147,7 +148,7 @@ def products(g, a, b, n):
     }
 
 
-@pytest.mark.parametrize("interval", range(1, 7))
+@pytest.mark.parametrize("interval", INTERVALS)
 def test_products(verify, interval):
     beats = beats_of(np.random.default_rng(interval))
     a, b = (Fixed(OPERAND, beats[name]) for name in "ab")
@@ -174,7 +175,7 @@ def table(g, a, b, n):
     }
 
 
-@pytest.mark.parametrize("interval", range(1, 7))
+@pytest.mark.parametrize("interval", INTERVALS)
 def test_look_up(verify, interval):
     beats = beats_of(np.random.default_rng(interval))
     total = beats["n"] ** 2 + beats["n"]
@@ -202,7 +203,7 @@ def shifts(g, a, b, n):
     }
 
 
-@pytest.mark.parametrize("interval", range(1, 7))
+@pytest.mark.parametrize("interval", INTERVALS)
 def test_operator_of_three_registers(verify, interval):
     beats = beats_of(np.random.default_rng(interval))
     amount = beats["n"] & 15
@@ -299,7 +300,7 @@ def late_and_early(g, a, b, n):
     }
 
 
-@pytest.mark.parametrize("interval", range(1, 7))
+@pytest.mark.parametrize("interval", INTERVALS)
 def test_late_words_and_early_results(verify, interval):
     beats = beats_of(np.random.default_rng(interval))
     total = beats["a"] + beats["b"]
@@ -308,7 +309,7 @@ def test_late_words_and_early_results(verify, interval):
 
 
 @pytest.mark.parametrize("shared", [False, True])
-@pytest.mark.parametrize("interval", [1, 2, 3, 5, 9])
+@pytest.mark.parametrize("interval", [3, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2, 5, 9))])
 def test_dot_products(verify, interval, shared):
     """Of two words, of a word and itself, and of a word and what is made from it."""
 
