@@ -1,4 +1,5 @@
-# blysk: `make demo` renders the Utah teapot through simulated RTL, `make test` checks everything.
+# blysk: `make demo` renders the Utah teapot through simulated RTL, `make test` is run before a commit,
+# `make test-all` checks everything, `make site` builds report, live page, units, theory and guide.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -9,7 +10,7 @@ COMMA := ,
 # The tests compile their models; without a C++ compiler one comes from PyPI.
 TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang++),[test],[test$(COMMA)native])
 
-.PHONY: demo test test-all prove mutants soak coverage bench pages lint clean
+.PHONY: demo test test-long test-all prove mutants soak coverage bench pages site lint clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
@@ -17,8 +18,13 @@ demo: $(VENV)/.installed
 test: $(VENV)/.installed-test lint
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile
 
-test-all: $(VENV)/.installed-test lint
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile -m ""
+# What `make test` leaves out: sweeps, proofs, browsers.
+test-long: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile -m "long or prove"
+
+test-all:
+	$(MAKE) test
+	$(MAKE) test-long
 
 prove: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) -m prove tests/formal
@@ -45,7 +51,11 @@ bench: $(VENV)/.installed-bench
 	$(BIN)/python -m blysk.bench.quality.sweep
 
 pages: $(VENV)/.installed
-	$(BIN)/blysk pages docs/blocks
+	mkdir -p build/pages
+	$(BIN)/blysk pages build/pages
+
+site: pages $(VENV)/.installed-web
+	$(BIN)/blysk web -o site --pages build/pages
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .
@@ -60,9 +70,13 @@ $(VENV)/.installed-test: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.$(TEST_EXTRAS)'
 	touch $@
 
+$(VENV)/.installed-web: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[web]'
+	touch $@
+
 $(VENV)/.installed-bench: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[bench,fpga,report]'
 	touch $@
 
 clean:
-	rm -rf $(VENV) build *.egg-info teapot.png
+	rm -rf $(VENV) build site report *.egg-info teapot.png

@@ -1,4 +1,4 @@
-"""The house: imports go one way and in no circle, and every package is in the wheel."""
+"""The house: imports go one way and in no circle, files and functions are short, the wheel is whole."""
 
 import ast
 import graphlib
@@ -105,3 +105,70 @@ def test_the_wheel_has_every_package():
     metadata = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))
     packages = {name for name, path in FILES.items() if path.name == "__init__.py"}
     assert set(metadata["tool"]["setuptools"]["packages"]) == (packages | {"blysk"}) - NOT_IN_THE_WHEEL
+
+
+# Length.
+
+LINES, FUNCTION_LINES = 500, 100
+"""Lines of a file, and of a function but for its docstring."""
+
+LONG_FILES = {
+    "tests/formal/test_interpolators.py": "to be split: remove this line then",
+    "tests/formal/test_widths.py": "to be split: remove this line then",
+    "tests/golden/frames/test_cut.py": "to be split: remove this line then",
+    "tests/golden/test_pipeline.py": "to be split: remove this line then",
+    "tests/hdl/emit/test_verilog.py": "to be split: remove this line then",
+    "tests/hdl/test_pipeline.py": "to be split: remove this line then",
+    "tests/sim/cli/malformed.py": "to be split: remove this line then",
+    "tests/sim/cli/test_main.py": "to be split: remove this line then",
+    "tests/sim/engines/test_cxxrtl.py": "to be split: remove this line then",
+    "tests/sim/engines/test_simulate.py": "to be split: remove this line then",
+    "tests/sim/meshes/test_mesh.py": "to be split: remove this line then",
+}
+"""Files over the limit, and why."""
+
+LONG_FUNCTIONS = {
+    "golden/reference/raster.py: rasterise": "to be split: remove this line then",
+}
+"""Functions over the limit, and why."""
+
+
+def long_functions(source: str) -> dict[str, int]:
+    """Lines of functions that are over the limit, but for their docstrings and what stands in them."""
+    found = {}
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            lines = node.end_lineno - node.lineno + 1
+            if ast.get_docstring(node) is not None:
+                lines -= node.body[0].end_lineno - node.body[0].lineno + 1
+            if lines > FUNCTION_LINES:
+                found[node.name] = lines
+    return found
+
+
+def sources() -> dict[str, str]:
+    """Every Python file of the project, by its path."""
+    return {
+        path.relative_to(PROJECT).as_posix(): path.read_text(encoding="utf-8")
+        for folder in (*LAYERS, "tests", "blysk")
+        for path in sorted((PROJECT / folder).rglob("*.py"))
+    }
+
+
+def test_files_are_short():
+    found = {path for path, text in sources().items() if len(text.splitlines()) > LINES}
+    assert found - set(LONG_FILES) == set(), f"over {LINES} lines: split them by what they do"
+    assert set(LONG_FILES) - found == set(), "short by now: take them off the list"
+
+
+def test_functions_are_short():
+    found = {f"{path}: {name}" for path, text in sources().items() for name in long_functions(text)}
+    assert found - set(LONG_FUNCTIONS) == set(), f"over {FUNCTION_LINES} lines: split them"
+    assert set(LONG_FUNCTIONS) - found == set(), "short by now: take them off the list"
+
+
+def test_a_long_function_is_found():
+    body = "    x = 1\n"
+    assert long_functions("def f():\n" + body * 99) == {}
+    assert long_functions("class C:\n  def f(self):\n" + body * 100) == {"f": 101}
+    assert long_functions('def f():\n    """One.\n\n    Two."""\n' + body * 99) == {}

@@ -1,0 +1,121 @@
+# amaranth: UnusedElaboratable=no
+"""A live page in a browser: its controls, its pictures, and what they should be."""
+
+import base64
+import hashlib
+
+import numpy as np
+
+from blysk.bench.tools import web_data
+from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.frames.frame import frame_buffer
+from blysk.golden.frames.prepare import prepare
+from blysk.sim.engines.cxxrtl import find_compilers
+from blysk.sim.engines.probes import ObservedPipeline
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.frames.frame import beats_of
+
+
+def has_compiler():
+    return next(find_compilers(), None) is not None
+
+
+WIDTHS = {"desktop": (1280, 800), "phone": (375, 740)}
+
+DESIGNS = [("chord", "cosquad"), ("chord", "exp"), ("linear", "cosquad")]
+
+VIEWS = {"teapot": 2, "square": 1}
+
+
+def settle(page):
+    """Wait until the frame is that of the page's settings."""
+    page.wait_for_function(
+        "() => blysk.latest && JSON.stringify(blysk.latest.settings) === JSON.stringify(blysk.settingsNow())"
+    )
+
+
+def change(page, control, value):
+    box = page.locator(f"#{control}")
+    if box.evaluate("box => box.localName") == "select":
+        box.select_option(str(value))
+    else:
+        box.evaluate(
+            "(box, value) => { box.value = value; box.dispatchEvent(new Event('input', {bubbles: true})); }",
+            str(value),
+        )
+    settle(page)
+
+
+def state_of(page):
+    return page.evaluate("() => ({...blysk.state})")
+
+
+def picture_of(page, name="frame"):
+    """Red, green and blue as the canvas shows them."""
+    script = """name => {
+        const canvas = document.getElementById(name);
+        const copy = new OffscreenCanvas(canvas.width, canvas.height);
+        const context = copy.getContext('2d', {willReadFrequently: true});
+        context.drawImage(canvas, 0, 0);
+        const {data} = context.getImageData(0, 0, canvas.width, canvas.height);
+        let text = '';
+        const letters = (k) => String.fromCharCode(...data.subarray(k, k + 4096));
+        for (let k = 0; k < data.length; k += 4096) text += letters(k);
+        return btoa(text);
+    }"""
+    data = np.frombuffer(base64.b64decode(page.evaluate(script, name)), dtype=np.uint8)
+    return data.reshape(web_data.HEIGHT, web_data.WIDTH, 4)[..., :3]
+
+
+def digest(image):
+    return hashlib.sha256(np.ascontiguousarray(image).tobytes()).hexdigest()
+
+
+def prepared(state):
+    """Scene, design and spans of the page's settings."""
+    design = web_data.design_of(state["method"], state["model"])
+    band = next(most for most in web_data.BANDS if state["exponent"] <= most)
+    return web_data.scene_of(state), design, prepare(web_data.scene_of(state | {"exponent": band}), design)
+
+
+UNITS = {}
+
+
+def natively(state):
+    """Frame and run of the native engine."""
+    scene, design, frame = prepared(state)
+    unit = UNITS.setdefault((design.method, design.model), ObservedPipeline(design))
+    run = simulate(
+        unit,
+        beats_of(unit.unit, frame.spans),
+        count=len(frame.cut_raster.span),
+        write=writes_of([FrameConstants.of(scene, 1)]),
+        engine="auto",
+    )
+    colors = np.stack([run.beats[name] for name in "rgb"], axis=-1)
+    return frame_buffer(scene, frame.cut_raster, colors), run
+
+
+def by_model(state):
+    scene, design, frame = prepared(state)
+    pixels = design.compute(frame.spans, FrameConstants.of(scene, 1))
+    return frame_buffer(scene, frame.cut_raster, pixels.color)
+
+
+def figure(page, name):
+    return float(page.locator(f"[data-figure={name}]").get_attribute("data-value"))
+
+
+def looked_at(page):
+    """Look inside a pixel of a bright place; the page's words about it."""
+    frame = picture_of(page).sum(axis=-1).astype(float)
+    y, x = np.unravel_index(frame.argmax(), frame.shape)
+    page.locator("#frame").scroll_into_view_if_needed()
+    box = page.locator("#frame").bounding_box()
+    at = (
+        box["x"] + (x + 0.5) * box["width"] / web_data.WIDTH,
+        box["y"] + (y + 0.5) * box["height"] / web_data.HEIGHT,
+    )
+    page.mouse.click(*at)
+    page.wait_for_selector(f'body[data-inside^="{x},{y},"]')
+    return int(x), int(y)

@@ -1,0 +1,358 @@
+# amaranth: UnusedElaboratable=no
+"""Place and route: what is counted, what is timed, what is kept, and what is refused."""
+
+import json
+import time
+
+import pytest
+from amaranth.hdl import Module, Signal
+from amaranth.lib import stream, wiring
+from amaranth.lib.wiring import In
+
+from blysk.bench.tools import place_and_route
+from blysk.bench.tools.families import ECP5, FAMILIES, NEXUS, Parts, Place
+from blysk.bench.tools.place_and_route import (
+    Layout,
+    Registered,
+    TooLarge,
+    ToolError,
+    lay_out,
+    parts_of,
+    read_report,
+)
+from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.lighting.diffuse import DiffuseUnit
+
+from .stubs import NEXUS_REPORT, REPORT, Counter, MultiplyAdd, Product, netlist
+
+tools = pytest.mark.skipif(
+    any(None in place_and_route.tool_versions(family).values() for family in FAMILIES.values()),
+    reason="the extra fpga is not installed",
+)
+
+
+def test_report():
+    place = read_report(REPORT, 7)
+    assert place == Place(
+        seed=7,
+        fmax=123.4,
+        start="i__payload",
+        end="sum.DI",
+        logic=4.625,
+        routing=2.0,
+        kinds={"multiplier": 1, "carry": 1, "LUT": 1},
+    )
+
+
+def test_stages_of_a_multiplier_are_one_cell():
+    assert read_report(NEXUS_REPORT, 7, NEXUS) == Place(
+        seed=7,
+        fmax=123.4,
+        start="product",
+        end="places$3.storage.D0",
+        logic=4.5,
+        routing=2.0,
+        kinds={"multiplier": 1, "carry": 1, "LUT": 1},
+    )
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"fmax": {}},
+        {"fmax": {"clk": {"achieved": 1.0}, "other": {"achieved": 2.0}}},
+        {"critical_paths": REPORT["critical_paths"][:1]},
+        {"critical_paths": [{**REPORT["critical_paths"][1], "path": []}]},
+    ],
+)
+def test_report_of_something_else(change):
+    with pytest.raises(ToolError, match="report is not as expected"):
+        read_report({**REPORT, **change}, 1)
+
+
+def test_registers_at_ports_are_not_counted():
+    # From the input, between, to the output.
+    flip_flops = [("TRELLIS_FF", {}, d, d + 1) for d in (2, 3, 4)]
+    found = parts_of(netlist(*flip_flops, ("MULT18X18D", {"REG_OUTPUT_CLK": "NONE"}, 8, 9)), REPORT)
+    assert found == Parts(77, 1, 1, 0, 0)
+    found = parts_of(netlist(("DP16KD", {}, 8, 9), ("TRELLIS_DPR16X4", {}, 8, 9)), REPORT)
+    assert found == Parts(77, 0, 0, 1, 1)
+    # A constant is no net of the port that has one.
+    assert parts_of(netlist(("TRELLIS_FF", {}, "0", 9)), REPORT).flip_flops == 1
+
+
+def test_cells_of_nexus():
+    """Four kinds of flip-flop and of block RAM, and a multiplier with its registers."""
+    flip_flops = [(f"FD1P3{kind}X", {}, 3, 4) for kind in "BDIJ"]
+    memories = [(f"{kind}16K", {}, 8, 9) for kind in ("DP", "PDP", "PDPSC", "SP")]
+    others = [("MULT18X18", {"REGINPUTA": "REGISTER"}, 8, 9), ("DPR16X4", {}, 8, 9), ("CCU2", {}, 8, 9)]
+    assert parts_of(netlist(*flip_flops, *memories, *others), NEXUS_REPORT, NEXUS) == Parts(77, 4, 1, 4, 1)
+
+
+@pytest.mark.parametrize(
+    ("family", "cell", "name"),
+    [
+        (ECP5, ("MULT18X18D", {"REG_INPUTA_CLK": "CLK0"}, 8, 9), "MULT18X18D.REG_INPUTA_CLK=CLK0"),
+        (ECP5, ("ALU54B", {"REG_OUTPUT0_CLK": "NONE"}, 8, 9), "ALU54B"),
+        (NEXUS, ("MULTADDSUB18X18", {"REGOUTPUT": "BYPASS"}, 8, 9), "MULTADDSUB18X18"),
+    ],
+)
+def test_what_nextpnr_does_not_time_is_not_placed(family, cell, name, cache, monkeypatch):
+    def run(self, tool, code, arguments, folder, text=""):
+        assert tool == "Yosys"
+        (folder / "netlist.json").write_text(json.dumps(netlist(("LUT4", {}, 3, 4), cell)))
+
+    monkeypatch.setattr(place_and_route._Runner, "run", run)
+    monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
+    with pytest.raises(ToolError, match=f"has a cell {name}, which nextpnr does not time paths through"):
+        lay_out("counter", Counter(), 1, family=family)
+
+
+@pytest.mark.parametrize(
+    ("family", "cell", "most", "name"),
+    [
+        (ECP5, "TRELLIS_FF", 24_288, "flip-flops"),
+        (ECP5, "MULT18X18D", 28, "multipliers"),
+        (ECP5, "DP16KD", 56, "block RAMs"),
+        (ECP5, "LUT4", 24_288, "look-up tables"),
+        (NEXUS, "MULT18X18", 56, "multipliers"),
+    ],
+)
+def test_what_does_not_fit_is_not_placed(family, cell, most, name, cache, monkeypatch):
+    """nextpnr's static placer would never end."""
+    count = most
+
+    def run(self, tool, code, arguments, folder, text=""):
+        if tool == "Yosys":
+            (folder / "netlist.json").write_text(json.dumps(netlist(*[(cell, {}, 3, 4)] * count)))
+        else:
+            raise ToolError("it is placed")
+
+    monkeypatch.setattr(place_and_route._Runner, "run", run)
+    monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
+    with pytest.raises(ToolError, match=r"^it is placed$"):
+        lay_out("counter", Counter(), 1, family=family)
+    count += 1
+    with pytest.raises(TooLarge, match=f"^does not fit: {count:,} {name}, ports too, on {most:,} of the "):
+        lay_out("counter", Counter(), 1, family=family)
+
+
+def test_what_finds_no_place_does_not_fit(calls, cache, monkeypatch):
+    run = place_and_route._Runner.run
+
+    def fails(self, name, *arguments):
+        if name == "nextpnr":
+            raise ToolError(
+                "nextpnr ends with status 125: ERROR: Unable to find legal placement for all cells"
+            )
+        run(self, name, *arguments)
+
+    monkeypatch.setattr(place_and_route._Runner, "run", fails)
+    with pytest.raises(
+        TooLarge, match=r"^does not fit: from seed 1 nextpnr ends with status 125: ERROR: Unable"
+    ):
+        lay_out("counter", Counter(), 1)
+
+
+def test_every_port_has_a_register():
+    unit = DiffuseUnit()
+    wrapped = Registered(unit)
+    assert set(wrapped.signature.members) == {
+        "i__payload",
+        "i__valid",
+        "i__ready",
+        "o__payload",
+        "o__valid",
+        "o__ready",
+    }
+    bits = sum(len(getattr(wrapped, name)) for name in wrapped.signature.members)
+    assert cost_of(wrapped).register_bits == cost_of(DiffuseUnit()).register_bits + bits
+
+
+def test_ports_that_are_constant_have_none():
+    class Always(wiring.Component):
+        i: In(stream.Signature(4, always_ready=True))
+
+        def elaborate(self, platform):
+            m = Module()
+            m.d.sync += Signal(4, name="kept").eq(self.i.payload)
+            return m
+
+    assert set(Registered(Always()).signature.members) == {"i__payload", "i__valid"}
+
+
+def test_what_is_cached_runs_no_tool(calls, cache):
+    first = lay_out("counter", Counter(), 3, 2)
+    assert sorted(calls) == [("Yosys",), ("nextpnr", "1"), ("nextpnr", "2"), ("nextpnr", "3")]
+    assert first.fmax == (101.0, 102.0, 103.0)
+    assert [place.seed for place in first.places] == [1, 2, 3]
+    calls.clear()
+    ticks = []
+    assert lay_out("again", Counter(), 3, progress=lambda: ticks.append(1)) == Layout(
+        "again", first.parts, first.places
+    )
+    assert not calls
+    assert len(ticks) == 3
+    # A seed more is placed alone; a damaged entry again.
+    lay_out("counter", Counter(), 4)
+    assert calls == [("Yosys",), ("nextpnr", "4")]
+    calls.clear()
+    next(cache.glob("*-2.json")).write_text('{"parts": {}')
+    assert lay_out("counter", Counter(), 4).fmax == (101.0, 102.5, 104.0)
+    assert calls == [("Yosys",), ("nextpnr", "2")]
+    assert len(list(cache.iterdir())) == 4
+
+
+@pytest.mark.parametrize(
+    ("luts", "placer"), [(place_and_route._MANY - 1, ()), (place_and_route._MANY, ECP5.large)]
+)
+def test_placer_by_size(luts, placer, cache, monkeypatch):
+    """Hardly any logic would never end in the static placer."""
+    given = []
+
+    def run(self, name, code, arguments, folder, text=""):
+        if name == "Yosys":
+            (folder / "netlist.json").write_text(json.dumps(netlist(*[("LUT4", {}, 3, 4)] * luts)))
+        else:
+            given.extend(arguments)
+            (folder / "1.json").write_text(json.dumps(REPORT))
+
+    monkeypatch.setattr(place_and_route._Runner, "run", run)
+    monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
+    lay_out("counter", Counter(), 1)
+    place = given.index("--placer") if placer else 0
+    assert ("--placer" in given) == bool(placer)
+    assert tuple(given[place : place + len(placer)]) == placer
+
+
+def test_another_design_family_or_tool_is_another_entry(calls, cache, monkeypatch):
+    lay_out("counter", Counter(), 1)
+    lay_out("counter", Counter(23), 1)
+    lay_out("counter", Counter(), 1, family=NEXUS)
+    monkeypatch.setattr(place_and_route, "versions_of", lambda family: {"pyosys": "1", family.package: "3"})
+    lay_out("counter", Counter(), 1)
+    assert calls == [("Yosys",), ("nextpnr", "1")] * 4
+    assert len(list(cache.iterdir())) == 4
+
+
+def test_seeds_that_are_done_stay_when_one_fails(calls, cache, monkeypatch):
+    run = place_and_route._Runner.run
+
+    def fails(self, name, code, arguments, folder, text=""):
+        if arguments[-1:] == ["2"]:
+            raise ToolError("nextpnr ends with status 1: no place")
+        run(self, name, code, arguments, folder, text)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(place_and_route._Runner, "run", fails)
+        with pytest.raises(ToolError, match="no place"):
+            lay_out("counter", Counter(), 3)
+    assert [path.name[-6] for path in cache.iterdir()] == ["1"]
+
+
+def test_runner_names_the_tools_own_error(tmp_path):
+    runner = place_and_route._Runner()
+    code = "import sys; print('INFO: x'); print('ERROR: no such cell'); print('more'); sys.exit(3)"
+    with pytest.raises(ToolError, match=r"^Yosys ends with status 3: ERROR: no such cell$"):
+        runner.run("Yosys", code, [], tmp_path)
+    runner.stop()
+    with pytest.raises(ToolError, match="Yosys was stopped"):
+        runner.run("Yosys", "", [], tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_stopped_runner_ends_what_runs(tmp_path):
+    runner = place_and_route._Runner()
+    pool = place_and_route.ThreadPoolExecutor(1)
+    waiting = pool.submit(runner.run, "nextpnr", "import time; time.sleep(600)", [], tmp_path)
+    while not runner._running:
+        time.sleep(0.01)
+    start = time.monotonic()
+    runner.stop()
+    with pytest.raises(ToolError, match="nextpnr ends with status -9"):
+        waiting.result(60)
+    assert time.monotonic() - start < 60
+    pool.shutdown()
+
+
+# With the tools.
+
+
+def period(place):
+    """A path is the clock's period, to the rounding of the report."""
+    return pytest.approx(1000 / place.fmax, rel=1e-3) == place.logic + place.routing
+
+
+@tools
+@pytest.mark.parametrize(
+    ("family", "kinds"),
+    [
+        (ECP5, ("TRELLIS_COMB", "TRELLIS_FF", "MULT18X18D", "DP16KD", "TRELLIS_RAMW")),
+        (NEXUS, ("OXIDE_COMB", "OXIDE_FF", "MULT18_CORE", "OXIDE_EBR", "RAMW")),
+    ],
+)
+def test_parts_and_time_of_a_counter(family, kinds, cache, monkeypatch):
+    reports = []
+
+    def parts(netlist, report, family):
+        reports.append(report)
+        return parts_of(netlist, report, family)
+
+    monkeypatch.setattr(place_and_route, "parts_of", parts)
+    counter = lay_out("counter", Counter(), 1, family=family)
+    assert counter.parts.flip_flops == 24
+    assert 24 <= counter.parts.luts <= 24 + 8
+    assert counter.parts.multipliers == counter.parts.block_rams == 0
+    assert "multiplier" not in counter.places[0].kinds
+    assert period(counter.places[0])
+    # What nextpnr says that the device has.
+    available = [reports[0]["utilization"][kind]["available"] for kind in kinds]
+    assert Parts(*available) == family.capacity
+
+
+@tools
+def test_parts_and_times_of_a_product(cache):
+    """The slowest path is through the multiplier."""
+    product = lay_out("product", Product(), 2, 2)
+    assert product.parts.multipliers == 1
+    assert product.parts.flip_flops == 0
+    for place in product.places:
+        assert place.kinds == {"multiplier": 1}
+        assert {place.start} <= {"a", "b"}
+        assert place.end.startswith("o.")
+        assert period(place)
+        # toolchain.md: one 18x18 multiplier's ceiling, out of a placement of nothing else.
+        assert 120 < place.fmax < 180
+
+
+@tools
+def test_times_of_a_multiplier_with_registers_of_its_own(cache):
+    """On Nexus the multiplier is timed between its own registers, and between others."""
+    inside, outside = (lay_out("product", Product(gates), 1, family=NEXUS) for gates in (False, True))
+    for layout in (inside, outside):
+        assert layout.parts.multipliers == 1
+        assert layout.parts.flip_flops == 0
+        assert period(layout.places[0])
+    (place,) = inside.places
+    assert place.kinds == {"multiplier": 1}
+    assert place.start == "o"
+    assert place.end.startswith("o.P")
+    # toolchain.md: by the speed grade of the device.
+    assert 165 < place.fmax < 221
+    (place,) = outside.places
+    assert place.kinds == {"LUT": 2, "multiplier": 1}
+    assert {place.start} <= set("abcd")
+    assert place.end.startswith("o.D")
+
+
+@tools
+def test_a_multiplier_with_an_adder_is_refused(cache):
+    with pytest.raises(ToolError, match="has a cell MULTADDSUB18X18, which nextpnr does not time"):
+        lay_out("sum", MultiplyAdd(), 1, family=NEXUS)
+
+
+@tools
+def test_what_the_tools_refuse_is_one_line(cache, monkeypatch):
+    monkeypatch.setattr(place_and_route, "_BEFORE", "read_rtlil nothing.il\n")
+    with pytest.raises(ToolError, match=r"^Yosys ends with status .*nothing\.il"):
+        lay_out("none", Counter(), 1)

@@ -1,0 +1,370 @@
+# amaranth: UnusedElaboratable=no
+"""The live page from inside: words of the pipeline, steps, keyboard, windows, servers, what is missing."""
+
+import base64
+import dataclasses
+import json
+import threading
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+
+import numpy as np
+import pytest
+
+from blysk.bench.tools import web_data
+from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.sim.engines.beats import pack, unpack
+from blysk.sim.engines.engine import Stimulus
+from blysk.sim.engines.probes import ObservedPipeline
+from blysk.sim.engines.pysim import Model
+from blysk.sim.frames.frame import beats_of
+
+from .live_page import WIDTHS, by_model, change, digest, looked_at, picture_of, prepared, settle, state_of
+
+pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+pytest.importorskip("ziglang", reason="ziglang is not installed")
+pytestmark = pytest.mark.long
+
+
+def traced(page, component):
+    """Status of pysim on the cycles of the page's trace."""
+    inside = page.evaluate(
+        """() => {
+            const {from, to, span, start, length, firstClock, lastClock, clock} = blysk.inside;
+            return {from, to, span, start, length, firstClock, lastClock, clock};
+        }"""
+    )
+    scene, _, frame = prepared(state_of(page))
+    spans = frame.spans[inside["from"] : inside["to"]]
+    none = np.zeros(1, dtype=bool)
+    stimulus = Stimulus(
+        input=pack(component.i.payload.shape(), beats_of(component.unit, spans)),
+        write=pack(component.write.payload.shape(), writes_of([FrameConstants.of(scene, 1)])),
+        constants=np.zeros((0, 0), dtype=np.uint32),
+        input_stalls=none,
+        output_stalls=none,
+        count=int(spans.length.sum()),
+        idle_timeout=1000,
+        settle=64,
+    )
+
+    def status(clock):
+        trace = Model(component).run(dataclasses.replace(stimulus, limit=clock))
+        return unpack(component.status.shape(), trace.status)[0]
+
+    return inside, stimulus, status
+
+
+def test_waveform_is_that_of_pysim(open_page):
+    page = open_page()
+    x, y = looked_at(page)
+    component = ObservedPipeline(web_data.design_of("chord", "cosquad"))
+    inside, stimulus, status = traced(page, component)
+    run = Model(component).run(stimulus)
+    own = slice(inside["start"], inside["start"] + inside["length"])
+    assert inside["lastClock"] == run.cycles[own][-1]
+    assert inside["firstClock"] == run.input_cycles[inside["span"] - inside["from"]]
+    cells = "row => Object.fromEntries([...row.cells].slice(1).map(c => [c.dataset.clock, c.dataset.code]))"
+    for clock in (inside["clock"], inside["clock"] + 2, inside["lastClock"]):
+        row = status(clock)
+        for name in (
+            "diffuse_0_sum",
+            "highlight_0_step",
+            "cosine",
+            "highlight",
+            "gated",
+            "base",
+            "square",
+            "r",
+        ):
+            shown = page.locator(f"#wave tr[data-word={name}]").evaluate(cells)
+            assert int(shown[str(clock)]) == int(row[name]), (clock, name)
+    # The pixel that was clicked comes out with the colour that the picture has.
+    pixel = picture_of(page)[y, x]
+    place = page.evaluate("([x, y]) => blysk.inside.spans.codes.x[blysk.inside.span]", [x, y])
+    clock = int(run.cycles[own][x - place])
+    for name, value in zip("rgb", pixel, strict=True):
+        assert int(page.locator(f"#wave tr[data-word={name}]").evaluate(cells)[str(clock)]) == value
+    assert int(page.locator("#wave tr[data-word=x]").evaluate(cells)[str(clock)]) == x
+
+
+def test_exact_values_are_near(open_page):
+    """On every clock, each word that belongs to a pixel is what its exact value says, to some steps."""
+    page = open_page()
+    for method, model in (("chord", "cosquad"), ("chord", "exp"), ("linear", "cosquad")):
+        change(page, "method", method)
+        change(page, "model", model)
+        looked_at(page)
+        script = """() => {
+            const {inside} = blysk;
+            const found = [];
+            for (const probe of inside.design.probes)
+                for (let clock = inside.firstClock; clock <= inside.lastClock; clock++) {
+                    const word = blysk.wordAt(inside, probe, clock);
+                    const {value, exact, pixel} = word;
+                    if (exact !== null) found.push([probe.name, clock, pixel, value, exact]);
+                }
+            return found;
+        }"""
+        found = page.evaluate(script)
+        names = {name for name, *_ in found}
+        sums = "highlight_0_sum" if method == "chord" else "normal_2_sum"
+        assert {
+            "cosine",
+            "highlight",
+            "argument",
+            "product",
+            "diffuse",
+            "specular",
+            "red",
+            "r",
+            sums,
+        } <= names
+        assert ("square" in names) == (model == "cosquad")
+        assert max(row[4] for row in found if row[0] == "specular") > 0.5
+        for name, clock, pixel, value, exact in found:
+            # What a step of a normal's component makes of a word, at the exponent of the page.
+            limit = 1.0 if name in "rgb" else 0.3 if name.startswith("red") else 1e-4
+            if name in ("product", "base", "square", "specular"):
+                limit = 1e-3
+            assert abs(value - exact) < limit, (method, model, name, clock, pixel, value, exact)
+        page.locator("#again").click()
+        settle(page)
+
+
+def test_step_through_a_span(open_page):
+    page = open_page()
+    looked_at(page)
+    shown = page.locator("#clock-text")
+    start = page.evaluate("() => blysk.inside.clock")
+    chips = page.locator("[data-stage=light] .track i.own")
+    before = chips.evaluate_all(
+        "dots => Object.fromEntries(dots.map(d => [d.textContent, parseFloat(d.style.left)]))"
+    )
+    assert before
+    page.locator("#step").click()
+    assert shown.inner_text().startswith(f"{start + 1} ")
+    after = chips.evaluate_all(
+        "dots => Object.fromEntries(dots.map(d => [d.textContent, parseFloat(d.style.left)]))"
+    )
+    moved = set(before) & set(after)
+    assert moved
+    assert all(after[name] > before[name] for name in moved)
+    code = page.locator("#pipeline tr[data-word=cosine] td[data-code]")
+    same = page.locator(f"#wave tr[data-word=cosine] td[data-clock='{start + 1}']")
+    assert code.get_attribute("data-code") == same.get_attribute("data-code")
+    assert page.locator("#wave td.now").count() == page.locator("#wave tbody tr").count()
+    page.locator("#back").click()
+    page.locator("#back").press("Enter")
+    assert shown.inner_text().startswith(f"{start - 1} ")
+    page.locator("#first").click()
+    assert page.locator("#back").is_disabled()
+    assert page.locator("[data-stage=setup] .track i.token").count() == 1
+    page.locator("#wave").press("ArrowRight")
+    first = page.evaluate("() => blysk.inside.firstClock")
+    assert shown.inner_text().startswith(f"{first + 1} ")
+    page.locator(f"#wave th button[data-clock='{first + 5}']").click()
+    assert shown.inner_text().startswith(f"{first + 5} ")
+    page.locator("#play").click()
+    page.wait_for_function(f"() => blysk.inside.clock > {first + 6}")
+    page.locator("#play").click()
+    # Another light is another frame: what was inside is gone.
+    change(page, "ambient", 0.2)
+    assert page.locator("#inside").is_hidden()
+
+
+def test_keyboard(open_page):
+    page = open_page()
+    before = state_of(page)["direction"]
+    page.locator("#frame").focus()
+    for key in ("ArrowRight", "ArrowRight", "ArrowDown"):
+        page.keyboard.press(key)
+    settle(page)
+    assert state_of(page)["direction"] != before
+    assert digest(picture_of(page)) == digest(by_model(state_of(page)))
+    page.keyboard.press("Enter")
+    page.wait_for_selector("body[data-inside]")
+    assert page.locator("#inside").is_visible()
+    # All that can be done is reached by the Tab key.
+    reached = set()
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate("() => document.activeElement.id"))
+    assert {
+        "method",
+        "model",
+        "mesh",
+        "exponent",
+        "color",
+        "orbit",
+        "slow",
+        "step",
+        "clock",
+        "wave",
+    } <= reached
+
+
+def test_empty_place(open_page):
+    page = open_page()
+    page.evaluate("() => blysk.look(2, 3)")
+    assert "no surface at column 2, row 3" in page.locator("#inside-title").inner_text()
+    page.evaluate("() => blysk.setClock(4)")
+
+
+def test_light_goes_round(open_page):
+    page = open_page()
+    count = page.evaluate("() => blysk.frames")
+    page.locator("#orbit").click()
+    page.wait_for_function(f"() => blysk.frames > {count + 5}")
+    assert page.locator("#orbit").get_attribute("aria-pressed") == "true"
+    page.locator("#orbit").click()
+    settle(page)
+    assert digest(picture_of(page)) == digest(by_model(state_of(page)))
+
+
+def test_page_stays_free_while_the_worker_simulates(open_page):
+    """The browser draws all through one long frame: that of fifty times the spans."""
+    page = open_page()
+    assert len(page.workers) == 1
+    _, _, frame = prepared(state_of(page))
+    often = np.tile(np.arange(len(frame.spans)), 50)
+    data = web_data.encode(frame.spans[often], np.tile(frame.cut_raster.visible, 50))
+    script = """async data => {
+        const bytes = await blysk.core.unpacked(data);
+        await blysk.ask('spans', {name: 'long', bytes});
+        const settings = {...blysk.settingsNow(), spans: 'long'};
+        const model = {kind: 'exp'};
+        let [last, longest, drawn, busy] = [performance.now(), 0, 0, true];
+        const draw = () => {
+            const now = performance.now();
+            [longest, last, drawn] = [Math.max(longest, now - last), now, drawn + 1];
+            if (busy) requestAnimationFrame(draw);
+        };
+        requestAnimationFrame(draw);
+        const {figures} = await blysk.ask('frame', {settings, model});
+        busy = false;
+        longest = Math.max(longest, performance.now() - last);
+        return {longest, drawn, pixels: figures.pixels, job: figures.milliseconds};
+    }"""
+    found = page.evaluate(script, base64.b64encode(data).decode())
+    assert found["pixels"] == 50 * len(frame.cut_raster.span)
+    assert found["longest"] < found["job"] / 4, found
+    assert found["drawn"] > 4
+
+
+COARSE = """
+    const told = performance.now.bind(performance);
+    performance.now = () => Math.floor(told() / 100) * 100;
+"""
+
+
+def test_coarse_clock(open_page):
+    """A browser that tells the time in steps of 100 ms, in the worker too."""
+    in_worker = """
+        const Plain = Blob;
+        window.Blob = class extends Plain {
+            constructor(parts, options) {
+                super(options?.type === 'text/javascript' ? [coarse, ...parts] : parts, options);
+            }
+        };
+    """
+    page = open_page(script=f"{COARSE} const coarse = {json.dumps(COARSE)}; {in_worker}")
+    seconds = []
+    for step in range(40):
+        change(page, "ambient", step / 100)
+        seconds.append(page.evaluate("() => blysk.latest.figures.seconds"))
+        texts = page.locator("#figures dd").all_inner_texts()
+        assert not any("NaN" in text or "∞" in text or "Infinity" in text for text in texts)
+        if not seconds[-1]:
+            break
+    assert not np.any(np.round(10 * np.array(seconds), 6) % 1)
+    assert seconds[-1] == 0
+    assert page.locator("[data-figure=speed]").inner_text() == "–"
+    assert page.locator("#failure").is_hidden()
+    page.locator("#orbit").click()
+    count = page.evaluate("() => blysk.frames")
+    page.wait_for_function(f"() => blysk.frames > {count + 30}")
+    page.locator("#orbit").click()
+    settle(page)
+    rate = page.locator("[data-figure=rate]").inner_text()
+    assert rate == "–" or 0 < float(rate) < 1000
+    assert digest(picture_of(page)) == digest(by_model(state_of(page)))
+
+
+def test_watch_it_being_shaded(open_page):
+    page = open_page()
+    whole = digest(picture_of(page))
+    page.locator("#slow").click()
+    page.wait_for_timeout(300)
+    part = picture_of(page)
+    assert digest(part) != whole
+    page.locator("#slow").click()
+    page.wait_for_timeout(50)
+    assert digest(picture_of(page)) == whole
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_page_fits_its_window(open_page, width, scheme):
+    page = open_page(width, color_scheme=scheme)
+    looked_at(page)
+    overflow = "() => document.documentElement.scrollWidth - document.documentElement.clientWidth"
+    assert page.evaluate(overflow) <= 0
+    for name in ("method", "exponent", "orbit", "step", "wave"):
+        box = page.locator(f"#{name}").bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= WIDTHS[width][0]
+        assert name == "exponent" or box["height"] >= 24
+    background = page.evaluate("() => getComputedStyle(document.body).backgroundColor")
+    dark = sum(map(int, background[4:-1].split(","))) < 3 * 128
+    assert dark == (scheme == "dark")
+
+
+def test_from_a_web_server(browser, live_site):
+    """A static host, which sends files as they are."""
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *arguments):
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=live_site)) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        context = browser.new_context()
+        page = context.new_page()
+        errors = []
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(f"http://127.0.0.1:{server.server_port}/index.html")
+        page.wait_for_selector("body[data-frame]", timeout=30_000)
+        image = picture_of(page)
+        state = state_of(page)
+        context.close()
+        server.shutdown()
+    assert errors == []
+    assert digest(image) == digest(by_model(state))
+
+
+def test_without_webassembly(open_page):
+    page = open_page(script="delete window.WebAssembly", waits=False)
+    assert page.locator("#failure").inner_text().startswith("This browser has no WebAssembly")
+    assert page.locator("#view").is_hidden()
+    assert page.get_by_text("To install it").is_visible()
+
+
+def test_without_scripts(open_page):
+    page = open_page(waits=False, java_script_enabled=False)
+    assert page.get_by_text("The live view needs JavaScript and WebAssembly.").is_visible()
+
+
+def test_missing_file_is_told(open_page, live_site):
+    kept = live_site / "models" / "exp.js"
+    text = kept.read_text()
+    kept.unlink()
+    try:
+        page = open_page(waits=True)
+        # The browser says so on its console, too.
+        open_page.allowed = "ERR_FILE_NOT_FOUND"
+        page.locator("#model").select_option("exp")
+        page.wait_for_selector("#failure:not([hidden])")
+        assert "models/exp.js is missing" in page.locator("#failure").inner_text()
+    finally:
+        kept.write_text(text)
