@@ -21,6 +21,7 @@ from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.units.cosines.local_chord_setup import values_of
 from blysk.sim.units.methods.interpolator import SPAN
+from blysk.sim.units.methods.quadratic_interpolator import STILL
 from blysk.sim.units.operands import (
     degrees_between,
     short_lengths,
@@ -239,7 +240,7 @@ def _brightest(unit, rng, count):
     constants.direction[:] = constants.halfway
     for color in (constants.ambient, constants.diffuse, constants.specular):
         color[...] = Intensity.color(np.array(8.0))
-    return case_of(unit, spans, constants, 0x3FFFF, 0, 0x3FFFF)
+    return case_of(unit, spans, constants, 0x3FFFF, 0, 0x15555, 0x2AAAA, 0x3FFFF)
 
 
 def _counters(unit, rng, count):
@@ -352,5 +353,15 @@ RECORD = Record(
         "constants": "A slope, n of 10 bits normalised to 17, ends in seven zeros: the bit is 0.",
         "cosine_2": "2^-34 of the cosine of a span's ends counts only within that of a border of 18 bits.",
     },
-    still={},
+    still=STILL
+    | {
+        "a counter stops at its largest value, and a flag that is set stays": (
+            "top.status[15] top.status[31-32]"
+        ),
+        "three terms of 8 times the full channel are 6120, less than 2^13": "rounded_{r,g,b}[13]",
+        "a slope is n / 2, and n of 10 bits, normalised to 17, ends in seven zeros": (
+            "slope_word[0-16] slope.scale[0-6] light_0.specular.datapath.product[0-6]"
+        ),
+        "the second bit of a square is 0": "light_0.specular.datapath.square[1]",
+    },
 )

@@ -129,6 +129,25 @@ RECORD = Record(
     },
     axis="n (1 - cos γ)",
     logarithmic=True,
-    waivers={},
-    still={},
+    waivers={
+        "product": "The slope, n of 10 bits normalised to 17, ends in seven zeros, and so does its product.",
+        "argument": "It is for the saturation at 2, which is dark at every exponent.",
+        "stages": (
+            "The table is read while the output is stalled, too, and gives the same: the exponent stays."
+        ),
+        "shifted": (
+            "It is for the saturation at 2, over the boundary of every exponent, so that its product is "
+            "not read."
+        ),
+    },
+    still={
+        "a slope is n / 2, and n of 10 bits, normalised to 17, ends in seven zeros": (
+            "slope.slope_word[0-16] slope.scale[0-6] datapath.product[0-6]"
+        ),
+        "the exponent stays for a run, so that what follows from it does not fall": (
+            "slope_word[17-26] slope.scale[7-16] slope.shift[0-3] slope.boundary[0-16] "
+            "boundaries.port__data[0-16]"
+        ),
+        "the second bit of a square is 0": "specular.datapath.square[1]",
+    },
 )

@@ -1,7 +1,10 @@
 """Record of the angular interpolator."""
 
 from blysk.golden.methods.angular_interpolator import PUBLISHED, AngularInterpolator
+from blysk.sim.units.cosines.angular_setup import RECORD as SETUP
+from blysk.sim.units.cosines.highlight_cosine import RECORD as COSINE
 from blysk.sim.units.methods.interpolator import STIMULI, expect, measured, options, status
+from blysk.sim.units.methods.light_products import CONSTANT
 from blysk.sim.units.record import Record
 
 __all__ = ["RECORD"]
@@ -25,4 +28,17 @@ RECORD = Record(
     expect=expect,
     status=status,
     stimuli=STIMULI,
+    waivers={
+        "cordic_*": "The controlling bit, of 1 and more, is 0: the axes are at most 0.71 and the root of 2.",
+        "minor_operand": "While the output is stalled, the register holds a word that has been read.",
+        "phase": "Inverted every second cycle, and read in those cycles only.",
+    },
+    still=SETUP.still
+    | COSINE.still
+    | {
+        CONSTANT: "setup_*.datapath.operands[108-161]",
+        "L and H are unit vectors: sum and distance are less than 4, the product less than 2": (
+            "squares[36-38] chord_exact[36-40] cross[35-38]"
+        ),
+    },
 )

@@ -33,6 +33,7 @@ __all__ = [
     "STIMULI",
     "case_of",
     "expect",
+    "long_lengths",
     "measured",
     "of_setup",
     "operand_beats",
@@ -180,10 +181,17 @@ def _angles(unit, rng, count):
     return case_of(unit, rng, spans["normal_left"], spans["normal_right"], rng.integers(1, 8, count))
 
 
+def long_lengths(rng: np.random.Generator, pixels: int) -> np.ndarray:
+    """Lengths of spans of about so many pixels: 3000 to 4095, each before a shorter one."""
+    length = rng.integers(3000, 4096, (pixels // 3800, 2))
+    length[:, 1] = np.floor(2000 ** rng.random(len(length)))
+    length[:2, 0] = 4095
+    return length.ravel()
+
+
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels in range, where the last bits of the differences count."""
-    length = rng.integers(3000, 4096, count // 3500)
-    length[:2] = 4095
+    """Spans of 3000 to 4095 pixels in range, where the last bits of the differences count; shorter ones."""
+    length = long_lengths(rng, count)
     left = sphere(rng, len(length))
     angles = unit.parameters.MAX_ANGLE * 10.0 ** rng.uniform(-3, 0, len(length))
     return case_of(unit, rng, quantise(left), quantise(turned(rng, left, angles)), length)

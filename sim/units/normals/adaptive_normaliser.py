@@ -140,4 +140,28 @@ RECORD = Record(
         "corners": Stimulus(_corners, 150, variants=tuple(_VARIANTS)),
         "last bits": Stimulus(_last_bits, 2000, stalled=False),
     },
+    waivers={
+        "fsm_state": (
+            "In the first state all bits of the state are 0, and so is the controlling bit of the next."
+        ),
+        "write_index": "Ends are 16 of 32 segments apart at most: the bit, 32, is 0 already.",
+        "inner_level": "The level falls from 1 on only, so that the controlling bit, the borrow, is not set.",
+        "i__payload": (
+            "Inverted every second cycle; a pair of ends is read on the second or fourth cycle after it came."
+        ),
+        "angle": "It is for u of 1 or more, and from 45 degrees on the cosine is read in its place.",
+        "total_2": "Inverted every second cycle, and read in those cycles only.",
+    },
+    still={
+        "half of 32 segments is the most that ends are apart or written last": "half[5] write_index[5]",
+        "the unit has 16 spans inside at most": "ready_spans[4-6]",
+        "a reciprocal is normalised and not negative, so that its first bits are 01": (
+            "reciprocal[16-17] reciprocals.table_port__data[16]"
+        ),
+        "a segment has at most 4095 pixels, and they take 4094 steps and 31": "available[13] advance[13-23]",
+        "a segment of 4096 steps is divided": "top.count[12]",
+        "a fraction is not negative": "phi[17]",
+        "the bisection's results are accepted at once": "bisection.held[0]",
+        "the first sum of its polynomials is 0.056, or 0.136 to 0.303": "bisection.datapath.total_2[17]",
+    },
 )

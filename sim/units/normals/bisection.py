@@ -130,4 +130,10 @@ RECORD = Record(
         "corners": Stimulus(_corners, 500),
         "last bits": Stimulus(_last_bits, 300_000, stalled=False),
     },
+    waivers={
+        "operands": (
+            "While the output is stalled, the operands of a beat four cycles before are read no more."
+        ),
+        "total_2": "Inverted every second cycle, and read in those cycles only.",
+    },
 )

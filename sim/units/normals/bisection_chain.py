@@ -147,4 +147,11 @@ RECORD = Record(
         "many spans": Stimulus(_corners, 2000, stalled=False),
         "last bits": Stimulus(_last_bits, 50_000, stalled=False),
     },
+    waivers={
+        "weight_l": (
+            "From 0 on, l becomes l/2 + 1 at most, so that it is not negative, less than 2, and never "
+            "saturates."
+        ),
+        "factor": "Operands are read on the cycle after they come; m, a product of factors, is not negative.",
+    },
 )

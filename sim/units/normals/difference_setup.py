@@ -107,4 +107,22 @@ RECORD = Record(
     },
     axis="pixel of the span",
     logarithmic=True,
+    waivers={
+        "address": "The table and the shift read the address on the first of its seven cycles.",
+        "places": "The upper half is read for the address, on the first of its seven cycles.",
+        "positions": "The upper half is read for the address, on the first of its seven cycles.",
+        "reciprocal": (
+            "An address stays for seven cycles: what is read again while the output is stalled is the same "
+            "word."
+        ),
+    },
+    still={
+        "twice a number is even": "top.spare[186] top.spare[230] top.spare[274] second_{0-2}[0]",
+        "a reciprocal is normalised, and so is its square, so that the first bit is 1": (
+            "reciprocal[16] reciprocals.port__data[16] square[16] square_rounded[16] multiplier_?_a[16] "
+            "multiplier_?[16]"
+        ),
+        "the largest square in the table is under 1 by 62 steps": "square_rounded[17]",
+        "a length of 12 bits takes shifts up to 12, and its square up to 25": "shift[4] square_shift[5]",
+    },
 )

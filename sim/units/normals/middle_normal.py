@@ -90,4 +90,12 @@ RECORD = Record(
         "corners": Stimulus(_corners, 500),
         "last bits": Stimulus(_last_bits, 40_000, stalled=False),
     },
+    waivers={
+        "slot": "Slot 4 becomes 6, which 5 follows, and only 0 and 5 are told from the others.",
+        "turn": "Slot 4 becomes 6, which 5 follows, and only 0 and 5 are told from the others.",
+    },
+    still={
+        "the polynomial's products are at most 0.0127 and 0.0293": "rounded_2[13-16] rounded_1[14-16]",
+        "its inner sums are 0.0458 to 0.0586 and 0.1250 to 0.1544": "datapath.total_{1,2}[14-16]",
+    },
 )

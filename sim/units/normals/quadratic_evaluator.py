@@ -95,4 +95,5 @@ RECORD = Record(
     },
     axis="pixel of the span",
     logarithmic=True,
+    waivers={"reciprocal": "A reciprocal is normalised: its first bit is 1 already."},
 )
