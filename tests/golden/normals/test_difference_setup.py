@@ -33,7 +33,7 @@ def walk(first, second, k):
 
 
 def test_stiff_every_length_to_its_last_pixel():
-    """The curve's end, with the largest coefficients of both signs: errors are as derived there."""
+    """The end of the curve with the largest coefficients of both signs: errors as the docstring states."""
     rng, worst, last = np.random.default_rng(1), 0, LENGTHS - 1
     for _ in range(4):
         g, p = coefficients(rng, len(LENGTHS))
