@@ -7,6 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from blysk.golden.cosines.chord_setup import SpanValues
+from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.highlight_gate import HighlightGate
@@ -14,11 +16,11 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
 from blysk.golden.methods.interpolator import Interpolator, Operands
-from blysk.golden.methods.local_chord_interpolator import SpanValues
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
-from blysk.golden.number.unit_vector import COMPONENT
+from blysk.golden.number.unit_vector import COMPONENT, quantise
+from blysk.golden.reference.geometry import normalise
 
 __all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]
 
@@ -39,6 +41,9 @@ class Spans:
         Index of the material; ``None``: 0 for all.
     values : SpanValues, optional
         Values of each light, for methods with `Interpolator.TAKES_VALUES`, which read no normals.
+    normal_middle : int array, shape (spans, 3), optional
+        Unit normals in the middle of each span, for methods with `Interpolator.TAKES_MIDDLE`; ``None``: the
+        bisectors of the two ends.
     """
 
     x: np.ndarray
@@ -48,10 +53,19 @@ class Spans:
     normal_right: np.ndarray
     material: np.ndarray | None = None
     values: SpanValues | None = None
+    normal_middle: np.ndarray | None = None
 
     def __post_init__(self):
         if self.material is None:
             object.__setattr__(self, "material", np.zeros(len(self.length), dtype=np.int64))
+
+    @cached_property
+    def middle(self) -> np.ndarray:
+        """`normal_middle`, or the bisectors; of opposite ends, the left one."""
+        if self.normal_middle is not None:
+            return self.normal_middle
+        total = np.add(self.normal_left, self.normal_right)
+        return quantise(normalise(np.where(np.any(total, axis=1, keepdims=True), total, self.normal_left)))
 
     def __len__(self):
         return len(self.length)
@@ -60,7 +74,8 @@ class Spans:
         """Some of the spans, by a slice, indices or a mask."""
         values = self.values if self.values is None else SpanValues(*(codes[which] for codes in self.values))
         fields = ("x", "y", "length", "normal_left", "normal_right", "material")
-        return Spans(*(getattr(self, name)[which] for name in fields), values)
+        middle = self.normal_middle if self.normal_middle is None else self.normal_middle[which]
+        return Spans(*(getattr(self, name)[which] for name in fields), values, middle)
 
 
 @dataclass(frozen=True)
@@ -77,6 +92,8 @@ class Pixels:
         Whether a pixel is the last of its span.
     out_of_range_spans : int
         Spans of a larger angle than the method serves, whose pixels have no error bound.
+    wide_spans : int
+        Spans of a larger angle than the method's error bound allows at the exponent; see `SpanLimit`.
     """
 
     x: np.ndarray
@@ -84,6 +101,7 @@ class Pixels:
     color: np.ndarray
     last: np.ndarray
     out_of_range_spans: int
+    wide_spans: int = 0
 
 
 STYLES = ("throughput", "compact")
@@ -204,6 +222,11 @@ class Design:
         return self.interpolator.TAKES_VALUES
 
     @cached_property
+    def span_limit(self) -> SpanLimit | None:
+        """Model of the unit that flags wide spans; ``None`` of methods without one."""
+        return SpanLimit() if self.lights and self.interpolator.TAKES_MIDDLE else None
+
+    @cached_property
     def highlight_gate(self) -> HighlightGate:
         """Bit-accurate model of the highlight gate."""
         return HighlightGate(self.specular, interpolator=self.interpolator)
@@ -275,7 +298,19 @@ class Design:
             color=color,
             last=step == length[span] - 1,
             out_of_range_spans=out_of_range,
+            wide_spans=self._wide_spans(spans, constants),
         )
+
+    def _wide_spans(self, spans: Spans, constants: Sequence[FrameConstants]) -> int:
+        """How many spans the span limit flags."""
+        if self.span_limit is None:
+            return 0
+        exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
+        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
+        vectors = (Fixed(COMPONENT, v) for v in (constants[0].direction, constants[0].halfway))
+        values = self.interpolator.values(left, Fixed(COMPONENT, spans.middle), right, *vectors)
+        operands = left, right, values, spans.length, exponent
+        return int(np.count_nonzero(self.span_limit.compute(*operands, self.specular is not None)))
 
     def _check(self, spans: Spans, constants: Sequence[FrameConstants]) -> None:
         """Refuse constants of another design, and codes out of range."""
@@ -310,7 +345,12 @@ class Design:
             )
         left, right = (Fixed(COMPONENT, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
         vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]
-        return lambda part: self.interpolator.compute(left[part], right[part], length[part], *vectors)
+        middle = []
+        if self.interpolator.TAKES_MIDDLE:
+            middle = [Fixed(COMPONENT, spans.middle[kept])]
+        return lambda part: self.interpolator.compute(
+            left[part], right[part], length[part], *vectors, *(normal[part] for normal in middle)
+        )
 
     def _shade(
         self, cosine: Fixed, highlight: Fixed, dark: np.ndarray, constants: FrameConstants

@@ -75,6 +75,11 @@ class Interpolator:
     TAKES_VALUES : bool
         Whether spans carry values of N·L and 1 - N·H of each light in place of normals, so that L and H may
         differ from pixel to pixel.
+    CUT_BY_ERROR : bool
+        Whether spans are cut until the method's curve is within a quarter of an LSB of exact normals; else
+        they are cut by their angle alone.
+    TAKES_MIDDLE : bool
+        Whether spans carry the true normal in their middle besides those at their ends.
     """
 
     COSINE_FORMAT: ClassVar[Format] = DotProduct().result_format
@@ -82,6 +87,8 @@ class Interpolator:
     MAX_ANGLE: ClassVar[float] = MAX_SPAN_ANGLE
     CURVE: ClassVar[str] = "normalised"
     TAKES_VALUES: ClassVar[bool] = False
+    TAKES_MIDDLE: ClassVar[bool] = False
+    CUT_BY_ERROR: ClassVar[bool] = True
 
     @property
     def name(self) -> str:

@@ -49,6 +49,8 @@ class LinearInterpolator(NormalInterpolator):
         """Name on the command line and in tables."""
         return "renormalise" if self.renormalised else "linear"
 
+    CUT_BY_ERROR = False
+
     @property
     def CURVE(self) -> str:
         """The curve in exact arithmetic."""
