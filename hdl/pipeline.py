@@ -26,6 +26,7 @@ PORT_DESCRIPTIONS = {
     "i_y": "its row",
     "i_length": "pixels of the span; 0 gives none",
     "i_normal_left": "unit normal at the first pixel centre, times 2^17 - 1",
+    "i_normal_middle": "unit normal in the middle between them",
     "i_normal_right": "unit normal at the last pixel centre",
     "i_values": "codes of N.L and 1 - N.H of each light at the first pixel, the middle and the last pixel",
     "i_material": "index of the span's material",
@@ -38,6 +39,7 @@ PORT_DESCRIPTIONS = {
     "write_address": "frame constant to write, see above",
     "write_data": "its code; accepted when no span is inside",
     "status_out_of_range_spans": "spans since reset of an angle that the method does not serve, up to 65535",
+    "status_wide_spans": "spans since reset wider than the error bound of the exponent allows, up to 65535",
     "status_empty_spans": "spans of length 0 since reset, up to 65535",
     "status_overrun": "a span went past the largest column",
 }
@@ -76,11 +78,17 @@ def status_shape() -> data.StructLayout:
     """Shape of the pipeline's counters since reset, which stop at their largest value.
 
     ``out_of_range_spans``: spans of an angle that the method does not serve, whose pixels have no error
-    bound; counted some cycles after the span is accepted. ``empty_spans``: spans of length 0. ``overrun``:
+    bound; counted some cycles after the span is accepted. ``wide_spans``: spans that are wider than the error
+    bound of the exponent allows, of the chord method; see `SpanLimit`. ``empty_spans``: spans of length 0. ``overrun``:
     whether a span went past the largest x, after which x goes on from 0.
     """
     return data.StructLayout(
-        {"out_of_range_spans": unsigned(16), "empty_spans": unsigned(16), "overrun": unsigned(1)}
+        {
+            "out_of_range_spans": unsigned(16),
+            "wide_spans": unsigned(16),
+            "empty_spans": unsigned(16),
+            "overrun": unsigned(1),
+        }
     )
 
 
@@ -228,7 +236,8 @@ class ShadingPipelineUnit(wiring.Component):
 
         17 are a memory of 16 words, and a register behind it.
         """
-        return max(-(-self.latency // self.setup_interval), 17)
+        interval = getattr(self._interpolator, "shortest_interval", None) or self.setup_interval
+        return max(-(-self.latency // interval), 17)
 
     def elaborate(self, platform):
         """Frame constants, units from spans to colours, coordinates past them, admission, counters."""
@@ -323,6 +332,7 @@ class ShadingPipelineUnit(wiring.Component):
         span, status = self.i.payload, self.status
         for counter, event in (
             (status.out_of_range_spans, self._interpolator.out_of_range if self._interpolator else 0),
+            (status.wide_spans, getattr(self._interpolator, "wide", 0)),
             (status.empty_spans, self.i.valid & self.i.ready & (span.length == 0)),
             (status.overrun, admit & (span.x + span.length > 1 << self.parameters.x_bits)),
         ):
@@ -342,6 +352,9 @@ class ShadingPipelineUnit(wiring.Component):
         if not p.takes_values:
             for vectors, light in zip(interpolator.constants, frame.constants.lights, strict=True):
                 m.d.comb += [vectors[name].eq(light[name]) for name in ("direction", "halfway")]
+        if "exponent" in interpolator.signature.members:
+            exponent = frame.constants.exponent if p.build.exponent is None else p.build.exponent
+            m.d.comb += interpolator.exponent.eq(exponent)
         operands, gated = interpolator.o, None
         if self._gate is not None:
             operands, gated = self._decide(m, frame, sinks)

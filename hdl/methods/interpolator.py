@@ -1,5 +1,6 @@
 """Interpolators: units that take a span to the operands of its pixels, by any method."""
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from amaranth.hdl import Module, Value
@@ -12,7 +13,15 @@ from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
 from blysk.hdl.core.stream import connect
 from blysk.hdl.methods.light_products import LightProductsUnit, operands_shape
 
-__all__ = ["InterpolatorUnit", "NormalInterpolatorUnit", "span_words"]
+__all__ = ["InterpolatorUnit", "NormalInterpolatorUnit", "span_words", "spelled"]
+
+
+def spelled(numbers: Sequence[int]) -> str:
+    """Numbers in ascending order in words: ``1 to 6``, or ``3, 9 or 18``."""
+    if len(numbers) > 1 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"{numbers[0]} to {numbers[-1]}"
+    *others, last = map(str, numbers)
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 def span_words(span: data.View) -> list[tuple[str, Value]]:
@@ -68,15 +77,29 @@ class InterpolatorUnit(wiring.Component):
 
     cycles_per_pixel = 1
 
+    shortest_interval: int | None = None
+    """Least cycles from a span to the next, where a short one takes fewer than `setup_interval`."""
+
     def __init_subclass__(cls, *, parameters: type[Interpolator] | None = None, **options):
         super().__init_subclass__(**options)
         if parameters is not None:
             InterpolatorUnit.UNITS[parameters] = cls
 
     @classmethod
-    def setup_intervals(cls, parameters: Interpolator) -> range:
+    def setup_intervals(cls, parameters: Interpolator) -> Sequence[int]:
         """Setup intervals that the method can be built for; empty where it has no choice."""
-        return range(0)
+        return ()
+
+    @classmethod
+    def further_members(cls, highlights: bool) -> dict[str, wiring.Member]:
+        """Ports of a method's own.
+
+        Parameters
+        ----------
+        highlights : bool
+            Of the unit.
+        """
+        return {}
 
     @classmethod
     def span_shape(cls, lights: int, *, highlights: bool = True, length_bits: int = LENGTH_BITS):
@@ -101,10 +124,10 @@ class InterpolatorUnit(wiring.Component):
     ):
         intervals = self.setup_intervals(parameters)
         if setup_interval not in (None, *intervals):
-            choice = f"1 to {intervals[-1]}" if intervals else "left out"
+            choice = spelled(intervals) if intervals else "left out"
             raise ValueError(f"setup_interval of {parameters.name} must be {choice}, not {setup_interval}")
         if intervals:
-            self.setup_interval = setup_interval or min(4, intervals[-1])
+            self.setup_interval = setup_interval or max(interval for interval in intervals if interval <= 4)
         self.parameters = parameters
         self.lights = lights
         self.highlights = highlights
@@ -118,6 +141,7 @@ class InterpolatorUnit(wiring.Component):
         }
         if not parameters.TAKES_VALUES:
             members["constants"] = In(light_vectors_shape(lights))
+        members |= self.further_members(highlights)
         super().__init__(members)
 
 
