@@ -15,6 +15,8 @@ from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
+from blysk.golden.lighting.value_gate import ValueGate
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.number.fixed import Fixed
@@ -157,8 +159,8 @@ class Design:
     materials : int
         Number of materials, 1 to `frame_constants.MAX_MATERIALS`.
     gate : bool
-        Whether a `HighlightGate` decides which spans have no highlight. With unit normals that changes no
-        pixel.
+        Whether a gate decides which spans have no highlight, which changes no pixel: a `ValueGate` of the
+        chord methods, else a `HighlightGate`, for unit normals.
     grey : bool
         One channel in place of three: it has red's colour operands, and the pixel has it three times.
     x_bits, y_bits, length_bits : int
@@ -196,8 +198,7 @@ class Design:
         if self.gate and not (self.specular and self.lights):
             raise ValueError("without specular light there is nothing to gate")
         if self.gate and not self.interpolator.serves_gate:
-            lacks = "normals" if self.takes_values else "error bound"
-            raise ValueError(f"method {self.method} has no {lacks} for a gate")
+            raise ValueError(f"method {self.method} has no error bound for a gate")
         for name, least in (("x_bits", 1), ("y_bits", 1), ("length_bits", 2)):
             if not least <= getattr(self, name) <= LENGTH_BITS:
                 raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
@@ -227,8 +228,10 @@ class Design:
         return SpanLimit() if self.lights and self.interpolator.TAKES_MIDDLE else None
 
     @cached_property
-    def highlight_gate(self) -> HighlightGate:
-        """Bit-accurate model of the highlight gate."""
+    def highlight_gate(self) -> HighlightGate | ValueGate:
+        """Bit-accurate model of the gate."""
+        if isinstance(self.interpolator, ChordInterpolator):
+            return ValueGate(self.specular)
         return HighlightGate(self.specular, interpolator=self.interpolator)
 
     def lit_spans(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> np.ndarray:
@@ -244,8 +247,16 @@ class Design:
         bool array, shape (spans, lights)
         """
         constants = [constants] if isinstance(constants, FrameConstants) else constants
-        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
         exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
+        if isinstance(self.highlight_gate, ValueGate):
+            highlight = self._values(spans, constants[0]).highlight.copy()
+            short = np.asarray(spans.length) < 3
+            # Of two pixels there is none in the middle.
+            highlight[short, :, 1] = highlight[short][:, :, ::2].min(axis=-1)
+            one = np.asarray(spans.length) == 1
+            highlight[one] = highlight[one][:, :, :1]
+            return self.highlight_gate.compute(highlight, exponent[:, np.newaxis])
+        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
         lit = [
             self.highlight_gate.compute(left, right, Fixed(COMPONENT, halfway), exponent)
             for halfway in constants[0].halfway
@@ -301,15 +312,20 @@ class Design:
             wide_spans=self._wide_spans(spans, constants),
         )
 
+    def _values(self, spans: Spans, constants: FrameConstants) -> SpanValues:
+        """Values of spans for a chord method."""
+        if self.takes_values:
+            return spans.values
+        words = spans.normal_left, spans.middle, spans.normal_right, constants.direction, constants.halfway
+        return self.interpolator.values(*(Fixed(COMPONENT, codes) for codes in words))
+
     def _wide_spans(self, spans: Spans, constants: Sequence[FrameConstants]) -> int:
         """How many spans the span limit flags."""
         if self.span_limit is None:
             return 0
         exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
         left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
-        vectors = (Fixed(COMPONENT, v) for v in (constants[0].direction, constants[0].halfway))
-        values = self.interpolator.values(left, Fixed(COMPONENT, spans.middle), right, *vectors)
-        operands = left, right, values, spans.length, exponent
+        operands = left, right, self._values(spans, constants[0]), spans.length, exponent
         return int(np.count_nonzero(self.span_limit.compute(*operands, self.specular is not None)))
 
     def _check(self, spans: Spans, constants: Sequence[FrameConstants]) -> None:

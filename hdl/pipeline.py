@@ -9,6 +9,7 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.pipeline import Design
 from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
 from blysk.hdl.frame_constants import FrameConstantsUnit, write_shape
@@ -16,6 +17,7 @@ from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.hdl.lighting.light import SPECULAR_KINDS, LightUnit
+from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
 
@@ -79,7 +81,8 @@ def status_shape() -> data.StructLayout:
 
     ``out_of_range_spans``: spans of an angle that the method does not serve, whose pixels have no error
     bound; counted some cycles after the span is accepted. ``wide_spans``: spans that are wider than the error
-    bound of the exponent allows, of the chord method; see `SpanLimit`. ``empty_spans``: spans of length 0. ``overrun``:
+    bound of the exponent allows, of the chord method; see `SpanLimit`. ``empty_spans``: spans of length 0.
+    ``overrun``:
     whether a span went past the largest x, after which x goes on from 0.
     """
     return data.StructLayout(
@@ -180,6 +183,9 @@ class ShadingPipelineUnit(wiring.Component):
             product_interval = p.intensity.channels
             if setup_interval is None:
                 setup_interval = max(method.setup_intervals(p.interpolator), default=None)
+        value_gate = None
+        if p.gate and isinstance(p.highlight_gate, ValueGate):
+            value_gate = ValueGateUnit(p.highlight_gate, p.lights, exponent=p.build.exponent)
         self._interpolator = method(
             p.interpolator,
             p.lights,
@@ -187,13 +193,14 @@ class ShadingPipelineUnit(wiring.Component):
             highlights=p.specular is not None,
             length_bits=p.length_bits,
             product_interval=product_interval,
+            gate=value_gate,
         )
         self.setup_interval = self._interpolator.setup_interval
         self._lights = self._light_units(compact)
         self._intensity = (CompactIntensityUnit if compact else IntensityUnit)(p.intensity)
         chain = (self._interpolator, self._lights[0], self._intensity, self._assembler)
         self.latency = sum(unit.latency for unit in chain)
-        if p.gate:
+        if p.gate and value_gate is None:
             interval = min(self.setup_interval, 3 + 12 * p.lights)
             self._gate = HighlightGateUnit(
                 p.highlight_gate, p.lights, initiation_interval=interval, exponent=p.build.exponent
@@ -379,8 +386,9 @@ class ShadingPipelineUnit(wiring.Component):
                 intensity.i.payload.diffuse[index].eq(terms.diffuse),
                 intensity.i.payload.specular[index].eq(terms.specular),
             ]
-            if gated is not None:
-                m.d.comb += light.i.payload.gated.eq(gated[index])
+            if p.gate:
+                decision = words.gated if gated is None else gated[index]
+                m.d.comb += light.i.payload.gated.eq(decision)
             if self._slope is not None:
                 m.d.comb += light.constants.eq(self._slope.slope)
             elif "constants" in light.signature.members:

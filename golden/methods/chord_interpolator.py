@@ -85,11 +85,6 @@ class ChordInterpolator(Interpolator):
         """Name on the command line and in tables."""
         return "chord"
 
-    @property
-    def serves_gate(self):
-        """No: a gate relies on the arc between a span's ends."""
-        return False
-
     @cached_property
     def setup(self) -> ChordSetup:
         """Model of the setup."""

@@ -1,6 +1,6 @@
 """The chord method: forward differences of N·L and of half the squared chord from N to H."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
+from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, enum, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -12,11 +12,31 @@ from blysk.hdl.core.stream import FIFO_LATENCY, SLICE_LATENCY, connect, connect_
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape, span_values_shape
 from blysk.hdl.cosines.chord_values import ChordValuesUnit, light_values_shape
 from blysk.hdl.cosines.span_limit import SpanLimitUnit, octave_limit
+from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 from blysk.hdl.methods.light_products import operands_shape
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 
 __all__ = ["ChordAccumulatorUnit", "ChordInterpolatorUnit", "ChordSpansUnit"]
+
+
+def least_highlight(m: Module, name: str, values: data.View) -> Value:
+    """`SpanLimit.least` of three values of u, one clock after them.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the registers.
+    name : str
+        Common part of their names.
+    values : data.View
+        u at the first pixel, in the middle and at the last pixel.
+    """
+    left, middle, right = (value.as_value() for value in values)
+    smaller = Signal.like(left, name=f"smaller_{name}", reset_less=True)
+    bulge = Signal(signed(len(left) + 2), name=f"bulge_{name}", reset_less=True)
+    m.d.sync += [smaller.eq(Mux(left < right, left, right)), bulge.eq(left + right - (middle << 1))]
+    return (smaller << 1) - Mux(bulge > 0, bulge, 0)
 
 
 class ChordAccumulatorUnit(AccumulatorUnit):
@@ -30,21 +50,32 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         Number of lights, at least 1.
     highlights : bool
         Whether there is u.
+    gated : bool
+        Whether spans bring a gate's decision for each light, ``lit``.
     """
 
-    def __init__(self, parameters: ChordInterpolator, lights: int, *, highlights: bool = True):
+    def __init__(
+        self, parameters: ChordInterpolator, lights: int, *, highlights: bool = True, gated: bool = False
+    ):
         self.parameters = p = parameters
+        self.gated = gated
         self.functions = ("diffuse", "highlight") if highlights else ("diffuse",)
+        span = {
+            "start": light_values_shape(lights, highlights=highlights),
+            "lights": chord_differences_shape(lights, highlights, p.setup)["lights"].shape,
+            "length": unsigned(LENGTH_BITS),
+        }
+        if gated:
+            span["lit"] = unsigned(lights)
         super().__init__(
-            data.StructLayout(
-                {
-                    "start": light_values_shape(lights, highlights=highlights),
-                    "lights": chord_differences_shape(lights, highlights, p.setup)["lights"].shape,
-                    "length": unsigned(LENGTH_BITS),
-                }
-            ),
-            operands_shape(p, lights, highlights=highlights),
+            data.StructLayout(span), operands_shape(p, lights, highlights=highlights, gated=gated)
         )
+
+    def carried(self, values):
+        """The decision of each light."""
+        if self.gated:
+            for index, light in enumerate(values):
+                yield ~self.i.payload.lit[index], light.gated
 
     def quadratics(self, values):
         """Those of each light."""
@@ -75,6 +106,8 @@ class ChordSpansUnit(wiring.Component):
         Whether there is u.
     length_bits : int
         Bits of the length.
+    gate : ValueGateUnit or None
+        Decides which spans have no highlight; ``None``: nothing does.
 
     Members
     -------
@@ -84,6 +117,8 @@ class ChordSpansUnit(wiring.Component):
         Operands of the pixels.
     out_of_range : :py:`Out(1)`
         High for one cycle for each span with a word that does not fit.
+    exponent : :py:`In(10)`
+        Specular exponent; only of a gate that has it as a port.
 
     Source: docs/theory/chord.md#differences.
     """
@@ -96,7 +131,9 @@ class ChordSpansUnit(wiring.Component):
         initiation_interval: int = 3,
         highlights: bool = True,
         length_bits: int = LENGTH_BITS,
+        gate: ValueGateUnit | None = None,
     ):
+        self._gate = gate
         self._setup = ChordSetupUnit(
             parameters.setup,
             lights,
@@ -105,9 +142,12 @@ class ChordSpansUnit(wiring.Component):
             highlights=highlights,
         )
         self.multipliers = self._setup.multipliers
-        self._accumulator = ChordAccumulatorUnit(parameters, lights, highlights=highlights)
+        gated = gate is not None
+        self._accumulator = ChordAccumulatorUnit(parameters, lights, highlights=highlights, gated=gated)
         self.latency = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
-        self.short_latency = FIFO_LATENCY + SLICE_LATENCY + self._accumulator.latency
+        waits = FIFO_LATENCY + (gate.latency if gate else 0)
+        self.short_latency = waits + SLICE_LATENCY + self._accumulator.latency
+        output = operands_shape(parameters, lights, highlights=highlights, gated=gated)
         super().__init__(
             {
                 "i": In(
@@ -120,9 +160,10 @@ class ChordSpansUnit(wiring.Component):
                         )
                     )
                 ),
-                "o": Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights))),
+                "o": Out(stream.Signature(output)),
                 "out_of_range": Out(1),
             }
+            | ({"exponent": In(SpanLimit.EXPONENT_BITS)} if gated and gate.exponent is None else {})
         )
 
     def elaborate(self, platform):
@@ -140,6 +181,11 @@ class ChordSpansUnit(wiring.Component):
         m.submodules.starts = starts = fifo.SyncFIFOBuffered(
             width=start_shape.size, depth=setup.latency + FIFO_LATENCY
         )
+        decided, gate_ready = Signal(init=1), Signal(init=1)
+        if self._gate is not None:
+            self._decide(m, joined, starts, decided, gate_ready)
+        else:
+            m.d.comb += [decided.eq(1), gate_ready.eq(1)]
         given, taken = Signal(start_shape, name="given"), Signal(start_shape, name="taken")
         m.d.comb += [
             given.length.eq(span.length),
@@ -150,22 +196,46 @@ class ChordSpansUnit(wiring.Component):
                 for name in functions
             ),
             starts.w_data.eq(given),
-            starts.w_en.eq(self.i.valid & (setup.i.ready | ~given.long)),
+            starts.w_en.eq(self.i.valid & gate_ready & (setup.i.ready | ~given.long)),
             setup.i.payload.eq(span),
-            setup.i.valid.eq(self.i.valid & starts.w_rdy & given.long),
-            self.i.ready.eq(starts.w_rdy & (setup.i.ready | ~given.long)),
+            setup.i.valid.eq(self.i.valid & gate_ready & starts.w_rdy & given.long),
+            self.i.ready.eq(starts.w_rdy & gate_ready & (setup.i.ready | ~given.long)),
             taken.eq(starts.r_data),
             joined.payload.start.eq(taken.start),
             joined.payload.length.eq(taken.length),
             joined.payload.lights.eq(setup.o.payload.lights),
-            joined.valid.eq(starts.r_rdy & (setup.o.valid | ~taken.long)),
-            starts.r_en.eq(joined.ready & (setup.o.valid | ~taken.long)),
-            setup.o.ready.eq(joined.ready & starts.r_rdy & taken.long),
+            joined.valid.eq(starts.r_rdy & decided & (setup.o.valid | ~taken.long)),
+            starts.r_en.eq(joined.ready & decided & (setup.o.valid | ~taken.long)),
+            setup.o.ready.eq(joined.ready & starts.r_rdy & decided & taken.long),
             self.out_of_range.eq(setup.o.valid & setup.o.ready & setup.o.payload.out_of_range),
         ]
         connect_slice(m, joined, accumulator.i)
         connect(m, accumulator.o, wiring.flipped(self.o))
         return m
+
+    def _decide(self, m: Module, joined: stream.Interface, starts, decided: Value, ready: Value) -> None:
+        """The gate beside the setup: a span waits for its decision."""
+        m.submodules.value_gate = gate = self._gate
+        lights = len(gate.o.payload)
+        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=lights, depth=starts.depth)
+        long = self.i.payload.length > 1
+        for given, light in zip(gate.i.payload, self.i.payload["values"], strict=True):
+            first, *others = (light.highlight[k].as_value() for k in range(3))
+            m.d.comb += given[0].as_value().eq(first)
+            m.d.comb += [given[k].as_value().eq(Mux(long, u, first)) for k, u in enumerate(others, 1)]
+        m.d.comb += [
+            # Of what every span goes to, the starts and the gate, each waits for the other.
+            gate.i.valid.eq(self.i.valid & self.i.ready),
+            ready.eq(gate.i.ready),
+            decisions.w_data.eq(gate.o.payload),
+            decisions.w_en.eq(gate.o.valid),
+            gate.o.ready.eq(decisions.w_rdy),
+            decided.eq(decisions.r_rdy),
+            decisions.r_en.eq(starts.r_en & starts.r_rdy),
+            joined.payload.lit.eq(decisions.r_data),
+        ]
+        if gate.exponent is None:
+            m.d.comb += gate.constants.eq(self.exponent)
 
 
 class _Place(enum.Enum, shape=2):
@@ -234,15 +304,15 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
             initiation_interval=self.setup_interval,
             highlights=self.highlights,
             length_bits=self.length_bits,
+            gate=self.gate,
         )
         units = self._values, self._limit, self._spans
         self.multipliers = sum(unit.multipliers for unit in units)
         self.latency = 2 * (self.setup_interval // 3) + self._values.latency + self._spans.latency
 
-    @classmethod
-    def further_members(cls, highlights):
+    def further_members(self):
         """Exponent and flag of the span limit."""
-        exponent = {"exponent": In(SpanLimit.EXPONENT_BITS)} if highlights else {}
+        exponent = {"exponent": In(SpanLimit.EXPONENT_BITS)} if self.highlights else {}
         return {"wide": Out(1)} | exponent
 
     def elaborate(self, platform):
@@ -259,6 +329,8 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         m.d.comb += [values.constants.eq(self.constants), self.out_of_range.eq(spans.out_of_range)]
         if self.highlights:
             m.d.comb += limit.constants.eq(self.exponent)
+        if "exponent" in spans.signature.members:
+            m.d.comb += spans.exponent.eq(self.exponent)
         return m
 
     def _send(self, m: Module, values, limit, tags, tag) -> None:
@@ -337,7 +409,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         self._flag(m, spans.i, limit)
 
     def _flag(self, m: Module, spans: stream.Interface, limit: SpanLimitUnit) -> None:
-        """Whether a span is wide, as it is complete: its angle, and whether a light may have a highlight there."""
+        """Whether a span is wide, as it is complete: its angle, and where a highlight may be."""
         p, given = limit.parameters, spans.payload["values"]
         wide, wide_if_lit = Signal(), Signal()
         long = spans.payload.length >= p.SHORTEST
@@ -350,24 +422,10 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         if self.highlights:
             level = octave_limit(m, "level", self.exponent, p.levels)
             for i, light in enumerate(given):
-                u_left, u_middle, u_right = (light.highlight[k] for k in range(3))
-                ends, twice = Signal.like(u_left + u_right), Signal.like(u_middle.scale(1))
-                smaller, front = Signal.like(u_left), Signal(name=f"front_{i}")
-                m.d.sync += [
-                    Value.cast(ends).eq(Value.cast(u_left + u_right)),
-                    Value.cast(twice).eq(Value.cast(u_middle.scale(1))),
-                    Value.cast(smaller).eq(
-                        Mux(
-                            Value.cast(u_left) < Value.cast(u_right),
-                            Value.cast(u_left),
-                            Value.cast(u_right),
-                        )
-                    ),
-                    front.eq(Cat(Value.cast(f) >= p.BEHIND.codes.item() for f in light.diffuse).any()),
-                ]
-                bulge = Value.cast(ends) - Value.cast(twice)
-                least = (Value.cast(smaller) << 1) - Mux(bulge > 0, bulge, 0)
-                lit.append(front & (least < Value.cast(level)))
+                front = Signal(name=f"front_{i}")
+                behind = p.BEHIND.codes.item()
+                m.d.sync += front.eq(Cat(f.as_value() >= behind for f in light.diffuse).any())
+                lit.append(front & (least_highlight(m, f"{i}", light.highlight) < level.as_value()))
         wide_now = Signal()
         m.d.sync += wide_now.eq(wide | (wide_if_lit & Cat(lit).any()))
         m.d.comb += self.wide.eq(wide_now)

@@ -11,6 +11,7 @@ from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
 from blysk.hdl.core.stream import connect
+from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.light_products import LightProductsUnit, operands_shape
 
 __all__ = ["InterpolatorUnit", "NormalInterpolatorUnit", "span_words", "spelled"]
@@ -54,6 +55,8 @@ class InterpolatorUnit(wiring.Component):
         Bits of the length.
     product_interval : int
         Least cycles from a pixel to the next in the products with L and H, of methods that find normals.
+    gate : ValueGateUnit or None
+        Decides which spans have no highlight, of the chord methods; operands then have ``gated``.
 
     Members
     -------
@@ -90,15 +93,8 @@ class InterpolatorUnit(wiring.Component):
         """Setup intervals that the method can be built for; empty where it has no choice."""
         return ()
 
-    @classmethod
-    def further_members(cls, highlights: bool) -> dict[str, wiring.Member]:
-        """Ports of a method's own.
-
-        Parameters
-        ----------
-        highlights : bool
-            Of the unit.
-        """
+    def further_members(self) -> dict[str, wiring.Member]:
+        """Ports of a method's own."""
         return {}
 
     @classmethod
@@ -121,6 +117,7 @@ class InterpolatorUnit(wiring.Component):
         highlights: bool = True,
         length_bits: int = LENGTH_BITS,
         product_interval: int = 1,
+        gate: ValueGateUnit | None = None,
     ):
         intervals = self.setup_intervals(parameters)
         if setup_interval not in (None, *intervals):
@@ -133,15 +130,20 @@ class InterpolatorUnit(wiring.Component):
         self.highlights = highlights
         self.length_bits = length_bits
         self.product_interval = product_interval
+        self.gate = gate
         span = self.span_shape(lights, highlights=highlights, length_bits=length_bits)
         members = {
             "i": In(stream.Signature(span)),
-            "o": Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights))),
+            "o": Out(
+                stream.Signature(
+                    operands_shape(parameters, lights, highlights=highlights, gated=gate is not None)
+                )
+            ),
             "out_of_range": Out(1),
         }
         if not parameters.TAKES_VALUES:
             members["constants"] = In(light_vectors_shape(lights))
-        members |= self.further_members(highlights)
+        members |= self.further_members()
         super().__init__(members)
 
 

@@ -2,7 +2,9 @@
 
 from amaranth.hdl import Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, wiring
+from amaranth.lib.wiring import In
 
+from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import connect
@@ -55,6 +57,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
             initiation_interval=self.setup_interval,
             highlights=self.highlights,
             length_bits=self.length_bits,
+            gate=self.gate,
         )
         self.multipliers = self._spans.multipliers
         self.latency = self._spans.latency
@@ -80,4 +83,11 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
         with m.If(spans.i.valid & spans.i.ready):
             m.d.sync += second.eq(pair & ~second)
         connect(m, spans.o, wiring.flipped(self.o))
+        if "exponent" in spans.signature.members:
+            m.d.comb += spans.exponent.eq(self.exponent)
         return m
+
+    def further_members(self):
+        """Exponent of a gate."""
+        has_port = self.gate is not None and self.gate.exponent is None
+        return {"exponent": In(SpanLimit.EXPONENT_BITS)} if has_port else {}
