@@ -356,10 +356,9 @@ class ShadingPipelineUnit(wiring.Component):
         sinks = [(interpolator.i.valid, interpolator.i.ready)]
         words = interpolator.i.payload
         m.d.comb += [Value.cast(words[name]).eq(Value.cast(span[name])) for name in words.shape().members]
-        if not p.takes_values:
-            for vectors, light in zip(interpolator.constants, frame.constants.lights, strict=True):
-                m.d.comb += [vectors[name].eq(light[name]) for name in ("direction", "halfway")]
-        if "exponent" in interpolator.signature.members:
+        for vectors, light in zip(interpolator.light_vectors, frame.constants.lights, strict=False):
+            m.d.comb += [vectors[name].eq(light[name]) for name in ("direction", "halfway")]
+        if interpolator.exponent is not None:
             exponent = frame.constants.exponent if p.build.exponent is None else p.build.exponent
             m.d.comb += interpolator.exponent.eq(exponent)
         operands, gated = interpolator.o, None

@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
-from blysk.hdl.core.shapes import span_normals_shape
+from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
 from blysk.hdl.core.stream import FIFO_LATENCY, SLICE_LATENCY, connect, connect_slice
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape, span_values_shape
 from blysk.hdl.cosines.chord_values import ChordValuesUnit, light_values_shape
@@ -117,8 +117,8 @@ class ChordSpansUnit(wiring.Component):
         Operands of the pixels.
     out_of_range : :py:`Out(1)`
         High for one cycle for each span with a word that does not fit.
-    exponent : :py:`In(10)`
-        Specular exponent; only of a gate that has it as a port.
+    constants : :py:`In(10)`
+        Specular exponent, constant while spans are inside; only of a gate that has it as a port.
 
     Source: docs/theory/chord.md#differences.
     """
@@ -163,7 +163,7 @@ class ChordSpansUnit(wiring.Component):
                 "o": Out(stream.Signature(output)),
                 "out_of_range": Out(1),
             }
-            | ({"exponent": In(SpanLimit.EXPONENT_BITS)} if gated and gate.exponent is None else {})
+            | ({"constants": In(SpanLimit.EXPONENT_BITS)} if gated and gate.exponent is None else {})
         )
 
     def elaborate(self, platform):
@@ -235,7 +235,7 @@ class ChordSpansUnit(wiring.Component):
             joined.payload.lit.eq(decisions.r_data),
         ]
         if gate.exponent is None:
-            m.d.comb += gate.constants.eq(self.exponent)
+            m.d.comb += gate.constants.eq(self.constants)
 
 
 class _Place(enum.Enum, shape=2):
@@ -269,8 +269,9 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
 
     Members
     -------
-    exponent : :py:`In(10)`
-        Specular exponent for `SpanLimit`; only with highlights.
+    constants : :py:`In(StructLayout({"lights": light_vectors_shape(lights), "exponent": 10}))`
+        L and H of each light, and with highlights the specular exponent for `SpanLimit`; constant while spans
+        are inside.
     wide : :py:`Out(1)`
         High for one cycle for each wide span.
 
@@ -312,8 +313,20 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
 
     def further_members(self):
         """Exponent and flag of the span limit."""
-        exponent = {"exponent": In(SpanLimit.EXPONENT_BITS)} if self.highlights else {}
-        return {"wide": Out(1)} | exponent
+        members = {"lights": light_vectors_shape(self.lights)}
+        if self.highlights:
+            members["exponent"] = unsigned(SpanLimit.EXPONENT_BITS)
+        return {"wide": Out(1), "constants": In(data.StructLayout(members))}
+
+    @property
+    def light_vectors(self):
+        """L and H of each light, of the constants."""
+        return self.constants.lights
+
+    @property
+    def exponent(self):
+        """The specular exponent, of the constants."""
+        return self.constants.exponent if self.highlights else None
 
     def elaborate(self, platform):
         """Normals one after the other to the values; these, collected, to the spans."""
@@ -326,11 +339,11 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         self._send(m, values, limit, tags, tag)
         self._collect(m, values, limit, tags, tag, spans)
         connect(m, spans.o, wiring.flipped(self.o))
-        m.d.comb += [values.constants.eq(self.constants), self.out_of_range.eq(spans.out_of_range)]
+        m.d.comb += [values.constants.eq(self.light_vectors), self.out_of_range.eq(spans.out_of_range)]
         if self.highlights:
             m.d.comb += limit.constants.eq(self.exponent)
-        if "exponent" in spans.signature.members:
-            m.d.comb += spans.exponent.eq(self.exponent)
+        if "constants" in spans.signature.members:
+            m.d.comb += spans.constants.eq(self.exponent)
         return m
 
     def _send(self, m: Module, values, limit, tags, tag) -> None:

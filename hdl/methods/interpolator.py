@@ -94,8 +94,18 @@ class InterpolatorUnit(wiring.Component):
         return ()
 
     def further_members(self) -> dict[str, wiring.Member]:
-        """Ports of a method's own."""
+        """Ports of a method's own, or in place of the common ones."""
         return {}
+
+    @property
+    def light_vectors(self) -> data.View | tuple:
+        """L and H of each light, of the constants; none of methods with `TAKES_VALUES`."""
+        return () if self.parameters.TAKES_VALUES else self.constants
+
+    @property
+    def exponent(self) -> Value | None:
+        """The specular exponent, of the constants; ``None`` where the method does not need it."""
+        return None
 
     @classmethod
     def span_shape(cls, lights: int, *, highlights: bool = True, length_bits: int = LENGTH_BITS):

@@ -33,6 +33,11 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
     options
         As for `InterpolatorUnit`; ``setup_interval`` is 1 to 6.
 
+    Members
+    -------
+    constants : :py:`In(10)`
+        Specular exponent, constant while spans are inside; only of a gate that has it as a port.
+
     Source: docs/theory/chord.md#local-lights.
     """
 
@@ -83,11 +88,16 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
         with m.If(spans.i.valid & spans.i.ready):
             m.d.sync += second.eq(pair & ~second)
         connect(m, spans.o, wiring.flipped(self.o))
-        if "exponent" in spans.signature.members:
-            m.d.comb += spans.exponent.eq(self.exponent)
+        if "constants" in spans.signature.members:
+            m.d.comb += spans.constants.eq(self.constants)
         return m
 
     def further_members(self):
         """Exponent of a gate."""
         has_port = self.gate is not None and self.gate.exponent is None
-        return {"exponent": In(SpanLimit.EXPONENT_BITS)} if has_port else {}
+        return {"constants": In(SpanLimit.EXPONENT_BITS)} if has_port else {}
+
+    @property
+    def exponent(self):
+        """Exponent of a gate, if it is a port."""
+        return getattr(self, "constants", None)
