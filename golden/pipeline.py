@@ -38,7 +38,8 @@ class Spans:
     length : int array, shape (spans,)
         Pixels, 0 to 4095. A span of length 0 gives no pixel; past the largest x, x goes on from 0.
     normal_left, normal_right : int arrays, shape (spans, 3)
-        Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``.
+        Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``; or what the method takes, in
+        its `Interpolator.END_FORMAT`.
     material : int array, shape (spans,), optional
         Index of the material; ``None``: 0 for all.
     values : SpanValues, optional
@@ -359,7 +360,8 @@ class Design:
             return lambda part: self.interpolator.compute_values(
                 SpanValues(*(codes[part] for codes in values)), length[part]
             )
-        left, right = (Fixed(COMPONENT, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
+        format = self.interpolator.END_FORMAT
+        left, right = (Fixed(format, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
         vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]
         middle = []
         if self.interpolator.TAKES_MIDDLE:

@@ -114,17 +114,32 @@ class SpanLimit:
         ValueError
             If an operand has another format or an exponent is out of range.
         """
+        wide, wide_if_lit = self.exceeds(normal_left, normal_right, exponent)
+        if highlights:
+            bits = self._bits(exponent)
+            level = self.least(values.highlight) < self.levels.codes[bits][:, np.newaxis]
+            front = values.diffuse.max(axis=2) >= self.BEHIND.codes
+            wide = wide | (wide_if_lit & (level & front).any(axis=1))
+        return wide & (np.asarray(length) >= self.SHORTEST)
+
+    def exceeds(
+        self, normal_left: Fixed, normal_right: Fixed, exponent: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Whether psi is over `WIDEST`, and whether over `angle` of the exponent; bool, shape (spans,) each.
+
+        Parameters and errors are those of `compute`.
+        """
+        bits = self._bits(exponent)
+        chord = Chord().compute(normal_right, normal_left).codes
+        return chord > self.widest.codes, chord > self.chords.codes[bits]
+
+    @staticmethod
+    def _bits(exponent: np.ndarray) -> np.ndarray:
+        """Number of bits of exponents."""
         exponent = np.asarray(exponent)
         if exponent.size and not 1 <= exponent.min() <= exponent.max() <= MAX_EXPONENT:
             raise ValueError(f"exponents must be 1 to {MAX_EXPONENT}")
-        chord = Chord().compute(normal_right, normal_left).codes
-        wide = chord > self.widest.codes
-        if highlights:
-            bits = np.frexp(exponent.astype(np.float64))[1]
-            level = self.least(values.highlight) < self.levels.codes[bits][:, np.newaxis]
-            front = values.diffuse.max(axis=2) >= self.BEHIND.codes
-            wide |= (chord > self.chords.codes[bits]) & (level & front).any(axis=1)
-        return wide & (np.asarray(length) >= self.SHORTEST)
+        return np.frexp(exponent.astype(np.float64))[1]
 
     @staticmethod
     def least(highlight: np.ndarray) -> np.ndarray:

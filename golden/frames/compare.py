@@ -1,13 +1,13 @@
 """Errors of a frame against its method in float64, exact interpolation and exact shading."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from time import perf_counter
 
 import numpy as np
 
 from blysk.golden.frames.frame import Frame
-from blysk.golden.frames.local import local_values
+from blysk.golden.frames.local import line_ends, local_values
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
@@ -72,6 +72,9 @@ def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarra
         values = local_values(scene, raster)
         cosine, one_minus_cosine = interpolator.exact_operands(values, raster.length)
         return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, design.specular.model)
+    if interpolator.takes_line:
+        left, right = line_ends(raster)
+        raster = replace(raster, normal_left=left, normal_right=right)
     return shade_spans(
         scene, raster, interpolator.exact_normals, design.specular.model, interpolator.uses_chord
     )

@@ -12,7 +12,7 @@ from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["CHUNK", "SurfacePoints", "along_spans", "chunks", "local_values", "middle_normals"]
+__all__ = ["CHUNK", "SurfacePoints", "along_spans", "chunks", "line_ends", "local_values", "middle_normals"]
 
 CHUNK = 1 << 16
 """Spans worked on at once; bounds the memory, changes no result."""
@@ -22,9 +22,16 @@ def along_spans(raster: Raster, span: np.ndarray, t: np.ndarray) -> tuple[np.nda
     """Weights and normals, not of unit length, at t of each span; both are linear along a span."""
     t = t[:, np.newaxis]
     weights = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
-    left = raster.magnitude_left[span][:, np.newaxis] * raster.normal_left[span]
-    right = raster.magnitude_right[span][:, np.newaxis] * raster.normal_right[span]
-    return weights, (1 - t) * left + t * right
+    left, right = line_ends(raster)
+    return weights, (1 - t) * left[span] + t * right[span]
+
+
+def line_ends(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
+    """Normals at the ends of spans with the lengths that they have there, shape (spans, 3)."""
+    return (
+        raster.magnitude_left[:, np.newaxis] * raster.normal_left,
+        raster.magnitude_right[:, np.newaxis] * raster.normal_right,
+    )
 
 
 def middle_normals(raster: Raster) -> np.ndarray:

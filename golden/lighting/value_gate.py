@@ -27,7 +27,8 @@ class ValueGate:
 
     A pixel's u is off the quadratic through the values by less than ``2^-23 + ChordSetup.walk_error(3/16,
     1/16) + 2^-26`` (`margin`): the rounding of G, the reciprocal of the length and the drift, and the
-    rounding of the result. The threshold is twice the largest argument to which the specular unit may give a term
+    rounding of the result. The threshold is twice the largest argument to which the specular unit may give a
+    term
     (`HighlightOperand.last_lit_arguments`), a step and the margin more. **So no pixel of a span that is not
     lit has a specular term other than 0**, and the picture is the same to the bit. No multiplication.
 
