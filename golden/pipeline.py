@@ -7,18 +7,22 @@ from typing import Literal
 
 import numpy as np
 
+from blysk.golden.cosines.chord_setup import SpanValues
+from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
+from blysk.golden.lighting.value_gate import ValueGate
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator, Operands
-from blysk.golden.methods.local_chord_interpolator import SpanValues
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
-from blysk.golden.number.unit_vector import COMPONENT
+from blysk.golden.number.unit_vector import COMPONENT, quantise
+from blysk.golden.reference.geometry import normalise
 
 __all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]
 
@@ -34,11 +38,15 @@ class Spans:
     length : int array, shape (spans,)
         Pixels, 0 to 4095. A span of length 0 gives no pixel; past the largest x, x goes on from 0.
     normal_left, normal_right : int arrays, shape (spans, 3)
-        Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``.
+        Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``; or what the method takes, in
+        its `Interpolator.END_FORMAT`.
     material : int array, shape (spans,), optional
         Index of the material; ``None``: 0 for all.
     values : SpanValues, optional
         Values of each light, for methods with `Interpolator.TAKES_VALUES`, which read no normals.
+    normal_middle : int array, shape (spans, 3), optional
+        Unit normals in the middle of each span, for methods with `Interpolator.TAKES_MIDDLE`; ``None``: the
+        bisectors of the two ends.
     """
 
     x: np.ndarray
@@ -48,10 +56,19 @@ class Spans:
     normal_right: np.ndarray
     material: np.ndarray | None = None
     values: SpanValues | None = None
+    normal_middle: np.ndarray | None = None
 
     def __post_init__(self):
         if self.material is None:
             object.__setattr__(self, "material", np.zeros(len(self.length), dtype=np.int64))
+
+    @cached_property
+    def middle(self) -> np.ndarray:
+        """`normal_middle`, or the bisectors; of opposite ends, the left one."""
+        if self.normal_middle is not None:
+            return self.normal_middle
+        total = np.add(self.normal_left, self.normal_right)
+        return quantise(normalise(np.where(np.any(total, axis=1, keepdims=True), total, self.normal_left)))
 
     def __len__(self):
         return len(self.length)
@@ -60,7 +77,8 @@ class Spans:
         """Some of the spans, by a slice, indices or a mask."""
         values = self.values if self.values is None else SpanValues(*(codes[which] for codes in self.values))
         fields = ("x", "y", "length", "normal_left", "normal_right", "material")
-        return Spans(*(getattr(self, name)[which] for name in fields), values)
+        middle = self.normal_middle if self.normal_middle is None else self.normal_middle[which]
+        return Spans(*(getattr(self, name)[which] for name in fields), values, middle)
 
 
 @dataclass(frozen=True)
@@ -77,6 +95,8 @@ class Pixels:
         Whether a pixel is the last of its span.
     out_of_range_spans : int
         Spans of a larger angle than the method serves, whose pixels have no error bound.
+    wide_spans : int
+        Spans of a larger angle than the method's error bound allows at the exponent; see `SpanLimit`.
     """
 
     x: np.ndarray
@@ -84,6 +104,7 @@ class Pixels:
     color: np.ndarray
     last: np.ndarray
     out_of_range_spans: int
+    wide_spans: int = 0
 
 
 STYLES = ("throughput", "compact")
@@ -139,8 +160,8 @@ class Design:
     materials : int
         Number of materials, 1 to `frame_constants.MAX_MATERIALS`.
     gate : bool
-        Whether a `HighlightGate` decides which spans have no highlight. With unit normals that changes no
-        pixel.
+        Whether a gate decides which spans have no highlight, which changes no pixel: a `ValueGate` of the
+        chord methods, else a `HighlightGate`, for unit normals.
     grey : bool
         One channel in place of three: it has red's colour operands, and the pixel has it three times.
     x_bits, y_bits, length_bits : int
@@ -178,8 +199,7 @@ class Design:
         if self.gate and not (self.specular and self.lights):
             raise ValueError("without specular light there is nothing to gate")
         if self.gate and not self.interpolator.serves_gate:
-            lacks = "normals" if self.takes_values else "error bound"
-            raise ValueError(f"method {self.method} has no {lacks} for a gate")
+            raise ValueError(f"method {self.method} has no error bound for a gate")
         for name, least in (("x_bits", 1), ("y_bits", 1), ("length_bits", 2)):
             if not least <= getattr(self, name) <= LENGTH_BITS:
                 raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
@@ -204,8 +224,15 @@ class Design:
         return self.interpolator.TAKES_VALUES
 
     @cached_property
-    def highlight_gate(self) -> HighlightGate:
-        """Bit-accurate model of the highlight gate."""
+    def span_limit(self) -> SpanLimit | None:
+        """Model of the unit that flags wide spans; ``None`` of methods without one."""
+        return SpanLimit() if self.lights and self.interpolator.TAKES_MIDDLE else None
+
+    @cached_property
+    def highlight_gate(self) -> HighlightGate | ValueGate:
+        """Bit-accurate model of the gate."""
+        if isinstance(self.interpolator, ChordInterpolator):
+            return ValueGate(self.specular)
         return HighlightGate(self.specular, interpolator=self.interpolator)
 
     def lit_spans(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> np.ndarray:
@@ -221,8 +248,16 @@ class Design:
         bool array, shape (spans, lights)
         """
         constants = [constants] if isinstance(constants, FrameConstants) else constants
-        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
         exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
+        if isinstance(self.highlight_gate, ValueGate):
+            highlight = self._values(spans, constants[0]).highlight.copy()
+            short = np.asarray(spans.length) < 3
+            # Of two pixels there is none in the middle.
+            highlight[short, :, 1] = highlight[short][:, :, ::2].min(axis=-1)
+            one = np.asarray(spans.length) == 1
+            highlight[one] = highlight[one][:, :, :1]
+            return self.highlight_gate.compute(highlight, exponent[:, np.newaxis])
+        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
         lit = [
             self.highlight_gate.compute(left, right, Fixed(COMPONENT, halfway), exponent)
             for halfway in constants[0].halfway
@@ -275,7 +310,24 @@ class Design:
             color=color,
             last=step == length[span] - 1,
             out_of_range_spans=out_of_range,
+            wide_spans=self._wide_spans(spans, constants),
         )
+
+    def _values(self, spans: Spans, constants: FrameConstants) -> SpanValues:
+        """Values of spans for a chord method."""
+        if self.takes_values:
+            return spans.values
+        words = spans.normal_left, spans.middle, spans.normal_right, constants.direction, constants.halfway
+        return self.interpolator.values(*(Fixed(COMPONENT, codes) for codes in words))
+
+    def _wide_spans(self, spans: Spans, constants: Sequence[FrameConstants]) -> int:
+        """How many spans the span limit flags."""
+        if self.span_limit is None:
+            return 0
+        exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
+        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
+        operands = left, right, self._values(spans, constants[0]), spans.length, exponent
+        return int(np.count_nonzero(self.span_limit.compute(*operands, self.specular is not None)))
 
     def _check(self, spans: Spans, constants: Sequence[FrameConstants]) -> None:
         """Refuse constants of another design, and codes out of range."""
@@ -308,9 +360,15 @@ class Design:
             return lambda part: self.interpolator.compute_values(
                 SpanValues(*(codes[part] for codes in values)), length[part]
             )
-        left, right = (Fixed(COMPONENT, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
+        format = self.interpolator.END_FORMAT
+        left, right = (Fixed(format, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
         vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]
-        return lambda part: self.interpolator.compute(left[part], right[part], length[part], *vectors)
+        middle = []
+        if self.interpolator.TAKES_MIDDLE:
+            middle = [Fixed(COMPONENT, spans.middle[kept])]
+        return lambda part: self.interpolator.compute(
+            left[part], right[part], length[part], *vectors, *(normal[part] for normal in middle)
+        )
 
     def _shade(
         self, cosine: Fixed, highlight: Fixed, dark: np.ndarray, constants: FrameConstants

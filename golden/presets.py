@@ -12,6 +12,7 @@ from blysk.golden.methods import (
     local_chord_interpolator,
     quadratic_interpolator,
     recurrence_interpolator,
+    renormalise_interpolator,
 )
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator, Operand
 from blysk.golden.pipeline import Build, Design
@@ -21,6 +22,7 @@ __all__ = ["METHODS", "MODELS", "PUBLISHED", "preset"]
 
 _MODULES = (
     linear_interpolator,
+    renormalise_interpolator,
     bisection_interpolator,
     quadratic_interpolator,
     angular_interpolator,

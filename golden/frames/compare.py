@@ -1,13 +1,14 @@
 """Errors of a frame against its method in float64, exact interpolation and exact shading."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from time import perf_counter
 
 import numpy as np
 
 from blysk.golden.frames.frame import Frame
-from blysk.golden.frames.local import local_values
+from blysk.golden.frames.local import line_ends, local_values
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import Raster
@@ -25,13 +26,14 @@ class Comparison:
     Parameters
     ----------
     golden : float64 array, shape (height, width, 3)
-        Exactly normalised Phong interpolation along the spans with the frame's model, in [0, 1].
+        The exact frame with the frame's model, in [0, 1]: per-pixel normals, perspective-correct and
+        normalised, of the triangles as rasterised.
     arithmetic_error : ErrorFigures
         Against the same method and model in float64.
     method_error : ErrorFigures
         Against ``golden``.
     total_error : ErrorFigures
-        Against the exact frame: Phong shading as on a GPU, Blinn's model.
+        Against the exact frame with Blinn's model.
     nmse : float
         Against the exact frame.
     mnse_published, mnse_published_share : float
@@ -66,10 +68,13 @@ def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarra
         In [0, 1].
     """
     interpolator = design.interpolator
-    if design.takes_values:
+    if isinstance(interpolator, ChordInterpolator):
         values = local_values(scene, raster)
         cosine, one_minus_cosine = interpolator.exact_operands(values, raster.length)
         return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, design.specular.model)
+    if interpolator.takes_line:
+        left, right = line_ends(raster)
+        raster = replace(raster, normal_left=left, normal_right=right)
     return shade_spans(
         scene, raster, interpolator.exact_normals, design.specular.model, interpolator.uses_chord
     )
@@ -87,7 +92,7 @@ def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
     """
     start = perf_counter()
     same_method = method_in_float64(scene, design, frame.cut_raster)
-    golden = shade_spans(scene, frame.raster, "normalised", design.specular.model)
+    golden = render(scene, "phong", design.specular.model, raster=frame.raster).image
     exact = render(scene, "phong", BLINN, raster=frame.raster)
     seconds = perf_counter() - start
     if exact.mask.any():

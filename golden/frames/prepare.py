@@ -6,7 +6,8 @@ import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans
-from blysk.golden.frames.local import local_values
+from blysk.golden.frames.local import line_ends, local_values, middle_normals
+from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.raster import Raster, rasterise
@@ -53,6 +54,11 @@ def prepare(scene: Scene, design: Design) -> PreparedFrame:
     spans = quantise_spans(cut, scene.mesh.material)
     if design.takes_values:
         spans = replace(spans, values=local_values(scene, cut, design.lights))
+    elif design.interpolator.takes_line:
+        left, right = quantise_line(*line_ends(cut))
+        spans = replace(spans, normal_left=left, normal_right=right)
+    elif design.interpolator.TAKES_MIDDLE:
+        spans = replace(spans, normal_middle=quantise(middle_normals(cut)))
     return PreparedFrame(raster, cut, count, spans)
 
 

@@ -65,8 +65,8 @@ class FunctionalUnit:
         Makes a piece: from a function that makes a register (value, name) and the operands, the result.
     left : list of int
         Uses that may still come.
-    free : list of list of bool
-        For each piece the turns that nothing has yet, one for every clock of the interval.
+    taken : list of set of int
+        For each piece the stages at which it has a use.
     """
 
     name: str
@@ -74,12 +74,12 @@ class FunctionalUnit:
     latency: int
     make: Callable[..., Any]
     left: list[int]
-    free: list[list[bool]] = field(default_factory=list)
+    taken: list[set[int]] = field(default_factory=list)
 
     @property
     def count(self) -> int:
         """How many pieces there are."""
-        return len(self.free)
+        return len(self.taken)
 
 
 class Dataflow:
@@ -87,9 +87,11 @@ class Dataflow:
 
     Every word gets the earliest age at which its operands are there. What is shared, such as a multiplier,
     is used when a piece of it is free: beats come a whole multiple of the initiation interval apart, so a
-    piece has as many turns as the interval has cycles, and ``ceil(uses / interval)`` pieces serve all. Uses
-    are placed in the order in which they are added. Words that are read later than they stand are copied on
-    the way by `build`.
+    piece has as many turns as the interval has cycles, and ``ceil(uses / interval)`` pieces serve all. In a
+    *spaced* graph beats come at any distance from the interval on: then the uses of a piece lie within as
+    many stages as the interval has cycles, and there are as many more pieces as that takes. Uses are placed
+    in the order in which they are added. Words that are read later than they stand are copied on the way by
+    `build`.
 
     Parameters
     ----------
@@ -97,6 +99,8 @@ class Dataflow:
         Initiation interval of the unit, at least 1.
     multiplications : int
         How many there will be.
+    spaced : bool
+        Whether beats come at any distance from the interval on; see `PipelinedUnit`.
     low_latency : bool
         Whether a product takes a single register, two cycles in all: for a unit whose results are waited for.
 
@@ -106,10 +110,13 @@ class Dataflow:
         If the interval is less than 1.
     """
 
-    def __init__(self, interval: int, multiplications: int = 0, *, low_latency: bool = False):
+    def __init__(
+        self, interval: int, multiplications: int = 0, *, spaced: bool = False, low_latency: bool = False
+    ):
         if interval < 1:
             raise ValueError(f"interval must be at least 1, not {interval}")
         self.interval = interval
+        self.spaced = spaced
         self._makers: list[tuple[Word, Callable[[_Build], Any]]] = []
         latency, product = MULTIPLIER_LATENCY, registered_product
         if low_latency:
@@ -158,9 +165,23 @@ class Dataflow:
     ) -> FunctionalUnit:
         """An operator for so many uses; the parameters are those of `Operator`."""
         pieces = -(-uses // self.interval)
-        return FunctionalUnit(
-            name, shapes, latency, make, [uses], [[True] * self.interval for _ in range(pieces)]
-        )
+        return FunctionalUnit(name, shapes, latency, make, [uses], [set() for _ in range(pieces)])
+
+    def _serves(self, taken: set[int], stage: int) -> bool:
+        """Whether a piece with uses at these stages serves one more, in any two beats."""
+        if self.spaced:
+            return stage not in taken and max(taken | {stage}) - min(taken | {stage}) < self.interval
+        return all((stage - other) % self.interval for other in taken)
+
+    def _place(self, functional_unit: FunctionalUnit, stage: int) -> tuple[int, int]:
+        """Piece and stage of a use, at the earliest from a stage on."""
+        for later in range(stage, stage + 2 * self.interval):
+            for piece, taken in enumerate(functional_unit.taken):
+                if self._serves(taken, later):
+                    taken.add(later)
+                    return piece, later
+        functional_unit.taken.append({stage})
+        return functional_unit.count - 1, stage
 
     def use(
         self,
@@ -201,10 +222,7 @@ class Dataflow:
         functional_unit.left[0] -= 1
         latency = functional_unit.latency if latency is None else latency
         stage = max(since - 1 - latency, *(word.stage for word in words))
-        while not any(turns[stage % self.interval] for turns in functional_unit.free):
-            stage += 1
-        piece = next(k for k, turns in enumerate(functional_unit.free) if turns[stage % self.interval])
-        functional_unit.free[piece][stage % self.interval] = False
+        piece, stage = self._place(functional_unit, stage)
 
         def make(build):
             given = operands(*(build.at(word, stage) for word in words))

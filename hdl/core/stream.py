@@ -211,9 +211,10 @@ class PipelinedUnit(wiring.Component):
 
     A beat taken in on one clock is offered on the output ``latency`` cycles later, unless the output waits:
     then the whole unit stands still, from the clock after the first on which a beat was not taken, and holds
-    its payloads (`offer`). As long as a beat is inside, the next is taken in a whole multiple of
-    ``initiation_interval`` cycles after it, not counting those of standing still. ``i.ready`` and ``o.valid``
-    follow from the unit's registers alone. Reset empties the unit.
+    its payloads (`skid_buffer`). As long as a beat is inside, the next is taken in a whole multiple of
+    ``initiation_interval`` cycles after it, not counting those of standing still; of a *spaced* unit any
+    number of cycles after it that is not less. ``i.ready`` and ``o.valid`` follow from the unit's registers
+    alone. Reset empties the unit.
 
     A subclass describes its registers in `datapath`, as if they moved on every clock. Control comes from the
     *age* of a beat: `at` tells whether a beat was taken in so many enabled cycles ago.
@@ -229,6 +230,8 @@ class PipelinedUnit(wiring.Component):
         with more, it gets a register that holds the input for ages 1 to ``initiation_interval``.
     constants : ShapeLike or None
         Shape of the port ``constants``: values that stay while beats are inside. ``None``: no such port.
+    spaced : bool
+        Whether the next beat may come at any distance from ``initiation_interval`` on.
 
     Members
     -------
@@ -248,11 +251,13 @@ class PipelinedUnit(wiring.Component):
         latency: int,
         initiation_interval: int = 1,
         constants: ShapeLike | None = None,
+        spaced: bool = False,
     ):
         if latency < 1 or initiation_interval < 1:
             raise ValueError("latency and initiation_interval must be at least 1")
         self.latency = latency
         self.initiation_interval = initiation_interval
+        self._spaced = spaced
         members = {"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))}
         if constants is not None:
             members["constants"] = In(constants)
@@ -285,7 +290,8 @@ class PipelinedUnit(wiring.Component):
         if self.initiation_interval == 1:
             m.d.comb += self.i.ready.eq(advance)
         else:
-            m.d.comb += self.i.ready.eq(self._turn(m, advance, accept))
+            schedule = self._wait if self._spaced else self._turn
+            m.d.comb += self.i.ready.eq(schedule(m, advance, accept))
         m.d.comb += accept.eq(self.i.valid & self.i.ready)
         with m.If(advance):
             m.d.sync += self._stages.eq(Cat(accept, self._stages[:-1]))
@@ -299,6 +305,21 @@ class PipelinedUnit(wiring.Component):
         m.submodules.datapath = EnableInserter(advance)(inner)
         m.d.comb += advance.eq(skid_buffer(m, self.o, self._stages[-1], result))
         return m
+
+    def _wait(self, m: Module, advance: Value, accept: Value) -> Value:
+        """Whether a beat may come: ``initiation_interval`` enabled cycles after the last one, or more.
+
+        A register, worked out a clock ahead.
+        """
+        ready = Signal(name="ready", init=1)
+        left = Signal(range(self.initiation_interval), name="left")
+        following = Signal.like(left, name="following")
+        m.d.comb += following.eq(
+            Mux(accept, self.initiation_interval - 1, Mux((left != 0) & advance, left - 1, left))
+        )
+        waits = self.o.valid & ~self.o.ready
+        m.d.sync += [left.eq(following), ready.eq(~waits & (following == 0))]
+        return ready
 
     def _turn(self, m: Module, advance: Value, accept: Value) -> Value:
         """Whether a beat may come: a shared part serves those of several ages, at turns fixed by distance.
