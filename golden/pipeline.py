@@ -351,6 +351,19 @@ class Design:
         if spans.values is None or spans.values.diffuse.shape != (len(spans), self.lights, 3):
             raise ValueError(f"method {self.method} takes spans with values for {self.lights} lights")
 
+    def operands(self, spans: Spans, constants: FrameConstants) -> Operands:
+        """Bit-accurate operands of every pixel of spans of one pixel or more, in the order of the spans.
+
+        Parameters
+        ----------
+        spans : Spans
+            Spans.
+        constants : FrameConstants
+            L and H of each light.
+        """
+        every = np.arange(len(spans))
+        return self._operands_of(spans, every, np.asarray(spans.length), constants)(slice(None))
+
     def _operands_of(
         self, spans: Spans, kept: np.ndarray, length: np.ndarray, constants: FrameConstants
     ) -> Callable[[slice], Operands]:

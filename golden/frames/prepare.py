@@ -13,7 +13,7 @@ from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["PreparedFrame", "constants_of", "prepare", "quantise_spans", "sort_by_material"]
+__all__ = ["PreparedFrame", "constants_of", "prepare", "quantise_spans", "sort_by_material", "spans_for"]
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,21 @@ def prepare(scene: Scene, design: Design) -> PreparedFrame:
     raster = rasterise(scene)
     cut, count = cut_spans(scene, raster, design)
     cut = sort_by_material(cut, scene.mesh.material)
+    return PreparedFrame(raster, cut, count, spans_for(scene, cut, design))
+
+
+def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
+    """The input beats of a pipeline for spans that are cut for it: normals, true lines or values.
+
+    Parameters
+    ----------
+    scene : Scene
+        Materials, lights and viewer.
+    cut : Raster
+        Spans from `cut_spans`.
+    design : Design
+        The pipeline.
+    """
     spans = quantise_spans(cut, scene.mesh.material)
     if design.takes_values:
         spans = replace(spans, values=local_values(scene, cut, design.lights))
@@ -59,7 +74,7 @@ def prepare(scene: Scene, design: Design) -> PreparedFrame:
         spans = replace(spans, normal_left=left, normal_right=right)
     elif design.interpolator.TAKES_MIDDLE:
         spans = replace(spans, normal_middle=quantise(middle_normals(cut)))
-    return PreparedFrame(raster, cut, count, spans)
+    return spans
 
 
 def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
