@@ -24,8 +24,8 @@ class RenormaliserUnit(PipelinedUnit):
 
     `Renormaliser`, the bit-accurate model, has segments, formats, error bounds and flag.
 
-    The latency is 16 cycles (leading one, its place, two for the shift, dot product 3, octave, table, four for
-    the polynomial, product, rounding, saturation), the initiation interval 1. Eight multipliers: three
+    The latency is 16 cycles (leading one, its place, two for the shift, dot product 3, octave, table, four
+    for the polynomial, product, rounding, saturation), the initiation interval 1. Eight multipliers: three
     squares, two in the polynomial, three products with the factor. The table holds 64 words of 48 bits.
 
     Parameters

@@ -16,7 +16,7 @@ _FORMAT = LineSetup.VECTOR_FORMAT
 
 
 def any_lines(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of the ends of lines: lengths in any proportion to 1:100, any angle; every eighth of any words."""
+    """Codes of the ends of lines: lengths to 1:100, any angle; every eighth of any words."""
     ends = [sphere(rng, count) * 10.0 ** -rng.uniform(0, 2, (count, 1)) for _ in range(2)]
     left, right = quantise_line(*ends)
     left[::8], right[::8] = any_codes(rng, _FORMAT, 2, *left[::8].shape)
