@@ -48,7 +48,7 @@ MODELS: dict[str, Specular | Power] = {
 
 
 def preset(
-    method: str = "quadratic",
+    method: str = "chord",
     model: str | None = "cosquad",
     lights: int = 1,
     *,

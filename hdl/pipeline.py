@@ -329,7 +329,9 @@ class ShadingPipelineUnit(wiring.Component):
                     m.d.sync += frame.material.eq(material)
             with m.Elif(~waited.all()):
                 m.d.sync += waited.eq(waited + 1)
-            m.d.comb += settled.eq((material == frame.material) & waited.all())
+            # Of no payload that is not valid: its bits may be unknown.
+            same = (material == frame.material) & waited.all()
+            m.d.comb += settled.eq(~self.i.valid | same)
         else:
             m.d.comb += settled.eq(1)
         return admit

@@ -17,7 +17,7 @@ from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["cut_by_angle", "cut_by_error", "cut_spans"]
+__all__ = ["cut_by_angle", "cut_by_error", "cut_spans", "missed_spans"]
 
 
 def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int]:
@@ -179,6 +179,25 @@ def cut_by_error(scene: Scene, raster: Raster, interpolator: Interpolator) -> tu
         return wide
 
     return _halve(raster, is_wide)
+
+
+def missed_spans(scene: Scene, raster: Raster, interpolator: Interpolator) -> int:
+    """How many spans of a raster the method's own curve misses by more than its tolerances.
+
+    Parameters
+    ----------
+    scene, raster, interpolator
+        As for `cut_by_error`.
+    """
+    exponents = np.array([material.exponent for material in scene.materials])
+    spans = np.flatnonzero(raster.length > 2)
+    missed = 0
+    for part in chunks(len(spans)):
+        origin = spans[part]
+        pieces = _Pieces.of(scene, raster, origin, np.zeros_like(origin), raster.length[origin] - 1)
+        exponent = exponents[scene.mesh.material[raster.triangle[origin]]]
+        missed += int(np.count_nonzero(pieces.miss(interpolator, exponent)))
+    return missed
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.cut import cut_spans
+from blysk.golden.frames.cut import cut_spans, missed_spans
 from blysk.golden.frames.local import line_ends, local_values, middle_normals
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise
@@ -30,12 +30,16 @@ class PreparedFrame:
         Spans of ``raster`` that were cut.
     spans : Spans
         Spans of ``cut_raster``, quantised: the pipeline's input.
+    missed_spans : int
+        Of a method whose spans are not cut by its error: those that its curve misses by more than a quarter
+        of an LSB.
     """
 
     raster: Raster
     cut_raster: Raster
     spans_cut: int
     spans: Spans
+    missed_spans: int = 0
 
 
 def prepare(scene: Scene, design: Design) -> PreparedFrame:
@@ -51,7 +55,10 @@ def prepare(scene: Scene, design: Design) -> PreparedFrame:
     raster = rasterise(scene)
     cut, count = cut_spans(scene, raster, design)
     cut = sort_by_material(cut, scene.mesh.material)
-    return PreparedFrame(raster, cut, count, spans_for(scene, cut, design))
+    method, missed = design.interpolator, 0
+    if not (method.CUT_BY_ERROR or method.takes_line):
+        missed = missed_spans(scene, cut, method)
+    return PreparedFrame(raster, cut, count, spans_for(scene, cut, design), missed)
 
 
 def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:

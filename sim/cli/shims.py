@@ -29,7 +29,7 @@ def design_options(command):
         click.option("--gate/--no-gate", default=False),
         click.option("--highlight", type=Choice("form", ("dot", "chord"))),
         click.option("--model", type=Choice("reflection model", REFLECTION_MODELS), default="cosquad"),
-        click.option("--method", type=Choice("method", METHODS | PUBLISHED), default="quadratic"),
+        click.option("--method", type=Choice("method", METHODS | PUBLISHED), default="chord"),
     ):
         command = option(command)
     return command
