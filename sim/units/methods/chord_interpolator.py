@@ -22,6 +22,7 @@ from blysk.sim.units.operands import (
     component_words,
     degrees_between,
     dot,
+    light_constants,
     short_lengths,
     span_lengths,
     sphere,
@@ -121,7 +122,7 @@ def gated_beats(
     if unit.gate is None:
         return operand_beats(unit, operands)
     span, pixel = pixels_of(length)
-    u = values.highlight[span]
+    u = values.highlight[span].astype(np.int64)
     own = np.where(pixel[:, np.newaxis] == 0, u[..., 0], u[..., 2])
     u = np.where((length[span] < 3)[:, np.newaxis, np.newaxis], own[..., np.newaxis], u)
     exponent = unit.gate.exponent or exponent
@@ -186,7 +187,7 @@ def _case(unit, rng, left, right, length, exponent=None):
     length = np.maximum(length % (1 << unit.length_bits), 1)
     direction, halfway = (unit_codes(rng, unit.lights) for _ in range(2))
     halfway[::2] = left[rng.integers(0, len(left), len(halfway[::2]))]
-    constants = {"lights": {"direction": direction, "halfway": halfway}}
+    constants = {"lights": light_constants(unit, direction, halfway)}
     if unit.highlights:
         constants["exponent"] = exponent or EXPONENT
     beats = {"normal_left": left, "normal_middle": _middles(rng, left, right), "normal_right": right}
