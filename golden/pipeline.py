@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
 from blysk.golden.methods.interpolator import Interpolator, Operands
-from blysk.golden.methods.local_chord_interpolator import SpanValues
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
@@ -46,7 +46,7 @@ class Spans:
     length: np.ndarray
     normal_left: np.ndarray
     normal_right: np.ndarray
-    material: np.ndarray | None = None
+    material: np.ndarray = None  # type: ignore[assignment]  # becomes an array
     values: SpanValues | None = None
 
     def __post_init__(self):
@@ -60,7 +60,7 @@ class Spans:
         """Some of the spans, by a slice, indices or a mask."""
         values = self.values if self.values is None else SpanValues(*(codes[which] for codes in self.values))
         fields = ("x", "y", "length", "normal_left", "normal_right", "material")
-        return Spans(*(getattr(self, name)[which] for name in fields), values)
+        return Spans(**{name: getattr(self, name)[which] for name in fields}, values=values)
 
 
 @dataclass(frozen=True)
@@ -206,6 +206,7 @@ class Design:
     @cached_property
     def highlight_gate(self) -> HighlightGate:
         """Bit-accurate model of the highlight gate."""
+        assert self.specular is not None
         return HighlightGate(self.specular, interpolator=self.interpolator)
 
     def lit_spans(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> np.ndarray:
@@ -304,8 +305,9 @@ class Design:
     ) -> Callable[[slice], Operands]:
         """Function from a part of the kept spans to the operands of its pixels."""
         if self.takes_values:
-            values = spans[kept].values
-            return lambda part: self.interpolator.compute_values(
+            interpolator, values = cast(LocalChordInterpolator, self.interpolator), spans[kept].values
+            assert values is not None
+            return lambda part: interpolator.compute_values(
                 SpanValues(*(codes[part] for codes in values)), length[part]
             )
         left, right = (Fixed(COMPONENT, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
@@ -336,7 +338,8 @@ class Design:
         return Intensity(self.lights, has_specular=self.specular is not None, channels=1 if self.grey else 3)
 
     @staticmethod
-    def _colors(constants: FrameConstants) -> tuple[Fixed, ...]:
+    def _colors(constants: FrameConstants) -> tuple[Fixed, Fixed, Fixed]:
         """Ambient, diffuse and specular colour operands."""
         colors = (constants.ambient, constants.diffuse, constants.specular)
-        return tuple(Fixed(Intensity.COLOR_FORMAT, codes) for codes in colors)
+        ambient, diffuse, specular = (Fixed(Intensity.COLOR_FORMAT, codes) for codes in colors)
+        return ambient, diffuse, specular

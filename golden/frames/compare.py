@@ -3,15 +3,17 @@
 import math
 from dataclasses import dataclass, fields
 from time import perf_counter
+from typing import cast
 
 import numpy as np
 
 from blysk.golden.frames.frame import Frame
 from blysk.golden.frames.local import local_values
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import Raster
-from blysk.golden.reference.reflection import BLINN
+from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.reference.renderer import render, shade_operands, shade_spans
 from blysk.golden.reference.scene import Scene
 
@@ -68,11 +70,17 @@ def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarra
     interpolator = design.interpolator
     if design.takes_values:
         values = local_values(scene, raster)
-        cosine, one_minus_cosine = interpolator.exact_operands(values, raster.length)
-        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, design.specular.model)
-    return shade_spans(
-        scene, raster, interpolator.exact_normals, design.specular.model, interpolator.uses_chord
-    )
+        cosine, one_minus_cosine = cast(LocalChordInterpolator, interpolator).exact_operands(
+            values, raster.length
+        )
+        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, _model_of(design))
+    return shade_spans(scene, raster, interpolator.exact_normals, _model_of(design), interpolator.uses_chord)
+
+
+def _model_of(design: Design) -> ReflectionModel:
+    if design.specular is None:
+        raise ValueError("a design without specular light has no reflection model to compare with")
+    return design.specular.model
 
 
 def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
@@ -87,17 +95,16 @@ def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
     """
     start = perf_counter()
     same_method = method_in_float64(scene, design, frame.cut_raster)
-    golden = shade_spans(scene, frame.raster, "normalised", design.specular.model)
+    golden = shade_spans(scene, frame.raster, "normalised", _model_of(design))
     exact = render(scene, "phong", BLINN, raster=frame.raster)
     seconds = perf_counter() - start
-    if exact.mask.any():
-        figures = [
-            error_figures(frame.image, reference * 255, exact.mask)
-            for reference in (same_method, golden, exact.image)
-        ]
-        shown, reference = frame.image[exact.mask], exact.image[exact.mask] * 255
-        squares = (nmse(shown, reference), *mnse_published(shown, reference))
-    else:
-        figures = [ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))] * 3
-        squares = (math.nan,) * 3
-    return Comparison(golden, *figures, *squares, seconds)
+    nothing = ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))
+    if not exact.mask.any():
+        return Comparison(golden, nothing, nothing, nothing, math.nan, math.nan, math.nan, seconds)
+    arithmetic, method, total = (
+        error_figures(frame.image, reference * 255, exact.mask)
+        for reference in (same_method, golden, exact.image)
+    )
+    shown, reference = frame.image[exact.mask], exact.image[exact.mask] * 255
+    published, share = mnse_published(shown, reference)
+    return Comparison(golden, arithmetic, method, total, nmse(shown, reference), published, share, seconds)
