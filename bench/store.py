@@ -17,7 +17,7 @@ import blysk.bench
 import blysk.golden
 import blysk.hdl
 import blysk.sim
-from blysk.sim.engines.cxxrtl import cache_folder
+from blysk.sim.engines.cache import cache_folder
 from blysk.sim.errors import InputError
 from blysk.sim.output import plain, write_json
 

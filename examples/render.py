@@ -1,4 +1,4 @@
-"""The Utah teapot through simulated hardware, and that hardware as Verilog: python examples/render.py FOLDER."""
+"""The Utah teapot through simulated hardware, and the hardware as Verilog: python render.py FOLDER."""
 
 import sys
 from pathlib import Path

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -54,7 +54,7 @@ class Spans:
     length: np.ndarray
     normal_left: np.ndarray
     normal_right: np.ndarray
-    material: np.ndarray | None = None
+    material: np.ndarray = None  # type: ignore[assignment]  # becomes an array
     values: SpanValues | None = None
     normal_middle: np.ndarray | None = None
 
@@ -78,7 +78,8 @@ class Spans:
         values = self.values if self.values is None else SpanValues(*(codes[which] for codes in self.values))
         fields = ("x", "y", "length", "normal_left", "normal_right", "material")
         middle = self.normal_middle if self.normal_middle is None else self.normal_middle[which]
-        return Spans(*(getattr(self, name)[which] for name in fields), values, middle)
+        chosen = {name: getattr(self, name)[which] for name in fields}
+        return Spans(**chosen, values=values, normal_middle=middle)
 
 
 @dataclass(frozen=True)
@@ -231,6 +232,7 @@ class Design:
     @cached_property
     def highlight_gate(self) -> HighlightGate | ValueGate:
         """Bit-accurate model of the gate."""
+        assert self.specular is not None
         if isinstance(self.interpolator, ChordInterpolator):
             return ValueGate(self.specular)
         return HighlightGate(self.specular, interpolator=self.interpolator)
@@ -369,8 +371,9 @@ class Design:
     ) -> Callable[[slice], Operands]:
         """Function from a part of the kept spans to the operands of its pixels."""
         if self.takes_values:
-            values = spans[kept].values
-            return lambda part: self.interpolator.compute_values(
+            interpolator, values = cast(ChordInterpolator, self.interpolator), spans[kept].values
+            assert values is not None
+            return lambda part: interpolator.compute_values(
                 SpanValues(*(codes[part] for codes in values)), length[part]
             )
         format = self.interpolator.END_FORMAT
@@ -407,7 +410,8 @@ class Design:
         return Intensity(self.lights, has_specular=self.specular is not None, channels=1 if self.grey else 3)
 
     @staticmethod
-    def _colors(constants: FrameConstants) -> tuple[Fixed, ...]:
+    def _colors(constants: FrameConstants) -> tuple[Fixed, Fixed, Fixed]:
         """Ambient, diffuse and specular colour operands."""
         colors = (constants.ambient, constants.diffuse, constants.specular)
-        return tuple(Fixed(Intensity.COLOR_FORMAT, codes) for codes in colors)
+        ambient, diffuse, specular = (Fixed(Intensity.COLOR_FORMAT, codes) for codes in colors)
+        return ambient, diffuse, specular

@@ -1,5 +1,6 @@
 """What a user installs: the wheel, what is in it, and that it renders with the oldest versions it allows."""
 
+import os
 import re
 import subprocess
 import sys
@@ -12,6 +13,8 @@ import numpy as np
 import pytest
 from packaging.requirements import Requirement
 from PIL import Image
+
+import blysk
 
 PROJECT = Path(__file__).parents[1]
 RENDER = ("render", "teapot", "--triangles", "500", "--size", "48x36", "-o")
@@ -69,12 +72,107 @@ def test_wheel_holds_the_packages_and_no_more(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     packages = {name.split("/")[0] for name in names}
-    assert packages - {f"blysk-{metadata()['version']}.dist-info"} == {"golden", "hdl", "sim", "bench"}
+    assert packages - {f"blysk-{metadata()['version']}.dist-info"} == {"blysk"}
+    assert "blysk/py.typed" in names
     assert any(name.endswith("licenses/LICENSE") for name in names)
     unwanted = [name for name in names if re.search(r"test|\.(png|gif|vcd|obj|glb|pyc)$", name)]
     # What writes a bench to take away, and the bench.
-    assert unwanted == ["sim/frames/testbench.py", "sim/frames/templates/test_pipeline.py"]
+    assert unwanted == ["blysk/sim/frames/testbench.py", "blysk/sim/frames/templates/test_pipeline.py"]
     assert wheel.stat().st_size < 1_000_000
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory):
+    """Python of a new environment with the wheel, and the libraries of this one."""
+    folder = tmp_path_factory.mktemp("installed")
+    run(sys.executable, "-m", "venv", "--without-pip", folder)
+    python = folder / "bin" / "python"
+    run(sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps", "--no-index", wheel)
+    (site,) = folder.glob("lib/python*/site-packages")
+    # A path in a .pth file is searched, but its own .pth files, as of this checkout, are not read.
+    libraries = [path for path in sys.path if Path(path).name in ("site-packages", "dist-packages")]
+    (site / "libraries.pth").write_text("\n".join(libraries))
+    return python
+
+
+_TABLE = """
+from blysk.sim.units.registry import RECORDS
+for name in RECORDS.keys() - {"dot_product"}:
+    del RECORDS[name]
+from blysk.sim.cli.main import main
+raise SystemExit(main())
+"""
+
+_UNIT = """
+import blysk
+from blysk.hdl.emit.verilog import emit
+from blysk.sim.units.registry import RECORDS
+print(blysk.__file__)
+record = RECORDS["dot_product"]
+print(emit(record.variants[record.default].unit(), "unit").partition("module")[2])
+"""
+
+
+@pytest.mark.long
+def test_wheel_in_a_project_with_packages_of_the_same_names(installed, tmp_path):
+    """A render, a Verilog, the table of units and a unit, beside a project's own hdl, sim and bench."""
+    for name in ("golden", "hdl", "sim", "bench", "tests"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text("raise ImportError('this is the project of a user')\n")
+    run(installed.with_name("blysk"), *RENDER, "a.png", cwd=tmp_path)
+    with Image.open(tmp_path / "a.png") as picture:
+        assert picture.size == (48, 36)
+    assert "\nmodule core (" in run(installed, "-m", "blysk", "verilog", "--name", "core", cwd=tmp_path)
+    # The table of all units takes minutes.
+    table = run(installed, "-c", _TABLE, "blocks", "--samples", "1000", "--jobs", "1", cwd=tmp_path)
+    assert "dot_product" in table
+    where, _, verilog = run(installed, "-c", _UNIT, cwd=tmp_path).partition("\n")
+    assert Path(where).is_relative_to(installed.parents[1])
+    assert "endmodule" in verilog
+
+
+_USER = """
+import numpy as np
+
+import blysk
+
+scene: blysk.Scene = blysk.scene("teapot", size=(64, 48), lights=[blysk.Light((1, 1, 1))], background="#fff")
+design: blysk.Design = blysk.design(method="chord", lights=2, gate=True)
+frame: blysk.RenderedFrame = blysk.render(scene, design=design, engine="auto")
+other = blysk.render("teapot", method="chord", exponent=200, view=(0, 0, 1))
+image: np.ndarray = frame.image
+figures: tuple[float, float, int, int] = frame.error.max_lsb, frame.error.psnr_db, frame.cycles, frame.spans
+text: str = blysk.verilog(design, name="core")
+materials: tuple[blysk.Material, ...] = scene.materials
+mesh: blysk.Mesh = scene.mesh
+camera: blysk.Camera = scene.camera
+errors = (blysk.InputError, blysk.SimulationError, blysk.CompilerMissing)
+"""
+
+
+@pytest.mark.long
+def test_types_of_the_wheel(wheel, tmp_path):
+    """The public modules by mypy's defaults, and a program that uses every public name by ``--strict``.
+
+    Other modules are read for the types that they state, and not checked: `follow_imports = silent`.
+    """
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "site")
+    (tmp_path / "user.py").write_text(_USER)
+    assert all(f"blysk.{name}" in _USER for name in blysk.__all__)
+    check = [sys.executable, "-m", "mypy", "--follow-imports=silent", "--no-incremental"]
+    paths = os.environ | {"MYPYPATH": str(tmp_path / "site")}
+    modules = ["blysk", *sorted({getattr(blysk, name).__module__ for name in blysk.__all__})]
+    public = [word for name in modules for word in ("-m", name)]
+    run(*check, "--disable-error-code=import-untyped", *public, cwd=tmp_path, env=paths)
+    run(*check, "--strict", "user.py", cwd=tmp_path, env=paths)
+    wrong = _USER + "blysk.render('teapot', exponent='high', shine=3)\n"
+    (tmp_path / "wrong.py").write_text(wrong)
+    done = subprocess.run(
+        [*check, "--strict", "wrong.py"], capture_output=True, text=True, cwd=tmp_path, env=paths
+    )
+    assert "exponent" in done.stdout
+    assert "shine" in done.stdout
 
 
 @pytest.mark.long
@@ -95,9 +193,7 @@ def test_wheel_renders_with_the_oldest_versions(wheel, tmp_path):
     old, new = (np.asarray(Image.open(tmp_path / name)) for name in ("old.png", "new.png"))
     np.testing.assert_array_equal(old, new)
     # The commands of the extras are there, and say what is missing.
-    done = subprocess.run(
-        [python.with_name("blysk"), "fpga", "--device", "gpq"], capture_output=True, text=True, cwd=tmp_path
-    )
+    done = subprocess.run([python.with_name("blysk"), "fpga"], capture_output=True, text=True, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("blysk: fpga: ")
     assert done.stderr.endswith("pip install 'blysk[fpga]'\n")

@@ -18,6 +18,7 @@ from amaranth.lib.wiring import Component, In, Member, Out
 from blysk.bench.quality.equivalence import yosys
 from blysk.bench.tools.place_and_route import ToolError
 from blysk.sim.engines import cxxrtl
+from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.engine import CompilerMissing, Ports, Stimulus, Trace
 from blysk.sim.engines.simulate import stimulus_of
 from blysk.sim.units.record import Record
@@ -229,7 +230,7 @@ class Mutants(cxxrtl.Model):
             self.ports.status = unsigned(32 * len(flags))
         source = resources.files(__package__).joinpath("mutants.cc").read_text(encoding="utf-8")
         driver = cxxrtl._members(self.ports) + cxxrtl._source("cxxrtl_driver.cc") + source
-        compiler = next(cxxrtl.find_compilers(), None)
+        compiler = next(find_compilers(), None)
         if compiler is None:
             raise CompilerMissing("no C++ compiler")
         # Compiling takes longer than running.

@@ -34,7 +34,7 @@ from blysk.bench.store import Task
 from blysk.bench.tools.place_and_route import tool_versions
 from blysk.golden.presets import METHODS, MODELS, PUBLISHED
 from blysk.golden.reference.renderer import SHADINGS
-from blysk.sim.engines.cxxrtl import find_compilers
+from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.errors import InputError
 
 __all__ = [

@@ -19,7 +19,7 @@ from amaranth.lib.wiring import Component
 
 from blysk.hdl.emit.verilog import emit
 from blysk.sim.engines.beats import pack, word_count
-from blysk.sim.engines.cxxrtl import find_compilers
+from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.engine import Ports, SimulationError, Stimulus
 
 __all__ = ["OPTIONS", "Verilated", "free_stimulus", "verilator_folder"]

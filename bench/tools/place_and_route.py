@@ -24,7 +24,7 @@ from amaranth.lib.wiring import Out
 
 from blysk.bench.store import version_of
 from blysk.bench.tools.families import ECP5, Family, Parts, Place, kind_of_cell, signal_name
-from blysk.sim.engines.cxxrtl import cache_folder
+from blysk.sim.engines.cache import cache_folder
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.errors import InputError
 from blysk.sim.output import write_json

@@ -12,7 +12,7 @@ from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import Raster
-from blysk.golden.reference.reflection import BLINN
+from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.reference.renderer import render, shade_operands, shade_spans
 from blysk.golden.reference.scene import Scene
 
@@ -71,13 +71,17 @@ def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarra
     if isinstance(interpolator, ChordInterpolator):
         values = local_values(scene, raster)
         cosine, one_minus_cosine = interpolator.exact_operands(values, raster.length)
-        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, design.specular.model)
+        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, _model_of(design))
     if interpolator.takes_line:
         left, right = line_ends(raster)
         raster = replace(raster, normal_left=left, normal_right=right)
-    return shade_spans(
-        scene, raster, interpolator.exact_normals, design.specular.model, interpolator.uses_chord
-    )
+    return shade_spans(scene, raster, interpolator.exact_normals, _model_of(design), interpolator.uses_chord)
+
+
+def _model_of(design: Design) -> ReflectionModel:
+    if design.specular is None:
+        raise ValueError("a design without specular light has no reflection model to compare with")
+    return design.specular.model
 
 
 def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
@@ -92,17 +96,16 @@ def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
     """
     start = perf_counter()
     same_method = method_in_float64(scene, design, frame.cut_raster)
-    golden = render(scene, "phong", design.specular.model, raster=frame.raster).image
+    golden = render(scene, "phong", _model_of(design), raster=frame.raster).image
     exact = render(scene, "phong", BLINN, raster=frame.raster)
     seconds = perf_counter() - start
-    if exact.mask.any():
-        figures = [
-            error_figures(frame.image, reference * 255, exact.mask)
-            for reference in (same_method, golden, exact.image)
-        ]
-        shown, reference = frame.image[exact.mask], exact.image[exact.mask] * 255
-        squares = (nmse(shown, reference), *mnse_published(shown, reference))
-    else:
-        figures = [ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))] * 3
-        squares = (math.nan,) * 3
-    return Comparison(golden, *figures, *squares, seconds)
+    nothing = ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))
+    if not exact.mask.any():
+        return Comparison(golden, nothing, nothing, nothing, math.nan, math.nan, math.nan, seconds)
+    arithmetic, method, total = (
+        error_figures(frame.image, reference * 255, exact.mask)
+        for reference in (same_method, golden, exact.image)
+    )
+    shown, reference = frame.image[exact.mask], exact.image[exact.mask] * 255
+    published, share = mnse_published(shown, reference)
+    return Comparison(golden, arithmetic, method, total, nmse(shown, reference), published, share, seconds)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 __all__ = ["Mesh", "normalise"]
 
@@ -33,7 +34,7 @@ class Mesh:
     vertices: np.ndarray
     faces: np.ndarray
     normals: np.ndarray
-    material: np.ndarray | None = None
+    material: np.ndarray = None  # type: ignore[assignment]  # becomes an array
 
     def __post_init__(self):
         for name, array in (("vertices", self.vertices), ("faces", self.faces), ("normals", self.normals)):
@@ -55,7 +56,7 @@ class Mesh:
             )
 
 
-def normalise(vectors: np.ndarray) -> np.ndarray:
+def normalise(vectors: ArrayLike) -> np.ndarray:
     """Unit vectors along the last axis; a vector of length 0 stays 0.
 
     Parameters

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.reflection import ReflectionModel
@@ -142,7 +143,7 @@ class Material:
             raise ValueError(f"a material's exponent must be in 1 to 1000, not {self.exponent}")
 
 
-def halfway_vector(light_direction: Sequence[float], viewer: Sequence[float]) -> np.ndarray:
+def halfway_vector(light_direction: ArrayLike, viewer: ArrayLike) -> np.ndarray:
     """Unit half-way vectors ``H = (L + V) / |L + V|``, or zeros when ``L = -V`` ([B] 3).
 
     Parameters
@@ -185,7 +186,7 @@ def intensity(
     material: Material,
     lights: Sequence[Light],
     ambient_light: Sequence[float],
-    viewer: Sequence[float],
+    viewer: ArrayLike,
     model: ReflectionModel,
     chord: bool = False,
     points: np.ndarray | None = None,

@@ -18,7 +18,7 @@ from blysk.sim.api.options import COUNTS, DESIGN, DesignOptions
 from blysk.sim.api.settings import Settings, read_settings
 from blysk.sim.errors import OptionError
 
-__all__ = ["design", "design_of", "header_of", "verilog"]
+__all__ = ["design", "design_of", "header_of", "verilog", "verilog_and_unit"]
 
 
 def design(*, lights: int = 1, materials: int = 1, **options: Unpack[DesignOptions]) -> Design:
@@ -137,9 +137,14 @@ def verilog(design: Design | None = None, name: str = "blysk") -> str:
     InputError
         If the name is none in Verilog.
     """
+    return verilog_and_unit(Design() if design is None else design, name)[0]
+
+
+def verilog_and_unit(design: Design, name: str) -> tuple[str, ShadingPipelineUnit]:
+    """The same, and the pipeline that it is of."""
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise OptionError("name", name, "no Verilog name", "use letters, digits and underscores")
-    unit = ShadingPipelineUnit(Design() if design is None else design)
+    unit = ShadingPipelineUnit(design)
     constants = address_table(unit.parameters.lights, unit.parameters.materials)
     header = [*header_of(unit), "", "Frame constants, through the write port:", *constants]
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
@@ -147,6 +152,6 @@ def verilog(design: Design | None = None, name: str = "blysk") -> str:
         port: text for port, text in PORT_DESCRIPTIONS.items() if not port.startswith("i_") or port in fields
     }
     try:
-        return emit(unit, name, header=header, descriptions=descriptions)
+        return emit(unit, name, header=header, descriptions=descriptions), unit
     except ValueError as error:
         raise OptionError("name", name, str(error), "choose another name") from None

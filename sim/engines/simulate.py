@@ -51,7 +51,7 @@ class Run:
     cycles: np.ndarray
     input_cycles: np.ndarray
     total_cycles: int
-    status: np.generic | None
+    status: np.void | None
     engine: str
 
 

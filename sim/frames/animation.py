@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from PIL import Image
 
 from blysk.golden.frames.compare import compare
@@ -40,7 +41,7 @@ __all__ = [
 # The camera's way.
 
 
-def turned(vector: Sequence[float], axis: Sequence[float], count: int) -> np.ndarray:
+def turned(vector: ArrayLike, axis: ArrayLike, count: int) -> np.ndarray:
     """A vector turned once round an axis, in equal steps, counter-clockwise seen against the axis.
 
     Step k is ``v cos a + (u x v) sin a + u (u·v) (1 - cos a)`` with the axis' unit vector u and

@@ -139,6 +139,7 @@ class FrameSimulator:
         count = len(raster.span)
         report = None if progress is None else lambda done: progress(done, count)
         run = self._run(prepared.spans, constants, count, progress=report, vcd=vcd)
+        assert run.status is not None
         pixel = run.beats["y"].astype(np.int64) * scene.width + run.beats["x"]
         if not np.array_equal(pixel, raster.pixel):
             raise SimulationError("the simulated pipeline answered with other pixels than it was asked for")

@@ -245,7 +245,7 @@ def _brightest(unit, rng, count):
     constants.direction[:] = constants.halfway
     for color in (constants.ambient, constants.diffuse, constants.specular):
         color[...] = Intensity.color(np.array(8.0))
-    return case_of(unit, spans, constants, 0x3FFFF, 0, 0x15555, 0x2AAAA, 0x3FFFF)
+    return case_of(unit, spans, constants, 0x3FFFF, 0, 0x15555, 0x2AAAA, 20, 0x3FFFF)
 
 
 def _counters(unit, rng, count):
@@ -342,7 +342,7 @@ RECORD = Record(
     expect=_expect,
     status=_status,
     stimuli={
-        "spans": Stimulus(_spans, 3000),
+        "spans": Stimulus(_spans, 3000, repeats=3),
         "setups": Stimulus(_every_setup, 60, stalled=False),
         "terminator": Stimulus(_terminator),
         "roundings": Stimulus(_roundings),

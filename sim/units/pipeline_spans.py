@@ -54,8 +54,10 @@ def any_constants(
         halfway[:] = spans.normal_left[rng.integers(0, len(spans), lights)]
     found = []
     for _ in range(design.materials):
-        exponent = design.build.exponent or int(rng.choice([1, 20, 200, 1000, rng.integers(1, 1001)]))
-        colors = [Intensity.color(rng.uniform(0, brightness, (lights, 3))) for _ in range(2)]
+        chosen = [1, 20, 200, 1000, rng.integers(1, 1001), 513 + 2 * rng.integers(243)]
+        exponent = design.build.exponent or int(rng.choice(chosen))
+        # Odd codes: the last bits of their products count.
+        colors = [Intensity.color(rng.uniform(0, brightness, (lights, 3))) | 1 for _ in range(2)]
         if design.specular is None:
             colors[1][:] = 0
         ambient = Intensity.color(rng.uniform(0, 0.2, 3))

@@ -1,9 +1,12 @@
 """The end of a command: one line and a status for each kind of error."""
 
+import re
+
 import click
 import pytest
 
 from blysk.bench.command import run
+from blysk.sim.cli.main import main
 from blysk.sim.engines.engine import CompilerMissing, SimulationError
 from blysk.sim.errors import InputError
 
@@ -27,3 +30,35 @@ def test_errors_are_one_line_and_a_status(error, status, text, capsys):
 
     assert run(command, "bench.x", []) == status
     assert capsys.readouterr() == ("", text)
+
+
+@pytest.mark.parametrize("name", ["bench", "blocks", "explore", "fpga", "pages", "web"])
+def test_help_has_an_example(name, capsys):
+    assert main([name, "--help"]) == 0
+    assert re.search(rf"Examples?:\n +blysk {name} ", capsys.readouterr().out)
+    assert main(["--help"]) == 0
+    assert re.search(rf"\n  {name} +\S", capsys.readouterr().out)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["blocks", "--samples", "many"], "--samples many: not a whole number; give a whole number from"),
+        (["blocks", "--samples", "999"], "--samples 999: out of range; give a whole number from 1000 to"),
+        (["blocks", "--jobs", "0"], "--jobs 0: out of range; give a whole number from 1 to"),
+        (["blocks", "--seed", "-1"], "--seed -1: out of range; give a whole number from 0 to"),
+        (["blocks", "--json", "nowhere/x"], "nowhere/x: cannot be written, there is no folder nowhere; make"),
+        (["pages", "nowhere"], "nowhere/README.md: cannot be written, there is no folder nowhere; make"),
+        (["pages", "file"], "file/README.md: cannot be written, file is no folder; choose"),
+        (["pages", ".", "--unit", "x"], "--unit x: unknown unit; use one of "),
+    ],
+)
+def test_bad_input_is_one_line(arguments, line, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    assert main(arguments) == 2
+    output, errors = capsys.readouterr()
+    assert output == ""
+    assert errors.startswith(f"blysk: {line}")
+    assert errors.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -22,7 +22,7 @@ from amaranth.lib.wiring import Component
 
 from blysk.hdl.emit.verilog import emit
 from blysk.sim.engines.beats import pack, unpack
-from blysk.sim.engines.cxxrtl import find_compilers
+from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.engine import Ports
 
 __all__ = ["SIMULATORS", "BenchError", "Found", "VerilogBench", "assert_beats", "missing_tool"]

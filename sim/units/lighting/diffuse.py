@@ -47,7 +47,7 @@ def _variants():
     yield "", Variant(DiffuseUnit, _measure, "N.L -1 to 1")
     for latency, interval in ((7, 1), (3, 2), (10, 2), (11, 3), (10, 6)):
         unit = partial(DiffuseUnit, latency=latency, initiation_interval=interval)
-        is_long = (latency, interval) not in ((7, 1), (11, 3))
+        is_long = (latency, interval) != (11, 3)
         yield f"latency {latency}, interval {interval}", Variant(unit, long=is_long)
 
 

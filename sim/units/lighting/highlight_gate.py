@@ -150,7 +150,7 @@ def _variants():
     )
     for interval in (1, 2, 3, 5, 8, 15):
         unit = partial(HighlightGateUnit, initiation_interval=interval)
-        yield f"interval {interval}", Variant(unit, long=interval != 1)
+        yield f"interval {interval}", Variant(unit, long=True)
     p = HighlightGate(Specular(REFLECTION_MODELS["lyon2"]))
     yield "lyon2, interval 4", Variant(partial(HighlightGateUnit, p, initiation_interval=4), long=True)
     for bits in (5, 6, 9):

@@ -94,7 +94,7 @@ def _variants():
         yield f"1 light, {style}", Variant(unit, _measure, "all terms", "LSB")
     for style, unit in styles.items():
         for lights in (2, 3, 16):
-            is_long = (lights, style) not in ((2, "throughput"), (3, "compact"))
+            is_long = (lights, style) != (3, "compact")
             yield f"{lights} lights, {style}", Variant(partial(unit, Intensity(lights)), long=is_long)
         p = Intensity(2, channels=1)
         yield f"1 channel, {style}", Variant(partial(unit, p), long=style != "compact")
@@ -110,7 +110,7 @@ RECORD = Record(
     expect=_expect,
     stimuli={
         "terms": Stimulus(_terms, 400),
-        "bright": Stimulus(_bright, 400),
+        "bright": Stimulus(_bright, 400, repeats=4),
         "sizes": Stimulus(_sizes, 5000, stalled=False, repeats=40),
         "halves": Stimulus(_halves, 1000, variants=("1 light, throughput", "1 light, compact")),
     },

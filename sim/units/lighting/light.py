@@ -103,8 +103,7 @@ def _variants():
     for name, interval, gated in (("cosquad", 1, False), ("coscos2", 1, True), ("coscos4", 6, True)):
         p = Specular(REFLECTION_MODELS[name], "one_minus_cosine")
         unit = partial(LightUnit, p, _CHORD, initiation_interval=interval, gated=gated)
-        is_long = name != "coscos2"
-        yield f"{name} of a chord, interval {interval}" + ", gated" * gated, Variant(unit, long=is_long)
+        yield f"{name} of a chord, interval {interval}" + ", gated" * gated, Variant(unit, long=True)
     for interval, gated in ((1, False), (42, True)):
         unit = partial(
             LightUnit, Power("one_minus_cosine"), _CHORD, initiation_interval=interval, gated=gated

@@ -53,4 +53,9 @@ RECORD = Record(
         ),
         "x_9": "It is for the saturation, and p + q - pq never does.",
     },
+    still={
+        "the second bit of a square is 0": "x_{0-8}_product[1]",
+        "twice a number is even": "x_{0-8}_sum[0]",
+        "p + q - pq is not negative for p and q of 0 to 1": "x_{0-8}_difference[35] s_{1-9}_difference[35]",
+    },
 )

@@ -93,7 +93,7 @@ def expect(unit, case):
 
 _SERVED = tuple(model for model in REFLECTION_MODELS.values() if isinstance(model, Specular.SERVED))
 _PUBLISHED = ("cosquad", "cosquad7", "cosquad_lin")
-_QUICK = ("cosquad", "exp", "coscos2")
+_QUICK = ("cosquad", "exp")
 """A model of each structure; another number of squares is that of a variant below."""
 
 
@@ -155,7 +155,7 @@ def _others():
         p = Specular(REFLECTION_MODELS[name], as_published=as_published)
         unit = partial(SpecularUnit, p, initiation_interval=interval)
         variant = f"{name}, interval {interval}" + ", as published" * as_published
-        is_long = name != "coscos4" and not as_published
+        is_long = name != "coscos4"
         yield variant, Variant(unit, as_published=as_published, long=is_long)
     for name, interval in (("cosquad", 1), ("coscos4", 3)):
         p = Specular(REFLECTION_MODELS[name])
@@ -199,7 +199,11 @@ RECORD = Record(
     logarithmic=True,
     still={
         "a slope is n / 2, and n of 10 bits, normalised to 17, ends in seven zeros": (
-            "datapath.slope.slope_word[0-16] datapath.slope.$signal[0-6] datapath.product[0-6]"
+            "datapath.slope.slope_word[0-16] datapath.slope.scale[0-6] datapath.product[0-6]"
+        ),
+        "the exponent stays for a run, so that what follows from it does not fall": (
+            "slope_word[17-26] slope.scale[7-16] slope.shift[0-3] slope.boundary[0-16] "
+            "boundaries.port__data[0-16]"
         ),
         "the second bit of a square is 0": "datapath.square[1]",
     },

@@ -30,7 +30,7 @@ RECORD = Record(
     still=COSINES
     | {
         "half of 128 segments is the most that ends are apart or written last": "half[7] write_index[7]",
-        "the normaliser has 16 spans inside at most": "ready_spans[4-8]",
+        "fewer than 32 spans fit into the normaliser": "ready_spans[5-8]",
         "a reciprocal is normalised and not negative, so that its first bits are 01": (
             "reciprocal[16-17] reciprocals.table_port__data[16]"
         ),

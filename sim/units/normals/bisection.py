@@ -136,4 +136,5 @@ RECORD = Record(
         ),
         "total_2": "Inverted every second cycle, and read in those cycles only.",
     },
+    still={"the first sum of the polynomials is 0.056, or 0.136 to 0.303": "total_2[17]"},
 )

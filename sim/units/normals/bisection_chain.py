@@ -154,4 +154,8 @@ RECORD = Record(
         ),
         "factor": "Operands are read on the cycle after they come; m, a product of factors, is not negative.",
     },
+    still={
+        "weights are not negative": "top.weight_{l,m}[21]",
+        "a pair comes on every cycle, and is accepted": "dot_product.stages[0-2] dot_product.held[0]",
+    },
 )

@@ -33,7 +33,7 @@ BASELINES = read()
 
 QUICK = (
     "frames: pipeline linear, cosquad, throughput",
-    *("parts: pipeline linear, cosquad, throughput", "parts: dot_product", "parts: chord_setup interval 4"),
+    *("parts: pipeline linear, cosquad, throughput", "parts: dot_product"),
 )
 """Of pipelines and units; all of them take minutes."""
 
@@ -87,7 +87,8 @@ def test_parts_are_those_of_the_cost():
     }
 
 
-def test_clocks_are_those_of_the_pixels():
+@pytest.mark.long
+def test_cycles_are_those_of_the_pixels():
     """The simulation by hand, to the last pixel; at least a clock a pixel."""
     design = preset("linear")
     cycles = cycles_of(design)

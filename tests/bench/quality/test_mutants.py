@@ -39,6 +39,7 @@ def test_waivers_are_of_a_signal_and_its_copies(monkeypatch):
     assert row.open == ("inv -> unit.other",)
 
 
+@pytest.mark.long
 def test_proofs_tell_faults_from_the_unit(tmp_path):
     """No killed mutant is equivalent, and the unit is equivalent to itself."""
     record = RECORDS["diffuse"]

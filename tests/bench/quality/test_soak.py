@@ -21,7 +21,7 @@ from blysk.sim.engines.engine import SimulationError
 DESIGN = {"method": "chord", "model": "cosquad", "gate": False, "seed": 1, "part": 0, "baseline": None}
 
 
-def test_every_method_of_a_pixel_a_clock_that_takes_normals():
+def test_every_method_of_a_pixel_a_cycle_that_takes_normals():
     assert {method for method, _, _ in DESIGNS} == set(METHODS) - {"bisection", "chord-local"}
 
 

@@ -56,6 +56,7 @@ def test_spans_are_those_of_a_frame(method):
             np.testing.assert_array_equal(spans.values, expected.spans.values)
 
 
+@pytest.mark.long
 def test_errors_are_those_of_the_simulated_frame():
     mesh = teapot(500)
     frame = Frame(mesh, 64, 48)

@@ -90,7 +90,8 @@ def test_empty_spans_do_not_count():
     assert shares_of(design, nothing, constants) == Shares(*[0] * 8)
 
 
-def test_gate_saves_clocks_of_the_compact_style_and_no_pixel_changes():
+@pytest.mark.long
+def test_gate_saves_cycles_of_the_compact_style_and_no_pixel_changes():
     """Blinn's power takes 42 cycles a pixel: a gated pixel takes 3, one a channel of its diffuse term."""
     off, on = (preset("chord", "blinn", gate=gate) for gate in (False, True))
     spans, constants = frame(off, 300, 200, 10, 8)

@@ -110,6 +110,6 @@ def test_what_the_documents_print_runs_as_hardware_too(method):
 
 @pytest.mark.long
 @pytest.mark.parametrize("method", METHODS)
-def test_every_pixel_of_every_pair_is_that_of_the_twin(method, capsys):
+def test_every_pixel_of_every_pair_is_that_of_the_model(method, capsys):
     assert main(["teapot", STRESS, "--methods", method]) == 0
     capsys.readouterr()

@@ -355,6 +355,7 @@ def test_smaller_pictures_keep_the_largest_error():
     assert np.argwhere(np.asarray(error)).tolist() == [[30 // 4, 600 // 4]]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [
@@ -402,6 +403,7 @@ def test_command_of_a_file():
     assert "--triangles" not in words
 
 
+@pytest.mark.long
 def test_readme_table(measured):
     chosen, results = measured
     kept = [(t, r) for t, r in zip(chosen, results, strict=True) if t.settings.get("method") == SIMULATED[0]]

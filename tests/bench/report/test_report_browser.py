@@ -187,6 +187,7 @@ def column(page, table, title):
     return heading, cells
 
 
+@pytest.mark.long
 def test_table_of_points_sorts(open_page, figures):
     page = open_page()
     heading, cells = column(page, "#part-points", "hardware, cycles, cycles a pixel")

@@ -39,9 +39,8 @@ from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_spans
 
-# Their quadratic is that of another method.
-ALIKE = ("quadratic-eval", "quadratic-horner")
-NAMES = [pytest.param(name, marks=pytest.mark.long) if name in ALIKE else name for name in METHODS]
+QUICK = ("linear", "quadratic", "chord", "chord-local")
+NAMES = [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in METHODS]
 FROM_SPANS = [group for group in GROUPS if group != STREAM_GROUP]
 
 
@@ -71,9 +70,8 @@ def test_keeps_what_is_promised(group, method):
             assert prepared["error"] <= GOOD, case.name
 
 
-@pytest.mark.parametrize(
-    "method", [name if name == "chord" else pytest.param(name, marks=pytest.mark.long) for name in METHODS]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("method", METHODS)
 def test_streams(method):
     """Stalls, empty spans and a reset change no pixel."""
     found = measure_stream(method, quick=True)
@@ -88,7 +86,7 @@ def test_streams(method):
 
 
 @pytest.mark.long
-def test_a_stall_on_every_clock():
+def test_a_stall_in_every_cycle():
     found = {case["case"]: case for case in measure_stream("chord", quick=False)}
     for side in ("input", "output"):
         assert found[f"a single stall of the {side}"]["runs"] > 150

@@ -59,6 +59,7 @@ def _cache(tmp_path, monkeypatch):
     monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
 
 
+@pytest.mark.long
 def test_measure():
     beats = np.random.default_rng(1).integers(-(1 << 17), 1 << 17, 500_000)
     speed = measure(Powers(), beats, constants=300, repeats=2)
@@ -169,6 +170,7 @@ def test_other_beats_than_expected_are_no_measure():
         measure(Pair(), beats, expected={"a": beats, "b": beats + 1})
 
 
+@pytest.mark.long
 def test_engines_that_differ_are_no_measure(monkeypatch):
     simulate = blysk.bench.speed.engines.simulate
 

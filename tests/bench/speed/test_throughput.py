@@ -32,7 +32,7 @@ def spans(lengths):
 @pytest.mark.parametrize(
     ("method", "interval"), [("chord", 4), pytest.param("quadratic", 7, marks=pytest.mark.long)]
 )
-def test_clocks_are_those_of_the_arithmetic(method, interval, monkeypatch):
+def test_cycles_are_those_of_the_arithmetic(method, interval, monkeypatch):
     """A span takes the larger of its pixels and the setup interval, one pixel a cycle."""
     runs = []
 

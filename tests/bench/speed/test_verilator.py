@@ -14,7 +14,7 @@ from blysk.bench.speed.verilator import Verilated
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedShape
 from blysk.sim.engines.beats import pack
-from blysk.sim.engines.cxxrtl import find_compilers
+from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.engine import SimulationError, Stimulus
 from blysk.sim.engines.simulate import simulate
 

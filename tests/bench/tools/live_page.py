@@ -10,7 +10,7 @@ from blysk.bench.tools import web_data
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.frame import frame_buffer
 from blysk.golden.frames.prepare import prepare
-from blysk.sim.engines.cxxrtl import find_compilers
+from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.probes import ObservedPipeline
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import beats_of

@@ -179,6 +179,7 @@ def test_several_lights_are_as_bright_as_one_and_all_used():
     assert not np.array_equal(render(lit).image, render(scene).image)
 
 
+@pytest.mark.long
 def test_costs_are_those_of_the_netlist():
     result = costs_of({"method": "linear", "model": "cosquad", "style": "compact"})
     unit = ShadingPipelineUnit(preset("linear", style="compact"))
@@ -279,7 +280,8 @@ def test_designs_of_two_styles_share_the_errors_and_not_the_costs():
     assert second.cycles_per_pixel == pytest.approx((3 * 7 + 7 + 2 * 30) / 25)
 
 
-def test_stated_clocks_are_a_bound_of_those_of_frames():
+@pytest.mark.long
+def test_stated_cycles_are_a_bound_of_those_of_frames():
     """Of the baselines, which are simulated; but for bisection, which states none."""
     measured = baselines.read()
     for method in METHODS:

@@ -42,6 +42,7 @@ def run(*arguments):
 # The command.
 
 
+@pytest.mark.long
 def test_sweep_of_four_designs_and_again(tmp_path, monkeypatch):
     """The listed ones against brute force over all; the second run measures nothing."""
     path = tmp_path / "designs.json"

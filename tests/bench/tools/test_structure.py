@@ -230,6 +230,7 @@ def row_of_boxes(count):
     return graph
 
 
+@pytest.mark.long
 def test_a_wide_drawing_is_folded():
     graph = row_of_boxes(40)
     bands = _bands(graph)

@@ -13,14 +13,12 @@ import pytest
 from amaranth.hdl import Fragment
 from click.testing import CliRunner
 
-from blysk.bench.report.report import chosen_tasks
 from blysk.bench.tools import web, web_data
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Spans
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.sim.cli.main import main
 from blysk.sim.engines.probes import probes_of
 from blysk.sim.errors import InputError
 
@@ -303,6 +301,41 @@ def test_report_in_the_site(tmp_path, work, results):
     assert "report/index.html" not in (tmp_path / "site" / "index.html").read_text()
 
 
+def test_documents_in_the_site(tmp_path, work, results):
+    """Pages link each other; what leads out of them becomes text."""
+    guide, pages = tmp_path / "guide", tmp_path / "pages"
+    for folder in (guide, pages):
+        folder.mkdir()
+    (guide / "use.md").write_text(
+        "# To use it\n\n[a](../blocks/unit.md#a-b-c) [b](../../hdl/x.py) [c](#to-use-it)\n"
+    )
+    (pages / "README.md").write_text("# Units\n\n![p](p.svg) [u](unit.md)\n\n| a |\n|---|\n| 1 |\n")
+    (pages / "unit.md").write_text("## A `b`, c\n\n[up](README.md) [web](https://a.example)\n")
+    (pages / "p.svg").write_text("<svg/>")
+    site = tmp_path / "site"
+    web.write_site(site, work, results, None, {"guide": guide, "blocks": pages})
+    use = (site / "guide" / "use.html").read_text()
+    assert '<h1 id="to-use-it">To use it</h1>' in use
+    assert '<a href="../blocks/unit.html#a-b-c">a</a> b <a href="#to-use-it">c</a>' in use
+    assert (site / "guide" / "index.html").read_text() == use
+    unit = (site / "blocks" / "unit.html").read_text()
+    assert '<h2 id="a-b-c">' in unit
+    assert '<a href="index.html">up</a> <a href="https://a.example">web</a>' in unit
+    assert '<div class="scroll"><table>' in (site / "blocks" / "index.html").read_text()
+    assert (site / "blocks" / "p.svg").read_text() == "<svg/>"
+    links = Addresses((site / "index.html").read_text()).found
+    assert {"guide/index.html", "blocks/index.html"} <= set(links)
+
+
+def test_folders_of_documents(tmp_path):
+    with pytest.raises(InputError, match="holds no pages of units; make them with `blysk pages FOLDER`"):
+        web.folders_of(tmp_path)
+    (tmp_path / "README.md").write_text("# Units\n")
+    found = web.folders_of(tmp_path)
+    assert found["blocks"] == tmp_path
+    assert {"guide", "theory"} <= set(found)
+
+
 # The command.
 
 
@@ -310,7 +343,7 @@ def run(*arguments):
     return CliRunner().invoke(web.command, list(map(str, arguments)))
 
 
-def test_command(tmp_path, monkeypatch, work, results):
+def test_command(tmp_path, monkeypatch, work, results, plain_section):
     asked = []
 
     def made(tasks, jobs, progress):
@@ -319,23 +352,19 @@ def test_command(tmp_path, monkeypatch, work, results):
             progress()
         return [results[0] if task.function is web_data.module_of else results[-1] for task in tasks]
 
-    # Of the report that is measured with it, one quick section.
-    monkeypatch.setattr(web, "chosen_tasks", lambda quick: chosen_tasks(quick, names=["errata"]))
+    # The report that is measured with it.
+    monkeypatch.setattr(web, "chosen_tasks", lambda quick: [])
+    monkeypatch.setattr(web, "measured", lambda chosen, jobs, count: [plain_section])
     monkeypatch.setattr(web, "measure_all", made)
     found = run("-o", tmp_path / "site", "--design", "chord/cosquad", "--design", "linear/exp")
     assert found.exit_code == 0, found.output
     report = json.loads((tmp_path / "site" / "report" / "report.json").read_text())
     assert report["quick"]
-    assert list(report["sections"]) == ["errata"]
+    assert list(report["sections"]) == ["plain"]
     assert found.output.split() == ["site", str(tmp_path / "site" / "index.html")]
     modules = [task.settings for task in asked if task.function is web_data.module_of]
     assert modules == [{"method": method, "model": model} for method, model in DESIGNS]
     assert len(asked) - len(modules) == sum(body.views for body in web_data.MESHES.values())
-
-
-def test_command_is_registered(capsys):
-    assert not main(["web", "--help"])
-    assert "blysk web -o site" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Chords, Specular
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.number.unit_vector import ONE, ONE_SQUARED, quantise
@@ -278,34 +279,34 @@ def test_second_lobe_stays_dark():
     assert not shade(cosine, ends, 4).codes.any()
 
 
-def test_documented_comparator_lets_the_second_lobe_through():
+def test_published_comparator_lets_the_second_lobe_through():
     """At n = 20, 60 degrees the square is 16: it saturates, and the surface is as bright as at the peak."""
-    drawn, gated = (Specular(as_published=as_published) for as_published in (True, False))
+    published, gated = (Specular(as_published=as_published) for as_published in (True, False))
     code = np.rint(ONE_SQUARED.codes * 0.5).astype(np.int64)
-    assert shade(drawn, code, 20).codes == 2**17 - 2
-    assert (shade(drawn, np.arange(-ONE_SQUARED.codes, code, 2**20), 20).codes == 2**17 - 2).all()
-    assert shade(drawn, ONE_SQUARED.codes, 20).codes == 2**17 - 2
+    assert shade(published, code, 20).codes == 2**17 - 2
+    assert (shade(published, np.arange(-ONE_SQUARED.codes, code, 2**20), 20).codes == 2**17 - 2).all()
+    assert shade(published, ONE_SQUARED.codes, 20).codes == 2**17 - 2
     assert shade(gated, code, 20).codes == 0
     # Where the base passes -1: 36.87 degrees, cos = 0.8.
     for degrees, bright in ((36, False), (37, True)):
         code = np.rint(ONE_SQUARED.codes * np.cos(np.radians(degrees))).astype(np.int64)
-        assert (shade(drawn, code, 20).codes == 2**17 - 2) == bright
+        assert (shade(published, code, 20).codes == 2**17 - 2) == bright
     # Dark is dark in either.
-    assert shade(drawn, code, 20, dark=True).codes == 0
+    assert shade(published, code, 20, dark=True).codes == 0
 
 
 @pytest.mark.parametrize("model", SPECULAR_MODELS)
-def test_documented_comparator(model):
-    """Up to the base's zero to the bit the default; past it the printed parabola, limited to 1."""
-    drawn, gated = (
-        Specular(REFLECTION_MODELS[model], "one_minus_cosine", documented) for documented in (True, False)
+def test_published_comparator(model):
+    """Up to the base's zero to the bit the default; past it the parabola as published, limited to 1."""
+    published, gated = (
+        Specular(REFLECTION_MODELS[model], "one_minus_cosine", published) for published in (True, False)
     )
     for exponent in EXPONENTS:
         k = REFLECTION_MODELS[model].slope(exponent)
         argument = np.r_[np.linspace(0, min(3 / k, 2), 20_000), np.linspace(0, 2, 20_000)]
         codes = np.minimum((argument * 2**25).astype(np.int64), ARGUMENT.max_code)
         base = 1 - k * codes * 2.0**-25
-        result = shade(drawn, codes, exponent)
+        result = shade(published, codes, exponent)
         assert np.abs(result.values - np.minimum(base * base, 1)).max() <= Specular.ERROR
         first = base > 0
         np.testing.assert_array_equal(result.codes[first], shade(gated, codes, exponent).codes[first])
@@ -313,47 +314,53 @@ def test_documented_comparator(model):
         assert (base <= -1).any() == (2 * k > 2)
 
 
+def unit_of(model, operand="cosine"):
+    """Model of a unit of highlights, and the bound of its error for a cosine of codes."""
+    if model == "blinn":
+        return Power(operand), Power.ERROR + 2.0**-16
+    unit = Specular(REFLECTION_MODELS[model], operand)
+    return unit, unit.error
+
+
 @pytest.mark.parametrize("exponent", EXPONENTS)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", [*MODELS, "blinn"])
 def test_stiff_exponents(model, exponent):
     """Over the whole half sphere, the bound; at the peak and past it by rounding, 1 to nine steps."""
-    unit = Specular(REFLECTION_MODELS[model], "cosine")
+    unit, bound = unit_of(model)
     one = ONE_SQUARED.codes.item()
     codes = np.unique(np.r_[np.linspace(0, one, 5000), one - np.geomspace(1, one, 5000)].astype(np.int64))
     ideal = REFLECTION_MODELS[model].reflect(codes / one, exponent)
-    assert np.abs(shade(unit, codes, exponent).values - ideal).max() <= unit.error
+    assert np.abs(shade(unit, codes, exponent).values - ideal).max() <= bound
     peak = shade(unit, [one, one + 1, one + 2**20, unit.operand_format.max_code], exponent)
     assert (peak.codes >= 2**17 - (2 if model in SPECULAR_MODELS else 9)).all()
     assert len(set(peak.codes.tolist())) == 1
-    assert shade(Specular(REFLECTION_MODELS[model], "one_minus_cosine"), [0], exponent).codes == peak.codes[0]
+    assert shade(unit_of(model, "one_minus_cosine")[0], [0], exponent).codes == peak.codes[0]
 
 
 @pytest.mark.parametrize("exponent", EXPONENTS)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", [*MODELS, "blinn"])
 def test_stiff_largest_and_smallest_codes(model, exponent):
     """The far side of the sphere, and codes of no unit vector: the term of N·H = -1, and of 1."""
-    unit = Specular(REFLECTION_MODELS[model], "cosine")
+    unit, bound = unit_of(model)
     one, format = ONE_SQUARED.codes.item(), unit.operand_format
     ends = shade(unit, [-one, format.min_code], exponent)
-    assert ends.values == pytest.approx(
-        REFLECTION_MODELS[model].reflect([-1.0, -1.0], exponent), abs=unit.error
-    )
+    assert ends.values == pytest.approx(REFLECTION_MODELS[model].reflect([-1.0, -1.0], exponent), abs=bound)
     assert shade(unit, format.max_code, exponent).codes == shade(unit, one, exponent).codes
-    argument = Specular(REFLECTION_MODELS[model], "one_minus_cosine")
+    argument = unit_of(model, "one_minus_cosine")[0]
     last = shade(argument, ARGUMENT.max_code, exponent)
-    assert last.values == pytest.approx(REFLECTION_MODELS[model].reflect(-1.0, exponent), abs=unit.error)
+    assert last.values == pytest.approx(REFLECTION_MODELS[model].reflect(-1.0, exponent), abs=bound)
     # A light behind the surface, at the terminator, N·L = 0, too: nothing, whatever the cosine.
     codes = [format.min_code, -one, 0, one, format.max_code]
     assert not shade(unit, codes, exponent, dark=True).codes.any()
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", [*MODELS, "blinn"])
 def test_stiff_normals_of_wrong_length(model):
     """N of length 1 +- 1/256 or 0, or no H: the term of that product, counted as 1 above 1; no more error.
 
     At n = 1000 a normal too short by 1/256 has no highlight left: ``cosquad`` gives 0, Blinn's power 0.02.
     """
-    unit = Specular(REFLECTION_MODELS[model], "cosine")
+    unit, bound = unit_of(model)
     rng = np.random.default_rng(5)
     normal = rng.normal(size=(400, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -364,7 +371,7 @@ def test_stiff_normals_of_wrong_length(model):
         for exponent in EXPONENTS:
             found = shade(unit, product, exponent).values
             assert found == pytest.approx(
-                REFLECTION_MODELS[model].reflect(product / ONE**2, exponent), abs=unit.error
+                REFLECTION_MODELS[model].reflect(product / ONE**2, exponent), abs=bound
             )
             if length > 1:
                 assert (found >= 1 - 9 * 2.0**-17).all()
@@ -372,14 +379,14 @@ def test_stiff_normals_of_wrong_length(model):
     assert short <= 0.06
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", [*MODELS, "blinn"])
 def test_stiff_peak_on_and_between_pixels(model):
     """Pixels 1 degree apart, the peak on one or half-way: symmetric, the largest in the middle, and exact.
 
     From n = 1000 on, the documents' highlights are 2.6 degrees across, three or four pixels. Narrower than a
     pixel, at pixels 20 degrees apart, only a pixel at the peak is lit; between two nothing is seen.
     """
-    unit = Specular(REFLECTION_MODELS[model], "cosine")
+    unit, bound = unit_of(model)
     for pitch in (1.0, 20.0):
         for offset in (0.0, 0.5):
             angle = np.radians(pitch * (np.arange(-9, 10 - 2 * offset) + offset))
@@ -390,7 +397,7 @@ def test_stiff_peak_on_and_between_pixels(model):
                 middle = len(codes) // 2
                 assert found.codes.max() == found.codes[middle]
                 ideal = REFLECTION_MODELS[model].reflect(np.cos(angle), exponent)
-                assert np.abs(found.values - ideal).max() <= unit.error + 2.0**-17
+                assert np.abs(found.values - ideal).max() <= bound + 2.0**-17
             # Of the last exponent, 1000.
             assert found.codes.any() == (pitch == 1 or not offset)
 

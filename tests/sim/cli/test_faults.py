@@ -19,6 +19,7 @@ from PIL import Image
 
 from blysk.bench.store import Task, results_of
 from blysk.sim.engines import cxxrtl
+from blysk.sim.engines.cache import cache_folder, private_folder
 from blysk.sim.engines.engine import CompilerMissing
 from blysk.sim.errors import InputError
 from blysk.sim.frames.picture import write_image
@@ -48,9 +49,9 @@ def temporary(tmp_path, monkeypatch):
     folder.mkdir()
     monkeypatch.setenv("TMPDIR", str(folder))
     monkeypatch.setattr(tempfile, "tempdir", None)
-    cxxrtl._private_folder.cache_clear()
+    private_folder.cache_clear()
     yield folder
-    cxxrtl._private_folder.cache_clear()
+    private_folder.cache_clear()
 
 
 @pytest.fixture
@@ -202,13 +203,13 @@ def test_read_only_cache(open_folder, monkeypatch):
     if not os.geteuid():
         os.chown(folder, NOBODY, NOBODY)
     monkeypatch.setenv("BLYSK_CACHE", str(folder))
-    cxxrtl._private_folder.cache_clear()
+    private_folder.cache_clear()
     with an_ordinary_user(), pytest.warns(RuntimeWarning, match="cannot be written: compiled models are"):
-        chosen = cxxrtl.cache_folder()
+        chosen = cache_folder()
     assert chosen != folder
     assert chosen.stat().st_mode & 0o777 == 0o700
     shutil.rmtree(chosen)
-    cxxrtl._private_folder.cache_clear()
+    private_folder.cache_clear()
 
 
 @pytest.mark.skipif(

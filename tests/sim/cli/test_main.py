@@ -118,9 +118,7 @@ def test_bad_mesh(refused, monkeypatch, name):
     data, reason = BAD_MESHES[name]
     find_spec = importlib.util.find_spec
     monkeypatch.setattr(
-        importlib.util,
-        "find_spec",
-        lambda name: None if name == "DracoPy" else find_spec(name),
+        importlib.util, "find_spec", lambda name: None if name == "DracoPy" else find_spec(name)
     )
     Path(name).write_bytes(data)
     refused("render", name, "--size", "8x6", "-o", "out.png", "--json", "out.json", thing=name, says=reason)
@@ -394,12 +392,7 @@ def test_no_light(capsys):
         ("mesh.file = 'empty.obj'", ["--triangles", "100"], "--triangles 100", "leave it out"),
         ("mesh.file = 'teapot'\nexponent = 3", [], "a.toml, exponent", "unknown key"),
         ("mesh.file = 'teapot'\nsize = ]", [], "a.toml", "is no TOML"),
-        (
-            "pipeline = {method = 'chord', operand = 'cosine'}",
-            [],
-            "a.toml, pipeline.operand",
-            "leave it out",
-        ),
+        ("pipeline = {method = 'chord', operand = 'cosine'}", [], "a.toml, pipeline.operand", "leave it out"),
         (
             "pipeline = {setup_interval = 26}",
             ["--method", "linear"],

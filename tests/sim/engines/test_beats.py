@@ -12,10 +12,7 @@ from hypothesis import strategies as st
 from blysk.hdl.core.fixed import SQ, UQ
 from blysk.sim.engines.beats import dtype_of, pack, unpack, word_count
 
-LEAVES = st.one_of(
-    st.integers(0, 64).map(unsigned),
-    st.integers(1, 64).map(signed),
-)
+LEAVES = st.one_of(st.integers(0, 64).map(unsigned), st.integers(1, 64).map(signed))
 LAYOUTS = st.recursive(
     LEAVES,
     lambda inner: st.one_of(

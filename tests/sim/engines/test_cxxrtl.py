@@ -242,7 +242,7 @@ def test_operations_against_integers(is_signed):
 def test_no_compiler(monkeypatch, cache):
     monkeypatch.setenv("PATH", "")
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    assert list(cxxrtl.find_compilers()) == []
+    assert list(compilers.find_compilers()) == []
     with pytest.raises(CompilerMissing) as caught:
         scaled()
     tried = "tried c++, g++, clang++ and the package ziglang"
@@ -298,7 +298,7 @@ def test_a_broken_compiler_gives_way_to_the_next(monkeypatch, tmp_path):
     folder.mkdir()
     script(folder, "c++", 'case "$1" in --version) echo 1.0; exit 0;; esac; exit 1')
     monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
-    names = [compiler.name for compiler in cxxrtl.find_compilers()]
+    names = [compiler.name for compiler in compilers.find_compilers()]
     if len(names) < 2:
         pytest.skip("there is one compiler only")
     assert names[0] == "c++"
@@ -358,7 +358,7 @@ class Buffer(Component):
 )
 def test_zig(monkeypatch, cache):
     monkeypatch.setattr(compilers, "_system_compiler", lambda command: None)
-    assert [compiler.name for compiler in cxxrtl.find_compilers()] == ["ziglang"]
+    assert [compiler.name for compiler in compilers.find_compilers()] == ["ziglang"]
     beats = np.arange(100) << 28
     stalls = np.random.default_rng(2).random(30) < 0.6
     run = simulate(Buffer(), beats, count=100, output_stalls=stalls)
@@ -561,7 +561,7 @@ def test_relative_paths(monkeypatch, tmp_path):
 def test_default_cache_is_the_users(monkeypatch, tmp_path):
     monkeypatch.delenv("BLYSK_CACHE")
     monkeypatch.setattr(cache_module.platformdirs, "user_cache_path", lambda name: tmp_path / "home" / name)
-    assert cxxrtl.cache_folder() == tmp_path / "home" / "blysk"
+    assert cache_module.cache_folder() == tmp_path / "home" / "blysk"
 
 
 PROGRAM = """

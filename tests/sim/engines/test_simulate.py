@@ -121,11 +121,7 @@ class Expander(Component):
         with m.If(self.i.ready & self.i.valid):
             m.d.sync += [left.eq(self.i.payload.x), index.eq(0), y.eq(self.i.payload.y)]
         with m.If(free):
-            m.d.sync += [
-                self.o.valid.eq(left != 0),
-                self.o.payload.index.eq(index),
-                self.o.payload.y.eq(y),
-            ]
+            m.d.sync += [self.o.valid.eq(left != 0), self.o.payload.index.eq(index), self.o.payload.y.eq(y)]
             with m.If(left != 0):
                 m.d.sync += [left.eq(left - 1), index.eq(index + 1)]
         return m

@@ -401,9 +401,7 @@ def test_draco_without_its_decoder(tmp_path, monkeypatch):
     path.write_bytes(draco_glb())
     find_spec = importlib.util.find_spec
     monkeypatch.setattr(
-        importlib.util,
-        "find_spec",
-        lambda name: None if name == "DracoPy" else find_spec(name),
+        importlib.util, "find_spec", lambda name: None if name == "DracoPy" else find_spec(name)
     )
     check_refused(path, "DracoPy", "pip install DracoPy")
 
