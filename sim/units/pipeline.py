@@ -211,13 +211,13 @@ def _halves(unit, rng, count):
     """Channels of a half, and of the least step less: there every bit of either term's product counts."""
     # For a pixel's terms d and s and a diffuse colour c the specular colour is
     # (2^22 - 0 or 1 - 2^17 ambient - c d) / s modulo 2^23, where it is a colour.
-    design, candidates = unit.parameters, 8192
+    design, candidates = unit.parameters, 32_768
     halfway = sphere(rng, 1)[0]
     spans = flat_spans(quantise(halfway)[np.newaxis])
     constants = replace(
         any_constants(rng, design, spans, 0.5)[0],
         exponent=int(1000 ** rng.uniform()),
-        direction=quantise(normalise(halfway + 0.5 * rng.normal(size=3)))[np.newaxis],
+        direction=quantise(normalise(halfway + 0.2 * rng.normal(size=3)))[np.newaxis],
     )
     away = rng.normal(size=(candidates, 3)) / np.sqrt(constants.exponent)
     flat = flat_spans(quantise(normalise(halfway + away)))
@@ -347,7 +347,7 @@ RECORD = Record(
         "terminator": Stimulus(_terminator),
         "roundings": Stimulus(_roundings),
         "long spans": Stimulus(_long_spans, stalled=False),
-        "highlights": Stimulus(partial(_highlights, exponent=1000, invert=0)),
+        "highlights": Stimulus(partial(_highlights, exponent=997, invert=0)),
         "highlights, inverted": Stimulus(partial(_highlights, exponent=30, invert=1)),
         "halves": Stimulus(_halves, 30, repeats=12),
         "brightest": Stimulus(_brightest, 800, stalled=False),

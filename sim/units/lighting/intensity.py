@@ -110,7 +110,7 @@ RECORD = Record(
     expect=_expect,
     stimuli={
         "terms": Stimulus(_terms, 400),
-        "bright": Stimulus(_bright, 400, repeats=4),
+        "bright": Stimulus(_bright, 400, repeats=12),
         "sizes": Stimulus(_sizes, 5000, stalled=False, repeats=40),
         "halves": Stimulus(_halves, 1000, variants=("1 light, throughput", "1 light, compact")),
     },

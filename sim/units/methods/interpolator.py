@@ -221,7 +221,7 @@ def of_setup(record: Record, count: int = 500) -> Stimulus:
     count : int
         Spans.
     """
-    return Stimulus(partial(_of_setup, make=record.stimuli["corners"].make), count, repeats=3)
+    return Stimulus(partial(_of_setup, make=record.stimuli["corners"].make), count, repeats=6)
 
 
 STIMULI: dict[str, Stimulus] = {

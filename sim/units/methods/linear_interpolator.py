@@ -1,13 +1,32 @@
 """Record of the linear interpolator."""
 
+import numpy as np
+
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
-from blysk.sim.units.methods.interpolator import STIMULI, expect, measured, options, status
+from blysk.golden.number.unit_vector import ONE
+from blysk.sim.units.methods.interpolator import STIMULI, case_of, expect, measured, options, status
 from blysk.sim.units.methods.light_products import COSINES
-from blysk.sim.units.record import Record
+from blysk.sim.units.operands import code_pairs_at, component_words
+from blysk.sim.units.record import Record, Stimulus
 
 __all__ = ["RECORD"]
 
 _LINE = LinearInterpolator()
+
+
+def _flags(unit, rng, count):
+    """Spans out of range by the difference, by a pixel alone, and in range: of a kind, then mixed."""
+    left, right = code_pairs_at(rng, 8 * count, rng.uniform(0, 180, 8 * count))
+    some = rng.random(8 * count) < 0.4
+    left[some], right[some] = rng.choice([0, 1, -1, ONE // 2, ONE], (2, np.count_nonzero(some), 3))
+    length = rng.integers(1, 12, 8 * count)
+    far, flagged = (
+        method.normals(*component_words(left, right), length)[1] for method in (_LINE, _RENORMALISED)
+    )
+    kinds = [np.flatnonzero(kind)[:count] for kind in (far, flagged & ~far, ~flagged)]
+    order = np.concatenate([*kinds, rng.permutation(np.concatenate(kinds))])
+    return case_of(unit, rng, left[order], right[order], length[order])
+
 
 RECORD = Record(
     name="linear_interpolator",
@@ -23,7 +42,8 @@ RECORD = Record(
     },
     expect=expect,
     status=status,
-    stimuli=STIMULI,
+    stimuli=STIMULI
+    | {"flags": Stimulus(_flags, 100, variants=("linear", "renormalise", "renormalise, interval 1"))},
     waivers={
         "spare": "A straight line has no second difference: the bit is 0 already.",
         "payload": "A straight line has no second difference: the bit is 0 already.",

@@ -1,13 +1,33 @@
 """Record of the recurrence interpolator."""
 
+import numpy as np
+
 from blysk.golden.methods.recurrence_interpolator import PUBLISHED, RecurrenceInterpolator
 from blysk.sim.units.cosines.recurrence_setup import RECORD as SETUP
-from blysk.sim.units.methods.interpolator import STIMULI, expect, measured, of_setup, options, status
-from blysk.sim.units.record import Record
+from blysk.sim.units.methods.interpolator import STIMULI, case_of, expect, measured, of_setup, options, status
+from blysk.sim.units.operands import code_pairs_at, unit_codes, word_ends
+from blysk.sim.units.record import Record, Stimulus
 
 __all__ = ["RECORD"]
 
 _RECURRENCE = RecurrenceInterpolator()
+
+
+def _words(unit, rng, count):
+    """Vectors L and H that are no unit vectors: results saturate, and no span after them changes."""
+    ends = word_ends(rng, 2, count, 3)
+    ends[:, ::2] = unit_codes(rng, 2 * len(ends[0, ::2])).reshape(2, -1, 3)
+    case = case_of(unit, rng, *ends, rng.integers(1, 20, count))
+    case.constants["direction"], case.constants["halfway"] = (
+        word_ends(rng, unit.lights, 3) for _ in range(2)
+    )
+    return case
+
+
+def _radian(unit, rng, count):
+    """Spans of a radian: half its square is 1/2 but for rounding, which brings some words to 1."""
+    return case_of(unit, rng, *code_pairs_at(rng, count, np.degrees(1)), rng.integers(1, 20, count))
+
 
 RECORD = Record(
     name="recurrence_interpolator",
@@ -21,7 +41,12 @@ RECORD = Record(
     },
     expect=expect,
     status=status,
-    stimuli=STIMULI | {"corners": of_setup(SETUP)},
+    stimuli=STIMULI
+    | {
+        "corners": of_setup(SETUP),
+        "words": Stimulus(_words, 200, repeats=2),
+        "radian": Stimulus(_radian, 300, stalled=False),
+    },
     waivers=SETUP.waivers
     | {
         "step_entry": "Inverted every second cycle, and read in those cycles only.",

@@ -1,4 +1,4 @@
-"""Every hardware operation equal to its NumPy twin, exhaustively at small widths, and the refusals."""
+"""Every hardware operation equal to its NumPy model, exhaustively at small widths, and the refusals."""
 
 import operator
 from itertools import product

@@ -1,0 +1,58 @@
+# amaranth: UnusedElaboratable=no
+"""Products of a normal with the vectors of every light: exact integers, times and multipliers."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.methods.linear_interpolator import LinearInterpolator
+from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED
+from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.methods.light_products import LightProductsUnit
+from blysk.sim.units.methods.light_products import RECORD
+
+TIMES = {"cosine": 7, "one_minus_cosine": 11}
+
+
+@pytest.mark.parametrize("operand", TIMES)
+@pytest.mark.parametrize("stimulus", RECORD.stimuli)
+def test_products_are_exact_integers(operand, stimulus):
+    """N.L and N.H whole; the chord of halved differences from a difference of 1 on, cut to 25 bits."""
+    unit = LightProductsUnit(LinearInterpolator(operand=operand), 3)
+    case = next(RECORD.runs(unit, stimulus)).case
+    found, normals = RECORD.expect(unit, case), case.beats
+    direction, halfway = (case.constants[name] for name in ("direction", "halfway"))
+    np.testing.assert_array_equal(found["cosine"], normals @ direction.T)
+    exact = normals @ halfway.T
+    if operand == "one_minus_cosine":
+        difference = normals[:, np.newaxis] - halfway
+        far = ((difference < COMPONENT.min_code) | (difference > COMPONENT.max_code)).any(axis=-1)
+        halved = np.square(difference >> 1).sum(axis=-1) << 2
+        square = np.where(far, halved, np.square(difference).sum(axis=-1))
+        exact = np.minimum(square >> 10, Specular.ARGUMENT_FORMAT.max_code)
+    np.testing.assert_array_equal(found["highlight"], exact)
+
+
+def test_chord_is_that_of_vectors():
+    """Half a squared chord is 1 - N.H, in float64, within its bound."""
+    unit = LightProductsUnit(LinearInterpolator(operand="one_minus_cosine"), 3)
+    case = next(RECORD.runs(unit, "normals")).case
+    kept = np.abs(np.linalg.norm(case.beats / ONE, axis=-1) - 1) < COMPONENT.step
+    normals, halfway = case.beats[kept] / ONE, case.constants["halfway"][[0, 2]] / ONE
+    found = RECORD.expect(unit, case)["highlight"][kept][:, [0, 2]] * Specular.ARGUMENT_FORMAT.step
+    # Halving cuts half a step of each difference, counted |N - H| times; the codes' lengths are within half a
+    # step of 1; the last cut.
+    bound = 2 * np.sqrt(3) * COMPONENT.step + COMPONENT.step + 2.0**-25
+    error = np.abs(found - ONE_SQUARED.values * (1 - normals @ halfway.T)).max()
+    assert bound / 8 < error <= bound + 2 * (1 - ONE_SQUARED.values)
+
+
+@pytest.mark.parametrize(("operand", "latency"), TIMES.items())
+def test_timing_and_multipliers(operand, latency):
+    method = LinearInterpolator(operand=operand)
+    for lights, interval in ((1, 1), (3, 1), (2, 3), (5, 1), (1, 3), (2, 12)):
+        unit = LightProductsUnit(method, lights, initiation_interval=interval)
+        assert unit.initiation_interval == interval
+        assert interval > 1 or unit.latency == latency
+        assert cost_of(unit).multipliers == {(18, 18): 6 * lights // interval}
+    assert cost_of(LightProductsUnit(method, 2, highlights=False)).multiplier_count == 6
