@@ -37,8 +37,8 @@ class Renormaliser:
     N            SQ(1, 17)  rounded; saturates
     ============ ========== =================================================================
 
-    A vector whose components are all under `SHORTEST` is flagged; its N means nothing. Else the direction of
-    N is off by at most `DIRECTION_ERROR` radians, besides what the rounding of v itself does: ``sqrt(3)
+    A vector whose components are all from -`SHORTEST` to under `SHORTEST` is flagged; its N means nothing.
+    Else the direction of N is off by at most `DIRECTION_ERROR` radians, besides what the rounding of v itself does: ``sqrt(3)
     2^-18`` by the rounding of w, of length 1/2 or more, and as much by that of N. Its length is off by at
     most `LENGTH_ERROR`: that of r, times |w| up to sqrt(3), and the rounding of N.
 
