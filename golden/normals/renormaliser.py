@@ -38,9 +38,9 @@ class Renormaliser:
     ============ ========== =================================================================
 
     A vector whose components are all from -`SHORTEST` to under `SHORTEST` is flagged; its N means nothing.
-    Else the direction of N is off by at most `DIRECTION_ERROR` radians, besides what the rounding of v itself does: ``sqrt(3)
-    2^-18`` by the rounding of w, of length 1/2 or more, and as much by that of N. Its length is off by at
-    most `LENGTH_ERROR`: that of r, times |w| up to sqrt(3), and the rounding of N.
+    Else the direction of N is off by at most `DIRECTION_ERROR` radians, besides what the rounding of v itself
+    does: ``sqrt(3) 2^-18`` by the rounding of w, of length 1/2 or more, and as much by that of N. Its length
+    is off by at most `LENGTH_ERROR`: that of r, times |w| up to sqrt(3), and the rounding of N.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """
