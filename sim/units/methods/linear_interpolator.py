@@ -15,15 +15,13 @@ _LINE = LinearInterpolator()
 
 
 def _flags(unit, rng, count):
-    """Spans out of range by the difference, by a pixel alone, and in range: of a kind, then mixed."""
+    """Spans out of range and in range: of a kind, then mixed."""
     left, right = code_pairs_at(rng, 8 * count, rng.uniform(0, 180, 8 * count))
     some = rng.random(8 * count) < 0.4
     left[some], right[some] = rng.choice([0, 1, -1, ONE // 2, ONE], (2, np.count_nonzero(some), 3))
     length = rng.integers(1, 12, 8 * count)
-    far, flagged = (
-        method.normals(*component_words(left, right), length)[1] for method in (_LINE, _RENORMALISED)
-    )
-    kinds = [np.flatnonzero(kind)[:count] for kind in (far, flagged & ~far, ~flagged)]
+    _, flagged = _LINE.normals(*component_words(left, right), length)
+    kinds = [np.flatnonzero(kind)[:count] for kind in (flagged, ~flagged)]
     order = np.concatenate([*kinds, rng.permutation(np.concatenate(kinds))])
     return case_of(unit, rng, left[order], right[order], length[order])
 
@@ -42,8 +40,7 @@ RECORD = Record(
     },
     expect=expect,
     status=status,
-    stimuli=STIMULI
-    | {"flags": Stimulus(_flags, 100, variants=("linear", "renormalise", "renormalise, interval 1"))},
+    stimuli=STIMULI | {"flags": Stimulus(_flags, 100, variants=("linear",))},
     waivers={
         "spare": "A straight line has no second difference: the bit is 0 already.",
         "payload": "A straight line has no second difference: the bit is 0 already.",
