@@ -29,14 +29,14 @@ GATES = {
 
 
 def operands_of(u, length, method=METHOD):
-    """u of every pixel of spans with three values each, as the specular unit takes it; spans of the pixels."""
+    """u of every pixel of spans with three values each, as the specular unit takes it; their spans."""
     values = SpanValues(np.zeros_like(u)[:, np.newaxis], u[:, np.newaxis])
     operands = method.compute_values(values, length)
     return operands.highlight[:, 0], pixels_of(length)[0], operands.out_of_range
 
 
 def lost(gate, u, length, exponent, method=METHOD):
-    """Spans that are not lit and have a pixel with a term; how many are not lit; how many have no term."""
+    """Spans that are not lit and have a pixel with a term; how many are not lit, how many have no term."""
     lit = gate.compute(u, exponent)
     operand, span, out_of_range = operands_of(u, length, method)
     term = gate.specular.compute(operand, np.zeros(len(span), bool), exponent).codes

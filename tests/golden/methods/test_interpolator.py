@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
+from blysk.golden.cosines.chord_setup import largest_span_angle
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
@@ -16,6 +15,7 @@ from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.curves import CURVES, interpolate
+from blysk.golden.reference.geometry import normalise
 
 STEP = 2.0**-17
 ONE_VALUE = float(ONE_SQUARED.values)
@@ -47,10 +47,10 @@ def vectors(rng, normal_pairs, lights):
 
 
 def compute(interpolator, left, right, length, direction, halfway):
-    left, right, direction, halfway = (
-        Fixed(COMPONENT, quantise(v)) for v in (left, right, direction, halfway)
-    )
-    return interpolator.compute(left, right, length, direction, halfway)
+    middle = [normalise(left + right)] if interpolator.TAKES_MIDDLE else []
+    words = (Fixed(COMPONENT, quantise(v)) for v in (left, right, direction, halfway, *middle))
+    left, right, *others = words
+    return interpolator.compute(left, right, length, *others)
 
 
 def places(length):
@@ -117,34 +117,6 @@ def test_products_are_those_of_the_normals(method, operand, normal_pairs):
     np.testing.assert_array_equal(operands.highlight.codes[near], square[near] >> 10)
 
 
-def test_chord_operands(normal_pairs):
-    """N.L and u against the fit in float64, in the bounds of `ChordSetup` and of the last rounding."""
-    rng = np.random.default_rng(4)
-    left, right, length = spans(rng, normal_pairs, 4000, 22.4, 400)
-    direction, halfway = vectors(rng, normal_pairs, 2)
-    operands = compute(ChordInterpolator(), left, right, length, direction, halfway)
-    left, right, direction, halfway = (
-        quantise(v) / np.linalg.norm(quantise(v), axis=-1, keepdims=True)
-        for v in (left, right, direction, halfway)
-    )
-    span, t = places(length)
-    middle = left + right
-    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
-    t = t[:, np.newaxis]
-
-    def fit(function):
-        a, b, c = (function(n)[span] for n in (left, middle, right))
-        return (2 * c - 4 * b + 2 * a) * t**2 + (4 * b - c - 3 * a) * t + a
-
-    cosine = ONE_VALUE * fit(lambda n: n @ direction.T)
-    u = ONE_VALUE * fit(lambda n: ((n[:, np.newaxis] - halfway) ** 2).sum(axis=-1) / 2)
-    rounding = 2.0**-26
-    p = ChordSetup()
-    assert np.abs(operands.cosine.values - cosine).max() <= p.diffuse_error(22.402) + rounding
-    largest = np.maximum(u[np.cumsum(length) - length], u[np.cumsum(length) - 1])[span] / ONE_VALUE
-    assert np.all(np.abs(operands.highlight.values - u) <= p.highlight_error(22.402, largest) + rounding)
-
-
 def test_angular_operands(normal_pairs):
     """``1 - cos`` along the great circle: the devices' bounds, and what rounding moves a vector, `MOVED`."""
     rng = np.random.default_rng(5)
@@ -195,7 +167,7 @@ def test_widest_span():
     for name, method in METHODS.items():
         for exponent in (1, 10, 1000):
             widest = method.widest_span(exponent)
-            assert widest == (largest_span_angle(exponent) if name == "chord" else method.MAX_ANGLE)
+            assert widest == (30 if name.startswith("chord") else method.MAX_ANGLE)
     assert largest_span_angle(1) == largest_span_angle(5) == 15.0
     assert abs(largest_span_angle(64) - 10.0) < 1e-12
     assert abs(largest_span_angle(1000) - 20 / 1000 ** (1 / 6)) < 1e-12
@@ -206,7 +178,6 @@ def test_widest_span():
     [
         ("bisection", 89.99, 90.1),
         ("quadratic", 44.99, 45.1),
-        ("chord", 22.49, 22.52),
         ("recurrence", 89.98, 90.1),
     ],
 )
@@ -245,6 +216,5 @@ def test_refuses():
     with pytest.raises(NotImplementedError):
         Interpolator().compute(None, None, None, None, None)
     wrong = Fixed(SQ(2, 16), np.zeros((1, 3), int))
-    for method in ("chord", "quadratic"):
-        with pytest.raises(ValueError, match=r"^operands? must be "):
-            METHODS[method].compute(wrong, wrong, np.array([2]), wrong, wrong)
+    with pytest.raises(ValueError, match=r"^operands? must be "):
+        METHODS["quadratic"].compute(wrong, wrong, np.array([2]), wrong, wrong)
