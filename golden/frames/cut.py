@@ -235,13 +235,14 @@ class _Pieces:
             wrong = np.zeros(len(self.origin), dtype=bool)
             misses = self._misses_of_normals(interpolator)
         wrong |= between[:, 0] & self.places[0].turned(self.places[-1], ChordInterpolator())
-        errors = {name: ChordInterpolator.MARGIN * miss for name, miss in misses.items()}
+        margin = self._margin()[:, np.newaxis]
+        errors = {name: margin * miss for name, miss in misses.items()}
         if chord:
             setup = interpolator.setup
             errors["diffuse"] += setup.diffuse_error(*diffuse.sizes)
             errors["highlight"] += setup.highlight_error(*highlight.sizes)
         in_front = diffuse.largest + errors["diffuse"] >= 0
-        least = np.maximum(highlight.least - misses["highlight"], 0)
+        least = np.maximum(highlight.least - margin / ChordInterpolator.MARGIN * misses["highlight"], 0)
         too_far = errors["diffuse"] > ChordInterpolator().diffuse_tolerance
         too_far |= errors["highlight"] > ChordInterpolator().highlight_tolerance(n, least)
         wrong |= (too_far & in_front & between).any(axis=1)
@@ -255,6 +256,22 @@ class _Pieces:
                 *(field[chosen] for field in (self.origin, self.first, self.last, turns_dark, *kept)),
             )
         return wrong
+
+    def _margin(self) -> np.ndarray:
+        """Bound of the largest error on each piece, in multiples of that at its quarters.
+
+        `ChordInterpolator.MARGIN`, and no less than the ratio of the lengths that the interpolated normals
+        have at the two ends, or of the weights: the larger it is, the nearer to one end lies all change.
+        """
+        ends = []
+        for place in (self.first, self.last):
+            weights, line = along_spans(
+                self.raster, self.origin, place / (self.raster.length[self.origin] - 1)
+            )
+            ends.append([np.linalg.norm(line, axis=1), weights.sum(axis=1)])
+        smaller, larger = np.sort(ends, axis=0)
+        ratio = np.divide(larger, smaller, out=np.full_like(larger, 1e9), where=smaller > 0).max(axis=0)
+        return np.maximum(ratio, ChordInterpolator.MARGIN)
 
     def _flagged(self, interpolator: ChordInterpolator, exponent, curves) -> np.ndarray:
         """Whether the chord method flags a piece, for certain not if this says no."""

@@ -35,8 +35,9 @@ class ChordInterpolator(Interpolator):
       |dL|`` is at most `MAX_HALFWAY_CHANGE` of ``|L + V|``: where L is nearly -V, H changes fast;
     - the quadratics are as near to the values at t = 1/4 and 3/4 as `highlight_tolerance` and
       `diffuse_tolerance` allow, less the bounds of the arithmetic; an error there counts `MARGIN` times, for
-      the positions between. That factor is found by search: the largest distance at any t was 1.31 times that
-      at 1/4 and 3/4.
+      the positions between, or as often as the normals' lengths at the two ends differ, if that is more. The
+      factor is found by search: with equal lengths the largest distance at any t was 1.31 times that at 1/4
+      and 3/4, and with lengths of g to 1 up to ``1.03 max(4/3, g)`` times.
 
     Fit and arithmetic then are within 0.4 LSB of exactly normalised interpolation in the specular term and
     0.12 in the diffuse one, at full reflection.

@@ -152,7 +152,9 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
 
 
 def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
-    """Connect two streams through a register, which takes `SLICE_LATENCY`; the source's ready is one, too.
+    """Connect two streams through registers that hold two payloads; one takes `SLICE_LATENCY` cycles.
+
+    The source's ready follows from registers alone.
 
     Parameters
     ----------
@@ -167,9 +169,10 @@ def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -
     require_same_shape(source.payload.shape(), sink.payload.shape())
     valid = Signal(name="valid")
     payload = Signal(Shape.cast(source.payload.shape()).width, name="payload", reset_less=True)
-    advance = skid_buffer(m, sink, valid, payload)
-    m.d.comb += source.ready.eq(advance)
-    with m.If(advance):
+    # With one payload waiting beyond the register there is room for one more in it.
+    accepts = skid_buffer(m, sink, valid, payload) | ~valid
+    m.d.comb += source.ready.eq(accepts)
+    with m.If(accepts):
         m.d.sync += [valid.eq(source.valid), payload.eq(source.payload)]
 
 

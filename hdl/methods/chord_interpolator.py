@@ -177,10 +177,10 @@ class ChordSpansUnit(wiring.Component):
         start_shape = data.StructLayout(
             {"start": joined.payload.start.shape(), "length": span.length.shape(), "long": 1}
         )
-        # As many starts as may follow a span that has just begun its setup.
-        m.submodules.starts = starts = fifo.SyncFIFOBuffered(
-            width=start_shape.size, depth=setup.latency + FIFO_LATENCY
-        )
+        # As many starts as may follow a span that has just begun its setup, or come before it: its values may
+        # take an interval, in which none comes.
+        depth = setup.latency + setup.initiation_interval + FIFO_LATENCY
+        m.submodules.starts = starts = fifo.SyncFIFOBuffered(width=start_shape.size, depth=depth)
         decided, gate_ready = Signal(init=1), Signal(init=1)
         if self._gate is not None:
             self._decide(m, joined, starts, decided, gate_ready)
@@ -394,18 +394,23 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
 
     def _collect(self, m: Module, values, limit, tags, tag, spans) -> None:
         """Values of a pixel, or of three places, as a span; and the flag of wide spans."""
+        limited = limit.o
+        if self.setup_interval > limit.initiation_interval:
+            # Its result is there before the middle values, and must not keep the next span out.
+            limited = limit.o.signature.create(path=("limited",))
+            connect_slice(m, limit.o, limited)
         word = Signal(tag, name="collected")
         left, right = (Signal.like(values.o.payload, name=f"values_{side}") for side in ("left", "right"))
         is_pixel, is_middle = word.place == _Place.PIXEL, word.place == _Place.MIDDLE
         complete = Signal()
         m.d.comb += [
             word.eq(tags.r_data),
-            complete.eq(is_pixel | (is_middle & limit.o.valid)),
+            complete.eq(is_pixel | (is_middle & limited.valid)),
             spans.i.valid.eq(values.o.valid & tags.r_rdy & complete),
             spans.i.payload.length.eq(word.length),
             values.o.ready.eq(tags.r_rdy & Mux(is_pixel | is_middle, complete & spans.i.ready, 1)),
             tags.r_en.eq(values.o.valid & values.o.ready),
-            limit.o.ready.eq(values.o.valid & tags.r_rdy & is_middle & spans.i.ready),
+            limited.ready.eq(values.o.valid & tags.r_rdy & is_middle & spans.i.ready),
         ]
         for place, side in ((_Place.LEFT, left), (_Place.RIGHT, right)):
             with m.If(values.o.valid & tags.r_rdy & (word.place == place)):
@@ -419,17 +424,17 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
                     given[i][name][1].eq(light[name]),
                     given[i][name][2].eq(right[i][name]),
                 ]
-        self._flag(m, spans.i, limit)
+        self._flag(m, spans.i, limited.payload)
 
-    def _flag(self, m: Module, spans: stream.Interface, limit: SpanLimitUnit) -> None:
+    def _flag(self, m: Module, spans: stream.Interface, limited: data.View) -> None:
         """Whether a span is wide, as it is complete: its angle, and where a highlight may be."""
-        p, given = limit.parameters, spans.payload["values"]
+        p, given = self._limit.parameters, spans.payload["values"]
         wide, wide_if_lit = Signal(), Signal()
         long = spans.payload.length >= p.SHORTEST
         fires = spans.valid & spans.ready & long
         m.d.sync += [
-            wide.eq(fires & limit.o.payload.wide),
-            wide_if_lit.eq(fires & limit.o.payload.wide_if_lit),
+            wide.eq(fires & limited.wide),
+            wide_if_lit.eq(fires & limited.wide_if_lit),
         ]
         lit = []
         if self.highlights:

@@ -33,6 +33,7 @@ __all__ = [
     "local_curves",
     "parabola",
     "three_values",
+    "value_at",
     "value_beats",
     "values_of",
 ]
@@ -72,7 +73,7 @@ def parabola(values: np.ndarray, t: np.ndarray) -> np.ndarray:
     return left + t * (4 * middle - right - 3 * left + t * 2 * (left + right - 2 * middle))
 
 
-def _value_at(differences, pixel) -> np.ndarray:
+def value_at(differences, pixel) -> np.ndarray:
     """Value of the first light's quadratic at a pixel of each span, in float64, in units of `ONE_SQUARED`."""
     start, first, second = (word.values[:, 0] for word in differences)
     k = pixel.astype(np.float64)
@@ -87,7 +88,7 @@ def _measure(rng, count):
     words = (Fixed(format, codes) for format, codes in zip(FORMATS.values(), values, strict=True))
     *differences, out_of_range = ChordSetup().compute(*words, length)
     kept = ~out_of_range
-    found = np.stack([_value_at(words, pixel) for words in differences])[:, kept]
+    found = np.stack([value_at(words, pixel) for words in differences])[:, kept]
     exact = parabola(exact, pixel / (length - 1))[:, kept]
     return Sample(found, exact, exact, pixel[kept])
 
