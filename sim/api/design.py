@@ -99,13 +99,13 @@ def header_of(unit: ShadingPipelineUnit) -> list[str]:
     if made.takes_values:
         formats = ChordSetup.DIFFUSE_FORMAT, ChordSetup.HIGHLIGHT_FORMAT
         lines += [
-            f"i_values: a light's three codes of N.L, {formats[0]}, and three of 1 - N.H, {formats[1]}, times",
-            "(1 - 2^-17)^2: at the first pixel, the middle, the last pixel; no L and H are read",
+            f"i_values: a light's three codes of N.L, {formats[0]}, and three of 1 - N.H, {formats[1]},",
+            "times (1 - 2^-17)^2: at the first pixel, the middle, the last pixel; no L and H are read",
         ]
     elif made.interpolator.takes_line:
         lines.append(
-            "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, in "
-            f"{made.interpolator.END_FORMAT}"
+            "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, "
+            f"in {made.interpolator.END_FORMAT}"
         )
     elif made.lights:
         lines.append("i_normal_*, L and H: unit vectors in SQ(1, 17), code = component (2^17 - 1)")

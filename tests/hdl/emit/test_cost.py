@@ -112,7 +112,8 @@ def test_methods_cost_what_the_readme_states(method):
 
 @pytest.mark.parametrize("lights", [2, 3])
 def test_lights_cost_fourteen_multipliers_each(lights):
-    assert cost_of(ShadingPipelineUnit(preset(lights=lights))).multiplier_count == 5 + 14 * lights
+    design = preset("quadratic", lights=lights)
+    assert cost_of(ShadingPipelineUnit(design)).multiplier_count == 5 + 14 * lights
     assert cost_of(IntensityUnit(Intensity(lights))).multiplier_count == 6 * lights
 
 

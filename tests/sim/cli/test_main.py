@@ -616,7 +616,7 @@ def test_verilog_with_a_gate(capsys):
     assert main(["verilog", "--method", "chord", "--gate"]) == 0
     output = capsys.readouterr().out
     assert "throughput style, highlight gate" in output
-    assert "highlight_gate" in output.partition("module")[2]
+    assert "value_gate" in output.partition("module")[2]
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["render", "--help"], ["verilog", "-h"]])
@@ -684,7 +684,7 @@ def test_figures(rendered):
     figures = json.loads((folder / "a.json").read_text())
     fixed = {
         "mesh": "teapot",
-        "method": "quadratic",
+        "method": "chord",
         "model": "cosquad",
         "exponent": 50,
         "lights": 1,
