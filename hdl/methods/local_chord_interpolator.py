@@ -1,6 +1,6 @@
 """The chord method for point lights and a near viewer: three values of N·L and of the chord a span."""
 
-from amaranth.hdl import Module, Mux, Signal, Value, unsigned
+from amaranth.hdl import Module, Signal, Value, unsigned
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In
 
@@ -68,25 +68,28 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
         self.latency = self._spans.latency
 
     def elaborate(self, platform):
-        """Two pixels one after the other; anything else as it comes."""
+        """Two pixels one after the other, the second from registers; anything else as it comes."""
         m = Module()
         m.submodules.chord_spans = spans = self._spans
-        span, second, pair = self.i.payload, Signal(), Signal()
+        span, second, pair = self.i.payload, Signal(name="second"), Signal()
         m.d.comb += [
             pair.eq(span.length == 2),
-            spans.i.valid.eq(self.i.valid),
+            spans.i.valid.eq(self.i.valid | second),
             spans.i.payload.eq(span),
-            self.i.ready.eq(spans.i.ready & (second | ~pair)),
+            self.i.ready.eq(spans.i.ready & ~second),
             self.out_of_range.eq(spans.out_of_range),
         ]
-        with m.If(pair):
+        with m.If(pair | second):
             m.d.comb += spans.i.payload.length.eq(1)
-            for given, light in zip(spans.i.payload["values"], span["values"], strict=True):
-                for name in light.shape().members:
-                    ends = (Value.cast(light[name][k]) for k in (2, 0))
-                    m.d.comb += Value.cast(given[name][0]).eq(Mux(second, *ends))
         with m.If(spans.i.valid & spans.i.ready):
             m.d.sync += second.eq(pair & ~second)
+        for index, (given, light) in enumerate(zip(spans.i.payload["values"], span["values"], strict=True)):
+            for name in light.shape().members:
+                end = Signal.like(light[name][2], name=f"{name}_{index}_end", reset_less=True)
+                with m.If(second):
+                    m.d.comb += Value.cast(given[name][0]).eq(Value.cast(end))
+                with m.Else():
+                    m.d.sync += Value.cast(end).eq(Value.cast(light[name][2]))
         connect(m, spans.o, wiring.flipped(self.o))
         if "constants" in spans.signature.members:
             m.d.comb += spans.constants.eq(self.constants)
