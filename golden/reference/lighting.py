@@ -213,7 +213,8 @@ def intensity(
     model : ReflectionModel
         The highlight.
     chord : bool
-        Whether ``1 - |N - H|^2 / 2`` takes the place of N·H, which it equals for unit normals (chord.md).
+        Whether ``1 - |N - H|^2 / 2`` takes the place of N·H, which it equals for unit normals
+        (docs/theory/chord.md#the-chord).
     points : array, shape (..., 3), optional
         Where each normal stands; only point lights read it.
 

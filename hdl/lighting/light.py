@@ -58,13 +58,12 @@ SPECULAR_KINDS: dict[type, SpecularKind] = {
 class LightUnit(wiring.Component):
     """``max(N . L, 0)`` and the reflection model of ``N . H``, for one light.
 
-    The specular unit is told when the light is behind the surface, or a highlight gate says that the span has
-    no highlight.
+    A beat is dark where the light is behind the surface, or a highlight gate tells that the span has no
+    highlight.
 
     With an initiation interval of 1 the diffuse and the specular unit run in lockstep: their latencies are
-    equal, they are offered the same beats and taken from on the same cycles, so what holds of one handshake
-    holds of the other. With a longer one, dark beats are not given to the specular unit at all: they wait
-    beside it in order, and take a clock each.
+    equal, and they accept and give the same beats on the same cycles, so that one handshake serves both. With
+    a longer one, dark beats bypass the specular unit: they wait beside it in order, and take a cycle each.
 
     The latency, the initiation interval and the multipliers are those of the specular unit, for beats that
     are not dark.
@@ -78,9 +77,9 @@ class LightUnit(wiring.Component):
     initiation_interval : int
         Distance in cycles of two inputs, at least 1. That of `Power` is 42 from 42 on, else 1.
     exponent : int or None
-        An exponent for good; see `SpecularUnit`.
+        Exponent that is fixed at build time; see `SpecularUnit`.
     shares_slope : bool
-        Whether a `SlopeUnit` outside works out what follows from the exponent. `Power` needs nothing.
+        Whether slope and boundary come from a `SlopeUnit` outside. `Power` needs none.
     gated : bool
         Whether there is a highlight gate.
 
@@ -94,7 +93,7 @@ class LightUnit(wiring.Component):
     constants
         That of the specular unit: exponent, slope, or none.
 
-    Source: [T] figure 4.10; [B] 4.
+    Source: docs/theory/models.md#lighting; [T] figure 4.10; [B] 4.
     """
 
     def __init__(
