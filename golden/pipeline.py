@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal, cast
 
 import numpy as np
@@ -11,6 +11,7 @@ from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
 from blysk.golden.methods.interpolator import Interpolator, Operands
@@ -19,6 +20,7 @@ from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
 from blysk.golden.number.unit_vector import COMPONENT
+from blysk.golden.reference.lighting import Material
 
 __all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]
 
@@ -132,7 +134,7 @@ class Design:
     ----------
     interpolator : Interpolator
         The method.
-    specular : Specular or Power or None
+    specular : Specular or Power or Lobe or None
         Specular term, of the operand that the interpolator gives. ``None``: no specular light.
     lights : int
         Number of lights, 0 to 16. With none there is ambient light alone, and no method.
@@ -151,14 +153,15 @@ class Design:
     Raises
     ------
     ValueError
-        If the number of lights or materials or a number of bits is out of range, or a gate is asked for
-        without specular light or with a method that has no error bound or no normals.
+        If the number of lights or materials or a number of bits is out of range, a gate is asked for
+        without specular light or with a method that has no error bound or no normals, or an exponent is fixed
+        where a lobe has tables.
 
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
 
     interpolator: Interpolator = field(default_factory=QuadraticInterpolator)
-    specular: Specular | Power | None = field(default_factory=Specular)
+    specular: Specular | Power | Lobe | None = field(default_factory=Specular)
     lights: int = 1
     materials: int = 1
     gate: bool = False
@@ -175,6 +178,8 @@ class Design:
         Intensity(self.lights)
         if not 1 <= self.materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {self.materials}")
+        if self.loads_tables:
+            self._check_lobe()
         if self.gate and not (self.specular and self.lights):
             raise ValueError("without specular light there is nothing to gate")
         if self.gate and not self.interpolator.serves_gate:
@@ -183,6 +188,29 @@ class Design:
         for name, least in (("x_bits", 1), ("y_bits", 1), ("length_bits", 2)):
             if not least <= getattr(self, name) <= LENGTH_BITS:
                 raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
+
+    def _check_lobe(self) -> None:
+        """Refuse what a lobe's tables do not serve."""
+        if self.build.exponent is not None:
+            raise ValueError("a lobe has tables and no exponent; fix its tables")
+        if self.specular.operand == "one_minus_cosine" and self.specular.fraction_bits != 25:
+            raise ValueError(
+                f"1 - N·H has 25 fraction bits in a pipeline, the lobe {self.specular.fraction_bits}"
+            )
+
+    @property
+    def loads_tables(self) -> bool:
+        """Whether the specular unit has tables of a lobe, so that frame constants need theirs."""
+        return self.specular is not None and self.specular.has_table
+
+    def highlight_parameter(self, material: Material) -> float | None:
+        """Exponent or roughness of a material, as the reflection model takes it; without one the exponent."""
+        return material.parameter(self.specular.model) if self.specular else material.exponent
+
+    def steepness(self, material: Material) -> float:
+        """Exponent that decides how fine spans must be, see `ReflectionModel.steepness`."""
+        parameter = self.highlight_parameter(material)
+        return self.specular.model.steepness(parameter) if self.specular else parameter
 
     def built(self, **changes) -> "Design":
         """The same design with other values of its `Build`."""
@@ -223,11 +251,15 @@ class Design:
         """
         constants = [constants] if isinstance(constants, FrameConstants) else constants
         left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
-        exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
-        lit = [
-            self.highlight_gate.compute(left, right, Fixed(COMPONENT, halfway), exponent)
-            for halfway in constants[0].halfway
-        ]
+        gate = self.highlight_gate
+        if self.loads_tables:
+            arguments = [of_material.lobe.last_lit_argument for of_material in constants]
+            threshold = gate.thresholds_of(arguments)[spans.material]
+            decide = partial(gate.compute_by, threshold=threshold)
+        else:
+            exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
+            decide = partial(gate.compute, exponent=exponent)
+        lit = [decide(left, right, Fixed(COMPONENT, halfway)) for halfway in constants[0].halfway]
         return np.stack(lit, axis=-1)
 
     def compute(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> Pixels:
@@ -286,6 +318,8 @@ class Design:
             if len(of_material.direction) != self.lights:
                 given = len(of_material.direction)
                 raise ValueError(f"the constants are for {given} lights, not {self.lights}")
+            if self.loads_tables:
+                self.specular.check(of_material.lobe)
             if self.build.exponent not in (None, of_material.exponent):
                 fixed = self.build.exponent
                 raise ValueError(f"the exponent is fixed at {fixed}, not {of_material.exponent}")
@@ -323,7 +357,7 @@ class Design:
         diffuse = diffuse_unit.compute(cosine)
         specular = Fixed(Intensity.TERM_FORMAT, np.zeros(dark.shape, dtype=np.int64))
         if self.specular is not None:
-            specular = self.specular.compute(highlight, dark, constants.exponent)
+            specular = self.specular.compute(highlight, dark, constants.highlight)
         return self.intensity.compute(*self._colors(constants), diffuse, specular)
 
     def _ambient(self, constants: Sequence[FrameConstants], material: np.ndarray) -> np.ndarray:

@@ -11,7 +11,9 @@ from blysk.golden.frame_constants import (
     LIGHT_STRIDE,
     MATERIAL_ADDRESS,
     MAX_MATERIALS,
+    THRESHOLD_ADDRESS,
 )
+from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import Specular
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.lighting.intensity import color_shape
@@ -24,16 +26,18 @@ def write_shape() -> data.StructLayout:
     return data.StructLayout({"address": unsigned(9), "data": unsigned(18)})
 
 
-def frame_constants_shape(lights: int) -> data.StructLayout:
-    """Shape of all constants of a frame with so many lights."""
+def frame_constants_shape(lights: int, has_threshold: bool = False) -> data.StructLayout:
+    """Shape of all constants of a frame with so many lights, perhaps with the highlight gate's T."""
     light = {
         "direction": normal_shape(),
         "halfway": normal_shape(),
         "diffuse": color_shape(),
         "specular": color_shape(),
     }
+    threshold = {"threshold": unsigned(HighlightGate().fraction_bits)} if has_threshold else {}
     return data.StructLayout(
         {
+            **threshold,
             "exponent": unsigned(Specular.EXPONENT_BITS),
             "ambient": color_shape(),
             "lights": data.ArrayLayout(data.StructLayout(light), lights),
@@ -52,9 +56,11 @@ class FrameConstantsUnit(wiring.Component):
     ======================== ==========================================================
     address                  constant
     ======================== ==========================================================
-    0                        exponent, 1 to 1000
+    0                        exponent, 1 to 1000; of a lobe the bank of its table
     1 to 3                   ambient red, green, blue, ``UQ(11, 6)`` LSB
     4                        index of a material, where there are several
+    5                        taken by the tables of lobes, where they are loaded: `LobeMemory`
+    6                        the highlight gate's T, ``UQ(0, 17)``, where tables are loaded
     16 (light + 1) + 0 to 2  direction to the light, ``SQ(1, 17)``
     16 (light + 1) + 3 to 5  half-way vector, ``SQ(1, 17)``
     16 (light + 1) + 6 to 8  diffuse red, green, blue, ``UQ(11, 6)`` LSB
@@ -72,6 +78,8 @@ class FrameConstantsUnit(wiring.Component):
         Number of lights.
     materials : int
         Number of materials, 1 to `MAX_MATERIALS`.
+    has_threshold : bool
+        Whether there is the highlight gate's T, for each material.
 
     Raises
     ------
@@ -86,21 +94,22 @@ class FrameConstantsUnit(wiring.Component):
         Whether no write is to be taken.
     material : :py:`In(range(materials))`
         Only where there are several: the material whose constants are given.
-    constants : :py:`Out(frame_constants_shape(lights))`
+    constants : :py:`Out(frame_constants_shape(lights, has_threshold))`
         The constants.
 
     Source: pipeline.md, "Span stream".
     """
 
-    def __init__(self, lights: int, materials: int = 1):
+    def __init__(self, lights: int, materials: int = 1, has_threshold: bool = False):
         if not 1 <= materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {materials}")
         self.lights = lights
         self.materials = materials
+        self.has_threshold = has_threshold
         members = {
             "write": In(stream.Signature(write_shape())),
             "hold": In(1),
-            "constants": Out(frame_constants_shape(lights)),
+            "constants": Out(frame_constants_shape(lights, has_threshold)),
         }
         if materials > 1:
             members["material"] = In(range(materials))
@@ -115,6 +124,9 @@ class FrameConstantsUnit(wiring.Component):
             field = self.constants[name]
             words |= {first + k: field[k] if count > 1 else field for k in range(count)}
             of_material |= set(range(first, first + count))
+        if self.has_threshold:
+            words[THRESHOLD_ADDRESS] = self.constants.threshold
+            of_material.add(THRESHOLD_ADDRESS)
         for light in range(self.lights):
             base = (light + 1) * LIGHT_STRIDE
             for name, (first, count) in FIELDS_OF_A_LIGHT.items():

@@ -1,6 +1,7 @@
 """Cutting of spans that are too wide for an interpolation method."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,8 +34,9 @@ def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int
     """
     interpolator = design.interpolator
     if design.takes_values:
-        return cut_local_spans(scene, raster, interpolator)
-    exponents = [material.exponent for material in scene.materials]
+        steepness = [design.steepness(material) for material in scene.materials]
+        return cut_local_spans(scene, raster, interpolator, steepness)
+    exponents = [design.steepness(material) for material in scene.materials]
     widest = min(map(interpolator.widest_span, exponents))
     return cut_wide_spans(raster, widest, min(map(interpolator.largest_deviation, exponents)))
 
@@ -150,7 +152,10 @@ def _parts(raster, origin, first, last, left, right, has_weights=False) -> Raste
 
 
 def cut_local_spans(
-    scene: Scene, raster: Raster, interpolator: LocalChordInterpolator | None = None
+    scene: Scene,
+    raster: Raster,
+    interpolator: LocalChordInterpolator | None = None,
+    exponents: Sequence[float] | None = None,
 ) -> tuple[Raster, int]:
     """Halve spans until quadratics through three values serve every light, with L and H of each pixel's own.
 
@@ -177,6 +182,8 @@ def cut_local_spans(
         Spans from `rasterise`.
     interpolator : LocalChordInterpolator, optional
         The method.
+    exponents : sequence of float, optional
+        Exponent, or steepness, of each material's highlight. By default the material's exponent.
 
     Returns
     -------
@@ -190,7 +197,7 @@ def cut_local_spans(
     # The curve of the method's reference, whatever the perspective.
     ones = np.ones(len(raster.length))
     whole = replace(raster, magnitude_left=ones, magnitude_right=ones)
-    exponents = np.array([material.exponent for material in scene.materials])
+    exponents = np.array(exponents or [material.exponent for material in scene.materials])
     origin = np.arange(len(raster.length))
     first = np.zeros(len(origin), dtype=np.int64)
     last = raster.length.astype(np.int64) - 1

@@ -1,8 +1,10 @@
 """What every streaming unit shares: connections, outputs that wait, and the pipeline with one enable."""
 
+from collections.abc import Mapping
+
 from amaranth.hdl import Cat, EnableInserter, Module, Mux, Shape, ShapeLike, Signal, Value, ValueLike
 from amaranth.lib import data, fifo, stream, wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 
 from blysk.hdl.core.fixed import FixedShape
 
@@ -228,6 +230,8 @@ class PipelinedUnit(wiring.Component):
         with more, it gets a register that holds the input on stages 1 to ``initiation_interval``.
     constants : ShapeLike or None
         Shape of the port ``constants``: values that are constant while beats are inside. ``None``: no port.
+    ports : mapping of str to Member, optional
+        Further members, by name.
 
     Members
     -------
@@ -237,6 +241,11 @@ class PipelinedUnit(wiring.Component):
         Results.
     constants : :py:`In(constants)`
         Only where asked for.
+
+    Attributes
+    ----------
+    advance : Signal
+        The common enable, from `elaborate` on: for what belongs to the unit but not to its data path.
     """
 
     def __init__(
@@ -247,6 +256,7 @@ class PipelinedUnit(wiring.Component):
         latency: int,
         initiation_interval: int = 1,
         constants: ShapeLike | None = None,
+        ports: Mapping[str, Member] | None = None,
     ):
         if latency < 1 or initiation_interval < 1:
             raise ValueError("latency and initiation_interval must be at least 1")
@@ -255,7 +265,7 @@ class PipelinedUnit(wiring.Component):
         members = {"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))}
         if constants is not None:
             members["constants"] = In(constants)
-        super().__init__(members)
+        super().__init__(members | dict(ports or {}))
 
     def datapath(self, m: Module, operands):
         """Describe the registers in ``m`` and return the payload of the output, ``latency`` registers on."""
@@ -280,7 +290,8 @@ class PipelinedUnit(wiring.Component):
         """Build the control and put the data path under the common enable."""
         m = Module()
         self._stages = Signal(self.latency, name="stages")
-        advance, accept = Signal(), Signal()
+        self.advance = advance = Signal(name="advance")
+        accept = Signal()
         if self.initiation_interval == 1:
             m.d.comb += self.i.ready.eq(advance)
         else:
