@@ -97,7 +97,7 @@ class FrameConstantsUnit(wiring.Component):
     constants : :py:`Out(frame_constants_shape(lights, has_threshold))`
         The constants.
 
-    Source: pipeline.md, "Span stream".
+    Source: docs/theory/units.md#frame-constants.
     """
 
     def __init__(self, lights: int, materials: int = 1, has_threshold: bool = False):

@@ -49,7 +49,7 @@ class PixelAssemblerUnit(wiring.Component):
     o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits)))`
         Pixels.
 
-    Source: pipeline.md, "Span stream".
+    Source: docs/theory/units.md#pipeline.
     """
 
     latency = 1
