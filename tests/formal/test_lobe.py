@@ -360,9 +360,9 @@ BUGS = {
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(refute, plant, bug):
+def test_bugs_are_found(refute, inject, bug):
     """Injected into the unit, each refutes a claim."""
     claim, *change = BUGS[bug]
-    plant(*change)
+    inject(*change)
     parameters = Lobe(operand="cosine", banks=3, octaves=6, steps=4)
     refute(claim(SMALL if claim in (of_banks, of_memory) else parameters), 20)
