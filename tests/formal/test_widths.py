@@ -140,8 +140,8 @@ def test_shifts_of_the_recurrence_setup_do_not_wrap():
     of_recurrence_shifts()
     widths = {register.name: len(register) for register in registers_of(RecurrenceSetupUnit())}
     assert {widths[f"{name}_shift"] for name in ("step", "phase")} == {6}
-    assert {widths[name] for name in ("exponent_of_span", "exponent")} == {6}
-    assert {widths[f"{name}_shift"] for name in ("place", "rho")} == {4}
+    assert {widths[name] for name in ("span_exponent", "exponent")} == {6}
+    assert {widths[f"{name}_shift"] for name in ("reciprocal", "rho")} == {4}
 
 
 @pytest.mark.parametrize("bits", [(5, 4), (6, 3)])
@@ -154,9 +154,12 @@ def test_shifts_of_the_recurrence_a_bit_too_short_are_found(bits):
 CUTS = {
     "blysk.hdl.core.reciprocal.reciprocal_words": "the leading one of m - 1; m is 1 or more",
     "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._prepare_segment": "2^levels - 1",
+    "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._reciprocal": "the leading one of m - 1; m is 1 or more",
     "blysk.hdl.cosines.half_chord.normalised_words": "v: `test_angular_setup`",
     "blysk.hdl.cosines.half_chord.half_chord_words": "half a turn less psi, as the model wraps it",
-    "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._describe": "shifts: `of_recurrence_shifts`",
+    "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._step_square": "shifts: `of_recurrence_shifts`",
+    "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._step_functions": "shifts: `of_recurrence_shifts`",
+    "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._rho": "shifts: `of_recurrence_shifts`",
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._steps": "the same; and the leading one of m - 1",
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._normalised": "q; the model refuses",
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._under_one": "under 1, times 2",
