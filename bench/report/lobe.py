@@ -1,4 +1,4 @@
-"""Errors and costs of the lobe unit and of pipelines with it, beside their rivals.
+"""Errors and costs of the lobe unit and of pipelines with it, beside their baselines.
 
 `python -m blysk.bench.report.lobe` prints the tables.
 """
@@ -57,7 +57,7 @@ MESHES = ("teapot", "sphere", "torus", "waves")
 """Surfaces of the frames."""
 
 FRONT = ("blinn_table", "cosquad", "lyon3_refitted", "exp", "blinn")
-"""Models of the pipelines that are compared: the table, and its rivals."""
+"""Models of the pipelines that are compared: the table, and its baselines."""
 
 EXPONENTS = (1, 10, 100, 1000)
 
@@ -291,7 +291,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
                 [given["name"], *(cost[name] for name in names), cost["initiation_interval"]]
                 for given, cost in made["unit_cost"]
             ],
-            "By Yosys, before mapping to a device.",
+            "By Yosys, before mapping to an FPGA.",
         ),
         Table(
             "lobe-pipelines",

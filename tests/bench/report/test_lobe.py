@@ -1,4 +1,4 @@
-"""The report's section of the lobe unit: its frames, its rivals, its costs."""
+"""The report's section of the lobe unit: its frames, its baselines, its costs."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_errors_of_a_model_that_is_not_exact_count_against_blinn():
     assert row["total_spans"] < 1
 
 
-def test_front_has_the_table_and_its_rivals():
+def test_front_has_the_table_and_its_baselines():
     assert set(lobe.FRONT) <= {*MODELS, *LOBES}
     costs = {model: lobe.pipeline_cost(model) for model in ("blinn_table", "cosquad")}
     assert costs["blinn_table"]["multipliers"] <= costs["cosquad"]["multipliers"] + 1
