@@ -198,6 +198,8 @@ _MEANINGS = {
     "exponent": "specular exponent, 1 to 1000; of a lobe the bank of its table",
     "ambient": "ambient colour, red green blue, UQ(11, 6) in LSB of the channel",
     "material": "index of the material that exponent and colours written next belong to",
+    "lobe": "the next value of a table, UQ(0, 17); with bit 17 the bank whose table begins",
+    "threshold": "threshold of the highlight gate, UQ(0, 17)",
     "direction": "unit vector to the light, SQ(1, 17)",
     "halfway": "unit half-way vector, SQ(1, 17)",
     "diffuse": "diffuse colour, red green blue, UQ(11, 6)",
@@ -205,11 +207,27 @@ _MEANINGS = {
 }
 
 
-def address_table(lights: int, materials: int = 1) -> list[str]:
-    """Lines that tell the address of every constant of a pipeline with so many lights and materials."""
+def address_table(
+    lights: int, materials: int = 1, loads_tables: bool = False, has_threshold: bool = False
+) -> list[str]:
+    """Lines that tell the address of every constant of a pipeline with so many lights and materials.
+
+    Parameters
+    ----------
+    lights, materials : int
+        Their numbers.
+    loads_tables : bool
+        Whether tables of lobes are loaded.
+    has_threshold : bool
+        Whether the highlight gate gets a threshold for each.
+    """
     rows = [(first, count, name) for name, (first, count) in FIELDS_OF_A_FRAME.items()]
     if materials > 1:
         rows.append((MATERIAL_ADDRESS, 1, "material"))
+    if loads_tables:
+        rows.append((LOBE_ADDRESS, 1, "lobe"))
+    if has_threshold:
+        rows.append((THRESHOLD_ADDRESS, 1, "threshold"))
     for light in range(lights):
         base = (light + 1) * LIGHT_STRIDE
         rows += [(base + first, count, name) for name, (first, count) in FIELDS_OF_A_LIGHT.items()]

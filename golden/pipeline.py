@@ -212,6 +212,14 @@ class Design:
         parameter = self.highlight_parameter(material)
         return self.specular.model.steepness(parameter) if self.specular else parameter
 
+    def for_materials(self, materials: Sequence[Material]) -> "Design":
+        """The same design for materials, with a bank for each of their lobes, at most `Lobe.MAX_BANKS`."""
+        specular = self.specular
+        if isinstance(specular, Lobe) and specular.fixed is None:
+            lobes = len({self.highlight_parameter(material) for material in materials})
+            specular = replace(specular, banks=min(lobes, Lobe.MAX_BANKS))
+        return replace(self, materials=len(materials), specular=specular)
+
     def built(self, **changes) -> "Design":
         """The same design with other values of its `Build`."""
         return replace(self, build=replace(self.build, **changes))

@@ -271,7 +271,7 @@ class TabulatedModel(ReflectionModel):
 
 def _steepness(model: ReflectionModel, parameter: float | None) -> float:
     """Steepest of 4,000 lines between points of the curve, closer to each other towards the peak."""
-    u = np.r_[0, np.geomspace(1e-9, 1 - 1e-12, 4_000)]
+    u = np.r_[0, np.geomspace(1e-7, 1 - 1e-12, 4_000)]
     slopes = np.abs(np.diff(model.reflect(1 - u, parameter))) / np.diff(u)
     return float(np.clip(slopes.max(), 1.0, STEEPEST))
 

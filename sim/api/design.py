@@ -6,8 +6,9 @@ from importlib.metadata import version
 from typing import Any, Unpack
 
 from blysk.golden.frame_constants import address_table
+from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import Design
-from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
+from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED, preset
 from blysk.hdl.emit.verilog import emit
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit
@@ -28,7 +29,7 @@ def design(*, lights: int = 1, materials: int = 1, **options: Unpack[DesignOptio
     method : str
         Interpolation along a span: one of `METHODS`, by default ``"quadratic"``.
     model : str
-        Reflection model: one of `MODELS`, by default ``"cosquad"``.
+        Reflection model: one of `MODELS` or `LOBES`, by default ``"cosquad"``; or the curve of a file.
     operand : {"cosine", "one_minus_cosine"}
         Operand of the specular unit, of methods that find normals.
     gate : bool
@@ -64,8 +65,9 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
         If there is no such pipeline.
     """
     method = settings["method"]
-    if settings["model"] not in MODELS:
-        remedy = f"use one of {', '.join(MODELS)}"
+    served = MODELS | LOBES
+    if isinstance(settings["model"], str) and settings["model"] not in served:
+        remedy = f"use one of {', '.join(served)}"
         raise settings.refuse("model", "the pipeline finds N.H, not R.V", remedy)
     if settings["gate"] and not (METHODS | PUBLISHED)[method].serves_gate:
         lacks = "error bound" if method in PUBLISHED else "normals"
@@ -75,10 +77,12 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
         made = preset(method, settings["model"], lights, **options)
     except ValueError as error:
         raise settings.refuse("operand", str(error), "leave it out") from None
-    served = unit_of(made.interpolator).setup_intervals(made.interpolator)
-    if settings["setup_interval"] not in (None, *served):
-        remedy = f"give 1 to {max(served)}" if served else "leave it out"
+    intervals = unit_of(made.interpolator).setup_intervals(made.interpolator)
+    if settings["setup_interval"] not in (None, *intervals):
+        remedy = f"give 1 to {max(intervals)}" if intervals else "leave it out"
         raise settings.refuse("setup_interval", f"method {method} is not built for it", remedy)
+    if isinstance(made.specular, Lobe):
+        made = replace(made, specular=replace(made.specular, banks=min(materials, Lobe.MAX_BANKS)))
     return replace(made, materials=materials)
 
 
@@ -118,7 +122,10 @@ def verilog_and_unit(design: Design, name: str) -> tuple[str, ShadingPipelineUni
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise OptionError("name", name, "no Verilog name", "use letters, digits and underscores")
     unit = ShadingPipelineUnit(design)
-    constants = address_table(unit.parameters.lights, unit.parameters.materials)
+    p = unit.parameters
+    lobe = p.specular if isinstance(p.specular, Lobe) else None
+    loads = lobe is not None and lobe.fixed is None
+    constants = address_table(p.lights, p.materials, loads, has_threshold=lobe is not None and p.gate)
     header = [*header_of(unit), "", "Frame constants, through the write port:", *constants]
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
     descriptions = {

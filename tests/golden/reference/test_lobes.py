@@ -13,6 +13,7 @@ from blysk.golden.reference.lobes import (
     BECKMANN,
     COPLANAR_PHONG,
     GGX,
+    STEEPEST,
     TABLE_MODELS,
     TabulatedModel,
     exponent_of_roughness,
@@ -266,3 +267,47 @@ def test_bad_points_are_refused(cosines, values, message):
 def test_bad_functions_are_refused(function, message):
     with pytest.raises(ValueError, match=message):
         TabulatedModel("curve", function=function).reflect([0.2, 0.9])
+
+
+def test_curve_of_a_file(tmp_path):
+    path = tmp_path / "satin.csv"
+    path.write_text("cosine, value\n# measured\n\n0, 0\n0.9, 0.1\n1, 1\n", encoding="utf-8-sig")
+    model = TabulatedModel.of_csv(path)
+    assert (model.name, model.source, model.PARAMETER) == ("satin", "satin.csv", None)
+    np.testing.assert_allclose(model.reflect([-0.5, 0.45, 0.9, 0.95, 1.2]), [0, 0.05, 0.1, 0.55, 1])
+    assert model.steepness() == pytest.approx(9, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0,0\n0.9,\n1,1\n", r"^line 2 of bad.csv must have two numbers, not '0.9,'$"),
+        ("cosine,value\n0,0\n0.9;0.3\n1,1\n", r"^line 3 of bad.csv must have two numbers, not '0.9;0.3'$"),
+        ("0,0\n0.5,nan\n1,1\n", r"^point 2 of bad must have two finite numbers, not cosine 0.5, value nan$"),
+        ("0,0\n0.5,1.5\n1,1\n", r"^point 2 of bad must have a value from 0 to 1, not cosine 0.5, value 1.5$"),
+        ("0,0\n0.5,0\n0.4,0\n1,1\n", r"^point 3 of bad must have a larger cosine than the point before it, "),
+        ("0,0\n0.5,0\n0.5,1\n1,1\n", r"^point 3 of bad must have a larger cosine than the point before it, "),
+        ("0,0\n", r"^bad must have at least 2 points, not 1$"),
+        ("", r"^bad must have at least 2 points, not 0$"),
+        ("0.2,0\n1,1\n", r"^the cosines of bad must go from 0 to 1, not from 0.2 to 1$"),
+        ("0,0\n" * 100_001, r"^bad.csv must have at most 100,000 points, not 100,001$"),
+        (b"\xff\xfe\x00", r"^bad.csv must be a text of numbers, not other bytes$"),
+    ],
+)
+def test_bad_files_are_refused(tmp_path, text, message):
+    path = tmp_path / "bad.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(ValueError, match=message):
+        TabulatedModel.of_csv(path)
+
+
+def test_steepness():
+    """The largest slope: of Blinn's power its exponent, of GGX 4/alpha^2 for a small alpha."""
+    assert BLINN.steepness(70) == 70
+    assert COPLANAR_PHONG.steepness(20) == 80
+    for roughness in (0.2, 0.3):
+        assert GGX.steepness(roughness) == pytest.approx(4 / roughness**4, rel=0.01)
+    assert GGX.steepness(1) == 1
+    assert GGX.steepness(0.01) == STEEPEST
+    with pytest.raises(ValueError, match=r"^roughness must be greater than 0 and at most 1"):
+        BECKMANN.steepness(2)
