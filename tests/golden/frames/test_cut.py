@@ -1,4 +1,4 @@
-"""Cutting spans of large angles against the curve's own formula, and the pipeline's flag after quantisation."""
+"""Cutting of spans of large angles, against the curve's formula; the pipeline's flag after quantisation."""
 
 from dataclasses import fields, replace
 

@@ -22,6 +22,8 @@ from blysk.golden.reference.renderer import fragment_positions, shade_spans
 from blysk.golden.reference.scene import Scene
 from blysk.sim.meshes.teapot import teapot
 
+from .test_cut import origins
+
 METHOD = LocalChordInterpolator()
 ONE_VALUE = (ONE / 2**17) ** 2
 CENTRE = np.array([0.0, 1.575, 0.0])
