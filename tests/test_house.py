@@ -118,11 +118,6 @@ LONG_FILES = {
     "tests/golden/frames/test_cut.py": "to be split: remove this line then",
     "tests/golden/test_pipeline.py": "to be split: remove this line then",
     "tests/hdl/emit/test_verilog.py": "to be split: remove this line then",
-    "tests/sim/cli/malformed.py": "to be split: remove this line then",
-    "tests/sim/cli/test_main.py": "to be split: remove this line then",
-    "tests/sim/engines/test_cxxrtl.py": "to be split: remove this line then",
-    "tests/sim/engines/test_simulate.py": "to be split: remove this line then",
-    "tests/sim/meshes/test_mesh.py": "to be split: remove this line then",
 }
 """Files over the limit, and why."""
 
