@@ -294,6 +294,7 @@ def prepare_rendering(
             if design is None:
                 made = made.for_materials(scenes[0].materials)
             _check_lobes(scenes[0], made, settings)
+            constants_of(scenes[0], made)
             stage("finding out what the scene needs" if settings["specialise"] else "")
             smallest = _specialised(scenes, made, settings)
             stage("building the model")
