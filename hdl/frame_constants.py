@@ -48,10 +48,10 @@ def frame_constants_shape(lights: int, has_threshold: bool = False) -> data.Stru
 class FrameConstantsUnit(wiring.Component):
     """Registers for the constants of a frame, one word a write.
 
-    A write is taken on a clock when ``hold`` is low, and seen one clock later. Words are 18 bits; the low
-    bits count where the constant is shorter. A write to any other address is taken like the rest and changes
-    nothing. Reset clears every constant: exponent 0 and black light. Exponents 0 and 1001 to 1023 are taken
-    and shade by the same formula, outside the stated error.
+    A write is accepted on a cycle on which ``hold`` is low. Words are 18 bits; the low bits count where the
+    constant is shorter. A write to any other address is accepted, too, and changes nothing. Reset clears
+    every constant: exponent 0 and black light. Exponents 0 and 1001 to 1023 are accepted and shade by the
+    same formula, outside the stated error.
 
     ======================== ==========================================================
     address                  constant
@@ -67,10 +67,10 @@ class FrameConstantsUnit(wiring.Component):
     16 (light + 1) + 9 to 11 specular red, green, blue, ``UQ(11, 6)`` LSB
     ======================== ==========================================================
 
-    A constant is there 2 cycles after its write was taken. With several materials the exponent and the
-    colours stand in memories of a word each, written for the material whose index was last written to
-    address 4 and read for that of ``material``: they follow it 1 clock behind, and a write 3. Writes for an
-    index past the last material are lost. Memories are not cleared by reset.
+    A constant has its value 2 cycles after its write was accepted. With several materials the exponent and
+    the colours are in memories, one for each word, written for the material whose index was last written to
+    address 4 and read for ``material``: 1 cycle after ``material`` changes, and 3 after a write. Writes for
+    an index past the last material are lost. Memories are not cleared by reset.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class FrameConstantsUnit(wiring.Component):
     write : :py:`In(stream.Signature(write_shape()))`
         Writes.
     hold : :py:`In(1)`
-        Whether no write is to be taken.
+        Whether no write is accepted.
     material : :py:`In(range(materials))`
         Only where there are several: the material whose constants are given.
     constants : :py:`Out(frame_constants_shape(lights, has_threshold))`
@@ -116,7 +116,7 @@ class FrameConstantsUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """One register, or memory, a word; its decoded address stands in one, too, beside the data."""
+        """A register or memory for each word, and one for its decoded address; a register for the data."""
         m = Module()
         m.d.comb += self.write.ready.eq(~self.hold)
         words, of_material = {}, set()
@@ -134,17 +134,17 @@ class FrameConstantsUnit(wiring.Component):
                 words |= dict(zip(addresses, self.constants.lights[light][name], strict=True))
                 if name in ("diffuse", "specular"):
                     of_material |= set(addresses)
-        taken = self.write.valid & self.write.ready
+        accepted = self.write.valid & self.write.ready
         word_data = Signal.like(self.write.payload.data)
         m.d.sync += word_data.eq(self.write.payload.data)
         if self.materials > 1:
             index = Signal(range(self.materials))
-            with m.If(taken & (self.write.payload.address == MATERIAL_ADDRESS)):
+            with m.If(accepted & (self.write.payload.address == MATERIAL_ADDRESS)):
                 m.d.sync += index.eq(self.write.payload.data)
         for address, word in words.items():
             code = Value.cast(word)
             written = Signal(name=f"written_{address}")
-            m.d.sync += written.eq(taken & (self.write.payload.address == address))
+            m.d.sync += written.eq(accepted & (self.write.payload.address == address))
             if self.materials > 1 and address in of_material:
                 memory = Memory(shape=len(code), depth=self.materials, init=[])
                 m.submodules[f"word_{address}"] = memory

@@ -270,7 +270,7 @@ CONSTANT_BUGS = {
     "a write is kept before it is taken": (
         FrameConstantsUnit,
         "elaborate",
-        "written.eq(taken & ",
+        "written.eq(accepted & ",
         "written.eq(self.write.valid & ",
     ),
 }

@@ -83,18 +83,18 @@ def test_colors(prove):
 BUGS = {
     "x stays": (of_waiting_spans, "m.Elif(moves)", "m.Elif(0)"),
     "x moves while it is stalled": (of_waiting_spans, "m.Elif(moves)", "m.Else()"),
-    "a colour is taken without a place": (of_colors, "advance & spot.valid", "advance"),
+    "a colour is taken without a place": (of_colors, "advance & position.valid", "advance"),
     "a place is taken without a colour": (of_waiting_spans, "advance & self.colors.valid", "advance"),
     "the next span comes early": (of_waiting_spans, "moves & ends", "moves"),
     "a pixel needs another span": (
         of_progress,
-        "spot.valid & self.colors.valid",
+        "position.valid & self.colors.valid",
         "following.valid & self.colors.valid",
     ),
     "a span that waits stops the one before it": (
         of_progress,
-        "moves.eq(skid_buffer(m, spot, active, Cat(x, y, ends)))",
-        "moves.eq(skid_buffer(m, spot, active, Cat(x, y, ends)) & ~following.valid)",
+        "moves.eq(skid_buffer(m, position, active, Cat(x, y, ends)))",
+        "moves.eq(skid_buffer(m, position, active, Cat(x, y, ends)) & ~following.valid)",
     ),
     "a pixel is overwritten": (of_colors, "m.If(advance)", "m.If(1)"),
 }

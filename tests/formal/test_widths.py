@@ -154,11 +154,11 @@ def test_shifts_of_the_recurrence_a_bit_too_short_are_found(bits):
 CUTS = {
     "blysk.hdl.core.reciprocal.reciprocal_words": "the leading one of m - 1; m is 1 or more",
     "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._prepare_segment": "2^levels - 1",
-    "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._reciprocal": "the leading one of m - 1; m is 1 or more",
+    "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._reciprocal": "as of m - 1 above",
     "blysk.hdl.cosines.half_chord.normalised_words": "v: `test_angular_setup`",
     "blysk.hdl.cosines.half_chord.half_chord_words": "half a turn less psi, as the model wraps it",
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._step_square": "shifts: `of_recurrence_shifts`",
-    "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._step_functions": "shifts: `of_recurrence_shifts`",
+    "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._step_functions": "the same shifts",
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._rho": "shifts: `of_recurrence_shifts`",
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._steps": "the same; and the leading one of m - 1",
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._normalised": "q; the model refuses",
