@@ -23,6 +23,11 @@ class TrueSpans:
     normal_left, normal_middle, normal_right : int64 arrays, shape (S, 3)
         Unit normals, SQ(1, 17), at the first pixel's centre, half-way to the last, and at the last. Of 1
         pixel all are the left one, of 2 the middle one is the right one.
+    line_left, line_right : int64 arrays, shape (S, 3)
+        N/W at the first and at the last pixel, `SPAN_NORMAL`: the normals' magnitudes, whose line on the
+        screen is exact in perspective. Where ``flip`` is set they point against the unit normals.
+    flip : bool array, shape (S,)
+        The unit normals are negated.
     depth : int64 array, shape (S,)
         At the first pixel, UQ(24, 9).
     depth_last : int64 array, shape (S,)
@@ -41,6 +46,9 @@ class TrueSpans:
     normal_left: np.ndarray
     normal_middle: np.ndarray
     normal_right: np.ndarray
+    line_left: np.ndarray
+    line_right: np.ndarray
+    flip: np.ndarray
     depth: np.ndarray
     depth_last: np.ndarray
     depth_step: np.ndarray
@@ -105,6 +113,9 @@ class EdgeNormals:
             normal_left=codes[:, 0],
             normal_middle=codes[:, 2],
             normal_right=codes[:, 1],
+            line_left=pieces.left.codes,
+            line_right=pieces.right.codes,
+            flip=pieces.flip,
             depth=pieces.depth.codes,
             depth_last=pieces.depth_last.codes,
             depth_step=pieces.depth_step.codes,

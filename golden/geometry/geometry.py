@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from blysk.golden.geometry.attribute_serialiser import AttributeSerialiser
 from blysk.golden.geometry.edge_normals import EdgeNormals, TrueSpans
 from blysk.golden.geometry.edge_setup import EdgeSetup
 from blysk.golden.geometry.edge_walk import EdgeWalk
@@ -51,8 +52,7 @@ class Geometry:
         scales = PlaneSetup(self.grid).compute(drawn, EdgeSetup(self.grid).compute(drawn))
         corners = (Fixed(ATTRIBUTE, drawn.triangles.attributes[:, k]) for k in range(3))
         gradients = GradientSetup().compute(*corners, scales)
-        assembler = PlaneAssembler()
-        planes = assembler.compute(gradients, assembler.least(drawn.triangles), frame)
+        planes = PlaneAssembler().compute(gradients, AttributeSerialiser().least(drawn.triangles), frame)
         return planes, int(scales.sliver.sum())
 
     def compute(self, triangles: Triangles, frame: Frame) -> tuple[TrueSpans, dict[str, int]]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from blysk.golden.geometry.gradient_setup import Gradients
-from blysk.golden.geometry.triangles import ATTRIBUTE, Frame, Triangles
+from blysk.golden.geometry.triangles import Frame
 
 __all__ = ["PlaneAssembler", "Planes"]
 
@@ -45,9 +45,7 @@ class PlaneAssembler:
     least length in the triangle. With
 
     - ``|g| <= (largest + sum) / 2`` of the sizes of its components, less than 1.16 times too much,
-    - ``m >= max(9/16 M, L)``: of the corners' components, each with the sign that it has at the first corner
-      and cut to 11 fraction bits, M is the least sum and L the largest of what a component is at least; 0
-      where that is negative,
+    - m at least what `AttributeSerialiser` gives,
 
     p is ``2^piece`` with the largest ``piece`` of 0 to 12 for which ``2^piece (largest + sum) / 2`` is at
     most that bound times the frame's limit. Single pixels have no chord, so that there is nothing that a
@@ -56,15 +54,7 @@ class PlaneAssembler:
     Source: docs/theory/geometry.md#normals; C. F. Dunkl, K. S. Williams, *A simple norm inequality*, 1964.
     """
 
-    LEAST_FRACTION = 11
     LARGEST = 12
-
-    def least(self, triangles: Triangles) -> np.ndarray:
-        """Bound on m of sorted triangles, in 2^-11, 0 to 3456; from the components' first 12 bits."""
-        cut = triangles.normal >> (ATTRIBUTE.fraction_bits - self.LEAST_FRACTION)
-        turned = np.where(triangles.normal[:, :1] < 0, ~cut, cut)
-        total, single = turned.sum(axis=2).min(axis=1), turned.min(axis=1).max(axis=1)
-        return np.maximum(np.maximum((9 * total) >> 4, single), 0)
 
     def compute(self, gradients: Gradients, least: np.ndarray, frame: Frame) -> Planes:
         """Bit-accurate planes.
@@ -74,7 +64,7 @@ class PlaneAssembler:
         gradients : Gradients, shape (T, 4)
             From `GradientSetup`.
         least : int64 array, shape (T,)
-            From `least`.
+            From `AttributeSerialiser`, in 2^-11.
         frame : Frame
             Its ``limit``.
         """

@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import GRID, Grid
 from blysk.golden.reference.scene import BACK_FACES
+from blysk.hdl.geometry.booth import booth_term
 from blysk.hdl.geometry.triangles import (
     corners_shape,
     count_events,
@@ -154,7 +155,7 @@ class VertexSortUnit(wiring.Component):
                         m.d.sync += rest.eq(Cat(Const(0, 1 + DIGIT_BITS * (most - count)), down))
             with m.Else():
                 m.d.sync += rest.eq(rest << DIGIT_BITS)
-            high, low = (_booth(width, rest[-size:][:3]) for size in (3, 5))
+            high, low = (booth_term(width, rest[-size:][:3]) for size in (3, 5))
             term = Signal(signed(grid.bits + DIGIT_BITS + 1), name=f"term_{k}")
             m.d.sync += term.eq((high << 2) + low)
             terms.append(term)
@@ -206,11 +207,3 @@ def _largest_digits(grid: Grid) -> int:
 def _rows_of(digits: int, grid: Grid) -> int:
     """Scanlines from which on a height may not fit so many digits, signed."""
     return (1 << (DIGIT_BITS * digits - 1 - grid.subpixel_bits)) - 1
-
-
-def _booth(value: Signal, bits: Value) -> Value:
-    """Value times the Booth digit of three bits: -2 to 2."""
-    low, middle, high = bits
-    one, two = low ^ middle, (low == middle) & (middle != high)
-    size = Mux(two, value << 1, Mux(one, value, 0))
-    return Mux(high, -size, size)
