@@ -7,7 +7,7 @@ import numpy as np
 from blysk.golden.geometry.edge_setup import FRACTION_BITS
 from blysk.golden.geometry.plane_setup import PlaneScales, PlaneSetup
 from blysk.golden.geometry.triangles import ATTRIBUTE
-from blysk.golden.geometry.wide_product import halves, wide_product
+from blysk.golden.geometry.wide_product import LOST, halves, wide_product
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 
 __all__ = ["GradientSetup", "Gradients"]
@@ -77,7 +77,7 @@ class GradientSetup:
     ============ ============ =====================================================================
 
     Sums are taken modulo 4 once they are made: attributes are in [-1, 1), so that those of covered pixels are
-    right whatever passes in between. The bound is in `error`. Twelve multiplications.
+    right whatever passes in between. `error` is the bound. Twelve multiplications.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
@@ -93,6 +93,30 @@ class GradientSetup:
     PRODUCT_LOW = 8
     WIDTH_LOW = 8
     FRACTION_LOW = 16
+
+    @staticmethod
+    def error(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
+        """Bound on the error of an attribute at any pixel that a triangle covers, before it is cut.
+
+        ``r D`` is off by ``e1 = 2 E + L``, E that of the reciprocal, L that of a `wide_product`, as v2 - v0
+        is below 2; ``v1 - v0 - r D1`` by ``2 e1 + L``; ``g W'`` by ``e2``, that and ``2 w + L``, w the
+        relative error of 1/W. Over the height r passes at most 2 times its error, g over the width, too, as
+        the mantissas are below 2 and at least 1/2. A scanline adds the roundings of r, f g and g, 2^-33 each,
+        and what f and the product f g leave out, 2^-33 each times a g of at most 2/W; a column adds that of
+        g, and the start four cuts at 2^-28.
+
+        Parameters
+        ----------
+        rows : array
+            Scanlines of the triangles.
+        width : array
+            Their widths W in pixels, more than 1/256.
+        """
+        product = LOST * 2.0**-24 + 2.0**-32
+        along = PlaneSetup.HEIGHT_ERROR + product
+        inward = 2 * along + product + 2 * PlaneSetup.WIDTH_ERROR + product
+        row = 3 * 2.0**-33 + 2 / width * (2.0**-32 + 2.0**-39)
+        return 2 * along + 2 * inward + (rows + 1) * row + (width + 1) * 2.0**-33 + 2.0**-26
 
     def compute(self, first: Fixed, middle: Fixed, last: Fixed, scales: PlaneScales) -> Gradients:
         """Bit-accurate gradients.

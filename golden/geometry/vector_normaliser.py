@@ -39,8 +39,10 @@ class VectorNormaliser:
 
     The length of the result is off by at most `LENGTH_ERROR`, 2^-15.7: that of f relative to f, `FIT` and
     2^-20 for the cut, with 2^-20 for the roundings; of e, 2^-18 times the shifted length, below 1.74; and of
-    three components, ``sqrt(3) 2^-18``. The last also turns the direction, and so does the rounding of the
-    shifted components, whose length is 1/2 at least: by at most `DIRECTION_ERROR`, 2^-15.6.
+    three components, ``sqrt(3) 2^-18``. `FIT` is a sixteenth of the second derivative, 24 at most, times the
+    squared segment, over f = 2, with the roundings of c0 and c1. The last error also turns the direction,
+    and so does the rounding of the shifted components, whose length is 1/2 at least: by at most
+    `DIRECTION_ERROR`, 2^-15.6.
 
     Six multiplications, and one of 12 by 12 bits that is made of adders.
 
@@ -61,7 +63,7 @@ class VectorNormaliser:
     C0_FORMAT = UQ(2, 20)
     C1_FORMAT = UQ(3, 9)
     FACTOR_FORMAT = SQ(1, 17)
-    FIT = 3.0e-6
+    FIT = 24 * 2.0**-18 / 16 / 2 + 2.0**-22 + 2.0**-21
     LENGTH_ERROR = FIT + 2.0**-19 + 1.74 * 2.0**-18 + np.sqrt(3) * 2.0**-18
     DIRECTION_ERROR = np.sqrt(3) * (2.0**-17 + 2.0**-18)
 

@@ -35,7 +35,8 @@ class AttributeSerialiserUnit(wiring.Component):
     """Four attributes of each triangle in a row: those of `AttributeSerialiser`, the bit-accurate model.
 
     The attributes of a triangle taken in on one cycle are offered from 5 cycles later on, one a cycle unless
-    the output waits; the next triangle is taken in with the last of them, so that one takes 7 cycles. No multipliers.
+    the output waits; the next triangle is taken in with the last of them, so that one takes 7 cycles. No
+    multipliers.
 
     Members
     -------
