@@ -239,6 +239,11 @@ class ShadingPipelineUnit(wiring.Component):
         """
         return max(-(-self.latency // self.setup_interval), 17)
 
+    @property
+    def spans_inside(self) -> int:
+        """Spans that are inside at most."""
+        return self._waiting_spans + self._assembler.SPANS_INSIDE
+
     def elaborate(self, platform):
         """Frame constants, units from spans to colours, coordinates past them, admission, counters."""
         m = Module()
@@ -306,7 +311,7 @@ class ShadingPipelineUnit(wiring.Component):
         connect(m, wiring.flipped(self.write), frame.write)
         # A constant has its value two cycles after its write.
         m.d.sync += written.eq(self.write.valid & self.write.ready)
-        inside = Signal(range(self._waiting_spans + self._assembler.SPANS_INSIDE + 1))
+        inside = Signal(range(self.spans_inside + 1))
         finished = self.o.valid & self.o.ready & self.o.payload.last
         idle = Signal(init=1)
         m.d.comb += frame.hold.eq(~idle)

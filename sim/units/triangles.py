@@ -25,6 +25,7 @@ __all__ = [
     "Stages",
     "corners",
     "edges_of",
+    "ended",
     "frame_of",
     "plane_corners",
     "random_triangles",
@@ -240,6 +241,14 @@ def random_triangles(
         normal=np.clip(np.rint(normal * 2**23), -most, most).astype(np.int64),
         material=rng.integers(0, 1024, count),
     )
+
+
+def ended(triangles: Triangles, grid: Grid = GRID) -> Triangles:
+    """The same, the last of them in front of all, over all of a small picture: what it gives comes last."""
+    far = 100 * grid.steps
+    triangles.x[-1], triangles.y[-1], triangles.depth[-1] = (-far, -far, 3 * far), (-far, 3 * far, -far), 0
+    triangles.normal[-1] = 1 << 22
+    return triangles
 
 
 def small_frame(rng: np.random.Generator, back_faces: str = "flip", limit: int = 267) -> Frame:

@@ -6,7 +6,7 @@ from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.triangles import Frame, Grid, Triangles
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.sim.units.record import Case, Record, Stimulus, Variant
-from blysk.sim.units.triangles import frame_of, random_triangles, small_frame
+from blysk.sim.units.triangles import ended, frame_of, random_triangles, small_frame
 
 __all__ = ["RECORD"]
 
@@ -17,19 +17,21 @@ def _spans(unit, case):
 
 def _small(unit, rng, count):
     """Triangles of all kinds in a small picture, that is cut at every side."""
-    return Case(random_triangles(rng, count, unit.grid, 6.0, 0.3).beats, small_frame(rng).codes)
+    return Case(
+        ended(random_triangles(rng, count, unit.grid, 6.0, 0.3), unit.grid).beats, small_frame(rng).codes
+    )
 
 
 def _tiny(unit, rng, count):
     """Triangles of a pixel or so, back faces left out."""
     frame = Frame(-20, -20, 20, 20, "cull", 200)
-    return Case(random_triangles(rng, count, unit.grid, 1.0, 0.1).beats, frame.codes)
+    return Case(ended(random_triangles(rng, count, unit.grid, 1.0, 0.1), unit.grid).beats, frame.codes)
 
 
 def _large(unit, rng, count):
     """Triangles of a picture's size, with spans in pieces."""
     frame = Frame(-100, -80, 100, 80, "flip", 60)
-    return Case(random_triangles(rng, count, unit.grid, 80.0, 0.05).beats, frame.codes)
+    return Case(ended(random_triangles(rng, count, unit.grid, 80.0, 0.05), unit.grid).beats, frame.codes)
 
 
 RECORD = Record(
