@@ -8,7 +8,7 @@ from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.render import Renderer
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import connect
+from blysk.hdl.core.stream import connect, connect_fifo
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.depth_test import DepthMemory, DepthTestUnit, drawn_pixel_shape
 from blysk.hdl.geometry.geometry import GeometryUnit
@@ -16,19 +16,22 @@ from blysk.hdl.geometry.span_adapter import connect_shading_span
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
 from blysk.hdl.pipeline import ShadingPipelineUnit
 
-__all__ = ["STATUS", "RenderUnit"]
+__all__ = ["STATUS", "WAITING_SPANS", "RenderUnit"]
 
 STATUS = (*COUNTERS, "pixels", "hidden", "out_of_range_spans")
 """Counters of `RenderUnit`."""
+
+WAITING_SPANS = 33
+"""Spans between geometry and shading: a memory of 32 words, and a register behind it."""
 
 
 class RenderUnit(wiring.Component):
     """Triangles to the pixels that are to be written: `Renderer` is the bit-accurate model.
 
-    `GeometryUnit`, `ShadingPipelineUnit` and `DepthTestUnit` in a row; depths of spans pass the pipeline in
-    a FIFO. Each takes as long as it would alone, at the same time as the others: a frame as many cycles as
-    the slowest, if none of them waits for long. The compact style is that of the design's build, of shading
-    and of geometry.
+    `GeometryUnit`, `ShadingPipelineUnit` and `DepthTestUnit` in a row; spans wait between the first two in a
+    FIFO, and their depths pass the pipeline in another. Each takes as long as it would alone, at the same
+    time as the others: a frame as many cycles as the slowest, if none of them waits for long. The compact
+    style is that of the design's build, of shading and of geometry.
 
     Frame constants are written while no span is inside; spans of another material than the one before wait
     for the pipeline to be empty, see `ShadingPipelineUnit`.
@@ -76,7 +79,7 @@ class RenderUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """The three units; each span goes to the pipeline, and its depth to a FIFO, on the same cycle."""
+        """The three units; a span goes to the pipeline, and its depth to a FIFO, on the same cycle."""
         m = Module()
         geometry, pipeline, depth = self.geometry, self.pipeline, self.depth
         m.submodules.geometry, m.submodules.pipeline, m.submodules.depth = geometry, pipeline, depth
@@ -87,22 +90,32 @@ class RenderUnit(wiring.Component):
         if depth.size is None:
             wiring.connect(m, depth.memory, wiring.flipped(self.memory))
 
-        shape = data.StructLayout({"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)})
+        deep = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
+        span = stream.Signature(data.StructLayout({"span": pipeline.i.payload.shape(), **deep}))
+        made, ready = span.create(path=("made",)), span.create(path=("ready",))
+        connect_shading_span(m, geometry.o.payload, made.payload.span)
+        m.d.comb += [
+            *(made.payload[name].eq(geometry.o.payload[name]) for name in deep),
+            made.valid.eq(geometry.o.valid),
+            geometry.o.ready.eq(made.ready),
+        ]
+        connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS)
+        shape = data.StructLayout(deep)
         m.submodules.depths = depths = fifo.SyncFIFOBuffered(
             width=Shape.cast(shape).width, depth=pipeline.spans_inside + 1
         )
-        word, span = Signal(shape, name="depth_word"), geometry.o.payload
-        connect_shading_span(m, span, pipeline.i.payload)
+        word = Signal(shape, name="depth_word")
         waiting, pixel = data.View(shape, depths.r_data), pipeline.o
         moves = depth.i.valid & depth.i.ready
         m.d.comb += [
-            *(word[name].eq(span[name]) for name in shape.members),
+            pipeline.i.payload.eq(ready.payload.span),
+            *(word[name].eq(ready.payload[name]) for name in deep),
             depths.w_data.eq(word),
-            depths.w_en.eq(geometry.o.valid & pipeline.i.ready),
-            pipeline.i.valid.eq(geometry.o.valid & depths.w_rdy),
-            geometry.o.ready.eq(pipeline.i.ready & depths.w_rdy),
+            depths.w_en.eq(ready.valid & pipeline.i.ready),
+            pipeline.i.valid.eq(ready.valid & depths.w_rdy),
+            ready.ready.eq(pipeline.i.ready & depths.w_rdy),
             depth.i.payload.pixel.eq(pixel.payload),
-            *(depth.i.payload[name].eq(waiting[name]) for name in shape.members),
+            *(depth.i.payload[name].eq(waiting[name]) for name in deep),
             depth.i.valid.eq(pixel.valid & depths.r_rdy),
             pixel.ready.eq(depth.i.ready & depths.r_rdy),
             depths.r_en.eq(moves & pixel.payload.last),

@@ -13,8 +13,8 @@ from blysk.golden.render import Renderer
 
 __all__ = ["SPAN_ANGLE", "TriangleFrame", "frame_of_pixels", "sent_triangles", "triangle_frame"]
 
-SPAN_ANGLE = 20.0
-"""Widest piece of a span in degrees; the chord's setup serves 22.5."""
+SPAN_ANGLE = 5.0
+"""Widest piece of a span in degrees, for at most 1 LSB at every exponent; the chord's setup serves 22.5."""
 
 
 @dataclass(frozen=True)

@@ -156,17 +156,17 @@ class DepthTestUnit(wiring.Component):
 
     def _remember(self, m: Module) -> None:
         """A memory of the picture's size behind the port."""
+        # Turned round, so that a cleared memory is one of zeros.
         port, (width, height) = self._port, self.size
-        init = [DepthTest.CLEARED] * (width * height)
-        m.submodules.depths = memory = Memory(shape=DEPTH.width, depth=width * height, init=init)
+        m.submodules.depths = memory = Memory(shape=DEPTH.width, depth=width * height, init=[])
         read, write = memory.read_port(), memory.write_port()
         m.d.comb += [
             read.addr.eq(port.read_place.y * width + port.read_place.x),
             read.en.eq(port.read_enable),
-            port.read_data.eq(read.data),
+            port.read_data.eq(~read.data),
             write.addr.eq(port.write_place.y * width + port.write_place.x),
             write.en.eq(port.write_enable),
-            write.data.eq(port.write_data),
+            write.data.eq(~port.write_data),
         ]
 
 

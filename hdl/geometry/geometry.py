@@ -21,6 +21,9 @@ from blysk.hdl.geometry.vertex_sort import VertexSortUnit
 
 __all__ = ["GeometryUnit"]
 
+_SORTED = 17
+"""Triangles that wait for the edge setup, while others are dropped by the sort."""
+
 _SCALES = 4
 """Triangles whose scales wait for their attributes."""
 
@@ -104,9 +107,11 @@ class GeometryUnit(wiring.Component):
     def _set_up(self, m: Module) -> stream.Interface:
         """From the sort to gradients; what is to be walked."""
         sort, serialiser, edges, planes = self._sort, self._serialiser, self._edges, self._planes
-        _fork(m, sort.o, edges.i, serialiser.i)
+        drawn = _between("drawn", sort.o)
+        connect_fifo(m, "waiting_triangles", sort.o, drawn, depth=_SORTED)
+        _fork(m, drawn, edges.i, serialiser.i)
         for to in (edges.i.payload, serialiser.i.payload):
-            m.d.comb += [to[name].eq(sort.o.payload[name]) for name in to.shape().members]
+            m.d.comb += [to[name].eq(drawn.payload[name]) for name in to.shape().members]
 
         # How many triangles are between their edges and their planes at most.
         delay = planes.latency + self._gradients.latency + ATTRIBUTES * self._gradients.initiation_interval

@@ -118,9 +118,7 @@ class TriangleSimulator:
             write=writes_of(constants_of(scene, self.renderer.design)),
             engine=self.engine,
             progress=progress,
-            idle_timeout=_longest_silence(
-                sent, self.renderer.geometry.grid.steps, self._unit.pipeline.cycles_per_pixel
-            ),
+            idle_timeout=self._longest_silence(sent),
         )
         self.engine = run.engine
         counts = {name: int(run.status[name]) for name in STATUS}

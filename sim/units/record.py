@@ -15,6 +15,7 @@ import numpy as np
 from amaranth.lib.wiring import Component
 
 __all__ = [
+    "PAUSED",
     "STALLS",
     "Beats",
     "Case",

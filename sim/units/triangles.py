@@ -19,6 +19,7 @@ from blysk.golden.geometry.triangles import ATTRIBUTE, GRID, Frame, Grid, Triang
 from blysk.golden.geometry.vertex_sort import SortedTriangles, VertexSort
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.reference.scene import BACK_FACES
+from blysk.sim.units.record import PAUSED
 
 __all__ = [
     "WHOLE",
@@ -244,10 +245,14 @@ def random_triangles(
 
 
 def ended(triangles: Triangles, grid: Grid = GRID) -> Triangles:
-    """The same, the last of them in front of all, over all of a small picture: what it gives comes last."""
+    """The same, two of them over all of a small picture, before a run's end: what they give comes last.
+
+    That is the last, in front of all, and the last of the run with pauses, in front of most.
+    """
     far = 100 * grid.steps
-    triangles.x[-1], triangles.y[-1], triangles.depth[-1] = (-far, -far, 3 * far), (-far, 3 * far, -far), 0
-    triangles.normal[-1] = 1 << 22
+    for index, depth in ((PAUSED - 1, 1 << 21), (-1, 0)):
+        triangles.x[index], triangles.y[index] = (-far, -far, 3 * far), (-far, 3 * far, -far)
+        triangles.depth[index], triangles.normal[index] = depth, 1 << 22
     return triangles
 
 
