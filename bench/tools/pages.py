@@ -41,6 +41,7 @@ SAMPLES = 100_000
 """Random operands of each variant: enough for the drawings."""
 
 _TITLES = {
+    "geometry": "Triangles to spans",
     "normals": "Normals of a span",
     "cosines": "Cosines without normals",
     "methods": "Whole methods",

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from blysk.golden.geometry.halfway_vector import HalfwayVector
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.golden.reference.lighting import halfway_vector
 from blysk.hdl.geometry.halfway_vector import HalfwayVectorUnit
@@ -30,7 +31,7 @@ def _vectors(unit, rng, count):
 def _measure(rng, count):
     light = sphere(rng, count)
     light, viewer = quantise(light), quantise(turned(rng, light, rng.uniform(0, 179, count)))
-    halfway, _ = HalfwayVectorUnit().parameters.compute(*component_words(light, viewer))
+    halfway, _ = HalfwayVector().compute(*component_words(light, viewer))
     exact = halfway_vector(light / ONE, viewer / ONE)
     return Sample(halfway.codes / ONE, exact, None, degrees_between(light, viewer).reshape(-1, 1))
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
+from blysk.golden.geometry.vector_normaliser import VectorNormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import ONE
 from blysk.hdl.geometry.vector_normaliser import VectorNormaliserUnit
@@ -47,9 +48,7 @@ def _corners(unit, rng, count):
 def _measure(rng, count):
     vector = _codes(sphere(rng, count) * 2.0 ** rng.uniform(14, 26, (count, 1)))
     length = np.linalg.norm(vector, axis=1)
-    normal, _ = VectorNormaliserUnit().parameters.compute(
-        Fixed(SPAN_NORMAL, vector), np.zeros(count, dtype=bool)
-    )
+    normal, _ = VectorNormaliser().compute(Fixed(SPAN_NORMAL, vector), np.zeros(count, dtype=bool))
     exact = vector / length[:, np.newaxis]
     return Sample(normal.codes / ONE, exact, None, np.log2(length * 2.0**-26)[:, np.newaxis])
 

@@ -18,6 +18,9 @@ from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
+from blysk.golden.geometry.gradient_setup import GradientSetup
+from blysk.golden.geometry.plane_setup import PlaneSetup
+from blysk.golden.geometry.vector_normaliser import VectorNormaliser
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
@@ -321,7 +324,13 @@ def lobe_bounds(name):
 
 
 # Bounds of the model's error and of the arithmetic's, and of the total where it is not their sum.
+UNIT_VECTOR_ERROR = VectorNormaliser.LENGTH_ERROR + VectorNormaliser.DIRECTION_ERROR
 BOUNDS = {
+    "plane_setup": lambda _: (None, None, PlaneSetup.WIDTH_ERROR),
+    # At the far side of the widest triangle.
+    "gradient_setup": lambda _: (None, None, GradientSetup.error(0, 4096)),
+    "vector_normaliser": lambda _: (None, None, UNIT_VECTOR_ERROR),
+    "halfway_vector": lambda _: (None, None, UNIT_VECTOR_ERROR),
     "dot_product": lambda _: (0, 0),
     "gpq": lambda _: (0, 0),
     "middle_normal": lambda fit: (4e-3, 3e-6, MiddleNormal(fit.split(", ")[0]).error),
@@ -375,7 +384,7 @@ def test_errors_keep_the_bounds_that_are_stated(entry, samples):
 
 @pytest.mark.parametrize("samples", [1000, pytest.param(200_000, marks=pytest.mark.long)])
 def test_no_word_wraps_in_its_domain(monkeypatch, samples):
-    """But the phases of the angular setup, where a turn is 1 and goes back to 0."""
+    """But phases of the angular setup, where 1 is a turn, and steps of attributes, which are modulo 4."""
     wraps, found = Fixed.wrap, set()
 
     def watched(number, format):
@@ -388,8 +397,8 @@ def test_no_word_wraps_in_its_domain(monkeypatch, samples):
     for entry in ENTRIES if samples > FEW else QUICK:
         sample_of(entry, samples)
     units, formats = (set(names) for names in zip(*found, strict=True))
-    assert units <= {"angular_setup", "angular_interpolator", "pipeline"}
-    assert formats == {AngularSetup.PHASE_FORMAT, AngularSetup.DIRECTION_FORMAT}
+    assert units <= {"angular_setup", "angular_interpolator", "pipeline", "gradient_setup"}
+    assert formats == {AngularSetup.PHASE_FORMAT, AngularSetup.DIRECTION_FORMAT, GradientSetup.FORMAT}
 
 
 @pytest.mark.parametrize(

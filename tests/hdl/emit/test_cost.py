@@ -69,6 +69,11 @@ MULTIPLIERS = {
     "light": 2,
     "intensity": 6,
     "pipeline": 19,
+    "edge_setup": 0,
+    "plane_setup": 1,
+    "gradient_setup": 3,
+    "vector_normaliser": 6,
+    "geometry": 10,
 }
 
 
