@@ -25,7 +25,7 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.unit_vector import ONE, quantise
 from blysk.golden.pipeline import Design, Spans
-from blysk.golden.presets import preset
+from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import unpack
@@ -39,15 +39,22 @@ from blysk.sim.value_types import Whole
 
 __all__ = ["DESIGNS", "WIDEST", "main", "measure", "random_constants", "random_spans", "table", "tasks"]
 
+_MODELS = {
+    "linear": "cosquad7",
+    "quadratic-eval": "lyon3",
+    "quadratic-horner": "exp",
+    "angular": "coscos2",
+    "recurrence": "coscos4",
+    "renormalise": "blinn",
+}
+"""Models of methods; others have the first of the documents."""
+
 DESIGNS = (
-    ("linear", "cosquad7", False),
-    ("quadratic", "cosquad", False),
-    ("quadratic-eval", "lyon3", False),
-    ("quadratic-horner", "exp", True),
-    ("angular", "coscos2", False),
-    ("recurrence", "coscos4", False),
-    ("renormalise", "blinn", False),
-    ("chord", "cosquad", False),
+    *(
+        (name, _MODELS.get(name, "cosquad"), name == "quadratic-horner")
+        for name, method in METHODS.items()
+        if name != "bisection" and not method.TAKES_VALUES
+    ),
     ("chord", "cosquad", True),
     ("chord", "cosquad_q", False),
 )

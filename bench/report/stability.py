@@ -52,7 +52,7 @@ _STYLES = {
     "chord": ("#d62728", "-"),
     "chord-local": ("#ff7f0e", "--"),
 }
-"""Colour and dashes of each method's line."""
+"""Colour and dashes of a method's line; others are black."""
 
 
 def tasks(quick: bool) -> list[Task]:
@@ -256,7 +256,7 @@ def _drawing(ranges: dict[str, dict]) -> Drawing:
             errors = [
                 of[way][key] if show else np.nan for of, show in zip(found["sweep"], shown, strict=True)
             ]
-            color, dash = _STYLES[method]
+            color, dash = _STYLES.get(method, ("#000000", "-."))
             panel.plot(SWEEP, errors, color=color, linestyle=dash, linewidth=1.4, label=method)
         panel.axhline(0.5, color="#888888", linewidth=0.8, linestyle=":")
         panel.set(xscale="log", yscale="log", title=title, xlabel="angle of the span, degrees")
