@@ -105,7 +105,6 @@ def test_scene_files_scenes_and_meshes(tmp_path):
     linear = blysk.design(method="linear")
     assert of_file.design == linear
     for other in (
-        blysk.render(scene, method="linear"),
         blysk.render(scene, design=linear),
         blysk.render(mesh, method="linear", **options),
         blysk.render(blysk.scene(mesh, **options), design=linear, engine="pysim"),
@@ -118,6 +117,7 @@ def test_scene_files_scenes_and_meshes(tmp_path):
     assert seen.camera == blysk.scene(mesh, size=(16, 12), **plain).camera != scene.camera
 
 
+@pytest.mark.long
 def test_specialised_pipeline():
     frame = blysk.render("teapot", method="linear", specular=0, specialise=True, engine="pysim", **TINY)
     saved = frame.figures["specialisation"]

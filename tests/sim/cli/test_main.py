@@ -50,17 +50,20 @@ def test_version(capsys):
 
 
 def test_verilog(capsys):
-    assert main(["verilog", "--model", "cosquad7"]) == 0
+    assert main(["verilog", "--method", "linear", "--model", "cosquad7"]) == 0
     printed, errors = capsys.readouterr()
     assert errors == ""
-    assert main(["verilog", "--model", "cosquad7", "-o", "core.v"]) == 0
+    assert main(["verilog", "--method", "linear", "--model", "cosquad7", "-o", "core.v"]) == 0
     assert capsys.readouterr() == ("", "")
     assert Path("core.v").read_text() == printed
     assert "model cosquad7, lights 1" in printed
     # The same text in another process, whatever the order of its sets.
     environment = {**os.environ, "PYTHONHASHSEED": "12345"}
     again = subprocess.run(
-        [*PROGRAM, "verilog", "--model", "cosquad7"], env=environment, capture_output=True, text=True
+        [*PROGRAM, "verilog", "--method", "linear", "--model", "cosquad7"],
+        env=environment,
+        capture_output=True,
+        text=True,
     )
     assert again.stdout == printed
 

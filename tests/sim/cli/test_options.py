@@ -138,7 +138,7 @@ def test_triangles_of_a_file(refused):
         (["--lights", "0"], "--lights 0", "from 1 to 16"),
         (["--lights", "17"], "--lights 17", "from 1 to 16"),
         (["--name", "1up"], "--name 1up", "letters, digits and underscores"),
-        (["--name", "module"], "--name module", "choose another name"),
+        (["--name", "module", "--method", "linear"], "--name module", "choose another name"),
         (["-o", "no/such/folder.v"], "no/such/folder.v", "there is no folder no/such"),
     ],
 )

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("folder")
 
 
 SCENE = """
-size = [64, 48]
+size = [24, 18]
 background = 0.5
 back_faces = "show"
 [mesh]
@@ -45,8 +45,9 @@ method = "linear"
 model = "cosquad7"
 """
 
+SLOW = ["--engine", "pysim"]
 SCENE_OPTIONS = [
-    *("--size", "64x48", "--background", "0.5", "--back-faces", "show", "--crease", "180"),
+    *("--size", "24x18", "--background", "0.5", "--back-faces", "show", "--crease", "180"),
     *("--projection", "orthographic", "--view", "0,1,3", "--light", "1,1,1"),
     *("--light=-1,1,1,0.5,0.25,0", "--ambient", "0.1", "--diffuse", "0.5,0.25,0.125"),
     *("--specular", "0.75", "--exponent", "20", "--method", "linear", "--model", "cosquad7"),
@@ -68,14 +69,16 @@ def figures_of(name):
 
 
 def test_scene_file_says_what_the_options_say(scenes, capsys):
-    assert main(["render", "scenes/a.toml", "--json", "file.json"]) == 0
-    assert main(["render", "scenes/a.obj", *SCENE_OPTIONS, "-o", "b.png", "--json", "options.json"]) == 0
+    assert main(["render", "scenes/a.toml", *SLOW, "--json", "file.json"]) == 0
+    assert (
+        main(["render", "scenes/a.obj", *SCENE_OPTIONS, *SLOW, "-o", "b.png", "--json", "options.json"]) == 0
+    )
     assert capsys.readouterr().err == ""
     assert Path("a-blysk.png").read_bytes() == Path("b.png").read_bytes()
     assert figures_of("file.json") == figures_of("options.json")
     figures = figures_of("file.json")
     assert (figures["method"], figures["model"], figures["exponent"]) == ("linear", "cosquad7", 20)
-    assert (figures["lights"], figures["width"], figures["mesh"]) == (2, 64, "a")
+    assert (figures["lights"], figures["width"], figures["mesh"]) == (2, 24, "a")
 
 
 @pytest.mark.long
