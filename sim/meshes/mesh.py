@@ -14,7 +14,8 @@ import trimesh
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.reference.geometry import Mesh
 from blysk.sim.errors import InputError
-from blysk.sim.meshes.gltf import check_gltf, find_gltf_materials, gltf_document, gltf_references, plain_gltf
+from blysk.sim.meshes.gltf import check_gltf, find_gltf_materials, gltf_document, plain_gltf
+from blysk.sim.meshes.gltf_arrays import gltf_buffers, plain_arrays
 from blysk.sim.meshes.materials import FileMaterial, Found
 from blysk.sim.meshes.normals import crease_normals, face_cross, repaired_normals, transformed
 from blysk.sim.meshes.obj import find_obj_materials, split_obj, tidy_obj
@@ -141,12 +142,18 @@ def load_mesh(
         raise InputError(source, "is nested too deeply", REEXPORT) from error
     # The loaders raise whatever a damaged file makes them trip over.
     except Exception as error:
-        text = str(error).strip().split("\n")[0]
-        kind = type(error).__name__
-        misshapen = isinstance(error, AttributeError | IndexError | KeyError | TypeError)
-        what = "is damaged, a part is missing or of a wrong kind" if misshapen else "cannot be read"
-        reason = f"{what} ({kind}: {text})" if text else f"{what} ({kind})"
-        raise InputError(source, reason, REEXPORT) from error
+        raise InputError(source, _fault(error), REEXPORT) from error
+
+
+def _fault(error: Exception) -> str:
+    """What a loader stumbled over, in words of the file and not of the program."""
+    damaged = "is damaged, a part is missing or of a wrong kind"
+    if isinstance(error, AssertionError | AttributeError | KeyError | TypeError):
+        return damaged
+    text = str(error).strip().split("\n")[0]
+    text = re.sub(r"^(\w+\.)*\w*(Error|Exception)\b:? *", "", text)
+    what = damaged if isinstance(error, IndexError) else "cannot be read"
+    return f"{what} ({text})" if text else what
 
 
 @contextmanager
@@ -214,10 +221,12 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> tuple[trimesh.Scene
     else:
         document = gltf_document(data, suffix)
         check_gltf(document)
-        references = gltf_references(document, path.parent)
+        buffers = gltf_buffers(document, data, suffix, path.parent)
         find_gltf_materials(document, materials, found)
-        data = plain_gltf(document, data, suffix)
-        options["skip_materials"] = False
+        buffers = plain_arrays(document, buffers)
+        references = {str(number): buffer for number, buffer in enumerate(buffers)}
+        data = plain_gltf(document, found)
+        options["skip_materials"], suffix = False, ".gltf"
     scene = trimesh.load_scene(
         io.BytesIO(data), file_type=suffix[1:], resolver=references, process=False, **options
     )
