@@ -25,7 +25,7 @@ BAD_MESHES = {
     "unknown.dae": (b"x", "unknown mesh type '.dae'"),
     "empty.obj": (b"", "the file is empty"),
     "empty.glb": (b"", "the file is empty"),
-    "truncated.ply": (box("ply")[:-20], "cannot be read"),
+    "truncated.ply": (box("ply")[:-20], "cut short"),
     "truncated.glb": (box("glb")[:-20], "cut short"),
     "index.obj": (CORNERS + b"f 1 2 4\n", "out of bounds"),
     "lines.obj": (CORNERS + b"l 1 2\n", "it has no faces"),
@@ -34,7 +34,7 @@ BAD_MESHES = {
     "infinite.obj": (CORNERS + b"v 0 inf 0\nf 1 2 4\n", "NaN or infinite"),
     "point.obj": (b"v 1 2 3\n" * 3 + b"f 1 2 3\n", "all its vertices are at one point"),
     "flat.obj": (b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "none of its faces has an area"),
-    "draco.glb": (glb(*draco_gltf()), "the decoder DracoPy is not installed; pip install DracoPy"),
+    "draco.glb": (glb(*draco_gltf()), "the decoder DracoPy is not installed; pip install 'blysk[draco]'"),
 }
 
 

@@ -63,8 +63,8 @@ def test_objects_and_materials_weld_to_one(tmp_path):
         (CORNERS + "f 1 2 3\nf 1 2", "fewer than 3 corners"),
         (CORNERS + "f 1 2 -9", "out of bounds"),
         (CORNERS + "f -3 -2 -1\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf -3 -2 -1", "relative face indices"),
-        (CORNERS + "f 1 2 3\nf 1 x 3", "could not be read"),
-        ("v 0 0\nv 1 0\nv 0 1\nf 1 2 3", "cannot be read"),
+        (CORNERS + "f 1 2 3\nf 1 x 3", "not indices"),
+        ("v 0 0\nv 1 0\nv 0 1\nf 1 2 3", "not 3 numbers"),
     ],
 )
 def test_bad_obj(tmp_path, text, reason):
@@ -74,7 +74,7 @@ def test_bad_obj(tmp_path, text, reason):
 def test_what_trimesh_makes_of_bad_obj_files(tmp_path):
     """The facts behind two refusals: an `IndexError`, and points in place of lines."""
     path = tmp_path / "a.obj"
-    check_refused(path, "IndexError", "out of bounds", content=CORNERS + "f 1 2 4\n")
+    check_refused(path, "out of bounds", content=CORNERS + "f 1 2 4\n")
     with pytest.raises(IndexError):
         trimesh.load_scene(str(path))
     check_refused(path, "it has no faces", content="v 0 0 0\nv 1 0 0\nl 1 2\n")
@@ -170,7 +170,7 @@ def test_draco(tmp_path, monkeypatch, decoder):
     """Without its decoder; with one that does not decode, of which trimesh leaves zeros and a line of log."""
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda n: decoder if n == "DracoPy" else find(n))
-    reason = "pip install DracoPy" if decoder is None else "all its vertices are at one point"
+    reason = "pip install 'blysk[draco]'" if decoder is None else "all its vertices are at one point"
     check_refused(tmp_path / "a.glb", reason, content=draco_gltf())
 
 
