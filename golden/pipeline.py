@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.lighting.lobe import Lobe
+from blysk.golden.lighting.lobe import Lobe, LobeTable
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
 from blysk.golden.methods.interpolator import Interpolator, Operands
@@ -193,10 +193,9 @@ class Design:
         """Refuse what a lobe's tables do not serve."""
         if self.build.exponent is not None:
             raise ValueError("a lobe has tables and no exponent; fix its tables")
-        if self.specular.operand == "one_minus_cosine" and self.specular.fraction_bits != 25:
-            raise ValueError(
-                f"1 - N·H has 25 fraction bits in a pipeline, the lobe {self.specular.fraction_bits}"
-            )
+        lobe = cast(Lobe, self.specular)
+        if lobe.operand == "one_minus_cosine" and lobe.fraction_bits != 25:
+            raise ValueError(f"1 - N·H has 25 fraction bits in a pipeline, the lobe {lobe.fraction_bits}")
 
     @property
     def loads_tables(self) -> bool:
@@ -209,8 +208,9 @@ class Design:
 
     def steepness(self, material: Material) -> float:
         """Exponent that decides how fine spans must be, see `ReflectionModel.steepness`."""
-        parameter = self.highlight_parameter(material)
-        return self.specular.model.steepness(parameter) if self.specular else parameter
+        if self.specular is None:
+            return material.exponent
+        return self.specular.model.steepness(self.highlight_parameter(material))
 
     def for_materials(self, materials: Sequence[Material]) -> "Design":
         """The same design for materials, with a bank for each of their lobes, at most `Lobe.MAX_BANKS`."""
@@ -261,7 +261,8 @@ class Design:
         left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
         gate = self.highlight_gate
         if self.loads_tables:
-            arguments = [of_material.lobe.last_lit_argument for of_material in constants]
+            tables = [cast(LobeTable, of_material.lobe) for of_material in constants]
+            arguments = np.array([table.last_lit_argument for table in tables])
             threshold = gate.thresholds_of(arguments)[spans.material]
             decide = partial(gate.compute_by, threshold=threshold)
         else:
@@ -327,7 +328,7 @@ class Design:
                 given = len(of_material.direction)
                 raise ValueError(f"the constants are for {given} lights, not {self.lights}")
             if self.loads_tables:
-                self.specular.check(of_material.lobe)
+                cast(Lobe, self.specular).check(cast(LobeTable, of_material.lobe))
             if self.build.exponent not in (None, of_material.exponent):
                 fixed = self.build.exponent
                 raise ValueError(f"the exponent is fixed at {fixed}, not {of_material.exponent}")
@@ -365,7 +366,7 @@ class Design:
         diffuse = diffuse_unit.compute(cosine)
         specular = Fixed(Intensity.TERM_FORMAT, np.zeros(dark.shape, dtype=np.int64))
         if self.specular is not None:
-            specular = self.specular.compute(highlight, dark, constants.highlight)
+            specular = self.specular.compute(highlight, dark, cast(Any, constants.highlight))
         return self.intensity.compute(*self._colors(constants), diffuse, specular)
 
     def _ambient(self, constants: Sequence[FrameConstants], material: np.ndarray) -> np.ndarray:
