@@ -87,7 +87,8 @@ def test_cycles(method, interval):
     assert np.all(taken <= np.maximum(length * unit.cycles_per_pixel, unit.setup_interval))
     if interval is not None:
         # In a run of single pixels each costs the interval.
-        assert np.all(taken[26:31] == interval == unit.setup_interval)
+        assert unit.setup_interval == interval
+        assert np.all(taken[26:31] == interval)
 
 
 @pytest.mark.parametrize("lights", [1, pytest.param(3, marks=pytest.mark.long)])
