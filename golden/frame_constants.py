@@ -6,17 +6,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from blysk.golden.lighting.intensity import MAX_INTENSITY, MAX_LIGHTS, Intensity
+from blysk.golden.lighting.lobe import LobeTable
+from blysk.golden.number.fixed import Format
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.reflection import ReflectionModel
 from blysk.golden.reference.scene import Scene
 
 __all__ = [
+    "BANK_ADDRESS",
     "FIELDS_OF_A_FRAME",
     "FIELDS_OF_A_LIGHT",
     "LIGHT_STRIDE",
+    "LOBE_ADDRESS",
     "MATERIAL_ADDRESS",
     "MAX_MATERIALS",
+    "THRESHOLD_ADDRESS",
     "FrameConstants",
     "address_table",
     "writes_of",
@@ -31,11 +36,23 @@ FIELDS_OF_A_LIGHT = {"direction": (0, 3), "halfway": (3, 3), "diffuse": (6, 3), 
 MATERIAL_ADDRESS = 4
 """Address of the index of the material that the constants written next belong to, where there are several."""
 
+LOBE_ADDRESS = 5
+"""Address of writes that load tables of lobes, see `LobeTable.writes`; ``begins`` is bit 17."""
+
+THRESHOLD_ADDRESS = 6
+"""Address of a material's threshold, from which on there is no highlight, where tables are loaded."""
+
+BANK_ADDRESS = 7
+"""Address of the bank of a material's table, where there are several."""
+
 MAX_MATERIALS = 1024
 """Most materials of a pipeline."""
 
 LIGHT_STRIDE = 16
 """Addresses from one light to the next."""
+
+
+_WIDER = {"exponent": "lower the exponent,", "roughness": "raise the roughness or lower"}
 
 
 @dataclass(frozen=True)
@@ -45,13 +62,20 @@ class FrameConstants:
     Parameters
     ----------
     exponent : int
-        Specular exponent, 1 to 1000.
+        Specular exponent, 1 to 1000; of a lobe the one of Blinn's power that is as steep, which decides how
+        wide spans may be.
     ambient : int array, shape (3,)
         Ambient colour operand, ``UQ(11, 6)`` in LSB.
     direction, halfway : int arrays, shape (lights, 3)
         Unit vectors to each light, and half-way to the viewer, ``SQ(1, 17)``.
     diffuse, specular : int arrays, shape (lights, 3)
         Colour operands of each light.
+    lobe : LobeTable, optional
+        Table of the highlight, of a design whose specular unit has one; see `prepare.constants_of`.
+    bank : int
+        Bank of that table.
+    threshold : int, optional
+        Of that table, see `Design.threshold_of`, where a gate or a span limit needs it.
     """
 
     exponent: int
@@ -60,6 +84,14 @@ class FrameConstants:
     halfway: np.ndarray
     diffuse: np.ndarray
     specular: np.ndarray
+    lobe: LobeTable | None = None
+    bank: int = 0
+    threshold: int | None = None
+
+    @property
+    def highlight(self) -> int | LobeTable:
+        """What the specular unit works with: the exponent, or the table."""
+        return self.exponent if self.lobe is None else self.lobe
 
     @classmethod
     def of(
@@ -99,7 +131,7 @@ class FrameConstants:
         Source of the factors: [C].
         """
         material = scene.materials[index]
-        factor = 1.0 if energy is None else energy.energy_factor(material.exponent)
+        factor = 1.0 if energy is None else energy.energy_factor(material.parameter(energy))
         count = max(len(scene.lights), 1) if lights is None else lights
         if not len(scene.lights) <= count <= MAX_LIGHTS:
             raise ValueError(f"the pipeline has {count} lights, the scene {len(scene.lights)}")
@@ -118,26 +150,38 @@ class FrameConstants:
                 highlight = factor * np.multiply(material.specular, light.color)
                 if energy is not None and highlight.max() > MAX_INTENSITY:
                     raise ValueError(
-                        f"the energy factor {factor:.4g} of {energy.name} with exponent {material.exponent} "
-                        f"makes a specular term of {highlight.max():.4g}, over {MAX_INTENSITY}; lower the "
-                        "exponent, the specular coefficient or the light"
+                        f"the energy factor {factor:.4g} of {energy.name} with {energy.PARAMETER} "
+                        f"{material.parameter(energy)} makes a specular term of {highlight.max():.4g}, over "
+                        f"{MAX_INTENSITY}; {_WIDER[energy.PARAMETER]} the specular coefficient or the light"
                     )
                 specular[index] = Intensity.color(highlight)
         ambient = Intensity.color(np.multiply(material.ambient, scene.ambient_light))
         return cls(material.exponent, ambient, direction, halfway, diffuse, specular)
 
-    def writes(self, index: int | None = None) -> dict[str, np.ndarray]:
+    def writes(self, index: int | None = None, loads: bool = True) -> dict[str, np.ndarray]:
         """Beats for the write port: ``address`` and ``data``, 18 bits of each code.
 
         Parameters
         ----------
         index : int, optional
             Of the material, for a pipeline with several.
+        loads : bool
+            Whether the table of a lobe is loaded, unless it is fixed at build time.
         """
         address, data = ([], []) if index is None else ([MATERIAL_ADDRESS], [index])
         for name, (first, count) in FIELDS_OF_A_FRAME.items():
             address += range(first, first + count)
             data += np.ravel(getattr(self, name)).tolist()
+        if self.lobe is not None and self.lobe.lobe.banks > 1:
+            address.append(BANK_ADDRESS)
+            data.append(self.bank)
+        if self.threshold is not None:
+            address.append(THRESHOLD_ADDRESS)
+            data.append(self.threshold)
+        if self.lobe is not None and self.lobe.lobe.fixed is None and loads:
+            beats = self.lobe.writes(self.bank)
+            address += [LOBE_ADDRESS] * len(beats["value"])
+            data += (beats["value"] | beats["begins"] << 17).tolist()
         for light in range(len(self.direction)):
             base = (light + 1) * LIGHT_STRIDE
             for name, (first, count) in FIELDS_OF_A_LIGHT.items():
@@ -147,17 +191,24 @@ class FrameConstants:
 
 
 def writes_of(constants: Sequence[FrameConstants]) -> dict[str, np.ndarray]:
-    """Beats for the write port of a pipeline with so many materials, see `FrameConstants.writes`."""
+    """Beats for the write port of a pipeline with so many materials, see `FrameConstants.writes`.
+
+    A table that several materials have is loaded once.
+    """
     if len(constants) == 1:
         return constants[0].writes()
-    writes = [of_material.writes(index) for index, of_material in enumerate(constants)]
+    banks = [of_material.bank for of_material in constants]
+    writes = [of.writes(index, banks.index(of.bank) == index) for index, of in enumerate(constants)]
     return {name: np.concatenate([beats[name] for beats in writes]) for name in ("address", "data")}
 
 
 _MEANINGS = {
-    "exponent": "specular exponent, 1 to 1000",
+    "exponent": "specular exponent, 1 to 1000; of a lobe that of Blinn's power as steep",
     "ambient": "ambient colour, red green blue, UQ(11, 6) in LSB of the channel",
     "material": "index of the material that exponent and colours written next belong to",
+    "lobe": "the next value of a table, UQ(0, 17); with bit 17 the bank whose table begins",
+    "threshold": "of the table: where its highlight ends; {threshold}",
+    "bank": "bank of the material's table",
     "direction": "unit vector to the light, SQ(1, 17)",
     "halfway": "unit half-way vector, SQ(1, 17)",
     "diffuse": "diffuse colour, red green blue, UQ(11, 6)",
@@ -165,16 +216,41 @@ _MEANINGS = {
 }
 
 
-def address_table(lights: int, materials: int = 1) -> list[str]:
-    """Lines that tell the address of every constant of a pipeline with so many lights and materials."""
+def address_table(
+    lights: int,
+    materials: int = 1,
+    banks: int = 0,
+    threshold: Format | None = None,
+    loads_tables: bool = False,
+) -> list[str]:
+    """Lines that tell the address of every constant of a pipeline with so many lights and materials.
+
+    Parameters
+    ----------
+    lights, materials : int
+        Their numbers.
+    banks : int
+        Number of tables of lobes.
+    threshold : Format or None
+        Format of a threshold for each table, where there is one.
+    loads_tables : bool
+        Whether tables are loaded.
+    """
     rows = [(first, count, name) for name, (first, count) in FIELDS_OF_A_FRAME.items()]
     if materials > 1:
         rows.append((MATERIAL_ADDRESS, 1, "material"))
+    if loads_tables:
+        rows.append((LOBE_ADDRESS, 1, "lobe"))
+    if banks > 1:
+        rows.append((BANK_ADDRESS, 1, "bank"))
+    if threshold is not None:
+        rows.append((THRESHOLD_ADDRESS, 1, "threshold"))
     for light in range(lights):
         base = (light + 1) * LIGHT_STRIDE
         rows += [(base + first, count, name) for name, (first, count) in FIELDS_OF_A_LIGHT.items()]
-    return [
-        f"  {first:>3}{f' to {first + count - 1}' if count > 1 else '':<8} {_MEANINGS[name]}"
-        + (f" (light {first // LIGHT_STRIDE - 1})" if first >= LIGHT_STRIDE else "")
-        for first, count, name in rows
-    ]
+    lines = []
+    for first, count, name in rows:
+        last = f" to {first + count - 1}" if count > 1 else ""
+        light = f" (light {first // LIGHT_STRIDE - 1})" if first >= LIGHT_STRIDE else ""
+        lines.append(f"  {first:>3}{last:<8} {_MEANINGS[name].format(threshold=threshold)}{light}")
+    return lines

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Literal, cast
+from functools import cached_property, partial
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -13,16 +13,18 @@ from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.lobe import Lobe, LobeTable
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
-from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.lighting import Material
 
 __all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]
 
@@ -154,7 +156,7 @@ class Design:
     ----------
     interpolator : Interpolator
         The method.
-    specular : Specular or Power or None
+    specular : Specular or Power or Lobe or None
         Specular term, of the operand that the interpolator gives. ``None``: no specular light.
     lights : int
         Number of lights, 0 to 16. With none there is ambient light alone, and no method.
@@ -173,14 +175,15 @@ class Design:
     Raises
     ------
     ValueError
-        If the number of lights or materials or a number of bits is out of range, or a gate is asked for
-        without specular light or with a method that has no error bound or no normals.
+        If the number of lights or materials or a number of bits is out of range, a gate is asked for
+        without specular light or with a method that has no error bound or no normals, or an exponent is fixed
+        where a lobe has tables.
 
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
 
     interpolator: Interpolator = field(default_factory=QuadraticInterpolator)
-    specular: Specular | Power | None = field(default_factory=Specular)
+    specular: Specular | Power | Lobe | None = field(default_factory=Specular)
     lights: int = 1
     materials: int = 1
     gate: bool = False
@@ -197,6 +200,8 @@ class Design:
         Intensity(self.lights)
         if not 1 <= self.materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {self.materials}")
+        if self.loads_tables:
+            self._check_lobe()
         if self.gate and not (self.specular and self.lights):
             raise ValueError("without specular light there is nothing to gate")
         if self.gate and not self.interpolator.serves_gate:
@@ -204,6 +209,37 @@ class Design:
         for name, least in (("x_bits", 1), ("y_bits", 1), ("length_bits", 2)):
             if not least <= getattr(self, name) <= LENGTH_BITS:
                 raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
+
+    def _check_lobe(self) -> None:
+        """Refuse what a lobe's tables do not serve."""
+        if self.build.exponent is not None:
+            raise ValueError("a lobe has tables and no exponent; fix its tables")
+        lobe = cast(Lobe, self.specular)
+        if lobe.operand == "one_minus_cosine" and lobe.fraction_bits != 25:
+            raise ValueError(f"1 - N·H has 25 fraction bits in a pipeline, the lobe {lobe.fraction_bits}")
+
+    @property
+    def loads_tables(self) -> bool:
+        """Whether the specular unit has tables of a lobe, so that frame constants need theirs."""
+        return self.specular is not None and self.specular.has_table
+
+    def highlight_parameter(self, material: Material) -> float | None:
+        """Exponent or roughness of a material, as the reflection model takes it; without one the exponent."""
+        return material.parameter(self.specular.model) if self.specular else material.exponent
+
+    def steepness(self, material: Material) -> float:
+        """Exponent that decides how fine spans must be, see `ReflectionModel.steepness`."""
+        if self.specular is None:
+            return material.exponent
+        return self.specular.model.steepness(self.highlight_parameter(material))
+
+    def for_materials(self, materials: Sequence[Material]) -> "Design":
+        """The same design for materials, with a bank for each of their lobes, at most `Lobe.MAX_BANKS`."""
+        specular = self.specular
+        if isinstance(specular, Lobe) and specular.fixed is None:
+            lobes = len({self.highlight_parameter(material) for material in materials})
+            specular = replace(specular, banks=min(lobes, Lobe.MAX_BANKS))
+        return replace(self, materials=len(materials), specular=specular)
 
     def built(self, **changes) -> "Design":
         """The same design with other values of its `Build`."""
@@ -237,6 +273,33 @@ class Design:
             return ValueGate(self.specular)
         return HighlightGate(self.specular, interpolator=self.interpolator)
 
+    @property
+    def has_threshold(self) -> bool:
+        """Whether frame constants have a threshold: for a gate or a span limit, where tables are loaded."""
+        return self.loads_tables and (self.gate or self.span_limit is not None)
+
+    @property
+    def banks(self) -> int:
+        """Number of tables of lobes; 0 without."""
+        return cast(Lobe, self.specular).banks if self.loads_tables else 0
+
+    @property
+    def threshold_format(self) -> Format | None:
+        """Format of the threshold among the frame constants; ``None`` without."""
+        if not self.has_threshold:
+            return None
+        gate = self.highlight_gate
+        return gate.THRESHOLD_FORMAT if isinstance(gate, ValueGate) else gate.level_format
+
+    def threshold_of(self, table: LobeTable) -> Fixed:
+        """The highlight gate's threshold for a table."""
+        return self.highlight_gate.thresholds_of(np.array([table.last_lit_argument]))[0]
+
+    def _thresholds(self, constants: Sequence[FrameConstants]) -> Fixed:
+        """Those of the tables of materials."""
+        tables = [cast(LobeTable, of_material.lobe) for of_material in constants]
+        return self.highlight_gate.thresholds_of(np.array([table.last_lit_argument for table in tables]))
+
     def lit_spans(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> np.ndarray:
         """Spans that may have a highlight of each light, as the highlight gate decides.
 
@@ -250,20 +313,26 @@ class Design:
         bool array, shape (spans, lights)
         """
         constants = [constants] if isinstance(constants, FrameConstants) else constants
+        gate = self.highlight_gate
         exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
-        if isinstance(self.highlight_gate, ValueGate):
+        if self.loads_tables:
+            threshold = self._thresholds(constants)[spans.material]
+        if isinstance(gate, ValueGate):
             highlight = self._values(spans, constants[0]).highlight.copy()
             short = np.asarray(spans.length) < 3
             # Of two pixels there is none in the middle.
             highlight[short, :, 1] = highlight[short][:, :, ::2].min(axis=-1)
             one = np.asarray(spans.length) == 1
             highlight[one] = highlight[one][:, :, :1]
-            return self.highlight_gate.compute(highlight, exponent[:, np.newaxis])
+            if self.loads_tables:
+                return gate.compute_by(highlight, threshold[:, np.newaxis])
+            return gate.compute(highlight, exponent[:, np.newaxis])
         left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
-        lit = [
-            self.highlight_gate.compute(left, right, Fixed(COMPONENT, halfway), exponent)
-            for halfway in constants[0].halfway
-        ]
+        if self.loads_tables:
+            decide = partial(gate.compute_by, threshold=threshold)
+        else:
+            decide = partial(gate.compute, exponent=exponent)
+        lit = [decide(left, right, Fixed(COMPONENT, halfway)) for halfway in constants[0].halfway]
         return np.stack(lit, axis=-1)
 
     def compute(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> Pixels:
@@ -329,7 +398,9 @@ class Design:
         exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
         left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
         operands = left, right, self._values(spans, constants[0]), spans.length, exponent
-        return int(np.count_nonzero(self.span_limit.compute(*operands, self.specular is not None)))
+        threshold = self._thresholds(constants)[spans.material] if self.loads_tables else None
+        wide = self.span_limit.compute(*operands, self.specular is not None, threshold)
+        return int(np.count_nonzero(wide))
 
     def _check(self, spans: Spans, constants: Sequence[FrameConstants]) -> None:
         """Refuse constants of another design, and codes out of range."""
@@ -339,6 +410,8 @@ class Design:
             if len(of_material.direction) != self.lights:
                 given = len(of_material.direction)
                 raise ValueError(f"the constants are for {given} lights, not {self.lights}")
+            if self.loads_tables:
+                cast(Lobe, self.specular).check(cast(LobeTable, of_material.lobe))
             if self.build.exponent not in (None, of_material.exponent):
                 fixed = self.build.exponent
                 raise ValueError(f"the exponent is fixed at {fixed}, not {of_material.exponent}")
@@ -395,7 +468,7 @@ class Design:
         diffuse = diffuse_unit.compute(cosine)
         specular = Fixed(Intensity.TERM_FORMAT, np.zeros(dark.shape, dtype=np.int64))
         if self.specular is not None:
-            specular = self.specular.compute(highlight, dark, constants.exponent)
+            specular = self.specular.compute(highlight, dark, cast(Any, constants.highlight))
         return self.intensity.compute(*self._colors(constants), diffuse, specular)
 
     def _ambient(self, constants: Sequence[FrameConstants], material: np.ndarray) -> np.ndarray:

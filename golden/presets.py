@@ -2,6 +2,7 @@
 
 from dataclasses import fields, replace
 
+from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods import (
@@ -16,9 +17,10 @@ from blysk.golden.methods import (
 )
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator, Operand
 from blysk.golden.pipeline import Build, Design
-from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX
+from blysk.golden.reference.reflection import BLINN, REFLECTION_MODELS, ReflectionModel
 
-__all__ = ["METHODS", "MODELS", "PUBLISHED", "preset"]
+__all__ = ["LOBES", "METHODS", "MODELS", "PUBLISHED", "preset"]
 
 _MODULES = (
     linear_interpolator,
@@ -46,16 +48,23 @@ MODELS: dict[str, Specular | Power] = {
 } | {"blinn": Power()}
 """Specular units of the reflection models; every method serves each."""
 
+LOBES: dict[str, Lobe] = {
+    "blinn_table": Lobe(BLINN),
+    **{model.name: Lobe(model) for model in (COPLANAR_PHONG, BECKMANN, GGX)},
+}
+"""Specular units by a table, which is written for each frame; every method serves each."""
+
 
 def preset(
     method: str = "chord",
-    model: str | None = "cosquad",
+    model: str | ReflectionModel | None = "cosquad",
     lights: int = 1,
     *,
     operand: Operand | None = None,
     style: str = "throughput",
     setup_interval: int | None = None,
     exponent: int | None = None,
+    roughness: float | None = None,
     **options,
 ) -> Design:
     """A design by names.
@@ -64,16 +73,20 @@ def preset(
     ----------
     method : str
         One of `METHODS` or `PUBLISHED`.
-    model : str or None
-        One of `MODELS`; ``None``: no specular light.
+    model : str or ReflectionModel or None
+        One of `MODELS` or `LOBES`; or a curve of N·H, such as a `TabulatedModel`, which a table serves;
+        ``None``: no specular light.
     lights : int
         Number of lights, 0 to 16.
     operand : {"cosine", "one_minus_cosine"}, optional
         Operand of the specular unit, of a method that finds normals; by default that of the method.
-    style, setup_interval, exponent
+    style, setup_interval
         See `Build`.
+    exponent, roughness : optional
+        Fixed at build time: `Build.exponent`, or that of a lobe's table (`Lobe.fixed`).
     **options
-        Further fields of `Design`, or of the method; ``None``: its own value.
+        Further fields of `Design`, of the lobe, or of the method; ``None``: its own value. A lobe has as many
+        ``banks`` as materials, at most `Lobe.MAX_BANKS`.
 
     Returns
     -------
@@ -86,8 +99,7 @@ def preset(
     """
     if method not in METHODS | PUBLISHED:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
-    if model is not None and model not in MODELS:
-        raise ValueError(f"model must be one of {', '.join(MODELS)}, not {model!r}")
+    specular = _specular(model)
     interpolator = (METHODS | PUBLISHED)[method]
     if operand not in (None, interpolator.operand):
         if not isinstance(interpolator, NormalInterpolator):
@@ -96,8 +108,35 @@ def preset(
     of_design = {field.name for field in fields(Design)}
     own = {name: options.pop(name) for name in list(options) if name not in of_design}
     own = {name: value for name, value in own.items() if value is not None}
+    if specular is not None and specular.has_table:
+        given = {name: own.pop(name) for name in ("octaves", "steps", "banks", "cutoff") if name in own}
+        given.setdefault("banks", min(options.get("materials", 1), Lobe.MAX_BANKS))
+        specular = _with_fixed_table(replace(specular, **given), exponent, roughness)
+        exponent = None
+    elif roughness is not None:
+        raise ValueError(f"model {model} has no roughness to fix")
     if unknown := sorted(own.keys() - {field.name for field in fields(interpolator)}):
         raise ValueError(f"method {method} has no option {unknown[0]}")
     build = Build(style, setup_interval, exponent)
-    specular = MODELS[model] if model else None
     return Design(replace(interpolator, **own), specular, lights, build=build, **options)
+
+
+def _specular(model: str | ReflectionModel | None) -> Specular | Power | Lobe | None:
+    if model is None:
+        return None
+    if isinstance(model, ReflectionModel):
+        return Lobe(model)
+    known = MODELS | LOBES
+    if model not in known:
+        raise ValueError(f"model must be one of {', '.join(known)}, not {model!r}")
+    return known[model]
+
+
+def _with_fixed_table(lobe: Lobe, exponent: int | None, roughness: float | None) -> Lobe:
+    """The lobe, of whose table the parameter is fixed where one is given."""
+    for name, value in (("exponent", exponent), ("roughness", roughness)):
+        if value is not None and name != lobe.model.PARAMETER:
+            raise ValueError(f"model {lobe.name} has no {name} to fix")
+        if value is not None:
+            lobe = replace(lobe, fixed=(value,), banks=1)
+    return lobe

@@ -6,13 +6,16 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.frame_constants import (
+    BANK_ADDRESS,
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
     LIGHT_STRIDE,
     MATERIAL_ADDRESS,
     MAX_MATERIALS,
+    THRESHOLD_ADDRESS,
 )
 from blysk.golden.lighting.specular import Specular
+from blysk.golden.number.fixed import Format
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.lighting.intensity import color_shape
 
@@ -24,16 +27,26 @@ def write_shape() -> data.StructLayout:
     return data.StructLayout({"address": unsigned(9), "data": unsigned(18)})
 
 
-def frame_constants_shape(lights: int) -> data.StructLayout:
-    """Shape of all constants of a frame with so many lights."""
+def frame_constants_shape(lights: int, threshold: Format | None = None, banks: int = 1) -> data.StructLayout:
+    """Shape of all constants of a frame.
+
+    Parameters
+    ----------
+    lights, threshold, banks
+        Those of `FrameConstantsUnit`.
+    """
     light = {
         "direction": normal_shape(),
         "halfway": normal_shape(),
         "diffuse": color_shape(),
         "specular": color_shape(),
     }
+    tables = {} if threshold is None else {"threshold": unsigned(threshold.width)}
+    if banks > 1:
+        tables["bank"] = range(banks)
     return data.StructLayout(
         {
+            **tables,
             "exponent": unsigned(Specular.EXPONENT_BITS),
             "ambient": color_shape(),
             "lights": data.ArrayLayout(data.StructLayout(light), lights),
@@ -44,10 +57,10 @@ def frame_constants_shape(lights: int) -> data.StructLayout:
 class FrameConstantsUnit(wiring.Component):
     """Registers for the constants of a frame, one word a write.
 
-    A write is taken on a clock when ``hold`` is low, and seen one clock later. Words are 18 bits; the low
-    bits count where the constant is shorter. A write to any other address is taken like the rest and changes
-    nothing. Reset clears every constant: exponent 0 and black light. Exponents 0 and 1001 to 1023 are taken
-    and shade by the same formula, outside the stated error.
+    A write is accepted on a cycle on which ``hold`` is low. Words are 18 bits; the low bits count where the
+    constant is shorter. A write to any other address is accepted, too, and changes nothing. Reset clears
+    every constant: exponent 0 and black light. Exponents 0 and 1001 to 1023 are accepted and shade by the
+    same formula, outside the stated error.
 
     ======================== ==========================================================
     address                  constant
@@ -55,16 +68,19 @@ class FrameConstantsUnit(wiring.Component):
     0                        exponent, 1 to 1000
     1 to 3                   ambient red, green, blue, ``UQ(11, 6)`` LSB
     4                        index of a material, where there are several
+    5                        taken by the tables of lobes, where they are loaded: `LobeMemory`
+    6                        threshold of a material's table
+    7                        bank of a material's table, where there are several
     16 (light + 1) + 0 to 2  direction to the light, ``SQ(1, 17)``
     16 (light + 1) + 3 to 5  half-way vector, ``SQ(1, 17)``
     16 (light + 1) + 6 to 8  diffuse red, green, blue, ``UQ(11, 6)`` LSB
     16 (light + 1) + 9 to 11 specular red, green, blue, ``UQ(11, 6)`` LSB
     ======================== ==========================================================
 
-    A constant is there 2 cycles after its write was taken. With several materials the exponent and the
-    colours stand in memories of a word each, written for the material whose index was last written to
-    address 4 and read for that of ``material``: they follow it 1 clock behind, and a write 3. Writes for an
-    index past the last material are lost. Memories are not cleared by reset.
+    A constant has its value 2 cycles after its write was accepted. With several materials the exponent and
+    the colours are in memories, one for each word, written for the material whose index was last written to
+    address 4 and read for ``material``: 1 cycle after ``material`` changes, and 3 after a write. Writes for
+    an index past the last material are lost. Memories are not cleared by reset.
 
     Parameters
     ----------
@@ -72,6 +88,10 @@ class FrameConstantsUnit(wiring.Component):
         Number of lights.
     materials : int
         Number of materials, 1 to `MAX_MATERIALS`.
+    threshold : Format or None
+        Format of a threshold for each material, see `Design.threshold_of`. ``None``: there is none.
+    banks : int
+        Number of tables of lobes that materials choose from.
 
     Raises
     ------
@@ -83,31 +103,36 @@ class FrameConstantsUnit(wiring.Component):
     write : :py:`In(stream.Signature(write_shape()))`
         Writes.
     hold : :py:`In(1)`
-        Whether no write is to be taken.
+        Whether no write is accepted.
     material : :py:`In(range(materials))`
         Only where there are several: the material whose constants are given.
-    constants : :py:`Out(frame_constants_shape(lights))`
+    constants : :py:`Out(frame_constants_shape(lights, threshold, banks))`
         The constants.
 
-    Source: pipeline.md, "Span stream".
+    Source: docs/theory/units.md#frame-constants.
     """
 
-    def __init__(self, lights: int, materials: int = 1):
+    def __init__(self, lights: int, materials: int = 1, threshold: Format | None = None, banks: int = 1):
         if not 1 <= materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {materials}")
         self.lights = lights
         self.materials = materials
+        self.tables = {}
+        if threshold is not None:
+            self.tables[THRESHOLD_ADDRESS] = "threshold"
+        if banks > 1:
+            self.tables[BANK_ADDRESS] = "bank"
         members = {
             "write": In(stream.Signature(write_shape())),
             "hold": In(1),
-            "constants": Out(frame_constants_shape(lights)),
+            "constants": Out(frame_constants_shape(lights, threshold, banks)),
         }
         if materials > 1:
             members["material"] = In(range(materials))
         super().__init__(members)
 
     def elaborate(self, platform):
-        """One register, or memory, a word; its decoded address stands in one, too, beside the data."""
+        """A register or memory for each word, and one for its decoded address; a register for the data."""
         m = Module()
         m.d.comb += self.write.ready.eq(~self.hold)
         words, of_material = {}, set()
@@ -115,6 +140,9 @@ class FrameConstantsUnit(wiring.Component):
             field = self.constants[name]
             words |= {first + k: field[k] if count > 1 else field for k in range(count)}
             of_material |= set(range(first, first + count))
+        for address, name in self.tables.items():
+            words[address] = self.constants[name]
+            of_material.add(address)
         for light in range(self.lights):
             base = (light + 1) * LIGHT_STRIDE
             for name, (first, count) in FIELDS_OF_A_LIGHT.items():
@@ -122,17 +150,17 @@ class FrameConstantsUnit(wiring.Component):
                 words |= dict(zip(addresses, self.constants.lights[light][name], strict=True))
                 if name in ("diffuse", "specular"):
                     of_material |= set(addresses)
-        taken = self.write.valid & self.write.ready
+        accepted = self.write.valid & self.write.ready
         word_data = Signal.like(self.write.payload.data)
         m.d.sync += word_data.eq(self.write.payload.data)
         if self.materials > 1:
             index = Signal(range(self.materials))
-            with m.If(taken & (self.write.payload.address == MATERIAL_ADDRESS)):
+            with m.If(accepted & (self.write.payload.address == MATERIAL_ADDRESS)):
                 m.d.sync += index.eq(self.write.payload.data)
         for address, word in words.items():
             code = Value.cast(word)
             written = Signal(name=f"written_{address}")
-            m.d.sync += written.eq(taken & (self.write.payload.address == address))
+            m.d.sync += written.eq(accepted & (self.write.payload.address == address))
             if self.materials > 1 and address in of_material:
                 memory = Memory(shape=len(code), depth=self.materials, init=[])
                 m.submodules[f"word_{address}"] = memory

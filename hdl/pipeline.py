@@ -7,6 +7,7 @@ from amaranth.hdl import Module, Mux, Shape, Signal, Value, unsigned
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from blysk.golden.frame_constants import LOBE_ADDRESS
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.value_gate import ValueGate
@@ -17,6 +18,7 @@ from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.hdl.lighting.light import SPECULAR_KINDS, LightUnit
+from blysk.hdl.lighting.lobe import LobeMemory
 from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
@@ -166,6 +168,7 @@ class ShadingPipelineUnit(wiring.Component):
         )
         self._assembler = PixelAssemblerUnit(p.x_bits, p.y_bits, p.length_bits)
         self._interpolator, self._gate, self._slope, self._lights = None, None, None, []
+        self._tables = None
         self.setup_interval = self.cycles_per_pixel = 1
         self.latency = FIFO_LATENCY + self._assembler.coordinates_latency
         if p.lights:
@@ -185,7 +188,9 @@ class ShadingPipelineUnit(wiring.Component):
                 setup_interval = max(method.setup_intervals(p.interpolator), default=None)
         value_gate = None
         if p.gate and isinstance(p.highlight_gate, ValueGate):
-            value_gate = ValueGateUnit(p.highlight_gate, p.lights, exponent=p.build.exponent)
+            value_gate = ValueGateUnit(
+                p.highlight_gate, p.lights, exponent=p.build.exponent, takes_threshold=p.loads_tables
+            )
         self._interpolator = method(
             p.interpolator,
             p.lights,
@@ -194,6 +199,7 @@ class ShadingPipelineUnit(wiring.Component):
             length_bits=p.length_bits,
             product_interval=product_interval,
             gate=value_gate,
+            takes_threshold=p.has_threshold,
         )
         self.setup_interval = self._interpolator.setup_interval
         self._lights = self._light_units(compact)
@@ -203,7 +209,11 @@ class ShadingPipelineUnit(wiring.Component):
         if p.gate and value_gate is None:
             interval = min(self.setup_interval, 3 + 12 * p.lights)
             self._gate = HighlightGateUnit(
-                p.highlight_gate, p.lights, initiation_interval=interval, exponent=p.build.exponent
+                p.highlight_gate,
+                p.lights,
+                initiation_interval=interval,
+                exponent=p.build.exponent,
+                takes_threshold=p.loads_tables,
             )
             # A FIFO before the gate, and one after it.
             decided = self._gate.latency + 2 * FIFO_LATENCY
@@ -215,7 +225,7 @@ class ShadingPipelineUnit(wiring.Component):
         )
 
     def _light_units(self, compact: bool) -> list:
-        """Light units, or diffuse units without specular light; and the slope unit that they share."""
+        """Light units, or diffuse units without specular light; and the slopes or tables that they share."""
         p = self.parameters
         exponent, diffuse = p.build.exponent, Diffuse(p.interpolator.COSINE_FORMAT)
         if p.specular is None:
@@ -223,6 +233,8 @@ class ShadingPipelineUnit(wiring.Component):
         kind = SPECULAR_KINDS[type(p.specular)]
         if exponent is None and kind.slope_unit:
             self._slope = kind.slope_unit(p.specular)
+        if p.loads_tables:
+            self._tables = LobeMemory(p.specular, p.specular.fixed_tables, p.lights)
         # In the compact style a colour takes a cycle a channel at least.
         interval = max(kind.compact_interval(p.specular, exponent), p.intensity.channels) if compact else 1
         return [
@@ -231,7 +243,7 @@ class ShadingPipelineUnit(wiring.Component):
                 diffuse,
                 initiation_interval=interval,
                 exponent=exponent,
-                shares_slope=self._slope is not None,
+                shares_slope=self._slope is not None or self._tables is not None,
                 gated=p.gate,
             )
             for _ in range(p.lights)
@@ -246,12 +258,19 @@ class ShadingPipelineUnit(wiring.Component):
         interval = getattr(self._interpolator, "shortest_interval", None) or self.setup_interval
         return max(-(-self.latency // interval), 17)
 
+    @property
+    def spans_inside(self) -> int:
+        """Spans that are inside at most."""
+        return self._waiting_spans + self._assembler.SPANS_INSIDE
+
     def elaborate(self, platform):
         """Frame constants, units from spans to colours, coordinates past them, admission, counters."""
         m = Module()
         p = self.parameters
         m.submodules.pixel_assembler = assembler = self._assembler
-        m.submodules.frame_constants = frame = FrameConstantsUnit(p.lights, p.materials)
+        m.submodules.frame_constants = frame = FrameConstantsUnit(
+            p.lights, p.materials, p.threshold_format, p.banks
+        )
         sinks = [self._carry_coordinates(m)]
         if p.lights:
             sinks += self._shade(m, frame)
@@ -312,7 +331,7 @@ class ShadingPipelineUnit(wiring.Component):
         connect(m, wiring.flipped(self.write), frame.write)
         # A constant has its value two cycles after its write.
         m.d.sync += written.eq(self.write.valid & self.write.ready)
-        inside = Signal(range(self._waiting_spans + self._assembler.SPANS_INSIDE + 1))
+        inside = Signal(range(self.spans_inside + 1))
         finished = self.o.valid & self.o.ready & self.o.payload.last
         idle = Signal(init=1)
         m.d.comb += frame.hold.eq(~idle)
@@ -363,12 +382,16 @@ class ShadingPipelineUnit(wiring.Component):
         if interpolator.exponent is not None:
             exponent = frame.constants.exponent if p.build.exponent is None else p.build.exponent
             m.d.comb += interpolator.exponent.eq(exponent)
+        if interpolator.threshold is not None:
+            m.d.comb += Value.cast(interpolator.threshold).eq(frame.constants.threshold)
         operands, gated = interpolator.o, None
         if self._gate is not None:
             operands, gated = self._decide(m, frame, sinks)
         if self._slope is not None:
             m.submodules.slope = self._slope
             m.d.comb += self._slope.exponent.eq(frame.constants.exponent)
+        if self._tables is not None:
+            self._connect_tables(m)
         self._connect_lights(m, operands)
         for index, light in enumerate(self._lights):
             m.submodules[f"light_{index}"] = light
@@ -393,10 +416,23 @@ class ShadingPipelineUnit(wiring.Component):
             if self._slope is not None:
                 m.d.comb += light.constants.eq(self._slope.slope)
             elif "constants" in light.signature.members:
-                m.d.comb += light.constants.eq(frame.constants.exponent)
+                word = frame.constants.bank if p.loads_tables else frame.constants.exponent
+                m.d.comb += Value.cast(light.constants).eq(word)
         m.d.comb += intensity.constants.ambient.eq(frame.constants.ambient)
         connect(m, intensity.o, self._assembler.colors)
         return sinks
+
+    def _connect_tables(self, m: Module) -> None:
+        """The memory of the lights' tables, behind a register of the writes that load it."""
+        m.submodules.tables = tables = self._tables
+        for light, read in zip(self._lights, tables.reads, strict=True):
+            wiring.connect(m, light.table, read)
+        if tables.tables is None:
+            taken = self.write.valid & self.write.ready
+            m.d.sync += [
+                tables.write.valid.eq(taken & (self.write.payload.address == LOBE_ADDRESS)),
+                Value.cast(tables.write.payload).eq(self.write.payload.data),
+            ]
 
     def _connect_lights(self, m: Module, operands: stream.Interface) -> None:
         """Handshakes from the operands through all lights to the intensity unit.
@@ -451,7 +487,9 @@ class ShadingPipelineUnit(wiring.Component):
         ]
         for index in range(p.lights):
             m.d.comb += gate.constants.halfway[index].eq(frame.constants.lights[index].halfway)
-        if p.build.exponent is None:
+        if gate.takes_threshold:
+            m.d.comb += gate.constants.threshold.eq(frame.constants.threshold)
+        elif p.build.exponent is None:
             m.d.comb += gate.constants.exponent.eq(frame.constants.exponent)
         with m.If(moves):
             m.d.sync += pixel.eq(Mux(last, 0, pixel + 1))

@@ -1,4 +1,4 @@
-"""Pixel assembler: gives each shaded colour its place on the screen."""
+"""Pixel assembler: gives each shaded colour its coordinates."""
 
 from amaranth.hdl import Cat, Module, Signal, unsigned
 from amaranth.lib import data, stream, wiring
@@ -11,12 +11,12 @@ __all__ = ["PixelAssemblerUnit", "coordinates_shape", "pixel_shape"]
 
 
 def coordinates_shape(x_bits: int = 12, y_bits: int = 12, length_bits: int = 12) -> data.StructLayout:
-    """Shape of a span's place: first pixel and number of pixels."""
+    """Shape of a span's coordinates: first pixel and number of pixels."""
     return data.StructLayout({"x": unsigned(x_bits), "y": unsigned(y_bits), "length": unsigned(length_bits)})
 
 
 def pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
-    """Shape of a pixel: place, colour, and whether it is the last of its span."""
+    """Shape of a pixel: coordinates, colour, and whether it is the last of its span."""
     return data.StructLayout(
         {
             "x": unsigned(x_bits),
@@ -30,10 +30,10 @@ def pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
 
 
 class PixelAssemblerUnit(wiring.Component):
-    """Joins the stream of colours with that of span places; counts x along the span and marks its end.
+    """Joins the streams of colours and of spans' coordinates; counts x along the span and marks its end.
 
-    A colour leaves as a pixel 1 clock after it was taken in, and one is taken in on every clock, if its place
-    has been there for 2. Places are taken in ahead of their colours. No multipliers.
+    A colour leaves as a pixel 1 cycle after it was accepted, and one is accepted on every cycle, if its
+    coordinates came 2 cycles before. Coordinates are accepted ahead of their colours. No multipliers.
 
     Parameters
     ----------
@@ -43,22 +43,22 @@ class PixelAssemblerUnit(wiring.Component):
     Members
     -------
     coordinates : :py:`In(stream.Signature(coordinates_shape(x_bits, y_bits, length_bits)))`
-        Place of each span, of 1 pixel or more. Past the largest x it starts at 0.
+        Coordinates of each span, of 1 pixel or more. Past the largest x it goes on from 0.
     colors : :py:`In(stream.Signature(pixel_color_shape()))`
         Colours, in the order of the spans' pixels.
     o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits)))`
         Pixels.
 
-    Source: pipeline.md, "Span stream".
+    Source: docs/theory/units.md#pipeline.
     """
 
     latency = 1
 
     coordinates_latency = 3
-    """Clocks from a place to its first pixel, if the colour waits."""
+    """Cycles from coordinates to their first pixel, if the colour waits."""
 
     SPANS_INSIDE = 6
-    """Spans inside at most: four places, and two pixels that wait."""
+    """Spans inside at most: coordinates of four, and two pixels that wait."""
 
     def __init__(self, x_bits: int = 12, y_bits: int = 12, length_bits: int = 12):
         super().__init__(
@@ -70,18 +70,18 @@ class PixelAssemblerUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """Places of spans; from them places of pixels, which meet the colours; a register for the pixel."""
+        """Coordinates of spans; from them those of pixels, which meet the colours; a pixel register."""
         m = Module()
-        place, color = self.coordinates.payload, self.colors.payload
+        span, color = self.coordinates.payload, self.colors.payload
         following = self.coordinates.signature.create(path=("following",))
         connect_slice(m, wiring.flipped(self.coordinates), following)
 
-        x, y = Signal.like(place.x), Signal.like(place.y)
+        x, y = Signal.like(span.x), Signal.like(span.y)
         load, moves = Signal(), Signal()
         active, ends = count_down(m, following.valid, following.payload.length, moves)
-        spot = stream.Signature(data.StructLayout({"x": x.shape(), "y": y.shape(), "last": 1})).create()
+        position = stream.Signature(data.StructLayout({"x": x.shape(), "y": y.shape(), "last": 1})).create()
         m.d.comb += [
-            moves.eq(skid_buffer(m, spot, active, Cat(x, y, ends))),
+            moves.eq(skid_buffer(m, position, active, Cat(x, y, ends))),
             following.ready.eq(moves & ends),
             load.eq(following.ready & following.valid),
         ]
@@ -93,13 +93,13 @@ class PixelAssemblerUnit(wiring.Component):
         pixel, valid, advance = Signal(self.o.payload.shape()), Signal(), Signal()
         m.d.comb += [
             advance.eq(skid_buffer(m, self.o, valid, pixel)),
-            self.colors.ready.eq(advance & spot.valid),
-            spot.ready.eq(advance & self.colors.valid),
+            self.colors.ready.eq(advance & position.valid),
+            position.ready.eq(advance & self.colors.valid),
         ]
         with m.If(advance):
             m.d.sync += [
-                valid.eq(spot.valid & self.colors.valid),
-                *(pixel[name].eq(spot.payload[name]) for name in ("x", "y", "last")),
+                valid.eq(position.valid & self.colors.valid),
+                *(pixel[name].eq(position.payload[name]) for name in ("x", "y", "last")),
                 *(pixel[name].eq(color[name]) for name in "rgb"),
             ]
         return m

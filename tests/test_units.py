@@ -83,7 +83,7 @@ def few_of(record, variant, unit):
     return Case(first(case.beats, FEW), case.constants, case.write)
 
 
-@pytest.mark.parametrize("name", RECORDS)
+@pytest.mark.parametrize("name", [name for name, record in RECORDS.items() if not record.remembers])
 def test_reset_leaves_nothing_behind(name):
     """Reset with beats inside: the unit then answers as from power-up, on the same cycles."""
     record = RECORDS[name]

@@ -25,7 +25,7 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.unit_vector import ONE, quantise
 from blysk.golden.pipeline import Design, Spans
-from blysk.golden.presets import preset
+from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import unpack
@@ -39,15 +39,22 @@ from blysk.sim.value_types import Whole
 
 __all__ = ["DESIGNS", "WIDEST", "main", "measure", "random_constants", "random_spans", "table", "tasks"]
 
+_MODELS = {
+    "linear": "cosquad7",
+    "quadratic-eval": "lyon3",
+    "quadratic-horner": "exp",
+    "angular": "coscos2",
+    "recurrence": "coscos4",
+    "renormalise": "blinn",
+}
+"""Models of methods; others have the first of the documents."""
+
 DESIGNS = (
-    ("linear", "cosquad7", False),
-    ("quadratic", "cosquad", False),
-    ("quadratic-eval", "lyon3", False),
-    ("quadratic-horner", "exp", True),
-    ("angular", "coscos2", False),
-    ("recurrence", "coscos4", False),
-    ("renormalise", "blinn", False),
-    ("chord", "cosquad", False),
+    *(
+        (name, _MODELS.get(name, "cosquad"), name == "quadratic-horner")
+        for name, method in METHODS.items()
+        if name != "bisection" and not method.TAKES_VALUES
+    ),
     ("chord", "cosquad", True),
     ("chord", "cosquad_q", False),
 )
@@ -63,7 +70,7 @@ WIDEST = 44
 _PART, _BATCH = 10**7, 250_000
 """Pixels of a task, and of a run."""
 
-_PATIENCE = 10_000
+_IDLE_TIMEOUT = 10_000
 
 
 def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> Spans:
@@ -90,7 +97,7 @@ def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> 
     left = rng.normal(size=(count, 3))
     near = towards + left * 10.0 ** rng.uniform(-4, 0, (count, 1))
     left = normalise(np.where(rng.random((count, 1)) < 0.5, near, left))
-    across = normalise(np.cross(left, rng.normal(size=(count, 3))))
+    normal = normalise(np.cross(left, rng.normal(size=(count, 3))))
     angle = WIDEST * np.where(rng.random(count) < 0.5, rng.random(count), 10.0 ** rng.uniform(-6, 0, count))
     angle = np.radians(angle)[:, None]
     return Spans(
@@ -98,7 +105,7 @@ def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> 
         y=rng.integers(0, 4096, count),
         length=length,
         normal_left=quantise(left),
-        normal_right=quantise(left * np.cos(angle) + across * np.sin(angle)),
+        normal_right=quantise(left * np.cos(angle) + normal * np.sin(angle)),
     )
 
 
@@ -187,7 +194,7 @@ def measure(
         }
         _hold("cxxrtl", f"{where}, status", found.status[None], {k: np.array([v]) for k, v in status.items()})
         if verilated is not None:
-            stimulus = free_stimulus(verilated.ports, beats, constants.writes(), len(shaded.x), _PATIENCE)
+            stimulus = free_stimulus(verilated.ports, beats, constants.writes(), len(shaded.x), _IDLE_TIMEOUT)
             output, _ = verilated.run(stimulus)
             _hold("verilator", where, unpack(verilated.ports.o, output), expected)
             totals["baseline_pixels"] += len(shaded.x)

@@ -48,7 +48,7 @@ LARGEST = 1.0
 
 LARGEST_COSINE = 0.12 / 255 + ChordInterpolator().largest_deviation(1) + 2.0**-15
 """How near to 0 an exact N·L must be for its sign to be open, 1.3e-3: the error of the chord method's fit
-(see `largest_span_angle`) and of a part's bend, and those of vectors and words."""
+(see `largest_span_angle`) and of the curvature of a part, and those of vectors and words."""
 
 
 @dataclass(frozen=True)
@@ -211,9 +211,9 @@ class Frame:
         length = spans.length[which]
         cosine = design.operands(spans[which], constants).cosine.codes[:, 0]
         start = np.cumsum(length) - length
-        of_twin = cosine[start[place] + cut.offset[fragment]]
+        of_model = cosine[start[place] + cut.offset[fragment]]
         exact = self._cosine[chosen]
-        return ((of_twin > 0) != (exact > 0)) & (np.abs(exact) < LARGEST_COSINE)
+        return ((of_model > 0) != (exact > 0)) & (np.abs(exact) < LARGEST_COSINE)
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,7 @@ def slope_drawing(found: dict[str, Any]) -> Drawing:
         "cosine-quadratic-4",
         "[C] figure 4: the slope k(n) and its line",
         svg(figure),
-        f"Largest error of the line {found['error']:.2%}, [C] prints 0.5 %; of 0.44813 n + 0.10235 "
+        f"Largest error of the line {found['error']:.2%}, [C] states 0.5 %; of 0.44813 n + 0.10235 "
         f"{found['refitted']:.2%}. {INFERRED}",
     )
 
@@ -185,7 +185,7 @@ def reflectance_drawing(found: dict[str, Any]) -> Drawing:
         "cosine-quadratic-11",
         "[C] figure 11: hemispherical reflectance of fQ2",
         svg(figure),
-        f"Off from 1 by at most {found['deviation']:.4f}, at n = {found['deviation_exponent']}; [C] prints "
+        f"Off from 1 by at most {found['deviation']:.4f}, at n = {found['deviation_exponent']}; [C] states "
         f"53e-3. {INFERRED}",
     )
 

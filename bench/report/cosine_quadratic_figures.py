@@ -45,7 +45,7 @@ EXPONENTS = range(2, 1001)
 
 ZONE = 0.59363
 """Least brightness of Blinn's model in the "epicentre zone", which [C] does not define: it gives the 7.924 %
-that [C] prints for f2."""
+that [C] states for f2."""
 
 _X = np.linspace(0, 30, 6001)
 """``n (1 - cos gamma)``, on which the models depend almost alone; above 30 Blinn is below 1e-13."""

@@ -74,18 +74,18 @@ class Erratum:
 
 @dataclass(frozen=True)
 class Unmatched:
-    """A figure of the project's own specification that could not be had, or not to all of its digits.
+    """A figure stated for the project that does not come out, or not to all of its digits.
 
     Parameters
     ----------
     what : str
         The figure.
     stated : str
-        As the specification has it.
+        As it was stated.
     found : str
         What was found instead, in words.
     values : callable
-        Computes: the figure, by what the specification says, and another that explains it.
+        Computes the figure as stated, and another that explains it.
     """
 
     what: str
@@ -327,7 +327,7 @@ OWN = {
         held_root,
     ),
 }
-"""Figures of the specification that did not come out, by name."""
+"""Stated figures that do not come out, by name."""
 
 
 def evidence(own: bool) -> dict[str, list[float]]:
@@ -369,8 +369,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "describes them.",
     )
     figures = Table(
-        "errata-specification",
-        "Figures of this project's specification that did not come out",
+        "errata-stated",
+        "Figures stated for this project that do not come out",
         ("figure", "stated", "found", "first", "second"),
         [[figure.what, figure.stated, figure.found, *own[name]] for name, figure in OWN.items()],
         "Computed in float64.",

@@ -104,7 +104,7 @@ def arccos_at_one() -> Evidence:
     """Largest error in rad near x = 1: of a quadratic in x, and of one times the root of 1 - x."""
     x = 1 - np.geomspace(1e-12, 0.04, 4001)
     error = np.polynomial.polynomial.polyval(x, Arccos("corrected").coefficients[4]) - np.arccos(x)
-    # The well-posed form of numbers.md, over the same x.
+    # The well-posed form, over the same x.
     root = np.sqrt(1 - x) * np.polynomial.polynomial.polyval(x, [1.5702117, -0.20212057, 0.04670706])
     return float(np.abs(error).max()), float(np.abs(root - np.arccos(x)).max())
 

@@ -139,8 +139,8 @@ def frames(
 
     - ``model``: Phong shading (normals interpolated over the triangle and normalised at every pixel, as on a
       GPU) with the design's model, against the same with Blinn's; both in float64. No arithmetic cures it;
-    - ``arithmetic``: the frame against the same method and model in float64; coefficients that a document
-      prints count as arithmetic;
+    - ``arithmetic``: the frame against the same method and model in float64; coefficients as published
+      count as arithmetic;
     - ``method``: the frame against exactly normalised interpolation along the spans with the same model;
     - ``total``: the frame against the exact one, Phong shading with Blinn's model.
 

@@ -314,7 +314,7 @@ def _ways_table(counted: Sequence[tuple[dict, dict]], timed: Sequence[tuple[dict
         ),
         rows,
         "One channel, one light, diffuse and ambient light included, a power as one function; counted and "
-        "timed while NumPy does them in float64; times in one run, in turn, the fastest of many. Printed in "
+        "timed while NumPy does them in float64; times in one run, in turn, the fastest of many. In "
         f"[P]: {FEWER_OPERATIONS[0]:.0%} to {FEWER_OPERATIONS[1]:.0%} fewer operations. Green: as many; "
         "yellow: fewer, but not so many; red: more.",
         grades,

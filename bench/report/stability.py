@@ -1,4 +1,4 @@
-"""Stiff and extreme cases: every method in each, as a section of the report (pipeline.md).
+"""Stiff and extreme cases: every method in each, as a section of the report.
 
 A case is a scene and its spans. Every method shades it twice: with the spans as they come, which is what the
 pipeline does to somebody who prepares spans without `spans`, and cut first, which is what `blysk` does.
@@ -52,7 +52,7 @@ _STYLES = {
     "chord": ("#d62728", "-"),
     "chord-local": ("#ff7f0e", "--"),
 }
-"""Colour and dashes of each method's line."""
+"""Colour and dashes of a method's line; others are black."""
 
 
 def tasks(quick: bool) -> list[Task]:
@@ -236,7 +236,7 @@ def _stream_table(streams: dict[str, list]) -> Table:
         for method, found in streams.items()
         for of in found
     ]
-    note = "Simulated hardware against the model: place, colour and mark of the span's end of each pixel."
+    note = "Simulated hardware against the model: coordinates, colour and end of the span of each pixel."
     columns = ["method", "case", "runs", "pixels", "pixels that differ"]
     grades = [["", "", "", "", "good" if row[4] == 0 else "bad"] for row in rows]
     title = f"Group {STREAM_GROUP}: {GROUPS[STREAM_GROUP]}"
@@ -248,7 +248,7 @@ def _drawing(ranges: dict[str, dict]) -> Drawing:
 
     figure = Figure(figsize=(8.4, 4.0), layout="constrained")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
-    titles = ("as they come, spans without a flag", "wide ones cut")
+    titles = ("as they come, spans without a flag", "out of range ones cut")
     ways = ("given", "silent"), ("prepared", "error")
     for panel, (way, key), title in zip(panels, ways, titles, strict=True):
         for method, found in ranges.items():
@@ -256,7 +256,7 @@ def _drawing(ranges: dict[str, dict]) -> Drawing:
             errors = [
                 of[way][key] if show else np.nan for of, show in zip(found["sweep"], shown, strict=True)
             ]
-            color, dash = _STYLES[method]
+            color, dash = _STYLES.get(method, ("#000000", "-."))
             panel.plot(SWEEP, errors, color=color, linestyle=dash, linewidth=1.4, label=method)
         panel.axhline(0.5, color="#888888", linewidth=0.8, linestyle=":")
         panel.set(xscale="log", yscale="log", title=title, xlabel="angle of the span, degrees")

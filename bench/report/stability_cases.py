@@ -43,7 +43,7 @@ GROUPS = {
     9: "triangles without area, slivers, at the edges",
     10: "intensities over 1, many lights",
 }
-"""The groups of pipeline.md."""
+"""Groups of cases."""
 
 STREAM_GROUP = 8
 """The group that is simulated."""

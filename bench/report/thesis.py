@@ -115,7 +115,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "baseline over a unit's is above 1 where the unit is the cheaper.",
         "Table 1.1 of [T] has the share of shading in the time of a frame. Its published values were not at "
         "hand; the table below shows what the golden renderer, in NumPy, takes for either method.",
-        f"MNSE, as [T] 4.1 prints it, is defined for {one['defined']:.0%} of the values of the teapot's "
+        f"MNSE, as published in [T] 4.1, is defined for {one['defined']:.0%} of the values of the teapot's "
         "frame, and for few of a flat picture (see the errata). It divides by a pixel's own distance from "
         f"the mean: with the method `{first['method']}` the hundredth of the values that is nearest the "
         f"mean makes {one['nearest']:.0%} of it. The same single step of 1 LSB, in the reference frame "

@@ -225,7 +225,7 @@ def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict
 
 
 def square_errors(method: str, triangles: int, width: int, height: int) -> dict[str, Any]:
-    """MNSE of a frame as [T] 4.1 prints it, and its well-posed form.
+    """MNSE of a frame as published in [T] 4.1, and its well-posed form.
 
     The frame is that of the bit-accurate model with the model cosquad, which the RTL equals to the bit; the
     reference is the exact one, Phong shading with Blinn's model; both over the pixels of the surface.

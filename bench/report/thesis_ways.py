@@ -74,9 +74,9 @@ def _forward_differences(left, right, vectors, pixels):
     """[T] 2.2 and figure 2.10."""
     middle = 4 * _middle(left, right)
     dt = 1 / (pixels - 1)
-    bend = (2 * (left + right) - middle) * dt
-    first = (bend + (middle - right - 3 * left)) * dt
-    second = 2 * dt * bend
+    curvature = (2 * (left + right) - middle) * dt
+    first = (curvature + (middle - right - 3 * left)) * dt
+    second = 2 * dt * curvature
     normal = left
     for _ in range(pixels):
         yield normal
@@ -143,9 +143,9 @@ def _turn(left, right, vectors):
 
 def _cosines_by_angles(left, right, vectors, pixels):
     """[T] 3.1: ``cos beta cos(lambda - t psi)``."""
-    angle, along, across = _turn(left, right, vectors)
-    amplitude = np.sqrt(along * along + across * across)
-    phase = np.arctan2(across, along)
+    angle, cosines, sines = _turn(left, right, vectors)
+    amplitude = np.sqrt(cosines * cosines + sines * sines)
+    phase = np.arctan2(sines, cosines)
     step = angle / (pixels - 1)
     for _ in range(pixels):
         yield amplitude * np.cos(phase)
@@ -154,10 +154,10 @@ def _cosines_by_angles(left, right, vectors, pixels):
 
 def _recurrence(left, right, vectors, pixels):
     """[T] 3.3: ``x(t+1) = 2 cos d x(t) - x(t-1)``."""
-    angle, before, across = _turn(left, right, vectors)
+    angle, before, sines = _turn(left, right, vectors)
     step = angle / (pixels - 1)
     cosine = np.cos(step)
-    now = before * cosine + across * np.sin(step)
+    now = before * cosine + sines * np.sin(step)
     twice = 2 * cosine
     for _ in range(pixels):
         yield before
@@ -319,12 +319,12 @@ class Counted(np.ndarray):
 def random_operands(seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Ends of random spans, up to `WIDEST` degrees, and a unit L and H."""
     rng = np.random.default_rng(seed)
-    left, across = rng.normal(size=(2, 3, SPANS))
+    left, normal = rng.normal(size=(2, 3, SPANS))
     left = _divided(left)
-    across = _divided(across - dot(across, left) * left)
+    normal = _divided(normal - dot(normal, left) * left)
     angle = np.radians(rng.uniform(0.1, WIDEST, SPANS))
     vectors = rng.normal(size=(2, 3, 1))
-    return left, left * np.cos(angle) + across * np.sin(angle), np.stack([_divided(v) for v in vectors])
+    return left, left * np.cos(angle) + normal * np.sin(angle), np.stack([_divided(v) for v in vectors])
 
 
 def finish(way: Way, operands: tuple, pixels: int) -> None:

@@ -41,6 +41,7 @@ SAMPLES = 100_000
 """Random operands of each variant: enough for the drawings."""
 
 _TITLES = {
+    "geometry": "Triangles to spans",
     "normals": "Normals of a span",
     "cosines": "Cosines without normals",
     "methods": "Whole methods",
@@ -82,9 +83,9 @@ def _model(unit: str) -> type | None:
 
 def _files(unit: str) -> str:
     """Links to the files of a unit."""
-    place = "/".join(type(_component(unit)).__module__.split(".")[2:])
-    folder, _, name = place.rpartition("/")
-    paths = [f"golden/{place}.py", f"hdl/{place}.py", f"sim/units/{place}.py"]
+    path = "/".join(type(_component(unit)).__module__.split(".")[2:])
+    folder, _, name = path.rpartition("/")
+    paths = [f"golden/{path}.py", f"hdl/{path}.py", f"sim/units/{path}.py"]
     paths += [f"tests/{layer}/{folder}/test_{name}.py".replace("//", "/") for layer in ("golden", "hdl")]
     return " · ".join(f"[`{path}`](../../{path})" for path in paths if (PROJECT / path).exists())
 
@@ -160,9 +161,9 @@ def variants_table(rows: Sequence[Row]) -> list[str]:
 
 
 @cache
-def _graph(unit: str, place: int) -> Graph:
+def _graph(unit: str, number: int) -> Graph:
     """Structure of a variant that a page has."""
-    return graph_of(entries_shown(unit)[place].variant.unit())
+    return graph_of(entries_shown(unit)[number].variant.unit())
 
 
 @cache
@@ -172,8 +173,8 @@ def _structures(unit: str) -> list[tuple[str, list[int]]]:
     if len(entries) == 1:
         return [("", [0])]
     groups: dict[str, list[int]] = {}
-    for place in range(len(entries)):
-        groups.setdefault(likeness(_graph(unit, place)), []).append(place)
+    for number in range(len(entries)):
+        groups.setdefault(likeness(_graph(unit, number)), []).append(number)
     return _suffixed(groups.values())
 
 
@@ -234,8 +235,8 @@ def _drawings(unit: str, rows: Sequence[Row]) -> list[str]:
     title = _title(unit).lower()
     lines = ["## Structure", "", _STRUCTURE_NOTE, ""]
     structures = _structures(unit)
-    for suffix, places in structures:
-        named = "; ".join(rows[k].entry.name for k in places if rows[k].entry.name) or "default"
+    for suffix, numbers in structures:
+        named = "; ".join(rows[k].entry.name for k in numbers if rows[k].entry.name) or "default"
         named = named if len(structures) > 1 else ""
         lines += [f"{inline(named)}:", ""] if named else []
         lines += [f"![Structure of the {title}{', ' * bool(named)}{named}]({unit}-structure{suffix}.svg)", ""]
@@ -315,8 +316,8 @@ def page(unit: str, rows: Sequence[Row]) -> str:
 def pictures(unit: str, rows: Sequence[Row], samples: Sequence[Sample | None]) -> Iterator[tuple[str, str]]:
     """Names and texts of the pictures of the page of a unit."""
     with rc_context(STYLE):
-        for suffix, places in _structures(unit):
-            yield f"{unit}-structure{suffix}.svg", svg(draw_structure(_graph(unit, places[0])))
+        for suffix, numbers in _structures(unit):
+            yield f"{unit}-structure{suffix}.svg", svg(draw_structure(_graph(unit, numbers[0])))
         for suffix, (row, *_) in _timings(rows):
             variant = row.entry.variant
             yield f"{unit}-timing{suffix}.svg", svg(draw_timing(waves_of(variant.unit(), variant.beat)))
@@ -325,7 +326,7 @@ def pictures(unit: str, rows: Sequence[Row], samples: Sequence[Sample | None]) -
 
 
 def _room(record: Record) -> str:
-    """Room of a unit, by the place of its file."""
+    """Room of a unit, by the folder of its file."""
     parts = record.kind.__module__.split(".")
     return parts[2] if len(parts) > 3 else ""
 

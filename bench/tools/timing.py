@@ -21,7 +21,7 @@ PIXELS = 3
 _HANDSHAKES = ("i.valid", "i.ready", "o.valid", "o.ready")
 
 _PERIOD = 1e-8
-_PATIENCE = 5000
+_IDLE_TIMEOUT = 5000
 
 _CLOCK, _ROW = 22.0, 22.0
 _MARGIN = 58.0
@@ -102,7 +102,7 @@ def waves_of(unit: Component, beat: dict | None = None, beats: int = 3) -> Waves
             taken += levels[0] and levels[1]
             given += levels[2] and levels[3]
             after -= given == beats * results
-            if len(history) > _PATIENCE:
+            if len(history) > _IDLE_TIMEOUT:
                 raise RuntimeError(f"{type(unit).__name__} gave {given} of {beats * results} results")
             await ctx.tick()
 

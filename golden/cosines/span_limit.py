@@ -93,6 +93,7 @@ class SpanLimit:
         length: np.ndarray,
         exponent: np.ndarray,
         highlights: bool = True,
+        threshold: Fixed | None = None,
     ) -> np.ndarray:
         """Whether spans are wide; bool, shape (spans,).
 
@@ -108,6 +109,8 @@ class SpanLimit:
             Specular exponent, 1 to 1000.
         highlights : bool
             Whether there is specular light.
+        threshold : Fixed, shape (spans,), UQ(2, 16), optional
+            In place of twice `lit` of the exponent: `ValueGate.thresholds_of` of a lobe's table.
 
         Raises
         ------
@@ -116,8 +119,10 @@ class SpanLimit:
         """
         wide, wide_if_lit = self.exceeds(normal_left, normal_right, exponent)
         if highlights:
-            bits = self._bits(exponent)
-            level = self.least(values.highlight) < self.levels.codes[bits][:, np.newaxis]
+            levels = self.levels[self._bits(exponent)]
+            if threshold is not None:
+                levels = threshold.extend(self.LEVEL_FORMAT)
+            level = self.least(values.highlight) < levels.codes[:, np.newaxis]
             front = values.diffuse.max(axis=2) >= self.BEHIND.codes
             wide = wide | (wide_if_lit & (level & front).any(axis=1))
         return wide & (np.asarray(length) >= self.SHORTEST)

@@ -33,7 +33,7 @@ class Comparison:
     method_error : ErrorFigures
         Against ``golden``.
     total_error : ErrorFigures
-        Against the exact frame with Blinn's model.
+        Against the exact frame with Blinn's model, or that of a lobe's table.
     nmse : float
         Against the exact frame.
     mnse_published, mnse_published_share : float
@@ -97,7 +97,8 @@ def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
     start = perf_counter()
     same_method = method_in_float64(scene, design, frame.cut_raster)
     golden = render(scene, "phong", _model_of(design), raster=frame.raster).image
-    exact = render(scene, "phong", BLINN, raster=frame.raster)
+    target = _model_of(design) if design.loads_tables else BLINN
+    exact = render(scene, "phong", target, raster=frame.raster)
     seconds = perf_counter() - start
     nothing = ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))
     if not exact.mask.any():

@@ -7,6 +7,7 @@ import numpy as np
 
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.span_limit import SpanLimit
+from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import CHUNK, SurfacePoints, along_spans, chunks
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator
@@ -43,11 +44,10 @@ def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int
     cut : int
         How many of the given spans were cut.
     """
-    interpolator = design.interpolator
+    interpolator, limits = design.interpolator, HighlightLimits.of(scene.materials, design)
     if interpolator.CUT_BY_ERROR:
-        return cut_by_error(scene, raster, interpolator)
-    exponents = [material.exponent for material in scene.materials]
-    return cut_by_angle(raster, min(map(interpolator.widest_span, exponents)))
+        return cut_by_error(scene, raster, interpolator, limits)
+    return cut_by_angle(raster, min(map(interpolator.widest_span, limits.exponents)))
 
 
 def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
@@ -134,7 +134,9 @@ def _parts(raster, origin, first, last) -> Raster:
     )
 
 
-def cut_by_error(scene: Scene, raster: Raster, interpolator: Interpolator) -> tuple[Raster, int]:
+def cut_by_error(
+    scene: Scene, raster: Raster, interpolator: Interpolator, limits: HighlightLimits | None = None
+) -> tuple[Raster, int]:
     """Halve spans until the method's own curve is near the exact one for every light.
 
     N·L and u along a span are those of its true normals and of the places on the surface,
@@ -160,14 +162,16 @@ def cut_by_error(scene: Scene, raster: Raster, interpolator: Interpolator) -> tu
         Spans.
     interpolator : Interpolator
         The method.
+    limits : HighlightLimits, optional
+        What the materials' highlights ask. By default those of their exponents.
 
     Returns
     -------
     raster, cut
         As of `cut_spans`.
     """
-    exponents = np.array([material.exponent for material in scene.materials])
-    cosines = np.cos(np.radians([interpolator.widest_span(exponent) for exponent in exponents]))
+    limits = limits or HighlightLimits.of(scene.materials)
+    cosines = np.cos(np.radians([interpolator.widest_span(exponent) for exponent in limits.exponents]))
 
     def is_wide(origin, first, last):
         material = scene.mesh.material[raster.triangle[origin]]
@@ -175,28 +179,30 @@ def cut_by_error(scene: Scene, raster: Raster, interpolator: Interpolator) -> tu
         wide = (np.einsum("ij,ij->i", left, right) < cosines[material]) & (last > first)
         rest = np.flatnonzero(~wide & (last - first > 1))
         pieces = _Pieces.of(scene, raster, origin[rest], first[rest], last[rest])
-        wide[rest] = pieces.miss(interpolator, exponents[material[rest]])
+        wide[rest] = pieces.miss(interpolator, limits, material[rest])
         return wide
 
     return _halve(raster, is_wide)
 
 
-def missed_spans(scene: Scene, raster: Raster, interpolator: Interpolator) -> int:
+def missed_spans(
+    scene: Scene, raster: Raster, interpolator: Interpolator, limits: HighlightLimits | None = None
+) -> int:
     """How many spans of a raster the method's own curve misses by more than its tolerances.
 
     Parameters
     ----------
-    scene, raster, interpolator
+    scene, raster, interpolator, limits
         As for `cut_by_error`.
     """
-    exponents = np.array([material.exponent for material in scene.materials])
+    limits = limits or HighlightLimits.of(scene.materials)
     spans = np.flatnonzero(raster.length > 2)
     missed = 0
     for part in chunks(len(spans)):
         origin = spans[part]
         pieces = _Pieces.of(scene, raster, origin, np.zeros_like(origin), raster.length[origin] - 1)
-        exponent = exponents[scene.mesh.material[raster.triangle[origin]]]
-        missed += int(np.count_nonzero(pieces.miss(interpolator, exponent)))
+        material = scene.mesh.material[raster.triangle[origin]]
+        missed += int(np.count_nonzero(pieces.miss(interpolator, limits, material)))
     return missed
 
 
@@ -220,16 +226,16 @@ class _Pieces:
         places = tuple(SurfacePoints.at(scene, raster, origin, t) for t in at)
         return cls(scene, raster, origin, first, last, places)
 
-    def miss(self, interpolator: Interpolator, exponent: np.ndarray) -> np.ndarray:
+    def miss(self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray) -> np.ndarray:
         """Whether the curve of a method is too far from the exact one; bool, shape (pieces,)."""
-        n, pixels = exponent[:, np.newaxis], (self.last - self.first + 1)[:, np.newaxis]
+        pixels = (self.last - self.first + 1)[:, np.newaxis]
         chord = isinstance(interpolator, ChordInterpolator)
         # A curve through three values, or through two, has pixels between them from so many on.
         between = pixels > (3 if chord else 2)
         curves = {name: _Quadratic.of(self.places, name) for name in ("diffuse", "highlight")}
         diffuse, highlight = curves.values()
         if chord:
-            wrong = self._flagged(interpolator, exponent, curves)
+            wrong = self._flagged(interpolator, limits, material, curves)
             misses = {name: curve.miss(self.places, name) for name, curve in curves.items()}
         else:
             wrong = np.zeros(len(self.origin), dtype=bool)
@@ -244,9 +250,9 @@ class _Pieces:
         in_front = diffuse.largest + errors["diffuse"] >= 0
         least = np.maximum(highlight.least - margin / ChordInterpolator.MARGIN * misses["highlight"], 0)
         too_far = errors["diffuse"] > ChordInterpolator().diffuse_tolerance
-        too_far |= errors["highlight"] > ChordInterpolator().highlight_tolerance(n, least)
+        too_far |= errors["highlight"] > limits.tolerance(material, least)
         wrong |= (too_far & in_front & between).any(axis=1)
-        turns_dark = in_front & (diffuse.least - errors["diffuse"] <= 0) & ChordInterpolator.is_lit(n, least)
+        turns_dark = in_front & (diffuse.least - errors["diffuse"] <= 0) & limits.is_lit(material, least)
         chosen = np.flatnonzero(turns_dark.any(axis=1) & ~wrong)
         if chord:
             kept = diffuse.left, diffuse.slope, diffuse.curvature
@@ -273,7 +279,9 @@ class _Pieces:
         ratio = np.divide(larger, smaller, out=np.full_like(larger, 1e9), where=smaller > 0).max(axis=0)
         return np.maximum(ratio, ChordInterpolator.MARGIN)
 
-    def _flagged(self, interpolator: ChordInterpolator, exponent, curves) -> np.ndarray:
+    def _flagged(
+        self, interpolator: ChordInterpolator, limits: HighlightLimits, material, curves
+    ) -> np.ndarray:
         """Whether the chord method flags a piece, for certain not if this says no."""
         setup, limit, one = interpolator.setup, SpanLimit(), float(ONE_SQUARED.values)
         formats = {"diffuse": setup.DIFFUSE_SLOPE_FORMAT, "highlight": setup.SLOPE_FORMAT}
@@ -287,9 +295,8 @@ class _Pieces:
             return flagged
         cosine = np.einsum("ij,ij->i", self.places[0].normal, self.places[-1].normal)
         angle = np.degrees(np.arccos(np.minimum(cosine, 1)))
-        bits = np.frexp(exponent.astype(np.float64))[1]
-        octaves = np.r_[0, 1 << np.arange(limit.EXPONENT_BITS)]
-        angles, lit = (np.array([f(max(n, 1)) for n in octaves])[bits] for f in (limit.angle, limit.lit))
+        angles = np.array([limit.angle(word) for word in limits.words])[material]
+        lit = limits.least_dark[material]
         values = (np.stack([getattr(self.places[k], name) for k in (0, 2, 4)], axis=-1) for name in curves)
         diffuse, highlight = values
         # Values are off by the rounding of N, L and H.

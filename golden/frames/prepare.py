@@ -1,19 +1,30 @@
 """The input of a pipeline for a frame: spans, cut, ordered and quantised, and frame constants."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans, missed_spans
+from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import line_ends, local_values, middle_normals
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.pipeline import Design, Spans
+from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["PreparedFrame", "constants_of", "prepare", "quantise_spans", "sort_by_material", "spans_for"]
+__all__ = [
+    "PreparedFrame",
+    "constants_of",
+    "prepare",
+    "quantise_spans",
+    "sort_by_material",
+    "spans_for",
+    "with_tables",
+]
 
 
 @dataclass(frozen=True)
@@ -57,7 +68,7 @@ def prepare(scene: Scene, design: Design) -> PreparedFrame:
     cut = sort_by_material(cut, scene.mesh.material)
     method, missed = design.interpolator, 0
     if not (method.CUT_BY_ERROR or method.takes_line):
-        missed = missed_spans(scene, cut, method)
+        missed = missed_spans(scene, cut, method, HighlightLimits.of(scene.materials, design))
     return PreparedFrame(raster, cut, count, spans_for(scene, cut, design), missed)
 
 
@@ -90,11 +101,56 @@ def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
     Raises
     ------
     ValueError
-        If the scene has more lights or other materials than the design, or a term is brighter than 8.
+        If the scene has more lights or other materials than the design, or other lobes than its banks hold,
+        or a term is brighter than 8.
     """
     if len(scene.materials) != design.materials:
         raise ValueError(f"the pipeline has {design.materials} materials, the scene {len(scene.materials)}")
-    return [FrameConstants.of(scene, design.lights, index=index) for index in range(design.materials)]
+    constants = [FrameConstants.of(scene, design.lights, index=index) for index in range(design.materials)]
+    return with_tables(constants, scene.materials, design) if design.loads_tables else constants
+
+
+def with_tables(
+    constants: Sequence[FrameConstants], materials: Sequence[Material], design: Design
+) -> list[FrameConstants]:
+    """Frame constants with the tables of the materials' lobes; equal ones share a bank.
+
+    Parameters
+    ----------
+    constants : sequence of FrameConstants
+        Of each material.
+    materials : sequence of Material
+        As many.
+    design : Design
+        Pipeline whose specular unit is a `Lobe`.
+
+    Raises
+    ------
+    ValueError
+        If the materials have more lobes than there are banks, or one that is not fixed where others are.
+    """
+    lobe = design.specular
+    parameters = [material.parameter(lobe.model) for material in materials]
+    banks = list(lobe.fixed or dict.fromkeys(parameters))
+    for parameter in parameters:
+        if parameter not in banks:
+            fixed = ", ".join(f"{value:g}" for value in banks)
+            raise ValueError(f"the {lobe.model.PARAMETER} is fixed at {fixed}, not {parameter:g}")
+    if len(banks) > lobe.banks:
+        raise ValueError(
+            f"the materials have {len(banks)} lobes, the pipeline has banks for {lobe.banks}; give materials "
+            f"an equal {lobe.model.PARAMETER}, or build it with more banks, up to {lobe.MAX_BANKS}"
+        )
+    tables = [lobe.table(parameter) for parameter in banks]
+    thresholds = [
+        design.threshold_of(table).codes.item() if design.has_threshold else None for table in tables
+    ]
+    chosen = map(banks.index, parameters)
+    exponents = HighlightLimits.of(materials, design).words.astype(np.int64).tolist()
+    return [
+        replace(of_material, exponent=exponent, lobe=tables[bank], bank=bank, threshold=thresholds[bank])
+        for of_material, exponent, bank in zip(constants, exponents, chosen, strict=True)
+    ]
 
 
 def sort_by_material(raster: Raster, material: np.ndarray) -> Raster:

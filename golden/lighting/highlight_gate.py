@@ -151,7 +151,11 @@ class HighlightGate:
     @cached_property
     def thresholds(self) -> Fixed:
         """The PROM: T for exponents 0 to 1023."""
-        nearest = (self.specular.last_lit_arguments + 1) * 2.0**-25
+        return self.thresholds_of(self.specular.last_lit_arguments)
+
+    def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
+        """T by the largest argument whose term is over 0, in steps of 2^-25, as `LobeTable` has it, too."""
+        nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25
         level = float(ONE_SQUARED.values) - (nearest + self.margin) / self.interpolator.shortest_normal
         # In steps of 2^-34; one less, as the quotient is not exact.
         level = np.floor(level * 2.0**34).astype(np.int64) - 1
@@ -211,12 +215,18 @@ class HighlightGate:
         exponent = np.asarray(exponent, dtype=np.int64)
         if exponent.size and not 1 <= exponent.min() <= exponent.max() <= MAX_EXPONENT:
             raise ValueError(f"exponents must be 1 to {MAX_EXPONENT}")
+        return self.compute_by(normal_left, normal_right, halfway, self.thresholds[exponent])
+
+    def compute_by(
+        self, normal_left: Fixed, normal_right: Fixed, halfway: Fixed, threshold: Fixed
+    ) -> np.ndarray:
+        """The same by thresholds T in place of exponents, of shape () or (spans,)."""
         dot, angle = self.dot_product, self.angle_format
         difference = self.one_squared - dot.compute(normal_left, normal_right)
         cut = difference.truncate(angle.fraction_bits).saturate(angle)
         u = Fixed(angle, np.minimum(cut.codes + 3, angle.max_code))
         a, b = (self._level(dot.compute(normal, halfway)) for normal in (normal_left, normal_right))
-        return (cut > self.widest) | self.decide(a, b, u, self.thresholds[exponent])
+        return (cut > self.widest) | self.decide(a, b, u, threshold)
 
     def _level(self, cosine: Fixed) -> Fixed:
         step = Fixed(self.level_format, 1)

@@ -62,6 +62,11 @@ class HighlightOperand:
         return ONE_SQUARED - operand if self.operand == "cosine" else operand
 
     @property
+    def has_table(self) -> bool:
+        """Whether each frame loads a table for each material: a `Lobe`."""
+        return False
+
+    @property
     def last_lit_arguments(self) -> np.ndarray:
         """Largest ``1 - cos gamma``, in steps of 2^-25, that may give a term over 0, for each exponent.
 

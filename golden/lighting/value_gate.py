@@ -8,7 +8,7 @@ import numpy as np
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.lighting.specular import MAX_EXPONENT, HighlightOperand, Specular
-from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.fixed import UQ, Fixed
 
 __all__ = ["ValueGate"]
 
@@ -45,6 +45,7 @@ class ValueGate:
     specular: HighlightOperand = field(default_factory=lambda: Specular(operand="one_minus_cosine"))
 
     LEVEL_FORMAT = SpanLimit.LEVEL_FORMAT
+    THRESHOLD_FORMAT = UQ(2, 16)
     LARGEST_BULGE = 1 << ChordSetup.HIGHLIGHT_FORMAT.fraction_bits - 5
     LARGEST_RISE = 1 << ChordSetup.HIGHLIGHT_FORMAT.fraction_bits - 3
 
@@ -55,10 +56,18 @@ class ValueGate:
 
     @cached_property
     def thresholds(self) -> Fixed:
-        """The PROM for exponents 0 to 1023, SQ(4, 26); the largest value where every argument may be lit."""
-        nearest = (self.specular.last_lit_arguments + 1) * 2.0**-25 + self.margin
-        codes = np.ceil(2 * nearest / self.LEVEL_FORMAT.step).astype(np.int64)
-        return Fixed(self.LEVEL_FORMAT, np.minimum(codes, self.LEVEL_FORMAT.max_code))
+        """The PROM for exponents 0 to 1023, UQ(2, 16)."""
+        return self.thresholds_of(self.specular.last_lit_arguments)
+
+    def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
+        """Thresholds by the largest argument whose term is over 0, in steps of 2^-25; rounded up.
+
+        Twice the least u is at most 4. Where every argument may be lit the threshold is the largest word.
+        """
+        format = self.THRESHOLD_FORMAT
+        nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25 + self.margin
+        codes = np.ceil(2 * nearest / format.step).astype(np.int64)
+        return Fixed(format, np.minimum(codes, format.max_code))
 
     def compute(self, highlight: np.ndarray, exponent: int | np.ndarray) -> np.ndarray:
         """Bit-accurate decisions.
@@ -83,8 +92,13 @@ class ValueGate:
         exponent = np.asarray(exponent, dtype=np.int64)
         if exponent.size and not 1 <= exponent.min() <= exponent.max() <= MAX_EXPONENT:
             raise ValueError(f"exponents must be 1 to {MAX_EXPONENT}")
+        return self.compute_by(highlight, self.thresholds[exponent])
+
+    def compute_by(self, highlight: np.ndarray, threshold: Fixed) -> np.ndarray:
+        """The same by thresholds in place of exponents, UQ(2, 16)."""
         left, middle, right = np.moveaxis(highlight, -1, 0)
         held = (np.abs(left + right - 2 * middle) < self.LARGEST_BULGE) & (
             np.abs(right - left) < self.LARGEST_RISE
         )
-        return ~held | (SpanLimit.least(highlight) < self.thresholds.codes[exponent])
+        level = threshold.extend(self.LEVEL_FORMAT).codes
+        return ~held | (SpanLimit.least(highlight) < level)

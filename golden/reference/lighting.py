@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.lobes import checked_roughness, exponent_of_roughness, roughness_of_exponent
 from blysk.golden.reference.reflection import ReflectionModel
 
 __all__ = [
@@ -121,11 +122,14 @@ class Material:
         k_a, k_d, k_s a channel, at least 0. Their sum may exceed 1: the intensity saturates.
     exponent : int
         Exponent n of the highlight, 1 to 1000.
+    roughness : float, optional
+        Roughness r of microfacets, greater than 0 and at most 1. By default that of the exponent, see
+        `lobes.roughness_of_exponent`.
 
     Raises
     ------
     ValueError
-        If a coefficient is negative or not finite, or the exponent is out of range.
+        If a coefficient is negative or not finite, or the exponent or the roughness is out of range.
     TypeError
         If the exponent is not an integer.
     """
@@ -134,6 +138,7 @@ class Material:
     diffuse: Triple
     specular: Triple
     exponent: int
+    roughness: float | None = None
 
     def __post_init__(self):
         for name in ("ambient", "diffuse", "specular"):
@@ -141,6 +146,52 @@ class Material:
         object.__setattr__(self, "exponent", operator.index(self.exponent))
         if not 1 <= self.exponent <= 1000:
             raise ValueError(f"a material's exponent must be in 1 to 1000, not {self.exponent}")
+        if self.roughness is not None:
+            object.__setattr__(self, "roughness", checked_roughness(self.roughness))
+
+    @classmethod
+    def of_metallic_roughness(
+        cls, base: Sequence[float], metallic: float, roughness: float, ambient: float = 0.1
+    ) -> "Material":
+        """Material of glTF's base colour, metallic and roughness factors.
+
+        ``k_d = (1 - metallic) base``; ``k_s = F_0 = 0.04 (1 - metallic) + metallic base``, the reflection
+        that Schlick's formula has along the normal; the exponent is that of the roughness, rounded, in 1 to
+        1000. A roughness under 1/1000 counts as that.
+
+        Parameters
+        ----------
+        base : three floats
+            Linear base colour, 0 to 1 a channel.
+        metallic, roughness : float
+            0 to 1.
+        ambient : float
+            k_a, as a share of the base colour.
+
+        Raises
+        ------
+        ValueError
+            If a value is out of range.
+
+        Notes
+        -----
+        Source: docs/theory/models.md#reflection-models; glTF 2.0, appendix B.
+        """
+        color = np.array(triple("a base colour", base, 0, 1))
+        for name, value in (("metallic", metallic), ("roughness", roughness)):
+            if not 0 <= value <= 1:
+                raise ValueError(f"{name} must be 0 to 1, not {value}")
+        roughness = max(float(roughness), 1e-3)
+        exponent = round(min(max(exponent_of_roughness(roughness), 1), 1000))
+        dielectric = 1 - metallic
+        specular = 0.04 * dielectric + metallic * color
+        return cls(tuple(ambient * color), tuple(dielectric * color), tuple(specular), exponent, roughness)
+
+    def parameter(self, model: ReflectionModel) -> float | None:
+        """Exponent or roughness, as `ReflectionModel.PARAMETER` of a model says, or ``None``."""
+        if model.PARAMETER == "roughness" and self.roughness is None:
+            return roughness_of_exponent(self.exponent)
+        return None if model.PARAMETER is None else getattr(self, model.PARAMETER)
 
 
 def halfway_vector(light_direction: ArrayLike, viewer: ArrayLike) -> np.ndarray:
@@ -213,7 +264,8 @@ def intensity(
     model : ReflectionModel
         The highlight.
     chord : bool
-        Whether ``1 - |N - H|^2 / 2`` takes the place of N·H, which it equals for unit normals (chord.md).
+        Whether ``1 - |N - H|^2 / 2`` takes the place of N·H, which it equals for unit normals
+        (docs/theory/chord.md#the-chord).
     points : array, shape (..., 3), optional
         Where each normal stands; only point lights read it.
 
@@ -284,7 +336,7 @@ def _add_light(total, material, light, cosine, highlight_cosine, has_halfway, mo
     color = np.asarray(light.color)
     total += np.maximum(cosine, 0.0)[..., np.newaxis] * (color * material.diffuse)
     if highlight_cosine is not None:
-        highlight = model.reflect(highlight_cosine, material.exponent)
+        highlight = model.reflect(highlight_cosine, material.parameter(model))
         highlight = np.where((cosine > 0) & has_halfway, highlight, 0.0)
         total += highlight[..., np.newaxis] * (color * material.specular)
 

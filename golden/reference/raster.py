@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -343,21 +344,10 @@ def rasterise(scene: Scene) -> Raster:
     span_back = back[triangle]
     turn = np.where(span_back, -1.0, 1.0) if scene.back_faces == "flip" else np.ones(len(triangle))
     fallback = plane[triangle] * turn[:, np.newaxis]
-    ends = []
-    repaired = 0
-    for column in (left, left + length - 1):
-        weights = _weights(pieces, piece, column, line)
-        normal = np.zeros((len(piece), 3))
-        for corner in range(3):
-            normal += weights[:, corner, np.newaxis] * mesh.normals[faces[triangle, corner]]
-        normal *= turn[:, np.newaxis]
-        magnitude = np.sqrt((normal * normal).sum(axis=1))
-        # Opposite unit normals leave a remainder of about 1e-16 where they should cancel.
-        lost = magnitude <= 1e-12 * weights.sum(axis=1)
-        magnitude[lost] = 0.0
-        normal[lost] = fallback[lost]
-        repaired += int(lost.sum())
-        ends.append((weights, normalise(normal), magnitude))
+    corners = mesh.normals[faces[triangle]] * turn[:, np.newaxis, np.newaxis]
+    ends = [
+        _end(corners, fallback, _weights(pieces, piece, column, line)) for column in (left, left + length - 1)
+    ]
 
     offset = _counting(length).astype(np.int16)
     span = np.repeat(np.arange(len(length), dtype=np.int32), length)
@@ -368,12 +358,12 @@ def rasterise(scene: Scene) -> Raster:
         y=line,
         length=length,
         triangle=triangle,
-        normal_left=ends[0][1],
-        normal_right=ends[1][1],
-        magnitude_left=ends[0][2],
-        magnitude_right=ends[1][2],
-        weights_left=ends[0][0],
-        weights_right=ends[1][0],
+        normal_left=ends[0].normal,
+        normal_right=ends[1].normal,
+        magnitude_left=ends[0].magnitude,
+        magnitude_right=ends[1].magnitude,
+        weights_left=ends[0].weights,
+        weights_right=ends[1].weights,
         back=span_back,
         span=span,
         offset=offset,
@@ -385,8 +375,30 @@ def rasterise(scene: Scene) -> Raster:
         outside=int(outside.sum() + len(candidates) - present[0].sum()),
         uncovered=int((present[1] & ~present[2]).sum()),
         hidden_spans=count - len(kept),
-        repaired_normals=repaired,
+        repaired_normals=sum(int(end.lost.sum()) for end in ends),
     )
+
+
+class _End(NamedTuple):
+    """Ends of spans on one side: weights, unit normals, their lengths before; where a normal was lost."""
+
+    weights: np.ndarray
+    normal: np.ndarray
+    magnitude: np.ndarray
+    lost: np.ndarray
+
+
+def _end(corners: np.ndarray, fallback: np.ndarray, weights: np.ndarray) -> _End:
+    """Normals of corners (count, 3, 3) by their weights; the fallback where they cancel."""
+    normal = np.zeros((len(weights), 3))
+    for corner in range(3):
+        normal += weights[:, corner, np.newaxis] * corners[:, corner]
+    magnitude = np.sqrt((normal * normal).sum(axis=1))
+    # Opposite unit normals leave a remainder of about 1e-16 where they should cancel.
+    lost = magnitude <= 1e-12 * weights.sum(axis=1)
+    magnitude[lost] = 0.0
+    normal[lost] = fallback[lost]
+    return _End(weights, normalise(normal), magnitude, lost)
 
 
 def _weights(pieces: _Pieces, piece: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:

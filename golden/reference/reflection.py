@@ -33,7 +33,10 @@ def _check_exponent(exponent: float) -> float:
 
 @dataclass(frozen=True)
 class ReflectionModel:
-    """A highlight: its brightness S, from 0 to 1, for every cosine and exponent. One subclass a family.
+    """A highlight: its brightness S, from 0 to 1, for every cosine and parameter. One subclass a family.
+
+    The parameter is one number that says how wide the highlight is: an exponent, or the roughness of the
+    microfacets in `lobes`. A table has none.
 
     Parameters
     ----------
@@ -42,12 +45,14 @@ class ReflectionModel:
     source : str
         Where the formula comes from; see docs/theory/models.md.
     energy : callable, optional
-        Factor that normalises the reflected energy, by exponent; see `energy_factor`.
+        Factor that normalises the reflected energy, by parameter; see `energy_factor`.
 
     Attributes
     ----------
     MIRROR : bool
         Whether the cosine is R·V, of the mirror direction; else N·H, of the half-way vector.
+    PARAMETER : str or None
+        What the parameter is: ``"exponent"``, ``"roughness"``, or nothing.
     """
 
     name: str
@@ -55,6 +60,7 @@ class ReflectionModel:
     energy: Callable[[float], float] | None = None
 
     MIRROR: ClassVar[bool] = False
+    PARAMETER: ClassVar[str | None] = "exponent"
 
     def __repr__(self):
         return f"<{type(self).__name__} {self.name}>"
@@ -68,7 +74,10 @@ class ReflectionModel:
     def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
         raise NotImplementedError
 
-    def reflect(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
+    def _checked(self, parameter: float) -> float:
+        return _check_exponent(parameter)
+
+    def reflect(self, cosine: np.ndarray, parameter: float) -> np.ndarray:
         """Brightness S of a highlight, 0 to 1.
 
         Parameters
@@ -76,8 +85,8 @@ class ReflectionModel:
         cosine : array
             N·H, or R·V for a model of the mirror direction. Values above 1, which vectors that are not quite
             of unit length give, count as 1.
-        exponent : float
-            Exponent n of Blinn's model that is approximated, greater than 0.
+        parameter : float
+            Exponent n of Blinn's model that is approximated, greater than 0; or what `PARAMETER` says.
 
         Returns
         -------
@@ -86,11 +95,24 @@ class ReflectionModel:
         Raises
         ------
         ValueError
-            If the exponent is not finite and positive, or too small for the model.
+            If the exponent is not finite and positive, or too small for the model; or the roughness is not
+            greater than 0 and at most 1.
         """
-        return self._lobe(np.minimum(np.asarray(cosine, dtype=np.float64), 1.0), _check_exponent(exponent))
+        return self._lobe(np.minimum(np.asarray(cosine, dtype=np.float64), 1.0), self._checked(parameter))
 
-    def energy_factor(self, exponent: float) -> float:
+    def steepness(self, parameter: float | None) -> float:
+        """Exponent of Blinn's power that changes as fast with N·H, at its steepest: how fine spans must be.
+
+        It is the exponent itself; for the models of `lobes` the largest ``|dS/dc|``, from 1 to 10,000.
+
+        Raises
+        ------
+        ValueError
+            If the parameter is out of range.
+        """
+        return self._checked(parameter)
+
+    def energy_factor(self, parameter: float) -> float:
         """Factor of the energy-normalised form, which is factor times S ([C]).
 
         =============== ==================================== ==============================================
@@ -101,6 +123,7 @@ class ReflectionModel:
                                                              hemisphere: viewer along the normal
         ``cosquad_lin`` ``0.214 (0.807 + n)``                a line through ``2 pi integral_0^1 S(c) c
                                                              dc``, off by at most 0.0533 for n >= 2
+        microfacets     see `MicrofacetModel`                that of ``blinn``
         =============== ==================================== ==============================================
 
         [C] integrates ``cosquad_lin`` over the angle itself, as for ``phong``, not over the half angle; it
@@ -108,18 +131,18 @@ class ReflectionModel:
 
         Parameters
         ----------
-        exponent : float
-            Exponent n, greater than 0.
+        parameter : float
+            Exponent n, greater than 0; or what `PARAMETER` says.
 
         Raises
         ------
         ValueError
-            If the model has no such form, or the exponent is not finite and positive.
+            If the model has no such form, or the parameter is out of range.
         """
         if self.energy is None:
             known = ", ".join(name for name, model in REFLECTION_MODELS.items() if model.energy)
             raise ValueError(f"model must be one of {known}, not {self.name}")
-        return self.energy(_check_exponent(exponent))
+        return self.energy(self._checked(parameter))
 
 
 @dataclass(frozen=True, repr=False)

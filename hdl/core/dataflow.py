@@ -27,7 +27,7 @@ MULTIPLIER_BITS = 18
 """Bits of a multiplier's signed operands."""
 
 MULTIPLIER_LATENCY = 4
-"""Clocks of `registered_product`."""
+"""Cycles of `registered_product`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +38,10 @@ class Word:
     ----------
     name : str
         Of its register.
-    age : int
-        Enabled cycles from when a beat is taken in until its word stands.
-    stands : int
-        Clocks for which it stands before the next beat's may take its place.
+    stage : int
+        Enabled cycles from the input of a beat to the first on which the word can be read.
+    lifetime : int
+        Cycles on which it can be read, before the next beat's word replaces it.
     """
 
     name: str
@@ -51,22 +51,22 @@ class Word:
 
 @dataclass(frozen=True, eq=False)
 class FunctionalUnit:
-    """Equal pieces of hardware that take turns at the uses of a graph.
+    """Equal instances of hardware, shared by the uses of a graph.
 
     Parameters
     ----------
     name : str
         Of its operand registers.
     shapes : sequence of ShapeLike
-        Operands; each piece has a register for every one.
+        Operands; each instance has a register for every one.
     latency : int
         Registers from those of the operands to the result.
     make : callable
-        Makes a piece: from a function that makes a register (value, name) and the operands, the result.
+        Makes an instance: from a function that makes a register (value, name) and the operands, the result.
     left : list of int
         Uses that may still come.
     taken : list of set of int
-        For each piece the stages at which it has a use.
+        For each instance the stages at which it has a use.
     """
 
     name: str
@@ -78,20 +78,20 @@ class FunctionalUnit:
 
     @property
     def count(self) -> int:
-        """How many pieces there are."""
+        """How many instances there are."""
         return len(self.taken)
 
 
 class Dataflow:
-    """The words of a `PipelinedUnit` and what makes each from others, before there is any hardware.
+    """The words of a `PipelinedUnit` and how each is computed from others, before there is any hardware.
 
-    Every word gets the earliest age at which its operands are there. What is shared, such as a multiplier,
-    is used when a piece of it is free: beats come a whole multiple of the initiation interval apart, so a
-    piece has as many turns as the interval has cycles, and ``ceil(uses / interval)`` pieces serve all. In a
-    *spaced* graph beats come at any distance from the interval on: then the uses of a piece lie within as
-    many stages as the interval has cycles, and there are as many more pieces as that takes. Uses are placed
-    in the order in which they are added. Words that are read later than they stand are copied on the way by
-    `build`.
+    Every word gets the earliest stage at which its operands can be read. A shared functional unit, such as a
+    multiplier, is issued when a slot of it is free: beats come a whole multiple of the initiation interval
+    apart, so an instance has as many slots as the interval has cycles, and ``ceil(uses / interval)``
+    instances serve all. In a *spaced* graph beats come at any distance from the interval on: then the uses of
+    an instance lie within as many stages as the interval has cycles, and there are as many more instances as
+    that takes. Uses get slots in the order in which they are added. A word that is read after its lifetime is
+    copied by `build`.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class Dataflow:
     spaced : bool
         Whether beats come at any distance from the interval on; see `PipelinedUnit`.
     low_latency : bool
-        Whether a product takes a single register, two cycles in all: for a unit whose results are waited for.
+        Whether a product takes a single register, two cycles in all.
 
     Raises
     ------
@@ -135,11 +135,11 @@ class Dataflow:
         return self._add(name, first, self.interval, lambda build: read(build.operands))
 
     def wire(self, name: str, function: Callable[[Any], Any], word: Word) -> Word:
-        """Wiring from a word's value; where it is read later than it stands, it is copied in its place."""
+        """Wiring from a word's value; read after the word's lifetime, the wire is copied, not the word."""
         return self._add(name, word.stage, word.lifetime, lambda build: function(build.at(word, word.stage)))
 
     def register(self, name: str, function: Callable[..., Any], *words: Word, since: int = 0) -> Word:
-        """A register that takes ``function`` of the words' values, one clock.
+        """A register of ``function`` of the words' values: one cycle.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class Dataflow:
         *words : Word
             What it is made from.
         since : int
-            Age at which it stands at the earliest: a word that is read late need not be copied till then.
+            Earliest stage of the word: a word that is read late needs no copies before.
         """
         stage = max(since - 1, *(word.stage for word in words))
 
@@ -163,23 +163,23 @@ class Dataflow:
     def share(
         self, name: str, uses: int, shapes: Sequence[ShapeLike], latency: int, make: Callable[..., Any]
     ) -> FunctionalUnit:
-        """An operator for so many uses; the parameters are those of `Operator`."""
-        pieces = -(-uses // self.interval)
-        return FunctionalUnit(name, shapes, latency, make, [uses], [set() for _ in range(pieces)])
+        """A functional unit for so many uses; the parameters are those of `FunctionalUnit`."""
+        instances = -(-uses // self.interval)
+        return FunctionalUnit(name, shapes, latency, make, [uses], [set() for _ in range(instances)])
 
     def _serves(self, taken: set[int], stage: int) -> bool:
-        """Whether a piece with uses at these stages serves one more, in any two beats."""
+        """Whether an instance with uses at these stages serves one more, in any two beats."""
         if self.spaced:
             return stage not in taken and max(taken | {stage}) - min(taken | {stage}) < self.interval
         return all((stage - other) % self.interval for other in taken)
 
     def _place(self, functional_unit: FunctionalUnit, stage: int) -> tuple[int, int]:
-        """Piece and stage of a use, at the earliest from a stage on."""
+        """Instance and stage of a use, at the earliest from a stage on."""
         for later in range(stage, stage + 2 * self.interval):
-            for piece, taken in enumerate(functional_unit.taken):
+            for instance, taken in enumerate(functional_unit.taken):
                 if self._serves(taken, later):
                     taken.add(later)
-                    return piece, later
+                    return instance, later
         functional_unit.taken.append({stage})
         return functional_unit.count - 1, stage
 
@@ -193,11 +193,11 @@ class Dataflow:
         latency: int | None = None,
         since: int = 0,
     ) -> Word:
-        """Result of an operator; it stands for one clock.
+        """Result of a functional unit; its lifetime is one cycle.
 
         Parameters
         ----------
-        operator : Operator
+        functional_unit : FunctionalUnit
             From `share`.
         name : str
             Of the word.
@@ -206,11 +206,11 @@ class Dataflow:
         operands : callable
             Wiring from the words' values to the operands.
         result : callable
-            Wiring from the operator's result to the word's value.
+            Wiring from the functional unit's result to the word's value.
         latency : int or None
             Registers from the operands to that value, where ``result`` takes one on the way; ``None``: all.
         since : int
-            Age at which the word stands at the earliest: one that is read late need not be copied till then.
+            Earliest stage of the word, as for `register`.
 
         Raises
         ------
@@ -222,11 +222,11 @@ class Dataflow:
         functional_unit.left[0] -= 1
         latency = functional_unit.latency if latency is None else latency
         stage = max(since - 1 - latency, *(word.stage for word in words))
-        piece, stage = self._place(functional_unit, stage)
+        instance, stage = self._place(functional_unit, stage)
 
         def make(build):
             given = operands(*(build.at(word, stage) for word in words))
-            return result(build.issue(functional_unit, piece, stage, given))
+            return result(build.issue(functional_unit, instance, stage, given))
 
         return self._add(name, stage + 1 + latency, 1, make)
 
@@ -241,7 +241,7 @@ class Dataflow:
     ) -> Word:
         """Exact product of two words on a shared multiplier.
 
-        It is there `MULTIPLIER_LATENCY` cycles after its operands; one, in a graph that ``low_latency``.
+        Its stage is `MULTIPLIER_LATENCY` cycles after that of its operands; one in a graph of low latency.
 
         Parameters
         ----------
@@ -257,7 +257,7 @@ class Dataflow:
         Raises
         ------
         ValueError
-            If an operand is too wide, or there are more multiplications than announced.
+            If an operand has too many bits, or there are more multiplications than announced.
         """
         format: list[Format] = []
 
@@ -275,7 +275,7 @@ class Dataflow:
         return self.use(self.multiplier, name, (a, b), operands, product, since=since)
 
     def look_up(self, name: str, words: Sequence[int], width: int, address: Word) -> Word:
-        """Word of a table at an address, one clock.
+        """Word of a table at an address: one cycle.
 
         Parameters
         ----------
@@ -297,11 +297,11 @@ class Dataflow:
             build.m.d.comb += port.addr.eq(build.at(address, stage))
             return port.data
 
-        # The address stands for an interval, and so does what is read.
+        # The word that is read has the lifetime of the address.
         return self._add(name, stage + 1, address.lifetime, make)
 
     def build(self, m: Module, unit: PipelinedUnit, operands: Any) -> Callable[[Word, int], Any]:
-        """Make the hardware; the result gives a word's value at an age.
+        """Make the hardware; the result gives a word's value at a stage.
 
         Parameters
         ----------
@@ -375,12 +375,12 @@ def dot(
 
 
 def checked_interval(interval: int | None, longest: int, default: int | None = None) -> int:
-    """An initiation interval from 1 to that of one multiplier for all; ``None`` stands for the default.
+    """An initiation interval from 1 to that of one multiplier for all; ``None`` means the default.
 
     Raises
     ------
     ValueError
-        If it is none of those.
+        If it is out of range.
     """
     if interval is None:
         return default or longest
@@ -395,14 +395,14 @@ class _Build:
     def __init__(self, m: Module, unit: PipelinedUnit, operands: Any):
         self.m, self.unit, self.operands = m, unit, operands
         self.values: dict[Word, dict[int, Any]] = {}
-        self._pieces: dict[tuple[FunctionalUnit, int], tuple[list[Signal], Any]] = {}
+        self._instances: dict[tuple[FunctionalUnit, int], tuple[list[Signal], Any]] = {}
 
     def when(self, stage: int) -> Value | None:
-        """When a register of that age is written; always where every clock brings a beat."""
+        """When a register of that stage is written; always where a beat may come on every cycle."""
         return self.unit.at(stage) if self.unit.initiation_interval > 1 else None
 
     def at(self, word: Word, stage: int) -> Any:
-        """Value of a word at an age, through copies where it no longer stands by itself."""
+        """Value of a word at a stage, through copies after its lifetime."""
         copies = self.values[word]
         first = max(copies)
         lifetime = word.lifetime if first == word.stage else self.unit.initiation_interval
@@ -415,24 +415,26 @@ class _Build:
             lifetime = self.unit.initiation_interval
         return copies[max(start for start in copies if start <= stage)]
 
-    def issue(self, functional_unit: FunctionalUnit, piece: int, stage: int, operands: Sequence[Any]) -> Any:
-        """Give a piece of an operator its operands at an age; its result, for all uses.
+    def issue(
+        self, functional_unit: FunctionalUnit, instance: int, stage: int, operands: Sequence[Any]
+    ) -> Any:
+        """Issue operands to an instance of a functional unit at a stage; its result, for all uses.
 
-        Those of the first use are given whenever it is no other's turn, so that no register needs an enable.
+        Those of the first use are issued on every cycle of no other use, so that no register needs an enable.
         """
-        key, when = (functional_unit, piece), self.when(stage)
-        if key not in self._pieces:
+        key, when = (functional_unit, instance), self.when(stage)
+        if key not in self._instances:
             when = None
             given = [
-                Signal(shape, name=f"{functional_unit.name}_{piece}_{k}")
+                Signal(shape, name=f"{functional_unit.name}_{instance}_{k}")
                 for k, shape in enumerate(functional_unit.shapes)
             ]
 
             def register(value, name):
-                return self.unit.register(self.m, value, f"{functional_unit.name}_{piece}_{name}")
+                return self.unit.register(self.m, value, f"{functional_unit.name}_{instance}_{name}")
 
-            self._pieces[key] = given, functional_unit.make(register, *given)
-        given, result = self._pieces[key]
+            self._instances[key] = given, functional_unit.make(register, *given)
+        given, result = self._instances[key]
         assignments = [
             Value.cast(to).eq(Value.cast(value)) for to, value in zip(given, operands, strict=True)
         ]

@@ -79,7 +79,7 @@ def UQ(integer_bits: int, fraction_bits: int) -> FixedShape:
 
 
 class FixedValue(ValueCastable):
-    """A fixed-point value in hardware; `Fixed` is its twin, operation by operation.
+    """A fixed-point value in hardware; `Fixed` is its bit-accurate model, operation by operation.
 
     Parameters
     ----------

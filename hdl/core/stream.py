@@ -1,8 +1,10 @@
 """What every streaming unit shares: connections, outputs that wait, and the pipeline with one enable."""
 
+from collections.abc import Mapping
+
 from amaranth.hdl import Cat, EnableInserter, Module, Mux, Shape, ShapeLike, Signal, Value, ValueLike
 from amaranth.lib import data, fifo, stream, wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 
 from blysk.hdl.core.fixed import FixedShape
 
@@ -61,7 +63,7 @@ def connect(m: Module, source: stream.Interface, sink: stream.Interface) -> None
     m : Module
         Module that gets the connection.
     source : stream.Interface
-        Stream that offers payloads (the output of a submodule, or the input of the enclosing component).
+        Stream that gives payloads (the output of a submodule, or the input of the enclosing component).
     sink : stream.Interface
         Stream that accepts them.
 
@@ -111,24 +113,23 @@ def connect_fifo(m: Module, name: str, source: stream.Interface, sink: stream.In
 
 
 def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
-    """Offer on a stream what stands in registers; one more register holds what is not taken.
+    """Skid buffer: drive a stream from registers; a spare register holds a beat that is not accepted.
 
-    The result, *advance*, tells whether the registers behind ``valid`` and ``payload`` take their next values
-    on this clock. It is itself a register, so that no path leads from the ready of one unit to that of the
-    one before it, however many there are in a row: a beat that is not taken on the clock on which it is first
-    offered moves into the register, and what stands behind it follows into its place and waits there.
+    The result, *advance*, tells whether the registers of ``valid`` and ``payload`` take their next values on
+    this cycle. It is itself a register, so that no path leads from the ready of one unit to that of the one
+    before it, in a chain of any length. A beat that is not accepted on its first cycle moves into the spare
+    register; the beat behind it moves into the output registers and waits there.
 
-    This costs a register and a multiplexer for each bit of the payload. It takes no clock, neither of the
-    latency nor of the throughput: a beat is offered on the clock on which ``valid`` rises, and while the
-    output is ready beats follow each other as they come. One that waits stays as it is. Reset empties the
-    register.
+    This costs a register and a multiplexer for each bit of the payload, and no cycle of latency or of
+    throughput: a beat is on the output on the cycle on which ``valid`` rises. The payload is held while it
+    waits. Reset empties the spare register.
 
     Parameters
     ----------
     m : Module
         Module that gets the register.
     output : stream.Interface
-        Stream on which to offer.
+        Stream to drive.
     valid : ValueLike
         Whether there is a payload; a register that changes only while ``advance``.
     payload : ValueLike
@@ -177,7 +178,7 @@ def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -
 
 
 def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[Signal, Signal]:
-    """Count the pixels of spans, one on each clock on which ``advance`` is high.
+    """Count the pixels of spans, one on each cycle on which ``advance`` is high.
 
     A span is taken in while ``valid & advance & ends``.
 
@@ -212,29 +213,32 @@ def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[
 class PipelinedUnit(wiring.Component):
     """A unit with a fixed latency and initiation interval, moved on by one common enable.
 
-    A beat taken in on one clock is offered on the output ``latency`` cycles later, unless the output waits:
-    then the whole unit stands still, from the clock after the first on which a beat was not taken, and holds
-    its payloads (`skid_buffer`). As long as a beat is inside, the next is taken in a whole multiple of
-    ``initiation_interval`` cycles after it, not counting those of standing still; of a *spaced* unit any
-    number of cycles after it that is not less. ``i.ready`` and ``o.valid`` follow from the unit's registers
-    alone. Reset empties the unit.
+    A beat that is accepted on one cycle is on the output ``latency`` cycles later, unless the output is
+    stalled: then the whole unit is disabled, from the cycle after the first on which a beat was not accepted,
+    and holds its payloads (`skid_buffer`). As long as a beat is inside, the next is accepted a whole multiple
+    of ``initiation_interval`` enabled cycles after it; of a *spaced* unit any number of enabled cycles that is
+    not less. ``i.ready`` and ``o.valid`` follow from the unit's
+    registers alone. Reset empties the unit.
 
-    A subclass describes its registers in `datapath`, as if they moved on every clock. Control comes from the
-    *age* of a beat: `at` tells whether a beat was taken in so many enabled cycles ago.
+    A subclass describes its registers in `datapath`, as if they were enabled on every cycle. Control comes
+    from the *stage* of a beat: `at` tells whether a beat was accepted so many enabled cycles ago.
 
     Parameters
     ----------
     input_shape, output_shape : ShapeLike
         Payloads.
     latency : int
-        Clocks from input to output, at least 1.
+        Cycles from input to output, at least 1.
     initiation_interval : int
         Distance in cycles of two inputs. With 1, `datapath` gets the input itself, and registers it;
-        with more, it gets a register that holds the input for ages 1 to ``initiation_interval``.
+        with more, it gets a register that holds the input on stages 1 to ``initiation_interval``.
     constants : ShapeLike or None
         Shape of the port ``constants``: values that stay while beats are inside. ``None``: no such port.
     spaced : bool
         Whether the next beat may come at any distance from ``initiation_interval`` on.
+        Shape of the port ``constants``: values that are constant while beats are inside. ``None``: no port.
+    ports : mapping of str to Member, optional
+        Further members, by name.
 
     Members
     -------
@@ -244,6 +248,11 @@ class PipelinedUnit(wiring.Component):
         Results.
     constants : :py:`In(constants)`
         Only where asked for.
+
+    Attributes
+    ----------
+    advance : Signal
+        The common enable, from `elaborate` on: for what belongs to the unit but not to its data path.
     """
 
     def __init__(
@@ -255,6 +264,7 @@ class PipelinedUnit(wiring.Component):
         initiation_interval: int = 1,
         constants: ShapeLike | None = None,
         spaced: bool = False,
+        ports: Mapping[str, Member] | None = None,
     ):
         if latency < 1 or initiation_interval < 1:
             raise ValueError("latency and initiation_interval must be at least 1")
@@ -264,7 +274,7 @@ class PipelinedUnit(wiring.Component):
         members = {"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))}
         if constants is not None:
             members["constants"] = In(constants)
-        super().__init__(members)
+        super().__init__(members | dict(ports or {}))
 
     def datapath(self, m: Module, operands):
         """Describe the registers in ``m`` and return the payload of the output, ``latency`` registers on."""
@@ -276,7 +286,7 @@ class PipelinedUnit(wiring.Component):
 
     @staticmethod
     def register(m: Module, value, name: str, *, when: Value | None = None):
-        """A register that takes ``value`` on every enabled clock, or only ``when`` told."""
+        """A register that takes ``value`` on every enabled cycle, or only on those of ``when``."""
         register = Signal(value.shape(), name=name)
         if when is None:
             m.d.sync += register.eq(value)
@@ -289,7 +299,8 @@ class PipelinedUnit(wiring.Component):
         """Build the control and put the data path under the common enable."""
         m = Module()
         self._stages = Signal(self.latency, name="stages")
-        advance, accept = Signal(), Signal()
+        self.advance = advance = Signal(name="advance")
+        accept = Signal()
         if self.initiation_interval == 1:
             m.d.comb += self.i.ready.eq(advance)
         else:
@@ -302,7 +313,7 @@ class PipelinedUnit(wiring.Component):
         inner = Module()
         operands = self.i.payload
         if self.initiation_interval > 1:
-            # What comes without being valid has no age.
+            # An operand that is not valid has no stage.
             operands = self.register(inner, operands, "operands", when=self.i.ready)
         result = self.datapath(inner, operands)
         m.submodules.datapath = EnableInserter(advance)(inner)
@@ -325,12 +336,12 @@ class PipelinedUnit(wiring.Component):
         return ready
 
     def _turn(self, m: Module, advance: Value, accept: Value) -> Value:
-        """Whether a beat may come: a shared part serves those of several ages, at turns fixed by distance.
+        """Whether a beat may come: shared parts serve beats of several stages in fixed slots.
 
-        A register, worked out a clock ahead.
+        A register, computed a cycle ahead.
         """
         ready, turn = Signal(name="ready", init=1), Signal(range(self.initiation_interval))
-        # Whether a beat will be inside on the next clock even if none comes on this one.
+        # Whether a beat will be inside on the next cycle even if none comes on this one.
         stays, opens = Signal(name="stays"), Signal(name="opens")
         m.d.comb += opens.eq((turn == self.initiation_interval - 1) | ~(accept | stays))
         with m.If(advance):

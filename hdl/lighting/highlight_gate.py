@@ -43,11 +43,13 @@ class HighlightGateUnit(PipelinedUnit):
         Distance in cycles of two inputs, from 1 to the number of multiplications. ``None``: 6.
     exponent : int or None
         Exponent that is fixed at build time, 1 to 1000: no PROM. ``None``: the exponent is a port.
+    takes_threshold : bool
+        Whether T is a port in place of the exponent: no PROM, as for the tables of a `Lobe`.
 
     Raises
     ------
     ValueError
-        If `initiation_interval` or the exponent is out of range.
+        If `initiation_interval` or the exponent is out of range, or both are asked for.
 
     Members
     -------
@@ -56,7 +58,8 @@ class HighlightGateUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(unsigned(lights)))`
         Whether the span may be lit, a bit for each light, the first lowest.
     constants : :py:`In(StructLayout({"halfway": ArrayLayout(..., lights), "exponent": 10}))`
-        Unit vectors H, and the exponent, 1 to 1000, where it is a port; constant while beats are inside.
+        Unit vectors H, and the exponent, 1 to 1000, where it is a port, or ``threshold``, T of F bits;
+        constant while beats are inside.
 
     Source: docs/theory/units.md#highlight-gate; [T] 4.2 and figure 4.10.
     """
@@ -68,18 +71,23 @@ class HighlightGateUnit(PipelinedUnit):
         *,
         initiation_interval: int | None = None,
         exponent: int | None = None,
+        takes_threshold: bool = False,
     ):
         self.parameters = p = parameters or HighlightGate()
         if exponent is not None and not 1 <= exponent <= MAX_EXPONENT:
             raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {exponent}")
-        self.lights, self.exponent = lights, exponent
+        if exponent is not None and takes_threshold:
+            raise ValueError("a gate with an exponent of its own takes no threshold")
+        self.lights, self.exponent, self.takes_threshold = lights, exponent, takes_threshold
         count = 3 + 12 * lights
         interval = checked_interval(initiation_interval, count, 6)
         self._graph = Dataflow(interval, count)
         self._lit = self._describe()
         normal = data.ArrayLayout(FixedShape(p.component_format), 3)
         constants = {"halfway": data.ArrayLayout(normal, lights)}
-        if exponent is None:
+        if takes_threshold:
+            constants["threshold"] = unsigned(p.fraction_bits)
+        elif exponent is None:
             constants["exponent"] = unsigned(p.specular.EXPONENT_BITS)
         super().__init__(
             data.StructLayout({"normal_left": normal, "normal_right": normal}),
@@ -92,7 +100,9 @@ class HighlightGateUnit(PipelinedUnit):
     def datapath(self, m, operands):
         """The PROM, addressed by the exponent, and the graph."""
         p = self.parameters
-        if self.exponent is not None:
+        if self.takes_threshold:
+            self._threshold = self.register(m, self.constants.threshold, "threshold")
+        elif self.exponent is not None:
             self._threshold = Const(p.thresholds.codes[self.exponent].item(), p.fraction_bits)
         else:
             m.submodules.thresholds = prom = Memory(

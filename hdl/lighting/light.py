@@ -8,11 +8,13 @@ from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import PipelinedUnit, connect_fifo
 from blysk.hdl.lighting.diffuse import DiffuseUnit
+from blysk.hdl.lighting.lobe import LobeUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SlopeUnit, SpecularUnit
 
@@ -26,7 +28,8 @@ class SpecularKind(NamedTuple):
     ----------
     unit : callable
         Makes the unit, of latency ``latency``, from its bit-accurate model and the options
-        ``initiation_interval``, ``exponent`` (fixed at build time, or ``None``) and ``shares_slope``.
+        ``initiation_interval``, ``exponent`` (fixed at build time, or ``None``) and ``shares_slope``
+        (or, of a lobe, its memory).
     compact_interval : callable
         Initiation interval at which one multiplier serves, from the model and the fixed exponent or ``None``.
     slope_unit : callable or None
@@ -48,7 +51,16 @@ def _power_unit(parameters: Power, *, initiation_interval: int, **_) -> Pipeline
     return PowerUnit(parameters, form="sequential" if initiation_interval >= 42 else "pipelined")
 
 
+def _lobe_unit(
+    parameters: Lobe, *, initiation_interval: int, shares_slope: bool, exponent: None
+) -> PipelinedUnit:
+    """A lobe has tables in place of an exponent, in a memory of its own or outside."""
+    tables = None if shares_slope else parameters.fixed_tables
+    return LobeUnit(parameters, initiation_interval, tables=tables, shares_memory=shares_slope)
+
+
 SPECULAR_KINDS: dict[type, SpecularKind] = {
+    Lobe: SpecularKind(_lobe_unit, lambda parameters, exponent: 1),
     Specular: SpecularKind(_specular_unit, SpecularUnit.multiplications, SlopeUnit),
     Power: SpecularKind(_power_unit, lambda parameters, exponent: 42),
 }
@@ -58,29 +70,29 @@ SPECULAR_KINDS: dict[type, SpecularKind] = {
 class LightUnit(wiring.Component):
     """``max(N . L, 0)`` and the reflection model of ``N . H``, for one light.
 
-    The specular unit is told when the light is behind the surface, or a highlight gate says that the span has
-    no highlight.
+    A beat is dark where the light is behind the surface, or a highlight gate tells that the span has no
+    highlight.
 
     With an initiation interval of 1 the diffuse and the specular unit run in lockstep: their latencies are
-    equal, they are offered the same beats and taken from on the same cycles, so what holds of one handshake
-    holds of the other. With a longer one, dark beats are not given to the specular unit at all: they wait
-    beside it in order, and take a clock each.
+    equal, and they accept and give the same beats on the same cycles, so that one handshake serves both. With
+    a longer one, dark beats bypass the specular unit: they wait beside it in order, and take a cycle each.
 
     The latency, the initiation interval and the multipliers are those of the specular unit, for beats that
     are not dark.
 
     Parameters
     ----------
-    parameters : Specular or Power
+    parameters : Specular or Power or Lobe
         Reflection model, and whether ``highlight`` is ``N . H`` or one minus it.
     diffuse : Diffuse
         Format of ``N . L``.
     initiation_interval : int
         Distance in cycles of two inputs, at least 1. That of `Power` is 42 from 42 on, else 1.
     exponent : int or None
-        An exponent for good; see `SpecularUnit`.
+        Exponent that is fixed at build time; see `SpecularUnit`.
     shares_slope : bool
-        Whether a `SlopeUnit` outside works out what follows from the exponent. `Power` needs nothing.
+        Whether slope and boundary come from a `SlopeUnit` outside, or tables from a `LobeMemory` outside.
+        `Power` needs none.
     gated : bool
         Whether there is a highlight gate.
 
@@ -92,14 +104,16 @@ class LightUnit(wiring.Component):
     o : :py:`Out(stream.Signature(StructLayout({"diffuse", "specular"})))`
         Terms, ``UQ(0, 17)``.
     constants
-        That of the specular unit: exponent, slope, or none.
+        That of the specular unit: exponent, slope, bank, or none.
+    table, write
+        Those of a `LobeUnit`.
 
-    Source: [T] figure 4.10; [B] 4.
+    Source: docs/theory/models.md#lighting; [T] figure 4.10; [B] 4.
     """
 
     def __init__(
         self,
-        parameters: Specular | Power | None = None,
+        parameters: Specular | Power | Lobe | None = None,
         diffuse: Diffuse | None = None,
         *,
         initiation_interval: int = 1,
@@ -129,7 +143,13 @@ class LightUnit(wiring.Component):
         }
         if exponent is None and self._has_constants:
             members["constants"] = self._specular.signature.members["constants"]
-        super().__init__(members)
+        super().__init__(members | self._forwarded)
+
+    @property
+    def _forwarded(self) -> dict:
+        """Ports of a lobe's unit for its tables."""
+        ports = self._specular.signature.members
+        return {name: ports[name] for name in ("table", "write") if name in ports}
 
     @property
     def _has_constants(self) -> bool:
@@ -150,6 +170,8 @@ class LightUnit(wiring.Component):
             specular.i.payload.operand.eq(self.i.payload.highlight),
             specular.i.payload.dark.eq(dark),
         ]
+        for name in self._forwarded:
+            wiring.connect(m, wiring.flipped(getattr(self, name)), getattr(specular, name))
         if self.exponent is not None and self._has_constants:
             # A specular unit that is not built for a fixed exponent.
             m.d.comb += specular.constants.exponent.eq(self.exponent)

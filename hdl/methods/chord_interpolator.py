@@ -5,8 +5,10 @@ from amaranth.lib import data, enum, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.cosines.span_limit import SpanLimit
+from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
+from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
 from blysk.hdl.core.stream import FIFO_LATENCY, SLICE_LATENCY, connect, connect_slice
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape, span_values_shape
@@ -117,8 +119,8 @@ class ChordSpansUnit(wiring.Component):
         Operands of the pixels.
     out_of_range : :py:`Out(1)`
         High for one cycle for each span with a word that does not fit.
-    constants : :py:`In(10)`
-        Specular exponent, constant while spans are inside; only of a gate that has it as a port.
+    constants : :py:`In(10)` or :py:`In(18)`
+        Specular exponent or threshold, constant while spans are inside; only of a gate that has it as a port.
 
     Source: docs/theory/chord.md#differences.
     """
@@ -163,7 +165,7 @@ class ChordSpansUnit(wiring.Component):
                 "o": Out(stream.Signature(output)),
                 "out_of_range": Out(1),
             }
-            | ({"constants": In(SpanLimit.EXPONENT_BITS)} if gated and gate.exponent is None else {})
+            | (gate.ports if gated else {})
         )
 
     def elaborate(self, platform):
@@ -234,7 +236,7 @@ class ChordSpansUnit(wiring.Component):
             decisions.r_en.eq(starts.r_en & starts.r_rdy),
             joined.payload.lit.eq(decisions.r_data),
         ]
-        if gate.exponent is None:
+        if gate.ports:
             m.d.comb += gate.constants.eq(self.constants)
 
 
@@ -269,9 +271,9 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
 
     Members
     -------
-    constants : :py:`In(StructLayout({"lights": light_vectors_shape(lights), "exponent": 10}))`
-        L and H of each light, and with highlights the specular exponent for `SpanLimit`; constant while spans
-        are inside.
+    constants : :py:`In(StructLayout({"lights": ..., "exponent": 10, "threshold": UQ(2, 16)}))`
+        L and H of each light, with highlights the specular exponent for `SpanLimit`, of tables a threshold;
+        constant while spans are inside.
     wide : :py:`Out(1)`
         High for one cycle for each wide span.
 
@@ -316,6 +318,8 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         members = {"lights": light_vectors_shape(self.lights)}
         if self.highlights:
             members["exponent"] = unsigned(SpanLimit.EXPONENT_BITS)
+        if self.takes_threshold:
+            members["threshold"] = FixedShape(ValueGate.THRESHOLD_FORMAT)
         return {"wide": Out(1), "constants": In(data.StructLayout(members))}
 
     @property
@@ -327,6 +331,11 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
     def exponent(self):
         """The specular exponent, of the constants."""
         return self.constants.exponent if self.highlights else None
+
+    @property
+    def threshold(self):
+        """The threshold of a lobe's table, of the constants."""
+        return self.constants.threshold if self.takes_threshold else None
 
     def elaborate(self, platform):
         """Normals one after the other to the values; these, collected, to the spans."""
@@ -343,7 +352,9 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         if self.highlights:
             m.d.comb += limit.constants.eq(self.exponent)
         if "constants" in spans.signature.members:
-            m.d.comb += spans.constants.eq(self.exponent)
+            m.d.comb += spans.constants.eq(
+                Value.cast(self.threshold) if self.takes_threshold else self.exponent
+            )
         return m
 
     def _send(self, m: Module, values, limit, tags, tag) -> None:
@@ -438,7 +449,11 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         ]
         lit = []
         if self.highlights:
-            level = octave_limit(m, "level", self.exponent, p.levels)
+            if self.takes_threshold:
+                level = Signal(FixedShape(p.LEVEL_FORMAT), name="level", reset_less=True)
+                m.d.sync += level.eq(self.threshold)
+            else:
+                level = octave_limit(m, "level", self.exponent, p.levels)
             for i, light in enumerate(given):
                 front = Signal(name=f"front_{i}")
                 behind = p.BEHIND.codes.item()

@@ -57,6 +57,8 @@ class InterpolatorUnit(wiring.Component):
         Least cycles from a pixel to the next in the products with L and H, of methods that find normals.
     gate : ValueGateUnit or None
         Decides which spans have no highlight, of the chord methods; operands then have ``gated``.
+    takes_threshold : bool
+        Whether a threshold tells where highlights end, in place of the exponent; see `Design.threshold_of`.
 
     Members
     -------
@@ -107,6 +109,11 @@ class InterpolatorUnit(wiring.Component):
         """The specular exponent, of the constants; ``None`` where the method does not need it."""
         return None
 
+    @property
+    def threshold(self) -> Value | None:
+        """The threshold, of the constants; ``None`` where there is none."""
+        return None
+
     @classmethod
     def span_shape(cls, lights: int, *, highlights: bool = True, length_bits: int = LENGTH_BITS):
         """Shape of a span.
@@ -128,6 +135,7 @@ class InterpolatorUnit(wiring.Component):
         length_bits: int = LENGTH_BITS,
         product_interval: int = 1,
         gate: ValueGateUnit | None = None,
+        takes_threshold: bool = False,
     ):
         intervals = self.setup_intervals(parameters)
         if setup_interval not in (None, *intervals):
@@ -141,6 +149,7 @@ class InterpolatorUnit(wiring.Component):
         self.length_bits = length_bits
         self.product_interval = product_interval
         self.gate = gate
+        self.takes_threshold = takes_threshold
         span = self.span_shape(lights, highlights=highlights, length_bits=length_bits)
         members = {
             "i": In(stream.Signature(span)),

@@ -2,9 +2,7 @@
 
 from amaranth.hdl import Module, Signal, Value, unsigned
 from amaranth.lib import data, wiring
-from amaranth.lib.wiring import In
 
-from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import connect
@@ -35,8 +33,8 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
 
     Members
     -------
-    constants : :py:`In(10)`
-        Specular exponent, constant while spans are inside; only of a gate that has it as a port.
+    constants : :py:`In(10)` or :py:`In(18)`
+        Specular exponent or threshold, constant while spans are inside; only of a gate that has it as a port.
 
     Source: docs/theory/chord.md#local-lights.
     """
@@ -96,11 +94,15 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
         return m
 
     def further_members(self):
-        """Exponent of a gate."""
-        has_port = self.gate is not None and self.gate.exponent is None
-        return {"constants": In(SpanLimit.EXPONENT_BITS)} if has_port else {}
+        """Exponent or threshold of a gate."""
+        return {} if self.gate is None else self.gate.ports
 
     @property
     def exponent(self):
         """Exponent of a gate, if it is a port."""
-        return getattr(self, "constants", None)
+        return None if self.takes_threshold else getattr(self, "constants", None)
+
+    @property
+    def threshold(self):
+        """Threshold of a gate, if it is a port."""
+        return getattr(self, "constants", None) if self.takes_threshold else None

@@ -8,8 +8,9 @@ from typing import Any, Unpack
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.frame_constants import address_table
 from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import Design
-from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
+from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED, preset
 from blysk.hdl.emit.verilog import emit
 from blysk.hdl.methods.interpolator import spelled
 from blysk.hdl.methods.registry import unit_of
@@ -31,7 +32,7 @@ def design(*, lights: int = 1, materials: int = 1, **options: Unpack[DesignOptio
     method : str
         Interpolation along a span: one of `METHODS`, by default ``"chord"``.
     model : str
-        Reflection model: one of `MODELS`, by default ``"cosquad"``.
+        Reflection model: one of `MODELS` or `LOBES`, by default ``"cosquad"``; or the curve of a file.
     operand : {"cosine", "one_minus_cosine"}
         Operand of the specular unit, of methods that find normals.
     gate : bool
@@ -67,8 +68,9 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
         If there is no such pipeline.
     """
     method = settings["method"]
-    if settings["model"] not in MODELS:
-        remedy = f"use one of {', '.join(MODELS)}"
+    served = MODELS | LOBES
+    if isinstance(settings["model"], str) and settings["model"] not in served:
+        remedy = f"use one of {', '.join(served)}"
         raise settings.refuse("model", "the pipeline finds N.H, not R.V", remedy)
     if settings["gate"] and not (METHODS | PUBLISHED)[method].serves_gate:
         raise settings.refuse("gate", f"{method} has no error bound for one", "leave it out", "")
@@ -81,6 +83,8 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
     if settings["setup_interval"] not in (None, *served):
         remedy = f"give {spelled(served)}" if served else "leave it out"
         raise settings.refuse("setup_interval", f"method {method} is not built for it", remedy)
+    if isinstance(made.specular, Lobe):
+        made = replace(made, specular=replace(made.specular, banks=min(materials, Lobe.MAX_BANKS)))
     return replace(made, materials=materials)
 
 
@@ -145,7 +149,10 @@ def verilog_and_unit(design: Design, name: str) -> tuple[str, ShadingPipelineUni
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise OptionError("name", name, "no Verilog name", "use letters, digits and underscores")
     unit = ShadingPipelineUnit(design)
-    constants = address_table(unit.parameters.lights, unit.parameters.materials)
+    p = unit.parameters
+    lobe = p.specular if isinstance(p.specular, Lobe) else None
+    loads = lobe is not None and lobe.fixed is None
+    constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads)
     header = [*header_of(unit), "", "Frame constants, through the write port:", *constants]
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
     descriptions = {

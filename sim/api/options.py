@@ -11,10 +11,11 @@ from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.pipeline import STYLES
-from blysk.golden.presets import METHODS, PUBLISHED
+from blysk.golden.presets import LOBES, METHODS, PUBLISHED
 from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Triple
+from blysk.golden.reference.lobes import TabulatedModel
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import BACK_FACES, VIEWERS
 from blysk.sim.meshes.mesh import DEFAULT_CREASE, DEFAULT_TRIANGLES
@@ -41,7 +42,7 @@ __all__ = [
 SLOW_SIZE = (160, 120)
 """Largest picture of the slow engine where it stands in for the compiled one, and its default size."""
 
-COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent")
+COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent", "roughness")
 """Options of a material."""
 
 ColorLike = str | float | Triple
@@ -78,6 +79,45 @@ class PartError(ValueError):
     def __init__(self, key: str, reason: str, remedy: str):
         super().__init__(reason)
         self.key, self.remedy = key, remedy
+
+
+class Model(Choice):
+    """A reflection model by its name, or the curve of a CSV file of measured points, see `TabulatedModel`."""
+
+    def __init__(self):
+        super().__init__("reflection model", REFLECTION_MODELS | LOBES)
+        points = "give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1"
+        self.remedy = f"{points}, or {self.remedy}"
+
+    def get_metavar(self, param, ctx=None):
+        """The names, or a file."""
+        return f"[{'|'.join(self.names)}|FILE.csv]"
+
+    def check(self, value):
+        """The name; or the curve of a file."""
+        if isinstance(value, TabulatedModel):
+            return value
+        if not isinstance(value, str) or not value.lower().endswith(".csv"):
+            return super().check(value)
+        try:
+            return TabulatedModel.of_csv(value)
+        except OSError as error:
+            raise ValueError(f"cannot be opened ({error.strerror})") from None
+
+
+class Roughness(Number):
+    """A number greater than 0 and at most 1."""
+
+    def __init__(self):
+        super().__init__(0, 1)
+        self.remedy = "give a number greater than 0 and at most 1"
+
+    def check(self, value):
+        """A `float` in the range."""
+        value = super().check(value)
+        if not value:
+            raise ValueError("out of range")
+        return value
 
 
 class Lights(Value):
@@ -197,6 +237,12 @@ SCENE: dict[str, Option] = {
     "diffuse": Option(Color(), (0.75, 0.42, 0.2), "Reflection k_d.", "material.diffuse"),
     "specular": Option(Color(), 0.6, "Reflection k_s.", "material.specular"),
     "exponent": Option(Whole(1, MAX_EXPONENT), 50, "Of the highlight.", "material.exponent"),
+    "roughness": Option(
+        Roughness(),
+        None,
+        "Of models that have one in place of an exponent, as in glTF.  [default: by the exponent]",
+        "material.roughness",
+    ),
 }
 """Options of a scene."""
 
@@ -208,9 +254,9 @@ DESIGN: dict[str, Option] = {
         "pipeline.method",
     ),
     "model": Option(
-        Choice("reflection model", REFLECTION_MODELS),
+        Model(),
         "cosquad",
-        "Reflection model; every method serves all but phong.",
+        "Reflection model; every method serves all but phong. A file holds a curve of N.H, measured.",
         "pipeline.model",
     ),
     "operand": Option(
@@ -282,13 +328,14 @@ class SceneOptions(TypedDict, total=False):
     diffuse: ColorLike
     specular: ColorLike
     exponent: int
+    roughness: float
 
 
 class DesignOptions(TypedDict, total=False):
     """Options of a design, by their names in Python: those of `DESIGN`."""
 
     method: str
-    model: str
+    model: str | TabulatedModel
     operand: Operand
     gate: bool
     setup_interval: int

@@ -7,7 +7,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -17,6 +17,7 @@ import numpy as np
 from PIL import Image
 
 from blysk.golden.frames.compare import Comparison, compare
+from blysk.golden.frames.prepare import constants_of
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures
 from blysk.golden.reference.scene import Scene
@@ -126,14 +127,16 @@ class RenderedFrame:
 
     def save_comparison(self, path: str | os.PathLike[str]) -> None:
         """Write one picture of the simulated frame, the golden frame and the error map; see `save`."""
-        exponent = self.scene.materials[0].exponent
+        parameter = self.design.highlight_parameter(self.scene.materials[0])
+        name = self.design.specular.model.PARAMETER if self.design.specular else "exponent"
+        highlight = "" if name is None else f", {name} {parameter:.4g}"
         subtitle = "no pixel shows the surface"
         if self.figures["visible_pixels"]:
             subtitle = (
                 "simulated RTL beside normalised Phong interpolation in float64: largest error "
                 f"{self.error.max_lsb:.2f} LSB, {self.cycles:,} cycles for {self.pixels:,} pixels"
             )
-        title = f"{self.name}: {self.design.method}, {self.design.model}, exponent {exponent}"
+        title = f"{self.name}: {self.design.method}, {self.design.model}{highlight}"
         write_comparison(path, self.image, self.comparison.golden, title=title, subtitle=subtitle)
 
     def lines(self) -> Iterator[str]:
@@ -289,7 +292,9 @@ def prepare_rendering(
         while True:
             scenes = tuple(scenes_of(loaded, settings, frames))
             if design is None:
-                made = replace(made, materials=len(scenes[0].materials))
+                made = made.for_materials(scenes[0].materials)
+            _check_lobes(scenes[0], made, settings)
+            constants_of(scenes[0], made)
             stage("finding out what the scene needs" if settings["specialise"] else "")
             smallest = _specialised(scenes, made, settings)
             stage("building the model")
@@ -306,6 +311,17 @@ def prepare_rendering(
     seconds["build"] = perf_counter() - start - seconds["load"]
     used = "pysim" if engine == "pysim" else "cxxrtl"
     return Rendering(loaded, scenes, smallest, settings["specialise"], used, simulator, seconds)
+
+
+def _check_lobes(scene: Scene, design: Design, settings: Settings) -> None:
+    """Refuse materials that have more lobes than there are banks, or others than the fixed ones."""
+    if not design.loads_tables:
+        return
+    try:
+        constants_of(scene, design)
+    except ValueError as error:
+        reason, _, remedy = str(error).partition("; ")
+        raise settings.refuse("model", reason, remedy or "build the pipeline for it", design.model) from None
 
 
 def _design(settings: Settings) -> Design:

@@ -120,6 +120,8 @@ def _parse(path: Path) -> dict:
             raise PartError("", "is not a regular file", "name a scene file")
         with open(path, "rb") as file:
             data = file.read(MAX_BYTES + 1)
+    except PartError:
+        raise
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise PartError("", f"cannot be opened ({reason})", "check the path and its permissions") from error

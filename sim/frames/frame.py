@@ -9,16 +9,17 @@ import numpy as np
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.frame import Frame, frame_buffer
-from blysk.golden.frames.prepare import constants_of, prepare
+from blysk.golden.frames.prepare import constants_of, prepare, with_tables
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.pipeline import Design, Spans
+from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import Run, simulate
 
-__all__ = ["FrameSimulator", "SimulatedFrame", "beats_of"]
+__all__ = ["FrameSimulator", "SimulatedFrame", "beats_of", "sample_material"]
 
 
 @dataclass(frozen=True)
@@ -185,4 +186,19 @@ def _sample(design: Design) -> tuple[Spans, list[FrameConstants]]:
         exponent = design.build.exponent or 7 + index
         ambient = rng.integers(0, 255 * 8, 3)
         constants.append(FrameConstants(exponent, ambient, vectors[0], vectors[1], colors[0], colors[1]))
+    if design.loads_tables:
+        materials = [sample_material(design, index) for index in range(design.materials)]
+        constants = with_tables(constants, materials, design)
     return spans, constants
+
+
+def sample_material(design: Design, index: int) -> Material:
+    """A material whose highlight the pipeline has a bank for, or the exponent that is fixed, by a number."""
+    material = Material((0.08, 0.05, 0.03), (0.5,) * 3, (0.6,) * 3, design.build.exponent or 7 + index)
+    if not design.loads_tables:
+        return material
+    lobe = design.specular
+    if lobe.fixed is None:
+        return replace(material, exponent=7 + index % lobe.banks)
+    name, value = lobe.model.PARAMETER, lobe.fixed[index % lobe.banks]
+    return replace(material, **({} if name is None else {name: value}))

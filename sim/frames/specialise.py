@@ -10,7 +10,7 @@ import numpy as np
 
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.prepare import PreparedFrame, prepare
+from blysk.golden.frames.prepare import PreparedFrame, constants_of, prepare
 from blysk.golden.pipeline import Design
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
@@ -108,10 +108,10 @@ def specialise(
     scenes, merged = _without_equal_materials(scenes, full)
     reductions = [*unlit, *merged]
     design = Specialisation(full, tuple(reductions), scenes).design
-    constants = _constants(scenes[0], design.lights)
+    constants = constants_of(scenes[0], design)
     prepared = [prepare(scene, design) for scene in scenes]
     reductions += _without_highlights(design, prepared, constants)
-    reductions += _with_fixed_values(constants, reductions)
+    reductions += _with_fixed_values(design, constants, reductions)
     longest = max(int(frame.spans.length.max(initial=0)) for frame in prepared)
     reductions += _with_fewer_bits(full, scenes[0], longest)
     if not exact and design.method == "chord" and design.lights:
@@ -144,7 +144,10 @@ def _without_dark_lights(
 def _without_equal_materials(
     scenes: tuple[Scene, ...], full: Design
 ) -> tuple[tuple[Scene, ...], list[Reduction]]:
-    keys = [tuple(of.writes()["data"].tolist()) for of in _constants(scenes[0], None)]
+    keys = [
+        (*of.writes()["data"].tolist(), full.highlight_parameter(material))
+        for of, material in zip(_constants(scenes[0], None), scenes[0].materials, strict=True)
+    ]
     first: dict[tuple, int] = {}
     index = np.array([first.setdefault(key, len(first)) for key in keys])
     if len(first) >= full.materials:
@@ -184,13 +187,19 @@ def _without_highlights(
 
 
 def _with_fixed_values(
-    constants: Sequence[FrameConstants], reductions: Sequence[Reduction]
+    design: Design, constants: Sequence[FrameConstants], reductions: Sequence[Reduction]
 ) -> list[Reduction]:
-    """One exponent, where specular light is left, and one channel."""
+    """One exponent, or all tables, where specular light is left, and one channel."""
     found = []
     exponents = {of.exponent for of in constants}
     has_specular = all(reduction.changes.get("specular", 0) is not None for reduction in reductions)
-    if len(exponents) == 1 and has_specular:
+    if has_specular and design.loads_tables:
+        if design.specular.fixed is None:
+            tables = {of.bank: of.lobe.parameter for of in constants}
+            fixed = tuple(tables[bank] for bank in sorted(tables))
+            reason = f"{len(fixed)} of {design.specular.banks} tables, fixed at build time: no writes"
+            found.append(Reduction(reason, {"specular": {"fixed": fixed, "banks": len(fixed)}}))
+    elif len(exponents) == 1 and has_specular:
         (exponent,) = exponents
         reason = f"exponent fixed at {exponent}: PROM folded"
         found.append(Reduction(reason, {"build": {"exponent": exponent}}))

@@ -10,14 +10,14 @@ from string import Template
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants, writes_of
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.pipeline import Design, Pixels, Spans
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.lighting import Light
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.errors import InputError
-from blysk.sim.frames.frame import beats_of
+from blysk.sim.frames.frame import beats_of, sample_material
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.output import files_within, write_text
 
@@ -55,8 +55,8 @@ def teapot_frame(
     mesh = load_mesh("teapot", triangles=triangles).mesh
     width, height = size
     materials = [
-        Material((0.08, 0.05, 0.03), np.roll((0.75, 0.42, 0.2), k), (0.6,) * 3, exponent)
-        for k, exponent in enumerate(design.build.exponent or 20 + k % 100 for k in range(design.materials))
+        replace(sample_material(design, 13 + k % 100), diffuse=tuple(np.roll((0.75, 0.42, 0.2), k)))
+        for k in range(design.materials)
     ]
     lights = [
         Light((np.cos(2 * k + 2), 0.8, np.sin(2 * k + 2)), np.roll((1.0, 0.8, 0.6), k) / design.lights)
@@ -73,7 +73,7 @@ def teapot_frame(
     spans = prepare(scene, design).spans
     spans = spans[np.r_[0, : len(spans)]]
     spans.length[0] = 0
-    constants = [FrameConstants.of(scene, design.lights, index=index) for index in range(design.materials)]
+    constants = constants_of(scene, design)
     return spans, constants, design.compute(spans, constants)
 
 

@@ -2,18 +2,22 @@
 
 import importlib.util
 import json
-import os
+import re
 import struct
 from functools import partial
-from pathlib import Path
-from urllib.parse import unquote
 
+from blysk.sim.meshes.gltf_arrays import check_arrays
 from blysk.sim.meshes.materials import FileMaterial, Found, color_of
-from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, Refused, inside, shown
+from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, Refused, shown
 
-__all__ = ["check_gltf", "find_gltf_materials", "gltf_document", "gltf_references", "plain_gltf"]
+__all__ = ["check_gltf", "find_gltf_materials", "gltf_document", "plain_gltf"]
 
 _NEEDS_DECODER = {"EXT_meshopt_compression", "KHR_meshopt_compression"}
+# Extensions whose geometry is read, and those that say nothing of geometry.
+_SUPPORTED = re.compile(
+    "KHR_draco_mesh_compression|KHR_mesh_quantization|EXT_mesh_gpu_instancing|"
+    "[A-Z0-9]+_(materials?|textures?|lights?|image|xmp|animation)(_.+)?"
+)
 
 
 def gltf_document(data: bytes, suffix: str) -> dict:
@@ -40,6 +44,12 @@ def check_gltf(document: dict) -> None:
         raise Refused(
             f"it is compressed with {extension}, for which there is no decoder", "export it uncompressed"
         )
+    for extension in sorted(map(str, document.get("extensionsRequired", []))):
+        if not _SUPPORTED.fullmatch(extension):
+            raise Refused(
+                f"it needs the extension {shown(extension)}, which is not supported", "export it without"
+            )
+    check_arrays(document)
     _check_nodes(document)
     accessors = document.get("accessors", [])
     for accessor in accessors:
@@ -59,7 +69,7 @@ def check_gltf(document: dict) -> None:
                 if importlib.util.find_spec("DracoPy") is None:
                     raise Refused(
                         "it is Draco-compressed and the decoder DracoPy is not installed",
-                        "pip install DracoPy",
+                        "pip install 'blysk[draco]'",
                     )
 
 
@@ -131,28 +141,25 @@ def _gltf_material(text: dict, name: str, given_name: str) -> tuple[FileMaterial
     return FileMaterial(given_name, color), textures
 
 
-def plain_gltf(document: dict, data: bytes, suffix: str) -> bytes:
-    """A GLB or glTF file with another document, without cameras: trimesh would lose what hangs on one."""
+def plain_gltf(document: dict, found: Found) -> bytes:
+    """The text of a document without what trimesh trips over, and what the picture will not show of it.
+
+    trimesh would lose what hangs on a camera. Morph targets with a weight other than 0 and skins are
+    counted: the mesh is drawn as it is without them.
+    """
+    meshes = document.get("meshes", [])
+    morphed = {
+        node["mesh"]
+        for node in document.get("nodes", [])
+        if "mesh" in node and any(node.get("weights", meshes[node["mesh"]].get("weights", [])))
+    }
+    skins = {node["skin"] for node in document.get("nodes", []) if "skin" in node and "mesh" in node}
+    for count, what in ((len(morphed), "mesh with morph weights"), (len(skins), "skin")):
+        if count:
+            found.ignored.append(f"{count} {what if count == 1 else _PLURALS[what]}")
     for node in document.get("nodes", []):
         node.pop("camera", None)
-    text = json.dumps(document).encode()
-    if suffix == ".gltf":
-        return text
-    text += b" " * (-len(text) % 4)
-    length, old = struct.unpack_from("<II", data, 8)
-    rest = data[20 + old : length]
-    return data[:8] + struct.pack("<II", 20 + len(text) + len(rest), len(text)) + data[16:20] + text + rest
+    return json.dumps(document).encode()
 
 
-def gltf_references(document: dict, folder: Path) -> dict[str, bytes]:
-    """The files that a glTF document takes its buffers from, by the URI it calls them; all in its folder."""
-    references = {}
-    for buffer in document.get("buffers", []):
-        uri = buffer.get("uri")
-        if uri is None or uri.startswith("data:"):
-            continue
-        target = inside(folder, uri, unquote(uri))
-        if not os.path.isfile(target):
-            raise Refused(f"it refers to {uri!r}, which does not exist", "put that file beside it")
-        references[uri] = target.read_bytes()
-    return references
+_PLURALS = {"mesh with morph weights": "meshes with morph weights", "skin": "skins"}

@@ -14,12 +14,14 @@ import trimesh
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.reference.geometry import Mesh
 from blysk.sim.errors import InputError
-from blysk.sim.meshes.gltf import check_gltf, find_gltf_materials, gltf_document, gltf_references, plain_gltf
+from blysk.sim.meshes.gltf import check_gltf, find_gltf_materials, gltf_document, plain_gltf
+from blysk.sim.meshes.gltf_arrays import gltf_buffers, plain_arrays
 from blysk.sim.meshes.materials import FileMaterial, Found
 from blysk.sim.meshes.normals import crease_normals, face_cross, repaired_normals, transformed
 from blysk.sim.meshes.obj import find_obj_materials, split_obj, tidy_obj
-from blysk.sim.meshes.ply_stl import tidy_ply, tidy_stl
+from blysk.sim.meshes.ply import read_ply
 from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, REEXPORT, Refused
+from blysk.sim.meshes.stl import tidy_stl
 from blysk.sim.meshes.teapot import teapot
 
 __all__ = ["DEFAULT_CREASE", "DEFAULT_TRIANGLES", "SUFFIXES", "LoadedMesh", "load_mesh"]
@@ -84,7 +86,9 @@ def load_mesh(
 
     All meshes of a scene are put together in world coordinates: vertices by the node's matrix ``M``,
     normals by its inverse transpose, and a mirroring node (``det M < 0``) turns the triangles round.
-    Points and lines beside a mesh are left out.
+    Points and lines beside a mesh are left out. Polygons of OBJ and PLY files are cut into triangles that
+    cover them, concave ones by ears. Of glTF, quantised arrays are scaled and instances of a node drawn;
+    morph weights and skins are not applied, and told in ``ignored``.
 
     Materials: of a GLB or glTF file ``pbrMetallicRoughness.baseColorFactor`` without its alpha, white where
     there is none; of an OBJ file the ``Kd``, ``Ks`` and ``Ns`` (rounded, at least 1) of its ``usemtl``, from
@@ -115,7 +119,8 @@ def load_mesh(
     ------
     InputError
         If a number is out of range, or the file is missing, empty, of unknown type, damaged, refers to
-        files outside its folder, needs a decoder that is not installed, or holds no triangle, a vertex
+        files outside its folder, needs a decoder that is not installed or a glTF extension that is not
+        supported, has numbers of another form than the format's, or holds no triangle, a vertex
         that is not finite, an index out of range, nodes that are no trees, or more than 20 million
         triangles; or a material in use has a colour that is not three numbers from 0 to 1 or an exponent
         over 1000, or there are more than 1024 of them.
@@ -141,12 +146,18 @@ def load_mesh(
         raise InputError(source, "is nested too deeply", REEXPORT) from error
     # The loaders raise whatever a damaged file makes them trip over.
     except Exception as error:
-        text = str(error).strip().split("\n")[0]
-        kind = type(error).__name__
-        misshapen = isinstance(error, AttributeError | IndexError | KeyError | TypeError)
-        what = "is damaged, a part is missing or of a wrong kind" if misshapen else "cannot be read"
-        reason = f"{what} ({kind}: {text})" if text else f"{what} ({kind})"
-        raise InputError(source, reason, REEXPORT) from error
+        raise InputError(source, _fault(error), REEXPORT) from error
+
+
+def _fault(error: Exception) -> str:
+    """What a loader stumbled over, in words of the file and not of the program."""
+    damaged = "is damaged, a part is missing or of a wrong kind"
+    if isinstance(error, AssertionError | AttributeError | KeyError | TypeError):
+        return damaged
+    text = str(error).strip().split("\n")[0]
+    text = re.sub(r"^(\w+\.)*\w*(Error|Exception)\b:? *", "", text)
+    what = damaged if isinstance(error, IndexError) else "cannot be read"
+    return f"{what} ({text})" if text else what
 
 
 @contextmanager
@@ -196,28 +207,23 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> tuple[trimesh.Scene
         data, libraries = split_obj(data, found)
         if materials and len(found.names) > 1:
             find_obj_materials(libraries, path.parent, found)
-        data = tidy_obj(data)
-        if re.search(rb"^v(?: +[^\s]+){6}", data, re.MULTILINE):
-            found.ignored.append("vertex colours")
+        data = tidy_obj(data, found)
         options["split_objects"] = True
     elif suffix == ".ply":
-        data = tidy_ply(data)
-        head = data.partition(b"end_header")[0]
-        if re.search(rb"^[ \t]*property[ \t]+\w+[ \t]+(diffuse_)?red\s*$", head, re.MULTILINE):
-            found.ignored.append("vertex colours")
-        if re.search(rb"^comment\s+TextureFile\b", head, re.MULTILINE):
-            found.ignored.append("1 texture")
-        # Cutting the mesh at texture seams would leave the stored normals in the old order.
-        options["fix_texture"] = False
+        vertices, normals, faces = read_ply(data, found)
+        mesh = trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False)
+        return trimesh.Scene(mesh), found
     elif suffix == ".stl":
         data = tidy_stl(data)
     else:
         document = gltf_document(data, suffix)
         check_gltf(document)
-        references = gltf_references(document, path.parent)
+        buffers = gltf_buffers(document, data, suffix, path.parent)
         find_gltf_materials(document, materials, found)
-        data = plain_gltf(document, data, suffix)
-        options["skip_materials"] = False
+        buffers = plain_arrays(document, buffers)
+        references = {str(number): buffer for number, buffer in enumerate(buffers)}
+        data = plain_gltf(document, found)
+        options["skip_materials"], suffix = False, ".gltf"
     scene = trimesh.load_scene(
         io.BytesIO(data), file_type=suffix[1:], resolver=references, process=False, **options
     )

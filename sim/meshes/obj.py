@@ -6,8 +6,11 @@ import re
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.sim.meshes.materials import FileMaterial, Found, color_of
+from blysk.sim.meshes.polygons import check_corners, triangulated
 from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused, inside, shown, utf8
 
 __all__ = ["find_obj_materials", "split_obj", "tidy_obj"]
@@ -105,16 +108,74 @@ def _float(word: str) -> float:
         return math.nan
 
 
-def tidy_obj(data: bytes) -> bytes:
-    """An OBJ file in the form that trimesh reads; face lines that it would take wrongly are refused."""
+# Possessive: a line is looked at once.
+_NUMBER = rb"[-+]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++|[nN][aA][nN]|[iI][nN][fF])(?:[eE][-+]?[0-9]++)?"
+_THREE = rb"%b(?:[ \t]++%b){2}+" % (_NUMBER, _NUMBER)
+_CORNER = rb"-?[0-9]++(?:/-?[0-9]*+){0,2}+"
+_END = rb"[ \t]*+\r?$"
+
+
+def tidy_obj(data: bytes, found: Found) -> bytes:
+    """An OBJ file in the form that trimesh reads: positions of 3 numbers, and faces of 3 corners.
+
+    Lines that it would take wrongly are refused: numbers of another form than C's, positions with a weight
+    other than 1, indices that are 0.
+    """
     data = re.sub(rb"#.*", b"", data)
-    data = re.sub(rb"^[ \t]*(v|vn|vt|f)[ \t]+", rb"\1 ", data, flags=re.MULTILINE)
+    if re.search(rb"^(?:[ \t]++(?:vn?|vt|f)[ \t]|(?:vn?|vt|f)(?:\t| [ \t]))", data, re.MULTILINE):
+        data = re.sub(rb"^[ \t]*(v|vn|vt|f)[ \t]+", rb"\1 ", data, flags=re.MULTILINE)
+    if re.search(rb"^vn? (?!%b%b)" % (_THREE, _END), data, re.MULTILINE):
+        data = _positions(data, found)
     if re.search(rb"^f(?: +[^\s]+){0,2}[ \t]*\r?$", data, re.MULTILINE):
         raise Refused("a face has fewer than 3 corners")
+    corners = rb"^f (?!%b(?:[ \t]++%b)*+%b)([^\n]*)" % (_CORNER, _CORNER, _END)
+    if bad := re.search(corners, data, re.MULTILINE):
+        raise Refused(f"a face has the corners {shown(bad[1].decode().strip())!r}, not indices")
     if re.search(rb"^f .*(?<= )-?0+(?=[/\s]|\Z)", data, re.MULTILINE):
         raise Refused("a face has the vertex index 0; they count from 1")
     # trimesh counts relative indices from the end of the file, not from the face.
     relative = re.search(rb"^f .*[ /]-\d", data, re.MULTILINE)
     if relative and re.search(rb"^vn? ", data[relative.end() :], re.MULTILINE):
         raise Refused("relative face indices with vertices after them", "export it with absolute indices")
-    return data
+    return _triangular(data)
+
+
+def _positions(data: bytes, found: Found) -> bytes:
+    """The text with three numbers of each position, where some have a weight or a colour, too."""
+    wrong = rb"^(?:v (?!%b(?:[ \t]++%b){0,5}+%b)|vn (?!%b%b))([^\n]*)" % (_THREE, _NUMBER, _END, _THREE, _END)
+    if bad := re.search(wrong, data, re.MULTILINE):
+        raise Refused(f"a position or normal is {shown(bad[1].decode().strip())!r}, not 3 numbers")
+    weights = re.findall(rb"^v %b[ \t]++(%b)%b" % (_THREE, _NUMBER, _END), data, re.MULTILINE)
+    if any(float(weight) != 1 for weight in weights):
+        raise Refused("a position has a weight w other than 1", "export it without weights")
+    if re.search(rb"^v %b(?:[ \t]++%b){2}+%b" % (_THREE, _NUMBER, _END), data, re.MULTILINE):
+        raise Refused("a position has 5 numbers", "give x y z, and red green blue after them")
+    if re.search(rb"^v %b(?:[ \t]++%b){3}" % (_THREE, _NUMBER), data, re.MULTILINE):
+        found.ignored.append("vertex colours")
+    return re.sub(rb"^(v %b)[^\n]*" % _THREE, rb"\1", data, flags=re.MULTILINE)
+
+
+def _triangular(data: bytes) -> bytes:
+    """The text with a line for each triangle of a polygon."""
+    lines = list(re.finditer(rb"^f (\S++(?:[ \t]++\S++){3,}+)%b" % _END, data, re.MULTILINE))
+    if not lines:
+        return data
+    numbers = b" ".join(re.findall(rb"^v ([^\n]*)", data, re.MULTILINE)).split()
+    vertices = np.array(numbers).astype(np.float64).reshape(-1, 3)
+    faces = [line[1].split() for line in lines]
+    sides = np.array([len(face) for face in faces])
+    texts: list[list[bytes]] = [[] for _ in faces]
+    for count in np.unique(sides).tolist():
+        chosen = np.flatnonzero(sides == count).tolist()
+        indices = np.array([[int(corner.partition(b"/")[0]) for corner in faces[k]] for k in chosen])
+        polygons = np.where(indices > 0, indices - 1, indices + len(vertices))
+        check_corners(polygons, len(vertices))
+        corners, owners = triangulated(vertices, polygons)
+        for owner, (a, b, c) in zip(owners.tolist(), corners.tolist(), strict=True):
+            face = faces[chosen[owner]]
+            texts[chosen[owner]].append(b"f " + b" ".join((face[a], face[b], face[c])))
+    pieces, start = [], 0
+    for line, text in zip(lines, texts, strict=True):
+        pieces += [data[start : line.start()], b"\n".join(text)]
+        start = line.end()
+    return b"".join([*pieces, data[start:]])

@@ -1,5 +1,6 @@
 """What the readers of mesh files share: refusals, names in messages, and files beside a file."""
 
+import codecs
 import os
 import re
 from pathlib import Path
@@ -30,7 +31,9 @@ def shown(text: str) -> str:
 
 
 def utf8(text: bytes) -> bytes:
-    """Text with the names and comments of another encoding made harmless."""
+    """Text with the names and comments of another encoding made harmless; UTF-16 by its mark."""
+    if text.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return text.decode("utf-16", "replace").encode()
     return text.decode("utf-8", "replace").encode()
 
 

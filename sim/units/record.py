@@ -15,6 +15,7 @@ import numpy as np
 from amaranth.lib.wiring import Component
 
 __all__ = [
+    "PAUSED",
     "STALLS",
     "Beats",
     "Case",
@@ -273,6 +274,8 @@ class Record:
         Signals of the default variant, reason by name: a fault there may survive.
     still : dict
         Register bits of the default variant that cannot toggle: signals with their bits by reason.
+    remembers : bool
+        It has a memory of what came before, which a reset does not clear.
     """
 
     name: str
@@ -286,6 +289,7 @@ class Record:
     logarithmic: bool = False
     waivers: Mapping[str, str] = field(default_factory=dict)
     still: Mapping[str, str] = field(default_factory=dict)
+    remembers: bool = False
 
     @property
     def default(self) -> str:

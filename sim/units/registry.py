@@ -12,8 +12,11 @@ from blysk.sim.units.record import Record
 
 __all__ = ["RECORDS", "ROOMS"]
 
-ROOMS = ("normals", "cosines", "methods", "lighting", "")
+ROOMS = ("geometry", "normals", "cosines", "methods", "lighting", "")
 """Rooms on the data's way; last those that stand in none."""
+
+HELPERS = ("operands", "record", "registry", "triangles")
+"""Modules beside the rooms that are no records."""
 
 
 def _found() -> dict[str, Record]:
@@ -21,7 +24,7 @@ def _found() -> dict[str, Record]:
     for room in ROOMS:
         package = import_module(".".join(part for part in ("blysk.sim.units", room) if part))
         for module in pkgutil.iter_modules(package.__path__):
-            if not module.ispkg and (room or module.name not in ("operands", "record", "registry")):
+            if not module.ispkg and (room or module.name not in HELPERS):
                 found = import_module(f"{package.__name__}.{module.name}")
                 if record := getattr(found, "RECORD", None):
                     records[record.name] = record

@@ -1,4 +1,4 @@
-"""Codes of which only bounds are known, for the bit-true twins; and where hardware wraps and cuts."""
+"""Codes of which only bounds are known, for the bit-accurate models; and where hardware wraps and cuts."""
 
 import inspect
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ class Bounds:
     """An array of integers, known by two enclosures at once; either may be the tighter one.
 
     One is an interval. The other is a sum of `Unknown` numbers times factors, and of a rest between two
-    numbers: ``N_r - N_l - G`` and ``t (1 - t) G`` stay what they are, whatever order a twin adds them in. A
+    numbers: ``N_r - N_l - G`` and ``t (1 - t) G`` stay what they are, whatever order a model adds them in. A
     product of two such sums starts anew from its interval. Shifts to the right leave what they cut to the
     rest.
 

@@ -35,7 +35,7 @@ def prove(tmp_path):
 
 @pytest.fixture
 def refute(tmp_path):
-    """Find a counterexample to the claims of a harness, of at most so many cycles; the planted bug's."""
+    """Find a counterexample to the claims of a harness, of at most so many cycles; the injected bug's."""
     if missing_tool():
         pytest.skip(missing_tool())
 
@@ -47,10 +47,10 @@ def refute(tmp_path):
 
 
 @pytest.fixture
-def plant(monkeypatch):
-    """Plant a bug: put a copy of a function in its place, in which one piece of text is another."""
+def inject(monkeypatch):
+    """Inject a bug: put a copy of a function in its place, in which one piece of text is another."""
 
-    def plant(owner, name, text, bug):
+    def inject(owner, name, text, bug):
         function = getattr(owner, name)
         source = textwrap.dedent(inspect.getsource(function))
         assert source.count(text) == 1, f"{name} has {text!r} {source.count(text)} times, not once"
@@ -58,12 +58,12 @@ def plant(monkeypatch):
         exec(source.replace(text, bug), namespace)
         monkeypatch.setattr(owner, name, namespace[name])
 
-    return plant
+    return inject
 
 
 @pytest.fixture
 def wraps(monkeypatch):
-    """Formats in which a twin wraps or makes words; it fails where one may not hold a code.
+    """Formats in which a model wraps or makes words; it fails where one may not hold a code.
 
     All other operations have results of formats that hold whatever there is, or saturate.
     """

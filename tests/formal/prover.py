@@ -44,11 +44,11 @@ _SECONDS = 150
 
 
 class Harness:
-    """A unit whose inputs are free, on every clock, and what is claimed of it.
+    """A unit whose inputs are free, on every cycle, and what is claimed of it.
 
     All input members, ``rst`` too, may take any value on any clock: a claim holds for every stimulus, and
     with a reset at any time. Registers of `m` are reset with the unit. Multipliers and tables without a write
-    port give anything on every clock: claims that hold so hold for the unit, but not the other way round.
+    port give anything on every cycle: claims that hold so hold for the unit, but not the other way round.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Harness:
             ]
 
     def free(self, shape: ShapeLike = 1, name: str = "free") -> Signal:
-        """A signal that takes any value on every clock."""
+        """A signal that takes any value on every cycle."""
         signal = Signal(shape, name=name)
         self._ports.append(Value.cast(signal))
         return signal
@@ -94,11 +94,11 @@ class Harness:
         return named.popitem()[1]
 
     def claim(self, condition: ValueLike) -> None:
-        """Claim that a condition holds on every clock."""
+        """Claim that a condition holds on every cycle."""
         self._claims.append(Value.cast(condition))
 
     def assume(self, condition: ValueLike) -> None:
-        """Leave out the runs in which a condition does not hold on every clock."""
+        """Leave out the runs in which a condition does not hold on every cycle."""
         self.m.d.comb += Assume(condition)
 
     def without_claims(self) -> "Harness":
@@ -123,7 +123,7 @@ class Verdict:
     Parameters
     ----------
     holds : bool or None
-        Whether they hold, on every clock or on so many as asked for; ``None``: not decided in time.
+        Whether they hold, on every cycle or on so many as asked for; ``None``: not decided in time.
     cycles : int
         Clocks after the first of the counterexample's last, or the frames that the search has seen.
     trace : str

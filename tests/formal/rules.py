@@ -11,7 +11,7 @@ __all__ = ["answers", "follows", "never_resumes", "pixels_follow", "stays", "tak
 
 
 def taken(channel: stream.Interface) -> Value:
-    """Whether a beat goes over on this clock."""
+    """Whether a beat goes over on this cycle."""
     return channel.valid & channel.ready
 
 
@@ -61,7 +61,7 @@ def follows(
     harness : Harness
         Of the unit.
     source, sink : stream.Interface
-        Where beats come and leave, a clock later at the earliest.
+        Where beats come and leave, a cycle later at the earliest.
     capacity : int
         Beats inside at most.
     image : callable

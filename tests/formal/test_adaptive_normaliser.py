@@ -22,7 +22,7 @@ from blysk.hdl.normals.bisection import BisectionUnit
 
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
-from .stand_ins import short
+from .stubs import short
 
 pytestmark = pytest.mark.prove
 
@@ -164,8 +164,8 @@ BUGS = {
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(refute, plant, harness, bug):
-    """Planted in the unit, each refutes a claim."""
+def test_bugs_are_found(refute, inject, harness, bug):
+    """Injected in the unit, each refutes a claim."""
     claims, *change = BUGS[bug]
-    plant(AdaptiveNormaliserUnit, *change)
+    inject(AdaptiveNormaliserUnit, *change)
     refute(claims(*harness(THRESHOLDS[1])))

@@ -101,7 +101,7 @@ def of_shift():
 def of_rotation():
     """Any two words of x and y: a bound of both after CORDIC's steps, whichever way each turns.
 
-    A step is a turn, times ``sqrt(1 + 4^-i)``, and the cuts of two shifts; which is read off the twin's
+    A step is a turn, times ``sqrt(1 + 4^-i)``, and the cuts of two shifts; which is read off the model's
     sums. So the length of (x, y) grows by that factor, and by that of (1, 1) at most.
     """
     unit, pairs, unknowns = AngularSetup(), [], []
@@ -163,7 +163,7 @@ def of_step():
 
 
 def of_cosine(monkeypatch):
-    """Any code of the dot product, and of psi by arccos; that unit is equal to its twin for every operand."""
+    """Any code of the dot product, and of psi by arccos; that unit equals its model for every operand."""
     dot = DotProduct().compute(word(COMPONENT, 1, 3), word(COMPONENT, 1, 3))
     for sign in (-1, 1):
         Fixed(SIZE_FORMAT, dot.codes * sign)
@@ -172,7 +172,7 @@ def of_cosine(monkeypatch):
 
 
 def of_adders():
-    """CORDIC's adder and its shifts, of any words: where the twin's sum fits the format, it gives that."""
+    """CORDIC's adder and its shifts, of any words: where the model's sum fits the format, it gives that."""
     h, format = Harness(), AngularSetup.ROTATED_FORMAT
     a, b = (Signal(signed(format.width), name=name) for name in "ab")
     h.m.d.sync += [a.eq(h.free(format.width, "any_a")), b.eq(h.free(format.width, "any_b"))]
@@ -273,7 +273,7 @@ def test_registers_have_the_words_that_are_proved(angle):
 
 
 def test_bounds_hold(monkeypatch, normal_pairs):
-    """The twin's operands of x and y are within their bounds, and not far within."""
+    """The model's operands of x and y are within their bounds, and not far within."""
     rng, shares = np.random.default_rng(1), {}
 
     def note(name, largest):
@@ -303,9 +303,9 @@ def test_adders_of_cordic_are_those_of_the_twin(prove):
     prove(of_adders())
 
 
-def test_bug_of_an_adder_is_found(refute, plant):
-    """A carry that is lost, planted in the hardware."""
-    plant(blysk.hdl.cosines.angular_setup, "_added", "Cat(negate, b", "Cat(~negate, b")
+def test_bug_of_an_adder_is_found(refute, inject):
+    """A carry that is lost, injected in the hardware."""
+    inject(blysk.hdl.cosines.angular_setup, "_added", "Cat(negate, b", "Cat(~negate, b")
     refute(of_adders(), 4)
 
 
@@ -326,7 +326,7 @@ SHORTER_FORMATS = {
 
 @pytest.mark.parametrize("word", SHORTER_FORMATS)
 def test_formats_too_short_are_found(monkeypatch, word):
-    """An integer bit less than what is needed, planted in the parameters; of psi and its step two."""
+    """An integer bit less than what is needed, injected in the parameters; of psi and its step two."""
     prove, name, format = SHORTER_FORMATS[word]
     monkeypatch.setattr(AngularSetup, name, format)
     with pytest.raises(AssertionError, match=" wraps in "):
@@ -343,23 +343,23 @@ def test_words_of_shifts_too_short_are_found(monkeypatch, prove, name, format):
         prove()
 
 
-def test_minor_operand_too_short_is_found(plant):
+def test_minor_operand_too_short_is_found(inject):
     """The same: ``minor 2^j``."""
-    plant(AngularSetup, "_minor", "wrap(SQ(3, 34))", "wrap(SQ(2, 34))")
+    inject(AngularSetup, "_minor", "wrap(SQ(3, 34))", "wrap(SQ(2, 34))")
     with pytest.raises(AssertionError, match=" wraps in "):
         of_minor()
 
 
-def test_cos_beta_too_short_is_found(plant, monkeypatch):
+def test_cos_beta_too_short_is_found(inject, monkeypatch):
     """The same; two bits less, as its sums have the format of CORDIC's x."""
-    plant(AngularSetup, "compute", "Fixed(SQ(4, self.GAIN_BITS)", "Fixed(SQ(2, self.GAIN_BITS)")
+    inject(AngularSetup, "compute", "Fixed(SQ(4, self.GAIN_BITS)", "Fixed(SQ(2, self.GAIN_BITS)")
     with pytest.raises(AssertionError, match=" wraps in "):
         of_results(monkeypatch, of_rotation())
 
 
-def test_cosine_for_arccos_too_short_is_found(plant, monkeypatch):
+def test_cosine_for_arccos_too_short_is_found(inject, monkeypatch):
     """The same; two bits less, as the format of the dot product is that of three of the largest products."""
-    plant(AngularSetup, "_by_arccos", "Fixed(cross.format", "Fixed(SQ(2, 34)")
+    inject(AngularSetup, "_by_arccos", "Fixed(cross.format", "Fixed(SQ(2, 34)")
     with pytest.raises(AssertionError, match=" wraps in "):
         of_cosine(monkeypatch)
 
@@ -372,9 +372,9 @@ BUGS = {
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_of_cordic_are_found(plant, bug):
-    """Planted in the twin, each breaks what is said of a step."""
-    plant(AngularSetup, "_polar", *BUGS[bug])
+def test_bugs_of_cordic_are_found(inject, bug):
+    """Injected in the model, each breaks what is said of a step."""
+    inject(AngularSetup, "_polar", *BUGS[bug])
     with pytest.raises(AssertionError):
         of_rotation()
 
@@ -397,8 +397,8 @@ SHORTER_REGISTERS = {
 
 
 @pytest.mark.parametrize("word", SHORTER_REGISTERS)
-def test_registers_a_bit_too_short_are_found(plant, word):
-    """A slice of a bit less, planted in the hardware. Others are read in a format that refuses it."""
-    plant(*SHORTER_REGISTERS[word])
+def test_registers_a_bit_too_short_are_found(inject, word):
+    """A slice of a bit less, injected in the hardware. Others are read in a format that refuses it."""
+    inject(*SHORTER_REGISTERS[word])
     with pytest.raises(AssertionError, match="not those of"):
         of_registers("half_chord")

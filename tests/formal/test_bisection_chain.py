@@ -54,7 +54,7 @@ BUGS = {
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(refute, plant, bug):
-    """Planted in `BisectionChainUnit`, each refutes the claims."""
-    plant(BisectionChainUnit, *BUGS[bug])
+def test_bugs_are_found(refute, inject, bug):
+    """Injected in `BisectionChainUnit`, each refutes the claims."""
+    inject(BisectionChainUnit, *BUGS[bug])
     refute(of_spans())

@@ -140,19 +140,19 @@ BUGS = {
     ),
     "no half step": ("(start + half_step).wrap(p.format)", "start.extend(p.format)"),
     "wraps": (".saturate(p.result_format)", ".wrap(p.result_format)"),
-    "sums while it stands": ("m.Elif(advance)", "m.Else()"),
-    "a clock late": ("valid.eq(active)", "valid.eq(active & ~ends)"),
+    "sums while it is stalled": ("m.Elif(advance)", "m.Else()"),
+    "a cycle late": ("valid.eq(active)", "valid.eq(active & ~ends)"),
 }
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(refute, plant, bug):
-    """Planted in `AccumulatorUnit`, each refutes the claim of exact sums."""
-    plant(AccumulatorUnit, "elaborate", *BUGS[bug])
+def test_bugs_are_found(refute, inject, bug):
+    """Injected in `AccumulatorUnit`, each refutes the claim of exact sums."""
+    inject(AccumulatorUnit, "elaborate", *BUGS[bug])
     refute(of_sums(DifferenceAccumulatorUnit()), 10)
 
 
-def test_bugs_of_the_offered_output_are_found(refute, plant):
+def test_bug_of_the_skid_buffer_is_found(refute, inject):
     """A value that is dropped while it waits refutes the count of pixels."""
-    plant(difference_accumulator, "offer", "Mux(held, spare, Value.cast(payload))", "payload")
+    inject(difference_accumulator, "skid_buffer", "Mux(held, spare, Value.cast(payload))", "payload")
     refute(of_pixels(), 20)

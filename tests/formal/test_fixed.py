@@ -98,21 +98,21 @@ BUGS = {
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_of_saturation_are_found(refute, plant, bug):
-    """Planted in `FixedValue.saturate`, each refutes the claim for a pair of formats."""
+def test_bugs_of_saturation_are_found(refute, inject, bug):
+    """Injected in `FixedValue.saturate`, each refutes the claim for a pair of formats."""
     formats, *change = BUGS[bug]
-    plant(FixedValue, "saturate", *change)
+    inject(FixedValue, "saturate", *change)
     refute(of_saturation(*formats), 4)
 
 
-def test_bug_of_rounding_is_found(refute, plant):
+def test_bug_of_rounding_is_found(refute, inject):
     """Cut instead."""
-    plant(FixedValue, "round_half_up", "self._code[dropped - 1]", "0")
+    inject(FixedValue, "round_half_up", "self._code[dropped - 1]", "0")
     refute(of_rounding(SQ(4, 34), 17), 4)
 
 
-def test_bug_of_cutting_is_found(refute, plant):
+def test_bug_of_cutting_is_found(refute, inject):
     """Towards 0 instead: negative codes go up."""
     kept = "self._code[self.format.fraction_bits - fraction_bits :]"
-    plant(FixedValue, "truncate", kept, f"({kept} + self._code[-1])[: format.width]")
+    inject(FixedValue, "truncate", kept, f"({kept} + self._code[-1])[: format.width]")
     refute(of_cutting(SQ(4, 34), 17), 4)

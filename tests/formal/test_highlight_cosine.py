@@ -7,7 +7,7 @@ from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
-from .stand_ins import short_wave
+from .stubs import short_wave
 
 pytestmark = pytest.mark.prove
 
@@ -15,7 +15,7 @@ LATENCY = 3
 
 
 @pytest.fixture(autouse=True)
-def stand_in(monkeypatch):
+def stub(monkeypatch):
     """Of the angle two bits, of cos beta one, through two registers."""
 
     def bits(theta, cos_beta):
@@ -47,23 +47,23 @@ def test_pixels(prove):
     """Inductive, lengths 0 to 3, `LATENCY` cycles in place of 12: what waits stays; a span's pixels leave in
     order, each once, each at its angle and with its span's cos beta.
 
-    While the output is ready, the first leaves `LATENCY` cycles after its span was taken, then one every
-    clock, and a span is taken in 3 cycles, and one.
+    While the output is ready, the first leaves `LATENCY` cycles after its span was accepted, then one every
+    cycle, and a span is taken in 3 cycles, and one.
     """
     prove(of_pixels())
 
 
 BUGS = {
-    "it moves while it stands": ("advance.eq(offer(", "advance.eq(1 | offer("),
-    "a span is taken while it stands": ("self.i.ready.eq(advance & ends)", "self.i.ready.eq(ends)"),
-    "the angle moves while it stands": ("m.Elif(active)", "m.Elif(0)"),
+    "it moves while it is stalled": ("advance.eq(skid_buffer(", "advance.eq(1 | skid_buffer("),
+    "a span is accepted while it is stalled": ("self.i.ready.eq(advance & ends)", "self.i.ready.eq(ends)"),
+    "the angle moves while it is stalled": ("m.Elif(active)", "m.Elif(0)"),
     "a pixel is lost": ("Cat(active, valid[:-1])", "Cat(active, valid[:-1]) & ~2"),
-    "the wave moves while it stands": ("EnableInserter(advance)", "EnableInserter(Value.cast(1))"),
+    "the wave moves while it is stalled": ("EnableInserter(advance)", "EnableInserter(Value.cast(1))"),
 }
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(refute, plant, bug):
-    """Planted in `HighlightCosineUnit`, each refutes the claims."""
-    plant(HighlightCosineUnit, "elaborate", *BUGS[bug])
+def test_bugs_are_found(refute, inject, bug):
+    """Injected in `HighlightCosineUnit`, each refutes the claims."""
+    inject(HighlightCosineUnit, "elaborate", *BUGS[bug])
     refute(of_pixels(), 20)

@@ -49,7 +49,7 @@ def is_unit(gate, vectors, off):
 
 
 def is_near(gate, vectors):
-    """Pairs of which the gate does not say that they are wide, and some of those just wider."""
+    """Pairs of which the gate does not say that they are out of range, and some just out of it."""
     limit = (gate.widest.codes.item() + 2) << gate.fraction_bits - 1
     return one_of(gate) ** 2 - vectors @ vectors.T < limit
 
@@ -148,17 +148,17 @@ BUGS = {
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(plant, bug):
-    """Planted in the unit, each stops a span that reaches its threshold."""
-    plant(HighlightGateUnit, *BUGS[bug])
+def test_bugs_are_found(inject, bug):
+    """Injected in the unit, each stops a span that reaches its threshold."""
+    inject(HighlightGateUnit, *BUGS[bug])
     gate = HighlightGate(fraction_bits=6)
     with pytest.raises(AssertionError, match=r"^lost highlights"):
         stopped(gate, *off_the_plane(gate))
 
 
-def test_bug_of_wide_spans_is_found(plant):
+def test_bug_of_spans_out_of_range_is_found(inject):
     """Taken as others, they reach their thresholds where they are stopped."""
-    plant(HighlightGateUnit, "_lit_by", "wide | bright", "bright")
+    inject(HighlightGateUnit, "_lit_by", "out_of_range | bright", "bright")
     gate = HighlightGate(fraction_bits=5)
     with pytest.raises(AssertionError, match=r"^lost highlights"):
         stopped(gate, *in_a_plane(gate))
@@ -175,8 +175,8 @@ def test_bug_of_thresholds_is_found(monkeypatch, bits, steps):
         shades_nothing_under(gate)
 
 
-def test_bug_of_the_cutoff_is_found(plant):
+def test_bug_of_the_cutoff_is_found(inject):
     """The specular unit shades as far as its parabola goes."""
-    plant(Specular, "compute", "lit &= shifted <= self.boundaries[exponent]", "pass")
+    inject(Specular, "compute", "lit &= shifted <= self.boundaries[exponent]", "pass")
     with pytest.raises(AssertionError, match=r"^lit under the threshold"):
         shades_nothing_under(HighlightGate())

@@ -43,9 +43,9 @@ def test_sums_do_not_wrap(prove, lights):
     prove(of_sums(lights))
 
 
-def test_bug_is_found(refute, plant):
-    """A bit less, planted in the unit."""
-    plant(CompactIntensityUnit, "elaborate", "UQ(11 + self._terms.bit_length(), 23)", "UQ(12, 23)")
+def test_bug_is_found(refute, inject):
+    """A bit less, injected in the unit."""
+    inject(CompactIntensityUnit, "elaborate", "UQ(11 + self._terms.bit_length(), 23)", "UQ(12, 23)")
     refute(of_sums(1))
 
 
@@ -99,8 +99,12 @@ def test_pixels(prove, choices, channels):
 
 
 PIXEL_BUGS = {
-    "a pixel is taken while it stands": ("_issue", "advance & (~busy | ends_pixel)", "~busy | ends_pixel"),
-    "it moves while it stands": ("elaborate", "m.If(advance)", "m.If(1)"),
+    "a pixel is accepted while it is stalled": (
+        "_issue",
+        "advance & (~busy | ends_pixel)",
+        "~busy | ends_pixel",
+    ),
+    "it moves while it is stalled": ("elaborate", "m.If(advance)", "m.If(1)"),
     "a pixel ends with a channel": (
         "_issue",
         "ends_channel & (channel == self.parameters.channels - 1)",
@@ -116,7 +120,7 @@ PIXEL_BUGS = {
 
 
 @pytest.mark.parametrize("bug", PIXEL_BUGS)
-def test_bugs_of_pixels_are_found(refute, plant, choices, bug):
-    """Planted in the unit, each refutes the claims on pixels."""
-    plant(CompactIntensityUnit, *PIXEL_BUGS[bug])
+def test_bugs_of_pixels_are_found(refute, inject, choices, bug):
+    """Injected in the unit, each refutes the claims on pixels."""
+    inject(CompactIntensityUnit, *PIXEL_BUGS[bug])
     refute(of_pixels(3), 24)

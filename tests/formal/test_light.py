@@ -10,7 +10,7 @@ from blysk.hdl.lighting.specular import SpecularUnit
 
 from .prover import Harness
 from .rules import answers, follows, stays, taken
-from .stand_ins import short
+from .stubs import short
 
 pytestmark = pytest.mark.prove
 
@@ -22,11 +22,11 @@ def two_bits(light, term):
 
 @pytest.fixture
 def make(monkeypatch):
-    """A light unit with `two_bits` for specular terms, a clock after the interval."""
+    """A light unit with `two_bits` for specular terms, a cycle after the interval."""
 
     def make(interval):
-        stand_in = short(SpecularUnit, two_bits, interval + 1)
-        monkeypatch.setattr(blysk.hdl.lighting.light, "SpecularUnit", stand_in)
+        stub = short(SpecularUnit, two_bits, interval + 1)
+        monkeypatch.setattr(blysk.hdl.lighting.light, "SpecularUnit", stub)
         return LightUnit(initiation_interval=interval)
 
     return make
@@ -73,16 +73,19 @@ BUGS = {
     ),
     "a dark beat is given": ("self.i.valid & takes & ~dark", "self.i.valid & takes"),
     "it leaves before its term is there": ("(skip | specular.o.valid)", "1"),
-    "a term is lost while the light stands": ("specular.o.ready.eq(gives & ~skip)", "specular.o.ready.eq(1)"),
+    "a term is lost while the light is stalled": (
+        "specular.o.ready.eq(gives & ~skip)",
+        "specular.o.ready.eq(1)",
+    ),
     "what waits beside it is lost": ("terms.ready.eq(gives)", "terms.ready.eq(1)"),
     "the term of a dark beat is kept": ("Mux(skip, 0, ", "Mux(0, 0, "),
 }
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(refute, plant, make, bug):
-    """Planted in `LightUnit`, each refutes the claims."""
-    plant(LightUnit, "_skip", *BUGS[bug])
+def test_bugs_are_found(refute, inject, make, bug):
+    """Injected in `LightUnit`, each refutes the claims."""
+    inject(LightUnit, "_skip", *BUGS[bug])
     refute(of_light(make(2)), 12)
 
 
@@ -96,7 +99,7 @@ LOCKSTEP_BUGS = {
 
 
 @pytest.mark.parametrize("bug", LOCKSTEP_BUGS)
-def test_bugs_in_lockstep_are_found(refute, plant, make, bug):
-    """Planted in `LightUnit`, each refutes the claims."""
-    plant(LightUnit, "elaborate", *LOCKSTEP_BUGS[bug])
+def test_bugs_in_lockstep_are_found(refute, inject, make, bug):
+    """Injected in `LightUnit`, each refutes the claims."""
+    inject(LightUnit, "elaborate", *LOCKSTEP_BUGS[bug])
     refute(of_light(make(1)), 12)

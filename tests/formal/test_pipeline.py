@@ -19,7 +19,7 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
-from .stand_ins import short
+from .stubs import short
 
 pytestmark = pytest.mark.prove
 
@@ -70,7 +70,7 @@ def decisions(span, lit):
 
 
 @pytest.fixture
-def stand_ins(monkeypatch):
+def stubs(monkeypatch):
     """A pipeline with three places, a `Line`, and units of a clock or two that hand its codes on."""
 
     def pipeline(parameters, style="throughput"):
@@ -98,7 +98,7 @@ def of_writes(parameters):
     """Spans inside are those taken in whose last pixel has not left.
 
     Assumed, as `of_waiting_spans` and the proofs of the assembler have it: a last pixel leaves only while a
-    span is inside, and there are at most as many as the FIFO of places and the assembler hold.
+    span is inside, and there are at most as many as the FIFO of coordinates and the assembler hold.
     """
     h = Harness(unit := ShadingPipelineUnit(parameters))
     inside = Signal(6)
@@ -180,7 +180,7 @@ def test_constants_stay(prove):
     prove(of_constants(), 16)
 
 
-# Clocks that the output, ready, stands at most, and cycles of the proof.
+# Cycles that the output, ready, waits at most, and cycles of the proof.
 PIPELINES = {
     "ambient": (AMBIENT, "throughput", 4, 12),
     "diffuse": (LINEAR, "throughput", 4, 14),
@@ -192,32 +192,37 @@ PIPELINES = {
 
 
 @pytest.mark.parametrize("name", PIPELINES)
-def test_pixels(prove, stand_ins, name):
-    """In so many cycles, spans of 0 to 3 pixels, with `stand_ins`: every span that is taken in goes to the
+def test_pixels(prove, stubs, name):
+    """In so many cycles, spans of 0 to 3 pixels, with `stubs`: every span that is taken in goes to the
     interpolator and to the places round it, so that its pixels leave in order, each once, each at its place
     and of its colour, the last of them marked; what is due comes, a waiting write too."""
     *pipeline, late, cycles = PIPELINES[name]
-    prove(of_waiting_spans(stand_ins(*pipeline), late), cycles)
+    prove(of_waiting_spans(stubs(*pipeline), late), cycles)
 
 
 BUGS = {
-    "a place of another row": ("diffuse", "elaborate", "place.y.eq(span.y)", "place.y.eq(~span.y)"),
+    "coordinates of another row": (
+        "diffuse",
+        "_carry_coordinates",
+        "assembler.coordinates.payload.eq(coordinates.r_data)",
+        "assembler.coordinates.payload.eq(coordinates.r_data ^ (1 << p.x_bits))",
+    ),
     "the interpolator takes what waits": (
         "diffuse",
-        "elaborate",
-        "others, offered & free",
-        "others, offered",
+        "_admit",
+        "others, nonempty & unlocked",
+        "others, nonempty",
     ),
-    "a place is lost": (
+    "coordinates are lost": (
         "diffuse",
-        "elaborate",
+        "_carry_coordinates",
         "coordinates.r_en.eq(assembler.coordinates.ready)",
         "coordinates.r_en.eq(1)",
     ),
-    "spans overtake a write": ("ambient", "elaborate", "free.eq(~self.write.valid & ", "free.eq("),
+    "spans overtake a write": ("ambient", "_admit", "unlocked.eq(~self.write.valid & ", "unlocked.eq("),
     "a light takes what the other does not": (
         "compact",
-        "_shade",
+        "_connect_lights",
         "(other.i.ready for other in others)",
         "()",
     ),
@@ -227,47 +232,53 @@ BUGS = {
         "source.ready.eq(operands.ready & decisions.r_rdy)",
         "source.ready.eq(operands.ready)",
     ),
-    "a decision is for a pixel": ("gated", "_decide", "last.eq(place == lengths.r_data - 1)", "last.eq(1)"),
+    "a decision is for a pixel": ("gated", "_decide", "last.eq(pixel == lengths.r_data - 1)", "last.eq(1)"),
 }
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(refute, plant, stand_ins, bug):
-    """Planted in `ShadingPipelineUnit`, each refutes the claims, in the cycles of the proof."""
+def test_bugs_are_found(refute, inject, stubs, bug):
+    """Injected in `ShadingPipelineUnit`, each refutes the claims, in the cycles of the proof."""
     name, *change = BUGS[bug]
     *pipeline, late, cycles = PIPELINES[name]
-    plant(ShadingPipelineUnit, *change)
-    refute(of_waiting_spans(stand_ins(*pipeline), late), cycles)
+    inject(ShadingPipelineUnit, *change)
+    refute(of_waiting_spans(stubs(*pipeline), late), cycles)
 
 
 WRITE_BUGS = {
     "constants change under a span": ("frame.hold.eq(~idle)", "frame.hold.eq(0)"),
     "a write waits for ever": ("finished & (inside == 1)", "finished & (inside == 2)"),
-    "a span is taken in beside a write": ("free.eq(~self.write.valid & ", "free.eq("),
-    "empty spans are counted": ("self.i.valid & ~empty", "self.i.valid"),
+    "a span is taken in beside a write": ("unlocked.eq(~self.write.valid & ", "unlocked.eq("),
+    "empty spans are counted": ("self.i.valid & (self.i.payload.length != 0)", "self.i.valid"),
 }
 
 
 @pytest.mark.parametrize("bug", WRITE_BUGS)
-def test_bugs_of_writes_are_found(refute, plant, bug):
-    """Planted in `ShadingPipelineUnit`, each refutes the claims on writes."""
-    plant(ShadingPipelineUnit, "elaborate", *WRITE_BUGS[bug])
+def test_bugs_of_writes_are_found(refute, inject, bug):
+    """Injected in `ShadingPipelineUnit`, each refutes the claims on writes."""
+    inject(ShadingPipelineUnit, "_admit", *WRITE_BUGS[bug])
     refute(of_writes(AMBIENT), 20)
 
 
 CONSTANT_BUGS = {
-    "constants change under a span": (ShadingPipelineUnit, "frame.hold.eq(~idle)", "frame.hold.eq(0)"),
+    "constants change under a span": (
+        ShadingPipelineUnit,
+        "_admit",
+        "frame.hold.eq(~idle)",
+        "frame.hold.eq(0)",
+    ),
     "a write is kept before it is taken": (
         FrameConstantsUnit,
-        "written.eq(taken & ",
+        "elaborate",
+        "written.eq(accepted & ",
         "written.eq(self.write.valid & ",
     ),
 }
 
 
 @pytest.mark.parametrize("bug", CONSTANT_BUGS)
-def test_bugs_of_constants_are_found(refute, plant, bug):
-    """Planted in the pipeline or behind its write port, each refutes the claim on colours."""
+def test_bugs_of_constants_are_found(refute, inject, bug):
+    """Injected in the pipeline or behind its write port, each refutes the claim on colours."""
     owner, *change = CONSTANT_BUGS[bug]
-    plant(owner, "elaborate", *change)
+    inject(owner, *change)
     refute(of_constants(), 16)

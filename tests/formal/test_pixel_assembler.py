@@ -81,28 +81,28 @@ def test_colors(prove):
 
 
 BUGS = {
-    "x stands": (of_waiting_spans, "m.Elif(moves)", "m.Elif(0)"),
-    "x moves while it stands": (of_waiting_spans, "m.Elif(moves)", "m.Else()"),
-    "a colour is taken without a place": (of_colors, "advance & spot.valid", "advance"),
+    "x stays": (of_waiting_spans, "m.Elif(moves)", "m.Elif(0)"),
+    "x moves while it is stalled": (of_waiting_spans, "m.Elif(moves)", "m.Else()"),
+    "a colour is taken without a place": (of_colors, "advance & position.valid", "advance"),
     "a place is taken without a colour": (of_waiting_spans, "advance & self.colors.valid", "advance"),
     "the next span comes early": (of_waiting_spans, "moves & ends", "moves"),
     "a pixel needs another span": (
         of_progress,
-        "spot.valid & self.colors.valid",
+        "position.valid & self.colors.valid",
         "following.valid & self.colors.valid",
     ),
     "a span that waits stops the one before it": (
         of_progress,
-        "moves.eq(offer(m, spot, active, Cat(x, y, ends)))",
-        "moves.eq(offer(m, spot, active, Cat(x, y, ends)) & ~following.valid)",
+        "moves.eq(skid_buffer(m, position, active, Cat(x, y, ends)))",
+        "moves.eq(skid_buffer(m, position, active, Cat(x, y, ends)) & ~following.valid)",
     ),
     "a pixel is overwritten": (of_colors, "m.If(advance)", "m.If(1)"),
 }
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(refute, plant, bug):
-    """Planted in `PixelAssemblerUnit`, each refutes the claims on places, on progress or on colours."""
+def test_bugs_are_found(refute, inject, bug):
+    """Injected in `PixelAssemblerUnit`, each refutes the claims on places, on progress or on colours."""
     claims, *change = BUGS[bug]
-    plant(PixelAssemblerUnit, "elaborate", *change)
+    inject(PixelAssemblerUnit, "elaborate", *change)
     refute(claims(), 20)

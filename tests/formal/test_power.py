@@ -192,10 +192,10 @@ BUGS_OF_ARGUMENT = {
 
 
 @pytest.mark.parametrize("bug", BUGS_OF_ARGUMENT)
-def test_bugs_of_the_argument_are_found(refute, plant, bug):
-    """Planted in the unit, each refutes the claims."""
+def test_bugs_of_the_argument_are_found(refute, inject, bug):
+    """Injected in the unit, each refutes the claims."""
     name, *change = BUGS_OF_ARGUMENT[bug]
-    plant(blysk.hdl.lighting.power if name == "one_minus" else PowerUnit, name, *change)
+    inject(blysk.hdl.lighting.power if name == "one_minus" else PowerUnit, name, *change)
     refute(of_power("cosine"), 4)
 
 
@@ -207,16 +207,16 @@ def test_bug_of_the_bounds_is_found(monkeypatch):
 
 
 @pytest.mark.parametrize("operand", OPERANDS)
-def test_bug_of_the_dark_is_found(plant, operand):
+def test_bug_of_the_dark_is_found(inject, operand):
     """That of a dark beat is the term it would have."""
-    plant(PowerUnit, "datapath", "Mux(dark, ", "Mux(0, ")
+    inject(PowerUnit, "datapath", "Mux(dark, ", "Mux(0, ")
     with pytest.raises(AssertionError):
         of_darkness(operand)
 
 
-def test_bug_of_cosines_to_0_is_found(plant):
+def test_bug_of_cosines_to_0_is_found(inject):
     """1 is not that of unit vectors."""
-    plant(blysk.hdl.lighting.power, "one_minus", "ONE_SQUARED.values.item()", "1")
+    inject(blysk.hdl.lighting.power, "one_minus", "ONE_SQUARED.values.item()", "1")
     with pytest.raises(AssertionError):
         of_cosines_to_0()
 
@@ -245,9 +245,9 @@ BUGS = {
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(plant, bug):
-    """Planted in the unit, each breaks a bound."""
+def test_bugs_are_found(inject, bug):
+    """Injected in the unit, each breaks a bound."""
     *change, claim = BUGS[bug]
-    plant(PowerUnit, *change)
+    inject(PowerUnit, *change)
     with pytest.raises(AssertionError, match=f"^{claim}"):
         check(PowerUnit(Power("one_minus_cosine")), 1000, every_argument(1000))

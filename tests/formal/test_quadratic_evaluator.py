@@ -10,11 +10,11 @@ from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
-from .stand_ins import short
+from .stubs import short
 
 pytestmark = pytest.mark.prove
 
-# Of each form, with the stand-ins: pixels inside at most, and cycles for which a span waits at most.
+# Of each form, with the stubs: pixels inside at most, and cycles for which a span waits at most.
 FORMS = {"direct": (12, 4), "horner": (11, 7)}
 
 
@@ -36,7 +36,7 @@ def polynomials(pixel, normal):
 
 
 @pytest.fixture(autouse=True)
-def stand_ins(monkeypatch):
+def stubs(monkeypatch):
     """Units for the step, in a clock, and for the polynomial, in two, hand on tags."""
     for name, hand_on, latency, interval in (
         ("_StepUnit", steps, 1, 1),
@@ -69,26 +69,26 @@ def of_pixels(form):
 @pytest.mark.parametrize("form", FORMS)
 def test_pixels(prove, form):
     """Inductive, lengths 0 to 3: what waits stays; a span's pixels leave in order, each once, each with its t
-    and its span's coefficients; while the output is ready, one leaves in 4 cycles, the stand-ins' latency and
+    and its span's coefficients; while the output is ready, one leaves in 4 cycles, the stubs' latency and
     one, and a span is taken in as many as `FORMS` says, and one."""
     prove(of_pixels(form))
 
 
 BUGS = {
-    "it moves while the polynomial stands": ("advance.eq(~valid | pixel.ready)", "advance.eq(1)"),
+    "it moves while the polynomial is stalled": ("advance.eq(~valid | pixel.ready)", "advance.eq(1)"),
     "a span takes another's place": ("span.ready.eq(advance & (remaining == 0))", "span.ready.eq(advance)"),
-    "a span is lost while it stands": (
+    "a span is lost while it is stalled": (
         "span.ready.eq(advance & (remaining == 0))",
         "span.ready.eq(remaining == 0)",
     ),
-    "t stands": ("total - step_held", "total"),
+    "t stays": ("total - step_held", "total"),
     "a pixel too many": ("length - 1", "length"),
     "a span of no pixels has one": ("valid.eq(length != 0)", "valid.eq(1)"),
 }
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(refute, plant, bug):
-    """Planted in `QuadraticEvaluatorUnit`, each refutes the claims."""
-    plant(QuadraticEvaluatorUnit, "elaborate", *BUGS[bug])
+def test_bugs_are_found(refute, inject, bug):
+    """Injected in `QuadraticEvaluatorUnit`, each refutes the claims."""
+    inject(QuadraticEvaluatorUnit, "elaborate", *BUGS[bug])
     refute(of_pixels("direct"), 20)

@@ -39,7 +39,7 @@ def most_at_start(c):
 
 
 def of_one_step(unit, monkeypatch, shift):
-    """A step of the twin, for every K, is ``x' = x + D'``, ``D' = D - c x + e``: c, and a bound of |e|.
+    """A step of the model, for every K, is ``x' = x + D'``, ``D' = D - c x + e``: c, and a bound of |e|.
 
     The register holds x with half a step of the operand.
     """
@@ -136,9 +136,9 @@ BUGS = {
 
 
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(plant, monkeypatch, bug):
-    """Planted in the twin, each breaks what is said of a step."""
-    plant(Recurrence, "_reinsch", *BUGS[bug])
+def test_bugs_are_found(inject, monkeypatch, bug):
+    """Injected in the model, each breaks what is said of a step."""
+    inject(Recurrence, "_reinsch", *BUGS[bug])
     with pytest.raises(AssertionError):
         of_one_step(Recurrence(), monkeypatch, 3)
 

@@ -108,7 +108,7 @@ def operands(unit, arguments):
 
 
 def check(unit, exponent):
-    """No term is larger than that of a smaller argument; all are the twin's.
+    """No term is larger than that of a smaller argument; all are the model's.
 
     It is 0 where the exact one is under 2^-14, and not where that is over it, but for a hundredth of that;
     and 0 for a dark beat at the peak.
@@ -165,17 +165,17 @@ BUGS_OF_ARGUMENT = {
 
 
 @pytest.mark.parametrize("bug", BUGS_OF_ARGUMENT)
-def test_bugs_of_the_argument_are_found(refute, plant, bug):
-    """Planted in the unit, each refutes the claims."""
-    plant(*BUGS_OF_ARGUMENT[bug])
+def test_bugs_of_the_argument_are_found(refute, inject, bug):
+    """Injected in the unit, each refutes the claims."""
+    inject(*BUGS_OF_ARGUMENT[bug])
     refute(of_specular("cosquad", "cosine"), 4)
 
 
-def test_bug_of_another_word_is_found(plant):
-    """What is shifted is made of the argument and the operand, planted in the unit."""
+def test_bug_of_another_word_is_found(inject):
+    """What is shifted is made of the argument and the operand, injected in the unit."""
     text = 'g.register("shifted_wide", shifted, argument)'
     bug = 'g.register("shifted_wide", lambda x, _: shifted(x), argument, operand)'
-    plant(SpecularUnit, "_describe", text, bug)
+    inject(SpecularUnit, "_describe", text, bug)
     with pytest.raises(AssertionError, match=r"^more is made of the operand"):
         reads_one_word(SpecularUnit(), "argument")
 
@@ -212,10 +212,10 @@ BUGS = {
 
 @pytest.mark.parametrize("operand", OPERANDS)
 @pytest.mark.parametrize("bug", BUGS)
-def test_bugs_are_found(plant, bug, operand):
-    """Planted in the unit, each breaks a claim."""
+def test_bugs_are_found(inject, bug, operand):
+    """Injected in the unit, each breaks a claim."""
     text, change, claim = BUGS[bug]
-    plant(SpecularUnit, "_describe", text, change)
+    inject(SpecularUnit, "_describe", text, change)
     unit = SpecularUnit(Specular(REFLECTION_MODELS["cosquad"], operand))
     with pytest.raises(AssertionError, match=f"^{claim}"):
         check(unit, 1000)

@@ -1,4 +1,4 @@
-"""Proofs of what every streaming unit shares: offered outputs, registers, buffers, pixel counters."""
+"""Proofs of what every streaming unit shares: skid buffers, register slices, FIFOs, pixel counters."""
 
 import itertools
 
@@ -27,7 +27,7 @@ class Delay(PipelinedUnit):
     def datapath(self, m, operands):
         stages = self.latency
         if self.initiation_interval > 1:
-            # Read as late as the operand stands.
+            # Read as late as the operand stays.
             stage = min(self.initiation_interval, self.latency - 1)
             if stage:
                 operands = self.register(m, operands, "late", when=self.at(stage))
@@ -109,7 +109,7 @@ def test_pipelined_unit(prove, latency, interval):
 
     A unit holds a beat for each interval of its latency, and one that waits. While the output is ready, a
     beat that is inside leaves ``latency`` cycles later at most, and one that is offered is taken after
-    ``initiation_interval`` cycles at most. All ages move on every clock but one after a clock on which a beat
+    ``initiation_interval`` cycles at most. All ages move on every cycle but one after a clock on which a beat
     was not taken; while a beat is inside, the next comes a whole multiple of the interval of such cycles on.
     """
     prove(of_delay(latency, interval))
@@ -141,19 +141,19 @@ BUFFER_BUGS = {
 
 
 @pytest.mark.parametrize("bug", BUFFER_BUGS)
-def test_bugs_of_a_buffer_are_found(refute, plant, bug):
-    """Planted in `connect_fifo`, each refutes the claims of a stream."""
-    plant(blysk.hdl.core.stream, "connect_fifo", *BUFFER_BUGS[bug])
+def test_bugs_of_a_buffer_are_found(refute, inject, bug):
+    """Injected in `connect_fifo`, each refutes the claims of a stream."""
+    inject(blysk.hdl.core.stream, "connect_fifo", *BUFFER_BUGS[bug])
     refute(of_stream(Chain(buffered(3)), 3, 1, 1))
 
 
-def test_a_proof_of_too_few_clocks_is_found(prove):
+def test_a_proof_of_too_few_cycles_is_found(prove):
     """Nothing that waited leaves in 6 cycles of a unit of 4: what is lost then is not seen."""
     with pytest.raises(AssertionError, match="nothing moves on in 6 cycles"):
         prove(of_stream(Delay(4), 5, 3, 1), 6)
 
 
-OFFER_BUGS = {
+SKID_BUFFER_BUGS = {
     "drops what it holds": ("Mux(held, spare, Value.cast(payload))", "payload"),
     "moves while it holds": ("return ~held", "return Value.cast(1)"),
     "forgets that it holds": ("held | valid", "valid"),
@@ -163,40 +163,40 @@ OFFER_BUGS = {
 }
 
 
-@pytest.mark.parametrize("bug", OFFER_BUGS)
+@pytest.mark.parametrize("bug", SKID_BUFFER_BUGS)
 @pytest.mark.parametrize("make", [lambda: of_delay(2, 1), lambda: of_registers(2)])
-def test_bugs_of_an_offered_output_are_found(refute, plant, make, bug):
-    """Planted in `offer`, each refutes the claims of a stream."""
-    plant(blysk.hdl.core.stream, "offer", *OFFER_BUGS[bug])
+def test_bugs_of_a_skid_buffer_are_found(refute, inject, make, bug):
+    """Injected in `skid_buffer`, each refutes the claims of a stream."""
+    inject(blysk.hdl.core.stream, "skid_buffer", *SKID_BUFFER_BUGS[bug])
     refute(make())
 
 
 UNIT_BUGS = {
-    "an age is lost": (
+    "a beat is lost": (
         (4, 1),
         "elaborate",
-        "Cat(accept, self._ages[:-1])",
-        "Cat(accept, self._ages[:-1]) & ~4",
+        "Cat(accept, self._stages[:-1])",
+        "Cat(accept, self._stages[:-1]) & ~4",
     ),
-    "the control moves while the data stands": ((4, 1), "elaborate", "m.If(advance)", "m.If(1)"),
-    "the data moves while it should stand": (
+    "the control moves while the data is stalled": ((4, 1), "elaborate", "m.If(advance)", "m.If(1)"),
+    "the data moves while it should be stalled": (
         (4, 1),
         "elaborate",
         "Inserter(advance)",
         "Inserter(Value.cast(1))",
     ),
     "any operand is taken in": ((10, 4), "elaborate", "when=self.i.ready", "when=Value.cast(1)"),
-    "the turn is a clock short": ((10, 4), "_turn", "self.initiation_interval - 1", "2"),
-    "the turn goes on": ((10, 4), "_turn", "opens, turn == 0", "opens, opens"),
-    "ready while it stands": ((10, 4), "_turn", "~waits & ", ""),
+    "the slot is a cycle short": ((10, 4), "_turn", "self.initiation_interval - 1", "2"),
+    "the slot goes on": ((10, 4), "_turn", "opens, turn == 0", "opens, opens"),
+    "ready while it is stalled": ((10, 4), "_turn", "~waits & ", ""),
 }
 
 
 @pytest.mark.parametrize("bug", UNIT_BUGS)
-def test_bugs_of_a_pipelined_unit_are_found(refute, plant, bug):
-    """Planted in `PipelinedUnit`, each refutes the claims of a stream or those of the turns."""
+def test_bugs_of_a_pipelined_unit_are_found(refute, inject, bug):
+    """Injected in `PipelinedUnit`, each refutes the claims of a stream or those of the turns."""
     timing, *change = UNIT_BUGS[bug]
-    plant(PipelinedUnit, *change)
+    inject(PipelinedUnit, *change)
     refute(of_delay(*timing))
 
 
@@ -222,13 +222,13 @@ def test_pixel_counter(prove):
 COUNTER_BUGS = {
     "a span of no pixels ends never": ("length <= 1", "length == 1"),
     "a span of no pixels has one": ("length != 0", "1"),
-    "it counts while it stands": ("m.If(advance)", "m.If(1)"),
+    "it counts while it is stalled": ("m.If(advance)", "m.If(1)"),
     "it ends a pixel early": ("remaining == 2", "remaining == 3"),
     "it never stops": ("active.eq(valid & (length != 0))", "active.eq(active | valid)"),
 }
 
 
 @pytest.mark.parametrize("bug", COUNTER_BUGS)
-def test_bugs_of_a_pixel_counter_are_found(refute, plant, bug):
-    plant(blysk.hdl.core.stream, "count_down", *COUNTER_BUGS[bug])
+def test_bugs_of_a_pixel_counter_are_found(refute, inject, bug):
+    inject(blysk.hdl.core.stream, "count_down", *COUNTER_BUGS[bug])
     refute(of_counter())

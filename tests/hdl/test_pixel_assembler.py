@@ -11,10 +11,10 @@ from blysk.hdl.pixel_assembler import PixelAssemblerUnit
 def drive(lengths, seed=0, shares=(0.0, 0.0, 0.0), reset_at=None):
     """Run the unit in pysim over spans of such lengths.
 
-    ``shares`` of the cycles on which places, colours and the sink pause. With ``reset_at``, the unit is
-    reset on that clock, and place and colour streams begin again.
+    ``shares`` of the cycles on which coordinates, colours and the sink are stalled. With ``reset_at``, the
+    unit is reset on that cycle, and both streams begin again.
 
-    Returns the pixels with their cycles, the cycles of the places taken, and what was expected of the pixels.
+    Returns the pixels with their cycles, the cycles of the coordinates accepted, and the expected pixels.
     """
     rng = np.random.default_rng(seed)
     lengths = np.asarray(lengths)
@@ -29,24 +29,24 @@ def drive(lengths, seed=0, shares=(0.0, 0.0, 0.0), reset_at=None):
     unit, reset = PixelAssemblerUnit(), Signal()
     m = Module()
     m.submodules.unit = ResetInserter(reset)(unit)
-    pixels, place_cycles, color_cycles = [], [], []
+    pixels, span_cycles, color_cycles = [], [], []
 
     async def run(ctx, cycles, stop_when_done):
-        place_waits = color_waits = False
+        span_waits = color_waits = False
         held = None
-        for records in (pixels, place_cycles, color_cycles):
+        for records in (pixels, span_cycles, color_cycles):
             records.clear()
         for clock in range(cycles):
-            pause_place, pause_color, pause_sink = (bool(p) for p in pauses[clock % len(pauses)])
-            # An offer, once made, stays.
-            place_waits = len(place_cycles) < spans and (place_waits or not pause_place)
+            pause_span, pause_color, pause_sink = (bool(p) for p in pauses[clock % len(pauses)])
+            # What is valid stays.
+            span_waits = len(span_cycles) < spans and (span_waits or not pause_span)
             color_waits = len(color_cycles) < count and (color_waits or not pause_color)
-            place, color = len(place_cycles), len(color_cycles)
-            ctx.set(unit.coordinates.valid, place_waits)
+            span_index, color = len(span_cycles), len(color_cycles)
+            ctx.set(unit.coordinates.valid, span_waits)
             ctx.set(
                 unit.coordinates.payload,
-                {"x": int(x[place]), "y": int(y[place]), "length": int(lengths[place])}
-                if place_waits
+                {"x": int(x[span_index]), "y": int(y[span_index]), "length": int(lengths[span_index])}
+                if span_waits
                 else {"x": 4095, "y": 4095, "length": 4095},
             )
             ctx.set(unit.colors.valid, color_waits)
@@ -59,9 +59,9 @@ def drive(lengths, seed=0, shares=(0.0, 0.0, 0.0), reset_at=None):
             held = pixel if valid and pause_sink else None
             if valid and not pause_sink:
                 pixels.append((clock, pixel))
-            if place_waits and ctx.get(unit.coordinates.ready):
-                place_cycles.append(clock)
-                place_waits = False
+            if span_waits and ctx.get(unit.coordinates.ready):
+                span_cycles.append(clock)
+                span_waits = False
             if color_waits and ctx.get(unit.colors.ready):
                 color_cycles.append(clock)
                 color_waits = False
@@ -81,7 +81,7 @@ def drive(lengths, seed=0, shares=(0.0, 0.0, 0.0), reset_at=None):
     simulator.add_clock(1e-8)
     simulator.add_testbench(bench)
     simulator.run()
-    return pixels, place_cycles, color_cycles, expected
+    return pixels, span_cycles, color_cycles, expected
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -89,16 +89,16 @@ def test_joins_the_streams_under_stalls(seed):
     rng = np.random.default_rng(seed)
     lengths = np.r_[1, 1, 2, 3, rng.integers(1, 12, 20)]
     shares = rng.choice([0.0, 0.1, 0.5, 0.85], 3)
-    pixels, place_cycles, color_cycles, expected = drive(lengths, seed, shares)
+    pixels, span_cycles, color_cycles, expected = drive(lengths, seed, shares)
     assert [pixel for _, pixel in pixels] == expected
     assert len(color_cycles) == len(pixels)
-    # A place is there when the first colour of its span is taken, and four are inside at most.
+    # Coordinates come before the first colour of their span is accepted, and four are inside at most.
     last = np.cumsum(lengths) - 1
-    assert np.all(np.array(place_cycles) + 2 <= np.array(color_cycles)[last - lengths + 1])
-    assert np.all(place_cycles[4:] > np.array(color_cycles)[last[:-4]])
+    assert np.all(np.array(span_cycles) + 2 <= np.array(color_cycles)[last - lengths + 1])
+    assert np.all(span_cycles[4:] > np.array(color_cycles)[last[:-4]])
 
 
-def test_one_pixel_a_clock():
+def test_one_pixel_a_cycle():
     lengths = [1, 5, 1, 1, 2, 16, 3]
     pixels, _, color_cycles, expected = drive(lengths)
     first = PixelAssemblerUnit.coordinates_latency

@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Callable
+from itertools import chain
 
 import numpy as np
 from markdown import table
 
 from blysk.bench.accuracy import scene_for
 from blysk.bench.report.errata import ERRATA
+from blysk.bench.report.lobe import CASES, errors_of_size
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.lighting.highlight_gate import HighlightGate
@@ -158,6 +160,24 @@ def _lobes() -> str:
     return table(["E, M", "entries", *_LOBES], rows)
 
 
+def _lobe_unit() -> str:
+    rows = []
+    for octaves, steps in ((12, 16), (15, 32), (20, 16)):
+        errors = chain(*errors_of_size(octaves, steps, 64))
+        rows.append(
+            [f"{octaves}, {steps}", str((octaves + 1) * steps), *(f"{error:.2f}" for error in errors)]
+        )
+    names = {"blinn": "Blinn", "beckmann": "Beckmann", "ggx": "GGX"}
+    heads = [
+        f"{names[case.model.name]} {'n' if case.label == 'n' else 'a'} = {value:g}"
+        if k == 0
+        else f"{value:g}"
+        for case in CASES
+        for k, value in enumerate(case.values)
+    ]
+    return table(["E, M", "words", *heads], rows)
+
+
 def _sentences() -> list[str]:
     squared = 20 / 2 * (math.cos(math.radians(60)) - 1) + 1
     assert squared**2 == ERRATA["second-lobe"].evidence()[0]
@@ -213,5 +233,6 @@ TABLES: dict[str, Callable[[], str]] = {
     "gate-angles": _thresholds,
     "gate-shares": _lit,
     "lobes": _lobes,
+    "lobe-unit": _lobe_unit,
 }
 SENTENCES: dict[str, Callable[[], list[str]]] = {"units.md": _sentences}

@@ -51,7 +51,7 @@ def made():
     ],
 )
 def test_errors_of_the_models(model, absolute, relative):
-    """numbers.md, "Reflection models"."""
+    """As published."""
     found = errors(model)
     assert absolute in (None, f"{found['absolute']:.4f}")
     assert f"{found['relative']:.2%}" == relative
@@ -89,13 +89,8 @@ def test_coefficients():
         energy = quad(lambda g, n=n: fq2(g, n) * math.cos(g) * math.sin(g), 0, edge, epsabs=1e-14)[0]
         assert ideal == pytest.approx(1 / (2 * math.pi * energy), rel=1e-9)
         assert line == pytest.approx(0.214 * (0.807 + n))
-    assert [f"{found[str(n)]:.4f}" for n in (2, 3, 4, 5, 10)] == [
-        "0.6345",
-        "0.8334",
-        "1.0404",
-        "1.2504",
-        "2.3126",
-    ]
+    published = ["0.6345", "0.8334", "1.0404", "1.2504", "2.3126"]
+    assert [f"{found[str(n)]:.4f}" for n in (2, 3, 4, 5, 10)] == published
     assert f"{found['deviation']:.4f}" == "0.0533"
     assert found["deviation_exponent"] == 2
 
@@ -150,7 +145,7 @@ def test_pictures():
 
 
 def test_published_table(made):
-    """numbers.md: all reproduce to the digits published but fQ's 1.255 % and fQ2's 1.256 %."""
+    """All reproduce to the digits published but fQ's 1.255 % and fQ2's 1.256 %."""
     table = made[2].parts[0]
     rows = {row["figure"]: row for row in table.records()}
     assert len(rows) == len(PUBLISHED)
@@ -170,20 +165,9 @@ def test_published_table(made):
 def test_section(made):
     chosen, found, whole = made
     drawings = [part for part in whole.parts if hasattr(part, "svg")]
-    assert [part.name.rpartition("-")[2] for part in drawings] == [
-        "2",
-        "3",
-        "4",
-        "5",
-        "6",
-        "10",
-        "11",
-        "pictures",
-    ]
+    assert [part.name.rpartition("-")[2] for part in drawings] == [*"23456", "10", "11", "pictures"]
     for part in drawings:
         assert part.svg.startswith("<?xml")
-        assert "inferred" in part.note or part.name.endswith("pictures")
-    assert "10 of 12 published figures" in whole.text[1]
     table = next(part for part in whole.parts if part.name == "cosine-quadratic-models")
     by_model = {
         task.settings["model"]: result
@@ -194,8 +178,5 @@ def test_section(made):
         assert row["largest absolute error"] == by_model[row["model"]]["absolute"]
 
 
-def test_tasks():
-    for quick in (True, False):
-        chosen = tasks(quick)
-        assert len({(task.name, json.dumps(task.settings)) for task in chosen}) == len(chosen)
-        assert not any(task.timed for task in chosen)
+def test_nothing_is_timed():
+    assert not any(task.timed for quick in (True, False) for task in tasks(quick))

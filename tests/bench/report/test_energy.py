@@ -84,12 +84,7 @@ def test_section():
     assert second["highlight gate, bits a pixel"] == 2
     assert (first["saved, share"], second["saved, share"]) == (None, pytest.approx(-0.05))
     assert [row[-1] for row in table.grades] == ["", "fair"]
-    text = " ".join(made.text)
-    assert "*intensity*: 75% of all with `cosquad` at exponent 50" in text
-    assert "changes by +5.0% (`cosquad`, exponent 50). " in text
-    assert "these have 2.0 pixels" in text
-    assert "Not counted" in text
-    assert "void" not in text
+    assert "void" not in " ".join(made.text)
     assert "void" in " ".join(section(quick, [[frame(False, top=1)], [on]]).text)
 
 
@@ -102,4 +97,3 @@ def test_tasks():
     results = [[frame(top=10), frame(top=20), frame(top=40 - 20 * task.settings["gate"])] for task in full]
     made = section(full, results)
     assert len(made.parts[0].rows) == 2 * len(MODELS) * len(EXPONENTS)
-    assert "changes by -50.0% (`cosquad`, exponent 1000) to +0.0% (`cosquad`, exponent 2)" in made.text[1]

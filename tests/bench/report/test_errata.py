@@ -41,14 +41,14 @@ def own():
     ],
 )
 def test_published_figures(found, name, published, right):
-    """numbers.md, to the digits shown there."""
+    """To the digits shown in docs/theory/errata.md."""
     values = [f"{value:.2g}" for value in found[name]]
     assert values[0] == published
     assert right is None or values[1] == right
 
 
 def test_mended_forms(found):
-    """numbers.md: Reinsch's form under 6e-5, and 3e-7 for 24 bits; sqrt(1-x) poly(x) 0.041 % relative."""
+    """Reinsch's form under 6e-5, and 3e-7 for 24 bits; sqrt(1-x) poly(x) 0.041 % relative."""
     assert found["recurrence-64"][1] < 6e-5
     assert found["recurrence-256"][1] < 6e-5
     assert found["recurrence-4095"][1] < 3e-7
@@ -86,7 +86,7 @@ def test_second_lobe(found):
 
 
 def test_worked_example(found):
-    """models.md: ambient 0.02, diffuse 0.323316, specular 0.002058."""
+    """Ambient 0.02, diffuse 0.323316, specular 0.002058."""
     assert found["worked-example"] == [
         0.3445,
         pytest.approx(0.02 + 0.8 * 0.7 / math.sqrt(3) + 0.5 * 3**-5, abs=1e-12),
@@ -166,7 +166,7 @@ def test_every_entry_shows_a_difference(found):
 
 
 def test_own_figures(own):
-    """What the specification states is none of what comes out."""
+    """What is stated is none of what comes out."""
     assert [f"{value:.1e}" for value in own["octaves"]] == ["9.2e-04", "6.8e-05"]
     # Symmetric about the middle, where the curve is exact.
     length, place = own["quadratic-length"]
@@ -177,7 +177,7 @@ def test_own_figures(own):
     assert own.keys() == OWN.keys()
 
 
-def test_printed_coefficients_are_those_of_the_devices():
+def test_published_coefficients_are_those_of_the_units():
     assert bisection._PUBLISHED == ROOT_PUBLISHED
     assert middle_normal._PUBLISHED == FACTOR_PUBLISHED
 

@@ -158,10 +158,6 @@ def test_section():
     assert (first["pixels of another colour"], second["pixels of another colour"]) == (0, 3)
     assert [row[-1] for row in totals.grades] == ["good", "bad"]
     assert [row["saves cells"] for row in reductions.records()] == [50, 50]
-    text = " ".join(made.text)
-    assert "to the bit: 1 of 2 are" in text
-    assert "2 of them by simulation" in text
-    assert "from 50% of the cells" in text
 
     quick = tasks(quick=True)
     assert [task.settings["name"] for task in quick] == list(QUICK_SCENES)

@@ -21,7 +21,8 @@ STRESS = str(Path(__file__).parents[2] / "data" / "teapot992.obj")
 ONE = {"methods": ["chord"], "models": ["cosquad"], "width": 48, "height": 36}
 
 
-@pytest.mark.parametrize("method", [pytest.param("chord", marks=pytest.mark.long), "chord-local"])
+@pytest.mark.long
+@pytest.mark.parametrize("method", ["chord", "chord-local"])
 def test_every_pixel_is_compared(method):
     meshes = [teapot(300), load_mesh(STRESS).mesh]
     pixels = sum(len(rasterise(scene_for(mesh, 1, 48, 36)).span) for mesh in meshes)

@@ -35,22 +35,14 @@ def test_a_table_a_family(found_tools):
     found = section(todo, [measure(**task.settings) for task in todo])
     assert [table.name for table in found.parts] == ["place-and-route-ecp5", "place-and-route-nexus"]
     rates = [f"clock rate, {which}, MHz" for which in ("smallest", "median", "largest")]
-    for table, (family, methods, largest), said in zip(
-        found.parts,
-        [("ecp5", METHODS, 105), ("nexus", OTHERS, 100 + OTHERS_SEEDS)],
-        found.text[1:],
-        strict=True,
-    ):
+    families = [("ecp5", METHODS, 105), ("nexus", OTHERS, 100 + OTHERS_SEEDS)]
+    for table, (family, methods, largest) in zip(found.parts, families, strict=True):
         assert [line["method"] for line in table.records()] == list(methods)
         line = table.records()[0]
         assert [line[rate] for rate in rates] == [101, (101 + largest) / 2, largest]
         assert (line["look-up tables"], line["multipliers"], line["why there is no figure"]) == (5000, 15, "")
         # Laid out for this family.
         assert line["RAMs in look-up tables"] == len(FAMILIES[family].package)
-        assert said.startswith(f"{FAMILIES[family].device}: ")
-        assert f"pyosys 1.0 and {FAMILIES[family].package} 2.0" in said
-    assert "without the registers" in found.parts[0].note
-    assert "where the tool times them" in found.parts[1].note
 
 
 def test_a_design_that_does_not_fit_says_so_and_other_failures_are_not_kept(found_tools, monkeypatch):

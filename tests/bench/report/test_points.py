@@ -279,16 +279,6 @@ def test_section(measured):
         assert record["total error, largest, LSB"] == point["errors"]["total_max_lsb"]
         assert record["hardware, cycles, cycles a pixel"] == point["times"]["cycles_per_pixel"]
     assert on_front.rows
-    # The best of all designs, those too that were not simulated.
-    exponents = sorted({point["settings"]["exponent"] for point in made.figures["points"]})
-    for exponent, text in zip(exponents, made.text, strict=False):
-        designs = [
-            point
-            for point in made.figures["points"]
-            if point["settings"]["exponent"] == exponent and point["group"] != "software"
-        ]
-        best = min(designs, key=lambda point: point["errors"]["total_max_lsb"])
-        assert f"Smallest total error: `{best['label']}`, " in text
     groups = {point["label"]: point["group"] for point in made.figures["points"]}
     assert groups == {
         "chord-local, cosquad": "own",
@@ -304,8 +294,6 @@ def test_section(measured):
         assert set(point["errors"]) == {axis["key"] for axis in ERRORS}
         assert set(point["times"]) == {axis["key"] for axis in TIMES}
     json.dumps(made.figures, allow_nan=False)
-    assert "of 5 hardware designs" in made.text[0]
-    assert "2 frames went through the simulated RTL, 8 through its bit-accurate model" in made.text[-1]
 
 
 def picture(uri):

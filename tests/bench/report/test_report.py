@@ -308,9 +308,14 @@ def test_interrupt_leaves_nothing_behind(interrupted):
 @pytest.mark.parametrize("name", SECTIONS)
 def test_sections_have_tasks(name):
     assert name == SECTIONS[name].__name__.rpartition(".")[2].replace("_", "-")
-    for task in SECTIONS[name].tasks(True):
-        assert json.loads(json.dumps(task.settings)) == task.settings
-        assert getattr(sys.modules[task.function.__module__], task.function.__name__) is task.function
+    for quick in (True, False):
+        tasks = SECTIONS[name].tasks(quick)
+        for task in tasks:
+            assert json.loads(json.dumps(task.settings)) == task.settings
+            assert getattr(sys.modules[task.function.__module__], task.function.__name__) is task.function
+        # No measurement twice.
+        keys = {(task.name, json.dumps(task.settings, sort_keys=True)) for task in tasks}
+        assert len(keys) == len(tasks)
 
 
 @pytest.mark.long

@@ -152,7 +152,7 @@ def test_wide_spans_are_told():
     assert by_angle["0 degrees"]["grade"] == "good"
 
 
-def test_every_case_of_the_specification_is_there():
+def test_every_case_is_there():
     names = [case.name for group in FROM_SPANS for case in cases(group)]
     assert len(set(names)) == len(names)
     for texts in (
@@ -259,10 +259,6 @@ def test_section():
     up_to = row["error to 1 LSB up to, degrees"]
     assert max(error for angle, error in errors.items() if angle <= up_to) <= 1
     assert errors[min(angle for angle in SWEEP if angle > up_to)] > 1
-    text = " ".join(made.text)
-    assert f"Bad cells with spans cut: 1 of {len(GROUPS)}." in text
-    assert "5 runs" in text
-    assert "100 pixels, 0 of them wrong; 1 came to a halt." in text
 
 
 def test_tasks():

@@ -321,7 +321,7 @@ def test_parts_and_times_of_a_product(cache):
         assert {place.start} <= {"a", "b"}
         assert place.end.startswith("o.")
         assert period(place)
-        # toolchain.md: one 18x18 multiplier's ceiling, out of a placement of nothing else.
+        # One 18x18 multiplier's ceiling, out of a placement of nothing else.
         assert 120 < place.fmax < 180
 
 
@@ -337,7 +337,7 @@ def test_times_of_a_multiplier_with_registers_of_its_own(cache):
     assert place.kinds == {"multiplier": 1}
     assert place.start == "o"
     assert place.end.startswith("o.P")
-    # toolchain.md: by the speed grade of the device.
+    # By the speed grade of the device.
     assert 165 < place.fmax < 221
     (place,) = outside.places
     assert place.kinds == {"LUT": 2, "multiplier": 1}

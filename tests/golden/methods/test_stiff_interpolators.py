@@ -35,11 +35,12 @@ def reference(method, left, right, length, vector):
     span, index = pixels_of(length)
     t = index / np.maximum(length - 1, 1)[span]
     a, b = ((end * vector).sum(axis=-1)[span] for end in (left, right))
-    if method in ("linear", "renormalise"):
-        normals = interpolate("linear" if method == "linear" else "normalised", left[span], right[span], t)
+    curve = METHODS[method].CURVE
+    if curve == "linear" or method == "renormalise":
+        normals = interpolate(curve, left[span], right[span], t)
         return (normals * vector[span]).sum(axis=-1)
     r = np.minimum((left * right).sum(axis=-1), 1)[span]
-    if method.startswith("quadratic"):
+    if curve == "quadratic":
         # Opposite normals are flagged.
         middle = (a + b) / np.sqrt(np.maximum(2 * (1 + r), STEP))
         return (2 * (a + b) - 4 * middle) * t**2 + (4 * middle - b - 3 * a) * t + a
@@ -111,7 +112,7 @@ def test_stiff_peak_narrower_than_a_pixel(method, exponent):
         assert (np.delete(term, peak) == 0).all()
         if not lit:
             assert term[peak] == 0
-        elif method != "linear" or at == 0:
+        elif interpolator.CURVE != "linear" or at == 0:
             # S falls by n an unit of N.H at its peak.
             assert term[peak] >= 1 - exponent * (bound(method, 3, 40) + 2 * STEP)
         else:

@@ -1,4 +1,4 @@
-"""Every operation of the NumPy twin against exact rational arithmetic, exhaustively at small widths."""
+"""Every operation of the NumPy model against exact rational arithmetic, exhaustively at small widths."""
 
 import operator
 from fractions import Fraction

@@ -24,7 +24,7 @@ def root_of_gap(v):
     return reciprocal_root(2 - v)
 
 
-# Function, domain, coefficient held, coefficients of numbers.md by ascending power, their digits, and the
+# Function, domain, coefficient held, published coefficients by ascending power, their digits, and the
 # largest absolute error shown there. The tables were made on another grid: where the least error is flat, the
 # last digits of the coefficients differ, and the error does not.
 PUBLISHED = {
@@ -71,7 +71,7 @@ PUBLISHED = {
         3e-8,
         "2.5e-05",
     ),
-    # numbers.md shows 0.0625277, 0.01144775, 0.00317987 and 7.9e-7; those coefficients give 8.5e-7, and no
+    # Published are 0.0625277, 0.01144775, 0.00317987 and 7.9e-7; those coefficients give 8.5e-7, and no
     # polynomial of these terms gives less than 8.08e-7 (the alternation below).
     "root held, 3 terms": (
         root_of_gap,
@@ -176,7 +176,7 @@ def test_printed_root_at_its_end():
 def test_plain_fit_dims_flat_faces():
     """A flat face's normal is 0.06 % too short; 14 LSB of cosquad at n = 100, 126 at 1000.
 
-    numbers.md shows 125, the same figure cut instead of rounded.
+    125 is published, the same figure cut instead of rounded.
     """
     length = 2 * minimax(factor_of_cosine, 0, 1, 3).sum()
     assert f"{1 - length:.2%}" == "0.06%"

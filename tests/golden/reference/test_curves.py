@@ -61,7 +61,7 @@ def test_published_errors(degrees, linear, length, vector, angle):
 
 @pytest.mark.parametrize(("degrees", "shown"), [(30, "0.13"), (60, "1.1")])
 def test_great_circle_is_a_third_curve(degrees, shown):
-    """models.md: how far ``slerp`` is from what the methods are measured against."""
+    """How far ``slerp`` is from what the methods are measured against."""
     left, right = pair(degrees)
     between = np.cross(interpolate("slerp", left, right, T), interpolate("normalised", left, right, T))
     angle = np.degrees(np.arcsin(np.linalg.norm(between, axis=1).max()))
@@ -73,7 +73,7 @@ PIXELS = np.linspace(0, 1, 65)
 
 
 def rounded(vectors):
-    """16 fractional bits, as the table of chord.md has them."""
+    """16 fractional bits, as the table of the chord method has them."""
     return np.floor(vectors * 2**16 + 0.5) / 2**16
 
 
@@ -104,7 +104,7 @@ def exact_cosines(left, right, vector):
     return np.einsum("spk,sk->sp", normals, vector)
 
 
-# chord.md: 3-point chord, linear-normal chord, dot product of quadratic normals with the plain minimax h.
+# 3-point chord, linear-normal chord, dot product of quadratic normals with the plain minimax h.
 @pytest.mark.parametrize(
     ("n", "degrees", "shown"),
     [
@@ -160,7 +160,7 @@ def test_published_errors_of_the_chord(n, degrees, shown):
     ("degrees", "shown", "ours"), [(5, 0.02, 0.0083), (10, 0.05, 0.039), (20, 0.28, 0.27), (30, 0.9, 0.89)]
 )
 def test_published_errors_of_the_diffuse_fit(degrees, shown, ours):
-    """chord.md, N·L through three points; at the small angles rounding is all of it, and ours is less."""
+    """N·L through three points; at the small angles rounding is all of it, and ours is less."""
     left, right, light = random_spans(degrees, 2)
     a, b, vector = rounded(left), rounded(right), rounded(light)
     middle = rounded(normalise(a + b))
@@ -171,7 +171,7 @@ def test_published_errors_of_the_diffuse_fit(degrees, shown, ours):
 
 
 def test_length_error_in_dot_product_and_chord():
-    """chord.md: N (1 + e) puts the base off by ``n e/2`` with the dot, the chord by e^2 and e theta^2."""
+    """N (1 + e) puts the base off by ``n e/2`` with the dot, the chord by e^2 and e theta^2."""
     n, e = 1000, 1e-4
     assert 1 - math.sqrt(REFLECTION_MODELS["cosquad"].reflect(1 - e, n)) == pytest.approx(0.05, rel=1e-9)
     left, _ = pair(30)

@@ -13,7 +13,8 @@ from blysk.golden.reference.lighting import (
     intensity_of_cosines,
     saturate,
 )
-from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.golden.reference.lobes import GGX, TabulatedModel
+from blysk.golden.reference.reflection import BLINN, REFLECTION_MODELS
 
 V = np.array([0.0, 0.0, 1.0])
 
@@ -322,3 +323,30 @@ def test_refusals():
             Material(grey(0), grey(0), grey(0), exponent)
     with pytest.raises(TypeError):
         Material(grey(0), grey(0), grey(0), 10.5)
+
+
+def test_roughness_of_a_material():
+    """Its own, or that of the exponent; models with an exponent, or without a parameter, do not read it."""
+    plain, rough = (Material((0,) * 3, (0,) * 3, (0,) * 3, 20, roughness) for roughness in (None, 0.3))
+    assert rough.parameter(GGX) == 0.3
+    assert plain.parameter(GGX) == pytest.approx((2 / 22) ** 0.25)
+    assert rough.parameter(BLINN) == 20
+    assert rough.parameter(TabulatedModel("flat", function=np.ones_like)) is None
+    for roughness in (0, 1.5, math.nan):
+        with pytest.raises(ValueError, match=r"^roughness must be greater than 0 and at most 1, not"):
+            Material((0,) * 3, (0,) * 3, (0,) * 3, 20, roughness)
+
+
+def test_material_of_metallic_roughness():
+    """A dielectric reflects 4% and its base colour; a metal its base colour, and nothing diffuse."""
+    base = (0.8, 0.5, 0.2)
+    dielectric, metal = (Material.of_metallic_roughness(base, metallic, 0.4) for metallic in (0, 1))
+    assert dielectric.diffuse == base
+    assert dielectric.specular == (0.04,) * 3
+    assert metal.diffuse == (0,) * 3
+    assert metal.specular == base
+    assert (metal.roughness, metal.exponent) == (0.4, round(2 / 0.4**4 - 2))
+    assert [Material.of_metallic_roughness(base, 0, r).exponent for r in (0, 1)] == [1000, 1]
+    for values, name in (((-0.1, 0.5), "metallic"), ((0.5, 1.1), "roughness")):
+        with pytest.raises(ValueError, match=rf"^{name} must be 0 to 1, not"):
+            Material.of_metallic_roughness(base, *values)

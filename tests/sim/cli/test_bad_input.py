@@ -18,7 +18,7 @@ TOO_LONG = (-signal.SIGALRM, -signal.SIGXCPU, -signal.SIGKILL)
 
 def attempts(folder, seed, files, every):
     """What came of the good files, of so many malformed ones, and of every so-many-th bad option."""
-    program = Path(__file__).with_name("malformed.py")
+    program = Path(__file__).with_name("trial.py")
     numbers = [str(number) for number in (seed, files, every)]
     done = subprocess.run(
         [sys.executable, str(program), str(folder), *numbers],
@@ -64,8 +64,8 @@ def check(rows):
 
 
 def test_some_malformed_input(tmp_path):
-    rows = attempts(tmp_path, seed=1, files=100, every=20)
-    assert len(rows) > 150
+    rows = attempts(tmp_path, seed=1, files=60, every=40)
+    assert len(rows) > 90
     check(rows)
 
 

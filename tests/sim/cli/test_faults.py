@@ -26,7 +26,7 @@ from blysk.sim.frames.picture import write_image
 from blysk.sim.frames.workers import local_executor
 from blysk.sim.output import check_writable, write_json
 
-from ..engines.test_cxxrtl import BEATS, entries, scaled, script, start
+from ..engines.scale import BEATS, entries, scaled, script, start
 
 THREE = (3 * BEATS).tolist()
 NOBODY = 65534

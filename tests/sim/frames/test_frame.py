@@ -12,7 +12,7 @@ import blysk.sim.frames.frame
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.cut import cut_spans
-from blysk.golden.frames.prepare import spans_for
+from blysk.golden.frames.prepare import prepare, spans_for
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.curves import interpolate
@@ -251,7 +251,7 @@ MATERIALS = (
 )
 
 
-@pytest.mark.parametrize("engine", ["cxxrtl", "pysim"])
+@pytest.mark.parametrize("engine", [pytest.param("cxxrtl", marks=pytest.mark.long), "pysim"])
 def test_frame_of_three_materials(engine):
     """Each pixel is that of a frame in its triangle's material alone, by the bit-accurate model.
 
@@ -307,13 +307,14 @@ def test_point_light_and_near_viewer(exponent):
         viewer="near",
     )
     design = preset("chord-local", lights=2)
-    frame = FrameSimulator(design).render(scene)
+    simulator = FrameSimulator(design)
+    frame = simulator.render(scene)
     assert frame.out_of_range_spans == 0
     errors = compare(scene, design, frame)
     assert errors.method_error.max_lsb < 1
     # Two terms of full brightness, and the last rounding.
     assert errors.arithmetic_error.max_lsb < 0.6
     far = dataclasses.replace(scene, viewer="distant", lights=[Light((-2, 4, 3)), scene.lights[1]])
-    assert np.abs(FrameSimulator(design).render(far).image.astype(int) - frame.image).max() > 20
+    assert np.abs(simulator.render(far).image.astype(int) - frame.image).max() > 20
     with pytest.raises(ValueError, match=r"^point lights and a near viewer need the method chord-local$"):
-        FrameSimulator(preset("chord", lights=2)).render(scene)
+        prepare(scene, preset("chord", lights=2))

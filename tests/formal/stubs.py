@@ -1,4 +1,4 @@
-"""Short stand-ins for proven units, so that what is made of them can be proved."""
+"""Short stubs for proven units, so that what is made of them can be proved."""
 
 from collections.abc import Callable, Iterable
 

@@ -1,24 +1,10 @@
-"""PLY and STL files that are cut short, which trimesh would load in part."""
+"""STL files that are cut short, which trimesh would load in part."""
 
-import re
 import struct
 
 from blysk.sim.meshes.refusal import Refused, utf8
 
-__all__ = ["tidy_ply", "tidy_stl"]
-
-
-def tidy_ply(data: bytes) -> bytes:
-    """Refuse an ASCII PLY with fewer lines than its header says; trimesh would load a part of it."""
-    head, mark, body = data.partition(b"end_header")
-    if not mark:
-        raise Refused("the PLY header has no end")
-    rows = sum(int(count) for count in re.findall(rb"^[ \t]*element[ \t]+\S+[ \t]+(\d+)", head, re.MULTILINE))
-    if b"format ascii" in head:
-        lines = sum(1 for line in body.splitlines()[1:] if line.strip())
-        if lines < rows:
-            raise Refused(f"it is cut short: the header says {rows} lines of data, there are {lines}")
-    return utf8(head) + mark + body
+__all__ = ["tidy_stl"]
 
 
 def tidy_stl(data: bytes) -> bytes:

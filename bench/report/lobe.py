@@ -1,0 +1,364 @@
+"""Errors and costs of the lobe unit and of pipelines with it, beside their baselines.
+
+`python -m blysk.bench.report.lobe` prints the tables.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Any
+
+import click
+import numpy as np
+
+from blysk.bench.accuracy import scene_for
+from blysk.bench.report.cosine_quadratic_figures import sphere
+from blysk.bench.report.section import Drawing, Section, Table
+from blysk.bench.store import Task
+from blysk.bench.svg import svg
+from blysk.golden.frames.compare import method_in_float64
+from blysk.golden.frames.frame import model_frame
+from blysk.golden.lighting.lobe import Lobe
+from blysk.golden.lighting.power import Power
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.presets import preset
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.lobes import BECKMANN, GGX
+from blysk.golden.reference.raster import fragment_normals
+from blysk.golden.reference.reflection import BLINN, COSQUAD, REFLECTION_MODELS, ReflectionModel
+from blysk.golden.reference.renderer import render
+from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.lighting.lobe import LobeUnit
+from blysk.hdl.lighting.power import PowerUnit
+from blysk.hdl.lighting.specular import SpecularUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.meshes.mesh import load_mesh
+
+__all__ = [
+    "CASES",
+    "FRONT",
+    "MESHES",
+    "SIZES",
+    "Case",
+    "errors_of_size",
+    "frame_errors",
+    "largest_error",
+    "pipeline_cost",
+    "section",
+    "tasks",
+    "unit_cost",
+]
+
+SIZES = ((8, 16), (12, 16), (12, 32), (14, 32), (15, 16), (15, 32), (20, 16))
+"""Octaves and steps."""
+
+MESHES = ("teapot", "sphere", "torus", "waves")
+"""Surfaces of the frames."""
+
+FRONT = ("blinn_table", "cosquad", "lyon3_refitted", "exp", "blinn")
+"""Models of the pipelines that are compared: the table, and its baselines."""
+
+EXPONENTS = (1, 10, 100, 1000)
+
+ROUGHNESSES = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A model, and the exponents or alphas of its table."""
+
+    model: ReflectionModel
+    label: str
+    values: tuple[float, ...]
+
+    def parameter(self, value: float) -> float:
+        """Parameter of the model: an exponent, or the roughness of an alpha."""
+        return value if self.model.PARAMETER == "exponent" else value**0.5
+
+
+CASES = (
+    Case(BLINN, "n", (1, 2, 10, 100, 1000)),
+    Case(BECKMANN, "alpha", (0.03, 0.1, 0.3, 0.6, 1)),
+    Case(GGX, "alpha", (0.0025, 0.01, 0.03, 0.05, 0.1, 0.3, 0.6, 1)),
+)
+"""What the columns of the table are of."""
+
+
+def largest_error(lobe: Lobe, parameter: float | None, samples: int = 256) -> float:
+    """Largest error of a table's terms against the model, in LSB of an 8-bit channel at intensity 1.
+
+    Parameters
+    ----------
+    lobe : Lobe
+        Of the operand ``one_minus_cosine``.
+    parameter : float or None
+        Of the model.
+    samples : int
+        Arguments in each step of the table, from its first to its last; all where there are no more.
+    """
+    knots = np.ldexp(lobe.knots, lobe.fraction_bits).astype(np.int64)
+    first, last = knots[:-1, np.newaxis], knots[1:, np.newaxis] - 1
+    codes = np.unique(first + (last - first) * np.arange(samples) // (samples - 1))
+    terms = lobe.compute(
+        Fixed(lobe.operand_format, codes), np.zeros(codes.shape, bool), lobe.table(parameter)
+    )
+    exact = lobe.model.reflect(1 - np.ldexp(codes, -lobe.fraction_bits), parameter)
+    return 255 * float(np.abs(terms.values - exact).max())
+
+
+def errors_of_size(octaves: int, steps: int, samples: int = 256) -> list[list[float]]:
+    """For each of `CASES` its largest errors, see `largest_error`."""
+    lobe = Lobe(BLINN, "one_minus_cosine", octaves, steps)
+    return [
+        [
+            largest_error(replace(lobe, model=case.model), case.parameter(value), samples)
+            for value in case.values
+        ]
+        for case in CASES
+    ]
+
+
+_UNITS = {
+    "lobe, table loaded": lambda lobe: LobeUnit(lobe),
+    "lobe, table fixed": lambda lobe: LobeUnit(lobe, tables=[lobe.table(20)]),
+    "lobe, memory outside": lambda lobe: LobeUnit(lobe, shares_memory=True),
+    "cosquad": lambda lobe: SpecularUnit(Specular(COSQUAD, lobe.operand)),
+    "cosquad, exponent fixed": lambda lobe: SpecularUnit(Specular(COSQUAD, lobe.operand), exponent=20),
+    "lyon3_refitted": lambda lobe: SpecularUnit(Specular(REFLECTION_MODELS["lyon3_refitted"], lobe.operand)),
+    "exp": lambda lobe: SpecularUnit(Specular(REFLECTION_MODELS["exp"], lobe.operand)),
+    "power by products": lambda lobe: PowerUnit(Power(lobe.operand)),
+    "power by products, sequential": lambda lobe: PowerUnit(Power(lobe.operand), form="sequential"),
+}
+"""Units that turn 1 - N·H into a specular term."""
+
+
+def unit_cost(name: str) -> dict[str, int]:
+    """`Cost.totals` of one of the units, its latency and its initiation interval."""
+    unit = _UNITS[name](Lobe(BLINN, "one_minus_cosine"))
+    return {
+        **cost_of(unit).totals,
+        "latency": unit.latency,
+        "initiation_interval": unit.initiation_interval,
+    }
+
+
+def pipeline_cost(model: str, style: str = "throughput", gate: bool = False) -> dict[str, int]:
+    """`Cost.totals` of a pipeline by the chord method, its latency and cycles a pixel."""
+    unit = ShadingPipelineUnit(preset("chord", model, style=style, gate=gate))
+    return {**cost_of(unit).totals, "latency": unit.latency, "cycles_per_pixel": unit.cycles_per_pixel}
+
+
+def mesh_of(name: str) -> Mesh:
+    """One of `MESHES`."""
+    if name == "teapot":
+        return load_mesh("teapot", triangles=10_000).mesh
+    if name == "sphere":
+        return sphere(48)
+    around, along = np.meshgrid(*[np.linspace(0, 1, 97)] * 2, indexing="ij")
+    if name == "torus":
+        a, b = 2 * np.pi * around, 2 * np.pi * along
+        out = 1 + 0.4 * np.cos(b)
+        points = np.stack([out * np.cos(a), 0.4 * np.sin(b), -out * np.sin(a)], -1)
+        normals = np.stack([np.cos(b) * np.cos(a), np.sin(b), -np.cos(b) * np.sin(a)], -1)
+    else:
+        x, z = 2 * around - 1, 2 * along - 1
+        height, slope = 0.15 * np.sin(7 * x) * np.cos(6 * z), 1.05 * np.cos(7 * x) * np.cos(6 * z)
+        points = np.stack([x, height, -z], -1)
+        normals = np.stack([-slope, np.ones_like(x), -0.9 * np.sin(7 * x) * np.sin(6 * z)], -1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    index = np.arange(around.size).reshape(around.shape)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+    return Mesh(points.reshape(-1, 3), faces, normals.reshape(-1, 3))
+
+
+def frame_errors(
+    mesh: str, model: str, values: Sequence[float], size: Sequence[int] = (640, 480)
+) -> list[dict[str, float]]:
+    """Largest errors of frames by the chord method, in LSB, where ``|N·L| > 0.002``.
+
+    Parameters
+    ----------
+    mesh : str
+        One of `MESHES`.
+    model : str
+        Of `MODELS` or `LOBES`.
+    values : sequence of float
+        Exponents, or roughnesses of a model that has them.
+    size : two ints
+        Width and height.
+
+    Returns
+    -------
+    list of dict
+        For each value: ``units``, against the method and the model in float64; ``total``, against the exact
+        frame, which is Blinn's, or of the model itself where a table has it; ``total_spans``, the same for
+        exact arithmetic and the exact model: what the spans of the method alone cost; ``everywhere``, the
+        total without regard to N·L.
+    """
+    design, surface, found = preset("chord", model), mesh_of(mesh), []
+    target = design.specular.model if design.loads_tables else BLINN
+    for value in values:
+        scene = scene_for(surface, 10, *size)
+        change = {"exponent": value} if target.PARAMETER == "exponent" else {"roughness": value}
+        scene = replace(scene, material=replace(scene.material, **change))
+        frame = model_frame(scene, design)
+        exact = render(scene, "phong", target, raster=frame.raster)
+        normals = fragment_normals(scene, frame.raster, frame.raster.visible)
+        lit = np.zeros(exact.mask.size, dtype=bool)
+        lit[frame.raster.pixel[frame.raster.visible]] = np.abs(normals @ scene.lights[0].direction) > 0.002
+        lit = lit.reshape(exact.mask.shape) & exact.mask
+        of_method = method_in_float64(scene, design, frame.cut_raster)
+        exact_model = replace(design, specular=Lobe(target))
+        of_spans = method_in_float64(scene, exact_model, frame.cut_raster)
+
+        def largest(image, reference, mask):
+            return float(np.abs(image[mask] - 255 * reference[mask]).max())
+
+        found.append(
+            {
+                "value": value,
+                "units": largest(frame.image.astype(float), of_method, lit),
+                "total": largest(frame.image.astype(float), exact.image, lit),
+                "total_spans": largest(255 * of_spans, exact.image, lit),
+                "everywhere": largest(frame.image.astype(float), exact.image, exact.mask),
+            }
+        )
+    return found
+
+
+def tasks(quick: bool) -> list[Task]:
+    """Errors by size, costs of units and pipelines, errors of frames."""
+    size = [160, 120] if quick else [640, 480]
+    found = [
+        Task(errors_of_size, {"octaves": octaves, "steps": steps, "samples": 16 if quick else 256})
+        for octaves, steps in (SIZES[-1:] if quick else SIZES)
+    ]
+    found += [Task(unit_cost, {"name": name}) for name in _UNITS]
+    found += [Task(pipeline_cost, {"model": model}) for model in FRONT]
+    for mesh in MESHES[:1] if quick else MESHES:
+        pairs = [*((model, EXPONENTS) for model in FRONT), ("ggx", ROUGHNESSES), ("beckmann", ROUGHNESSES)]
+        found += [
+            Task(frame_errors, {"mesh": mesh, "model": model, "values": list(values), "size": size})
+            for model, values in pairs
+        ]
+    return found
+
+
+def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
+    """Tables of errors and costs, and the front."""
+    made: dict[str, list[tuple[dict, Any]]] = {}
+    for task, result in zip(tasks, results, strict=True):
+        made.setdefault(task.function.__name__, []).append((task.settings, result))
+    frames = [(given["mesh"], given["model"], row) for given, rows in made["frame_errors"] for row in rows]
+    pipelines = {given["model"]: cost for given, cost in made["pipeline_cost"]}
+    worst = {
+        model: max(row["total"] for _, of, row in frames if of == model)
+        for model in dict.fromkeys(of for _, of, _ in frames)
+    }
+    table, cosquad = pipelines["blinn_table"], pipelines["cosquad"]
+    text = [
+        "A table of 336 words, addressed by the octave of 1 - N·H, with one multiplier gives Blinn's power "
+        "at every exponent, and any other curve of N·H: Beckmann's and GGX among them.",
+        f"A pipeline with it has {table['multipliers']} multipliers, one with `cosquad` "
+        f"{cosquad['multipliers']}; both take a span to its first pixel in {table['latency']} and "
+        f"{cosquad['latency']} cycles, and give a pixel every {table['cycles_per_pixel']} and "
+        f"{cosquad['cycles_per_pixel']} cycles. Its largest error against exact shading with Blinn's power "
+        f"is {worst['blinn_table']:.2f} LSB, that of `cosquad` {worst['cosquad']:.2f}.",
+        "What is left is the method's: it turns normals evenly along a span on the screen, and the "
+        "exact frame evenly on the surface. The column *spans alone* has that error by itself.",
+    ]
+    heads = [f"{case.model.name} {case.label} = {value:g}, LSB" for case in CASES for value in case.values]
+    sizes = [
+        [f"{given['octaves']}, {given['steps']}", (given["octaves"] + 1) * given["steps"], *chain(*errors)]
+        for given, errors in made["errors_of_size"]
+    ]
+    names = ("multipliers", "cells", "register_bits", "memory_bits", "latency")
+    parts = [
+        Table(
+            "lobe-errors",
+            "Largest error of the lobe unit, by the size of its table",
+            ["octaves, steps", "words", *heads],
+            sizes,
+            "Bit-accurate terms against the model in float64, in LSB of a channel of full brightness.",
+        ),
+        Table(
+            "lobe-units",
+            "Units that make a specular term of 1 - N·H",
+            ["unit", *names, "initiation interval"],
+            [
+                [given["name"], *(cost[name] for name in names), cost["initiation_interval"]]
+                for given, cost in made["unit_cost"]
+            ],
+            "By Yosys, before mapping to an FPGA.",
+        ),
+        Table(
+            "lobe-pipelines",
+            "Pipelines by the chord method, one light",
+            ["model", *names, "largest error, LSB"],
+            [[model, *(cost[name] for name in names), worst[model]] for model, cost in pipelines.items()],
+            "The error against exact shading with Blinn's power, over all frames of the next table.",
+        ),
+        Table(
+            "lobe-frames",
+            "Largest errors of frames by the chord method",
+            [
+                "mesh",
+                "model",
+                "exponent or roughness",
+                "units, LSB",
+                "total, LSB",
+                "spans alone, LSB",
+                "anywhere, LSB",
+            ],
+            [
+                [
+                    mesh,
+                    model,
+                    *(row[name] for name in ("value", "units", "total", "total_spans", "everywhere")),
+                ]
+                for mesh, model, row in frames
+            ],
+            "White light, k_d 0.4 and k_s 0.55; pixels with |N·L| over 0.002, but for the last column. "
+            "*Units*: against the method and the model in float64, the rounding of a pixel included.",
+        ),
+        _front(pipelines, worst),
+    ]
+    return Section("lobe", "Exact highlights from one small table", text, parts)
+
+
+def _front(pipelines: dict[str, dict], worst: dict[str, float]) -> Drawing:
+    """Multipliers against the largest error."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+    axes = figure.subplots()
+    for model, cost in pipelines.items():
+        x, y = cost["multipliers"], worst[model]
+        axes.plot(x, y, "o", color="#d55e00" if model == "blinn_table" else "#0072b2")
+        axes.annotate(model, (x, y), xytext=(6, 4), textcoords="offset points")
+    axes.set(xlabel="multipliers of the pipeline", ylabel="largest error, LSB", yscale="log")
+    axes.margins(x=0.15, y=0.15)
+    axes.grid(True, color="#dddddd", linewidth=0.5)
+    axes.set_axisbelow(True)
+    note = "Against exact shading with Blinn's power. Lower and further left is better."
+    return Drawing("lobe-front", "Error of highlights against multipliers", svg(figure), note)
+
+
+@click.command()
+@click.option("--quick", is_flag=True, help="Small frames of one mesh.")
+def main(quick: bool) -> None:
+    """Print the tables."""
+    chosen = tasks(quick)
+    made = section(chosen, [task.function(**task.settings) for task in chosen])
+    for part in made.parts:
+        if isinstance(part, Table):
+            click.echo(f"\n{part.title}\n\n| {' | '.join(part.columns)} |\n|{'---|' * len(part.columns)}")
+            for row in part.rows:
+                cells = (f"{cell:.3g}" if isinstance(cell, float) else str(cell) for cell in row)
+                click.echo(f"| {' | '.join(cells)} |")
+
+
+if __name__ == "__main__":
+    main()

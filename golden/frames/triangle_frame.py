@@ -1,0 +1,99 @@
+"""A frame by triangles: what the bit-accurate models of geometry, shading and depth test make of a scene."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.frames.prepare import constants_of
+from blysk.golden.geometry.scene_triangles import SceneTriangles, scene_triangles
+from blysk.golden.geometry.triangles import Frame
+from blysk.golden.reference.scene import Scene
+from blysk.golden.render import Renderer
+
+__all__ = ["SPAN_ANGLE", "TriangleFrame", "frame_of_pixels", "sent_triangles", "triangle_frame"]
+
+SPAN_ANGLE = 5.0
+"""Widest piece of a span in degrees, for at most 1 LSB at every exponent; the chord's setup serves 22.5."""
+
+
+@dataclass(frozen=True)
+class TriangleFrame:
+    """A scene's picture from triangles.
+
+    Parameters
+    ----------
+    image : uint8 array, shape (height, width, 3)
+        The frame buffer.
+    sent : SceneTriangles
+        What was drawn.
+    owner : int64 array, shape (height, width)
+        Face of the mesh that each pixel shows, -1 for the background.
+    counts : mapping of str to int
+        Counters of `RenderUnit`.
+    """
+
+    image: np.ndarray
+    sent: SceneTriangles
+    owner: np.ndarray
+    counts: Mapping[str, int]
+
+
+def sent_triangles(scene: Scene, renderer: Renderer, angle: float = SPAN_ANGLE) -> SceneTriangles:
+    """The triangles of a scene for a renderer, sorted by material, with spans cut at an angle.
+
+    Raises
+    ------
+    ValueError
+        If the scene has point lights or a near viewer.
+    """
+    if scene.local:
+        raise ValueError("point lights and a near viewer need spans with values, which triangles do not give")
+    return scene_triangles(scene, renderer.geometry.grid, Frame.limit_of(angle)).by_material()
+
+
+def frame_of_pixels(scene: Scene, x: np.ndarray, y: np.ndarray, color: np.ndarray) -> np.ndarray:
+    """Frame buffer after writes in their order, over the background.
+
+    Parameters
+    ----------
+    scene : Scene
+        Size and background; this is rounded to the nearest code, half up.
+    x, y : int arrays, shape (P,)
+        Places.
+    color : uint8 array, shape (P, 3)
+        Red, green, blue.
+
+    Returns
+    -------
+    uint8 array, shape (height, width, 3)
+    """
+    image = np.empty((scene.height, scene.width, 3), dtype=np.uint8)
+    image[...] = np.floor(np.multiply(scene.background, 255) + 0.5)
+    # Of several writes to a place the last counts, as in hardware.
+    image[y, x] = color
+    return image
+
+
+def triangle_frame(scene: Scene, renderer: Renderer, angle: float = SPAN_ANGLE) -> TriangleFrame:
+    """Frame by the bit-accurate models: the image of the simulated hardware to the bit.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to draw: at most as many lights as the design has, and as many materials.
+    renderer : Renderer
+        Geometry and shading.
+    angle : float
+        Widest piece of a span in degrees, 0 to 59.
+
+    Raises
+    ------
+    ValueError
+        If the scene has point lights or a near viewer, or does not fit the design.
+    """
+    sent = sent_triangles(scene, renderer, angle)
+    drawn = renderer.compute(sent.triangles, sent.frame, constants_of(scene, renderer.design))
+    owner = np.full((scene.height, scene.width), -1, dtype=np.int64)
+    owner[drawn.y, drawn.x] = sent.source[drawn.triangle]
+    return TriangleFrame(frame_of_pixels(scene, drawn.x, drawn.y, drawn.color), sent, owner, drawn.counts)

@@ -1,0 +1,87 @@
+"""Geometry ([T] figure 4.10): triangles to spans."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from blysk.golden.geometry.attribute_serialiser import AttributeSerialiser
+from blysk.golden.geometry.edge_normals import EdgeNormals, TrueSpans
+from blysk.golden.geometry.edge_setup import EdgeSetup
+from blysk.golden.geometry.edge_walk import EdgeWalk
+from blysk.golden.geometry.gradient_setup import GradientSetup
+from blysk.golden.geometry.plane_assembler import PlaneAssembler, Planes
+from blysk.golden.geometry.plane_setup import PlaneSetup
+from blysk.golden.geometry.span_attributes import SpanAttributes
+from blysk.golden.geometry.span_clip import ClippedRows, SpanClip
+from blysk.golden.geometry.triangles import ATTRIBUTE, GRID, Frame, Grid, Triangles
+from blysk.golden.geometry.vertex_sort import SortedTriangles, VertexSort
+from blysk.golden.number.fixed import Fixed
+
+__all__ = ["COUNTERS", "Geometry"]
+
+COUNTERS = ("empty", "zero_area", "culled", "sliver", "cut", "repaired")
+"""What is counted: triangles without a span, without area, culled, slivers; spans cut; normals repaired."""
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """The bit-accurate models of the units in a row: `VertexSort` to `EdgeNormals`.
+
+    Parameters
+    ----------
+    grid : Grid
+        Fraction bits of the coordinates.
+
+    Source: docs/theory/geometry.md#composition; [T] figure 4.10.
+    """
+
+    grid: Grid = GRID
+
+    def rows(
+        self, triangles: Triangles, frame: Frame
+    ) -> tuple[SortedTriangles, ClippedRows, np.ndarray, dict[str, int]]:
+        """Coverage alone: sorted triangles, their scanlines, the triangle of each, and the counts so far."""
+        drawn, counts = VertexSort(self.grid).compute(triangles, frame)
+        edges = EdgeSetup(self.grid).compute(drawn)
+        rows = EdgeWalk().compute(edges, drawn, frame)
+        clipped = SpanClip().compute(rows, frame)
+        return drawn, clipped, rows.triangle, counts
+
+    def planes(self, drawn: SortedTriangles, frame: Frame) -> tuple[Planes, int]:
+        """Gradients of sorted triangles, and how many are slivers."""
+        scales = PlaneSetup(self.grid).compute(drawn, EdgeSetup(self.grid).compute(drawn))
+        corners = (Fixed(ATTRIBUTE, drawn.triangles.attributes[:, k]) for k in range(3))
+        gradients = GradientSetup().compute(*corners, scales)
+        planes = PlaneAssembler().compute(gradients, AttributeSerialiser().least(drawn.triangles), frame)
+        return planes, int(scales.sliver.sum())
+
+    def compute(self, triangles: Triangles, frame: Frame) -> tuple[TrueSpans, dict[str, int]]:
+        """Bit-accurate spans, and what was counted.
+
+        Parameters
+        ----------
+        triangles : Triangles
+            In the order of drawing.
+        frame : Frame
+            The picture, back faces, and the limit of a span's width.
+
+        Returns
+        -------
+        spans : TrueSpans
+            In the order of the triangles, of one from top to bottom, of a scanline from the long edge on;
+            their ``triangle`` is the index among those that came.
+        counts : dict of str to int
+            `COUNTERS`.
+        """
+        drawn, rows, _, counts = self.rows(triangles, frame)
+        planes, sliver = self.planes(drawn, frame)
+        pieces, more = SpanAttributes().compute(rows, planes)
+        spans, repaired = EdgeNormals().compute(pieces)
+        counts = {
+            **counts,
+            "empty": counts["empty"] + more["empty"],
+            "sliver": sliver,
+            "cut": more["cut"],
+            "repaired": repaired,
+        }
+        return replace(spans, triangle=drawn.source[spans.triangle]), counts

@@ -1,0 +1,207 @@
+"""Gradient setup: one attribute's start and steps along the long edge and along a scanline."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.geometry.edge_setup import FRACTION_BITS
+from blysk.golden.geometry.plane_setup import PlaneScales, PlaneSetup
+from blysk.golden.geometry.triangles import ATTRIBUTE
+from blysk.golden.geometry.wide_product import LOST, halves, wide_product
+from blysk.golden.number.fixed import SQ, UQ, Fixed
+
+__all__ = ["GradientSetup", "Gradients"]
+
+
+@dataclass(frozen=True)
+class Gradients:
+    """How attributes change over triangles, any shape; all modulo 4.
+
+    Parameters
+    ----------
+    start : Fixed, SQ(2, 28)
+        Value at the centre of the pixel at the long edge, on the first scanline.
+    short, long : Fixed, SQ(2, 32)
+        What is added to go down a scanline, without the long edge's carry and with it.
+    inward : Fixed, SQ(2, 32)
+        What is added to go a pixel away from the long edge.
+    size : int64 array
+        At least the size of `inward` before it is taken modulo 4, in 2^-20; at most ``2^20 - 1``, for all
+        that is over.
+    """
+
+    start: Fixed
+    short: Fixed
+    long: Fixed
+    inward: Fixed
+    size: np.ndarray
+
+    @property
+    def beats(self) -> dict:
+        """What the hardware gives."""
+        return {
+            name: value.codes if isinstance(value, Fixed) else value for name, value in vars(self).items()
+        }
+
+
+@dataclass(frozen=True)
+class GradientSetup:
+    """The plane of an attribute v in the form that the walk along the long edge needs.
+
+    With the corners' values v0, v1, v2 from the top, ``r`` the step of v along the long edge per scanline and
+    ``g`` the step per pixel away from that edge, both without a difference of large numbers:
+
+        r = (v2 - v0) / D,    g = (v1 - v0 - r D1) / W
+
+    D is the height, D1 that of the middle corner, W the width there. Every value in the triangle is
+    ``v0 + r (y - y0) + g |x - X(y)|``, a mean of corners' values whose weights are off by little, however
+    thin the triangle is.
+
+    The pixel at the long edge moves by whole columns, so that v moves by ``short = r - f g`` a scanline,
+    ``f`` the fraction of the edge's step, and by ``long = short + g`` with the walk's carry (g and f with the
+    other sign where the edge is on the right). Its start, ``down`` k below the first corner, is
+    ``v0 + (k short + n g) / 256``: ``n = along`` of `Edges` if the edge is on the left, ``256 - along`` if on
+    the right.
+
+    ============ ============ =====================================================================
+    word         format       why
+    ============ ============ =====================================================================
+    v            SQ(1, 23)
+    r D          SQ(2, 24)    `wide_product`, 7 and 9 low bits
+    v1 - v0 - r D1  SQ(2, 24) `wide_product`, 8 and 3 low bits; saturates
+    g W'         SQ(2, 24)    `wide_product` with the mantissa of 1/W, 8 and 8 low bits
+    f            UQ(0, 33)    32 bits, and a 1 for the half step that they leave out
+    f g W'       SQ(2, 40)    `wide_product`, 16 and 8 low bits; cut, not rounded
+    r, g, f g    SQ(10, 32)   shifted by the scales' exponents, rounded half up
+    k short, n g fraction 28  one sum, cut after the division by 256
+    ============ ============ =====================================================================
+
+    Sums are taken modulo 4 once they are made: attributes are in [-1, 1), so that those of covered pixels are
+    right whatever passes in between. `error` is the bound. Twelve multiplications.
+
+    Source: docs/theory/geometry.md#normals; not in the documents.
+    """
+
+    FORMAT = SQ(2, 32)
+    START_FORMAT = SQ(2, 28)
+    DIFFERENCE_FORMAT = SQ(2, 23)
+    PRODUCT_FORMAT = SQ(2, 24)
+    FRACTION_FORMAT = UQ(0, FRACTION_BITS + 1)
+    SHIFTED_FORMAT = SQ(10, 32)
+    SIZE_BITS = 20
+    DIFFERENCE_LOW = 7
+    PRODUCT_LOW = 8
+    WIDTH_LOW = 8
+    FRACTION_LOW = 16
+
+    @staticmethod
+    def error(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
+        """Bound on the error of an attribute at any pixel that a triangle covers, before it is cut.
+
+        ``r D`` is off by ``e1 = 2 E + L``, E that of the reciprocal, L that of a `wide_product`, as v2 - v0
+        is below 2; ``v1 - v0 - r D1`` by ``2 e1 + L``; ``g W'`` by ``e2``, that and ``2 w + L``, w the
+        relative error of 1/W. Over the height r passes at most 2 times its error, g over the width, too, as
+        the mantissas are below 2 and at least 1/2. A scanline adds the roundings of r, f g and g, 2^-33 each,
+        and what f and the product f g leave out, 2^-33 each times a g of at most 2/W; a column adds that of
+        g, and the start four cuts at 2^-28.
+
+        Parameters
+        ----------
+        rows : array
+            Scanlines of the triangles.
+        width : array
+            Their widths W in pixels, more than 1/256.
+        """
+        product = LOST * 2.0**-24 + 2.0**-32
+        along = PlaneSetup.HEIGHT_ERROR + product
+        inward = 2 * along + product + 2 * PlaneSetup.WIDTH_ERROR + product
+        row = 3 * 2.0**-33 + 2 / width * (2.0**-32 + 2.0**-39)
+        return 2 * along + 2 * inward + (rows + 1) * row + (width + 1) * 2.0**-33 + 2.0**-26
+
+    def compute(self, first: Fixed, middle: Fixed, last: Fixed, scales: PlaneScales) -> Gradients:
+        """Bit-accurate gradients.
+
+        Parameters
+        ----------
+        first, middle, last : Fixed, shape (T, ...), SQ(1, 23)
+            An attribute's values at the sorted corners, or those of several attributes.
+        scales : PlaneScales
+            Of the triangles, from `PlaneSetup`.
+
+        Raises
+        ------
+        ValueError
+            If an operand has another format.
+        """
+        if {v.format for v in (first, middle, last)} != {ATTRIBUTE}:
+            raise ValueError(f"operands must be {ATTRIBUTE}")
+
+        def each(values: np.ndarray) -> np.ndarray:
+            return values.reshape(-1, *(1,) * (first.codes.ndim - 1))
+
+        def scale(value: Fixed) -> Fixed:
+            return Fixed(value.format, each(value.codes))
+
+        right = each(scales.right)
+        product = self.PRODUCT_FORMAT
+        point = product.fraction_bits
+        along = wide_product(
+            (last - first).wrap(self.DIFFERENCE_FORMAT),
+            scale(scales.height_reciprocal),
+            self.DIFFERENCE_LOW,
+            PlaneSetup.RECIPROCAL_LOW,
+            point,
+        ).wrap(product)
+        knee = wide_product(along, scale(scales.knee), self.PRODUCT_LOW, PlaneSetup.HEIGHT_LOW, point)
+        across = ((middle - first).extend(SQ(3, point)) - knee).saturate(product)
+        inward = wide_product(
+            across, scale(scales.width_reciprocal), self.PRODUCT_LOW, self.WIDTH_LOW, point
+        ).wrap(product)
+        fraction = Fixed(self.FRACTION_FORMAT, 2 * each(scales.fraction) + 1)
+        part = self._part(fraction, inward)
+
+        row = self._shifted(along, each(scales.row_shift))
+        inward = self._shifted(inward, each(scales.column_shift))
+        part = self._shifted(part, each(scales.column_shift))
+        short = Fixed((row - part).format, np.where(right, (row + part).codes, (row - part).codes))
+        long = Fixed((short - inward).format, np.where(right, (short - inward).codes, (short + inward).codes))
+        start = self._start(first, short, inward, each(scales.down), each(scales.along), right)
+        size = np.where(inward.codes < 0, ~inward.codes, inward.codes)
+        size = (size >> (self.FORMAT.fraction_bits - self.SIZE_BITS)) + 1
+        return Gradients(
+            start=start,
+            short=short.wrap(self.FORMAT),
+            long=long.wrap(self.FORMAT),
+            inward=inward.wrap(self.FORMAT),
+            size=np.minimum(size, (1 << self.SIZE_BITS) - 1),
+        )
+
+    def _part(self, fraction: Fixed, inward: Fixed) -> Fixed:
+        """``f g W'``, cut to 40 fraction bits."""
+        (f_high, f_low), (g_high, g_low) = (
+            halves(fraction, self.FRACTION_LOW),
+            halves(inward, self.PRODUCT_LOW),
+        )
+        parts = f_high * g_high, (f_high * g_low).truncate(40), (f_low * g_high).truncate(40)
+        return (parts[0] + (parts[1] + parts[2])).wrap(SQ(2, 40))
+
+    def _shifted(self, value: Fixed, shift: np.ndarray) -> Fixed:
+        """``2^8 value``, shifted right and rounded half up."""
+        word = value.scale(8).extend(self.SHIFTED_FORMAT).codes
+        return Fixed(self.SHIFTED_FORMAT, ((word << 1 >> shift) + 1) >> 1)
+
+    def _start(
+        self,
+        first: Fixed,
+        short: Fixed,
+        inward: Fixed,
+        down: np.ndarray,
+        along: np.ndarray,
+        right: np.ndarray,
+    ) -> Fixed:
+        point = self.START_FORMAT.fraction_bits
+        n = np.where(right, 256 - along, along)
+        short, inward = short.truncate(point), inward.truncate(point)
+        total = (down * short.codes + (n & 255) * inward.codes) >> 8
+        total = total + (n >> 8) * inward.codes + first.extend(SQ(1, point)).codes
+        return Fixed(self.START_FORMAT, self.START_FORMAT.wrap(total))

@@ -1,0 +1,151 @@
+"""From a scene to the triangles that the hardware takes: projection, clipping, rounding, in float64."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, Frame, Grid, Triangles
+from blysk.golden.reference.scene import Scene
+
+__all__ = ["SceneTriangles", "scene_triangles"]
+
+_LARGEST = ATTRIBUTE.max_code
+# Nothing is as far as the depth that a picture is cleared to.
+_FARTHEST = DEPTH.max_code - 1
+
+
+@dataclass(frozen=True)
+class SceneTriangles:
+    """The triangles of a scene, ready to be sent.
+
+    Parameters
+    ----------
+    triangles : Triangles
+        In the order of the mesh; the pieces of a clipped one follow each other.
+    frame : Frame
+        The picture.
+    source : int64 array, shape (T,)
+        Face of the mesh that each is, or is a piece of.
+    clipped : int
+        Faces of which the near plane or the guard band cut something off.
+    outside : int
+        Faces left out because nothing of them is between the near plane and the guard band.
+    """
+
+    triangles: Triangles
+    frame: Frame
+    source: np.ndarray
+    clipped: int
+    outside: int
+
+    def by_material(self) -> "SceneTriangles":
+        """The same, those of one material after the other; within one the order stays."""
+        order = np.argsort(self.triangles.material, kind="stable")
+        return replace(self, triangles=self.triangles[order], source=self.source[order])
+
+
+def scene_triangles(scene: Scene, grid: Grid = GRID, limit: int = Frame.limit) -> SceneTriangles:
+    """Transform a scene's triangles, clip and round them.
+
+    Vertices go through the camera in float64. A triangle is cut by the near plane and by the guard band, so
+    that its coordinates fit the grid; those inside both stay whole. Positions are rounded to the nearest step
+    of the grid. A normal is divided by W over the largest 1/W of its triangle and rounded to `ATTRIBUTE`. The
+    depth is ``-1/W`` in a perspective, or the distance along the line of sight: linear on the screen, from 0
+    at the nearest corner of the frame to 2^24 - 2 at the farthest, rounded.
+
+    Parameters
+    ----------
+    scene : Scene
+        At most 4095 pixels wide and high; the picture is in the middle of the grid.
+    grid : Grid
+        Fraction bits of the coordinates.
+    limit : int
+        `Frame.limit`.
+
+    Returns
+    -------
+    SceneTriangles
+    """
+    frame = Frame.centred(scene.width, scene.height, back_faces=scene.back_faces, limit=limit)
+    mesh = scene.mesh
+    homogeneous = scene.camera.homogeneous(mesh.vertices, scene.width, scene.height)
+    # The grid's origin is in the middle of the picture.
+    homogeneous[:, 0] += frame.left * homogeneous[:, 2]
+    homogeneous[:, 1] += frame.top * homogeneous[:, 2]
+    records = np.concatenate((homogeneous[mesh.faces], mesh.normals[mesh.faces]), axis=-1)
+    source = np.arange(len(records))
+    low, high = grid.coordinate.min_code / grid.steps, grid.coordinate.max_code / grid.steps
+    # Half a step of the grid is left for the rounding.
+    planes = [np.array([0.0, 0.0, 0.0, 1.0, -scene.camera.near])]
+    for axis in (0, 1):
+        for sign, bound in ((1.0, low), (-1.0, high)):
+            plane = np.zeros(5)
+            plane[axis], plane[2] = sign, -sign * bound
+            planes.append(plane)
+    whole = len(records)
+    cut = np.zeros(whole, dtype=bool)
+    for plane in planes:
+        records, source, crossed = _clip(records, source, plane)
+        cut[crossed] = True
+    order = np.argsort(source, kind="stable")
+    records, source = records[order], source[order]
+    present = np.zeros(whole, dtype=bool)
+    present[source] = True
+
+    w = records[..., 2]
+    position = np.rint(records[..., :2] / w[..., np.newaxis] * grid.steps).astype(np.int64)
+    position = np.clip(position, grid.coordinate.min_code, grid.coordinate.max_code)
+    normal = records[..., 4:] * (w.min(axis=1, keepdims=True) / w)[..., np.newaxis]
+    depth = -1 / w if scene.camera.projection == "perspective" else records[..., 3]
+    near, far = (depth.min(), depth.max()) if len(depth) else (0.0, 1.0)
+    depth = (depth - near) * (_FARTHEST / ((far - near) or 1.0))
+    triangles = Triangles(
+        x=position[..., 0],
+        y=position[..., 1],
+        depth=np.rint(depth).astype(np.int64),
+        normal=np.clip(np.rint(normal * 2.0**ATTRIBUTE.fraction_bits), -_LARGEST, _LARGEST).astype(np.int64),
+        material=mesh.material[source].astype(np.int64),
+    )
+    return SceneTriangles(triangles, frame, source, int((cut & present).sum()), int((~present).sum()))
+
+
+def _clip(
+    records: np.ndarray, source: np.ndarray, plane: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cut triangles by a plane, a row that is not negative inside; also which faces were cut."""
+    distance = records[..., :4] @ plane[:4] + plane[4]
+    inside = distance >= 0
+    count = inside.sum(axis=1)
+    kept, kept_source = [records[count == 3]], [source[count == 3]]
+    crossed = (count > 0) & (count < 3)
+    for corners_inside in (1, 2):
+        chosen = np.flatnonzero(count == corners_inside)
+        # The odd corner out becomes the first, the winding stays.
+        odd = (inside[chosen] == (corners_inside == 1)).argmax(axis=1)
+        turn = (odd[:, np.newaxis] + np.arange(3)) % 3
+        rows = chosen[:, np.newaxis]
+        first, second, third = np.moveaxis(records[rows, turn], 1, 0)
+        d_first, d_second, d_third = distance[rows, turn].T
+        if corners_inside == 1:
+            pieces = [
+                (
+                    first,
+                    _between(first, second, d_first, d_second),
+                    _between(first, third, d_first, d_third),
+                )
+            ]
+        else:
+            to_second = _between(second, first, d_second, d_first)
+            to_third = _between(third, first, d_third, d_first)
+            pieces = [(second, third, to_third), (second, to_third, to_second)]
+        for piece in pieces:
+            kept.append(np.stack(piece, axis=1))
+            kept_source.append(source[chosen])
+    return np.concatenate(kept), np.concatenate(kept_source), source[crossed]
+
+
+def _between(inner: np.ndarray, outer: np.ndarray, d_inner: np.ndarray, d_outer: np.ndarray) -> np.ndarray:
+    """Where the line from an inner to an outer corner meets the plane: always from the inside, so that two
+    triangles cut their shared edge in the same bits.
+    """
+    return inner + (d_inner / (d_inner - d_outer))[:, np.newaxis] * (outer - inner)

@@ -1,0 +1,164 @@
+"""Span attributes: N/W and depth at both ends of every span, and of every piece of a wide one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.geometry.gradient_setup import GradientSetup
+from blysk.golden.geometry.plane_assembler import Planes
+from blysk.golden.geometry.span_clip import ClippedRows
+from blysk.golden.number.fixed import SQ, UQ, Fixed
+
+__all__ = ["DEPTH_STEP", "SPAN_DEPTH", "SPAN_NORMAL", "Pieces", "SpanAttributes"]
+
+SPAN_NORMAL = SQ(1, 26)
+"""Number format of a component of N/W at a pixel."""
+
+SPAN_DEPTH = UQ(24, 9)
+"""Number format of the depth at a pixel."""
+
+DEPTH_STEP = SQ(25, 9)
+"""Number format of the step of the depth from a pixel to the next."""
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Spans, or pieces of them, before their normals have unit length.
+
+    Parameters
+    ----------
+    x, y, length : int64 arrays, shape (S,)
+        First pixel, and pixels from there on, 1 or more.
+    left, right : Fixed, shape (S, 3), SQ(1, 26)
+        N/W at the first and at the last pixel's centre.
+    depth : Fixed, shape (S,), UQ(24, 9)
+        At the first pixel.
+    depth_last : Fixed, shape (S,), UQ(24, 9)
+        At the last pixel.
+    depth_step : Fixed, shape (S,), SQ(25, 9)
+        From a pixel to the next; of a single pixel it means nothing.
+    flip : bool array, shape (S,)
+        Normals are to be negated.
+    material : int64 array, shape (S,)
+    triangle : int64 array, shape (S,)
+        Index of the triangle.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    length: np.ndarray
+    left: Fixed
+    right: Fixed
+    depth: Fixed
+    depth_last: Fixed
+    depth_step: Fixed
+    flip: np.ndarray
+    material: np.ndarray
+    triangle: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    @property
+    def beats(self) -> dict:
+        """What the hardware gives."""
+        return {
+            name: value.codes if isinstance(value, Fixed) else value
+            for name, value in vars(self).items()
+            if name != "triangle"
+        }
+
+
+@dataclass(frozen=True)
+class SpanAttributes:
+    """Accumulators along the long edge, and from there along each span by shifts and additions.
+
+    Down a scanline the value at the long edge's pixel takes `Gradients.short` or, with the walk's carry,
+    `Gradients.long`: no product. Along the scanline it takes ``n inward`` to the pixel n from the edge, a sum
+    of shifts of ``inward`` for the ones of n, which takes as many cycles as n has bits and so never more than
+    the span has pixels. What the picture's border cuts off at the long edge is skipped in the same way.
+
+    A span of more than ``2^piece`` pixels leaves as pieces of that many, from the long edge on, and a last
+    one: each as a span of its own with the true normals at both its ends.
+
+    Values are exact sums of the gradients' codes, modulo 4; they are cut to the pieces' formats, and saturate
+    where errors carry them over the ends.
+
+    Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
+    """
+
+    def compute(self, rows: ClippedRows, planes: Planes) -> tuple[Pieces, dict[str, int]]:
+        """Bit-accurate pieces, and the counts of triangles without a span and of spans that were cut.
+
+        Parameters
+        ----------
+        rows : ClippedRows
+            From `SpanClip`.
+        planes : Planes
+            Of the triangles whose scanlines they are, from `PlaneAssembler`.
+
+        Returns
+        -------
+        pieces : Pieces
+            In the order of the scanlines, of one from the long edge on.
+        counts : dict of str to int
+            ``empty`` and ``cut``.
+        """
+        format = GradientSetup.FORMAT
+        gradients = planes.gradients
+        first = np.r_[True, rows.last[:-1]] if len(rows) else np.zeros(0, dtype=bool)
+        triangle = np.cumsum(first) - 1
+        row = np.arange(len(rows)) - np.flatnonzero(first)[triangle]
+        carries = np.cumsum(rows.carry) - rows.carry
+        carries = carries - carries[first][triangle]
+
+        spans = np.flatnonzero(rows.length)
+        triangle, row, carries = triangle[spans], row[spans], carries[spans]
+        short, long, inward = (
+            value.codes[triangle] for value in (gradients.short, gradients.long, gradients.inward)
+        )
+        start = gradients.start.extend(format).codes[triangle]
+        skip = rows.skip[spans]
+        edge = format.wrap(start + row[:, np.newaxis] * short + carries[:, np.newaxis] * (long - short))
+        edge = edge + skip[:, np.newaxis] * inward
+
+        length, most = rows.length[spans], 1 << planes.piece[triangle]
+        count = -(-length // most)
+        span = np.repeat(np.arange(len(spans)), count)
+        number = np.arange(len(span)) - np.repeat(np.cumsum(count) - count, count)
+        before = number * most[span]
+        pixels = np.minimum(length[span] - before, most[span])
+        near = format.wrap(edge[span] + before[:, np.newaxis] * inward[span])
+        far = format.wrap(near + (pixels - 1)[:, np.newaxis] * inward[span])
+        source = triangle[span]
+        right = rows.right[spans][span]
+        x = rows.x[spans][span]
+        turned = right[:, np.newaxis]
+        left_end, right_end = np.where(turned, far, near), np.where(turned, near, far)
+        step = inward[span, 3]
+        pieces = Pieces(
+            x=np.where(right, x + length[span] - before - pixels, x + before),
+            y=rows.y[spans][span],
+            length=pixels,
+            left=_normal(left_end),
+            right=_normal(right_end),
+            depth=_depth(left_end),
+            depth_last=_depth(right_end),
+            depth_step=Fixed(DEPTH_STEP, format.wrap(np.where(right, -step, step))),
+            flip=rows.flip[spans][span],
+            material=rows.material[spans][span],
+            triangle=source,
+        )
+        drawn = np.zeros(len(planes), dtype=bool)
+        drawn[triangle] = True
+        return pieces, {"empty": int((~drawn).sum()), "cut": int((count > 1).sum())}
+
+
+def _normal(codes: np.ndarray) -> Fixed:
+    value = Fixed(GradientSetup.FORMAT, codes[:, :3])
+    return value.truncate(SPAN_NORMAL.fraction_bits).saturate(SPAN_NORMAL)
+
+
+def _depth(codes: np.ndarray) -> Fixed:
+    value = Fixed(GradientSetup.FORMAT, codes[:, 3]).saturate(SQ(1, GradientSetup.FORMAT.fraction_bits))
+    return Fixed(SPAN_DEPTH, value.codes - value.format.min_code)

@@ -1,0 +1,81 @@
+"""Span clip ([T] figure 4.10, screen coordinates): scanlines of triangles cut to the picture."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.geometry.edge_walk import Rows
+from blysk.golden.geometry.triangles import Frame
+
+__all__ = ["ClippedRows", "SpanClip"]
+
+
+@dataclass(frozen=True)
+class ClippedRows:
+    """Scanlines of triangles, cut to the picture.
+
+    Parameters
+    ----------
+    x, y : int64 arrays, shape (R,)
+        First column, and scanline, counted from the picture's top left pixel; 0 where ``length`` is.
+    length : int64 array, shape (R,)
+        Pixels, 0 to 4095.
+    skip : int64 array, shape (R,)
+        Pixels cut off at the long edge; 0 where ``length`` is.
+    carry, last, right, flip : bool arrays, shape (R,)
+    material : int64 array, shape (R,)
+        As `Rows` has them.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    length: np.ndarray
+    skip: np.ndarray
+    carry: np.ndarray
+    last: np.ndarray
+    right: np.ndarray
+    flip: np.ndarray
+    material: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+    @property
+    def beats(self) -> dict:
+        """What the hardware gives."""
+        return dict(vars(self))
+
+
+@dataclass(frozen=True)
+class SpanClip:
+    """``x = max(begin, left)``, ``length = min(end, right) - x``; nothing above the picture.
+
+    A scanline of which nothing is left goes on with length 0: what follows the long edge counts it, and
+    makes no span of it.
+
+    Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
+    """
+
+    def compute(self, rows: Rows, frame: Frame) -> ClippedRows:
+        """Bit-accurate scanlines in the picture.
+
+        Parameters
+        ----------
+        rows : Rows
+            From `EdgeWalk`.
+        frame : Frame
+            The picture.
+        """
+        begin, end = np.maximum(rows.begin, frame.left), np.minimum(rows.end, frame.right)
+        covered = (end > begin) & (rows.y >= frame.top)
+        return ClippedRows(
+            x=np.where(covered, begin - frame.left, 0),
+            y=np.where(covered, rows.y - frame.top, 0),
+            length=np.where(covered, end - begin, 0),
+            skip=np.where(covered, np.where(rows.right, rows.end - end, begin - rows.begin), 0),
+            carry=rows.carry,
+            last=rows.last,
+            right=rows.right,
+            flip=rows.flip,
+            material=rows.material,
+        )

@@ -1,0 +1,198 @@
+"""Triangles as the hardware takes them: corners on a sub-pixel grid with depth and scaled normal."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.number.fixed import SQ, UQ, Format
+from blysk.golden.reference.scene import BACK_FACES
+
+__all__ = [
+    "ATTRIBUTE",
+    "ATTRIBUTES",
+    "DEPTH",
+    "GRID",
+    "LIMIT_BITS",
+    "MATERIAL_BITS",
+    "PIXEL_BITS",
+    "Frame",
+    "Grid",
+    "Triangles",
+]
+
+PIXEL_BITS = 12
+"""Bits of a coordinate before the binary point: pixels -2048 to 2047."""
+
+ATTRIBUTE = SQ(1, 23)
+"""Number format of what is interpolated: components of N/W, and the depth over half its range."""
+
+ATTRIBUTES = 4
+"""Components of N/W, then the depth."""
+
+DEPTH = UQ(24, 0)
+"""Number format of a corner's depth, 0 nearest."""
+
+LIMIT_BITS = 10
+"""Bits of a frame's limit."""
+
+MATERIAL_BITS = 10
+"""Bits of the index of a material."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The grid of corners: fractions of a pixel, and what follows from them.
+
+    Pixel i has its centre at ``i + 1/2``, which is ``i 2^s + 2^(s-1)`` in steps of the grid.
+
+    Parameters
+    ----------
+    subpixel_bits : int
+        Fraction bits s of a coordinate: 4 or 8.
+
+    Raises
+    ------
+    ValueError
+        If it is neither.
+    """
+
+    subpixel_bits: int = 8
+
+    def __post_init__(self):
+        if self.subpixel_bits not in (4, 8):
+            raise ValueError(f"subpixel_bits must be 4 or 8, not {self.subpixel_bits!r}")
+
+    @property
+    def coordinate(self) -> Format:
+        """Number format of a coordinate, in pixels."""
+        return SQ(PIXEL_BITS, self.subpixel_bits)
+
+    @property
+    def bits(self) -> int:
+        """Bits of a coordinate, and of the difference of two in sorted order."""
+        return self.coordinate.width
+
+    @property
+    def steps(self) -> int:
+        """Steps of the grid in a pixel."""
+        return 1 << self.subpixel_bits
+
+    @property
+    def half(self) -> int:
+        """Steps from a pixel's border to its centre."""
+        return self.steps // 2
+
+    def first_centre(self, codes: np.ndarray) -> np.ndarray:
+        """First pixel whose centre is not before a coordinate: ``ceil((c - half) / steps)``."""
+        return (codes + (self.half - 1)) >> self.subpixel_bits
+
+
+GRID = Grid()
+"""The grid of 1/256 pixel."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What stays while the triangles of a frame pass.
+
+    Parameters
+    ----------
+    left, top, right, bottom : int
+        The picture, in pixels of the grid: columns ``left`` to ``right - 1``, scanlines ``top`` to
+        ``bottom - 1``, each at least one and at most 4095; from -2048 to 2048.
+    back_faces : str
+        One of `BACK_FACES`.
+    limit : int
+        Largest chord between the unit normals of a span's ends, in 1/1024: 0 to 1023. See
+        `PlaneAssembler`; `limit_of` gives it for an angle.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range.
+    """
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+    back_faces: str = "flip"
+    limit: int = 267
+
+    def __post_init__(self):
+        for low, high in (("left", "right"), ("top", "bottom")):
+            first, end = getattr(self, low), getattr(self, high)
+            if not (-2048 <= first < end <= 2048 and end - first <= 4095):
+                raise ValueError(
+                    f"a frame's {low} and {high} must be 1 to 4095 apart, from -2048 to 2048, "
+                    f"not {first} and {end}"
+                )
+        if self.back_faces not in BACK_FACES:
+            raise ValueError(f"back_faces must be one of {', '.join(BACK_FACES)}, not {self.back_faces!r}")
+        if not 0 <= self.limit < 1 << LIMIT_BITS:
+            raise ValueError(f"a frame's limit must be 0 to {(1 << LIMIT_BITS) - 1}, not {self.limit}")
+
+    @classmethod
+    def centred(cls, width: int, height: int, **options) -> "Frame":
+        """The picture in the middle of the grid, so that the guard band is as wide on either side."""
+        left, top = -(width // 2), -(height // 2)
+        return cls(left, top, left + width, top + height, **options)
+
+    @staticmethod
+    def limit_of(angle: float) -> int:
+        """The largest ``limit`` of which no span is wider than an angle in degrees, 0 to 59."""
+        return min(int(2048 * np.sin(np.radians(angle) / 2)), (1 << LIMIT_BITS) - 1)
+
+    @property
+    def codes(self) -> dict[str, int]:
+        """What the hardware is given."""
+        return {
+            "left": self.left,
+            "top": self.top,
+            "right": self.right,
+            "bottom": self.bottom,
+            "back_faces": BACK_FACES.index(self.back_faces),
+            "limit": self.limit,
+        }
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """Triangles in codes, corner by corner.
+
+    Parameters
+    ----------
+    x, y : int64 arrays, shape (T, 3)
+        Corners in steps of the grid, y down.
+    depth : int64 array, shape (T, 3)
+        0 to 2^24 - 1, linear on the screen, less when nearer.
+    normal : int64 array, shape (T, 3, 3)
+        Components of N/W over the largest 1/W of the triangle, `ATTRIBUTE`; the last axis is x, y, z.
+    material : int64 array, shape (T,)
+        Index of the material.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    depth: np.ndarray
+    normal: np.ndarray
+    material: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    def __getitem__(self, key) -> "Triangles":
+        """Triangles picked by a NumPy index."""
+        return Triangles(self.x[key], self.y[key], self.depth[key], self.normal[key], self.material[key])
+
+    @property
+    def attributes(self) -> np.ndarray:
+        """Codes of what is interpolated, shape (T, 3, 4): N/W, then the depth less half its range."""
+        depth = self.depth + ATTRIBUTE.min_code
+        return np.concatenate((self.normal, depth[..., np.newaxis]), axis=-1)
+
+    @property
+    def beats(self) -> dict:
+        """What is sent to the hardware."""
+        names = ("x", "y", "depth", "normal", "material")
+        return {name: getattr(self, name) for name in names}

@@ -1,0 +1,135 @@
+"""Vertex sort ([T] figure 4.10): corners from top to bottom, orientation, and what is not drawn at all."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from blysk.golden.geometry.triangles import GRID, Frame, Grid, Triangles
+
+__all__ = ["SortedTriangles", "VertexSort"]
+
+
+@dataclass(frozen=True)
+class SortedTriangles:
+    """Triangles to be drawn, their corners from top to bottom, and from left to right on one height.
+
+    Parameters
+    ----------
+    triangles : Triangles
+        With sorted corners.
+    area : int64 array, shape (T,)
+        Twice the area in squared steps of the grid, at least 1.
+    right : bool array, shape (T,)
+        The long edge, from the first corner to the last, is on the right.
+    flip : bool array, shape (T,)
+        Normals are to be negated.
+    source : int64 array, shape (T,)
+        Index of each among those that came.
+    """
+
+    triangles: Triangles
+    area: np.ndarray
+    right: np.ndarray
+    flip: np.ndarray
+    source: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.area)
+
+    @property
+    def beats(self) -> dict:
+        """What the hardware gives."""
+        return self.triangles.beats | {"area": self.area, "right": self.right, "flip": self.flip}
+
+
+@dataclass(frozen=True)
+class VertexSort:
+    """Sorts the corners of a triangle by y, then x, and drops triangles that give no span.
+
+    In this order a triangle is
+
+    1. counted as ``empty`` and dropped where no pixel of the picture has its centre in the triangle's box,
+       the box's right and lower side left out. The top-left rule covers no centre there, so that no pixel
+       is lost;
+    2. counted as ``zero_area`` and dropped where twice its area,
+       ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)``, is 0;
+    3. counted as ``culled`` and dropped where it is seen from behind and the frame asks for that. Corners
+       that are counterclockwise as seen, y up, face the viewer.
+
+    A sorted triangle has its long edge on the right where a of the sorted corners is negative. All is exact.
+
+    Parameters
+    ----------
+    grid : Grid
+        Fraction bits of the coordinates.
+
+    Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
+    """
+
+    grid: Grid = GRID
+
+    def order(self, triangles: Triangles) -> np.ndarray:
+        """Index of the corners from top to bottom, shape (T, 3): a key of y, then x; equal ones stay."""
+        key = (triangles.y << (self.grid.bits + 1)) + triangles.x
+        return np.argsort(key, axis=1, kind="stable")
+
+    def compute(self, triangles: Triangles, frame: Frame) -> tuple[SortedTriangles, dict[str, int]]:
+        """Triangles to be drawn, and the counts of the others.
+
+        Parameters
+        ----------
+        triangles : Triangles
+            Corners in the grid's range.
+        frame : Frame
+            The picture, and what happens to back faces.
+
+        Returns
+        -------
+        sorted : SortedTriangles
+            In the order in which they came.
+        counts : dict of str to int
+            ``empty``, ``zero_area`` and ``culled``.
+
+        Raises
+        ------
+        ValueError
+            If a coordinate is out of range.
+        """
+        code = self.grid.coordinate
+        for values in (triangles.x, triangles.y):
+            if values.size and not (code.min_code <= values.min() and values.max() <= code.max_code):
+                raise ValueError(f"coordinates must be {code}: {code.min_code} to {code.max_code}")
+        covered = np.ones(len(triangles), dtype=bool)
+        for values, first, end in (
+            (triangles.x, frame.left, frame.right),
+            (triangles.y, frame.top, frame.bottom),
+        ):
+            low, high = (self.grid.first_centre(f(values, axis=1)) for f in (np.min, np.max))
+            covered &= np.maximum(low, first) < np.minimum(high, end)
+        source = np.flatnonzero(covered)
+        kept = triangles[source]
+        order = self.order(kept)
+        rows = np.arange(len(kept))[:, np.newaxis]
+        kept = replace(
+            kept, **{name: getattr(kept, name)[rows, order] for name in ("x", "y", "depth", "normal")}
+        )
+        dx, dy = (values[:, 1:] - values[:, :1] for values in (kept.x, kept.y))
+        area = dx[:, 0] * dy[:, 1] - dx[:, 1] * dy[:, 0]
+        # Of a triangle's six orders those three are odd that have one corner in its place or turn two round.
+        odd = (order == np.arange(3)).sum(axis=1) == 1
+        back = (area > 0) ^ odd
+        solid = area != 0
+        drawn = solid & ~back if frame.back_faces == "cull" else solid
+        counts = {
+            "empty": len(triangles) - len(kept),
+            "zero_area": int((~solid).sum()),
+            "culled": int((solid & ~drawn).sum()),
+        }
+        result = SortedTriangles(
+            triangles=kept[drawn],
+            area=np.abs(area[drawn]),
+            right=area[drawn] < 0,
+            flip=back[drawn] & (frame.back_faces == "flip"),
+            source=source[drawn],
+        )
+        return result, counts

@@ -1,0 +1,443 @@
+"""Lobe unit: any curve of 1 - N·H from one small table, addressed by octaves; one multiplier interpolates."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from blysk.golden.lighting.specular import HighlightOperand
+from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
+from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.reference.reflection import BLINN, ReflectionModel
+
+__all__ = ["Lobe", "LobeTable"]
+
+
+@dataclass(frozen=True)
+class Lobe(HighlightOperand):
+    """Any highlight of ``u = 1 - N·H`` from a table that is denser the smaller u is, linear between entries.
+
+    *Address.* The range [0, 1) of u is cut into E octaves, ``[2^-j, 2^(1-j))`` with j = 1 to E, and the rest,
+    ``[0, 2^-E)``. These are the E + 1 *rows* of the table: row 0 is the rest, row E the octave from 1/2. A
+    row has M equal steps. So the distance of two entries is between 1/(2M) and 1/M of u, whatever u is, and
+    ``2^-E / M`` in row 0. The row follows from the position of u's leading one, the step from the m = log2(M)
+    bits after it, and the share f of the step that u has gone from the bits after those.
+
+    *Entries.* There are (E + 1) M of them, and one for the end, u = 1. A word of the memory holds an entry v
+    and its difference D to the next entry, of either sign: 35 bits. A block RAM of 512 by 36 holds 512 words.
+    The term is ``v + D f``, with one product.
+
+    ============= =========== =====================================================================
+    word          format      why
+    ============= =========== =====================================================================
+    u             UQ(1, B)    B is 25, or more for narrower lobes; 0 where negative
+    f             UQ(0, F)    ``F = min(17, B - 1 - m)``; multiplier operand; cut
+    v             UQ(0, 17)   rounded; an entry of 1 is ``1 - 2^-17``
+    D             SQ(1, 17)   exact difference of two v; multiplier operand
+    D f           SQ(1, 17)   cut
+    result        UQ(0, 17)   v + D f is between v and the next entry: it cannot wrap
+    ============= =========== =====================================================================
+
+    *Range.* The term is 0 where N·H is not positive, ``u >= 1``, and for a dark beat. A negative u, which
+    vectors longer than 1 give, counts as 0.
+
+    *Monotone.* Within a word the terms fall with f if D is negative, and rise if it is positive, as a cut
+    keeps the order. As f < 1, ``D f`` is between 0 and D, and so is what the cut to a code makes of it. So no
+    term of a word passes the next entry: over the whole range the term falls where the entries fall. `table`
+    makes entries that fall from every curve that falls.
+
+    *Arithmetic error*, against straight lines between entries that are not rounded: at most 2^-17 from the
+    entries (2^-18 by rounding, 2^-17 for an entry of 1), ``|D| 2^-17`` from the cut of f, 2^-17 from the cut
+    of the product; together at most `ERROR`, 0.006 LSB of an 8-bit channel at intensity 1.
+
+    *Error of the lines.* A line over a step h is off by at most ``h^2/8 max |S''|``, S the curve. In an
+    octave that begins at b, ``h = b/M``: from ``b^2 |S''| <= C`` follows ``C / (8 M^2)``. C is 4/e^2 = 0.54
+    for Blinn's power with a large exponent, 0.5 for the exponent 2, and 3/8 for ``ggx``. Entries are moved
+    towards the curve's other side, which halves the error (`table`). In row 0 ``h = 2^-E/M`` must be small
+    beside the lobe's width: ``ggx`` has ``|S''| <= 24/alpha^4``, which with M = 16 gives an error of 0.035
+    LSB if ``2^-E <= 0.15 alpha^2``. Measured, in LSB, the entries included:
+
+    == == ===== ======================== ======================== =======================================
+    E  M  words ``blinn``, n =           ``beckmann``, alpha =    ``ggx``, alpha =
+                1, 2, 10, 100, 1000      0.03, 0.1, 0.3, 0.6, 1   0.0025, 0.01, 0.03, 0.05, 0.1, 0.3, 0.6
+    == == ===== ======================== ======================== =======================================
+    8  16 144   0.00 0.05 0.03 0.03 0.84 3.60 0.04 0.04 0.06 0.55 172 100 12 2.55 0.20 0.02 0.02
+    12 16 208   0.00 0.05 0.03 0.03 0.03 0.03 0.03 0.04 0.06 0.55 100 5.28 0.10 0.02 0.02 0.02 0.02
+    12 32 416   0.00 0.01 0.01 0.01 0.01 0.01 0.01 0.01 0.02 0.14 69 1.68 0.03 0.01 0.01 0.01 0.01
+    14 32 480   0.00 0.01 0.01 0.01 0.01 0.01 0.01 0.01 0.02 0.14 15 0.13 0.01 0.01 0.01 0.01 0.01
+    15 16 256   0.00 0.05 0.03 0.03 0.03 0.03 0.03 0.04 0.06 0.55 15 0.13 0.02 0.02 0.02 0.02 0.02
+    15 32 512   0.00 0.01 0.01 0.01 0.01 0.01 0.01 0.01 0.02 0.14 5.27 0.03 0.01 0.01 0.01 0.01 0.01
+    20 16 336   0.00 0.05 0.03 0.03 0.03 0.03 0.03 0.04 0.06 0.55 0.03 0.02 0.02 0.02 0.02 0.02 0.02
+    == == ===== ======================== ======================== =======================================
+
+    The default has at most 0.05 LSB for every exponent from 1 to 1000 and for ``ggx`` from alpha = 0.0025
+    (roughness 0.05) on. Beckmann's distribution with a large alpha falls to 0 just before u = 1, where steps
+    are long.
+
+    *Error of u.* It comes on top, times the slope of the lobe: n for Blinn's power, ``4/alpha^2`` for
+    ``ggx``. A step of 2^-25 is 0.008 LSB for n = 1000, and for ``ggx`` 0.3 LSB at alpha = 0.01, 4.9 at
+    0.0025: there B should be 30. With the operand ``cosine``, u is in units of `ONE_SQUARED`, and so too
+    small by ``2^-16 u``: under 0.002 LSB for either lobe. It is cut to B bits, another step. But a cosine
+    also feels the length of the normal: a code that is off by 2^-18 in length moves u by as much, which is 1
+    LSB for n = 1000. The chord form (operand ``one_minus_cosine``) feels that length at second order only.
+
+    *Gate.* A highlight gate passes over arguments whose term is 0, so that the picture is the same to the bit
+    with and without a gate. The largest argument with a term over 0 follows from the table
+    (`LobeTable.last_lit_argument`). A lobe with a long tail may have terms over 0 up to u = 1: ``ggx`` from
+    alpha = 0.044 on. Its gate passes over what faces away from H, and nothing else. For a gate that passes
+    over more, `table` ends the lobe early: entries under a ``cutoff`` are 0. The picture then differs from
+    the model's, with and without a gate alike, by at most the cutoff times the intensity I; with ``cutoff =
+    1/(510 I)`` by half an LSB. A gate that leaves out terms of less than half an LSB that the unit without a
+    gate does not leave out would not be exact: they may change the rounding of a sum.
+
+    *Loading.* A write of 18 bits loads an entry; entries come in order, and the unit works out differences
+    (`LobeTable.writes`). That is (E + 1) M + 2 writes for a table, 338 by default; words of 35 bits would
+    take twice as many. There may be several *banks*, a table each, for materials: then a span of another
+    material takes no write. The memory's word ``(bank (E + 1) + row) M + step`` is of a bank.
+
+    Parameters
+    ----------
+    model : ReflectionModel
+        Model of which `table` makes tables, of N·H. The hardware does not depend on it.
+    operand : str
+        ``"cosine"`` or ``"one_minus_cosine"``; see `HighlightOperand`.
+    octaves : int
+        E, at least 1; ``E + log2 M`` is at most B.
+    steps : int
+        M, a power of two, 2 to 256.
+    banks : int
+        Number of tables, 1 to `MAX_BANKS`.
+    fraction_bits : int
+        B, 20 to 34.
+    cutoff : float
+        Entries of a table under it are 0; at least 0, under 1.
+    fixed : tuple of float or None
+        Parameters of the tables that are fixed at build time, one for each bank (``None`` where the model has
+        no parameter). ``None``: the tables are written.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range, there are not as many fixed tables as banks, or the model is of R·V.
+
+    Source: docs/theory/units.md#lobe. The graphics processor PICA200 has tables of 256 entries with
+    differences, addressed by a cosine in equal steps.
+    """
+
+    model: ReflectionModel = BLINN
+    operand: Literal["cosine", "one_minus_cosine"] = "cosine"
+    octaves: int = 20
+    steps: int = 16
+    banks: int = 1
+    fraction_bits: int = 25
+    cutoff: float = 0.0
+    fixed: tuple[float | None, ...] | None = None
+
+    VALUE_FORMAT: ClassVar[Format] = UQ(0, 17)
+    DIFFERENCE_FORMAT: ClassVar[Format] = SQ(1, 17)
+    WORD_BITS: ClassVar[int] = VALUE_FORMAT.width + DIFFERENCE_FORMAT.width
+    MAX_BANKS: ClassVar[int] = 64
+    ERROR: ClassVar[float] = 3 * 2.0**-17
+
+    def __post_init__(self):
+        super().__post_init__()
+        if self.model.MIRROR:
+            raise ValueError(
+                f"a table holds a lobe of N·H, and {self.model.name} is one of R·V; take phong_coplanar"
+            )
+        if self.steps not in (2**bits for bits in range(1, 9)):
+            raise ValueError(f"steps must be a power of two from 2 to 256, not {self.steps}")
+        if not 20 <= self.fraction_bits <= 34:
+            raise ValueError(f"fraction_bits must be 20 to 34, not {self.fraction_bits}")
+        if not 1 <= self.octaves <= self.fraction_bits - self.step_bits:
+            raise ValueError(
+                f"octaves must be 1 to {self.fraction_bits - self.step_bits} with {self.steps} steps and "
+                f"{self.fraction_bits} fraction bits, not {self.octaves}"
+            )
+        if not 1 <= self.banks <= self.MAX_BANKS:
+            raise ValueError(f"banks must be 1 to {self.MAX_BANKS}, not {self.banks}")
+        if not 0 <= self.cutoff < 1:
+            raise ValueError(f"cutoff must be at least 0 and under 1, not {self.cutoff}")
+        if self.fixed is not None:
+            object.__setattr__(self, "fixed", tuple(self.fixed))
+            if len(self.fixed) != self.banks:
+                raise ValueError(f"{len(self.fixed)} tables are fixed, of {self.banks} banks")
+            for parameter in self.fixed:
+                self.model.reflect(1.0, parameter)
+
+    @property
+    def has_table(self) -> bool:
+        """True."""
+        return True
+
+    @property
+    def fixed_tables(self) -> "list[LobeTable] | None":
+        """Tables that are fixed at build time."""
+        return None if self.fixed is None else [self.table(parameter) for parameter in self.fixed]
+
+    @property
+    def name(self) -> str:
+        """Name of the reflection model."""
+        return self.model.name
+
+    @property
+    def argument_format(self) -> Format:
+        """Format of u."""
+        return UQ(1, self.fraction_bits)
+
+    @property
+    def operand_format(self) -> Format:
+        """Format of the input."""
+        return super().operand_format if self.operand == "cosine" else self.argument_format
+
+    @property
+    def step_bits(self) -> int:
+        """Bits of the step's address, log2 M."""
+        return self.steps.bit_length() - 1
+
+    @property
+    def fraction_format(self) -> Format:
+        """Format of f."""
+        return UQ(0, min(17, self.fraction_bits - 1 - self.step_bits))
+
+    @property
+    def rows(self) -> int:
+        """Rows of a table, E + 1."""
+        return self.octaves + 1
+
+    @property
+    def entries(self) -> int:
+        """Words of a table, ``(E + 1) M``."""
+        return self.rows * self.steps
+
+    @cached_property
+    def knots(self) -> np.ndarray:
+        """Arguments u of the entries and of the end, 1: float64 array, shape (entries + 1,)."""
+        row, step = np.divmod(np.arange(self.entries + 1), self.steps)
+        # A row from 1 on begins at 2^(row-1-E); row 0 goes on with the steps of row 1.
+        start = np.where(row > 0, self.steps, 0)
+        return np.ldexp((start + step) / self.steps, np.maximum(row, 1) - 1 - self.octaves)
+
+    def table(self, parameter: float | None = None) -> "LobeTable":
+        """Table of the model.
+
+        Entries are values of the curve, moved against the error of the lines: by half of what the line is too
+        high in the middle of the step before or after, whichever is more, but by at most twice the smaller.
+        Where one line is too high and the other too low the entry is not moved.
+
+        Parameters
+        ----------
+        parameter : float, optional
+            Exponent or roughness, as `ReflectionModel.PARAMETER` says.
+
+        Raises
+        ------
+        ValueError
+            If the parameter is not one of the model.
+        """
+        if parameter is None and self.model.PARAMETER is not None:
+            raise ValueError(f"a table of {self.name} needs its {self.model.PARAMETER}")
+        curve: Callable[[np.ndarray], np.ndarray] = partial(self.model.reflect, parameter=parameter)
+        # At the end the value that the curve tends to: at a right angle itself it is 0.
+        knots = np.minimum(self.knots, 1 - 2.0**-40)
+        value = curve(1 - knots)
+        high = (value[1:] + value[:-1]) / 2 - curve(1 - (knots[1:] + knots[:-1]) / 2)
+        left, right = np.r_[high[0], high], np.r_[high, high[-1]]
+        larger, smaller = np.maximum(np.abs(left), np.abs(right)), np.minimum(np.abs(left), np.abs(right))
+        move = np.where(left * right > 0, np.sign(left) * np.minimum(larger / 2, 2 * smaller), 0)
+        format = self.VALUE_FORMAT
+        codes = Fixed.round(format, np.clip(value - move, 0, 1 - format.step)).codes
+        falls, rises = (np.diff(value) <= 0).all(), (np.diff(value) >= 0).all()
+        if falls or rises:
+            codes = (np.minimum if falls else np.maximum).accumulate(codes)
+        values = Fixed(format, np.where(codes < self.cutoff / format.step, 0, codes))
+        return LobeTable(self, values, parameter)
+
+    @property
+    def last_lit_arguments(self):
+        """Of the model's table at each exponent, see `LobeTable.last_lit_argument`; that of 1 at exponent 0.
+
+        Raises
+        ------
+        ValueError
+            If the model has no exponent: its gate gets the threshold of a table.
+        """
+        if self.model.PARAMETER != "exponent":
+            raise ValueError(f"{self.name} has no exponent, by which a gate could look up its threshold")
+        exponents = range(1 << self.EXPONENT_BITS)
+        return np.array([self.table(max(exponent, 1)).last_lit_argument for exponent in exponents])
+
+    def argument(self, operand: Fixed) -> Fixed:
+        """Argument u of an operand.
+
+        Raises
+        ------
+        ValueError
+            If the operand has another format.
+        """
+        if operand.format != self.operand_format:
+            raise ValueError(f"operand must be {self.operand_format}, not {operand.format}")
+        exact = ONE_SQUARED - operand if self.operand == "cosine" else operand
+        return exact.truncate(self.fraction_bits).saturate(self.argument_format)
+
+    def address(self, argument: Fixed) -> tuple[np.ndarray, Fixed]:
+        """Where an argument under 1 stands in a table.
+
+        Parameters
+        ----------
+        argument : Fixed, any shape, UQ(1, B)
+            u, under 1.
+
+        Returns
+        -------
+        entry : int64 array, same shape
+            Index of the word in its table.
+        fraction : Fixed, same shape, UQ(0, F)
+            f.
+        """
+        code, top = argument.codes, self.fraction_bits - 1
+        # Of a code under 2^34 float64 knows the leading one exactly; frexp counts it from 1, and 0 has 0.
+        _, length = np.frexp(code.astype(np.float64))
+        row = np.maximum(length - self.fraction_bits + self.octaves, 0)
+        normal = code << (self.octaves - np.maximum(row, 1))
+        below = normal & ((1 << top) - 1)
+        width = top - self.step_bits
+        fraction = (below & ((1 << width) - 1)) >> (width - self.fraction_format.width)
+        return row * self.steps + (below >> width), Fixed(self.fraction_format, fraction)
+
+    def compute(self, operand: Fixed, dark: np.ndarray, table: "LobeTable") -> Fixed:
+        """Bit-accurate specular terms.
+
+        Parameters
+        ----------
+        operand : Fixed, any shape
+            ``N·H`` or ``1 - N·H`` in `operand_format`; a cosine in units of `ONE_SQUARED`.
+        dark : bool array, same shape
+            Whether the light is behind the surface: the result is 0.
+        table : LobeTable
+            Table, of as many octaves and steps.
+
+        Returns
+        -------
+        Fixed, same shape, UQ(0, 17)
+
+        Raises
+        ------
+        ValueError
+            If the operand has another format, there is no table, or it has another size.
+        """
+        self.check(table)
+        u = self.argument(operand)
+        front = operand.codes > 0 if self.operand == "cosine" else u.codes < 1 << self.fraction_bits
+        lit = front & ~np.asarray(dark, dtype=bool)
+        entry, fraction = self.address(Fixed(u.format, np.where(lit, u.codes, 0)))
+        way = (table.differences[entry] * fraction).truncate(17)
+        term = (table.values[entry] + way).codes
+        return Fixed(self.RESULT_FORMAT, np.where(lit, term, 0))
+
+    def check(self, table: "LobeTable") -> None:
+        """Refuse what is no table, or a table of another size.
+
+        Raises
+        ------
+        ValueError
+            If it is.
+        """
+        if not isinstance(table, LobeTable):
+            raise ValueError("a lobe needs a table; constants_of gives the constants of a scene theirs")
+        if (table.lobe.octaves, table.lobe.steps) != (self.octaves, self.steps):
+            raise ValueError(
+                f"the table has {table.lobe.octaves} octaves of {table.lobe.steps} steps, the unit "
+                f"{self.octaves} of {self.steps}"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class LobeTable:
+    """Entries of a `Lobe`'s table, for one model and parameter; `Lobe.table` makes one.
+
+    Parameters
+    ----------
+    lobe : Lobe
+        Size and model.
+    values : Fixed, shape (entries + 1,), UQ(0, 17)
+        Entries, and the value at the end.
+    parameter : float, optional
+        Exponent or roughness that they are of.
+
+    Raises
+    ------
+    ValueError
+        If there are more entries or fewer, or their format is another.
+
+    Source: docs/theory/units.md#lobe.
+    """
+
+    lobe: Lobe
+    values: Fixed
+    parameter: float | None = None
+
+    def __post_init__(self):
+        format, shape = Lobe.VALUE_FORMAT, (self.lobe.entries + 1,)
+        if (self.values.format, self.values.shape) != (format, shape):
+            raise ValueError(
+                f"a table has {shape[0]} values of {format}, not {self.values.shape} of {self.values.format}"
+            )
+
+    @property
+    def differences(self) -> Fixed:
+        """D: Fixed, shape (entries,), SQ(1, 17)."""
+        return Fixed(Lobe.DIFFERENCE_FORMAT, np.diff(self.values.codes))
+
+    @property
+    def words(self) -> np.ndarray:
+        """Words of the memory, v in the low 17 bits and D in the 18 above: int64 array, shape (entries,)."""
+        difference, value = Lobe.DIFFERENCE_FORMAT, Lobe.VALUE_FORMAT
+        low = self.differences.codes & ((1 << difference.width) - 1)
+        return self.values.codes[:-1] | low << value.width
+
+    def writes(self, bank: int = 0) -> dict[str, np.ndarray]:
+        """Beats that load the table: the bank with ``begins`` set, then every value in order.
+
+        Parameters
+        ----------
+        bank : int
+            Where to.
+
+        Returns
+        -------
+        dict
+            ``value``, 17 bits, and ``begins``, one: int64 arrays, shape (entries + 2,). In a word of 18 bits
+            ``begins`` is the highest.
+
+        Raises
+        ------
+        ValueError
+            If there is no such bank.
+        """
+        if not 0 <= bank < self.lobe.banks:
+            raise ValueError(f"bank must be 0 to {self.lobe.banks - 1}, not {bank}")
+        value = np.r_[bank, self.values.codes]
+        return {"value": value, "begins": (np.arange(len(value)) == 0).astype(np.int64)}
+
+    @property
+    def last_lit_argument(self) -> int:
+        """Largest u, in steps of 2^-25, whose term is over 0; -1 if there is none. Exact, in integers.
+
+        Of an argument with more fraction bits, it is what is left of it at 25.
+        """
+        lobe, values = self.lobe, self.values.codes
+        lit = np.flatnonzero((values[:-1] > 0) | (values[1:] > 0))
+        if not len(lit):
+            return -1
+        entry, fraction = int(lit[-1]), lobe.fraction_format
+        start, end = (round(knot * 2**lobe.fraction_bits) for knot in lobe.knots[entry : entry + 2].tolist())
+        argument, last = end - 1, int(values[entry])
+        if not values[entry + 1]:
+            # last + floor(-last f) >= 1, where f is the share of the step, cut.
+            f = ((last - 1) << fraction.width) // last
+            argument = start + (((f + 1) * (end - start) - 1) >> fraction.width)
+        shift = 25 - lobe.fraction_bits
+        return ((argument + 1) << shift) - 1 if shift > 0 else argument >> -shift

@@ -1,0 +1,371 @@
+"""Lobes of N·H that only a table serves: microfacets, Phong's as far as it goes, any curve; in float64."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from blysk.golden.reference.reflection import BLINN, ReflectionModel
+
+__all__ = [
+    "BECKMANN",
+    "COPLANAR_PHONG",
+    "GGX",
+    "MAX_POINTS",
+    "STEEPEST",
+    "TABLE_MODELS",
+    "Beckmann",
+    "CoplanarPhong",
+    "MicrofacetModel",
+    "TabulatedModel",
+    "TrowbridgeReitz",
+    "checked_roughness",
+    "exponent_of_roughness",
+    "roughness_of_exponent",
+]
+
+
+MAX_POINTS = 100_000
+"""Most points of a curve in a file."""
+
+STEEPEST = 10_000.0
+"""Largest steepness of a curve: one that jumps has no larger one."""
+
+
+@dataclass(frozen=True, repr=False)
+class CoplanarPhong(ReflectionModel):
+    """``max(2 c^2 - 1, 0)^p``: what a lobe of c = N·H can be of Phong's model, with Phong's exponent p.
+
+    Where N, L and V are coplanar, the angle between R and V is twice the angle between N and H. Then
+    ``R·V = 2 c^2 - 1``, and this is Phong's model. Near its peak it is Blinn's model with an exponent of 4 p
+    (`exponent_ratio`).
+
+    It is not Phong's model where N, L and V are not coplanar: R·V is then no function of N·H. At grazing
+    light the highlight of this model, like Blinn's, is drawn out, while Phong's stays round.
+
+    Source: docs/theory/models.md#reflection-models; [P].
+    """
+
+    def _lobe(self, cosine, exponent):
+        # 2 c^2 - 1 = 1 - 2 (1 - c)(1 + c), in which a small 1 - c keeps its digits.
+        base = 1 - 2 * (1 - cosine) * (1 + cosine)
+        return np.where(cosine > 0, np.maximum(base, 0.0), 0.0) ** exponent
+
+    def steepness(self, parameter):
+        """Four times the exponent, at the peak."""
+        return 4 * self._checked(parameter)
+
+
+@dataclass(frozen=True, repr=False)
+class MicrofacetModel(ReflectionModel):
+    """A distribution D of the normals of microfacets, divided by its largest value: ``S = D / peak``.
+
+    The parameter is the roughness r of glTF, greater than 0 and at most 1; the formulas have ``alpha = r^2``.
+    D has ``integral D(c) c = 1`` over the hemisphere, with c = N·H, and is 0 for c <= 0. S is D alone: the
+    other factors of a microfacet model (Fresnel, masking and shadowing) are not in it.
+
+    The energy factor is 1 over ``integral S(cos(t/2)) cos t`` over the hemisphere, the viewer along the
+    normal, as for ``blinn``. With ``w = c^2`` the integral is ``4 pi integral_{1/2}^1 S (2 w - 1) dw``.
+
+    Source: docs/theory/models.md#reflection-models; B. Walter and others, *Microfacet models for refraction
+    through rough surfaces*, 2007; glTF 2.0, appendix B.
+    """
+
+    PARAMETER: ClassVar = "roughness"
+
+    def _checked(self, parameter):
+        return checked_roughness(parameter)
+
+    def steepness(self, parameter):
+        """Of the curve itself, see `ReflectionModel.steepness`."""
+        return _steepness(self, parameter)
+
+    def peak(self, roughness: float) -> float:
+        """Largest value of D: ``1 / (pi alpha^2)``, its value at c = 1, unless the subclass says otherwise.
+
+        Raises
+        ------
+        ValueError
+            If the roughness is not greater than 0 and at most 1.
+        """
+        return self._peak(checked_roughness(roughness) ** 2)
+
+    def _peak(self, alpha: float) -> float:
+        return 1 / (math.pi * alpha * alpha)
+
+
+@dataclass(frozen=True, repr=False)
+class TrowbridgeReitz(MicrofacetModel):
+    """GGX: ``D = alpha^2 / (pi (c^2 (alpha^2 - 1) + 1)^2)``, largest at c = 1.
+
+    In ``u = 1 - c`` it is ``S = 1 / (1 + u (2 - u) (1 - alpha^2) / alpha^2)^2``. Its tail is long: S falls to
+    alpha^4 at a right angle.
+
+    Source: docs/theory/models.md#reflection-models; T. Trowbridge and K. Reitz, *Average irregularity
+    representation of a rough surface for ray reflection*, 1975.
+    """
+
+    def _lobe(self, cosine, roughness):
+        alpha = roughness**2
+        spread = (1 - cosine) * (1 + cosine) * ((1 - alpha) * (1 + alpha) / alpha**2)
+        return np.where(cosine > 0, (1 + np.maximum(spread, 0.0)) ** -2.0, 0.0)
+
+
+@dataclass(frozen=True, repr=False)
+class Beckmann(MicrofacetModel):
+    """``D = exp(-tan^2 gamma / alpha^2) / (pi alpha^2 c^4)``, with ``c = cos gamma``.
+
+    Up to ``alpha = 1/sqrt 2`` (roughness 0.84) it is largest at c = 1, and falls from there on. For a larger
+    alpha it is largest at ``c^2 = 1/(2 alpha^2)``, with ``4 alpha^2 exp(1/alpha^2 - 2) / pi``: up to 1.47
+    times its value at c = 1.
+
+    Source: docs/theory/models.md#reflection-models; P. Beckmann and A. Spizzichino, *The scattering of
+    electromagnetic waves from rough surfaces*, 1963; R. Cook and K. Torrance, *A reflectance model for
+    computer graphics*, 1982.
+    """
+
+    def _lobe(self, cosine, roughness):
+        alpha = roughness**2
+        # Below the limit the exponential is 0: tan^2 / alpha^2 is nearly 800.
+        square = np.maximum(cosine * cosine, 1 / (1 + 800 * alpha**2))
+        tangent = (1 - cosine) * (1 + cosine) / square
+        density = np.exp(-tangent / alpha**2) / (math.pi * (alpha * square) ** 2)
+        return np.where(cosine > 0, density / self._peak(alpha), 0.0)
+
+    def _peak(self, alpha):
+        if 2 * alpha * alpha <= 1:
+            return super()._peak(alpha)
+        return 4 * alpha * alpha * math.exp(alpha**-2 - 2) / math.pi
+
+
+@dataclass(frozen=True, repr=False)
+class TabulatedModel(ReflectionModel):
+    """Any curve of N·H: a function, or straight lines between given points (`of_points`).
+
+    It has no parameter. Where N·H is not positive the brightness is 0.
+
+    Parameters
+    ----------
+    function : callable
+        The curve: of a float64 array of cosines, greater than 0 and at most 1, as many values from 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        On use, if the function gives an array of another shape, or a value that is not 0 to 1.
+    """
+
+    function: Callable[[np.ndarray], np.ndarray] | None = None
+
+    PARAMETER: ClassVar = None
+
+    @classmethod
+    def of_points(
+        cls, name: str, cosines: np.ndarray, values: np.ndarray, source: str = ""
+    ) -> "TabulatedModel":
+        """Straight lines between points.
+
+        Parameters
+        ----------
+        name, source : str
+            Of the model.
+        cosines : array, shape (points,)
+            N·H, rising from 0 to 1.
+        values : array, shape (points,)
+            Brightness at each, 0 to 1.
+
+        Raises
+        ------
+        ValueError
+            If there are fewer than two points, a number is missing or not finite, a value is not 0 to 1, the
+            cosines do not rise, one comes twice, or they do not go from 0 to 1. The message names the first
+            such point, counted from 1.
+        """
+        cosines, values = (np.array(column, dtype=np.float64) for column in (cosines, values))
+        if cosines.ndim != 1 or cosines.shape != values.shape:
+            raise ValueError(f"{name} must have one value for each cosine, and one row of each")
+        if len(cosines) < 2:
+            raise ValueError(f"{name} must have at least 2 points, not {len(cosines)}")
+        for good, must in (
+            (np.isfinite(cosines) & np.isfinite(values), "have two finite numbers"),
+            ((values >= 0) & (values <= 1), "have a value from 0 to 1"),
+            (np.diff(cosines, prepend=-np.inf) > 0, "have a larger cosine than the point before it"),
+        ):
+            if not good.all():
+                bad = int(np.argmin(good))
+                given = f"cosine {cosines[bad]:.6g}, value {values[bad]:.6g}"
+                raise ValueError(f"point {bad + 1} of {name} must {must}, not {given}")
+        if cosines[0] != 0 or cosines[-1] != 1:
+            raise ValueError(
+                f"the cosines of {name} must go from 0 to 1, not from {cosines[0]:.6g} to {cosines[-1]:.6g}"
+            )
+        return cls(name, source, function=partial(np.interp, xp=cosines, fp=values))
+
+    @classmethod
+    def of_csv(cls, path: str | Path) -> "TabulatedModel":
+        """Straight lines between the points of a file of measured values; its name is the file's.
+
+        A line holds a cosine and a value, a comma between them. Lines that are empty or begin with ``#`` are
+        passed over, and so is the first other line, where it holds no number.
+
+        Parameters
+        ----------
+        path : str or Path
+            File of at most `MAX_POINTS` lines.
+
+        Raises
+        ------
+        ValueError
+            If a line does not hold two numbers, or as `of_points` does; the message names the file, and the
+            line or the point.
+        OSError
+            If the file cannot be read.
+        """
+        path = Path(path)
+        try:
+            text = path.read_text(encoding="utf-8-sig")
+        except UnicodeDecodeError:
+            raise ValueError(f"{path.name} must be a text of numbers, not other bytes") from None
+        lines = [
+            (number, [field.strip() for field in line.split(",")])
+            for number, line in enumerate(text.splitlines(), 1)
+            if line.strip() and not line.lstrip().startswith("#")
+        ]
+        if len(lines) > MAX_POINTS:
+            raise ValueError(f"{path.name} must have at most {MAX_POINTS:,} points, not {len(lines):,}")
+        if lines and not any(map(_is_number, lines[0][1])):
+            del lines[0]
+        for number, fields in lines:
+            if len(fields) != 2 or not all(map(_is_number, fields)):
+                shown = ",".join(fields)[:40]
+                raise ValueError(f"line {number} of {path.name} must have two numbers, not {shown!r}")
+        points = np.array([fields for _, fields in lines], dtype=np.float64).reshape(-1, 2)
+        return cls.of_points(path.stem, points[:, 0], points[:, 1], path.name)
+
+    def _checked(self, parameter):
+        return None
+
+    def steepness(self, parameter=None):
+        """Of the curve itself, see `ReflectionModel.steepness`."""
+        return _steepness(self, parameter)
+
+    def reflect(self, cosine, parameter=None):
+        """Brightness S, see `ReflectionModel.reflect`; any parameter is passed over."""
+        return super().reflect(cosine, parameter)
+
+    def _lobe(self, cosine, parameter):
+        lit = cosine > 0
+        given = np.asarray(self.function(cosine[lit]), dtype=np.float64)
+        if given.shape != cosine[lit].shape:
+            raise ValueError(f"{self.name} must give one value for each cosine")
+        if not ((given >= 0) & (given <= 1)).all():
+            raise ValueError(f"{self.name} must give values from 0 to 1")
+        value = np.zeros(cosine.shape)
+        value[lit] = given
+        return value
+
+
+def _steepness(model: ReflectionModel, parameter: float | None) -> float:
+    """Steepest of 4,000 lines between points of the curve, closer to each other towards the peak."""
+    u = np.r_[0, np.geomspace(1e-7, 1 - 1e-12, 4_000)]
+    slopes = np.abs(np.diff(model.reflect(1 - u, parameter))) / np.diff(u)
+    return float(np.clip(slopes.max(), 1.0, STEEPEST))
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def checked_roughness(roughness: float) -> float:
+    """The roughness as a float.
+
+    Raises
+    ------
+    ValueError
+        If it is not greater than 0 and at most 1.
+    """
+    roughness = float(roughness)
+    if not 0 < roughness <= 1:
+        raise ValueError(f"roughness must be greater than 0 and at most 1, not {roughness}")
+    return roughness
+
+
+def _energy_of_ggx(roughness: float) -> float:
+    """``1 / (4 pi I)`` with ``I = (z - ln(1 + z)) / (2 z^2)``, ``z = (1 - alpha^2) / (2 alpha^2)``."""
+    alpha = roughness**2
+    z = (1 - alpha) * (1 + alpha) / (2 * alpha * alpha)
+    # Near z = 0 the difference has lost its digits; the series is off by less than z^3 / 10.
+    integral = (z - math.log1p(z)) / (2 * z * z) if z > 1e-4 else 0.25 - z / 6 + z * z / 8
+    return 1 / (4 * math.pi * integral)
+
+
+def _energy_of_beckmann(roughness: float) -> float:
+    """1 over the integral of S, that of D over its peak.
+
+    With ``t = 1/w - 1`` and ``D = exp(-t/alpha^2) / (pi alpha^2 w^2)`` the integral of D is
+    ``4 / alpha^2 integral_0^1 exp(-t/alpha^2) (2/(1 + t) - 1) dt``. Beyond 40 alpha^2 it has under e^-40.
+    """
+    alpha = roughness**2
+    half = min(1.0, 40 * alpha * alpha) / 2
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    t = (nodes + 1) * half
+    integral = half * float(weights @ (np.exp(-t / alpha**2) * (2 / (1 + t) - 1)))
+    return BECKMANN.peak(roughness) * alpha * alpha / (4 * integral)
+
+
+COPLANAR_PHONG = CoplanarPhong("phong_coplanar", "[T] 6, [P]")
+"""Phong's model where N, L and V are coplanar."""
+
+BECKMANN = Beckmann("beckmann", "Beckmann 1963", _energy_of_beckmann)
+"""Beckmann's distribution."""
+
+GGX = TrowbridgeReitz("ggx", "Trowbridge 1975, Walter 2007", _energy_of_ggx)
+"""The distribution of Trowbridge and Reitz."""
+
+TABLE_MODELS: dict[str, ReflectionModel] = {
+    model.name: model for model in (BLINN, COPLANAR_PHONG, BECKMANN, GGX)
+}
+"""Models of which a frame may load a table, by name."""
+
+
+def exponent_of_roughness(roughness: float) -> float:
+    """Exponent of Blinn's model for a roughness: ``n = 2 / alpha^2 - 2`` with ``alpha = roughness^2``.
+
+    So Blinn's power is ``exp(-gamma^2 / alpha^2)`` near the peak, but for terms of gamma^2, as Beckmann's
+    distribution is. At roughness 1 it is 0, which no exponent may be.
+
+    Raises
+    ------
+    ValueError
+        If the roughness is not greater than 0 and at most 1.
+
+    Notes
+    -----
+    Source: docs/theory/models.md#reflection-models; Walter 2007.
+    """
+    return 2 / checked_roughness(roughness) ** 4 - 2
+
+
+def roughness_of_exponent(exponent: float) -> float:
+    """Roughness for an exponent of Blinn's model, ``(2 / (n + 2))^(1/4)``: `exponent_of_roughness` reversed.
+
+    Raises
+    ------
+    ValueError
+        If the exponent is not finite and positive.
+
+    Notes
+    -----
+    Source: docs/theory/models.md#reflection-models; Walter 2007.
+    """
+    if not (math.isfinite(exponent) and exponent > 0):
+        raise ValueError(f"exponent must be finite and greater than 0, not {exponent}")
+    return (2 / (exponent + 2)) ** 0.25

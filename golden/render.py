@@ -1,0 +1,112 @@
+"""Triangles to pixels: geometry, shading and depth test, and their bit-accurate model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.geometry.edge_normals import TrueSpans
+from blysk.golden.geometry.geometry import Geometry
+from blysk.golden.geometry.span_adapter import shading_spans
+from blysk.golden.geometry.triangles import Frame, Triangles
+from blysk.golden.pipeline import Design
+
+__all__ = ["DrawnPixels", "Renderer"]
+
+
+@dataclass(frozen=True)
+class DrawnPixels:
+    """Pixels in the order in which they are drawn, those of which that something nearer follows included.
+
+    Parameters
+    ----------
+    x, y : int64 arrays, shape (P,)
+        Place, counted from the picture's top left pixel.
+    color : uint8 array, shape (P, 3)
+        Red, green, blue.
+    depth : int64 array, shape (P,)
+        0 to 2^24 - 2.
+    triangle : int64 array, shape (P,)
+        Index of the triangle.
+    spans : TrueSpans
+        What was shaded.
+    counts : dict of str to int
+        `COUNTERS` of geometry; ``pixels`` shaded and how many of them were ``hidden``.
+    out_of_range_spans : int
+        Spans of a larger angle than the method serves.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    color: np.ndarray
+    depth: np.ndarray
+    triangle: np.ndarray
+    spans: TrueSpans
+    counts: dict[str, int]
+    out_of_range_spans: int
+
+    @property
+    def beats(self) -> dict:
+        """What the hardware gives."""
+        colors = dict(zip("rgb", self.color.T, strict=True))
+        return {"x": self.x, "y": self.y, **colors, "depth": self.depth}
+
+
+@dataclass(frozen=True)
+class Renderer:
+    """Bit-accurate model of triangles to pixels.
+
+    Parameters
+    ----------
+    design : Design
+        The shading pipeline, of a method that takes normals.
+    geometry : Geometry
+        Triangles to spans.
+
+    Raises
+    ------
+    ValueError
+        If the method takes values.
+
+    Source: docs/theory/geometry.md#composition; [T] figure 4.10.
+    """
+
+    design: Design = field(default_factory=Design)
+    geometry: Geometry = field(default_factory=Geometry)
+
+    def __post_init__(self):
+        if self.design.takes_values:
+            raise ValueError(f"method {self.design.method} takes no normals, which is what triangles give")
+
+    def compute(
+        self, triangles: Triangles, frame: Frame, constants: FrameConstants | Sequence[FrameConstants]
+    ) -> DrawnPixels:
+        """Bit-accurate pixels.
+
+        Parameters
+        ----------
+        triangles : Triangles
+            In the order of drawing.
+        frame : Frame
+            The picture.
+        constants : FrameConstants or sequence of FrameConstants
+            As for `Design.compute`.
+        """
+        spans, counts = self.geometry.compute(triangles, frame)
+        pixels = self.design.compute(shading_spans(spans), constants)
+        test = DepthTest()
+        depth = test.depths(spans.length, spans.depth, spans.depth_step)
+        x, y = (np.asarray(place, dtype=np.int64) for place in (pixels.x, pixels.y))
+        drawn = test.drawn((y << self.design.x_bits) + x, depth)
+        return DrawnPixels(
+            x=x[drawn],
+            y=y[drawn],
+            color=pixels.color[drawn],
+            depth=depth[drawn],
+            triangle=np.repeat(spans.triangle, spans.length)[drawn],
+            spans=spans,
+            counts=counts | {"pixels": len(drawn), "hidden": int((~drawn).sum())},
+            out_of_range_spans=pixels.out_of_range_spans,
+        )

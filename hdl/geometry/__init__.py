@@ -1,0 +1,1 @@
+"""Units that turn triangles into spans and keep the nearest pixels."""

@@ -1,0 +1,174 @@
+"""Depth test: the depth of every pixel of spans, and which of them are in front of what came before."""
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
+from blysk.golden.geometry.triangles import DEPTH
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.geometry.triangles import count_events, counters_shape
+from blysk.hdl.pixel_assembler import pixel_shape
+
+__all__ = ["DepthMemory", "DepthTestUnit", "deep_pixel_shape", "drawn_pixel_shape"]
+
+
+def deep_pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
+    """Shape of a pixel with its span's depth and step, which are read with the span's first pixel."""
+    depth = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
+    return data.StructLayout({"pixel": pixel_shape(x_bits, y_bits)} | depth)
+
+
+def drawn_pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
+    """Shape of a pixel that is to be written: place, colour and depth."""
+    members = dict(pixel_shape(x_bits, y_bits).members)
+    del members["last"]
+    return data.StructLayout(members | {"depth": unsigned(DEPTH.width)})
+
+
+class DepthMemory(wiring.Signature):
+    """Port to a memory of depths, a word a pixel: what is read on a clock stands on the next.
+
+    A write and a read of one place on the same clock give the read what was there before. What is read stays
+    while ``read_enable`` is low. The memory is cleared to `DepthTest.CLEARED` before a frame.
+
+    Parameters
+    ----------
+    x_bits, y_bits : int
+        Bits of a place.
+    """
+
+    def __init__(self, x_bits: int = 12, y_bits: int = 12):
+        place = data.StructLayout({"x": unsigned(x_bits), "y": unsigned(y_bits)})
+        super().__init__(
+            {
+                "read_place": Out(place),
+                "read_enable": Out(1),
+                "read_data": In(DEPTH.width),
+                "write_place": Out(place),
+                "write_enable": Out(1),
+                "write_data": Out(DEPTH.width),
+            }
+        )
+
+
+class DepthTestUnit(wiring.Component):
+    """Drops pixels behind what was drawn before: `DepthTest` is the bit-accurate model.
+
+    A pixel is taken in on each cycle, and leaves 3 cycles later if it is drawn. Those of the last two cycles
+    that stand at the same place count though the memory does not have them yet. No multipliers.
+
+    Parameters
+    ----------
+    x_bits, y_bits : int
+        Bits of a place.
+    size : (int, int) or None
+        Width and height of a memory of its own, at most 2^x_bits and 2^y_bits, cleared at power-up; ``None``:
+        there is a port ``memory``.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(deep_pixel_shape(x_bits, y_bits)))`
+        Pixels.
+    o : :py:`Out(stream.Signature(drawn_pixel_shape(x_bits, y_bits)))`
+        Those that are drawn.
+    status : :py:`Out(counters_shape("pixels", "hidden"))`
+        Pixels, and those of them that were dropped, since the reset.
+    memory : :py:`Out(DepthMemory(x_bits, y_bits))`
+        Depths so far.
+
+    Source: docs/theory/geometry.md#depth; not in the documents.
+    """
+
+    latency = 3
+
+    def __init__(self, x_bits: int = 12, y_bits: int = 12, size: tuple[int, int] | None = None):
+        self.x_bits, self.y_bits, self.size = x_bits, y_bits, size
+        members = {
+            "i": In(stream.Signature(deep_pixel_shape(x_bits, y_bits))),
+            "o": Out(stream.Signature(drawn_pixel_shape(x_bits, y_bits))),
+            "status": Out(counters_shape("pixels", "hidden")),
+        }
+        port = DepthMemory(x_bits, y_bits)
+        if size is None:
+            members["memory"] = Out(port)
+        super().__init__(members)
+        self._port = port.create(path=("port",)) if size else self.memory
+
+    def elaborate(self, platform):
+        """Depth of the pixel; the memory's word; their comparison; the write."""
+        m = Module()
+        port, incoming = self._port, self.i.payload
+        if self.size:
+            self._remember(m)
+        advance, accept = Signal(name="advance"), Signal(name="accept")
+        stages = [Signal(self.o.payload.shape(), name=f"pixel_{k}") for k in range(3)]
+        valid = [Signal(name=f"valid_{k}") for k in range(3)]
+        m.d.comb += [
+            advance.eq(skid_buffer(m, self.o, valid[2], stages[2])),
+            self.i.ready.eq(advance),
+            accept.eq(self.i.valid & advance),
+        ]
+
+        # The sum has a sign, and a bit more than any step of a span can add.
+        first, total = Signal(name="first", init=1), Signal(37, name="total")
+        step = Signal(FixedShape(DEPTH_STEP), name="step")
+        begin = Value.cast(incoming.depth)
+        going = (total.as_signed() + Value.cast(step))[:37]
+        with m.If(accept):
+            m.d.sync += [first.eq(incoming.pixel.last), total.eq(Mux(first, begin, going))]
+            with m.If(first):
+                m.d.sync += step.eq(incoming.depth_step)
+
+        code = total.as_signed() >> SPAN_DEPTH.fraction_bits
+        depth = Mux(code < 0, 0, Mux(code > DepthTest.FARTHEST, DepthTest.FARTHEST, code))
+        there, drawn = Signal(DEPTH.width, name="there"), Signal(name="drawn")
+        # Written a clock after the read, or on the clock of the read.
+        late = [(valid[2], stages[2]), (Signal(name="before_valid"), Signal.like(stages[2], name="before"))]
+        m.d.comb += [there.eq(port.read_data), drawn.eq(valid[1] & (stages[1].depth < there))]
+        for written, pixel in reversed(late):
+            with m.If(written & (_place(pixel) == _place(stages[1]))):
+                m.d.comb += there.eq(pixel.depth)
+        with m.If(advance):
+            m.d.sync += [
+                valid[0].eq(accept),
+                *(stages[0][name].eq(incoming.pixel[name]) for name in "xyrgb"),
+                valid[1].eq(valid[0]),
+                stages[1].eq(stages[0]),
+                stages[1].depth.eq(depth),
+                valid[2].eq(drawn),
+                stages[2].eq(stages[1]),
+                late[1][0].eq(valid[2]),
+                late[1][1].eq(stages[2]),
+            ]
+        m.d.comb += [
+            port.read_enable.eq(advance),
+            port.write_enable.eq(advance & valid[2]),
+            port.write_data.eq(stages[2].depth),
+            *(port.read_place[name].eq(stages[0][name]) for name in "xy"),
+            *(port.write_place[name].eq(stages[2][name]) for name in "xy"),
+        ]
+        count_events(m, self.status, pixels=advance & valid[1], hidden=advance & valid[1] & ~drawn)
+        return m
+
+    def _remember(self, m: Module) -> None:
+        """A memory of the picture's size behind the port."""
+        # Turned round, so that a cleared memory is one of zeros.
+        port, (width, height) = self._port, self.size
+        m.submodules.depths = memory = Memory(shape=DEPTH.width, depth=width * height, init=[])
+        read, write = memory.read_port(), memory.write_port()
+        m.d.comb += [
+            read.addr.eq(port.read_place.y * width + port.read_place.x),
+            read.en.eq(port.read_enable),
+            port.read_data.eq(~read.data),
+            write.addr.eq(port.write_place.y * width + port.write_place.x),
+            write.en.eq(port.write_enable),
+            write.data.eq(~port.write_data),
+        ]
+
+
+def _place(pixel) -> Value:
+    return Cat(pixel.x, pixel.y)

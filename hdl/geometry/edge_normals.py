@@ -1,0 +1,140 @@
+"""Edge normals ([T] figure 4.10): unit normals at both ends and in the middle of every piece of a span."""
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from amaranth.lib import data, fifo, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.edge_normals import EdgeNormals
+from blysk.golden.geometry.span_attributes import SPAN_NORMAL
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.shapes import normal_shape
+from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.geometry.span_attributes import pieces_shape, span_words_shape
+from blysk.hdl.geometry.triangles import count_events, counters_shape
+from blysk.hdl.geometry.vector_normaliser import VectorNormaliserUnit
+
+__all__ = ["EdgeNormalsUnit", "true_spans_shape"]
+
+
+def true_spans_shape() -> data.StructLayout:
+    """Shape of `TrueSpans.beats`: a span with its three unit normals, and N/W at both ends."""
+    line = data.ArrayLayout(FixedShape(SPAN_NORMAL), 3)
+    normals = {name: normal_shape() for name in ("normal_left", "normal_middle", "normal_right")}
+    return data.StructLayout(normals | {"line_left": line, "line_right": line} | span_words_shape())
+
+
+class EdgeNormalsUnit(wiring.Component):
+    """Normalises the ends and the middle of pieces in turns: `EdgeNormals` is the bit-accurate model.
+
+    A piece of one pixel takes a cycle, of two pixels two, of more three; it leaves `latency` cycles after it
+    was taken in, and a cycle later for each further normal. Six multipliers, those of
+    `VectorNormaliserUnit`.
+
+    Parameters
+    ----------
+    parameters : EdgeNormals
+        Bit-accurate model.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(pieces_shape()))`
+        Pieces of spans.
+    o : :py:`Out(stream.Signature(true_spans_shape()))`
+        The same with unit normals.
+    status : :py:`Out(counters_shape("repaired"))`
+        Normals that took the place of lost ones, since the reset.
+
+    Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
+    """
+
+    def __init__(self, parameters: EdgeNormals | None = None):
+        self.parameters = parameters or EdgeNormals()
+        self._normaliser = VectorNormaliserUnit(self.parameters.normaliser)
+        self.latency = self._normaliser.latency + 2
+        super().__init__(
+            {
+                "i": In(stream.Signature(pieces_shape())),
+                "o": Out(stream.Signature(true_spans_shape())),
+                "status": Out(counters_shape("repaired")),
+            }
+        )
+
+    def elaborate(self, platform):
+        """A piece's vectors in turns; what is beside them waits in a FIFO; its normals are collected."""
+        m = Module()
+        m.submodules.normaliser = normaliser = self._normaliser
+        rest_shape = _rest_shape()
+        m.submodules.rest = rest = fifo.SyncFIFOBuffered(
+            width=rest_shape.as_shape().width, depth=normaliser.latency + 4
+        )
+        self._send(m, normaliser, rest)
+        repaired = self._collect(m, normaliser, data.View(rest_shape, rest.r_data), rest)
+        count_events(m, self.status, repaired=repaired)
+        return m
+
+    def _send(self, m: Module, normaliser, rest) -> None:
+        """Left, right and middle vector of the piece in the register, as many as it needs."""
+        busy, turn, last = Signal(name="busy"), Signal(2, name="turn"), Signal(name="last_turn")
+        piece, moves = Signal(self.i.payload.shape(), name="piece"), Signal(name="moves")
+        middle = Signal(data.ArrayLayout(FixedShape(SPAN_NORMAL), 3), name="middle")
+        m.d.comb += [
+            last.eq(turn == Mux(piece.length > 2, 2, piece.length - 1)),
+            normaliser.i.valid.eq(busy & ((turn != 0) | rest.w_rdy)),
+            moves.eq(normaliser.i.valid & normaliser.i.ready),
+            self.i.ready.eq(~busy | (moves & last)),
+            rest.w_en.eq(moves & (turn == 0)),
+            rest.w_data.eq(
+                Cat(*(Value.cast(piece[name]) for name in ("left", "right", *span_words_shape())))
+            ),
+            normaliser.i.payload.flip.eq(piece.flip),
+        ]
+        for k in range(3):
+            ends = Value.cast(piece.left[k]).as_signed(), Value.cast(piece.right[k]).as_signed()
+            m.d.sync += Value.cast(middle[k]).eq((ends[0] + ends[1]) >> 1)
+            chosen = Mux(turn[1], Value.cast(middle[k]), Mux(turn[0], ends[1], ends[0]))
+            m.d.comb += Value.cast(normaliser.i.payload.vector[k]).eq(chosen)
+        with m.If(self.i.ready):
+            m.d.sync += [busy.eq(self.i.valid), turn.eq(0), piece.eq(self.i.payload)]
+        with m.Elif(moves):
+            m.d.sync += turn.eq(turn + 1)
+
+    def _collect(self, m: Module, normaliser, words, rest) -> Value:
+        """Normals as they come, a lost one replaced by the one before; whether one was, on this cycle."""
+        valid, result = Signal(name="valid"), Signal(self.o.payload.shape(), name="result")
+        good = Signal(normal_shape(), name="good", init=_init())
+        left, right = (Signal(normal_shape(), name=name) for name in ("left_normal", "right_normal"))
+        turn, last, moves, advance = Signal(2), Signal(), Signal(name="takes"), Signal(name="advance")
+        lost = normaliser.o.payload.lost
+        normal = Signal(normal_shape(), name="normal")
+        m.d.comb += [
+            advance.eq(skid_buffer(m, self.o, valid, result)),
+            last.eq(turn == Mux(words.length > 2, 2, words.length - 1)),
+            normaliser.o.ready.eq(advance & rest.r_rdy),
+            moves.eq(normaliser.o.valid & normaliser.o.ready),
+            rest.r_en.eq(moves & last),
+            Value.cast(normal).eq(Mux(lost, Value.cast(good), Value.cast(normaliser.o.payload.normal))),
+        ]
+        with m.If(moves):
+            m.d.sync += [good.eq(normal), turn.eq(Mux(last, 0, turn + 1)), right.eq(normal)]
+            with m.If(turn == 0):
+                m.d.sync += left.eq(normal)
+        with m.If(advance):
+            m.d.sync += [
+                valid.eq(moves & last),
+                Value.cast(result.normal_left).eq(Mux(turn == 0, Value.cast(normal), Value.cast(left))),
+                Value.cast(result.normal_right).eq(Mux(turn[1], Value.cast(right), Value.cast(normal))),
+                result.normal_middle.eq(normal),
+                result.line_left.eq(words.left),
+                result.line_right.eq(words.right),
+                *(result[name].eq(words[name]) for name in span_words_shape()),
+            ]
+        return moves & lost
+
+
+def _rest_shape() -> data.StructLayout:
+    line = data.ArrayLayout(FixedShape(SPAN_NORMAL), 3)
+    return data.StructLayout({"left": line, "right": line} | span_words_shape())
+
+
+def _init() -> list:
+    return [value * 2.0**-17 for value in EdgeNormals.FIRST]

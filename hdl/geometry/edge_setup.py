@@ -1,0 +1,311 @@
+"""Edge setup ([T] figure 4.10, increments): steps and start of an edge's walk, in integers."""
+
+from dataclasses import dataclass
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
+from amaranth.lib import data
+
+from blysk.golden.geometry.edge_setup import EDGES, FRACTION_BITS, X_BITS
+from blysk.golden.geometry.triangles import GRID, Grid
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.geometry.triangles import first_centre, tag_shape
+
+__all__ = ["EdgeSetupUnit", "edge_corners_shape", "edges_shape", "plane_corners_shape"]
+
+ALONG_BITS = 11
+"""Bits of `Edges.along`, with its sign."""
+
+
+def edge_corners_shape(grid: Grid = GRID) -> data.StructLayout:
+    """Shape of what edges are made from: sorted corners, twice the area, and the tag."""
+    coordinate = data.ArrayLayout(FixedShape(grid.coordinate), 3)
+    return data.StructLayout(
+        {"x": coordinate, "y": coordinate, "area": unsigned(2 * grid.bits)} | tag_shape()
+    )
+
+
+def plane_corners_shape(grid: Grid = GRID) -> dict:
+    """Members that the attributes need of a triangle's corners: heights, area, and how the walk starts."""
+    return {
+        "long_height": unsigned(grid.bits),
+        "knee": unsigned(grid.bits),
+        "area": unsigned(2 * grid.bits),
+        "fraction": unsigned(FRACTION_BITS),
+        "down": unsigned(8),
+        "along": signed(ALONG_BITS),
+    }
+
+
+def edges_shape(grid: Grid = GRID) -> data.StructLayout:
+    """Shape of `Edges.beats`, three edges each, with the tag, and what the attributes need."""
+
+    def three(shape):
+        return data.ArrayLayout(shape, 3)
+
+    return data.StructLayout(
+        {
+            "x": three(signed(X_BITS)),
+            "error": three(unsigned(grid.bits)),
+            "step": three(signed(X_BITS)),
+            "error_step": three(unsigned(grid.bits)),
+            "height": three(unsigned(grid.bits)),
+            "first": signed(X_BITS),
+            "upper": unsigned(X_BITS),
+            "lower": unsigned(X_BITS),
+        }
+        | tag_shape()
+        | plane_corners_shape(grid)
+    )
+
+
+@dataclass(frozen=True)
+class _Ages:
+    """Ages at which the parts of an edge's division are loaded and read."""
+
+    divide: int
+    start: int
+    done: int
+
+
+class EdgeSetupUnit(PipelinedUnit):
+    """Quotients, remainders and starts of three edges: those of `EdgeSetup`, the bit-accurate model.
+
+    Each edge takes a division of a difference of x by the height, non-restoring, then the products of the
+    start, bit by bit with the remainder. The long edge's division goes on to the fraction's 32 bits. With
+    three dividers the edges of a triangle go side by side, with one they take turns. No multipliers.
+
+    Parameters
+    ----------
+    grid : Grid
+        Fraction bits s of the coordinates.
+    dividers : int
+        1 or 3.
+    bits_per_cycle : int
+        Quotient bits that a divider finds in a cycle: 1 or 2.
+    initiation_interval : int or None
+        Cycles from a triangle to the next at the closest; ``None``: the least, `least_interval`, which is 16
+        for three dividers of two bits, 67 for one of one.
+
+    Raises
+    ------
+    ValueError
+        If a number is none of those, or the interval is too short.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(edge_corners_shape(grid)))`
+        Sorted corners.
+    o : :py:`Out(stream.Signature(edges_shape(grid)))`
+        Edges, and what the attributes need.
+
+    Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
+    """
+
+    def __init__(
+        self,
+        grid: Grid = GRID,
+        dividers: int = 3,
+        bits_per_cycle: int = 2,
+        initiation_interval: int | None = None,
+    ):
+        if dividers not in (1, 3):
+            raise ValueError(f"dividers must be 1 or 3, not {dividers!r}")
+        if bits_per_cycle not in (1, 2):
+            raise ValueError(f"bits_per_cycle must be 1 or 2, not {bits_per_cycle!r}")
+        self.grid, self.dividers, self.bits_per_cycle = grid, dividers, bits_per_cycle
+        steps = grid.bits // bits_per_cycle
+        # A divider is loaded, takes its steps, and is read; then the next edge.
+        turn = max(steps, grid.subpixel_bits) + 2
+        loads = [2 + (0 if dividers == 3 else k * turn) for k in range(3)]
+        self._ages = [_Ages(load, load + steps + 2, load + steps + 4 + grid.subpixel_bits) for load in loads]
+        fraction_read = self._ages[0].start + FRACTION_BITS // bits_per_cycle
+        # What an edge starts from stands for an interval, and is read as its start is loaded.
+        least = max(FRACTION_BITS // bits_per_cycle, len(loads) // dividers * turn, self._ages[-1].start - 1)
+        interval = least if initiation_interval is None else initiation_interval
+        if interval < least:
+            raise ValueError(f"initiation_interval must be at least {least}, not {interval}")
+        self.least_interval = least
+        self._fraction_read = fraction_read
+        last = max(self._ages[-1].done, fraction_read)
+        super().__init__(
+            edge_corners_shape(grid),
+            edges_shape(grid),
+            latency=last + 2,
+            initiation_interval=interval,
+        )
+
+    def datapath(self, m, operands):
+        """Differences, divisions, starts; what is found early is kept until the last is."""
+        grid = self.grid
+        result = Signal(self.o.payload.shape())
+        x, y = ([Value.cast(operands[name][k]) for k in range(3)] for name in "xy")
+
+        def keep(value, name, age):
+            # Taken at an age, stands for an interval; taken again as often as needed to stand at the last.
+            register = value
+            while True:
+                register = self.register(m, register, f"{name}_{age}", when=self.at(age))
+                if age + self.initiation_interval >= self.latency:
+                    return register
+                age += self.initiation_interval
+
+        edges = []
+        for k, (top, bottom) in enumerate(EDGES):
+            width = self.register(m, x[bottom] - x[top], f"width_{k}", when=self.at(1))
+            down = (y[bottom] - y[top])[: grid.bits]
+            height = self.register(m, down | (down == 0), f"height_{k}", when=self.at(1))
+            begin = x[top] - grid.half
+            begin = self.register(m, begin, f"begin_{k}", when=self.at(1))
+            below = (grid.half - y[top])[: grid.subpixel_bits]
+            below = self.register(m, below, f"below_{k}", when=self.at(1))
+            edges.append((width, height, begin, below))
+
+        copies = [[k] for k in range(3)] if self.dividers == 3 else [[0, 1, 2]]
+        for number, members in enumerate(copies):
+            self._divide(m, number, members, edges, result, keep)
+
+        rows = [first_centre(value, grid) for value in y]
+        for name, value in (
+            ("first", rows[0]),
+            ("upper", (rows[1] - rows[0])[:X_BITS]),
+            ("lower", (rows[2] - rows[1])[:X_BITS]),
+            ("knee", (y[1] - y[0])[: grid.bits]),
+            ("area", operands.area),
+            ("down", Cat(Const(0, 8 - grid.subpixel_bits), edges[0][3])),
+            *((name, operands[name]) for name in tag_shape()),
+        ):
+            early = name != "down"
+            age = self.initiation_interval if early else 1 + self.initiation_interval
+            m.d.comb += result[name].eq(keep(value, name, age))
+        return result
+
+    def _divide(self, m: Module, number: int, members: list[int], edges: list, result, keep) -> None:
+        """One divider with what follows it, for the edges that take turns at it."""
+        grid, ages = self.grid, [self._ages[k] for k in members]
+        bits = grid.bits
+
+        def chosen(values, moments):
+            value = values[-1]
+            for other, moment in zip(values[:-1], moments[:-1], strict=True):
+                value = Mux(self.at(moment), other, value)
+            return value
+
+        # The division: remainder from -d to d - 1, and the bits still to come, from below filled by quotient.
+        load = [age.divide for age in ages]
+        rest, word = Signal(signed(bits + 1), name=f"rest_{number}"), Signal(bits, name=f"word_{number}")
+        divisor, negative = Signal(bits, name=f"divisor_{number}"), Signal(name=f"negative_{number}")
+        width = chosen([edges[k][0] for k in members], load)
+        with m.If(_any(self.at(age) for age in load)):
+            m.d.sync += [
+                rest.eq(width[-1].replicate(bits + 1)),
+                word.eq(width),
+                negative.eq(width[-1]),
+                divisor.eq(chosen([edges[k][1] for k in members], load)),
+            ]
+        with m.Else():
+            after, quotient = _steps(rest, word, divisor, self.bits_per_cycle)
+            m.d.sync += [rest.eq(after), word.eq(quotient)]
+
+        # Its remainder put right; the start from it.
+        corrected = Mux(rest < 0, rest + divisor, rest)[:bits]
+        quotient = Cat(word, negative).as_signed()
+        read = [age.start - 1 for age in ages]
+        found = _any(self.at(age) for age in read)
+        step = self.register(m, quotient, f"step_{number}", when=found)
+        error_step = self.register(m, corrected, f"error_step_{number}", when=found)
+        height = self.register(m, divisor, f"height_of_{number}", when=found)
+        self._start(m, number, members, edges, (step, error_step, height), result, keep)
+        if 0 in members:
+            fraction = self._fraction(m, error_step, height)
+            m.d.comb += result.fraction.eq(keep(fraction, "fraction", self._fraction_read))
+
+    def _start(self, m, number, members, edges, division, result, keep) -> None:
+        """``b`` bit by bit, lowest first, and with it ``u``; then x and error."""
+        grid, (step, error_step, height) = self.grid, division
+        ages = [self._ages[k] for k in members]
+        load = [age.start for age in ages]
+
+        def chosen(values):
+            value = values[-1]
+            for other, moment in zip(values[:-1], load[:-1], strict=True):
+                value = Mux(self.at(moment), other, value)
+            return value
+
+        s = grid.subpixel_bits
+        total = Signal(signed(grid.bits + 1), name=f"total_{number}")
+        carried = Signal(signed(grid.bits + 2), name=f"carried_{number}")
+        below, low = Signal(s, name=f"below_of_{number}"), Signal(s, name=f"low_{number}")
+        begin = Signal(signed(grid.bits + 1), name=f"begin_of_{number}")
+        of_edge = [edges[k] for k in members]
+        sum_ = total + Mux(below[0], step, 0)
+        more = carried + Mux(below[0], error_step, 0) + Mux(sum_[0], height, 0)
+        with m.If(_any(self.at(age) for age in load)):
+            first = chosen([edge[2] for edge in of_edge])
+            m.d.sync += [
+                begin.eq(first),
+                total.eq(first[:s]),
+                carried.eq(-1),
+                below.eq(chosen([edge[3] for edge in of_edge])),
+            ]
+        with m.Else():
+            m.d.sync += [
+                total.eq(sum_ >> 1),
+                carried.eq(more >> 1),
+                below.eq(below >> 1),
+                low.eq(Cat(low[1:], sum_[0])),
+            ]
+        over = carried >= height
+        places = Mux(carried < 0, 0, Mux(over, 2, 1))
+        error = (carried + Mux(carried < 0, height, Mux(over, -height, 0)))[: grid.bits]
+        column = ((begin >> s) + total + places)[:X_BITS].as_signed()
+        along = ((places << s) - low).as_signed() << (8 - s)
+        for k, age in zip(members, ages, strict=True):
+            for name, value in (
+                ("x", column),
+                ("error", error),
+                ("step", step[:X_BITS].as_signed()),
+                ("error_step", error_step),
+                ("height", height),
+            ):
+                value = keep(value, f"{name}_{k}", age.done - 1)
+                m.d.comb += result[name][k].eq(value)
+                if k == 0 and name == "height":
+                    m.d.comb += result.long_height.eq(value)
+            if k == 0:
+                along = keep(along[:ALONG_BITS].as_signed(), "along", age.done - 1)
+                m.d.comb += result.along.eq(along)
+
+    def _fraction(self, m: Module, error_step: Value, height: Value) -> Value:
+        """The division goes on: ``floor(2^32 error_step / height)``."""
+        bits = self.grid.bits
+        rest, word = (
+            Signal(signed(bits + 1), name="fraction_rest"),
+            Signal(FRACTION_BITS, name="fraction_word"),
+        )
+        divisor = Signal(bits, name="fraction_divisor")
+        nothing = Const(0, FRACTION_BITS)
+        after, quotient = _steps(error_step, nothing, height, self.bits_per_cycle)
+        with m.If(self.at(self._ages[0].start)):
+            m.d.sync += [rest.eq(after), word.eq(quotient), divisor.eq(height)]
+        with m.Else():
+            after, quotient = _steps(rest, word, divisor, self.bits_per_cycle)
+            m.d.sync += [rest.eq(after), word.eq(quotient)]
+        return word
+
+
+def _any(values) -> Value:
+    return Cat(*values).any()
+
+
+def _steps(rest: Value, word: Value, divisor: Value, count: int) -> tuple[Value, Value]:
+    """So many steps of a division: ``rest`` takes a bit of ``word``, less or more the divisor by its sign."""
+    bits = len(divisor)
+    for _ in range(count):
+        subtract = rest >= 0
+        doubled = Cat(word[-1], rest)[: bits + 1]
+        # One adder: the 1 of a subtraction comes in by a bit below.
+        turned = Cat(divisor, Const(0, 1)) ^ subtract.replicate(bits + 1)
+        rest = (Cat(Const(1, 1), doubled) + Cat(subtract, turned))[1 : bits + 2].as_signed()
+        word = Cat(rest >= 0, word[:-1])
+    return rest, word

@@ -1,0 +1,182 @@
+"""Edge walk ([T] figure 4.10, rasteriser): the first and the last covered pixel of each scanline, exactly."""
+
+from amaranth.hdl import Module, Mux, Signal, signed, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.edge_setup import X_BITS
+from blysk.golden.geometry.triangles import GRID, Grid
+from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.geometry.triangles import frame_shape, tag_shape
+
+__all__ = ["EdgeWalkUnit", "rows_shape", "walk_shape"]
+
+
+def walk_shape(grid: Grid = GRID) -> data.StructLayout:
+    """Shape of what is walked: three edges, scanlines, and the tag."""
+
+    def three(shape):
+        return data.ArrayLayout(shape, 3)
+
+    return data.StructLayout(
+        {
+            "x": three(signed(X_BITS)),
+            "error": three(unsigned(grid.bits)),
+            "step": three(signed(X_BITS)),
+            "error_step": three(unsigned(grid.bits)),
+            "height": three(unsigned(grid.bits)),
+            "first": signed(X_BITS),
+            "upper": unsigned(X_BITS),
+            "lower": unsigned(X_BITS),
+        }
+        | tag_shape()
+    )
+
+
+def rows_shape() -> data.StructLayout:
+    """Shape of `Rows.beats`: columns of a scanline, the long edge's carry, and the tag."""
+    return data.StructLayout(
+        {
+            "y": signed(X_BITS),
+            "begin": signed(X_BITS),
+            "end": signed(X_BITS),
+            "carry": unsigned(1),
+            "last": unsigned(1),
+        }
+        | tag_shape()
+    )
+
+
+class EdgeWalkUnit(wiring.Component):
+    """Two edges walked side by side, a scanline a cycle: those of `EdgeWalk`, the bit-accurate model.
+
+    A triangle of n scanlines taken in on one cycle gives them 2 cycles later and more on each of the n - 1
+    cycles after, unless the output waits; the next triangle is taken in on the cycle that leaves no gap.
+    Scanlines above the picture are walked, those below are not. No multipliers.
+
+    Parameters
+    ----------
+    grid : Grid
+        Fraction bits of the coordinates.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(walk_shape(grid)))`
+        Edges of triangles.
+    o : :py:`Out(stream.Signature(rows_shape()))`
+        Scanlines.
+    constants : :py:`In(frame_shape())`
+        The frame, of which ``bottom`` is read; stays while triangles are inside.
+
+    Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
+    """
+
+    latency = 2
+
+    def __init__(self, grid: Grid = GRID):
+        self.grid = grid
+        super().__init__(
+            {
+                "i": In(stream.Signature(walk_shape(grid))),
+                "o": Out(stream.Signature(rows_shape())),
+                "constants": In(frame_shape()),
+            }
+        )
+
+    def elaborate(self, platform):
+        """The long edge, the short one, and the lower one that waits; counters; a register for the result."""
+        m = Module()
+        triangle, advance, load = self.i.payload, Signal(), Signal()
+        active, last = Signal(name="active"), Signal(name="last_row", init=1)
+        left, upper = Signal(signed(X_BITS + 1), name="left"), Signal(X_BITS, name="upper")
+        y, valid = Signal(signed(X_BITS), name="y"), Signal(name="valid")
+        tag = Signal(data.StructLayout(tag_shape()), name="tag")
+        row = Signal(self.o.payload.shape(), name="row")
+        m.d.comb += [
+            advance.eq(skid_buffer(m, self.o, valid, row)),
+            self.i.ready.eq(advance & last),
+            load.eq(self.i.valid & self.i.ready),
+        ]
+
+        low_is_next = Signal(name="low_is_next")
+        lower = self._edge(m, "lower", load, [(load, 2)], None)
+        long = self._edge(m, "long", load, [(load, 0)], advance)
+        flat = triangle.upper == 0
+        short = self._edge(
+            m, "short", load, [(load & flat, 2), (load & ~flat, 1)], advance, low_is_next, lower
+        )
+
+        total = triangle.upper + triangle.lower
+        seen = self.constants.bottom - triangle.first
+        rows = Mux(seen < total, seen, total)
+        with m.If(advance):
+            m.d.sync += valid.eq(active)
+            with m.If(last):
+                m.d.sync += [active.eq(self.i.valid), left.eq(rows - 2), last.eq(~self.i.valid | (rows <= 1))]
+                m.d.sync += [upper.eq(triangle.upper - 1), low_is_next.eq(triangle.upper == 1)]
+                m.d.sync += [y.eq(triangle.first), *(tag[name].eq(triangle[name]) for name in tag_shape())]
+            with m.Else():
+                m.d.sync += [left.eq(left - 1), last.eq(left <= 0), y.eq(y + 1)]
+                m.d.sync += [upper.eq(upper - 1), low_is_next.eq(upper == 1)]
+            m.d.sync += [
+                row.y.eq(y),
+                row.begin.eq(Mux(tag.right, short.x, long.x)),
+                row.end.eq(Mux(tag.right, long.x, short.x)),
+                row.carry.eq(long.carry),
+                row.last.eq(last),
+                *(row[name].eq(tag[name]) for name in tag_shape()),
+            ]
+        return m
+
+    def _edge(self, m: Module, name: str, load, sources, advance, turns=None, lower=None):
+        """Registers of an edge, loaded from the input, and stepped while ``advance``."""
+        triangle, bits = self.i.payload, self.grid.bits
+        edge = _Edge(name, bits)
+        # The remainder is compared before it is reduced: both sums are there.
+        more = edge.error + edge.error_step
+        less = (edge.error - edge.lack).as_signed()
+        m.d.comb += edge.carry.eq(less >= 0)
+        with m.If(load):
+            for when, k in sources:
+                with m.If(when):
+                    m.d.sync += [
+                        edge.x.eq(triangle.x[k]),
+                        edge.error.eq(triangle.error[k]),
+                        edge.step.eq(triangle.step[k]),
+                        edge.error_step.eq(triangle.error_step[k]),
+                        edge.lack.eq(triangle.height[k] - triangle.error_step[k]),
+                    ]
+        if advance is None:
+            return edge
+
+        def walk():
+            m.d.sync += [
+                edge.x.eq(edge.x + edge.step + edge.carry),
+                edge.error.eq(Mux(edge.carry, less, more)),
+            ]
+
+        with m.Elif(advance):
+            if turns is None:
+                walk()
+            else:
+                with m.If(turns):
+                    m.d.sync += [mine.eq(its) for mine, its in zip(edge.words, lower.words, strict=True)]
+                with m.Else():
+                    walk()
+        return edge
+
+
+class _Edge:
+    """Registers of an edge; ``lack`` is the height less the step of the error."""
+
+    def __init__(self, name: str, bits: int):
+        self.x, self.step = (Signal(signed(X_BITS), name=f"{name}_{word}") for word in ("x", "step"))
+        self.error, self.error_step, self.lack = (
+            Signal(bits, name=f"{name}_{word}") for word in ("error", "error_step", "lack")
+        )
+        self.carry = Signal(name=f"{name}_carry")
+
+    @property
+    def words(self) -> tuple[Signal, ...]:
+        """All of them."""
+        return self.x, self.step, self.error, self.error_step, self.lack

@@ -1,0 +1,187 @@
+"""Geometry ([T] figure 4.10): triangles to spans."""
+
+from amaranth.hdl import Module, Signal, unsigned
+from amaranth.lib import stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.geometry import COUNTERS
+from blysk.golden.geometry.triangles import ATTRIBUTES, GRID, Grid
+from blysk.hdl.core.stream import connect, connect_fifo
+from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit, serial_attribute_shape
+from blysk.hdl.geometry.edge_normals import EdgeNormalsUnit, true_spans_shape
+from blysk.hdl.geometry.edge_setup import EdgeSetupUnit
+from blysk.hdl.geometry.edge_walk import EdgeWalkUnit
+from blysk.hdl.geometry.gradient_setup import GradientSetupUnit
+from blysk.hdl.geometry.plane_assembler import PlaneAssemblerUnit
+from blysk.hdl.geometry.plane_setup import PlaneSetupUnit, scales_shape
+from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
+from blysk.hdl.geometry.span_clip import SpanClipUnit
+from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
+from blysk.hdl.geometry.vertex_sort import VertexSortUnit
+
+__all__ = ["GeometryUnit"]
+
+_SORTED = 17
+"""Triangles that wait for the edge setup, while others are dropped by the sort."""
+
+_SCALES = 4
+"""Triangles whose scales wait for their attributes."""
+
+
+class GeometryUnit(wiring.Component):
+    """Triangles to spans, up to one triangle each 16 cycles and one span a cycle: `Geometry` is the model.
+
+    The units of the room in a row. Corners go to the edges and, one attribute after the other, to a FIFO,
+    where they meet the scales of their triangle; edges wait in a FIFO until their planes are there. In the
+    *compact* style one divider finds one quotient bit a cycle, and attributes share a multiplier.
+
+    A triangle takes as long as the slowest of its units, while others work on its neighbours:
+
+    - setup: `interval` cycles where it is drawn, 16 or compact 67; 5 to 9 where it is dropped by the sort;
+    - the walk: a cycle for a scanline without pixels in the picture;
+    - a span, or a piece of it, of p pixels: as many cycles as ``p - 1`` has bits, but at least 1 for 1 pixel,
+      2 for 2 pixels and 3 for more. Never more than it has pixels.
+
+    The multipliers are `multipliers`: 10, in the compact style 8.
+
+    Parameters
+    ----------
+    grid : Grid
+        Fraction bits of the coordinates.
+    compact : bool
+        The compact style.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(triangle_shape(grid)))`
+        Triangles.
+    o : :py:`Out(stream.Signature(true_spans_shape()))`
+        Their spans.
+    constants : :py:`In(frame_shape())`
+        The frame; stays while triangles are inside.
+    status : :py:`Out(counters_shape(*COUNTERS))`
+        What was counted since the reset.
+
+    Source: docs/theory/geometry.md#composition; [T] figure 4.10.
+    """
+
+    def __init__(self, grid: Grid = GRID, compact: bool = False):
+        self.grid, self.compact = grid, compact
+        self._sort, self._serialiser = VertexSortUnit(grid), AttributeSerialiserUnit()
+        self._edges = EdgeSetupUnit(grid, *((1, 1) if compact else (3, 2)))
+        self.interval = interval = self._edges.initiation_interval
+        self._planes = PlaneSetupUnit(grid, interval)
+        self._gradients = GradientSetupUnit(12 if compact else interval // ATTRIBUTES)
+        self._assembler, self._attributes = PlaneAssemblerUnit(), SpanAttributesUnit()
+        self._walk, self._clip, self._normals = EdgeWalkUnit(grid), SpanClipUnit(), EdgeNormalsUnit()
+        normaliser = 6
+        self.multipliers = self._planes.multipliers + self._gradients.multipliers + normaliser
+        super().__init__(
+            {
+                "i": In(stream.Signature(triangle_shape(grid))),
+                "o": Out(stream.Signature(true_spans_shape())),
+                "constants": In(frame_shape()),
+                "status": Out(counters_shape(*COUNTERS)),
+            }
+        )
+
+    def elaborate(self, platform):
+        """The units, what waits between them, and the counters."""
+        m = Module()
+        for name in ("sort", "serialiser", "edges", "planes", "gradients", "assembler", "attributes"):
+            m.submodules[name] = getattr(self, f"_{name}")
+        for name in ("walk", "clip", "normals"):
+            m.submodules[name] = getattr(self, f"_{name}")
+        for unit in (self._sort, self._walk, self._clip, self._assembler):
+            m.d.comb += unit.constants.eq(self.constants)
+        connect(m, wiring.flipped(self.i), self._sort.i)
+        walks = self._set_up(m)
+        connect(m, walks, self._walk.i)
+        connect(m, self._walk.o, self._clip.i)
+        self._walk_planes(m)
+        connect(m, self._attributes.o, self._normals.i)
+        connect(m, self._normals.o, wiring.flipped(self.o))
+        self._count(m)
+        return m
+
+    def _set_up(self, m: Module) -> stream.Interface:
+        """From the sort to gradients; what is to be walked."""
+        sort, serialiser, edges, planes = self._sort, self._serialiser, self._edges, self._planes
+        drawn = _between("drawn", sort.o)
+        connect_fifo(m, "waiting_triangles", sort.o, drawn, depth=_SORTED)
+        _fork(m, drawn, edges.i, serialiser.i)
+        for to in (edges.i.payload, serialiser.i.payload):
+            m.d.comb += [to[name].eq(drawn.payload[name]) for name in to.shape().members]
+
+        # How many triangles are between their edges and their planes at most.
+        delay = planes.latency + self._gradients.latency + ATTRIBUTES * self._gradients.initiation_interval
+        inside = delay // self.interval + 3
+        corners, walks = _between("corners", planes.i), _between("walks", self._walk.i)
+        _fork(m, edges.o, corners, walks)
+        for to in (corners.payload, walks.payload):
+            m.d.comb += [to[name].eq(edges.o.payload[name]) for name in to.shape().members]
+        connect_fifo(m, "waiting_corners", corners, planes.i, depth=3)
+        waiting = _between("walk", self._walk.i)
+        connect_fifo(m, "waiting_walks", walks, waiting, depth=inside)
+
+        ahead = (edges.latency + planes.latency) // self.interval + 3
+        attributes, scales = _between("attribute", serialiser.o), _between("scale", planes.o)
+        connect_fifo(m, "waiting_attributes", serialiser.o, attributes, depth=ATTRIBUTES * ahead)
+        connect_fifo(m, "waiting_scales", planes.o, scales, depth=_SCALES)
+        to, turn = self._gradients.i, Signal(range(ATTRIBUTES), name="turn")
+        moves = to.valid & to.ready
+        with m.If(moves):
+            m.d.sync += turn.eq(turn + 1)
+        m.d.comb += [
+            to.valid.eq(attributes.valid & scales.valid),
+            attributes.ready.eq(to.ready & scales.valid),
+            scales.ready.eq(moves & (turn == ATTRIBUTES - 1)),
+            *(to.payload[name].eq(attributes.payload[name]) for name in serial_attribute_shape().members),
+            *(to.payload[name].eq(scales.payload[name]) for name in scales_shape()),
+        ]
+        connect(m, self._gradients.o, self._assembler.i)
+        self._sliver = scales.ready & scales.payload.sliver
+        return waiting
+
+    def _walk_planes(self, m: Module) -> None:
+        """Scanlines meet their planes: the first of a triangle waits for them, the others do not."""
+        rows, planes, to = self._clip.o, self._assembler.o, self._attributes.i
+        first = Signal(name="first", init=1)
+        with m.If(rows.valid & rows.ready):
+            m.d.sync += first.eq(rows.payload.last)
+        m.d.comb += [
+            to.payload.planes.eq(planes.payload),
+            to.payload.row.eq(rows.payload),
+            to.valid.eq(rows.valid & (planes.valid | ~first)),
+            rows.ready.eq(to.ready & (planes.valid | ~first)),
+            planes.ready.eq(to.ready & rows.valid & first),
+        ]
+
+    def _count(self, m: Module) -> None:
+        """Counters of the units; those that two have are added."""
+        sliver = Signal(unsigned(len(self.status.sliver)), name="slivers")
+        with m.If(self._sliver):
+            m.d.sync += sliver.eq(sliver + 1)
+        sort, attributes = self._sort.status, self._attributes.status
+        m.d.comb += [
+            self.status.empty.eq(sort.empty + attributes.empty),
+            self.status.zero_area.eq(sort.zero_area),
+            self.status.culled.eq(sort.culled),
+            self.status.sliver.eq(sliver),
+            self.status.cut.eq(attributes.cut),
+            self.status.repaired.eq(self._normals.status.repaired),
+        ]
+
+
+def _between(name: str, port: stream.Interface) -> stream.Interface:
+    """A stream of the shape of a unit's, between two of them."""
+    return stream.Signature(port.payload.shape()).create(path=(name,))
+
+
+def _fork(m: Module, source: stream.Interface, first: stream.Interface, second: stream.Interface) -> None:
+    """Both take a payload, on the same cycle; what they take of it is not connected here."""
+    m.d.comb += [
+        first.valid.eq(source.valid & second.ready),
+        second.valid.eq(source.valid & first.ready),
+        source.ready.eq(first.ready & second.ready),
+    ]

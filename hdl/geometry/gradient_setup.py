@@ -1,0 +1,226 @@
+"""Gradient setup: one attribute's start and steps along the long edge and along a scanline."""
+
+from amaranth.hdl import Array, Cat, Const, Mux, Signal, Value, signed, unsigned
+from amaranth.lib import data
+
+from blysk.golden.geometry.gradient_setup import GradientSetup
+from blysk.golden.geometry.plane_setup import PlaneSetup
+from blysk.golden.geometry.triangles import ATTRIBUTE
+from blysk.golden.number.fixed import SQ
+from blysk.hdl.core.dataflow import Dataflow
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.geometry.plane_setup import scales_shape
+from blysk.hdl.geometry.wide_product import three_products, wide_product
+
+__all__ = ["LEAST_BITS", "GradientSetupUnit", "attribute_shape", "gradient_shape"]
+
+LEAST_BITS = 12
+"""Bits of the bound of `PlaneAssembler.least`."""
+
+_ROUND = 1
+"""Bits that a shifted word has more, to be rounded."""
+
+
+def attribute_shape() -> data.StructLayout:
+    """Shape of an attribute: its values at the sorted corners, the triangle's scales and its bound."""
+    corners = {name: FixedShape(ATTRIBUTE) for name in ("first", "middle", "last")}
+    return data.StructLayout(corners | scales_shape() | {"least": unsigned(LEAST_BITS)})
+
+
+def gradient_shape() -> data.StructLayout:
+    """Shape of `Gradients.beats`, of one attribute, with the triangle's bound."""
+    p = GradientSetup
+    steps = {name: FixedShape(p.FORMAT) for name in ("short", "long", "inward")}
+    rest = {"size": unsigned(p.SIZE_BITS), "least": unsigned(LEAST_BITS)}
+    return data.StructLayout({"start": FixedShape(p.START_FORMAT)} | steps | rest)
+
+
+class GradientSetupUnit(PipelinedUnit):
+    """Start and steps of an attribute: those of `GradientSetup`, the bit-accurate model.
+
+    The twelve multiplications of an attribute take turns at ``ceil(12 / I)`` multipliers of 18x18 bits, I
+    the initiation interval: 3 for an interval of 4, 1 for 12. Three words take turns at a shifter; the sum of
+    the start takes four turns at an adder, two bits of both factors a turn. The latency, `latency`, follows
+    from the turns.
+
+    Parameters
+    ----------
+    initiation_interval : int
+        Cycles from an attribute to the next at the closest, at least 4.
+
+    Raises
+    ------
+    ValueError
+        If the interval is too short.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(attribute_shape()))`
+        Attributes.
+    o : :py:`Out(stream.Signature(gradient_shape()))`
+        Their gradients.
+
+    Source: docs/theory/geometry.md#normals; not in the documents.
+    """
+
+    def __init__(self, initiation_interval: int = 4):
+        if initiation_interval < 4:
+            raise ValueError(f"initiation_interval must be at least 4, not {initiation_interval}")
+        self._graph = graph = Dataflow(initiation_interval, 12)
+        self.multipliers = graph.multiplier.count
+        self._results = self._describe()
+        super().__init__(
+            attribute_shape(),
+            gradient_shape(),
+            latency=max(word.stage for word in self._results.values()),
+            initiation_interval=initiation_interval,
+        )
+
+    def _describe(self) -> dict:
+        """Words of the results."""
+        g, p = self._graph, GradientSetup
+        point = p.PRODUCT_FORMAT.fraction_bits
+        first, middle, last, reciprocal, knee, width, row_shift, column_shift, fraction, right = (
+            g.input(name, lambda operands, name=name: operands[name])
+            for name in (
+                *("first", "middle", "last", "height_reciprocal", "knee", "width_reciprocal"),
+                *("row_shift", "column_shift", "fraction", "right"),
+            )
+        )
+        least = g.input("least", lambda operands: operands.least)
+        difference = g.register("difference", lambda a, b: (b - a).wrap(p.DIFFERENCE_FORMAT), first, last)
+        along = wide_product(
+            g,
+            "along",
+            difference,
+            reciprocal,
+            p.DIFFERENCE_LOW,
+            PlaneSetup.RECIPROCAL_LOW,
+            point,
+            p.PRODUCT_FORMAT,
+        )
+        at_knee = wide_product(
+            g, "at_knee", along, knee, p.PRODUCT_LOW, PlaneSetup.HEIGHT_LOW, point, lambda value: value
+        )
+        rise = g.register(
+            "rise", lambda a, b: (b - a).extend(SQ(3, point)), first, middle, since=at_knee.stage
+        )
+        across = g.register("across", lambda a, b: (a - b).saturate(p.PRODUCT_FORMAT), rise, at_knee)
+        inward = wide_product(
+            g, "inward_word", across, width, p.PRODUCT_LOW, p.WIDTH_LOW, point, p.PRODUCT_FORMAT
+        )
+        f = g.wire("fraction_word", lambda f: FixedValue(p.FRACTION_FORMAT, Cat(Const(1, 1), f)), fraction)
+        high, crossed = three_products(g, "part", f, inward, p.FRACTION_LOW, p.PRODUCT_LOW, 40)
+        part = g.register("part", lambda a, b: (a + b).wrap(SQ(2, 40)), high, crossed)
+
+        # The others wait for the last: what they are made of is narrower.
+        shifter = self._shifter()
+        part = g.use(shifter, "part_shifted", (part, column_shift), self._to_shift)
+        row, step = (
+            g.use(shifter, name, (word, shift), self._to_shift, since=part.stage)
+            for name, word, shift in (("row", along, row_shift), ("step", inward, column_shift))
+        )
+        short = g.register("short", lambda a, b, right: _either(right, a + b, a - b), row, part, right)
+        long = g.register("long", lambda a, b, right: _either(right, a - b, a + b), short, step, right)
+        start = self._start(first, short, step, right)
+
+        def size(step):
+            code = Value.cast(step).as_unsigned()
+            kept = (code ^ code[-1].replicate(len(code)))[p.FORMAT.fraction_bits - p.SIZE_BITS :]
+            return Mux(
+                kept[p.SIZE_BITS :].any() | kept[: p.SIZE_BITS].all(), (1 << p.SIZE_BITS) - 1, kept + 1
+            )[: p.SIZE_BITS]
+
+        return {
+            "start": start,
+            "short": g.wire("short_word", lambda v: v.wrap(p.FORMAT), short),
+            "long": g.wire("long_word", lambda v: v.wrap(p.FORMAT), long),
+            "inward": g.register("inward", lambda v: v.wrap(p.FORMAT), step),
+            "size": g.register("size", size, step),
+            "least": least,
+        }
+
+    def datapath(self, m, operands):
+        """The graph, read at the age of its last words."""
+        value = self._graph.build(m, self, operands)
+        result = Signal(self.o.payload.shape(), name="result")
+        for name, word in self._results.items():
+            m.d.comb += result[name].eq(value(word, self.latency))
+        return result
+
+    def _shifter(self):
+        """Right by 0 to 31 places, in two registers, then rounded half up in a third."""
+        format = GradientSetup.SHIFTED_FORMAT
+        bits = format.width + _ROUND
+
+        def shift(register, word, amount):
+            coarse = register((word >> Cat(Const(0, 2), amount[2:]))[:bits].as_signed(), "coarse")
+            fine = register(amount[:2], "fine_amount")
+            shifted = register((coarse >> fine)[:bits].as_signed(), "shifted")
+            return register(FixedValue(format, ((shifted + 1) >> 1)[: format.width]), "rounded")
+
+        return self._graph.share("shifter", 3, (signed(bits), unsigned(PlaneSetup.SHIFT_BITS)), 3, shift)
+
+    @staticmethod
+    def _to_shift(value: FixedValue, amount: Value):
+        word = value.scale(8).extend(GradientSetup.SHIFTED_FORMAT)
+        return Cat(Const(0, _ROUND), Value.cast(word)).as_signed(), amount
+
+    def _start(self, first, short, step, right):
+        """``(k short + n inward) / 256`` in four digits of two bits, lowest first; then the rest of n."""
+        g, p = self._graph, GradientSetup
+        point = p.START_FORMAT.fraction_bits
+        down, along = (g.input(name, lambda o, name=name: o[name]) for name in ("down", "along"))
+        n = g.register(
+            "n", lambda along, right: Mux(right, 256 - along, along)[:11].as_signed(), along, right
+        )
+        wide = signed(SQ(11, point).width)
+
+        def cut(value):
+            return Value.cast(value.truncate(point)).as_signed()
+
+        def digit(register, short, step, of_short, of_step):
+            total = sum(
+                Mux(bit, word << place, 0)
+                for word, digit in ((short, of_short), (step, of_step))
+                for place, bit in enumerate(digit)
+            )
+            return register(total, "digit")
+
+        digits = g.share("digit", 4, (wide, wide, unsigned(2), unsigned(2)), 1, digit)
+        total = None
+        for k in range(4):
+            low = slice(2 * k, 2 * k + 2)
+            term = g.use(
+                digits,
+                f"digit_{k}",
+                (short, step, down, n),
+                lambda short, step, down, n, low=low: (cut(short), cut(step), down[low], n[low]),
+            )
+            words = (term,) if total is None else (term, total)
+            total = g.register(f"total_{k}", lambda term, total=None: _quarter(term, total), *words)
+        above = g.register(
+            "above",
+            lambda step, n: Array([Const(0, signed(1)), step, step << 1, -step])[n],
+            g.wire("step_cut", cut, step),
+            g.wire("n_above", lambda n: n[8:10], n),
+            since=total.stage,
+        )
+        begin = g.register(
+            "begin",
+            lambda first, above: Value.cast(first.extend(SQ(1, point))).as_signed() + above,
+            first,
+            above,
+        )
+        return g.register(
+            "start", lambda a, b: FixedValue(p.START_FORMAT, (a + b)[: p.START_FORMAT.width]), total, begin
+        )
+
+
+def _quarter(term: Value, total: Value | None) -> Value:
+    return (term if total is None else term + total) >> 2
+
+
+def _either(right: Value, then: FixedValue, otherwise: FixedValue) -> FixedValue:
+    return FixedValue(then.format, Mux(right, Value.cast(then), Value.cast(otherwise)))

@@ -1,0 +1,126 @@
+"""Plane assembler: the gradients of a triangle's attributes, and the longest piece of its spans."""
+
+from amaranth.hdl import Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.attribute_serialiser import AttributeSerialiser
+from blysk.golden.geometry.gradient_setup import GradientSetup
+from blysk.golden.geometry.plane_assembler import PlaneAssembler
+from blysk.golden.geometry.triangles import ATTRIBUTES, LIMIT_BITS
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.geometry.gradient_setup import gradient_shape
+from blysk.hdl.geometry.triangles import frame_shape
+
+__all__ = ["PIECE_BITS", "PlaneAssemblerUnit", "planes_shape"]
+
+PIECE_BITS = 4
+"""Bits of a piece's exponent."""
+
+_WORDS = ("start", "short", "long", "inward")
+
+
+def planes_shape() -> data.StructLayout:
+    """Shape of `Planes.beats`: gradients of four attributes, and the exponent of a piece."""
+    p = GradientSetup
+    four = {name: data.ArrayLayout(FixedShape(p.FORMAT), ATTRIBUTES) for name in _WORDS[1:]}
+    start = {"start": data.ArrayLayout(FixedShape(p.START_FORMAT), ATTRIBUTES)}
+    return data.StructLayout(start | four | {"piece": unsigned(PIECE_BITS)})
+
+
+class PlaneAssemblerUnit(wiring.Component):
+    """Collects four gradients, and finds ``piece``: `PlaneAssembler` is the bit-accurate model.
+
+    With the first gradient the product of bound and limit begins, two bits of the limit a cycle; after the
+    third ``piece`` is searched for, a bit a cycle. If gradients are at least 3 cycles apart a triangle is
+    offered 2 cycles after its fourth one at the earliest, and the next one's first is taken in from 2 cycles
+    after that on; so one each four cycles never waits. No multipliers.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(gradient_shape()))`
+        Gradients of N/W by component, then of the depth.
+    o : :py:`Out(stream.Signature(planes_shape()))`
+        Triangles.
+    constants : :py:`In(frame_shape())`
+        The frame, of which ``limit`` is read; stays while triangles are inside.
+
+    Source: docs/theory/geometry.md#normals; not in the documents.
+    """
+
+    def __init__(self):
+        super().__init__(
+            {
+                "i": In(stream.Signature(gradient_shape())),
+                "o": Out(stream.Signature(planes_shape())),
+                "constants": In(frame_shape()),
+            }
+        )
+
+    def elaborate(self, platform):
+        """Collected words; bound times limit; sum and largest of the sizes; the search."""
+        m = Module()
+        gradient, result = self.i.payload, Signal(self.o.payload.shape(), name="result")
+        count, full, accept = Signal(2, name="count"), Signal(name="full"), Signal()
+        m.d.comb += [self.i.ready.eq(~full), accept.eq(self.i.valid & ~full)]
+        with m.If(accept):
+            m.d.sync += [count.eq(count + 1), full.eq(count == ATTRIBUTES - 1)]
+            for name in _WORDS:
+                words = [Value.cast(word) for word in result[name]]
+                m.d.sync += [
+                    word.eq(other)
+                    for word, other in zip(words, [*words[1:], Value.cast(gradient[name])], strict=True)
+                ]
+        allowed, multiplied = self._allowed(m, accept & (count == 0), gradient.least)
+        found = self._search(m, accept, count, gradient.size, allowed, multiplied, result.piece)
+        m.d.comb += [self.o.valid.eq(full & found), self.o.payload.eq(result)]
+        with m.If(self.o.valid & self.o.ready):
+            m.d.sync += full.eq(0)
+        return m
+
+    def _allowed(self, m: Module, begins: Value, least: Value) -> tuple[Signal, Value]:
+        """Bound times limit, and whether it is there."""
+        bits = AttributeSerialiser.BITS + LIMIT_BITS
+        allowed, factor = Signal(bits, name="allowed"), Signal(AttributeSerialiser.BITS, name="factor")
+        rest, left = Signal(LIMIT_BITS, name="rest"), Signal(range(LIMIT_BITS // 2 + 1), name="left")
+        with m.If(begins):
+            m.d.sync += [
+                allowed.eq(0),
+                factor.eq(least),
+                rest.eq(self.constants.limit),
+                left.eq(LIMIT_BITS // 2),
+            ]
+        with m.Elif(left != 0):
+            term = Mux(rest[-1], factor << 1, 0) + Mux(rest[-2], factor, 0)
+            m.d.sync += [allowed.eq((allowed << 2) + term), rest.eq(rest << 2), left.eq(left - 1)]
+        return allowed, left == 0
+
+    @staticmethod
+    def _search(m: Module, accept, count, size, allowed, multiplied, piece) -> Signal:
+        """The largest exponent, from its first bit on; whether it is found."""
+        bits = GradientSetup.SIZE_BITS
+        largest, total = Signal(bits, name="largest"), Signal(bits + 2, name="total")
+        norm, step = Signal(bits + 2 + (1 << PIECE_BITS), name="norm"), Signal(3, name="search_step")
+        found, exponent = Signal(name="found"), Signal(PIECE_BITS, name="exponent")
+        with m.If(accept & (count < 3)):
+            first = count == 0
+            m.d.sync += [
+                largest.eq(Mux(first | (size > largest), size, largest)),
+                total.eq(Mux(first, 0, total) + size),
+                step.eq(count == 2),
+                found.eq(0),
+            ]
+        with m.Elif((step == 1) & multiplied):
+            m.d.sync += [norm.eq(largest + total), exponent.eq(0), step.eq(2)]
+        with m.Elif(step >= 2):
+            with m.Switch(step):
+                for k in range(PIECE_BITS):
+                    bit = PIECE_BITS - 1 - k
+                    with m.Case(2 + k):
+                        more = norm << (1 << bit)
+                        with m.If(more <= allowed):
+                            m.d.sync += [norm.eq(more), exponent[bit].eq(1)]
+            last = step == 1 + PIECE_BITS
+            m.d.sync += [step.eq(Mux(last, 0, step + 1)), found.eq(last)]
+        m.d.comb += piece.eq(Mux(exponent > PlaneAssembler.LARGEST, PlaneAssembler.LARGEST, exponent))
+        return found

@@ -1,0 +1,180 @@
+"""Plane setup: reciprocals of a triangle's height and width, for the steps of its attributes."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data
+
+from blysk.golden.geometry.plane_setup import PlaneSetup
+from blysk.golden.geometry.reciprocal import Reciprocal
+from blysk.golden.geometry.triangles import GRID, Grid
+from blysk.hdl.core.dataflow import Dataflow
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.geometry.edge_setup import plane_corners_shape
+from blysk.hdl.geometry.reciprocal import reciprocal_word, shared_table
+from blysk.hdl.geometry.wide_product import wide_product
+
+__all__ = ["PlaneSetupUnit", "scales_shape"]
+
+
+def scales_shape() -> dict:
+    """Members of `PlaneScales.beats` that the attributes are made with."""
+    walk = {
+        name: shape for name, shape in plane_corners_shape().items() if name in ("fraction", "down", "along")
+    }
+    return {
+        "height_reciprocal": FixedShape(Reciprocal.FORMAT),
+        "knee": FixedShape(PlaneSetup.HEIGHT_FORMAT),
+        "width_reciprocal": FixedShape(PlaneSetup.WIDTH_FORMAT),
+        "row_shift": unsigned(PlaneSetup.SHIFT_BITS),
+        "column_shift": unsigned(PlaneSetup.SHIFT_BITS),
+        **walk,
+        "right": unsigned(1),
+    }
+
+
+class PlaneSetupUnit(PipelinedUnit):
+    """``1/D``, ``1/W`` and their exponents: those of `PlaneSetup`, the bit-accurate model.
+
+    A shared shifter finds the first bits of height and area, a shared table starts both reciprocals, and
+    the seven multiplications take turns at ``ceil(7 / I)`` multipliers of 18x18 bits, I the initiation
+    interval. The latency, `latency`, follows from the turns.
+
+    Parameters
+    ----------
+    grid : Grid
+        Fraction bits of the coordinates.
+    initiation_interval : int
+        Cycles from a triangle to the next at the closest, at least 1.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(plane_corners_shape(grid) with right))`
+        Heights, area, and what goes on as it is.
+    o : :py:`Out(stream.Signature(scales_shape() with sliver))`
+        Scales.
+
+    Source: docs/theory/geometry.md#normals; not in the documents.
+    """
+
+    def __init__(self, grid: Grid = GRID, initiation_interval: int = 16):
+        self.grid = grid
+        self._graph = graph = Dataflow(initiation_interval, 7)
+        self.multipliers = graph.multiplier.count
+        self._results = self._describe()
+        super().__init__(
+            data.StructLayout(plane_corners_shape(grid) | {"right": unsigned(1)}),
+            data.StructLayout(scales_shape() | {"sliver": unsigned(1)}),
+            latency=max(word.stage for word in self._results.values()),
+            initiation_interval=initiation_interval,
+        )
+
+    def _describe(self) -> dict:
+        """Words of the results."""
+        g, grid, p = self._graph, self.grid, PlaneSetup
+        s, bits = grid.subpixel_bits, 2 * grid.bits
+        point = Reciprocal.FORMAT.fraction_bits
+        height, knee, area, right = (
+            g.input(name, lambda operands, name=name: operands[name])
+            for name in ("long_height", "knee", "area", "right")
+        )
+        results = {
+            name: g.input(name, lambda o, name=name: o[name]) for name in ("fraction", "down", "along")
+        }
+
+        # A word to its first 1, and the places it moved by: two registers.
+        def normalise(register, word):
+            moved = []
+            for step in (32, 16, 8):
+                word, moved = _move(word, step, moved)
+            word, moved = (
+                register(word, "coarse"),
+                [register(bit, f"moved_{k}") for k, bit in enumerate(moved)],
+            )
+            for step in (4, 2, 1):
+                word, moved = _move(word, step, moved)
+            return data.View(shifted, register(Cat(word, *reversed(moved)), "shifted"))
+
+        shifted = data.StructLayout({"word": unsigned(bits), "places": unsigned(6)})
+        shifter = g.share("shifter", 2, (unsigned(bits),), 2, normalise)
+        top = g.use(shifter, "height_moved", (height,), lambda h: (Cat(Const(0, grid.bits), h),))
+        wide = g.use(shifter, "area_moved", (area,), lambda a: (a,))
+        # Both stand for one cycle, and are needed for longer.
+        top, wide = (g.register(f"{w.name}_kept", lambda v: v, w) for w in (top, wide))
+
+        def mantissa(view):
+            # The first bits of a word, as many as the format has.
+            return FixedValue(Reciprocal.FORMAT, _resized(view.word, bits, point + 1))
+
+        d = g.wire("mantissa", mantissa, top)
+        knee = g.register(
+            "knee_word",
+            lambda knee, top: FixedValue(
+                p.HEIGHT_FORMAT,
+                _resized((knee << top.places[:5])[: grid.bits], grid.bits, p.HEIGHT_FORMAT.width),
+            ),
+            knee,
+            top,
+        )
+        table = shared_table(g, 2, lambda: self._module)
+        of_height = reciprocal_word(g, table, "height_reciprocal", d)
+        of_area = reciprocal_word(g, table, "area_reciprocal", g.wire("area_mantissa", mantissa, wide))
+        short = g.wire("height_mantissa", lambda d: d.truncate(p.HEIGHT_FORMAT.fraction_bits), d)
+        ratio = wide_product(
+            g,
+            "ratio",
+            short,
+            of_area,
+            p.HEIGHT_LOW,
+            p.RECIPROCAL_LOW,
+            point,
+            lambda r: r.wrap(Reciprocal.FORMAT),
+        )
+        sliver = g.register("sliver", lambda a, h: (a << (8 - s)) <= h, area, height)
+
+        def width(ratio, sliver):
+            code = Value.cast(ratio)
+            kept = Mux(code[point], code[1:], code[:point])
+            return FixedValue(p.WIDTH_FORMAT, Mux(sliver, 0, kept)[:point])
+
+        # e is 19 less the places of the height, of a grid of 8 bits, and g is 39 less those of the area.
+        row = g.register("row_shift", lambda top: (8 - s + grid.bits - 1 - top.places)[: p.SHIFT_BITS], top)
+        column = g.register(
+            "column_shift",
+            lambda top, wide, ratio: (
+                8 - s + grid.bits + top.places - wide.places - Value.cast(ratio)[point]
+            )[: p.SHIFT_BITS],
+            top,
+            wide,
+            ratio,
+        )
+        return results | {
+            "height_reciprocal": of_height,
+            "knee": knee,
+            "width_reciprocal": g.register("width_reciprocal", width, ratio, sliver),
+            "row_shift": row,
+            "column_shift": column,
+            "right": right,
+            "sliver": sliver,
+        }
+
+    def datapath(self, m: Module, operands):
+        """The graph, read at the age of its last words."""
+        self._module = m
+        value = self._graph.build(m, self, operands)
+        result = Signal(self.o.payload.shape(), name="result")
+        for name, word in self._results.items():
+            m.d.comb += result[name].eq(value(word, self.latency))
+        return result
+
+
+def _move(word: Value, step: int, moved: list) -> tuple[Value, list]:
+    """Left by so many places if as many first bits are 0; beyond the word never."""
+    if step >= len(word):
+        return word, [*moved, Const(0, 1)]
+    empty = ~word[-step:].any()
+    return Mux(empty, (word << step)[: len(word)], word), [*moved, empty]
+
+
+def _resized(code: Value, bits: int, wanted: int) -> Value:
+    """First bits of a word, or the word with zeros behind it."""
+    return code[bits - wanted : bits] if bits >= wanted else Cat(Const(0, wanted - bits), code)

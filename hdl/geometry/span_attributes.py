@@ -1,0 +1,270 @@
+"""Span attributes: N/W and depth at both ends of every span, and of every piece of a wide one."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.gradient_setup import GradientSetup
+from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_NORMAL
+from blysk.golden.geometry.triangles import ATTRIBUTES, MATERIAL_BITS, PIXEL_BITS
+from blysk.golden.number.fixed import SQ
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.geometry.plane_assembler import planes_shape
+from blysk.hdl.geometry.span_clip import clipped_rows_shape
+from blysk.hdl.geometry.triangles import count_events, counters_shape
+
+__all__ = ["SpanAttributesUnit", "pieces_shape", "planes_rows_shape", "span_words_shape"]
+
+_BITS = GradientSetup.FORMAT.width
+
+
+def planes_rows_shape() -> data.StructLayout:
+    """Shape of a scanline with its triangle's planes, which are read with the triangle's first."""
+    return data.StructLayout({"planes": planes_shape(), "row": clipped_rows_shape()})
+
+
+def span_words_shape() -> dict:
+    """Members of a piece beside its normals."""
+    words = {name: unsigned(PIXEL_BITS) for name in ("x", "y", "length")}
+    depth = {"depth": FixedShape(SPAN_DEPTH), "depth_last": FixedShape(SPAN_DEPTH)}
+    rest = {"depth_step": FixedShape(DEPTH_STEP), "flip": unsigned(1), "material": unsigned(MATERIAL_BITS)}
+    return words | depth | rest
+
+
+def pieces_shape() -> data.StructLayout:
+    """Shape of `Pieces.beats`: first pixel, length, N/W and depth at both ends, flip and material."""
+    normal = data.ArrayLayout(FixedShape(SPAN_NORMAL), 3)
+    return data.StructLayout({"left": normal, "right": normal} | span_words_shape())
+
+
+class SpanAttributesUnit(wiring.Component):
+    """Walks attributes down the long edge and along the spans: `SpanAttributes` is the bit-accurate model.
+
+    A scanline without pixels takes a cycle. One with pixels takes, for every piece of p pixels, as many
+    cycles as ``p - 1`` has bits, at least one; and for n pixels cut off at the long edge as many as n has
+    bits. So a piece never takes more cycles than it has pixels. A span of one piece of one or two pixels is
+    offered `latency` cycles after its scanline was taken in. No multipliers: additions of shifted steps,
+    modulo 4.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(planes_rows_shape()))`
+        Scanlines; the planes are read with a triangle's first one, which follows another's last.
+    o : :py:`Out(stream.Signature(pieces_shape()))`
+        Pieces.
+    status : :py:`Out(counters_shape("empty", "cut"))`
+        Triangles without a span, and spans of more than one piece, since the reset.
+
+    Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
+    """
+
+    latency = 3
+
+    def __init__(self):
+        super().__init__(
+            {
+                "i": In(stream.Signature(planes_rows_shape())),
+                "o": Out(stream.Signature(pieces_shape())),
+                "status": Out(counters_shape("empty", "cut")),
+            }
+        )
+
+    def elaborate(self, platform):
+        """The long edge's values; the walk along a scanline; the pieces' words."""
+        m = Module()
+        row, planes = self.i.payload.row, self.i.payload.planes
+        first, drawn = Signal(name="first", init=1), Signal(name="drawn")
+        busy, free, accept, loads = (Signal(name=name) for name in ("busy", "free", "accept", "loads"))
+        piece, tag = Signal.like(planes.piece, name="piece"), Signal(_tag_shape(), name="tag")
+        m.d.comb += [
+            self.i.ready.eq(free),
+            accept.eq(self.i.valid & free),
+            loads.eq(accept & (row.length != 0)),
+        ]
+        with m.If(accept):
+            m.d.sync += [first.eq(row.last), drawn.eq((row.length != 0) | (drawn & ~first))]
+            with m.If(first):
+                m.d.sync += piece.eq(planes.piece)
+        with m.If(loads):
+            m.d.sync += [tag[name].eq(row[name]) for name in ("y", "right", "flip", "material")]
+
+        most = Mux(first, planes.piece, piece)
+        along = _Along(m, row, tag, most, piece, loads)
+        found = Signal(self._found_shape(), name="found")
+        for k in range(ATTRIBUTES):
+            base, inward = self._down(m, k, accept, first, row, planes)
+            near, far = along.values(
+                m, f"attribute_{k}", loads, base, Mux(first, _code(planes.inward[k]), inward), inward
+            )
+            with m.If(along.advance):
+                m.d.sync += [found.near[k].eq(near), found.far[k].eq(far), found.step[k].eq(inward)]
+        m.d.comb += [free.eq(~busy | along.leaves), along.busy.eq(busy)]
+        with m.If(loads):
+            m.d.sync += busy.eq(1)
+        with m.Elif(along.leaves):
+            m.d.sync += busy.eq(0)
+
+        valid, result, result_valid = (
+            Signal(name="found_valid"),
+            Signal(self.o.payload.shape(), name="result"),
+            Signal(name="result_valid"),
+        )
+        m.d.comb += along.advance.eq(skid_buffer(m, self.o, result_valid, result))
+        with m.If(along.advance):
+            m.d.sync += [
+                valid.eq(along.emits),
+                found.x.eq(along.x),
+                found.length.eq(along.pixels + 1),
+                found.tag.eq(tag),
+                result_valid.eq(valid),
+            ]
+            self._convert(m, found, result)
+        count_events(
+            m,
+            self.status,
+            empty=accept & row.last & (row.length == 0) & (first | ~drawn),
+            cut=along.cuts,
+        )
+        return m
+
+    @staticmethod
+    def _found_shape() -> data.StructLayout:
+        words = {name: data.ArrayLayout(unsigned(_BITS), ATTRIBUTES) for name in ("near", "far", "step")}
+        places = {"x": unsigned(PIXEL_BITS), "length": unsigned(PIXEL_BITS)}
+        return data.StructLayout(words | places | {"tag": _tag_shape()})
+
+    @staticmethod
+    def _down(m: Module, k: int, accept, first, row, planes) -> tuple[Value, Signal]:
+        """An attribute's value at the long edge's pixel, and its step along a scanline."""
+        short, long, inward, edge = (
+            Signal(_BITS, name=f"{name}_{k}") for name in ("short", "long", "inward", "edge")
+        )
+        steps = [
+            Mux(first, _code(planes[name][k]), kept) for name, kept in (("short", short), ("long", long))
+        ]
+        start = Cat(
+            Const(0, GradientSetup.FORMAT.fraction_bits - GradientSetup.START_FORMAT.fraction_bits),
+            Value.cast(planes.start[k]),
+        )
+        base = Mux(first, start, edge)
+        with m.If(accept):
+            m.d.sync += edge.eq(base + Mux(row.carry, steps[1], steps[0]))
+            with m.If(first):
+                m.d.sync += [
+                    kept.eq(_code(planes[name][k]))
+                    for name, kept in (("short", short), ("long", long), ("inward", inward))
+                ]
+        return base, inward
+
+    @staticmethod
+    def _convert(m: Module, found, result) -> None:
+        """Left and right from near and far; components cut, the depth moved, all saturated."""
+        right = found.tag.right
+        for k in range(ATTRIBUTES):
+            near, far = (
+                FixedValue(GradientSetup.FORMAT, Value.cast(word[k]).as_signed())
+                for word in (found.near, found.far)
+            )
+            left_end, right_end = (
+                FixedValue(GradientSetup.FORMAT, Mux(right, Value.cast(a), Value.cast(b)).as_signed())
+                for a, b in ((far, near), (near, far))
+            )
+            for name, depth, value in (("left", "depth", left_end), ("right", "depth_last", right_end)):
+                if k < ATTRIBUTES - 1:
+                    cut = value.truncate(SPAN_NORMAL.fraction_bits).saturate(SPAN_NORMAL)
+                    m.d.sync += result[name][k].eq(cut)
+                else:
+                    code = Value.cast(value.saturate(SQ(1, GradientSetup.FORMAT.fraction_bits)))
+                    m.d.sync += Value.cast(result[depth]).eq(Cat(code[:-1], ~code[-1]))
+        step = Value.cast(found.step[ATTRIBUTES - 1])
+        m.d.sync += [
+            Value.cast(result.depth_step).eq(Mux(right, -step, step)),
+            *(result[name].eq(found[name]) for name in ("x", "length")),
+            *(result[name].eq(found.tag[name]) for name in ("y", "flip", "material")),
+        ]
+
+
+class _Along:
+    """Control of the walk along a scanline: pixels to skip, then pieces, a bit of each number a cycle."""
+
+    def __init__(self, m: Module, row, tag, most: Value, piece: Signal, loads: Signal):
+        # What is left of the span less one pixel, of which a piece takes part; bits of the walk.
+        left, bits = Signal(PIXEL_BITS, name="left"), Signal(PIXEL_BITS, name="bits")
+        self.pixels, begin = Signal(PIXEL_BITS, name="pixels"), Signal(PIXEL_BITS, name="begin")
+        self.advance, self.busy = Signal(name="advance"), Signal(name="walks")
+        self.emits, self.leaves, self.cuts = (Signal(name=name) for name in ("emits", "leaves", "cuts"))
+        self.skipping, whole = Signal(name="skipping"), Signal(name="whole")
+        self.moves, self.ends, self.bit = (Signal(name=name) for name in ("moves", "ends", "bit"))
+        self.single = Signal(name="single")
+        m.d.comb += [
+            self.bit.eq(bits[0]),
+            self.ends.eq(~bits[1:].any()),
+            self.moves.eq(self.busy & self.advance),
+            self.emits.eq(self.moves & self.ends & ~self.skipping),
+            self.leaves.eq(self.emits & ~whole),
+            self.single.eq(piece == 0),
+        ]
+        # A piece that is whole and not the last has 2^piece pixels.
+        after = (left - (1 << piece))[:PIXEL_BITS]
+        count, size = row.length - 1, Mux(self.skipping, left, after)
+        mine, its = _piece(count[:PIXEL_BITS], most), _piece(size, piece)
+        first = Signal(name="first_piece")
+        m.d.comb += self.cuts.eq(self.emits & whole & first)
+        with m.If(loads):
+            m.d.sync += [
+                left.eq(count),
+                begin.eq(row.x),
+                self.skipping.eq(row.skip != 0),
+                bits.eq(Mux(row.skip != 0, row.skip, mine[0])),
+                self.pixels.eq(mine[0]),
+                whole.eq(mine[1]),
+                first.eq(1),
+            ]
+        with m.Elif(self.moves):
+            with m.If(~self.ends):
+                m.d.sync += bits.eq(bits >> 1)
+            with m.Else():
+                m.d.sync += [bits.eq(its[0]), self.pixels.eq(its[0]), whole.eq(its[1]), self.skipping.eq(0)]
+                with m.If(~self.skipping):
+                    m.d.sync += [left.eq(after), first.eq(0)]
+                    with m.If(~tag.right):
+                        m.d.sync += begin.eq(begin + self.pixels + 1)
+        self.x = Mux(tag.right, begin + left - self.pixels, begin)[:PIXEL_BITS]
+
+    def values(self, m: Module, name: str, loads, base, inward, kept) -> tuple[Value, Value]:
+        """Values of an attribute at the piece's ends; ``inward`` is its step, once loaded ``kept``."""
+        near, total, step = (Signal(_BITS, name=f"{name}_{word}") for word in ("near", "total", "step"))
+        far = (total + Mux(self.bit, step, 0))[:_BITS]
+        following = (near + Mux(self.single, step, step << 1))[:_BITS]
+        with m.If(loads):
+            m.d.sync += [near.eq(base), total.eq(base), step.eq(inward)]
+        with m.Elif(self.moves):
+            with m.If(~self.ends):
+                m.d.sync += [total.eq(far), step.eq(step << 1)]
+            with m.Else():
+                begin = Mux(self.skipping, far, following)
+                m.d.sync += [near.eq(begin), total.eq(begin), step.eq(kept)]
+        return near, far
+
+
+def _tag_shape() -> data.StructLayout:
+    return data.StructLayout(
+        {
+            "y": unsigned(PIXEL_BITS),
+            "right": unsigned(1),
+            "flip": unsigned(1),
+            "material": unsigned(MATERIAL_BITS),
+        }
+    )
+
+
+def _code(value) -> Value:
+    return Value.cast(value).as_unsigned()
+
+
+def _piece(left: Value, piece: Value) -> tuple[Value, Value]:
+    """Pixels of the next piece less one, and whether others follow it."""
+    mask = ((1 << piece) - 1)[:PIXEL_BITS]
+    more = (left & ~mask).any()
+    return Mux(more, mask, left), more

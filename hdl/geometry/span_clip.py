@@ -1,0 +1,67 @@
+"""Span clip ([T] figure 4.10, screen coordinates): scanlines of triangles cut to the picture."""
+
+from amaranth.hdl import Mux, Signal, unsigned
+from amaranth.lib import data
+
+from blysk.golden.geometry.triangles import PIXEL_BITS
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.geometry.edge_walk import rows_shape
+from blysk.hdl.geometry.triangles import frame_shape, tag_shape
+
+__all__ = ["SpanClipUnit", "clipped_rows_shape"]
+
+
+def clipped_rows_shape() -> data.StructLayout:
+    """Shape of `ClippedRows.beats`: pixels of a scanline in the picture, and what is cut off."""
+    words = {name: unsigned(PIXEL_BITS) for name in ("x", "y", "length", "skip")}
+    return data.StructLayout(words | {"carry": unsigned(1), "last": unsigned(1)} | tag_shape())
+
+
+class SpanClipUnit(PipelinedUnit):
+    """Scanlines cut to the picture: those of `SpanClip`, the bit-accurate model.
+
+    The latency is 2 cycles (borders, differences) and the initiation interval is 1. No multipliers.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(rows_shape()))`
+        Scanlines.
+    o : :py:`Out(stream.Signature(clipped_rows_shape()))`
+        The same in the picture.
+    constants : :py:`In(frame_shape())`
+        The frame; stays while scanlines are inside.
+
+    Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
+    """
+
+    def __init__(self):
+        super().__init__(rows_shape(), clipped_rows_shape(), latency=2, constants=frame_shape())
+
+    def datapath(self, m, operands):
+        """Borders first, then what is between them."""
+        frame, result = self.constants, Signal(self.o.payload.shape(), name="result")
+        first, last = operands.begin < frame.left, operands.end > frame.right
+        begin = self.register(m, Mux(first, frame.left, operands.begin), "begin")
+        end = self.register(m, Mux(last, frame.right, operands.end), "end")
+        cut = Mux(
+            operands.right,
+            Mux(last, operands.end - frame.right, 0),
+            Mux(first, frame.left - operands.begin, 0),
+        )
+        cut = self.register(m, cut[:PIXEL_BITS], "cut")
+        # The first column against the right border too: outside of it nothing is covered.
+        inside = (operands.y >= frame.top) & (operands.end > frame.left) & (operands.begin < frame.right)
+        inside = self.register(m, inside, "inside")
+        y = self.register(m, (operands.y - frame.top)[:PIXEL_BITS], "line")
+        rest = {name: operands[name] for name in ("carry", "last", *tag_shape())}
+        for name, value in rest.items():
+            m.d.sync += result[name].eq(self.register(m, value, name))
+        pixels = (end - begin).as_signed()
+        covered = inside & (pixels > 0)
+        m.d.sync += [
+            result.x.eq(Mux(covered, begin - frame.left, 0)),
+            result.y.eq(Mux(covered, y, 0)),
+            result.length.eq(Mux(covered, pixels, 0)),
+            result.skip.eq(Mux(covered, cut, 0)),
+        ]
+        return result

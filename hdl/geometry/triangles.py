@@ -1,0 +1,76 @@
+"""Shapes of triangles, of what stays during a frame, and of counters."""
+
+from amaranth.hdl import Module, Signal, Value, ValueLike, signed, unsigned
+from amaranth.lib import data
+
+from blysk.golden.geometry.edge_setup import X_BITS
+from blysk.golden.geometry.triangles import (
+    ATTRIBUTE,
+    DEPTH,
+    GRID,
+    LIMIT_BITS,
+    MATERIAL_BITS,
+    Grid,
+)
+from blysk.hdl.core.fixed import FixedShape
+
+__all__ = [
+    "COUNTER_BITS",
+    "corners_shape",
+    "count_events",
+    "counters_shape",
+    "first_centre",
+    "frame_shape",
+    "tag_shape",
+    "triangle_shape",
+]
+
+COUNTER_BITS = 32
+"""Bits of a counter; after so many it starts from 0 again."""
+
+
+def corners_shape(grid: Grid = GRID) -> dict:
+    """Members of three corners: coordinates, depth, and N/W over the largest 1/W of the triangle."""
+    coordinate, component = FixedShape(grid.coordinate), FixedShape(ATTRIBUTE)
+    return {
+        "x": data.ArrayLayout(coordinate, 3),
+        "y": data.ArrayLayout(coordinate, 3),
+        "depth": data.ArrayLayout(FixedShape(DEPTH), 3),
+        "normal": data.ArrayLayout(data.ArrayLayout(component, 3), 3),
+    }
+
+
+def triangle_shape(grid: Grid = GRID) -> data.StructLayout:
+    """Shape of a triangle: corners in any order, and the index of its material."""
+    return data.StructLayout(corners_shape(grid) | {"material": unsigned(MATERIAL_BITS)})
+
+
+def tag_shape() -> dict:
+    """Members that go with a triangle to its spans: long edge on the right, normals negated, material."""
+    return {"right": unsigned(1), "flip": unsigned(1), "material": unsigned(MATERIAL_BITS)}
+
+
+def frame_shape() -> data.StructLayout:
+    """Shape of `Frame.codes`: the picture's borders in pixels, back faces by index, the limit of a span."""
+    borders = {name: signed(X_BITS) for name in ("left", "top", "right", "bottom")}
+    return data.StructLayout(borders | {"back_faces": unsigned(2), "limit": unsigned(LIMIT_BITS)})
+
+
+def counters_shape(*names: str) -> data.StructLayout:
+    """Shape of counters by name."""
+    return data.StructLayout({name: unsigned(COUNTER_BITS) for name in names})
+
+
+def count_events(m: Module, counters: data.View, **events: ValueLike) -> None:
+    """Count the cycles on which each event is 1, in registers behind a member ``status``."""
+    for name, event in events.items():
+        count = Signal(COUNTER_BITS, name=f"count_{name}")
+        with m.If(event):
+            m.d.sync += count.eq(count + 1)
+        m.d.comb += counters[name].eq(count)
+
+
+def first_centre(code: Value, grid: Grid) -> Value:
+    """First pixel whose centre is not before a coordinate, `X_BITS` signed: `Grid.first_centre`."""
+    code = Value.cast(code)
+    return (code + (grid.half - 1))[grid.subpixel_bits :].as_signed()

@@ -1,0 +1,209 @@
+"""Vertex sort ([T] figure 4.10): corners from top to bottom, orientation, and what is not drawn at all."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.edge_setup import X_BITS
+from blysk.golden.geometry.triangles import GRID, Grid
+from blysk.golden.reference.scene import BACK_FACES
+from blysk.hdl.geometry.booth import booth_term
+from blysk.hdl.geometry.triangles import (
+    corners_shape,
+    count_events,
+    counters_shape,
+    first_centre,
+    frame_shape,
+    tag_shape,
+    triangle_shape,
+)
+
+__all__ = ["VertexSortUnit", "sorted_triangle_shape"]
+
+DIGIT_BITS = 4
+"""Bits of a height that the area takes in on a cycle."""
+
+
+def sorted_triangle_shape(grid: Grid = GRID) -> data.StructLayout:
+    """Shape of `SortedTriangles.beats`: sorted corners, twice the area, and the tag."""
+    return data.StructLayout(corners_shape(grid) | {"area": unsigned(2 * grid.bits)} | tag_shape())
+
+
+class VertexSortUnit(wiring.Component):
+    """Sorts corners, finds the area, and drops what `VertexSort`, the bit-accurate model, drops.
+
+    Two stages, each with a triangle inside. The first exchanges neighbouring corners in three cycles and
+    compares the triangle's box with the picture. The second sums
+    ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` in digits of four bits of the heights, from the first on,
+    with two Booth digits of each product a cycle; flat triangles have fewer digits. Exact; no multipliers.
+
+    Cycles a triangle: 5 if its box is empty; else the larger of 5 and of n + 2, or n + 3 if it is drawn, n
+    the digits: 3 for boxes of up to 7 scanlines, 4 to 127, 5 to 2047, 6 beyond (of a grid of 8 bits).
+    A drawn triangle is offered n + 6 cycles after it was taken in.
+
+    Parameters
+    ----------
+    grid : Grid
+        Fraction bits of the coordinates.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(triangle_shape(grid)))`
+        Triangles.
+    o : :py:`Out(stream.Signature(sorted_triangle_shape(grid)))`
+        Those that are drawn.
+    constants : :py:`In(frame_shape())`
+        The frame; stays while triangles are inside.
+    status : :py:`Out(counters_shape("empty", "zero_area", "culled"))`
+        Triangles dropped, since the reset.
+
+    Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
+    """
+
+    def __init__(self, grid: Grid = GRID):
+        self.grid = grid
+        super().__init__(
+            {
+                "i": In(stream.Signature(triangle_shape(grid))),
+                "o": Out(stream.Signature(sorted_triangle_shape(grid))),
+                "constants": In(frame_shape()),
+                "status": Out(counters_shape("empty", "zero_area", "culled")),
+            }
+        )
+
+    def elaborate(self, platform):
+        """The two stages and the counters."""
+        m = Module()
+        corners = [Signal(_corner_shape(self.grid), name=f"corner_{k}") for k in range(3)]
+        material, odd = Signal.like(self.i.payload.material), Signal(name="odd")
+        covered, leaves, digits = Signal(name="covered"), Signal(name="leaves"), Signal(3, name="digits")
+        free = Signal(name="area_free")
+
+        step = Signal(3, name="sort_step")
+        with m.Switch(step):
+            with m.Case(0):
+                m.d.sync += [step.eq(self.i.valid), material.eq(self.i.payload.material), odd.eq(0)]
+                for k, corner in enumerate(corners):
+                    m.d.sync += [corner[name].eq(self.i.payload[name][k]) for name in corner.shape().members]
+            with m.Case(4):
+                m.d.comb += leaves.eq(covered & free)
+                with m.If(leaves | ~covered):
+                    m.d.sync += step.eq(0)
+            with m.Default():
+                m.d.sync += step.eq(step + 1)
+        m.d.comb += self.i.ready.eq(step == 0)
+        self._exchange(m, corners, odd, step)
+        self._box(m, corners, step, covered, digits)
+        zero, culled = self._area(m, corners, material, odd, digits, leaves, free)
+        count_events(m, self.status, empty=(step == 4) & ~covered, zero_area=zero, culled=culled)
+        return m
+
+    def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal) -> None:
+        """Exchange the first two corners, the last two, the first two, where they are the wrong way round."""
+        last = step == 2
+        # x counts from the lowest one, so that y and x are one signed number.
+        columns = [Value.cast(corner.x) for corner in corners]
+        key = [
+            Cat(x[:-1], ~x[-1], Value.cast(corner.y)).as_signed()
+            for x, corner in zip(columns, corners, strict=True)
+        ]
+        wrong = Mux(last, key[1], key[0]) > Mux(last, key[2], key[1])
+        turns = wrong & (step != 0) & (step != 4)
+        first, second, third = corners
+        with m.If(turns):
+            m.d.sync += odd.eq(~odd)
+            with m.If(last):
+                m.d.sync += [second.eq(third), third.eq(second)]
+            with m.Else():
+                m.d.sync += [first.eq(second), second.eq(first)]
+
+    def _box(self, m: Module, corners: list, step: Signal, covered: Signal, digits: Signal) -> None:
+        """Whether the box and the picture have a pixel's centre in common, and the digits of the height."""
+        frame, inside = self.constants, []
+        for name, first, end in (("x", frame.left, frame.right), ("y", frame.top, frame.bottom)):
+            low, high = (Signal(signed(X_BITS), name=f"{end}_{name}") for end in ("low", "high"))
+            a, b, c = (first_centre(corner[name], self.grid) for corner in corners)
+            with m.If(step == 1):
+                m.d.sync += [low.eq(Mux(a < b, a, b)), high.eq(Mux(a < b, b, a))]
+            with m.If(step == 2):
+                m.d.sync += [low.eq(Mux(c < low, c, low)), high.eq(Mux(c > high, c, high))]
+            inside += [low < high, low < end, first < high]
+        rows = high - low
+        with m.If(step == 3):
+            m.d.sync += [covered.eq(Cat(inside).all()), digits.eq(_largest_digits(self.grid))]
+            for count in reversed(range(3, _largest_digits(self.grid))):
+                with m.If(rows < _rows_of(count, self.grid)):
+                    m.d.sync += digits.eq(count)
+
+    def _area(self, m, corners, material, odd, digits, leaves, free) -> tuple[Value, Value]:
+        """The second stage; whether a triangle has no area, or is culled, on this cycle."""
+        grid, result = self.grid, Signal(self.o.payload.shape(), name="result")
+        total_bits, most = 2 * grid.bits + 1, _largest_digits(grid)
+        total = Signal(signed(total_bits), name="total")
+        left, busy, done, odd_area = Signal(3), Signal(name="busy"), Signal(name="done"), Signal()
+        x, y = ([Value.cast(corner[name]) for corner in corners] for name in "xy")
+        terms = []
+        for k, (across, height) in enumerate(((1, 2), (2, 1))):
+            width = Signal(signed(grid.bits + 1), name=f"width_{k}")
+            # With the bit that a Booth digit looks back to.
+            rest = Signal(DIGIT_BITS * most + 1, name=f"rest_{k}")
+            down = (y[height] - y[0])[: grid.bits]
+            with m.If(leaves):
+                m.d.sync += width.eq(x[across] - x[0])
+                for count in range(3, most + 1):
+                    with m.If(digits == count):
+                        m.d.sync += rest.eq(Cat(Const(0, 1 + DIGIT_BITS * (most - count)), down))
+            with m.Else():
+                m.d.sync += rest.eq(rest << DIGIT_BITS)
+            high, low = (booth_term(width, rest[-size:][:3]) for size in (3, 5))
+            term = Signal(signed(grid.bits + DIGIT_BITS + 1), name=f"term_{k}")
+            m.d.sync += term.eq((high << 2) + low)
+            terms.append(term)
+
+        sums, drops = Signal(name="sums"), Signal(name="drops")
+        m.d.sync += sums.eq(busy)
+        with m.If(leaves):
+            m.d.sync += [busy.eq(1), left.eq(digits - 1), total.eq(0), odd_area.eq(odd)]
+            m.d.sync += [result.material.eq(material), *(self._sorted(result, corners))]
+        with m.Elif(busy):
+            m.d.sync += [left.eq(left - 1), busy.eq(left != 0)]
+        with m.If(sums):
+            m.d.sync += total.eq((total << DIGIT_BITS) + terms[0] - terms[1])
+        m.d.sync += done.eq(sums & ~busy)
+
+        back = (total > 0) ^ odd_area
+        zero = total == 0
+        culled = back & (self.constants.back_faces == BACK_FACES.index("cull"))
+        valid = Signal(name="valid")
+        m.d.comb += [drops.eq(zero | culled), free.eq(~(busy | sums | done | valid))]
+        with m.If(done):
+            m.d.sync += [
+                valid.eq(~drops),
+                result.area.eq(Mux(total < 0, -total, total)),
+                result.right.eq(total < 0),
+                result.flip.eq(back & (self.constants.back_faces == BACK_FACES.index("flip"))),
+            ]
+        with m.Elif(self.o.ready):
+            m.d.sync += valid.eq(0)
+        m.d.comb += [self.o.valid.eq(valid), self.o.payload.eq(result)]
+        return done & zero, done & culled & ~zero
+
+    @staticmethod
+    def _sorted(result, corners):
+        for k, corner in enumerate(corners):
+            for name in corner.shape().members:
+                yield result[name][k].eq(corner[name])
+
+
+def _corner_shape(grid: Grid) -> data.StructLayout:
+    return data.StructLayout({name: shape.elem_shape for name, shape in corners_shape(grid).items()})
+
+
+def _largest_digits(grid: Grid) -> int:
+    """Digits that any height has, with a bit for its sign."""
+    return -(-(grid.bits + 1) // DIGIT_BITS)
+
+
+def _rows_of(digits: int, grid: Grid) -> int:
+    """Scanlines from which on a height may not fit so many digits, signed."""
+    return (1 << (DIGIT_BITS * digits - 1 - grid.subpixel_bits)) - 1

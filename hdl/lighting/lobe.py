@@ -1,0 +1,300 @@
+"""Lobe unit: any curve of 1 - N·H from a small table addressed by octaves, with one multiplier."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.lighting.lobe import Lobe, LobeTable
+from blysk.hdl.core.dataflow import Dataflow, Word
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.lighting.specular import highlight_shape, one_minus
+
+__all__ = ["LobeMemory", "LobeUnit", "lobe_read_signature", "lobe_write_shape"]
+
+
+def lobe_write_shape() -> data.StructLayout:
+    """Shape of a write, 18 bits: a value, or the bank whose values come next. See `LobeTable.writes`."""
+    return data.StructLayout({"value": Lobe.VALUE_FORMAT.width, "begins": 1})
+
+
+def lobe_read_signature(parameters: Lobe) -> wiring.Signature:
+    """Port for reading words: a clock after one with ``enable`` there is the word of its ``address``.
+
+    Without ``enable`` the word stays.
+    """
+    return wiring.Signature(
+        {
+            "address": Out(range(parameters.banks * parameters.entries)),
+            "enable": Out(1),
+            "word": In(Lobe.WORD_BITS),
+        }
+    )
+
+
+class LobeMemory(wiring.Component):
+    """Tables of `Lobe` in one memory, with a read port for each unit that it serves.
+
+    ``banks (E + 1) M`` words of 35 bits: up to 512 in a block RAM of 512 by 36. Where two units, of two
+    lights, read the same tables, Yosys makes a copy of tables that are written for either port. Tables that
+    are fixed at build time need none: up to 1024 words take two block RAMs of 1024 by 18 for both ports.
+
+    A write is taken on every clock. The first write of a table, with ``begins``, tells its bank. The values
+    follow in order: each but the first makes the word of the value before it, which is in the memory a cycle
+    after the write was taken. Values beyond the end of a table are lost, and so are all those of a bank that
+    does not exist. A table that is not completed keeps the other words of the one before. Reset ends a table,
+    and clears no word. A bank must not be written while a unit reads it.
+
+    Parameters
+    ----------
+    parameters : Lobe
+        Size of the tables, and their number.
+    tables : sequence of LobeTable or None
+        Tables fixed at build time, one for each bank. ``None``: they are written.
+    ports : int
+        Read ports, at least 1.
+
+    Members
+    -------
+    write : :py:`In(stream.Signature(lobe_write_shape()))`
+        Writes, unless the tables are fixed; always ready.
+    reads : :py:`In(lobe_read_signature(parameters)).array(ports)`
+        Read ports.
+
+    Raises
+    ------
+    ValueError
+        If there are not as many tables as banks, or one has another size.
+
+    Source: docs/theory/units.md#lobe.
+    """
+
+    def __init__(
+        self, parameters: Lobe | None = None, tables: Sequence[LobeTable] | None = None, ports: int = 1
+    ):
+        self.parameters = p = parameters or Lobe()
+        self.tables = _checked(p, tables)
+        members = {"reads": In(lobe_read_signature(p)).array(ports)}
+        if tables is None:
+            members["write"] = In(stream.Signature(lobe_write_shape()))
+        super().__init__(members)
+
+    def elaborate(self, platform):
+        """The memory, and what makes its words of the values written."""
+        p = self.parameters
+        m = Module()
+        words = [word for table in self.tables or [] for word in table.words.tolist()]
+        m.submodules.words = memory = Memory(shape=Lobe.WORD_BITS, depth=p.banks * p.entries, init=words)
+        for read in self.reads:
+            port = memory.read_port()
+            m.d.comb += [port.addr.eq(read.address), port.en.eq(read.enable), read.word.eq(port.data)]
+        if self.tables is None:
+            self._write(m, memory.write_port())
+        return m
+
+    def _write(self, m: Module, port: Any) -> None:
+        """Word by word behind the values."""
+        p, write = self.parameters, self.write.payload
+        previous, holds = Signal.like(write.value, name="previous"), Signal(name="holds")
+        address, last = (Signal.like(port.addr, name=name) for name in ("address", "last"))
+        active = Signal(name="active")
+        follows = self.write.valid & ~write.begins
+        m.d.comb += [
+            self.write.ready.eq(1),
+            port.en.eq(follows & holds & active),
+            port.addr.eq(address),
+            port.data.eq(Cat(previous, (write.value - previous)[: Lobe.DIFFERENCE_FORMAT.width])),
+        ]
+        with m.If(follows):
+            m.d.sync += [previous.eq(write.value), holds.eq(1)]
+            with m.If(holds):
+                m.d.sync += [address.eq(address + 1), active.eq(active & (address != last))]
+        with m.If(self.write.valid & write.begins):
+            m.d.sync += [holds.eq(0), active.eq(0)]
+            with m.Switch(write.value):
+                for bank in range(p.banks):
+                    with m.Case(bank):
+                        first = bank * p.entries
+                        m.d.sync += [address.eq(first), last.eq(first + p.entries - 1), active.eq(1)]
+
+
+class LobeUnit(PipelinedUnit):
+    """A lobe of 1 - N·H by its table, 0 for a dark beat and where N·H is not positive.
+
+    Table, formats and error bounds are those of `Lobe`, the bit-accurate model.
+
+    With an initiation interval of 1 the latency is 7 cycles: one minus, saturation, leading one, shift, word,
+    product, sum. A longer interval takes 5 more: the input has a register, and the multiplier has registers
+    all around (`registered_product`). At every interval there is one multiplier of 18 by 18 bits. A beat that
+    is dark, or whose N·H is not positive, works as if its argument were 0: from one to the next nothing
+    toggles but the input and the first registers.
+
+    Parameters
+    ----------
+    parameters : Lobe
+        Size and number of the tables, and the operand.
+    initiation_interval : int
+        Distance in cycles of two inputs, at least 1.
+    tables : sequence of LobeTable or None
+        Tables fixed at build time, one for each bank. ``None``: they are written.
+    shares_memory : bool
+        Whether a `LobeMemory` outside has the tables. Else the unit has its own.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"operand": ..., "dark": 1})))`
+        ``N·H`` in ``SQ(4, 34)`` or ``1 - N·H`` in ``UQ(1, B)``; whether the beat is dark.
+    o : :py:`Out(stream.Signature(UQ(0, 17)))`
+        Specular term.
+    constants : :py:`In(StructLayout({"bank": ...}))`
+        Where there are several: the bank, less than their number; stays while beats are inside.
+    write : :py:`In(stream.Signature(lobe_write_shape()))`
+        Where the unit has a memory of its own that is not fixed; see `LobeMemory`.
+    table : :py:`Out(lobe_read_signature(parameters))`
+        Where the memory is outside.
+
+    Raises
+    ------
+    ValueError
+        If the interval is out of range, tables are given for a memory outside, there are not as many as
+        banks, or one has another size.
+
+    Source: docs/theory/units.md#lobe.
+    """
+
+    def __init__(
+        self,
+        parameters: Lobe | None = None,
+        initiation_interval: int = 1,
+        *,
+        tables: Sequence[LobeTable] | None = None,
+        shares_memory: bool = False,
+    ):
+        self.parameters = p = parameters or Lobe()
+        if tables is not None and shares_memory:
+            raise ValueError("a unit that shares a memory has no tables of its own")
+        self.tables, self.shares_memory = _checked(p, tables), shares_memory
+        self._graph = Dataflow(initiation_interval, int(initiation_interval > 1))
+        self._read = lobe_read_signature(p).create(path=("table",))
+        self._result = self._describe()
+        ports = {}
+        if shares_memory:
+            ports["table"] = Out(lobe_read_signature(p))
+        elif tables is None:
+            ports["write"] = In(stream.Signature(lobe_write_shape()))
+        bank = data.StructLayout({"bank": range(p.banks)})
+        super().__init__(
+            highlight_shape(p),
+            FixedShape(p.RESULT_FORMAT),
+            latency=self._result.stage,
+            initiation_interval=initiation_interval,
+            constants=bank if p.banks > 1 else None,
+            ports=ports,
+        )
+
+    def elaborate(self, platform):
+        """The pipeline, and the memory beside it, which is written whether the pipeline moves or not."""
+        m = super().elaborate(platform)
+        m.d.comb += self._read.enable.eq(self.advance)
+        if self.shares_memory:
+            wiring.connect(m, wiring.flipped(self.table), self._read)
+        else:
+            m.submodules.memory = memory = LobeMemory(self.parameters, self.tables)
+            wiring.connect(m, self._read, memory.reads[0])
+            if self.tables is None:
+                wiring.connect(m, wiring.flipped(self.write), memory.write)
+        return m
+
+    def datapath(self, m, operands):
+        """The graph, read at the age of its last word."""
+        p = self.parameters
+        self._base = Const(0, 1)
+        if p.banks > 1:
+            self._base = Signal(range(p.banks * p.rows), name="base")
+            with m.Switch(self.constants.bank):
+                for bank in range(p.banks):
+                    with m.Case(bank):
+                        m.d.sync += self._base.eq(bank * p.rows)
+        self._module = m
+        return self._graph.build(m, self, operands)(self._result, self.latency)
+
+    def _describe(self) -> Word:
+        """Words from the operand to the result."""
+        p, g = self.parameters, self._graph
+        bits, top = p.fraction_bits, p.fraction_bits - 1
+        operand = g.input("operand", lambda operands: operands.operand)
+        dark = g.input("dark", lambda operands: operands.dark)
+
+        def is_lit(operand, dark):
+            code = Value.cast(operand)
+            return ~(dark | code[-1] | (~code.any() if p.operand == "cosine" else 0))
+
+        def limited(wide, lit):
+            # Where lit it is under 1.
+            return Mux(lit, Value.cast(wide.saturate(p.argument_format))[:bits], 0)[:bits]
+
+        def place(argument, zeros):
+            normal = (argument << Mux(zeros == p.octaves, p.octaves - 1, zeros))[:top]
+            row = (self._base + p.octaves - zeros)[: len(self._read.address) - p.step_bits]
+            step, rest = normal[top - p.step_bits :], normal[: top - p.step_bits]
+            return Cat(step, row), rest[len(rest) - p.fraction_format.width :]
+
+        lit = g.register("lit", is_lit, operand, dark)
+        argument = g.register("one_minus_cosine", lambda x: one_minus(p, x).truncate(bits), operand)
+        argument = g.register("argument", limited, argument, lit)
+        zeros = g.register("zeros", lambda code: _leading_zeros(code[bits - p.octaves :]), argument)
+        shapes = unsigned(len(self._read.address)), unsigned(p.fraction_format.width)
+        memory = g.share("memory", 1, shapes, 1, self._look_up)
+        return self._interpolate(g.use(memory, "word", (argument, zeros), place), lit)
+
+    def _look_up(self, register: Callable[[Any, str], Any], address: Value, fraction: Value) -> Value:
+        """Word of an address, and beside it the fraction."""
+        self._module.d.comb += self._read.address.eq(address)
+        return Cat(self._read.word, register(fraction, "fraction"))
+
+    def _interpolate(self, word: Word, lit: Word) -> Word:
+        """Term of a word and its fraction: ``v + D f``."""
+        p, g = self.parameters, self._graph
+        formats = {"value": p.VALUE_FORMAT, "difference": p.DIFFERENCE_FORMAT, "fraction": p.fraction_format}
+        parts, first = [], 0
+        for name, format in formats.items():
+            bits = slice(first, first + format.width)
+            parts.append(
+                g.wire(name, lambda code, format=format, bits=bits: FixedValue(format, code[bits]), word)
+            )
+            first += format.width
+        value, difference, fraction = parts
+        if g.interval == 1:
+            product = g.register("product", lambda x, y: x * y, difference, fraction)
+        else:
+            product = g.multiply("product", difference, fraction)
+
+        def term(value, product, lit):
+            # Between two entries.
+            total = (value + product.truncate(17)).wrap(p.RESULT_FORMAT)
+            return FixedValue(p.RESULT_FORMAT, Mux(lit, Value.cast(total), 0))
+
+        return g.register("term", term, value, product, lit)
+
+
+def _leading_zeros(code: Value) -> Value:
+    """How many bits at the top are 0, by halves."""
+    if len(code) == 1:
+        return ~code
+    half = 1 << (len(code) - 1).bit_length() - 1
+    high, low = code[len(code) - half :], code[: len(code) - half]
+    return Mux(high.any(), _leading_zeros(high), half + _leading_zeros(low))[: len(code).bit_length()]
+
+
+def _checked(parameters: Lobe, tables: Sequence[LobeTable] | None) -> list[LobeTable] | None:
+    if tables is None:
+        return None
+    if len(tables) != parameters.banks:
+        raise ValueError(f"there must be a table for each of {parameters.banks} banks, not {len(tables)}")
+    for table in tables:
+        parameters.check(table)
+    return list(tables)

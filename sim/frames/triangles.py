@@ -1,0 +1,154 @@
+"""Frames by triangles: scenes through simulated geometry, shading and depth test."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from blysk.golden.frame_constants import writes_of
+from blysk.golden.frames.prepare import constants_of
+from blysk.golden.frames.triangle_frame import SPAN_ANGLE, frame_of_pixels, sent_triangles
+from blysk.golden.geometry.scene_triangles import SceneTriangles
+from blysk.golden.reference.scene import Scene
+from blysk.golden.render import Renderer
+from blysk.hdl.render import STATUS, RenderUnit
+from blysk.sim.engines.engine import SimulationError
+from blysk.sim.engines.simulate import simulate
+
+__all__ = ["SimulatedTriangleFrame", "TriangleSimulator"]
+
+
+@dataclass(frozen=True)
+class SimulatedTriangleFrame:
+    """A frame of simulated hardware that takes triangles.
+
+    Parameters
+    ----------
+    image : uint8 array, shape (height, width, 3)
+        The frame buffer.
+    sent : SceneTriangles
+        What was sent.
+    counts : dict of str to int
+        `RenderUnit`'s counters.
+    written : int
+        Pixels written, those that something nearer replaced later included.
+    cycles : int
+        Cycles from the first triangle to the last pixel.
+    input_cycles : int
+        Cycles until the last triangle was taken in.
+    engine : {"cxxrtl", "pysim"}
+        The simulator.
+    seconds : dict
+        Of ``triangles`` (transformed and clipped) and of ``simulate``.
+    """
+
+    image: np.ndarray
+    sent: SceneTriangles
+    counts: dict[str, int]
+    written: int
+    cycles: int
+    input_cycles: int
+    engine: str
+    seconds: dict[str, float]
+
+
+class TriangleSimulator:
+    """Triangles to pixels, built once for a size of pictures.
+
+    Parameters
+    ----------
+    renderer : Renderer
+        Geometry and shading.
+    size : (int, int)
+        Width and height of the depth memory.
+    engine : str
+        ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
+    angle : float
+        Widest piece of a span in degrees.
+    """
+
+    def __init__(
+        self,
+        renderer: Renderer,
+        size: tuple[int, int],
+        engine: str = "auto",
+        angle: float = SPAN_ANGLE,
+    ):
+        self.renderer, self.size, self.engine, self.angle = renderer, size, engine, angle
+        self._unit = RenderUnit(renderer, size)
+
+    def render(
+        self, scene: Scene, progress: Callable[[int], object] | None = None, count: int | None = None
+    ) -> SimulatedTriangleFrame:
+        """Send a scene's triangles, and collect its pixels.
+
+        Parameters
+        ----------
+        scene : Scene
+            What to draw, of the simulator's size.
+        progress : callable, optional
+            Called now and then with the number of pixels written so far.
+        count : int, optional
+            How many pixels will be written, where that is known: less than waiting for more.
+
+        Raises
+        ------
+        SimulationError
+            If the hardware breaks the stream's rules or stops.
+        ValueError
+            If the scene has another size, point lights or a near viewer, or does not fit the design.
+        """
+        if (scene.width, scene.height) != self.size:
+            raise ValueError(f"the scene is {scene.width}x{scene.height}, the memory {self.size}")
+        start = perf_counter()
+        sent = sent_triangles(scene, self.renderer, self.angle)
+        ready = perf_counter()
+        if not len(sent.triangles):
+            image = frame_of_pixels(scene, *np.zeros((2, 0), dtype=int), np.zeros((0, 3), dtype=np.uint8))
+            seconds = {"triangles": ready - start, "simulate": 0.0}
+            return SimulatedTriangleFrame(
+                image, sent, dict.fromkeys(STATUS, 0), 0, 0, 0, self.engine, seconds
+            )
+        run = simulate(
+            self._unit,
+            sent.triangles.beats,
+            count=count,
+            constants=sent.frame.codes,
+            write=writes_of(constants_of(scene, self.renderer.design)),
+            engine=self.engine,
+            progress=progress,
+            idle_timeout=self._longest_silence(sent),
+        )
+        self.engine = run.engine
+        counts = {name: int(run.status[name]) for name in STATUS}
+        if count is None and counts["pixels"] - counts["hidden"] != len(run.beats):
+            raise SimulationError("the hardware counted other pixels than it gave")
+        beats = run.beats
+        color = np.stack([beats[channel] for channel in "rgb"], axis=-1)
+        return SimulatedTriangleFrame(
+            image=frame_of_pixels(scene, beats["x"], beats["y"], color),
+            sent=sent,
+            counts=counts,
+            written=len(beats),
+            cycles=int(max(run.cycles.max(initial=0), run.input_cycles[-1]) - run.input_cycles[0] + 1),
+            input_cycles=int(run.input_cycles[-1] - run.input_cycles[0] + 1),
+            engine=run.engine,
+            seconds={"triangles": ready - start, "simulate": perf_counter() - ready},
+        )
+
+    def _longest_silence(self, sent: SceneTriangles, inside: int = 24) -> int:
+        """Cycles without a triangle taken in or a pixel given, at most: those inside may all be hidden.
+
+        Of so many of the largest every pixel and scanline of their boxes.
+        """
+        triangles, frame, steps = sent.triangles, sent.frame, self.renderer.geometry.grid.steps
+        sides = []
+        for values, first, end in (
+            (triangles.x, frame.left, frame.right),
+            (triangles.y, frame.top, frame.bottom),
+        ):
+            low, high = (f(values, axis=1) / steps for f in (np.min, np.max))
+            sides.append(np.maximum(np.minimum(high, end) - np.maximum(low, first), 0) + 2)
+        largest = np.sort(sides[0] * sides[1] + np.ptp(triangles.y, axis=1) / steps)[-inside:]
+        return 10_000 + 80 * inside + (self._unit.pipeline.cycles_per_pixel + 1) * int(largest.sum())

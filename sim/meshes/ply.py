@@ -1,0 +1,251 @@
+"""PLY files: text and binary, with polygons of any count of corners."""
+
+import re
+import struct
+from typing import NamedTuple
+
+import numpy as np
+
+from blysk.sim.meshes.materials import Found
+from blysk.sim.meshes.polygons import check_corners, triangulated
+from blysk.sim.meshes.refusal import Refused, shown
+
+__all__ = ["read_ply"]
+
+_KINDS = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"}
+_TYPES = {
+    **_KINDS,
+    **{f"{'u' * (kind[0] == 'u')}int{8 * int(kind[1])}": kind for kind in _KINDS.values()},
+    **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
+}
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+class _Property(NamedTuple):
+    name: str
+    kind: str
+    """Type of the value, or of the values of a list."""
+    count: str = ""
+    """Type of a list's count; empty if it is none."""
+
+
+class _Element(NamedTuple):
+    name: str
+    rows: int
+    properties: list[_Property]
+
+
+class _List(NamedTuple):
+    """Lists of all rows: their values one after the other, and how many each has."""
+
+    values: np.ndarray
+    counts: np.ndarray
+
+
+_Columns = dict[str, np.ndarray | _List]
+
+
+def read_ply(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
+    """Vertices, their normals if there are any, and triangles of a PLY file.
+
+    Raises
+    ------
+    Refused
+        If the header is damaged, rows or bytes are missing, a list has another count than it says, or a face
+        has fewer than 3 corners or one that does not exist.
+    """
+    order, elements, body = _header(data, found)
+    columns: dict[str, _Columns] = {}
+    rows = [line for line in body.splitlines() if line.strip()] if not order else []
+    if not order:
+        expected = sum(element.rows for element in elements)
+        if len(rows) < expected:
+            raise Refused(f"it is cut short: the header says {expected} lines of data, there are {len(rows)}")
+        if b"_" in body:
+            raise Refused("it has a number with the character _")
+    start = 0
+    for element in elements:
+        if order:
+            columns[element.name], start = _binary(element, body, start, order)
+        else:
+            columns[element.name] = _text(element, rows[start : start + element.rows])
+            start += element.rows
+    vertex = columns.get("vertex", {})
+    if not all(isinstance(vertex.get(name), np.ndarray) for name in "xyz"):
+        raise Refused("its vertices have no x, y and z")
+    vertices = np.column_stack([vertex[name] for name in "xyz"]).astype(np.float64)
+    normals = None
+    if all(isinstance(vertex.get(name), np.ndarray) for name in ("nx", "ny", "nz")):
+        normals = np.column_stack([vertex[name] for name in ("nx", "ny", "nz")]).astype(np.float64)
+    return vertices, normals, _triangles(vertices, columns.get("face", {}))
+
+
+def _triangles(vertices: np.ndarray, face: _Columns) -> np.ndarray:
+    lists = {name: column for name, column in face.items() if isinstance(column, _List)}
+    name = next((name for name in ("vertex_indices", "vertex_index") if name in lists), None)
+    if name is None and len(lists) != 1:
+        return np.zeros((0, 3), dtype=np.int64)
+    indices = lists[name] if name else next(iter(lists.values()))
+    if (indices.values != np.floor(indices.values)).any():
+        raise Refused("a face has an index that is no whole number")
+    values = indices.values.astype(np.int64)
+    check_corners(values, len(vertices))
+    if (indices.counts < 3).any():
+        raise Refused("a face has fewer than 3 corners")
+    starts = np.cumsum(indices.counts) - indices.counts
+    pieces, faces = [], []
+    for sides in np.unique(indices.counts).tolist():
+        chosen = np.flatnonzero(indices.counts == sides)
+        polygons = values[starts[chosen][:, np.newaxis] + np.arange(sides)]
+        corners, owners = triangulated(vertices, polygons)
+        pieces.append(polygons[owners[:, np.newaxis], corners])
+        faces.append(chosen[owners])
+    if not pieces:
+        return np.zeros((0, 3), dtype=np.int64)
+    return np.concatenate(pieces)[np.argsort(np.concatenate(faces), kind="stable")]
+
+
+def _header(data: bytes, found: Found) -> tuple[str, list[_Element], bytes]:
+    """Order of the bytes (empty for text), the elements, and what comes after the header."""
+    head, mark, body = data.partition(b"end_header")
+    if not mark:
+        raise Refused("the PLY header has no end")
+    order, elements, textures = None, [], 0
+    lines = head.decode("utf-8", "replace").splitlines()
+    if lines[0].strip() != "ply":
+        raise Refused("it is no PLY file")
+    for line in lines[1:]:
+        words = line.split()
+        # A comment of several lines: some programs forget the word before the second.
+        if not words or words[0] not in ("format", "element", "property"):
+            textures += words[:2] == ["comment", "TextureFile"]
+        elif words[0] == "format" and len(words) == 3 and words[1] in _ORDERS and order is None:
+            order = _ORDERS[words[1]]
+        elif words[0] == "element" and len(words) == 3 and re.fullmatch("[0-9]{1,18}", words[2]):
+            elements.append(_Element(words[1], int(words[2]), []))
+        elif words[0] == "property" and elements and (read := _property(words)):
+            elements[-1].properties.append(read)
+        else:
+            raise Refused(f"its header has the line {shown(line.strip())!r}")
+    if order is None:
+        raise Refused("its header says no format")
+    for element in elements:
+        names = [each.name for each in element.properties]
+        if len(set(names)) < len(names) or [e.name for e in elements].count(element.name) > 1:
+            raise Refused("its header has a name twice")
+        if element.name == "vertex" and {"red", "diffuse_red"}.intersection(names):
+            found.ignored.append("vertex colours")
+    if textures:
+        found.ignored.append("1 texture")
+    for end in (b"\r\n", b"\n", b"\r") if head.startswith(b"ply\r\n") else (b"\n", b"\r"):
+        if (body.lstrip(b" \t") if order == "" else body).startswith(end):
+            return order, elements, body.partition(end)[2]
+    if body.strip():
+        raise Refused("the PLY header has no end")
+    return order, elements, b""
+
+
+def _property(words: list[str]) -> _Property | None:
+    kinds = [_TYPES.get(word) for word in words[2:-1] if len(words) == 5] or [_TYPES.get(words[1])]
+    if len(words) == 5 and words[1] == "list" and all(kinds) and kinds[0][0] != "f":
+        return _Property(words[4], kinds[1], kinds[0])
+    if len(words) == 3 and kinds[0]:
+        return _Property(words[2], kinds[0])
+    return None
+
+
+def _text(element: _Element, rows: list[bytes]) -> _Columns:
+    """Columns of an element of a text; each row has to have what the header says, and nothing else."""
+    words = [row.split() for row in rows]
+    lengths = np.array([len(row) for row in words], dtype=np.int64)
+    try:
+        flat = np.array([float(word) for row in words for word in row])
+    except ValueError:
+        raise Refused(f"its {shown(element.name)} rows hold a word that is no number") from None
+    ends = np.cumsum(lengths)
+    cursor = ends - lengths
+    wrong = f"a row of its {shown(element.name)} has more or fewer numbers than it says"
+    columns: _Columns = {}
+    for each in element.properties:
+        if (cursor >= ends).any():
+            raise Refused(wrong)
+        values, cursor = flat[cursor] if len(rows) else flat, cursor + 1
+        if each.count:
+            if not ((values >= 0) & (values == np.floor(values)) & (values <= ends - cursor)).all():
+                raise Refused(wrong)
+            counts = values.astype(np.int64)
+            before = np.cumsum(counts) - counts
+            places = np.arange(counts.sum()) + np.repeat(cursor - before, counts)
+            columns[each.name], cursor = _List(flat[places], counts), cursor + counts
+        else:
+            columns[each.name] = values
+    if (cursor != ends).any():
+        raise Refused(wrong)
+    return columns
+
+
+def _binary(element: _Element, body: bytes, start: int, order: str) -> tuple[_Columns, int]:
+    """Columns of an element of a binary file, and where it ends."""
+    short = f"it is cut short: its {shown(element.name)} rows take more bytes than there are"
+    counts: list[int] = []
+    cursor = start
+    for each in element.properties if element.rows else ():
+        if each.count:
+            kind = np.dtype(order + each.count)
+            if cursor + kind.itemsize > len(body):
+                raise Refused(short)
+            counts.append(int(np.frombuffer(body, kind, 1, cursor)[0]))
+            if not 0 <= counts[-1] <= len(body):
+                raise Refused("a list has a wrong count")
+            cursor += kind.itemsize
+        cursor += np.dtype(each.kind).itemsize * (counts[-1] if each.count else 1)
+    # Most files have lists of one length only, of which one row's type tells all.
+    remaining = iter(counts)
+    row = []
+    for each in element.properties:
+        if each.count:
+            row += [(f"{each.name} count", order + each.count)]
+        row += [(each.name, order + each.kind, (next(remaining, 0),))[: 3 if each.count else 2]]
+    kind = np.dtype(row)
+    end = start + element.rows * kind.itemsize
+    if end <= len(body):
+        table = np.frombuffer(body, kind, element.rows, start) if kind.itemsize else np.zeros(0, kind)
+        lists = [each for each in element.properties if each.count]
+        alike = [(table[f"{e.name} count"] == n).all() for e, n in zip(lists, counts, strict=bool(counts))]
+        if all(alike):
+            columns: _Columns = {e.name: table[e.name] for e in element.properties}
+            for each in lists:
+                columns[each.name] = _List(
+                    table[each.name].ravel().astype(np.float64), table[f"{each.name} count"].astype(np.int64)
+                )
+            return columns, end
+    elif not any(each.count for each in element.properties):
+        raise Refused(short)
+    try:
+        return _ragged(element, body, start, order or "<")
+    except struct.error:
+        raise Refused(short) from None
+
+
+def _ragged(element: _Element, body: bytes, start: int, order: str) -> tuple[_Columns, int]:
+    """Columns of an element whose lists differ in length: where a row starts, only the one before tells."""
+    letters = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
+    values: dict[str, list] = {each.name: [] for each in element.properties}
+    counts: dict[str, list[int]] = {each.name: [] for each in element.properties}
+    sizes = {each: struct.calcsize(letters[each.kind]) for each in element.properties}
+    for _ in range(element.rows):
+        for each in element.properties:
+            count = 1
+            if each.count:
+                (count,) = struct.unpack_from(order + letters[each.count], body, start)
+                if not 0 <= count <= len(body):
+                    raise Refused("a list has a wrong count")
+                start += struct.calcsize(letters[each.count])
+            values[each.name] += struct.unpack_from(f"{order}{count}{letters[each.kind]}", body, start)
+            counts[each.name].append(count)
+            start += count * sizes[each]
+    columns: _Columns = {}
+    for each in element.properties:
+        column = np.array(values[each.name], dtype=np.float64)
+        columns[each.name] = _List(column, np.array(counts[each.name])) if each.count else column
+    return columns, start

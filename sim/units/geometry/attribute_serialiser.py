@@ -1,0 +1,47 @@
+"""Record of the attribute serialiser."""
+
+import numpy as np
+
+from blysk.golden.geometry.attribute_serialiser import AttributeSerialiser
+from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit
+from blysk.sim.units.record import Case, Record, Stimulus, Variant
+from blysk.sim.units.triangles import random_triangles, triangles_with
+
+__all__ = ["RECORD"]
+
+
+def _expect(unit, case):
+    return AttributeSerialiser().compute(triangles_with(**case.beats))
+
+
+def _case(rng, count, spread):
+    triangles = random_triangles(rng, count, spread=spread)
+    return Case({"depth": triangles.depth, "normal": triangles.normal})
+
+
+def _near(unit, rng, count):
+    """Corners with normals near to each other, of all lengths."""
+    return _case(rng, count, 0.3)
+
+
+def _far(unit, rng, count):
+    """Normals of any directions, components near 0 and at the ends of the word."""
+    case = _case(rng, count, 2.0)
+    low, high = -(1 << 23) + 1, (1 << 23) - 1
+    words = [low, high, 0, -1, 1, 4095, 4096, -4096, -4097]
+    case.beats["normal"][::3] = rng.choice(words, case.beats["normal"][::3].shape)
+    case.beats["normal"][::6, 1:] = np.sign(case.beats["normal"][::6, :1]) * np.abs(
+        case.beats["normal"][::6, 1:]
+    )
+    return case
+
+
+RECORD = Record(
+    name="attribute_serialiser",
+    title="A triangle's attributes one by one, and a bound on its normals' length",
+    source="docs/theory/geometry.md#normals",
+    variants={"": Variant(AttributeSerialiserUnit, note="exact")},
+    expect=_expect,
+    stimuli={"near": Stimulus(_near, 500), "far": Stimulus(_far, 500)},
+    axis="",
+)

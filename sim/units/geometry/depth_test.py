@@ -1,0 +1,77 @@
+"""Record of the depth test."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.number.spans import pixels_of
+from blysk.hdl.geometry.depth_test import DepthTestUnit
+from blysk.sim.units.record import Case, Record, Stimulus, Variant
+
+__all__ = ["RECORD"]
+
+
+def _drawn(beats):
+    pixel, test = beats["pixel"], DepthTest()
+    first = np.r_[True, pixel["last"][:-1]]
+    length = np.diff(np.r_[np.flatnonzero(first), len(first)])
+    depth = test.depths(length, beats["depth"][first], beats["depth_step"][first])
+    drawn = test.drawn(pixel["y"] * 4096 + pixel["x"], depth)
+    return {name: pixel[name][drawn] for name in "xyrgb"} | {"depth": depth[drawn]}, len(drawn)
+
+
+def _status(unit, case):
+    drawn, count = _drawn(case.beats)
+    return {"pixels": count, "hidden": count - len(drawn["depth"])}
+
+
+def _case(rng, count, size, longest, most):
+    """Spans with depths from 0 to ``most`` at both ends."""
+    width, height = size
+    length = rng.integers(1, longest + 1, count)
+    span, k = pixels_of(length)
+    span, k = span[:count], k[:count]
+    left, right = rng.integers(0, most + 1, (2, count)) << 9
+    left[::5], right[::7] = rng.choice([0, (1 << 33) - 1], len(left[::5])), 0
+    step = (right - left) // np.maximum(length - 1, 1)
+    begin, line = rng.integers(0, width - length + 1), rng.integers(0, height, count)
+    pixel = {
+        "x": begin[span] + k,
+        "y": line[span],
+        "last": k == length[span] - 1,
+        **{channel: rng.integers(0, 256, count) for channel in "rgb"},
+    }
+    pixel["last"][-1] = True
+    return Case({"pixel": pixel, "depth": left[span], "depth_step": step[span]})
+
+
+def _few(unit, rng, count):
+    """Spans of one to eight pixels of a small picture, over and over, some of equal depths."""
+    return _case(rng, count, unit.size, min(8, unit.size[0]), 1000)
+
+
+def _same(unit, rng, count):
+    """Spans of a pixel or two in a corner: places that were written on the last cycles."""
+    return _case(rng, count, (2, 1), 2, (1 << 24) - 1)
+
+
+def _far(unit, rng, count):
+    """Depths about the farthest, where a picture is cleared to."""
+    case = _case(rng, count, unit.size, 3, 3)
+    case.beats["depth"] = (1 << 33) - 1 - case.beats["depth"]
+    case.beats["depth_step"] = -case.beats["depth_step"]
+    return case
+
+
+RECORD = Record(
+    name="depth_test",
+    title="Depth of each pixel of a span, and whether it is in front",
+    source="docs/theory/geometry.md#depth",
+    variants={"": Variant(partial(DepthTestUnit, 4, 3, (16, 8)), note="exact")},
+    expect=lambda unit, case: _drawn(case.beats)[0],
+    status=_status,
+    stimuli={"few": Stimulus(_few, 2000), "same": Stimulus(_same, 500), "far": Stimulus(_far, 300)},
+    axis="",
+    remembers=True,
+)

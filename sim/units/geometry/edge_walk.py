@@ -1,0 +1,55 @@
+"""Record of the edge walk."""
+
+from functools import partial
+
+from blysk.golden.geometry.edge_walk import EdgeWalk
+from blysk.golden.geometry.triangles import Frame, Grid
+from blysk.hdl.geometry.edge_walk import EdgeWalkUnit, walk_shape
+from blysk.sim.units.record import Case, Record, Stimulus, Variant, first
+from blysk.sim.units.triangles import Stages, edges_of, frame_of, random_triangles, small_frame, sorted_of
+
+__all__ = ["RECORD"]
+
+
+def _expect(unit, case):
+    beats = case.beats
+    return EdgeWalk().compute(edges_of(beats), sorted_of(beats), frame_of(case.constants)).beats
+
+
+def _walked(unit, rng, count, frame, size=12.0):
+    stages = Stages(random_triangles(rng, 4 * count, unit.grid, size), frame, unit.grid)
+    beats = stages.drawn.beats | stages.edges.beats
+    return Case(first({name: beats[name] for name in walk_shape(unit.grid).members}, count), frame.codes)
+
+
+def _small(unit, rng, count):
+    """Triangles of all kinds in a small picture, with scanlines above it and cut off below."""
+    return _walked(unit, rng, count, small_frame(rng))
+
+
+def _tall(unit, rng, count):
+    """A picture as high as the grid, and triangles of all sizes."""
+    return _walked(unit, rng, count, Frame(-2048, -2048, 2047, 2047), 60.0)
+
+
+def _below(unit, rng, count):
+    """A picture that begins below most triangles' first corners."""
+    return _walked(unit, rng, count, Frame(-2048, 8, 2047, 2047))
+
+
+RECORD = Record(
+    name="edge_walk",
+    title="First and last covered pixel of each scanline of a triangle",
+    source="[T] figure 4.10",
+    variants={
+        "": Variant(EdgeWalkUnit, note="exact"),
+        "4 fraction bits": Variant(partial(EdgeWalkUnit, Grid(4)), note="exact"),
+    },
+    expect=_expect,
+    stimuli={
+        "small": Stimulus(_small, 300),
+        "tall": Stimulus(_tall, 300),
+        "below": Stimulus(_below, 300),
+    },
+    axis="",
+)

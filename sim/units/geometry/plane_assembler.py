@@ -1,0 +1,74 @@
+"""Record of the plane assembler."""
+
+import numpy as np
+
+from blysk.golden.geometry.gradient_setup import Gradients, GradientSetup
+from blysk.golden.geometry.plane_assembler import PlaneAssembler
+from blysk.golden.geometry.triangles import ATTRIBUTES, Frame
+from blysk.golden.number.fixed import Fixed
+from blysk.hdl.geometry.plane_assembler import PlaneAssemblerUnit
+from blysk.sim.units.operands import any_codes
+from blysk.sim.units.record import Case, Record, Stimulus, Variant
+from blysk.sim.units.triangles import frame_of
+
+__all__ = ["RECORD"]
+
+_FORMATS = {"start": GradientSetup.START_FORMAT} | dict.fromkeys(
+    ("short", "long", "inward"), GradientSetup.FORMAT
+)
+
+
+def _expect(unit, case):
+    count = len(case.beats["size"]) // ATTRIBUTES
+    beats = {
+        name: value[: ATTRIBUTES * count].reshape(count, ATTRIBUTES) for name, value in case.beats.items()
+    }
+    words = {name: Fixed(format, beats[name]) for name, format in _FORMATS.items()}
+    gradients = Gradients(**words, size=beats["size"])
+    return PlaneAssembler().compute(gradients, beats["least"][:, 0], frame_of(case.constants)).beats
+
+
+def _case(rng, count, limit):
+    beats = {name: any_codes(rng, format, ATTRIBUTES * count) for name, format in _FORMATS.items()}
+    size = 1 << rng.integers(0, 20, (count, 1))
+    size = np.minimum(size + rng.integers(0, size + 1, (count, ATTRIBUTES)), (1 << 20) - 1)
+    size[::5, 0] = rng.choice([1, (1 << 20) - 1], len(size[::5]))
+    least = rng.integers(0, 3457, count)
+    least[::7] = rng.choice([0, 1, 3456], len(least[::7]))
+    # Bounds next to a power of two times the sum.
+    norm = size[:, :3].max(axis=1) + size[:, :3].sum(axis=1)
+    close = np.arange(count) % 3 == 0
+    near = (norm << rng.integers(0, 13, count)) // max(limit, 1) + rng.integers(0, 2, count)
+    least = np.where(close, np.minimum(near, 3456), least)
+    beats |= {"size": size.ravel(), "least": np.repeat(least, ATTRIBUTES)}
+    return Case(beats, Frame(0, 0, 10, 10, limit=limit).codes)
+
+
+def _usual(unit, rng, count):
+    """Sizes of every power of two, bounds next to where a piece gets longer, a usual limit."""
+    return _case(rng, count, 267)
+
+
+def _largest(unit, rng, count):
+    """The largest limit."""
+    return _case(rng, count, 1023)
+
+
+def _least(unit, rng, count):
+    """Limits of 0 and of 1, which cut all spans but those of no change."""
+    return _case(rng, count, int(rng.integers(0, 2)))
+
+
+RECORD = Record(
+    name="plane_assembler",
+    title="Gradients of a triangle's attributes, and the longest piece of its spans",
+    source="docs/theory/geometry.md#normals",
+    variants={"": Variant(PlaneAssemblerUnit, note="exact")},
+    expect=_expect,
+    stimuli={
+        "usual": Stimulus(_usual, 500),
+        "largest": Stimulus(_largest, 300),
+        "least": Stimulus(_least, 100),
+    },
+    axis="",
+)

@@ -1,0 +1,110 @@
+"""Record of the span attributes."""
+
+import numpy as np
+
+from blysk.golden.geometry.gradient_setup import Gradients, GradientSetup
+from blysk.golden.geometry.plane_assembler import Planes
+from blysk.golden.geometry.span_attributes import SpanAttributes
+from blysk.golden.geometry.span_clip import ClippedRows
+from blysk.golden.geometry.triangles import ATTRIBUTES, GRID, Frame
+from blysk.golden.number.fixed import Fixed
+from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
+from blysk.sim.units.operands import any_codes
+from blysk.sim.units.record import Case, Record, Stimulus, Variant, first
+from blysk.sim.units.triangles import Stages, random_triangles
+
+__all__ = ["RECORD"]
+
+
+def _firsts(last):
+    return np.r_[True, last[:-1]]
+
+
+def _pieces(beats):
+    rows, at = ClippedRows(**beats["row"]), _firsts(beats["row"]["last"])
+    planes = {name: value[at] for name, value in beats["planes"].items()}
+    formats = {"start": GradientSetup.START_FORMAT} | dict.fromkeys(
+        ("short", "long", "inward"), GradientSetup.FORMAT
+    )
+    words = {name: Fixed(format, planes[name]) for name, format in formats.items()}
+    return SpanAttributes().compute(rows, Planes(Gradients(**words, size=np.zeros(0)), planes["piece"]))
+
+
+def _status(unit, case):
+    counts, rows = _pieces(case.beats)[1], case.beats["row"]
+    # A triangle whose last scanline is not there is not yet known to be empty.
+    begun = np.flatnonzero(_firsts(rows["last"]))[-1]
+    unknown = not rows["last"][-1] and not rows["length"][begun:].any()
+    return counts | {"empty": counts["empty"] - unknown}
+
+
+def _case(triangles, frame, count):
+    # Of high triangles a few would fill the run.
+    low = np.ptp(triangles.y, axis=1) < 64 * GRID.steps
+    stages = Stages(triangles[low], frame)
+    rows = stages.clipped
+    triangle = np.cumsum(_firsts(rows.last)) - 1
+    planes = {name: value[triangle] for name, value in stages.planes.beats.items()}
+    return Case(first({"planes": planes, "row": rows.beats}, count))
+
+
+def _rows(unit, rng, count):
+    """Scanlines of triangles of all kinds, cut to a small picture, and their spans at a limit."""
+    frame = Frame(-18, -22, 21, 19, limit=100)
+    return _case(random_triangles(rng, count, spread=0.1), frame, count)
+
+
+def _narrow(unit, rng, count):
+    """Nothing is cut: spans of few pixels."""
+    frame = Frame(-18, -22, 21, 19, limit=1023)
+    return _case(random_triangles(rng, count, size=1.5, spread=0.0), frame, count)
+
+
+def _any(unit, rng, count):
+    """Words of any codes, pieces and lengths: sums modulo 4, saturation, the longest spans."""
+    triangles = rng.integers(1, 12, count)
+    total = int(triangles.sum())
+    last = np.zeros(total, dtype=bool)
+    last[np.cumsum(triangles) - 1] = True
+    flags = rng.integers(0, 2, (3, total)).astype(bool)
+    length = (4095 >> rng.integers(0, 13, total)) - rng.integers(0, 2, total)
+    skip = rng.integers(0, 4096 - length)
+    covered = (length > 0) & (rng.random(total) < 0.9)
+    row = {
+        "x": np.where(covered, rng.integers(0, 4096 - length), 0),
+        "y": np.where(covered, rng.integers(0, 4096, total), 0),
+        "length": np.where(covered, length, 0),
+        "skip": np.where(covered & (rng.random(total) < 0.3), skip, 0),
+        "carry": flags[0],
+        "last": last,
+        "right": flags[1],
+        "flip": flags[2],
+        "material": rng.integers(0, 1024, total),
+    }
+    # Long spans of short pieces are many.
+    least = np.maximum(np.ceil(np.log2(np.maximum(length, 1))).astype(np.int64) - 3, 0)
+    words = {"start": GradientSetup.START_FORMAT} | dict.fromkeys(
+        ("short", "long", "inward"), GradientSetup.FORMAT
+    )
+    planes = {name: any_codes(rng, format, total, ATTRIBUTES) for name, format in words.items()}
+    at = np.cumsum(_firsts(last)) - 1
+    largest = np.zeros(count, dtype=np.int64)
+    np.maximum.at(largest, at, least)
+    planes["piece"] = np.minimum(largest + rng.integers(0, 4, count), 12)[at]
+    return Case({"planes": planes, "row": row})
+
+
+RECORD = Record(
+    name="span_attributes",
+    title="N/W and depth at both ends of each span, and of each piece of a wide one",
+    source="docs/theory/geometry.md#normals",
+    variants={"": Variant(SpanAttributesUnit, note="exact sums of the steps")},
+    expect=lambda unit, case: _pieces(case.beats)[0].beats,
+    status=_status,
+    stimuli={
+        "rows": Stimulus(_rows, 1500),
+        "narrow": Stimulus(_narrow, 1000),
+        "any": Stimulus(_any, 100),
+    },
+    axis="",
+)

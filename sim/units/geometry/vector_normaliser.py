@@ -1,0 +1,68 @@
+"""Record of the vector normaliser."""
+
+import numpy as np
+
+from blysk.golden.geometry.span_attributes import SPAN_NORMAL
+from blysk.golden.geometry.vector_normaliser import VectorNormaliser
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import ONE
+from blysk.hdl.geometry.vector_normaliser import VectorNormaliserUnit
+from blysk.sim.units.operands import any_codes, sphere
+from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
+
+__all__ = ["RECORD"]
+
+
+def _expect(unit, case):
+    normal, lost = unit.parameters.compute(Fixed(SPAN_NORMAL, case.beats["vector"]), case.beats["flip"])
+    return {"normal": normal.codes, "lost": lost}
+
+
+def _codes(vectors):
+    return np.clip(np.rint(vectors), SPAN_NORMAL.min_code, SPAN_NORMAL.max_code).astype(np.int64)
+
+
+def _vectors(unit, rng, count):
+    """Vectors of all lengths, some of any words, some of no direction."""
+    vector = _codes(sphere(rng, count) * 2.0 ** rng.uniform(8, 26.5, (count, 1)))
+    vector[::8] = any_codes(rng, SPAN_NORMAL, *vector[::8].shape)
+    return Case({"vector": vector, "flip": rng.integers(0, 2, count)})
+
+
+def _corners(unit, rng, count):
+    """Squared lengths next to the borders of the table's segments, axes, ends of the word."""
+    squared = (np.arange(128, 512) / 512)[:, np.newaxis] + np.arange(-2, 3) * 2.0**-20
+    length = np.sqrt(np.r_[squared.ravel(), 4 * squared.ravel()])
+    direction = sphere(rng, len(length))
+    direction /= np.maximum(np.abs(direction).max(axis=1), 1 / np.sqrt(3))[:, np.newaxis] ** 0
+    near = _codes(direction * length[:, np.newaxis] * 2.0**26)
+    ends = (
+        np.array(np.meshgrid(*[[SPAN_NORMAL.min_code, -1, 0, 1, SPAN_NORMAL.max_code]] * 3)).reshape(3, -1).T
+    )
+    steps = np.eye(3, dtype=np.int64)[np.newaxis] << np.arange(26)[:, np.newaxis, np.newaxis]
+    steps = steps.reshape(-1, 3)
+    vector = rng.permutation(np.vstack([near, ends, steps, -steps, steps - 1]))
+    return Case({"vector": vector, "flip": rng.integers(0, 2, len(vector))})
+
+
+def _measure(rng, count):
+    vector = _codes(sphere(rng, count) * 2.0 ** rng.uniform(14, 26, (count, 1)))
+    length = np.linalg.norm(vector, axis=1)
+    normal, _ = VectorNormaliser().compute(Fixed(SPAN_NORMAL, vector), np.zeros(count, dtype=bool))
+    exact = vector / length[:, np.newaxis]
+    return Sample(normal.codes / ONE, exact, None, np.log2(length * 2.0**-26)[:, np.newaxis])
+
+
+RECORD = Record(
+    name="vector_normaliser",
+    title="Vector of any length divided by its length",
+    source="docs/theory/geometry.md#normals",
+    variants={"": Variant(VectorNormaliserUnit, _measure, "lengths 2^-12 to 1", note="components over ONE")},
+    expect=_expect,
+    stimuli={
+        "vectors": Stimulus(_vectors, 1000),
+        "corners": Stimulus(_corners, 500),
+        "last bits": Stimulus(_vectors, 100_000, stalled=False),
+    },
+    axis="log2 of the vector's length",
+)

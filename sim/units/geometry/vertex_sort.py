@@ -1,0 +1,56 @@
+"""Record of the vertex sort."""
+
+from functools import partial
+
+from blysk.golden.geometry.triangles import Grid, Triangles
+from blysk.golden.geometry.vertex_sort import VertexSort
+from blysk.hdl.geometry.vertex_sort import VertexSortUnit
+from blysk.sim.units.record import Case, Record, Stimulus, Variant
+from blysk.sim.units.triangles import WHOLE, frame_of, random_triangles, small_frame
+
+__all__ = ["RECORD"]
+
+
+def _sorted(unit, case):
+    return VertexSort(unit.grid).compute(Triangles(**case.beats), frame_of(case.constants))
+
+
+def _flipped(unit, rng, count, back_faces="flip"):
+    """Triangles of all kinds in a small picture, back faces turned."""
+    frame = small_frame(rng, back_faces)
+    return Case(random_triangles(rng, count, unit.grid).beats, frame.codes)
+
+
+def _culled(unit, rng, count):
+    """The same, back faces left out."""
+    return _flipped(unit, rng, count, "cull")
+
+
+def _shown(unit, rng, count):
+    """The same, back faces as they are."""
+    return _flipped(unit, rng, count, "show")
+
+
+def _whole(unit, rng, count):
+    """A picture of all the grid: triangles of all sizes."""
+    return Case(random_triangles(rng, count, unit.grid, 500.0).beats, WHOLE.codes)
+
+
+RECORD = Record(
+    name="vertex_sort",
+    title="Corners of triangles from top to bottom, orientation, and what is not drawn",
+    source="[T] figure 4.10",
+    variants={
+        "": Variant(VertexSortUnit, note="exact"),
+        "4 fraction bits": Variant(partial(VertexSortUnit, Grid(4)), note="exact"),
+    },
+    expect=lambda unit, case: _sorted(unit, case)[0].beats,
+    status=lambda unit, case: _sorted(unit, case)[1],
+    stimuli={
+        "flipped": Stimulus(_flipped, 1000),
+        "culled": Stimulus(_culled, 1000),
+        "shown": Stimulus(_shown, 1000),
+        "whole": Stimulus(_whole, 1000),
+    },
+    axis="",
+)

@@ -1,0 +1,76 @@
+"""Record of the whole: triangles to pixels."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.geometry.triangles import Frame, Triangles
+from blysk.golden.presets import preset
+from blysk.golden.render import Renderer
+from blysk.hdl.render import RenderUnit
+from blysk.sim.units.operands import unit_codes
+from blysk.sim.units.record import Case, Record, Stimulus, Variant
+from blysk.sim.units.triangles import ended, frame_of, random_triangles
+
+__all__ = ["RECORD"]
+
+_SIZE = 32, 24
+_SEED = 2026
+
+
+def _constants(rng, design):
+    """Frame constants of each material: lights from anywhere."""
+    direction, halfway = (unit_codes(rng, design.lights) for _ in range(2))
+    for index in range(design.materials):
+        colors = rng.integers(0, 255 * 64, (2, design.lights, 3))
+        yield FrameConstants(9 + index, rng.integers(0, 255 * 8, 3), direction, halfway, *colors)
+
+
+def _made(unit, case):
+    parameters = unit.parameters
+    constants = list(_constants(np.random.default_rng(_SEED), parameters.design))
+    return parameters.compute(Triangles(**case.beats), frame_of(case.constants), constants)
+
+
+def _status(unit, case):
+    made = _made(unit, case)
+    return made.counts | {"out_of_range_spans": made.out_of_range_spans}
+
+
+def _triangles(unit, rng, count, size=6.0, spread=0.2):
+    """Triangles of all kinds, one over the other in a small picture."""
+    design = unit.parameters.design
+    triangles = ended(random_triangles(rng, count, size=size, spread=spread))
+    triangles.material[:] = rng.integers(0, design.materials, count)
+    frame = Frame.centred(*_SIZE, limit=Frame.limit_of(15.0))
+    write = writes_of(list(_constants(np.random.default_rng(_SEED), design)))
+    return Case(triangles.beats, frame.codes, write)
+
+
+def _tiny(unit, rng, count):
+    """Triangles of a pixel or so."""
+    return _triangles(unit, rng, count, 1.0)
+
+
+def _variants():
+    for name, options in (
+        ("chord", {}),
+        ("chord, compact", {"style": "compact"}),
+        ("renormalise, 2 lights, 3 materials", {"method": "renormalise", "lights": 2, "materials": 3}),
+    ):
+        design = preset(**{"method": "chord", "x_bits": 5, "y_bits": 5} | options)
+        yield name, Variant(partial(RenderUnit, Renderer(design), _SIZE), long=name != "chord")
+
+
+RECORD = Record(
+    name="render",
+    title="Triangles to pixels",
+    source="[T] figure 4.10",
+    variants=dict(_variants()),
+    expect=lambda unit, case: _made(unit, case).beats,
+    status=_status,
+    stimuli={"triangles": Stimulus(_triangles, 200), "tiny": Stimulus(_tiny, 200)},
+    axis="",
+    remembers=True,
+)

@@ -1,0 +1,214 @@
+"""Short units of few bits in the place of the parts of interpolators, and the words that they hand on."""
+
+from amaranth.hdl import Cat, Const, Fragment, Signal, Value
+
+import blysk.hdl.cosines.highlight_cosine
+import blysk.hdl.methods.angular_interpolator
+import blysk.hdl.methods.bisection_interpolator
+import blysk.hdl.methods.chord_interpolator
+import blysk.hdl.methods.interpolator
+import blysk.hdl.methods.linear_interpolator
+import blysk.hdl.methods.local_chord_interpolator
+import blysk.hdl.methods.quadratic_interpolator
+import blysk.hdl.methods.recurrence_interpolator
+import blysk.hdl.normals.difference_accumulator
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
+from blysk.golden.number.fixed import SQ
+from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
+from blysk.hdl.cosines.recurrence import RecurrenceUnit
+from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
+from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
+from blysk.hdl.normals.difference_accumulator import AccumulatorUnit, DifferenceAccumulatorUnit
+from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
+
+from .stubs import short, short_wave
+
+# Spans of 0 to 3 pixels, and the cycles from one to the next that setups are built for.
+LENGTH_BITS, INTERVAL = 2, 2
+TAG_BITS = 2
+WORD_BITS = LENGTH_BITS + TAG_BITS
+NARROW = DifferenceAccumulator(SQ(1, WORD_BITS), SQ(2, WORD_BITS + 1), SQ(2, WORD_BITS + 1), SQ(1, WORD_BITS))
+
+
+def word(number: FixedValue) -> Value:
+    """Of a pixel: its place in its span, and the tag of the span."""
+    return Value.cast(number)[:WORD_BITS]
+
+
+def tag(number: FixedValue) -> Value:
+    """Of a span."""
+    return word(number)[LENGTH_BITS:]
+
+
+def first_word(number: FixedValue, place: int = 0) -> Value:
+    """Of the pixel at a place of the span."""
+    return Cat(Const(place, LENGTH_BITS), tag(number))
+
+
+def put(number: FixedValue, code: Value):
+    """Assign a code."""
+    return Value.cast(number).eq(code)
+
+
+def left(span):
+    return span.normal_left[0]
+
+
+def middle_value(span):
+    return span["values"][0].diffuse[0]
+
+
+def constant_coefficient(span):
+    return span.q[0]
+
+
+def start(span):
+    return span.start[0]
+
+
+def light_start(span):
+    return span.lights[0].diffuse.start
+
+
+def phase(span):
+    return span.phase
+
+
+def first_value(span, light, copy="diffuse"):
+    return span.lights[light][copy].first[0]
+
+
+def itself(pixel):
+    return pixel
+
+
+def normal(pixel):
+    return pixel[0]
+
+
+def cosine(pixel):
+    return pixel[0].cosine
+
+
+def difference_setup(span, gives):
+    yield put(gives.start[0], first_word(span.q[0]))
+    yield gives.length.eq(span.length)
+
+
+def chord_setup(span, gives):
+    find = middle_value if "values" in span.shape().members else left
+    yield put(light_start(gives), first_word(find(span)))
+    yield gives.length.eq(span.length)
+
+
+def middle_normal(span, gives):
+    yield put(gives.normal_left[0], word(span.normal_left[0]))
+
+
+def coefficients(span, gives):
+    yield put(gives.q[0], word(span.normal_left[0]))
+
+
+def renormaliser(vector, gives):
+    yield put(gives.normal[0], word(vector[0]))
+
+
+def products(vector, gives):
+    yield put(gives[0].cosine, word(vector[0]))
+
+
+def angular_setup(span, gives):
+    # The angle falls from pixel to pixel.
+    yield put(gives.phase, Cat(Const(3, LENGTH_BITS), tag(left(span))))
+    yield put(gives.step, 1)
+    yield gives.length.eq(span.length)
+
+
+def recurrence_setup(span, gives):
+    for light in gives.lights:
+        for copy in (light.diffuse, light.highlight):
+            for place, number in enumerate(copy.first):
+                yield put(number, first_word(left(span), place))
+    yield gives.length.eq(span.length)
+
+
+def angle(theta, cos_beta):
+    return Cat(~theta[:LENGTH_BITS], theta[LENGTH_BITS:WORD_BITS])
+
+
+def loop(self, m, name, start, starts, *others):
+    """In place of the recurrence unit's: of each of a span's first four pixels the value that was given."""
+    x = Signal(WORD_BITS, name=name)
+    with m.If(starts):
+        m.d.sync += x.eq(word(start[0]))
+    format = self.parameters.result_format
+    return FixedValue(format, Cat(x, Const(0, format.width - WORD_BITS)))
+
+
+def walk(find, place):
+    """In place of an accumulator's quadratics: one of few bits, from a span's word by one a pixel."""
+
+    def quadratics(self, values):
+        one, none = (
+            FixedValue.constant(NARROW.difference_format, value) for value in (NARROW.result_format.step, 0)
+        )
+        begin = FixedValue(NARROW.start_format, Cat(first_word(find(self.i.payload)), Const(0, 1)))
+        result = FixedValue(NARROW.result_format, Value.cast(place(values))[: WORD_BITS + 1])
+        yield "word", NARROW, (begin, one, none), result
+
+    return quadratics
+
+
+class Line(AccumulatorUnit):
+    """In place of a unit that takes spans to normals: an accumulator of its streams."""
+
+    cycles_per_pixel = 1
+
+    def __init__(self, parameters):
+        unit = self.OF(parameters)
+        # Else its parts count as forgotten.
+        Fragment.get(unit, None)
+        super().__init__(unit.i.payload.shape(), unit.o.payload.shape())
+
+
+class Normaliser(Line):
+    """Of a span that is not divided; the unit itself takes 69 cycles to its first pixel."""
+
+    OF = AdaptiveNormaliserUnit
+    quadratics = walk(left, lambda values: values.normal[0])
+
+    def preparation(self, levels):
+        return self.latency
+
+
+class Evaluator(Line):
+    """Of either form."""
+
+    OF = QuadraticEvaluatorUnit
+    quadratics = walk(constant_coefficient, normal)
+
+
+def replace_parts(monkeypatch) -> None:
+    """Put units of 2 or 3 cycles, and accumulators of few bits, in the place of parts: they hand words on."""
+    for module, name, hand_on, latency in (
+        (blysk.hdl.methods.interpolator, "LightProductsUnit", products, 2),
+        (blysk.hdl.methods.linear_interpolator, "DifferenceSetupUnit", difference_setup, 3),
+        (blysk.hdl.methods.linear_interpolator, "RenormaliserUnit", renormaliser, 2),
+        # A length takes three cycles round these two.
+        (blysk.hdl.methods.quadratic_interpolator, "MiddleNormalUnit", middle_normal, 3),
+        (blysk.hdl.methods.quadratic_interpolator, "GPQUnit", coefficients, 1),
+        (blysk.hdl.methods.quadratic_interpolator, "DifferenceSetupUnit", difference_setup, 3),
+        (blysk.hdl.methods.chord_interpolator, "ChordSetupUnit", chord_setup, 3),
+        (blysk.hdl.methods.local_chord_interpolator, "LocalChordSetupUnit", chord_setup, 3),
+        (blysk.hdl.methods.angular_interpolator, "AngularSetupUnit", angular_setup, 3),
+        (blysk.hdl.methods.recurrence_interpolator, "RecurrenceSetupUnit", recurrence_setup, 3),
+    ):
+        monkeypatch.setattr(module, name, short(getattr(module, name), hand_on, latency))
+    monkeypatch.setattr(DifferenceAccumulatorUnit, "quadratics", walk(start, normal))
+    monkeypatch.setattr(ChordAccumulatorUnit, "quadratics", walk(light_start, cosine))
+    monkeypatch.setattr(HighlightCosineUnit, "latency", 3)
+    monkeypatch.setattr(HighlightCosineUnit, "_wave", short_wave(angle))
+    monkeypatch.setattr(RecurrenceUnit, "_reinsch", loop)
+    monkeypatch.setattr(blysk.hdl.methods.bisection_interpolator, "AdaptiveNormaliserUnit", Normaliser)
+    monkeypatch.setattr(blysk.hdl.methods.quadratic_interpolator, "QuadraticEvaluatorUnit", Evaluator)

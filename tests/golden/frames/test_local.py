@@ -1,0 +1,280 @@
+"""Spans under point lights or a near viewer: three values of each light, cut where a parabola fits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blysk.golden.frames.cut import cut_local_spans
+from blysk.golden.frames.local import local_values
+from blysk.golden.frames.prepare import sort_by_material
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.number.unit_vector import ONE
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.curves import interpolate
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.raster import fragment_normals, rasterise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.golden.reference.renderer import fragment_positions, shade_spans
+from blysk.golden.reference.scene import Scene
+from blysk.sim.meshes.teapot import teapot
+
+from .test_cut import origins
+
+METHOD = LocalChordInterpolator()
+ONE_VALUE = (ONE / 2**17) ** 2
+CENTRE = np.array([0.0, 1.575, 0.0])
+
+
+def material(exponent):
+    return Material((0.1,) * 3, (0.7,) * 3, (0.6,) * 3, exponent)
+
+
+def lit_teapot(exponent, triangles=1000, viewer="near"):
+    """A lamp to the upper left, one close to the lid, and the sun."""
+    mesh = teapot(triangles)
+    camera = Camera.framing(mesh.vertices, (0.4, 0.5, 1), "perspective", 4 / 3, field_of_view=45)
+    lamps = [Light(position=tuple(CENTRE + offset)) for offset in ([-3.2, 4.0, 4.5], [0.3, 2.1, 0.5])]
+    return Scene(mesh, camera, 320, 240, material(exponent), (*lamps, Light((1, 1, 1))), viewer=viewer)
+
+
+def floor(lamps, exponent=50, viewer="near", eye=(0, 1.5, 5)):
+    """A square of two triangles, from so near that its spans are as wide as the picture."""
+    vertices = np.array([[-4, 0, -4], [4, 0, -4], [4, 0, 4], [-4, 0, 4]], dtype=float)
+    mesh = Mesh(vertices, np.array([[0, 2, 1], [0, 3, 2]]), np.tile([0.0, 1, 0], (4, 1)))
+    camera = Camera(eye, (0, 0, 0), projection="perspective", field_of_view=50)
+    lights = tuple(Light(position=lamp) for lamp in lamps)
+    return Scene(mesh, camera, 320, 200, material(exponent), lights, back_faces="show", viewer=viewer)
+
+
+def exact_operands(scene, raster):
+    """N·L and u of every fragment, each vector normalised there."""
+    span = raster.span
+    t = raster.offset / np.maximum(raster.length[span] - 1, 1)
+    normal = interpolate("normalised", raster.normal_left[span], raster.normal_right[span], t)
+    point = fragment_positions(scene, raster, np.arange(len(span)))
+    viewer = scene.camera.position - point if scene.viewer == "near" else scene.camera.viewer
+    viewer = viewer / np.linalg.norm(viewer, axis=-1, keepdims=True)
+    cosine, u = [], []
+    for light in scene.lights:
+        towards = light.direction if light.position is None else light.position - point
+        towards = normalise(np.broadcast_to(towards, point.shape))
+        halfway = normalise(towards + viewer)
+        cosine.append((normal * towards).sum(axis=1))
+        u.append(((normal - halfway) ** 2).sum(axis=1) / 2)
+    return np.stack(cosine, axis=1), np.stack(u, axis=1)
+
+
+def local_errors(scene, by_material=False):
+    """Errors in LSB of full reflection over all fragments and lights, diffuse and specular; the cut spans."""
+    raster = rasterise(scene)
+    cut, count = cut_local_spans(scene, raster)
+    if by_material:
+        cut = sort_by_material(cut, scene.mesh.material)
+    values = local_values(scene, cut)
+    operands = METHOD.compute_values(values, cut.length)
+    assert not operands.out_of_range.any()
+    # Every fragment by its triangle and pixel.
+    key, wanted = (
+        r.triangle[r.span].astype(np.int64) * scene.width * scene.height + r.pixel for r in (cut, raster)
+    )
+    place = np.argsort(key)[np.searchsorted(np.sort(key), wanted)]
+    assert np.array_equal(key[place], wanted)
+    found, highlight = operands.cosine[place], operands.highlight[place]
+    cosine, u = exact_operands(scene, raster)
+    diffuse = Diffuse(found.format).compute(found).values
+    specular, expected = np.zeros((2, *u.shape))
+    unit = Specular(REFLECTION_MODELS["cosquad"], "one_minus_cosine")
+    material = scene.mesh.material[raster.triangle[raster.span]]
+    for index, coefficients in enumerate(scene.materials):
+        which, n = material == index, coefficients.exponent
+        specular[which] = unit.compute(highlight[which], Diffuse.dark(found[which]), n).values
+        expected[which] = np.where(
+            cosine[which] > 0, REFLECTION_MODELS["cosquad"].reflect(1 - u[which], n), 0
+        )
+    # At a step of the words from 0 the sign of N·L, and with it the highlight, may be the other.
+    sure = np.abs(cosine) > 2.0**-25
+    return (
+        255 * np.abs(diffuse - np.maximum(cosine, 0)).max(initial=0),
+        255 * np.abs(specular - expected)[sure].max(initial=0),
+        cut,
+        count,
+        expected,
+    )
+
+
+@pytest.mark.parametrize("exponent", [1, 10, 100, 1000])
+@pytest.mark.parametrize("triangles", [100, 1000, 10_000])
+def test_local_operands_of_the_teapot(exponent, triangles):
+    """Fit, arithmetic and the last units together, at every pixel: under half an LSB of full reflection.
+
+    0.4 and 0.12 LSB for the former; the specular unit's own error adds up to 0.05, the diffuse one's 0.01.
+    """
+    diffuse, specular, cut, count, expected = local_errors(lit_teapot(exponent, triangles))
+    print(
+        f"{triangles} triangles, n = {exponent}: {diffuse:.3f}, {specular:.3f} LSB, {len(cut.length)} spans"
+    )
+    assert count > 0
+    assert np.count_nonzero(expected > 0.1) > 20
+    assert 0.05 < diffuse <= METHOD.DIFFUSE_BUDGET + 0.01
+    assert 0.05 < specular <= METHOD.HIGHLIGHT_BUDGET + 0.05
+
+
+LAMPS = {
+    "high": [(0.5, 3.0, 0.5)],
+    "low": [(0.5, 0.05, 0.5)],
+    "in steps of pixels": [(0.3, 0.002, 1.0)],
+    "on the surface": [(0.25, 0.0, 0.5)],
+    "on a corner": [(4.0, 0.0, 4.0)],
+    "behind": [(0.5, -1.0, 0.5)],
+    "opposite to the viewer": [(0.0, -1.5, -5.0)],
+    "at the camera": [(0.0, 1.5, 5.0)],
+    "far": [(1e6, 2e6, 1e6)],
+    "through the floor": [(0.0, 1.5, -5.0), (0.1, 1.5, -4.0)],
+    "several": [(1.0, 0.3, 2.0), (-1.0, 0.1, 0.0), (0.0, -2.0, 0.0)],
+}
+
+
+@pytest.mark.parametrize("viewer", ["near", "distant"])
+@pytest.mark.parametrize("lamps", LAMPS)
+@pytest.mark.parametrize("exponent", [1, 50, 1000])
+def test_stiff_lamps_over_a_floor(lamps, viewer, exponent):
+    """Spans of hundreds of pixels, L and H that turn within a few of them: the same bounds, and no NaN."""
+    # From below the lamps above are opposite: L = -V here and there, and N·L over 0.
+    eye = (0, -1.5, 5) if lamps == "through the floor" else (0, 1.5, 5)
+    scene = floor(LAMPS[lamps], exponent, viewer, eye)
+    diffuse, specular, cut, _, _ = local_errors(scene)
+    print(f"{lamps}, {viewer}, n = {exponent}: {diffuse:.3f}, {specular:.3f} LSB, {len(cut.length)} spans")
+    assert diffuse <= METHOD.DIFFUSE_BUDGET + 0.01
+    assert specular <= METHOD.HIGHLIGHT_BUDGET + 0.05
+    # What the float64 renderer shows of the parts is what it shows of the whole spans.
+    raster = rasterise(scene)
+    whole = shade_spans(scene, raster, "normalised", REFLECTION_MODELS["cosquad"])
+    parts = shade_spans(scene, cut, "normalised", REFLECTION_MODELS["cosquad"])
+    assert np.isfinite(whole).all()
+    lit = np.abs(exact_operands(scene, raster)[0]).min(axis=1) > 1e-9
+    pixel = raster.pixel[lit & raster.visible]
+    assert np.abs(whole - parts).reshape(-1, 3)[pixel].max(initial=0) <= 1e-9
+
+
+def test_a_light_behind_cuts_nothing_but_what_turns():
+    """Where N·L stays negative the light gives nothing, however badly the quadratics fit."""
+    scene = floor([(0.5, -9.0, 0.5)], 10, "distant")
+    above = replace(scene, lights=(Light(position=(0.5, 9.0, 0.5)),))
+    fine, _ = cut_local_spans(above, rasterise(scene))
+    cut, _ = cut_local_spans(scene, rasterise(scene))
+    operands = METHOD.compute_values(local_values(scene, cut), cut.length)
+    assert (operands.cosine.codes < 0).all()
+    assert len(cut.length) < 0.8 * len(fine.length)
+
+
+def test_local_cut_keeps_fragments():
+    scene = lit_teapot(50, 100)
+    raster = rasterise(scene)
+    cut, count = cut_local_spans(scene, raster)
+    assert count == np.count_nonzero(np.bincount(origins(raster, cut)[0]) > 1)
+    for name in ("pixel", "visible"):
+        assert np.array_equal(getattr(cut, name), getattr(raster, name))
+    origin, _ = origins(raster, cut)
+    assert np.array_equal(np.bincount(origin, weights=cut.length), raster.length)
+    assert np.array_equal(cut.triangle, raster.triangle[origin])
+    # Positions and normals of the fragments are those of the whole spans.
+    everything = np.arange(len(raster.span))
+    points = (fragment_positions(scene, r, everything) for r in (raster, cut))
+    assert np.abs(np.subtract(*points)).max() < 1e-12
+    curve = interpolate(
+        "normalised",
+        raster.normal_left[raster.span],
+        raster.normal_right[raster.span],
+        raster.offset / np.maximum(raster.length[raster.span] - 1, 1),
+    )
+    assert np.abs(fragment_normals(scene, cut, everything) - curve).max() < 1e-12
+
+
+def test_local_values_by_hand():
+    """Of one span: first, middle and last, rounded to codes in units of ONE_SQUARED."""
+    scene = floor([(0.5, 0.4, 0.5), (-1, 2, 1)])
+    cut, _ = cut_local_spans(scene, rasterise(scene))
+    values = local_values(scene, cut)
+    span = int(np.argmax(cut.length))
+    length = int(cut.length[span])
+    assert length > 3
+    first = int(np.cumsum(cut.length)[span]) - length
+    ends = fragment_positions(scene, cut, np.array([first, first + length - 1]))
+    shares = [w / w.sum() for w in (cut.weights_left[span], cut.weights_right[span])]
+    middle = cut.weights_left[span] + cut.weights_right[span]
+    corners = scene.mesh.vertices[scene.mesh.faces[cut.triangle[span]]]
+    points = shares[0] @ corners, middle / middle.sum() @ corners, shares[1] @ corners
+    assert np.abs(ends - [points[0], points[2]]).max() < 1e-12
+    # On the floor's line of sight: halfway on the screen is not halfway in the world.
+    eye = np.array(scene.camera.position)
+    for index, light in enumerate(scene.lights):
+        for place, point in enumerate(points):
+            towards = np.subtract(light.position, point)
+            towards /= np.linalg.norm(towards)
+            sight = (eye - point) / np.linalg.norm(eye - point)
+            half = (towards + sight) / np.linalg.norm(towards + sight)
+            assert abs(values.diffuse[span, index, place] - ONE_VALUE * towards[1] * 2**25) < 0.51
+            u = ((half - [0, 1, 0]) ** 2).sum() / 2
+            assert abs(values.highlight[span, index, place] - ONE_VALUE * u * 2**26) < 0.51
+
+
+def test_short_local_spans_do_not_bend():
+    """A span of one pixel has one value, one of two the mean in the middle."""
+    scene = lit_teapot(1000, 1000)
+    cut, _ = cut_local_spans(scene, rasterise(scene))
+    values = local_values(scene, cut)
+    for codes in values:
+        alone, pairs = codes[cut.length == 1], codes[cut.length == 2]
+        assert len(alone) > 10
+        assert len(pairs) > 10
+        assert (alone == alone[..., :1]).all()
+        assert np.abs(pairs[..., 0] + pairs[..., 2] - 2 * pairs[..., 1]).max() <= 2
+
+
+def test_a_pipeline_of_more_lights():
+    """The lights that the scene has not are dark in every pixel."""
+    scene = lit_teapot(10, 100)
+    cut, _ = cut_local_spans(scene, rasterise(scene))
+    three, five = local_values(scene, cut), local_values(scene, cut, 5)
+    for a, b in zip(three, five, strict=True):
+        assert np.array_equal(a, b[:, :3])
+        assert not b[:, 3:].any()
+    assert Diffuse.dark(METHOD.compute_values(five, cut.length).cosine)[:, 3:].all()
+
+
+def test_no_light_and_no_span():
+    scene = replace(lit_teapot(10, 100), lights=())
+    cut, count = cut_local_spans(scene, rasterise(scene))
+    assert local_values(scene, cut).diffuse.shape == (len(cut.length), 0, 3)
+    assert count == np.count_nonzero(np.bincount(origins(rasterise(scene), cut)[0]) > 1)
+    empty = replace(scene, mesh=replace(scene.mesh, faces=scene.mesh.faces[:0], material=None))
+    cut, count = cut_local_spans(empty, rasterise(empty))
+    assert (count, len(cut.length), len(local_values(empty, cut).diffuse)) == (0, 0, 0)
+
+
+def test_local_results_do_not_depend_on_the_chunks(monkeypatch):
+    scene = lit_teapot(100, 100)
+    raster = rasterise(scene)
+    results = []
+    for chunk in (1 << 16, 97):
+        monkeypatch.setattr("blysk.golden.frames.local.CHUNK", chunk)
+        cut, count = cut_local_spans(scene, raster)
+        results.append((cut.length, count, *local_values(scene, cut)))
+    for a, b in zip(*results, strict=True):
+        assert np.array_equal(a, b)
+
+
+def test_local_spans_by_material():
+    """Each triangle's own exponent decides; the spans may be put in the order of their materials."""
+    scene = lit_teapot(10, 1000)
+    faces = len(scene.mesh.faces)
+    mesh = replace(scene.mesh, material=np.arange(faces) % 2)
+    scene = replace(scene, mesh=mesh, material=(material(1000), material(10)))
+    diffuse, specular, cut, _, _ = local_errors(scene, by_material=True)
+    assert diffuse <= METHOD.DIFFUSE_BUDGET + 0.01
+    assert specular <= METHOD.HIGHLIGHT_BUDGET + 0.05
+    assert len(np.unique(scene.mesh.material[cut.triangle])) == 2

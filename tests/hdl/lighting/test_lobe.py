@@ -1,0 +1,298 @@
+# amaranth: UnusedElaboratable=no
+"""Lobe unit: lost writes, writes beside a unit that stands still, banks, a memory for two lights, cost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from amaranth.hdl import Fragment, Module, Signal, Value
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+from amaranth.sim import Simulator
+
+from blysk.golden.lighting.lobe import Lobe
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.reference.lobes import BECKMANN, GGX
+from blysk.golden.reference.reflection import BLINN
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import connect_fifo
+from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.lighting.lobe import LobeMemory, LobeUnit, lobe_write_shape
+from blysk.hdl.lighting.specular import highlight_shape
+from blysk.sim.engines.simulate import simulate
+
+OPERANDS = ("cosine", "one_minus_cosine")
+CHORD = "one_minus_cosine"
+LOBE = Lobe(operand=CHORD)
+CASES = ((BLINN, 1), (BLINN, 20), (BLINN, 1000), (BECKMANN, 0.3), (BECKMANN, 1), (GGX, 0.05), (GGX, 1))
+
+
+def operands(parameters, seed, count=600):
+    """Ends of every step, codes of every octave, and the ends of the word."""
+    rng, format = np.random.default_rng(seed), parameters.operand_format
+    bits = parameters.fraction_bits
+    knots = np.ldexp(parameters.knots, bits).astype(np.int64)
+    u = np.r_[knots, knots - 1, (2.0 ** (bits - rng.uniform(-1, bits, count))).astype(np.int64)]
+    if parameters.operand == "cosine":
+        one = ONE_SQUARED.codes.item()
+        low = rng.integers(0, 1 << 34 - bits, len(u)) if bits < 34 else 0
+        codes = one - (u << 34 - bits) - low
+        ends = [one, one - 1, one + 1, one + 10**6, 0, 1, -1, -one, one - (1 << 34), format.min_code]
+    else:
+        codes, ends = u, [0, 1, 2, format.max_code - 1, 1 << bits, (1 << bits) + 1]
+    codes = rng.permutation(np.r_[ends, format.max_code, codes])
+    return np.clip(codes, format.min_code, format.max_code)
+
+
+def beats_of(parameters, codes, table, seed=0):
+    """Input beats, a tenth of them dark, and the model's terms."""
+    dark = np.random.default_rng(seed).random(len(codes)) < 0.1
+    expected = parameters.compute(Fixed(parameters.operand_format, codes), dark, table).codes
+    return {"operand": codes, "dark": dark.astype(np.uint8)}, expected
+
+
+def writes_of(*writes):
+    """Writes of several tables, one after the other."""
+    return {name: np.concatenate([of_table[name] for of_table in writes]) for name in ("value", "begins")}
+
+
+def check(unit, beats, expected, **options):
+    run = simulate(unit, beats, count=len(expected), engine="auto", **options)
+    np.testing.assert_array_equal(run.beats, expected)
+
+
+@pytest.mark.parametrize("interval", [1, 3])
+@pytest.mark.parametrize("fixed", [False, True])
+def test_banks(fixed, interval):
+    """Each bank has its own table, whatever order they are written in, and one may be written again."""
+    parameters = replace(LOBE, banks=5)
+    tables = [replace(parameters, model=model).table(parameter) for model, parameter in CASES[:5]]
+    unit = LobeUnit(parameters, interval, tables=tables if fixed else None)
+    write = None
+    if not fixed:
+        order = [3, 0, 4, 2, 1]
+        write = writes_of(tables[0].writes(2), *(tables[bank].writes(bank) for bank in order))
+    for bank, table in enumerate(tables):
+        beats, expected = beats_of(parameters, operands(parameters, bank), table, bank)
+        check(unit, beats, expected, write=write, constants={"bank": bank})
+
+
+def test_writes_that_are_lost():
+    """Values past a table's end or of no bank change nothing; a table not completed keeps the rest."""
+    parameters = replace(LOBE, banks=3)
+    old, new, other = (parameters.table(exponent) for exponent in (7, 100, 1000))
+    beyond = {"value": np.arange(1000) * 131 % 2**17, "begins": np.zeros(1000, dtype=np.int64)}
+    no_bank = other.writes()
+    for bank in (3, 4, 7, 64, 2**16, 2**17 - 1):
+        no_bank["value"][0] = bank
+        part = {name: column[:50] for name, column in new.writes(1).items()}
+        write = writes_of(beyond, *(old.writes(k) for k in range(3)), beyond, no_bank, part, no_bank)
+        half = replace(
+            old, values=Fixed(old.values.format, np.r_[new.values.codes[:49], old.values.codes[49:]])
+        )
+        unit = LobeUnit(parameters)
+        for k in range(3):
+            beats, expected = beats_of(parameters, operands(parameters, k), half if k == 1 else old)
+            if k == 1:
+                # The last word written leads to the new table's value; that of the old one is behind it.
+                entry, _ = parameters.address(Fixed(LOBE.argument_format, beats["operand"] & (2**25 - 1)))
+                keep = entry != 48
+                beats = {name: column[keep] for name, column in beats.items()}
+                expected = expected[keep]
+            check(unit, beats, expected, write=write, constants={"bank": k})
+
+
+def test_writes_go_on_while_the_unit_stands_still():
+    """Beats wait inside while the other bank is written: their terms are of their own bank."""
+    parameters = replace(LOBE, banks=2)
+    first, second = parameters.table(20), replace(parameters, model=GGX).table(0.2)
+    unit = LobeUnit(parameters)
+    codes = operands(parameters, 1)[:40]
+    writes = second.writes(1)
+    found = []
+
+    async def write(context, table, bank):
+        context.set(unit.write.valid, 1)
+        beats = table.writes(bank)
+        for value, begins in zip(beats["value"].tolist(), beats["begins"].tolist(), strict=True):
+            context.set(unit.write.payload, {"value": value, "begins": begins})
+            assert context.get(unit.write.ready)
+            await context.tick()
+        context.set(unit.write.valid, 0)
+
+    async def send(context, codes, ready):
+        """Beats, one a cycle while the unit takes them; the terms that come."""
+        sent = 0
+        for step in range(4 * len(codes)):
+            context.set(unit.i.valid, sent < len(codes))
+            context.set(Value.cast(unit.i.payload.operand), int(codes[min(sent, len(codes) - 1)]))
+            context.set(unit.o.ready, ready)
+            if context.get(unit.o.valid) and ready:
+                found.append(context.get(Value.cast(unit.o.payload)))
+            sent += context.get(unit.i.valid & unit.i.ready)
+            await context.tick()
+            if not ready and step > 12:
+                break
+        context.set(unit.i.valid, 0)
+        return sent
+
+    async def bench(context):
+        context.set(unit.constants.bank, 0)
+        await write(context, first, 0)
+        sent = await send(context, codes, 0)
+        assert 0 < sent < 12
+        assert context.get(unit.o.valid)
+        await write(context, second, 1)
+        await send(context, codes[sent:], 1)
+        assert len(found) == len(codes)
+        context.set(unit.constants.bank, 1)
+        await send(context, codes, 1)
+
+    simulator = Simulator(unit)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert len(writes["value"]) == 338
+    lit = np.zeros(len(codes), dtype=bool)
+    expected = [
+        parameters.compute(Fixed(LOBE.operand_format, codes), lit, table).codes for table in (first, second)
+    ]
+    np.testing.assert_array_equal(found, np.concatenate(expected))
+
+
+class TwoLights(wiring.Component):
+    """Two units at one memory; the second's terms wait in a FIFO: it need not stand still with the first."""
+
+    def __init__(self, parameters, tables, intervals):
+        self.memory = LobeMemory(parameters, tables, 2)
+        self.units = [LobeUnit(parameters, interval, shares_memory=True) for interval in intervals]
+        operands = {name: highlight_shape(parameters) for name in ("first", "second")}
+        terms = dict.fromkeys(operands, FixedShape(parameters.RESULT_FORMAT))
+        members = {
+            "i": In(stream.Signature(data.StructLayout(operands))),
+            "o": Out(stream.Signature(data.StructLayout(terms))),
+        }
+        if tables is None:
+            members["write"] = In(stream.Signature(lobe_write_shape()))
+        super().__init__(members)
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.memory = memory = self.memory
+        if memory.tables is None:
+            wiring.connect(m, wiring.flipped(self.write), memory.write)
+        m.submodules.first, m.submodules.second = first, second = self.units
+        for read, unit in zip(memory.reads, self.units, strict=True):
+            wiring.connect(m, unit.table, read)
+        waiting = second.o.signature.create(path=("waiting",))
+        connect_fifo(m, "fifo", second.o, waiting, 20)
+        gives = Signal()
+        m.d.comb += [
+            self.i.ready.eq(first.i.ready & second.i.ready),
+            first.i.valid.eq(self.i.valid & second.i.ready),
+            second.i.valid.eq(self.i.valid & first.i.ready),
+            Value.cast(first.i.payload).eq(Value.cast(self.i.payload.first)),
+            Value.cast(second.i.payload).eq(Value.cast(self.i.payload.second)),
+            self.o.valid.eq(first.o.valid & waiting.valid),
+            gives.eq(self.o.valid & self.o.ready),
+            first.o.ready.eq(gives),
+            waiting.ready.eq(gives),
+            Value.cast(self.o.payload.first).eq(Value.cast(first.o.payload)),
+            Value.cast(self.o.payload.second).eq(Value.cast(waiting.payload)),
+        ]
+        return m
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+@pytest.mark.parametrize("intervals", [(1, 1), (3, 1)])
+def test_two_units_share_a_memory(intervals, fixed):
+    table = replace(LOBE, model=GGX).table(0.4)
+    tables = [table] if fixed else None
+    both = TwoLights(LOBE, tables, intervals)
+    rng = np.random.default_rng(8)
+    beats, expected = {}, {}
+    for name, seed in (("first", 1), ("second", 2)):
+        beats[name], expected[name] = beats_of(LOBE, operands(LOBE, seed), table, seed)
+    count = len(expected["first"])
+    for share in (0.0, 0.5, 0.9):
+        stalls = {"output_stalls": rng.random(1009) < share, "input_stalls": rng.random(997) < 0.2}
+        write = None if fixed else table.writes()
+        run = simulate(both, beats, count=count, engine="auto", write=write, **stalls)
+        for name, terms in expected.items():
+            np.testing.assert_array_equal(run.beats[name], terms)
+    unit = LobeUnit(LOBE, shares_memory=True)
+    assert unit.latency == 7
+    assert cost_of(unit).totals["memory_bits"] == 0
+    assert cost_of(both.memory).totals["memory_bits"] == 336 * 35
+
+
+@pytest.mark.parametrize("operand", OPERANDS)
+def test_dark_beats_do_not_toggle(operand):
+    """Of beats that are dark or behind, only the input's and the first registers change."""
+    parameters = Lobe(operand=operand)
+    unit = LobeUnit(parameters, tables=[parameters.table(20)])
+    fragment = Fragment.get(unit, None)
+    ((path, _, _),) = [part for part in fragment.subfragments if part[1] == "datapath"]
+    registers = {
+        signal.name: signal for statement in path.statements["sync"] for signal in statement._lhs_signals()
+    }
+    assert {"argument", "zeros", "memory_0_0", "memory_0_1", "memory_0_fraction", "product", "term"} < set(
+        registers
+    )
+    # The first register is of the operand.
+    del registers["one_minus_cosine"]
+    seen = []
+    rng = np.random.default_rng(3)
+    codes = operands(parameters, 4)
+    behind = codes[codes <= 0] if operand == "cosine" else codes[codes >= 1 << 25]
+    lit = codes[codes > 0] if operand == "cosine" else codes[codes < 1 << 25]
+
+    async def bench(context):
+        context.set(unit.o.ready, 1)
+        context.set(unit.i.valid, 1)
+        for clock in range(140):
+            dark = int(clock < 120 and rng.random() < 0.5)
+            code = rng.choice(codes if dark else behind if clock < 120 else lit)
+            context.set(Value.cast(unit.i.payload.operand), int(code))
+            context.set(unit.i.payload.dark, dark)
+            await context.tick()
+            if clock > 20:
+                seen.append({name: context.get(Value.cast(s)) for name, s in registers.items()})
+
+    simulator = Simulator(fragment)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    assert len(behind) > 3
+    *dark, _ = seen[:100]
+    assert all(now == dark[0] for now in dark)
+    # All of them move once there is light.
+    assert all(any(now[name] != dark[0][name] for now in seen[99:]) for name in registers)
+
+
+@pytest.mark.parametrize("interval", [1, 4])
+def test_cost(interval):
+    """One multiplier, the memory, and fewer registers than a cosine-quadratic unit and a table of slopes."""
+    for banks in (1, 3):
+        parameters = replace(LOBE, banks=banks)
+        written = cost_of(LobeUnit(parameters, interval))
+        fixed = cost_of(LobeUnit(parameters, interval, tables=[parameters.table(20)] * banks))
+        assert written.multipliers == fixed.multipliers == {(18, 18): 1}
+        assert written.constant_multipliers == fixed.constant_multipliers == 0
+        assert (written.ram_bits, written.rom_bits) == (banks * 336 * 35, 0)
+        assert (fixed.ram_bits, fixed.rom_bits) == (0, banks * 336 * 35)
+
+
+def test_bad_options_are_refused():
+    table = LOBE.table(20)
+    with pytest.raises(ValueError, match=r"^there must be a table for each of 2 banks, not 1$"):
+        LobeUnit(replace(LOBE, banks=2), tables=[table])
+    with pytest.raises(ValueError, match=r"^there must be a table for each of 1 banks, not 0$"):
+        LobeMemory(LOBE, [])
+    with pytest.raises(ValueError, match=r"^the table has 20 octaves of 16 steps, the unit 12 of 16$"):
+        LobeUnit(replace(LOBE, octaves=12), tables=[table])
+    with pytest.raises(ValueError, match=r"^a unit that shares a memory has no tables of its own$"):
+        LobeUnit(LOBE, tables=[table], shares_memory=True)
+    with pytest.raises(ValueError, match=r"^interval must be at least 1, not 0$"):
+        LobeUnit(LOBE, 0)

@@ -1,0 +1,139 @@
+# amaranth: UnusedElaboratable=no
+"""Pipelines with a table: RTL against the bit-accurate model, tables loaded again, the gate, cost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blysk.golden.frame_constants import writes_of
+from blysk.golden.frames.prepare import with_tables
+from blysk.golden.lighting.highlight_gate import HighlightGate
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import quantise
+from blysk.golden.presets import preset
+from blysk.golden.reference.lighting import Material
+from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.frames.frame import _sample, beats_of
+from blysk.sim.units.lighting.highlight_gate import spans_about
+from blysk.sim.units.operands import component_words, sphere
+
+DESIGNS = {
+    "chord": preset("chord", "blinn_table"),
+    "materials, lights, gate": preset("chord", "ggx", materials=3, lights=2, gate=True),
+    "two banks of three materials": preset("chord", "beckmann", materials=3, banks=2),
+    "compact, gate": preset("quadratic", "beckmann", materials=3, style="compact", gate=True, cutoff=1 / 510),
+    "fixed, gate, compact": preset("chord", "blinn_table", 2, exponent=20, gate=True, style="compact"),
+    "fixed roughness": preset("linear", "ggx", roughness=0.3),
+    "values": preset("chord-local", "ggx"),
+    "other size": preset("chord", "ggx", octaves=12, steps=32),
+}
+
+
+def colors(beats):
+    return np.stack([beats[channel] for channel in "rgb"], axis=-1)
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_equals_model(design):
+    design = DESIGNS[design]
+    unit = ShadingPipelineUnit(design)
+    spans, constants = _sample(design)
+    pixels = design.compute(spans, constants)
+    rng = np.random.default_rng(7)
+    stalls = {"input_stalls": rng.random(997) < 0.4, "output_stalls": rng.random(1009) < 0.4}
+    for options in ({}, stalls):
+        run = simulate(
+            unit,
+            beats_of(unit, spans),
+            count=len(pixels.x),
+            write=writes_of(constants),
+            engine="auto",
+            **options,
+        )
+        np.testing.assert_array_equal(colors(run.beats), pixels.color)
+        np.testing.assert_array_equal(run.beats["x"], pixels.x)
+
+
+def test_a_frame_loads_its_own_tables():
+    """Tables of the frame before, in every bank, are gone."""
+    design = preset("chord", "ggx", materials=3, gate=True)
+    unit = ShadingPipelineUnit(design)
+    spans, constants = _sample(design)
+    material = Material((0.1,) * 3, (0.5,) * 3, (0.6,) * 3, 10)
+
+    def of(*roughness):
+        return with_tables(constants, [replace(material, roughness=r) for r in roughness], design)
+
+    first, second = of(0.2, 0.5, 0.8), of(0.6, 0.15, 0.6)
+    writes = [writes_of(frame) for frame in (first, second)]
+    write = {name: np.concatenate([beats[name] for beats in writes]) for name in writes[0]}
+    pixels, before = design.compute(spans, second), design.compute(spans, first)
+    assert (pixels.color != before.color).any()
+    run = simulate(unit, beats_of(unit, spans), count=len(pixels.x), write=write, engine="auto")
+    np.testing.assert_array_equal(colors(run.beats), pixels.color)
+
+
+def test_gate_by_threshold():
+    """As the model decides, for any T; there is no PROM."""
+    p = HighlightGate()
+    unit = HighlightGateUnit(p, takes_threshold=True)
+    assert cost_of(unit).rom_bits == 0
+    assert unit.latency == HighlightGateUnit(p).latency
+    rng = np.random.default_rng(3)
+    decided = set()
+    for threshold in (0, 1, 40_000, 110_000, 131_000, 2**17 - 1):
+        halfway = np.repeat(sphere(rng, 1), 500, axis=0)
+        cosine = np.full(500, (threshold * 2.0**-17) ** 0.5)
+        left, right = map(quantise, spans_about(rng, halfway, cosine, rng.uniform(0, 40, 500), 0.01))
+        vector = quantise(halfway[:1])
+        expected = p.compute_by(*component_words(left, right, vector[0]), Fixed(p.level_format, threshold))
+        run = simulate(
+            unit,
+            {"normal_left": left, "normal_right": right},
+            count=500,
+            constants={"halfway": vector, "threshold": threshold},
+        )
+        np.testing.assert_array_equal(run.beats, expected)
+        decided |= set(expected.tolist())
+    assert decided == {True, False}
+    with pytest.raises(ValueError, match=r"^a gate with an exponent of its own takes no threshold$"):
+        HighlightGateUnit(p, exponent=20, takes_threshold=True)
+
+
+def test_one_multiplier_a_light():
+    """One fewer than cosine-quadratic light has, which multiplies by its slope; 17 fewer than by products."""
+    for lights in (1, 2):
+        multipliers = {
+            model: cost_of(ShadingPipelineUnit(preset("chord", model, lights))).totals["multipliers"]
+            for model in (None, "blinn_table", "cosquad", "blinn")
+        }
+        plain = multipliers["blinn_table"] - lights
+        assert multipliers == {
+            None: multipliers[None],
+            "blinn_table": plain + lights,
+            "cosquad": plain + 2 * lights,
+            "blinn": plain + 18 * lights,
+        }
+        if lights == 1:
+            assert multipliers["blinn_table"] == 14
+
+
+def test_latency_and_rate_are_those_of_cosquad():
+    units = [ShadingPipelineUnit(preset("chord", model)) for model in ("blinn_table", "cosquad")]
+    assert len({(unit.latency, unit.cycles_per_pixel, unit.setup_interval) for unit in units}) == 1
+    assert units[0].cycles_per_pixel == 1
+
+
+def test_one_memory_for_all_lights():
+    """One of 336 words of 35 bits a bank, in one place, whatever the lights."""
+    for lights, materials in ((1, 1), (3, 1), (2, 4)):
+        with_table, without = (
+            cost_of(ShadingPipelineUnit(preset("chord", model, lights, materials=materials)))
+            for model in ("blinn_table", None)
+        )
+        assert with_table.ram_bits - without.ram_bits >= materials * 336 * 35
+        assert with_table.rom_bits == without.rom_bits

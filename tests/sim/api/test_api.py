@@ -1,0 +1,204 @@
+"""The Python interface: scenes, designs, frames and Verilog by the words of the command line."""
+
+import base64
+import importlib.util
+import io
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import blysk
+from blysk.golden.frames.compare import compare
+from blysk.golden.frames.frame import model_frame
+from blysk.golden.pipeline import Build
+from blysk.golden.presets import preset
+from blysk.sim.api.options import DESIGN, RENDERING, SCENE, DesignOptions, RenderOptions, SceneOptions
+from blysk.sim.cli.main import main
+from blysk.sim.errors import OptionError
+from blysk.sim.meshes.mesh import load_mesh
+
+TINY = {"triangles": 100, "size": (16, 12)}
+
+
+@pytest.fixture(scope="module")
+def frame():
+    return blysk.render("teapot", method="chord", exponent=200, triangles=500, size=(64, 48))
+
+
+def test_import_is_quick():
+    code = "import sys, blysk; print(*sys.modules.keys() & {'numpy', 'amaranth', 'scipy', 'click'})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "\n"
+    assert set(dir(blysk)) == set(blysk.__all__)
+    assert all(getattr(blysk, name).__doc__ for name in blysk.__all__)
+    with pytest.raises(AttributeError, match="module 'blysk' has no attribute 'paint'"):
+        _ = blysk.paint
+
+
+def test_every_option_has_a_type_for_checkers():
+    assert SceneOptions.__annotations__.keys() == SCENE.keys()
+    assert DesignOptions.__annotations__.keys() == DESIGN.keys()
+    assert RenderOptions.__annotations__.keys() == SCENE.keys() | DESIGN.keys() | RENDERING.keys()
+    keys = [option.key for table in (SCENE, DESIGN, RENDERING) for option in table.values()]
+    assert all(keys)
+    assert len(set(keys)) == len(keys)
+
+
+def test_frame_is_that_of_the_model(frame):
+    expected = model_frame(frame.scene, frame.design)
+    np.testing.assert_array_equal(frame.image, expected.image)
+    assert frame.design == preset("chord")
+    assert frame.error == compare(frame.scene, frame.design, expected).method_error
+    assert (frame.spans, frame.pixels) == (expected.spans, expected.pixels)
+    assert frame.cycles == frame.figures["cycles"] > frame.pixels
+    assert frame.scene.materials[0].exponent == frame.figures["exponent"] == 200
+    assert (frame.engine, frame.figures["mesh"]) == ("cxxrtl", "teapot")
+
+
+def test_frame_in_a_notebook(frame):
+    for png in (frame._repr_png_(), base64.b64decode(re.search(r"base64,([^\"]+)", frame._repr_html_())[1])):
+        np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(png))), frame.image)
+    assert f"{frame.cycles:,}" in frame._repr_html_()
+    assert f"{frame.error.max_lsb:.3f} LSB" in frame._repr_html_()
+    assert repr(frame) == f"<RenderedFrame teapot 64x48, chord, cosquad, {frame.cycles:,} cycles>"
+
+
+def test_command_line_prints_and_writes_the_same(frame, tmp_path, capsys):
+    options = ["--method", "chord", "--exponent", "200", "--triangles", "500", "--size", "64x48"]
+    assert main(["render", "teapot", *options, "-o", str(tmp_path / "a.png")]) == 0
+    frame.save(tmp_path / "b.png")
+    frame.save_comparison(tmp_path / "c.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    with Image.open(tmp_path / "c.png") as picture:
+        assert picture.width > 3 * 64
+    varying = ("simulated", "seconds", "frame")
+    printed = [line for line in capsys.readouterr().out.splitlines() if not line.startswith(varying)]
+    assert printed == [line for line in str(frame).splitlines() if not line.startswith(varying)]
+
+
+def test_design_and_verilog(capsys):
+    design = blysk.design(method="chord", lights=2, materials=3, gate=True, style="compact", setup_interval=7)
+    build = Build(style="compact", setup_interval=7)
+    assert design == preset("chord", lights=2, materials=3, gate=True, style="compact", setup_interval=7)
+    assert design.build == build
+    assert blysk.design() == preset() == blysk.Design()
+    assert main(["verilog", "--method", "linear", "--name", "core"]) == 0
+    assert blysk.verilog(blysk.design(method="linear"), name="core") == capsys.readouterr().out
+
+
+def test_scene_files_scenes_and_meshes(tmp_path):
+    """One picture from a scene file, its scene, and its mesh with the same options."""
+    path = tmp_path / "a.toml"
+    path.write_text(
+        "size = [16, 12]\nbackground = 1\n[mesh]\nfile = 'teapot'\ntriangles = 100\n"
+        "[camera]\nposition = [9, 5, 9]\n[material]\nexponent = 9\n[pipeline]\nmethod = 'linear'\n"
+    )
+    of_file = blysk.render(path)
+    scene = blysk.scene(path)
+    assert (scene.width, scene.materials[0].exponent, scene.background) == (16, 9, (1, 1, 1))
+    mesh = load_mesh("teapot", triangles=100).mesh
+    options = {"size": np.array([16, 12]), "background": "#ffffff", "position": (9, 5, 9), "exponent": 9}
+    linear = blysk.design(method="linear")
+    assert of_file.design == linear
+    for other in (
+        blysk.render(scene, design=linear),
+        blysk.render(mesh, method="linear", **options),
+        blysk.render(blysk.scene(mesh, **options), design=linear, engine="pysim"),
+    ):
+        np.testing.assert_array_equal(other.image, of_file.image)
+        assert other.cycles == of_file.cycles
+    # A view takes the place of the file's position, and None is none.
+    plain = {"background": 1, "exponent": 9, "view": (1, 1, 0)}
+    seen = blysk.scene(path, view=(1, 1, 0), position=None)
+    assert seen.camera == blysk.scene(mesh, size=(16, 12), **plain).camera != scene.camera
+
+
+@pytest.mark.long
+def test_specialised_pipeline():
+    frame = blysk.render("teapot", method="linear", specular=0, specialise=True, engine="pysim", **TINY)
+    saved = frame.figures["specialisation"]
+    assert saved["different_pixels"] == 0
+    assert saved["specialised"]["cells"] < saved["full"]["cells"]
+    assert frame.design.specular is not None
+    assert "left out    no specular path" in str(frame)
+
+
+def test_waveforms(tmp_path):
+    frame = blysk.render("teapot", method="linear", vcd=tmp_path / "a.vcd", **TINY)
+    assert frame.engine == "pysim"
+    assert "$enddefinitions" in (tmp_path / "a.vcd").read_text()
+
+
+def test_without_a_compiler(monkeypatch):
+    """pysim, with a warning and a smaller picture; a scene that is given keeps its size."""
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("CXX", raising=False)
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *rest: None if name == "ziglang" else find(name, *rest)
+    )
+    monkeypatch.setattr("blysk.sim.api.render.SLOW_SIZE", (8, 8))
+    with pytest.warns(RuntimeWarning, match=r"^pysim at 8x6 instead of cxxrtl, no working C\+\+ compiler"):
+        frame = blysk.render("teapot", method="linear", **TINY)
+    assert (frame.engine, frame.image.shape) == ("pysim", (6, 8, 3))
+    with pytest.warns(RuntimeWarning, match=r"^pysim instead of cxxrtl"):
+        assert blysk.render(blysk.scene(**TINY), method="linear").image.shape == (12, 16, 3)
+    with pytest.raises(blysk.CompilerMissing):
+        blysk.render("teapot", method="linear", engine="cxxrtl", **TINY)
+
+
+SCENE_OF_ITS_OWN = blysk.scene(**TINY)
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "line"),
+    [
+        ("teapot", {"exponent": 0}, "exponent 0: out of range; give a whole number from 1 to 1000"),
+        ("teapot", {"method": "x"}, "method 'x': unknown; use one of linear, "),
+        ("teapot", {"size": 5}, "size 5: not a size; "),
+        ("teapot", {"background": "red"}, "background 'red': not a colour; "),
+        ("teapot", {"gate": 1}, "gate 1: neither true nor false; "),
+        ("teapot", {"up": (0, 0, 0)}, "up [0, 0, 0]: no direction; "),
+        ("teapot", {"lights": [{"position": 3}]}, "lights: [1].position, 3 is not three numbers; "),
+        ("teapot", {"lights": [{}]}, "lights: [1].direction, is missing; "),
+        (
+            "teapot",
+            {"position": (1, 2, 3), "view": (1, 2, 3)},
+            "view 1,2,3: the camera has a position, too; ",
+        ),
+        ("teapot", {"target": (1, 2, 3)}, "target 1,2,3: the camera has no position; "),
+        ("teapot", {"model": "phong"}, "model phong: the pipeline finds N.H, not R.V; use one of cosquad, "),
+        ("teapot", {"method": "chord", "operand": "cosine"}, "operand cosine: method chord finds no normals"),
+        ("teapot", {"viewer": "near"}, "method quadratic: point lights and a near viewer need "),
+        ("teapot", {"short_words": True}, "short_words: nothing is specialised; "),
+        ("teapot", {"vcd": "a", "engine": "cxxrtl"}, "vcd: the engine cxxrtl writes no waveforms; "),
+        ("no.toml", {}, "no.toml: there is no such file; "),
+        ("no.obj", {"triangles": 100}, "triangles 100: only the teapot is tessellated; "),
+        (SCENE_OF_ITS_OWN, {"exponent": 3}, "exponent 3: the scene has its own; "),
+        (SCENE_OF_ITS_OWN, {"design": preset(), "method": "chord"}, "method: the design has its own; "),
+        (SCENE_OF_ITS_OWN, {"design": preset(materials=2)}, "design: the "),
+    ],
+    ids=str,
+)
+def test_bad_input_is_one_line(source, options, line):
+    with pytest.raises(blysk.InputError) as error:
+        blysk.render(source, **options)
+    assert str(error.value).startswith(line)
+    assert "\n" not in str(error.value)
+
+
+def test_other_refusals(tmp_path):
+    with pytest.raises(OptionError, match=r"^lights 17: out of range"):
+        blysk.design(lights=17)
+    with pytest.raises(OptionError, match=r"^name 1up: no Verilog name"):
+        blysk.verilog(name="1up")
+    with pytest.raises(TypeError, match="there is no option 'shine'; use one of method, "):
+        blysk.design(shine=3)
+    path = tmp_path / "a.toml"
+    path.write_text("[mesh]\nfile = 'teapot'\n[camera]\nview = [1, 0, 0]\nposition = [1, 0, 0]\n")
+    with pytest.raises(blysk.InputError, match=re.escape(f"{path}, camera.view: the camera has a position")):
+        blysk.scene(path)

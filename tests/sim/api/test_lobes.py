@@ -1,0 +1,79 @@
+"""Lobes through the Python interface: roughness, curves of files, banks of materials, bad input."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import blysk
+from blysk.golden.reference.lobes import GGX
+from blysk.sim.api.design import design_of, verilog
+from blysk.sim.api.options import DESIGN, SCENE
+from blysk.sim.api.render import prepare_rendering, rendering_settings
+from blysk.sim.api.settings import read_settings
+from blysk.sim.errors import InputError
+
+SMALL = {"size": (48, 36), "triangles": 300}
+
+
+def many(count):
+    """A scene of as many materials, each with a roughness of its own."""
+    scene = blysk.scene("teapot", **SMALL)
+    (material,) = scene.materials
+    mesh = replace(scene.mesh, material=np.arange(len(scene.mesh.faces)) % count)
+    materials = [replace(material, roughness=0.2 + 0.8 * k / count) for k in range(count)]
+    return replace(scene, mesh=mesh, material=materials)
+
+
+def test_render_by_roughness():
+    frame = blysk.render("teapot", model="ggx", method="chord", roughness=0.3, engine="pysim", **SMALL)
+    assert frame.design.specular.model is GGX
+    assert frame.scene.materials[0].roughness == 0.3
+    assert frame.error.max_lsb < 0.8
+
+
+def test_curve_of_a_file(tmp_path):
+    path = tmp_path / "satin.csv"
+    path.write_text("0,0\n0.9,0.1\n1,1\n")
+    settings = read_settings("teapot", {"model": str(path), **SMALL}, {**SCENE, **DESIGN})
+    assert design_of(settings, 1).model == "satin"
+
+
+def test_each_lobe_has_a_bank():
+    scene = many(3)
+    settings = rendering_settings(scene, {"model": "ggx", "gate": True})
+    made = prepare_rendering(settings, engine="pysim")
+    assert (made.design.materials, made.design.specular.banks) == (3, 3)
+
+
+def test_too_many_lobes_are_refused():
+    settings = rendering_settings(many(65), {"model": "ggx"})
+    with pytest.raises(InputError) as caught:
+        prepare_rendering(settings, engine="pysim")
+    message = str(caught.value)
+    assert "the materials have 65 lobes, the pipeline has banks for 64" in message
+    assert "give materials an equal roughness" in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"roughness": 0}, "out of range; give a number greater than 0 and at most 1"),
+        ({"roughness": 1.1}, "out of range; give a number greater than 0 and at most 1"),
+        ({"roughness": float("nan")}, "out of range; give a number greater than 0 and at most 1"),
+        ({"model": "none.csv"}, "cannot be opened (No such file or directory); give a .csv file of cosines"),
+        ({"model": "velvet"}, "unknown"),
+    ],
+)
+def test_bad_input(options, message):
+    with pytest.raises(InputError) as caught:
+        read_settings("teapot", options, {**SCENE, **DESIGN})
+    assert message in str(caught.value)
+
+
+def test_verilog_tells_the_addresses_of_tables():
+    text = verilog(blysk.design(model="ggx", method="chord", gate=True))
+    assert "the next value of a table, UQ(0, 17); with bit 17 the bank whose table begins" in text
+    assert "threshold of the highlight gate, UQ(0, 17)" in text
+    assert "the next value of a table" not in verilog(blysk.design(method="chord", gate=True))

@@ -1,0 +1,27 @@
+"""What tests of the command line share."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+PROGRAM = [sys.executable, "-c", "import sys; from blysk.sim.cli.main import main; sys.exit(main())"]
+
+SMALL = ["teapot", "--triangles", "500", "--size", "64x48"]
+
+TINY = ["teapot", "--triangles", "100", "--size", "16x12"]
+
+ERROR_NAMES = ["max_lsb", "p999_lsb", "rmse_lsb", "psnr_db"]
+
+
+def picture(path):
+    with Image.open(path) as image:
+        return np.asarray(image)
+
+
+def files():
+    return {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()}
+
+
+CORNERS = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"

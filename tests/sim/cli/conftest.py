@@ -1,0 +1,35 @@
+"""A folder for each test of the command line, and bad input in one line."""
+
+import re
+
+import pytest
+
+from blysk.sim.cli.main import main
+
+from .commandline import files
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Each test runs in a folder of its own, with the compilers of the machine."""
+    monkeypatch.delenv("CXX", raising=False)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def refused(capsys):
+    """Run with bad input: one line of thing, reason and remedy, status 2, and no file touched."""
+
+    def refused(*arguments, thing, says=""):
+        before = files()
+        assert main([str(argument) for argument in arguments]) == 2
+        output, line = capsys.readouterr()
+        assert output == ""
+        assert re.fullmatch(r"blysk: [^\n]+: [^\n]+; [^\n]+\n", line), line
+        assert line.startswith(f"blysk: {thing}: ")
+        assert says in line
+        assert files() == before
+        return line
+
+    return refused

@@ -1,0 +1,203 @@
+"""Bad meshes, options, designs and output files: one line each, and no file touched."""
+
+import importlib.util
+import os
+import re
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from blysk.golden.presets import METHODS, PUBLISHED
+from blysk.sim.cli.main import main
+
+from ..meshes.files import draco_gltf, glb
+from .commandline import CORNERS, TINY, files
+
+pytestmark = pytest.mark.usefixtures("folder")
+
+
+def box(file_type):
+    return trimesh.creation.box().export(file_type=file_type)
+
+
+BAD_MESHES = {
+    "unknown.dae": (b"x", "unknown mesh type '.dae'"),
+    "empty.obj": (b"", "the file is empty"),
+    "empty.glb": (b"", "the file is empty"),
+    "truncated.ply": (box("ply")[:-20], "cut short"),
+    "truncated.glb": (box("glb")[:-20], "cut short"),
+    "index.obj": (CORNERS + b"f 1 2 4\n", "out of bounds"),
+    "lines.obj": (CORNERS + b"l 1 2\n", "it has no faces"),
+    "faceless.obj": (CORNERS, "it has no faces"),
+    "nan.obj": (CORNERS + b"v nan 0 0\nf 1 2 4\n", "NaN or infinite"),
+    "infinite.obj": (CORNERS + b"v 0 inf 0\nf 1 2 4\n", "NaN or infinite"),
+    "point.obj": (b"v 1 2 3\n" * 3 + b"f 1 2 3\n", "all its vertices are at one point"),
+    "flat.obj": (b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "none of its faces has an area"),
+    "draco.glb": (glb(*draco_gltf()), "the decoder DracoPy is not installed; pip install 'blysk[draco]'"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_MESHES)
+def test_bad_mesh(refused, monkeypatch, name):
+    data, reason = BAD_MESHES[name]
+    find_spec = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "DracoPy" else find_spec(name)
+    )
+    Path(name).write_bytes(data)
+    refused("render", name, "--size", "8x6", "-o", "out.png", "--json", "out.json", thing=name, says=reason)
+
+
+def test_no_mesh(refused):
+    refused("render", "nowhere.obj", thing="nowhere.obj", says="there is no such file")
+    Path("folder.obj").mkdir()
+    refused("render", "folder.obj", thing="folder.obj", says="is a folder")
+    refused("render", "", thing="MESH ''", says="is no file's name")
+    refused("render", "/", thing="MESH '/'")
+
+
+KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS | PUBLISHED)}"
+
+
+@pytest.mark.parametrize(
+    ("options", "thing", "says"),
+    [
+        (["--exponent", "0"], "--exponent 0", "from 1 to 1000"),
+        (["--exponent", "1001"], "--exponent 1001", "from 1 to 1000"),
+        (["--exponent", "-3"], "--exponent -3", "from 1 to 1000"),
+        (["--exponent", "2.5"], "--exponent 2.5", "not a whole number"),
+        (["--exponent", "x"], "--exponent x", "not a whole number"),
+        (["--exponent", ""], "--exponent ", "not a whole number"),
+        (["--size", "0x0"], "--size 0x0", "1 to 4095 each"),
+        (["--size", "5000x10"], "--size 5000x10", "1 to 4095 each"),
+        (["--size", "10x4096"], "--size 10x4096", "1 to 4095 each"),
+        (["--size", "abc"], "--size abc", "not a size"),
+        (["--size", "-1x5"], "--size -1x5", "not a size"),
+        (["--method", "slurp"], "--method slurp", KNOWN_METHODS),
+        (["--model", "shiny"], "--model shiny", "use one of phong, blinn, cosquad, cosquad7, "),
+        (["--engine", "steam"], "--engine steam", "use one of auto, cxxrtl, pysim"),
+        (["--projection", "flat"], "--projection flat", "orthographic"),
+        (["--back-faces", "hide"], "--back-faces hide", "flip, show, cull"),
+        (["--triangles", "63"], "--triangles 63", "from 64 to 4000000"),
+        (["--crease", "181"], "--crease 181", "0 to 180"),
+        (["--crease", "sharp"], "--crease sharp", "not a number"),
+        (["--view", "0,0,0"], "--view 0,0,0", "no direction"),
+        (["--view", "1,2"], "--view 1,2", "not a direction; give X,Y,Z"),
+        (["--view", "1,nan,2"], "--view 1,nan,2", "out of range"),
+        (["--light", "0,0,0"], "--light 0,0,0", "a direction other than 0"),
+        (["--light", "1,2,3,4"], "--light 1,2,3,4", "give X,Y,Z or X,Y,Z,R,G,B"),
+        (["--light", "1,1,1,-1,0,0"], "--light 1,1,1,-1,0,0", "colours of 0 or more"),
+        (["--light", "1,1,1,0,0,50"], "--light", "make the light darker"),
+        (["--light", "1,1,1"] * 17, "--light", "17 lights; give at most 16"),
+        (["--ambient", "1.5"], "--ambient 1.5", "from 0 to 1"),
+        (["--diffuse", "0,0,-0.1"], "--diffuse 0,0,-0.1", "from 0 to 1"),
+        (["--specular", "0.1,0.2"], "--specular 0.1,0.2", "not a colour; give #rrggbb"),
+        (["--background", "#12345"], "--background #12345", "not a colour"),
+        (["--vcd", "a.vcd", "--engine", "cxxrtl"], "--vcd", "use --engine pysim"),
+        (["--operand", "cross"], "--operand cross", "use one of cosine, one_minus_cosine"),
+        (["--setup-interval", "0"], "--setup-interval 0", "from 1 to 46"),
+        (["--frames", "0"], "--frames 0", "from 1 to 9999"),
+        (["--frames", "2", "--jobs", "0"], "--jobs 0", "from 1 to 1024"),
+        (["--jobs", "2"], "--jobs", "give --frames, too"),
+        (["--cluster", ""], "--cluster", "give --frames, too"),
+        (["--frames", "2", "--cluster", ""], "--cluster ", "as tcp://host:8786"),
+        (["--frames", "2", "--cluster", "a:1", "--jobs", "2"], "--jobs", "leave out --jobs or --cluster"),
+        (["--frames", "2", "--compare", "a.png"], "--compare a.png", "is for one frame"),
+        (["--frames", "2", "--vcd", "a.vcd"], "--vcd a.vcd", "is for one frame"),
+        (["--frames", "2", "-o", "a.jpg"], "a.jpg", "use .gif or .png"),
+        (["--frames", "2", "-o", "no/a.gif"], "no/a.gif", "there is no folder no"),
+        (["--frames", "2", "-o", "a.gif", "--json", "a-0002.png"], "a-0002.png", "another output"),
+        (["--frames", "2", "--view", "0,1,0"], "--view 0,1,0", "looks along the axis"),
+    ],
+)
+def test_bad_option(refused, options, thing, says):
+    refused("render", "teapot", *options, thing=thing, says=says)
+
+
+@pytest.mark.parametrize("command", [["render", "teapot"], ["verilog", "-o", "core.v"]])
+def test_design_that_cannot_be(refused, command):
+    says = "the pipeline finds N.H, not R.V; use one of cosquad, "
+    refused(*command, "--model", "phong", thing="--model phong", says=says)
+    says = "method chord finds no normals"
+    refused(*command, "--method", "chord", "--operand", "cosine", thing="--operand cosine", says=says)
+    says = "method linear is not built for it; "
+    refused(*command, "--method", "linear", "--setup-interval", "26", thing="--setup-interval 26", says=says)
+
+
+def test_triangles_of_a_file(refused):
+    Path("a.obj").write_bytes(CORNERS + b"f 1 2 3\n")
+    refused("render", "a.obj", "--triangles", "100", thing="--triangles 100", says="leave it out for a file")
+
+
+@pytest.mark.parametrize(
+    ("options", "thing", "says"),
+    [
+        (["--model", "shiny"], "--model shiny", "use one of phong"),
+        (["--method", "slurp"], "--method slurp", KNOWN_METHODS),
+        (["--lights", "0"], "--lights 0", "from 1 to 16"),
+        (["--lights", "17"], "--lights 17", "from 1 to 16"),
+        (["--name", "1up"], "--name 1up", "letters, digits and underscores"),
+        (["--name", "module", "--method", "linear"], "--name module", "choose another name"),
+        (["-o", "no/such/folder.v"], "no/such/folder.v", "there is no folder no/such"),
+    ],
+)
+def test_bad_option_of_verilog(refused, options, thing, says):
+    refused("verilog", *options, thing=thing, says=says)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ([], "Missing command"),
+        (["paint"], "No such command 'paint'"),
+        (["render"], "Missing argument 'MESH'"),
+        (["render", "teapot", "kettle"], "unexpected extra argument (kettle)"),
+        (["render", "teapot", "--shiny"], "No such option"),
+        (["render", "teapot", "--size"], "'--size' requires an argument"),
+        (["--shiny"], "No such option"),
+    ],
+)
+def test_wrong_command(capsys, arguments, says):
+    assert main(arguments) == 2
+    output, line = capsys.readouterr()
+    assert (output, files()) == ("", {})
+    assert re.fullmatch(r"blysk: [^\n]+; see blysk --help\n", line)
+    assert says in line
+
+
+@pytest.mark.parametrize("option", ["-o", "--compare", "--json", "--vcd"])
+def test_unwritable_output(refused, option):
+    suffix = {"--json": "json", "--vcd": "vcd"}.get(option, "png")
+    Path(f"folder.{suffix}").mkdir()
+    Path("file").write_text("x")
+    for name, says in (
+        (f"nowhere/a.{suffix}", "there is no folder nowhere; make the folder first"),
+        (f"folder.{suffix}", "it is a folder"),
+        (f"file/a.{suffix}", "file is no folder"),
+    ):
+        refused("render", *TINY, option, name, thing=name, says=says)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+def test_folder_without_permission(refused):
+    Path("locked").mkdir(mode=0o500)
+    refused("render", *TINY, "-o", "locked/a.png", thing="locked/a.png", says="permission denied")
+
+
+def test_wrong_suffix_of_picture(refused):
+    refused("render", *TINY, "-o", "a.obj", thing="a.obj", says="use .png")
+    refused("render", *TINY, "--compare", "a", thing="a", says="the name has no suffix")
+
+
+def test_two_outputs_with_one_name(refused):
+    says = "is the mesh or another output; choose another file"
+    refused("render", *TINY, "-o", "a.png", "--compare", "./a.png", thing="./a.png", says=says)
+    refused("render", *TINY, "--json", "a", "--vcd", "a", thing="a", says=says)
+    Path("link.png").symlink_to("a.png")
+    refused("render", *TINY, "-o", "a.png", "--compare", "link.png", thing="link.png", says=says)
+
+
+def test_output_over_the_mesh(refused):
+    Path("a.obj").write_bytes(CORNERS + b"f 1 2 3\n")
+    refused("render", "a.obj", "--json", "a.obj", thing="a.obj", says="is the mesh")

@@ -1,0 +1,257 @@
+"""Scene files and options say the same, and what both refuse."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from blysk.golden.presets import preset
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.scene import Scene
+from blysk.sim.cli.main import main
+from blysk.sim.frames.frame import FrameSimulator
+from blysk.sim.meshes.mesh import load_mesh
+
+from .commandline import picture
+
+pytestmark = pytest.mark.usefixtures("folder")
+
+
+SCENE = """
+size = [24, 18]
+background = 0.5
+back_faces = "show"
+[mesh]
+file = "a.obj"
+crease = 180
+[camera]
+projection = "orthographic"
+view = [0, 1, 3]
+[[lights]]
+direction = [1, 1, 1]
+[[lights]]
+direction = [-1, 1, 1]
+color = [0.5, 0.25, 0]
+[material]
+ambient = 0.1
+diffuse = [0.5, 0.25, 0.125]
+specular = 0.75
+exponent = 20
+[pipeline]
+method = "linear"
+model = "cosquad7"
+"""
+
+SLOW = ["--engine", "pysim"]
+SCENE_OPTIONS = [
+    *("--size", "24x18", "--background", "0.5", "--back-faces", "show", "--crease", "180"),
+    *("--projection", "orthographic", "--view", "0,1,3", "--light", "1,1,1"),
+    *("--light=-1,1,1,0.5,0.25,0", "--ambient", "0.1", "--diffuse", "0.5,0.25,0.125"),
+    *("--specular", "0.75", "--exponent", "20", "--method", "linear", "--model", "cosquad7"),
+]
+
+
+@pytest.fixture
+def scenes():
+    """A folder with a scene file and its mesh."""
+    Path("scenes").mkdir()
+    Path("scenes/a.obj").write_text(trimesh.creation.box().export(file_type="obj"))
+    Path("scenes/a.toml").write_text(SCENE)
+
+
+def figures_of(name):
+    figures = json.loads(Path(name).read_text())
+    del figures["seconds"], figures["simulated_pixels_per_second"]
+    return figures
+
+
+def test_scene_file_says_what_the_options_say(scenes, capsys):
+    assert main(["render", "scenes/a.toml", *SLOW, "--json", "file.json"]) == 0
+    assert (
+        main(["render", "scenes/a.obj", *SCENE_OPTIONS, *SLOW, "-o", "b.png", "--json", "options.json"]) == 0
+    )
+    assert capsys.readouterr().err == ""
+    assert Path("a-blysk.png").read_bytes() == Path("b.png").read_bytes()
+    assert figures_of("file.json") == figures_of("options.json")
+    figures = figures_of("file.json")
+    assert (figures["method"], figures["model"], figures["exponent"]) == ("linear", "cosquad7", 20)
+    assert (figures["lights"], figures["width"], figures["mesh"]) == (2, 24, "a")
+
+
+@pytest.mark.long
+def test_options_go_before_the_scene_file(scenes, capsys):
+    given = [
+        "--size",
+        "32x24",
+        "--exponent",
+        "70",
+        "--light",
+        "0,0,1",
+        "--method",
+        "quadratic",
+        "--model",
+        "cosquad",
+        "--view",
+        "1,2,3",
+    ]
+    assert main(["render", "scenes/a.toml", *given, "-o", "a.png", "--json", "a.json"]) == 0
+    options = [*SCENE_OPTIONS]
+    for name in ("--light", "--light=-1,1,1,0.5,0.25,0"):
+        place = options.index(name)
+        del options[place : place + 1 + ("=" not in name)]
+    assert main(["render", "scenes/a.obj", *options, *given, "-o", "b.png", "--json", "b.json"]) == 0
+    assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
+    assert figures_of("a.json") == figures_of("b.json")
+    assert (figures_of("a.json")["lights"], figures_of("a.json")["width"]) == (1, 32)
+    # A default that is written out is given, too.
+    assert main(["render", "scenes/a.toml", "--exponent", "50", "--json", "a.json"]) == 0
+    assert figures_of("a.json")["exponent"] == 50
+
+
+@pytest.mark.long
+def test_position_of_the_camera(capsys):
+    """A camera by its position, in any unit of the mesh, and the middle of the mesh as its target."""
+
+    def draw(unit, name, place):
+        mesh = trimesh.creation.box((2, 1, 1))
+        vertices = [" ".join(f"{value * unit:.17g}" for value in vertex) for vertex in mesh.vertices]
+        text = "".join(f"v {vertex}\n" for vertex in vertices)
+        text += "".join("f {} {} {}\n".format(*(face + 1)) for face in mesh.faces)
+        Path("a.obj").write_text(text)
+        head = "size = [64, 48]\nmesh.file = 'a.obj'\npipeline.method = 'linear'\n[camera]\n"
+        Path(f"{name}.toml").write_text(head + place.format(x=1 * unit, y=2 * unit, z=3 * unit, up=unit / 2))
+        assert main(["render", f"{name}.toml", "-o", f"{name}.png"]) == 0
+        assert capsys.readouterr().err == ""
+        return picture(f"{name}.png")
+
+    target = "position = [{x}, {y}, {z}]\ntarget = [0, {up}, 0]\n"
+    pictures = [draw(2.0**power, f"target{power}", target) for power in (-600, 0, 600)]
+    assert np.array_equal(pictures[0], pictures[1])
+    assert np.array_equal(pictures[2], pictures[1])
+    middle = draw(1.0, "middle", "position = [{x}, {y}, {z}]\n")
+
+    mesh = load_mesh("a.obj").mesh
+    for expected, place in ((pictures[1], (0, 0.5, 0)), (middle, (0, 0, 0))):
+        scene = Scene(
+            mesh=mesh,
+            camera=Camera((1, 2, 3), place, projection="perspective", near=0.001),
+            width=64,
+            height=48,
+            material=Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0.6, 0.6, 0.6), 50),
+            lights=[Light((-0.5, 0.8, 0.7))],
+            background=(int("1a", 16) / 255, int("1c", 16) / 255, int("20", 16) / 255),
+        )
+        assert np.array_equal(FrameSimulator(preset("linear")).render(scene).image, expected)
+    # --view takes the place of the file's position.
+    options = ["--size", "64x48", "--method", "linear", "--view", "1,2,3"]
+    assert main(["render", "middle.toml", "--view", "1,2,3", "-o", "again.png"]) == 0
+    assert main(["render", "a.obj", *options, "-o", "view.png"]) == 0
+    assert np.array_equal(picture("again.png"), picture("view.png"))
+
+
+def test_no_light(capsys):
+    """Ambient light only."""
+    Path("a.toml").write_text("lights = []\nsize = [16, 12]\nmesh.file = 'teapot'\nmaterial.ambient = 0.2\n")
+    assert main(["render", "a.toml"]) == 0
+    assert capsys.readouterr().err == ""
+    colors = np.unique(picture("a-blysk.png").reshape(-1, 3), axis=0)
+    assert colors.tolist() == [[0x1A, 0x1C, 0x20], [51, 51, 51]]
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "thing", "says"),
+    [
+        ("mesh.file = 'no.obj'", [], "a.toml, mesh.file", "no.obj, there is no such file"),
+        ("mesh.file = 'b.toml'", [], "a.toml, mesh.file", "unknown mesh type '.toml'"),
+        ("mesh.file = '.'", [], "a.toml, mesh.file", "is no file's name"),
+        ("mesh.file = 'empty.obj'", [], "a.toml, mesh.file", "empty.obj, the file is empty"),
+        ("mesh.file = 'empty.obj'", ["--triangles", "100"], "--triangles 100", "leave it out"),
+        ("mesh.file = 'teapot'\nexponent = 3", [], "a.toml, exponent", "unknown key"),
+        ("mesh.file = 'teapot'\nsize = ]", [], "a.toml", "is no TOML"),
+        ("pipeline = {method = 'chord', operand = 'cosine'}", [], "a.toml, pipeline.operand", "leave it out"),
+        (
+            "pipeline = {setup_interval = 26}",
+            ["--method", "linear"],
+            "a.toml, pipeline.setup_interval",
+            "linear",
+        ),
+        ("lights = [{direction = [1, 1, 1], color = 30}]", [], "a.toml, lights", "make the light darker"),
+        (
+            "camera.position = [0, 0, 0]\ncamera.target = [0, 0, 0]",
+            [],
+            "a.toml, camera.position",
+            "its target",
+        ),
+        ("camera.position = [1e300, 0, 0]", [], "a.toml, camera.position", "too far away"),
+        ("camera.view = [0, 1, 0]", ["--frames", "2"], "a.toml, camera.view", "looks along the axis"),
+        (
+            "camera.position = [0, 9, 0]\ncamera.target = [0, 0, 0]",
+            ["--frames", "2"],
+            "a.toml, camera.position",
+            "axis",
+        ),
+        ("", ["--json", "a.toml"], "a.toml", "another output"),
+    ],
+)
+def test_bad_scene(refused, text, options, thing, says):
+    Path("empty.obj").touch()
+    Path("b.toml").touch()
+    mesh = "" if "mesh." in text else "mesh.file = 'teapot'\n"
+    Path("a.toml").write_text(mesh + text)
+    refused("render", "a.toml", *options, thing=thing, says=says)
+
+
+def test_no_scene(refused):
+    refused("render", "no.toml", thing="no.toml", says="there is no such file")
+    Path("folder.toml").mkdir()
+    refused("render", "folder.toml", thing="folder.toml", says="is a folder")
+
+
+@pytest.mark.long
+def test_point_lights(folder, refused, capsys):
+    local = ["--method", "chord-local", "--point-light", "3,4,5,1,0.5,0.5", "--viewer", "near"]
+    assert main(["render", "teapot", *local, "--size", "48x36", "-o", "a.png", "--json", "a.json"]) == 0
+    assert json.loads(Path("a.json").read_text())["method_error"]["max_lsb"] < 1
+    Path("a.toml").write_text(
+        '[mesh]\nfile = "teapot"\n[[lights]]\nposition = [3, 4, 5]\ncolor = [1, 0.5, 0.5]\n'
+        '[camera]\nviewer = "near"\n[pipeline]\nmethod = "chord-local"\n'
+    )
+    assert main(["render", "a.toml", "--size", "48x36", "-o", "b.png"]) == 0
+    np.testing.assert_array_equal(picture("a.png"), picture("b.png"))
+    smallest = [
+        "--specialise",
+        "--engine",
+        "pysim",
+        "--triangles",
+        "64",
+        "--size",
+        "16x12",
+        "--json",
+        "c.json",
+    ]
+    assert main(["render", "teapot", *local, *smallest, "--json", "c.json"]) == 0
+    assert json.loads(Path("c.json").read_text())["specialisation"]["different_pixels"] == 0
+    capsys.readouterr()
+    what = "need the values of a span; use chord-local"
+    refused("render", "teapot", "--point-light", "3,4,5", thing="--method quadratic", says=what)
+    refused("render", "a.toml", "--method", "chord", thing="--method chord", says=what)
+    refused("render", "teapot", *local, "--projection", "orthographic", thing="--viewer near", says="distant")
+    refused("render", "teapot", *local, "--gate", thing="--gate", says="has no normals for one")
+    refused("render", "teapot", "--short-words", thing="--short-words", says="nothing is specialised")
+
+
+def test_unit_of_the_mesh_does_not_matter(capsys):
+    """Products of the coordinates of the second and third would under- and overflow."""
+    pictures = []
+    for unit in ("", "e-310", "e300"):
+        points = [f"v -1{unit} 0 0", f"v 1{unit} 0 0", f"v 0 1{unit} 0", "f 1 2 3"]
+        Path("a.obj").write_text("\n".join(points))
+        assert main(["render", "a.obj", "--size", "16x12"]) == 0
+        assert capsys.readouterr().err == ""
+        pictures.append(picture("a-blysk.png"))
+    assert len(np.unique(pictures[0].reshape(-1, 3), axis=0)) > 1
+    assert np.array_equal(pictures[0], pictures[1])
+    assert np.array_equal(pictures[0], pictures[2])

@@ -1,0 +1,266 @@
+"""Small components of many kinds, and one that breaks the rules of a stream."""
+
+import numpy as np
+from amaranth.hdl import Module, Mux, Signal, signed, unsigned
+from amaranth.lib import data, stream
+from amaranth.lib.fifo import SyncFIFOBuffered
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import Component, In, Out
+
+PAIR = data.StructLayout({"x": unsigned(16), "y": signed(18)})
+
+
+def refused(component):
+    """A component that is never elaborated, which Amaranth would warn about."""
+    component._MustUse__silence = True
+    return component
+
+
+def pairs(count, seed=1):
+    rng = np.random.default_rng(seed)
+    return {"x": rng.integers(0, 1 << 16, count), "y": rng.integers(-(1 << 17), 1 << 17, count)}
+
+
+class Register(Component):
+    """``2 y + 1`` through one register; ready depends on the sink's."""
+
+    i: In(stream.Signature(PAIR))
+    o: Out(stream.Signature(signed(19)))
+
+    def elaborate(self, platform):
+        m = Module()
+        m.d.comb += self.i.ready.eq(~self.o.valid | self.o.ready)
+        with m.If(self.i.ready):
+            m.d.sync += [self.o.valid.eq(self.i.valid), self.o.payload.eq(2 * self.i.payload.y + 1)]
+        return m
+
+    @staticmethod
+    def model(beats):
+        return 2 * beats["y"].astype(np.int64) + 1
+
+
+class Pipeline(Component):
+    """``x y`` and ``(x y)^2 mod 2^63`` behind three stages with a common enable."""
+
+    i: In(stream.Signature(PAIR))
+    o: Out(stream.Signature(data.StructLayout({"product": signed(34), "square": unsigned(63)})))
+
+    def elaborate(self, platform):
+        m = Module()
+        x, y, product, again = Signal(16), Signal(signed(18)), Signal(signed(34)), Signal(signed(34))
+        square, valid = Signal(63), Signal(3)
+        m.d.comb += [
+            self.i.ready.eq(~self.o.valid | self.o.ready),
+            self.o.valid.eq(valid[2]),
+            self.o.payload.product.eq(again),
+            self.o.payload.square.eq(square),
+        ]
+        with m.If(self.i.ready):
+            m.d.sync += [
+                x.eq(self.i.payload.x),
+                y.eq(self.i.payload.y),
+                product.eq(x * y),
+                again.eq(product),
+                square.eq(product * product),
+                valid.eq(valid << 1 | self.i.valid),
+            ]
+        return m
+
+    @staticmethod
+    def model(beats):
+        product = beats["x"].astype(np.int64) * beats["y"]
+        square = [value * value % (1 << 63) for value in product.tolist()]
+        return np.array(list(zip(product.tolist(), square, strict=True)), dtype="i8, u8")
+
+
+class Queue(Component):
+    """Amaranth's own buffered queue."""
+
+    i: In(stream.Signature(PAIR))
+    o: Out(stream.Signature(PAIR))
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.fifo = fifo = SyncFIFOBuffered(width=34, depth=5)
+        m.d.comb += [
+            fifo.w_data.eq(self.i.payload),
+            fifo.w_en.eq(self.i.valid),
+            self.i.ready.eq(fifo.w_rdy),
+            self.o.payload.eq(fifo.r_data),
+            self.o.valid.eq(fifo.r_rdy),
+            fifo.r_en.eq(self.o.ready),
+        ]
+        return m
+
+    @staticmethod
+    def model(beats):
+        return np.array(list(zip(beats["x"].tolist(), beats["y"].tolist(), strict=True)), dtype="u2, i4")
+
+
+class Expander(Component):
+    """``x mod 8`` output beats an input beat: the index in it, and ``y``. No beat where that is 0."""
+
+    i: In(stream.Signature(PAIR))
+    o: Out(stream.Signature(data.StructLayout({"index": 3, "y": signed(18)})))
+
+    def elaborate(self, platform):
+        m = Module()
+        left, index, y, free = Signal(3), Signal(3), Signal(signed(18)), Signal()
+        m.d.comb += [free.eq(~self.o.valid | self.o.ready), self.i.ready.eq((left == 0) & free)]
+        with m.If(self.i.ready & self.i.valid):
+            m.d.sync += [left.eq(self.i.payload.x), index.eq(0), y.eq(self.i.payload.y)]
+        with m.If(free):
+            m.d.sync += [self.o.valid.eq(left != 0), self.o.payload.index.eq(index), self.o.payload.y.eq(y)]
+            with m.If(left != 0):
+                m.d.sync += [left.eq(left - 1), index.eq(index + 1)]
+        return m
+
+    @staticmethod
+    def model(beats):
+        rows = [(k, y) for x, y in zip(beats["x"], beats["y"], strict=True) for k in range(x % 8)]
+        return np.array(rows, dtype="u1, i4")
+
+
+class Lookup(Component):
+    """``table[x mod 50] - y`` from a ROM in a submodule; its last rows are not there and read as 0."""
+
+    i: In(stream.Signature(PAIR))
+    o: Out(stream.Signature(signed(20)))
+
+    class Table(Component):
+        address: In(6)
+        enable: In(1)
+        data: Out(16)
+
+        def elaborate(self, platform):
+            m = Module()
+            init = [row * row * 3 for row in range(50)]
+            m.submodules.rom = rom = Memory(shape=16, depth=50, init=init)
+            port = rom.read_port()
+            m.d.comb += [port.addr.eq(self.address), port.en.eq(self.enable), self.data.eq(port.data)]
+            return m
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.table = table = self.Table()
+        y, valid = Signal(signed(18)), Signal()
+        m.d.comb += [
+            self.i.ready.eq(~self.o.valid | self.o.ready),
+            table.address.eq(self.i.payload.x),
+            table.enable.eq(self.i.ready),
+        ]
+        with m.If(self.i.ready):
+            m.d.sync += [
+                y.eq(self.i.payload.y),
+                valid.eq(self.i.valid),
+                self.o.valid.eq(valid),
+                self.o.payload.eq(table.data.as_signed() - y),
+            ]
+        return m
+
+    @staticmethod
+    def model(beats):
+        row = beats["x"].astype(np.int64) % 64
+        return np.where(row < 50, row * row * 3, 0) - beats["y"]
+
+
+class Accumulator(Component):
+    """Writes fill a memory; a beat gives ``scale * memory[x mod 4] + y``; status counts."""
+
+    i: In(stream.Signature(PAIR))
+    o: Out(stream.Signature(signed(40)))
+    write: In(stream.Signature(data.StructLayout({"row": 2, "value": signed(12)})))
+    constants: In(data.StructLayout({"scale": data.ArrayLayout(signed(9), 2), "unused": 40}))
+    status: Out(data.StructLayout({"writes": 8, "total": signed(30), "busy": 1}))
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.memory = memory = Memory(shape=signed(12), depth=4, init=[])
+        store, fetch = memory.write_port(), memory.read_port(domain="comb")
+        beat = Signal()
+        m.d.comb += [
+            # A write is taken on every other clock.
+            self.write.ready.eq(beat),
+            store.addr.eq(self.write.payload.row),
+            store.data.eq(self.write.payload.value),
+            store.en.eq(self.write.valid & self.write.ready),
+            fetch.addr.eq(self.i.payload.x),
+            self.i.ready.eq(~self.o.valid | self.o.ready),
+            self.status.busy.eq(self.o.valid),
+        ]
+        m.d.sync += beat.eq(~beat)
+        with m.If(store.en):
+            m.d.sync += self.status.writes.eq(self.status.writes + 1)
+        with m.If(self.i.ready):
+            scale = Mux(self.i.payload.x[2], self.constants.scale[1], self.constants.scale[0])
+            m.d.sync += [
+                self.o.valid.eq(self.i.valid),
+                self.o.payload.eq(scale * fetch.data + self.i.payload.y),
+            ]
+            with m.If(self.i.valid):
+                m.d.sync += self.status.total.eq(self.status.total + self.i.payload.y)
+        return m
+
+
+ALL = [Register, Pipeline, Queue, Expander, Lookup]
+
+
+class Plain(Component):
+    """Members of plain signed shapes, ``i * constants + status``; a write sets the status."""
+
+    i: In(stream.Signature(signed(18)))
+    o: Out(stream.Signature(signed(36)))
+    constants: In(signed(16))
+    write: In(stream.Signature(signed(5)))
+    status: Out(signed(7))
+
+    def elaborate(self, platform):
+        m = Module()
+        m.d.comb += [self.write.ready.eq(1), self.i.ready.eq(~self.o.valid | self.o.ready)]
+        with m.If(self.write.valid):
+            m.d.sync += self.status.eq(self.write.payload)
+        with m.If(self.i.ready):
+            m.d.sync += [
+                self.o.valid.eq(self.i.valid),
+                self.o.payload.eq(self.i.payload * self.constants + self.status),
+            ]
+        return m
+
+
+class Faulty(Component):
+    """A register that breaks one rule."""
+
+    i: In(stream.Signature(PAIR))
+    o: Out(stream.Signature(signed(18)))
+
+    def __init__(self, fault):
+        super().__init__()
+        self.fault = fault
+
+    def elaborate(self, platform):
+        m = Module()
+        age = Signal(8)
+        free = Signal()
+        m.d.comb += [free.eq(~self.o.valid | self.o.ready), self.i.ready.eq(free)]
+        with m.If(self.i.valid & self.i.ready & (age != 255)):
+            m.d.sync += age.eq(age + 1)
+        with m.If(free):
+            m.d.sync += [self.o.valid.eq(self.i.valid), self.o.payload.eq(self.i.payload.y)]
+        if self.fault == "drops":
+            with m.If(self.o.valid & ~self.o.ready):
+                m.d.sync += self.o.valid.eq(0)
+        elif self.fault == "changes":
+            with m.If(self.o.valid & ~self.o.ready):
+                m.d.sync += self.o.payload.eq(self.o.payload + 1)
+        elif self.fault == "loses":
+            with m.If(self.i.valid & self.i.ready & (age == 7)):
+                m.d.sync += self.o.valid.eq(0)
+        elif self.fault == "deadlocks":
+            m.d.comb += self.i.ready.eq(free & (age < 7))
+            with m.If(age >= 7):
+                m.d.sync += self.o.valid.eq(0)
+        elif self.fault == "invents":
+            again = Signal()
+            with m.If(free & ~self.i.valid & (age == 20) & ~again):
+                m.d.sync += [self.o.valid.eq(1), again.eq(1)]
+        return m

@@ -1,0 +1,200 @@
+"""Mesh files of every kind as tests write them, and what every loaded mesh promises."""
+
+import base64
+import json
+import os
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+
+from blysk.golden.reference.geometry import normalise
+from blysk.sim.errors import InputError
+from blysk.sim.meshes.mesh import load_mesh
+
+TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def put(path, content):
+    """Write text, bytes, a glTF document with its buffer, or what trimesh exports; the path as text."""
+    if isinstance(content, tuple) and path.suffix == ".glb":
+        content = glb(*content)
+    elif isinstance(content, tuple):
+        document, buffer = content
+        uri = "data:application/octet-stream;base64," + base64.b64encode(buffer).decode()
+        document["buffers"][0].setdefault("uri", uri)
+        content = json.dumps(document)
+    elif not isinstance(content, str | bytes):
+        content = content.export(file_type=path.suffix[1:])
+    path.write_bytes(content.encode("utf-8", "surrogatepass") if isinstance(content, str) else content)
+    return str(path)
+
+
+def load(path, content, **options):
+    """Write a file as `put` does, and load it."""
+    return load_mesh(put(path, content), **options)
+
+
+def check_refused(source, *words, content=None, **options):
+    """One line that names the file and holds the words; the line."""
+    if content is not None:
+        put(source, content)
+    with pytest.raises(InputError) as refusal:
+        load_mesh(str(source), **options)
+    text = str(refusal.value)
+    assert "\n" not in text
+    assert text.startswith(str(source)) or not os.path.exists(str(source))
+    for word in words:
+        assert word in text
+    return text
+
+
+def loaded_or_refused(path):
+    """The mesh, or the one line that refuses it."""
+    try:
+        return load_mesh(str(path)), None
+    except InputError as refusal:
+        text = str(refusal)
+    assert "\n" not in text
+    return None, text
+
+
+def without_normals(mesh):
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+
+
+def with_normals(mesh, normals):
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_normals=normals, process=False)
+
+
+def obj_of(vertices, faces):
+    """Text of an OBJ file; every bit of a coordinate."""
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, dtype=float).tolist()]
+    return "\n".join(lines + [f"f {a} {b} {c}" for a, b, c in (np.asarray(faces) + 1).tolist()])
+
+
+def gltf(primitives, blobs, accessors, nodes, **extra):
+    """A glTF document and its one buffer, each blob a view of its own."""
+    buffer, views = b"", []
+    for blob in blobs:
+        views.append({"buffer": 0, "byteOffset": len(buffer), "byteLength": len(blob)})
+        buffer += blob + bytes(-len(blob) % 4)
+    document = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes}
+    document |= {"meshes": [{"primitives": primitives}], "accessors": accessors, "bufferViews": views}
+    return document | {"buffers": [{"byteLength": len(buffer)}], **extra}, buffer
+
+
+def vectors(count, view):
+    return {"bufferView": view, "componentType": 5126, "count": count, "type": "VEC3"}
+
+
+def indices(count, view):
+    return {"bufferView": view, "componentType": 5125, "count": count, "type": "SCALAR"}
+
+
+def glb(document, buffer):
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
+    if buffer:
+        chunks += struct.pack("<II", len(buffer), 0x004E4942) + buffer
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+
+
+def mesh_gltf(vertices=TRIANGLE, faces=(0, 1, 2), normals=None, nodes=None, uri=None, **extra):
+    """A document of one mesh, by default of one triangle, and its buffer, perhaps in a file of its own."""
+    blobs = [np.asarray(vertices, "<f4").tobytes(), np.asarray(faces, "<u4").tobytes()]
+    accessors = [vectors(len(vertices), 0), indices(np.size(faces), 1)]
+    attributes = {"POSITION": 0}
+    if normals is not None:
+        blobs.append(np.asarray(normals, "<f4").tobytes())
+        accessors.append(vectors(len(normals), 2))
+        attributes["NORMAL"] = 2
+    primitives = [{"attributes": attributes, "indices": 1}]
+    document, buffer = gltf(primitives, blobs, accessors, nodes or [{"mesh": 0}], **extra)
+    if uri is not None:
+        document["buffers"][0]["uri"] = uri
+    return document, buffer
+
+
+def draco_gltf():
+    """A document with compressed data that nothing decodes."""
+    name = "KHR_draco_mesh_compression"
+    extension = {name: {"bufferView": 0, "attributes": {"POSITION": 0}}}
+    primitives = [{"attributes": {"POSITION": 0}, "indices": 1, "extensions": extension}]
+    accessors = [{"componentType": 5126, "count": 3, "type": "VEC3"}]
+    accessors += [{"componentType": 5125, "count": 3, "type": "SCALAR"}]
+    return gltf(primitives, [b"DRACO123"], accessors, [{"mesh": 0}], extensionsUsed=[name])
+
+
+def base(*color, **other):
+    """A material of a glTF document."""
+    return {"pbrMetallicRoughness": {"baseColorFactor": list(color)}, **other}
+
+
+def material_gltf(materials, primitives, nodes=None, normals=None):
+    """A strip of triangles, one a primitive, of the materials of these indices; None is for none."""
+    document, buffer = mesh_gltf(normals=normals)
+    first = document["meshes"][0]["primitives"][0]
+    of_each = [first if index is None else {**first, "material": index} for index in primitives]
+    document["meshes"] = [{"primitives": [primitive]} for primitive in of_each]
+    if materials is not None:
+        document["materials"] = materials
+    count = range(len(primitives))
+    document["nodes"] = nodes or [{"mesh": k, "translation": [2 * k, 0, 0]} for k in count]
+    document["scenes"][0]["nodes"] = list(range(len(document["nodes"])))
+    return document, buffer
+
+
+def strip(count):
+    """Triangles side by side, the middle of number k at x = 2 k + 1/3, as lines of an OBJ file."""
+    lines = [f"v {2 * k + x} {y} 0" for k in range(count) for x, y in ((0, 0), (1, 0), (0, 1))]
+    return "\n".join(lines) + "\n", [f"f {3 * k + 1} {3 * k + 2} {3 * k + 3}\n" for k in range(count)]
+
+
+def material_obj(names, library="a.mtl"):
+    """A `strip` as an OBJ file, each triangle of the material of its name."""
+    vertices, faces = strip(len(names))
+    return f"mtllib {library}\n{vertices}" + "".join(
+        f"usemtl {name}\n{face}" for name, face in zip(names, faces, strict=True)
+    )
+
+
+def by_position(loaded):
+    """Material of each triangle of a `strip`, None where it is missing, in order of its position."""
+    corner = loaded.mesh.vertices[loaded.mesh.faces].min(axis=1)[:, 0]
+    position = np.rint(corner / 2).astype(int)
+    result = [None] * (position.max() + 1)
+    for where, index in zip(position.tolist(), loaded.mesh.material.tolist(), strict=True):
+        assert result[where] is None
+        result[where] = loaded.materials[index]
+    return result
+
+
+def face_normals(mesh):
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+    return normalise(np.cross(b - a, c - a))
+
+
+def volume(mesh):
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+    return np.einsum("fi,fi->", a, np.cross(b, c)) / 6
+
+
+def check(loaded):
+    """What every loaded mesh and its materials promise."""
+    mesh = loaded.mesh
+    assert len(mesh.faces) > 0
+    assert np.isfinite(mesh.vertices).all()
+    # Three squares, a sum, a root and a division round to less than 8 units of 2**-53.
+    assert np.abs(np.linalg.norm(mesh.normals, axis=1) - 1).max() < 8 * 2**-53
+    assert np.array_equal(np.unique(mesh.faces), np.arange(len(mesh.vertices)))
+    assert mesh.faces.dtype == mesh.material.dtype == np.int64
+    assert mesh.material.shape == (len(mesh.faces),)
+    # Each is used, and no two are equal but for the name.
+    assert np.array_equal(np.unique(mesh.material), np.arange(len(loaded.materials)))
+    assert len({(m.diffuse, m.specular, m.exponent) for m in loaded.materials}) == len(loaded.materials)
+    return loaded

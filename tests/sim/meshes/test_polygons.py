@@ -1,0 +1,214 @@
+"""Polygons of OBJ and PLY files cut into triangles, and numbers that are none."""
+
+import struct
+
+import numpy as np
+import pytest
+
+from blysk.sim.errors import InputError
+from blysk.sim.meshes.mesh import load_mesh
+from blysk.sim.meshes.polygons import triangulated
+
+# Corners in order, counter-clockwise; the first corner sees all of none but the square.
+OUTLINES = {
+    "square": [(0, 0), (1, 0), (1, 1), (0, 1)],
+    "dart": [(4, 0), (0, 4), (1, 1), (0, -4)],
+    "L": [(2, 1), (1, 1), (1, 3), (0, 3), (0, 0), (2, 0)],
+    "C": [(3, 1), (1, 1), (1, 2), (3, 2), (3, 3), (0, 3), (0, 0), (3, 0)],
+    "comb": [(0, 0), (7, 0), (7, 3), (6, 3), (6, 1), (4, 1), (4, 3), (3, 3), (3, 1), (1, 1), (1, 3), (0, 3)],
+}
+
+
+def shoelace(points):
+    """Twice the signed area of a polygon of the plane."""
+    x, y = np.asarray(points, dtype=float).T
+    return (x * np.roll(y, -1) - y * np.roll(x, -1)).sum()
+
+
+def placed(outline, seed):
+    """A polygon turned and moved in space."""
+    rng = np.random.default_rng(seed)
+    axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    return np.c_[np.array(outline, dtype=float), np.zeros(len(outline))] @ axes.T + rng.normal(size=3) * 10
+
+
+def spiral(count, seed):
+    """A polygon around the origin whose corners go in and out."""
+    rng = np.random.default_rng(seed)
+    angle = (np.arange(count) + rng.uniform(-0.3, 0.3, count)) * 2 * np.pi / count
+    return (rng.uniform(0.1, 1, count) * [np.cos(angle), np.sin(angle)]).T
+
+
+def check_cover(outline, corners):
+    """As much area as the polygon, by triangles that are all turned like it: no overlap and no gap."""
+    areas = np.array([shoelace(np.asarray(outline)[triangle]) for triangle in corners])
+    assert (areas * np.sign(shoelace(outline)) >= -1e-12).all()
+    assert areas.sum() == pytest.approx(shoelace(outline), rel=1e-12)
+    assert len(corners) <= len(outline) - 2
+
+
+CASES = {**OUTLINES, **{f"spiral{k}": spiral(5 + k, k) for k in range(20)}}
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+@pytest.mark.parametrize("outline", CASES.values(), ids=CASES)
+def test_triangles_cover_the_polygon(outline, turn):
+    outline = list(outline)[::turn]
+    for first in range(len(outline)):
+        points = outline[first:] + outline[:first]
+        corners, owners = triangulated(placed(points, first), np.arange(len(points))[np.newaxis])
+        check_cover(points, corners)
+        assert not owners.any()
+
+
+def test_many_polygons_keep_their_order():
+    """Convex and concave ones of one count, each far from the others, together as alone."""
+    outlines = [spiral(7, seed) for seed in range(50)]
+    vertices = np.concatenate([placed(outline, seed) for seed, outline in enumerate(outlines)])
+    polygons = np.arange(350).reshape(50, 7)
+    corners, owners = triangulated(vertices, polygons)
+    assert (np.diff(owners) >= 0).all()
+    for number, outline in enumerate(outlines):
+        check_cover(outline, corners[owners == number])
+
+
+def test_polygons_without_area():
+    """They give triangles without area, which are dropped and counted elsewhere."""
+    for points in (np.zeros((5, 3)), np.outer(np.arange(5), [1, 2, 3]), np.full((5, 3), np.nan)):
+        corners, _ = triangulated(points.astype(float), np.arange(5)[np.newaxis])
+        assert len(corners) == 3
+
+
+def obj(points, turn=1):
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
+    corners = " ".join(map(str, range(1, len(points) + 1)[::turn]))
+    return "\n".join([*lines, f"f {corners}"]).encode()
+
+
+def ply(points, order):
+    format = {"": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    head = f"ply\nformat {format} 1.0\nelement vertex {len(points)}\n"
+    head += "".join(f"property double {name}\n" for name in "xyz")
+    head += "element face 2\nproperty list uchar int vertex_indices\nproperty uchar flags\nend_header\n"
+    faces = [list(range(len(points))), [0, 1, 2]]
+    if order:
+        body = struct.pack(f"{order}{points.size}d", *points.ravel())
+        body += b"".join(struct.pack(f"{order}B{len(f)}iB", len(f), *f, 7) for f in faces)
+    else:
+        lines = [f"{x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
+        lines += [" ".join(map(str, [len(f), *f, 7])) for f in faces]
+        body = ("\n".join(lines) + "\n").encode()
+    return head.encode() + body
+
+
+def drawn_area(loaded):
+    a, b, c = np.moveaxis(loaded.mesh.vertices[loaded.mesh.faces], 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+
+
+@pytest.mark.parametrize("outline", [OUTLINES["dart"], OUTLINES["C"]], ids=["dart", "C"])
+def test_concave_polygon_of_obj(tmp_path, outline):
+    path = tmp_path / "a.obj"
+    path.write_bytes(obj(placed(outline, 1)))
+    loaded = load_mesh(str(path))
+    assert drawn_area(loaded) == pytest.approx(shoelace(outline))
+    # All triangles face one way: a fan would turn some over.
+    assert (loaded.mesh.normals @ loaded.mesh.normals[0] > 0.999).all()
+
+
+@pytest.mark.parametrize("order", ["", "<", ">"])
+def test_concave_polygon_beside_a_triangle_of_ply(tmp_path, order):
+    """Lists of different lengths, of which trimesh refuses binary ones and fan-splits those of a text."""
+    path = tmp_path / "a.ply"
+    points = placed(OUTLINES["C"], 2)
+    path.write_bytes(ply(points, order))
+    extra = abs(shoelace(OUTLINES["C"][:3]))
+    assert drawn_area(load_mesh(str(path))) == pytest.approx(shoelace(OUTLINES["C"]) + extra)
+
+
+def test_polygon_keeps_normals_and_relative_indices(tmp_path):
+    path = tmp_path / "a.obj"
+    lines = [f"v {x} {y} 0" for x, y in OUTLINES["L"]] + ["vn 0 0 1", "vn 0 0.6 0.8"]
+    corners = [f"{k - 6}//{-1 - (k % 2)}" for k in range(6)]
+    path.write_text("\n".join([*lines, "f " + " ".join(corners)]))
+    loaded = load_mesh(str(path))
+    assert loaded.repaired_normals == 0
+    assert drawn_area(loaded) == pytest.approx(shoelace(OUTLINES["L"]))
+    for place, normal in zip(loaded.mesh.vertices, loaded.mesh.normals, strict=True):
+        number = OUTLINES["L"].index((place[0], place[1]))
+        np.testing.assert_allclose(normal, [0, 0, 1] if number % 2 else [0, 0.6, 0.8])
+
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (SQUARE + "f 1 2 3_0\n", "corners '1 2 3_0'"),
+        (SQUARE + "f 1 2 1_0 4\n", "corners '1 2 1_0 4'"),
+        (SQUARE + "f 1 2 3.5\n", "corners"),
+        (SQUARE + "f 1/1/1/1 2 3\n", "corners"),
+        (SQUARE + "f 1 2 3 9\n", "vertex 8 (from 0), there are 4"),
+        (SQUARE + "f 1 2 3 -9\n", "vertex -5"),
+        (SQUARE.replace("v 1 0 0", "v 1_0 0 0") + "f 1 2 3\n", "'1_0 0 0', not 3 numbers"),
+        (SQUARE + "vn 0 0 1_0\nf 1//1 2//1 3//1\n", "not 3 numbers"),
+        (SQUARE.replace("v 1 0 0", "v 1 0 0 2") + "f 1 2 3\n", "weight w other than 1"),
+        (SQUARE.replace("v 1 0 0", "v 1 0 0 0.5") + "f 1 2 3\n", "weight w other than 1"),
+        (SQUARE.replace("v 1 0 0", "v 1 0 0 1 1") + "f 1 2 3\n", "5 numbers"),
+    ],
+)
+def test_bad_obj(tmp_path, text, reason):
+    path = tmp_path / "a.obj"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"^[^\n]*$") as refusal:
+        load_mesh(str(path))
+    assert reason in str(refusal.value)
+
+
+def test_weight_of_1_and_colours(tmp_path):
+    """Beside positions without: trimesh takes columns by the first line."""
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0 1.0\nv 1 0 0\nv 1 1 0 1 0 0\nv 0 1 0 1e0\nf 1 2 3 4\n")
+    loaded = load_mesh(str(path))
+    assert drawn_area(loaded) == pytest.approx(2)
+    assert loaded.ignored == ("vertex colours",)
+
+
+HEAD = (
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [
+        ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n4 0 1 2\n", "more or fewer numbers"),
+        ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 1 2 3\n", "more or fewer numbers"),
+        ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n-3 0 1 2\n", "more or fewer numbers"),
+        ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n2.5 0 1 2\n", "more or fewer numbers"),
+        ("0 0 0\n1 0 0\n1 1 0\n0 1\n3 0 1 2\n3 0 1 2\n", "more or fewer numbers"),
+        ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n2 0 1\n", "fewer than 3 corners"),
+        ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 1 1_0\n", "the character _"),
+        ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 1 2.5\n", "no whole number"),
+        ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 1 4\n", "vertex 4 (from 0), there are 4"),
+        ("0 0 0\n1 0 0\n1 1 0\n0 1 zero\n3 0 1 2\n3 0 1 2\n", "no number"),
+    ],
+)
+def test_bad_ply(tmp_path, body, reason):
+    path = tmp_path / "a.ply"
+    path.write_text(HEAD + body)
+    with pytest.raises(InputError, match=r"^[^\n]*$") as refusal:
+        load_mesh(str(path))
+    assert reason in str(refusal.value)
+
+
+def test_wrong_counts_of_binary_lists(tmp_path):
+    path = tmp_path / "a.ply"
+    whole = ply(placed(OUTLINES["C"], 2), "<")
+    start = whole.index(b"end_header\n") + 11 + 8 * 24
+    for count in (0, 2, 7, 9, 255):
+        path.write_bytes(whole[:start] + bytes([count]) + whole[start + 1 :])
+        with pytest.raises(InputError, match=r"^[^\n]*$"):
+            load_mesh(str(path))
