@@ -132,8 +132,8 @@ def test_stiff_normals_of_wrong_length_lose_highlights(method, operand, short, l
     """Where the gate does not hold for lengths off by 1/256: these methods count on unit normals.
 
     The gate goes by the N.H of the codes. A bisection makes short normals longer: a pixel is up to 1/256
-    nearer to H than the gate knows. Too long ones make the angle of a half chord wider than that of the dot product.
-    The other way round nothing is lost, nor with unit normals.
+    nearer to H than the gate knows. Too long ones make the angle of a half chord wider than that of the dot
+    product. The other way round nothing is lost, nor with unit normals.
     """
     # One call a span costs more than arithmetic.
     count = 120 if method in ("angular", "recurrence") else 4000

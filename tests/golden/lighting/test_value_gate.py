@@ -153,7 +153,7 @@ def test_what_is_not_held_is_lit():
 
 @pytest.mark.parametrize("exponent", [10, 100, 1000])
 def test_few_dark_spans_are_lit(exponent):
-    """Of spans whose least u is over 1.05 times the last lit one none is lit; straight ones a step further."""
+    """Of spans whose least u is over 1.05 times the last lit one none is lit; straight ones a step on."""
     gate, rng = ValueGate(), np.random.default_rng(exponent)
     last = (gate.specular.last_lit_arguments[exponent] + 1) * 2.0**-25
     least = last * rng.uniform(1.05, 1.5, 4000)
