@@ -142,9 +142,9 @@ class Frame:
         return replace(self.scene, material=replace(self.scene.material, exponent=exponent))
 
     def golden(self, model: str, exponent: int) -> np.ndarray:
-        """Exactly normalised interpolation, in LSB: float64 array, shape (pixels, 3).
+        """Exact normals of every pixel, in LSB: float64 array, shape (pixels, 3).
 
-        What `shade_spans` draws, pixel by pixel in the order of the fragments.
+        What `render` draws, pixel by pixel in the order of the fragments.
         """
         scene = self.scene_of(exponent)
         shaded = intensity_of_cosines(

@@ -200,8 +200,8 @@ def _range_table(ranges: dict[str, dict]) -> Table:
         "`blysk` cuts wider spans before the pipeline, and counts them; the pipeline counts those that it "
         f"gets and can tell, some or all. Errors at exponent {SWEEP_EXPONENT}, spans of 16 pixels with the "
         "highlight in them; no figure where every span is flagged. Of `chord` the widest span is the widest "
-        "lit one that the pipeline does not count as wide; of `chord-local` it is measured: it depends on the "
-        "light, and is that of which none of a sample is cut."
+        "lit one that the pipeline does not count as wide; of `chord-local` it is measured, as it depends on "
+        "the light: that of which none of a sample is cut."
     )
     title = "Range of each method: served whole, exact to a step, flagged; and what it does outside"
     return Table("safe-ranges", title, [*columns, "pixels of a span", "exponents"], rows, note, grades)

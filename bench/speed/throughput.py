@@ -2,9 +2,9 @@
 
 ``python -m blysk.bench.speed.throughput [TRIANGLES ...]`` draws teapots of 1,000, 10,000, 100,000 and
 1,000,000 triangles at 1920x1080, and sends their spans through the simulated pipelines of the methods chord
-and quadratic, with those of the setup intervals 1, 2, 3, 4, 7 and 9 that each is built for. It prints two tables in Markdown: how long the spans are,
-and how many cycles they take. ``--json`` prints the same as JSON. The exit status is 1 when spans of 16
-pixels and more take over 1.05 cycles a pixel.
+and quadratic, with those of the setup intervals 1, 2, 3, 4, 7 and 9 that each is built for. It prints two
+tables in Markdown: how long the spans are, and how many cycles they take. ``--json`` prints the same as JSON.
+The exit status is 1 when spans of 16 pixels and more take over 1.05 cycles a pixel.
 """
 
 import argparse

@@ -17,7 +17,7 @@ from blysk.golden.presets import MODELS, preset
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.golden.reference.renderer import shade_spans
+from blysk.golden.reference.renderer import render
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.teapot import teapot
 
@@ -32,11 +32,9 @@ def test_exponents():
 
 @pytest.mark.parametrize(("model", "exponent"), [("cosquad", 1), ("blinn", 30), ("coscos4", 700)])
 def test_reference_is_the_renderer(model, exponent):
-    """Worked out once a mesh, the exact frame is that which the golden renderer draws from the spans."""
+    """Worked out once a mesh, the exact frame is that which the golden renderer draws."""
     frame = Frame(teapot(1000), 96, 72)
-    image = shade_spans(
-        frame.scene_of(exponent), frame.raster, "normalised", REFLECTION_MODELS[model]
-    ).reshape(-1, 3)
+    image = render(frame.scene_of(exponent), model=REFLECTION_MODELS[model]).image.reshape(-1, 3)
     shown = frame.raster.pixel[frame.raster.visible]
     assert len(shown) == frame.pixels > 1500
     np.testing.assert_allclose(frame.golden(model, exponent), 255 * image[shown], rtol=0, atol=1e-9)

@@ -233,7 +233,7 @@ def test_ranges(method):
         assert of["prepared"]["flagged"] == 0
     if method == "chord":
         twice = outside[-1]["given"]
-        assert (twice["grade"], twice["flagged"]) == ("fair", twice["spans"])
+        assert (twice["grade"], twice["flagged"]) == ("fair", outside[-1]["spans"])
 
 
 def test_section():

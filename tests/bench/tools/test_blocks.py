@@ -278,7 +278,7 @@ def specular_bounds(variant):
 def interpolator_bounds(method):
     p = METHODS[method]
     if p.takes_line:
-        # The true line, at 120 degrees and lengths of 1 to 4 as near to 0 as one of 158 degrees of equal ones.
+        # The true line, at 120 degrees and lengths of 1 to 4: as near to 0 as one of 158 of equal ones.
         return 0, p.operand_error(4095, 158.5)
     # At 45 degrees: a straight line's length; slerp against normalised, 0.46 degrees; a quadratic against
     # slerp. Straight parts of an arc are too short by the threshold.
