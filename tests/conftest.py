@@ -67,7 +67,7 @@ def assert_beats_equal(actual, expected, path="beat"):
 
 @pytest.fixture
 def verify():
-    """Hold a unit of fixed latency against its bit-accurate model: every beat and cycle, both engines, stalls."""
+    """Hold a unit of fixed latency against its bit-accurate model: beats, cycles, both engines, stalls."""
 
     def verify(unit, beats, expected, *, constants=None, seed=2026):
         rng = np.random.default_rng(seed)
