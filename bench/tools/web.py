@@ -31,6 +31,7 @@ from blysk.bench.tools.web_data import (
     HEIGHT,
     MESHES,
     REFERENCES,
+    SERVED,
     START,
     WIDTH,
     method,
@@ -301,9 +302,8 @@ class _Design(click.ParamType):
         if isinstance(value, tuple):
             return value
         method, _, model = value.partition("/")
-        served = [name for name in METHODS if METHODS[name].serves_gate]
-        if method not in served:
-            raise InputError(f"--design {value}", "unknown method", f"use one of {', '.join(served)}")
+        if method not in SERVED:
+            raise InputError(f"--design {value}", "unknown method", f"use one of {', '.join(SERVED)}")
         if model not in MODELS:
             raise InputError(f"--design {value}", "unknown model", f"use one of {', '.join(MODELS)}")
         return method, model

@@ -43,6 +43,7 @@ __all__ = [
     "HEIGHT",
     "MESHES",
     "REFERENCES",
+    "SERVED",
     "START",
     "WIDTH",
     "Body",
@@ -63,8 +64,12 @@ WIDTH, HEIGHT = 320, 240
 BANDS = (100, MAX_EXPONENT)
 """Spans are cut for these exponents; a frame has those of the smallest that is not under its own."""
 
-DESIGNS = tuple(pair for pair in accuracy.DESIGNS if not preset(pair[0]).takes_values)
-"""Method and model of each module. Where spans carry values of the light, it cannot be moved without them."""
+SERVED = tuple(name for name, method in METHODS.items() if method.serves_gate and not method.TAKES_VALUES)
+"""Methods of modules, which have a gate. Where spans carry values of the light, it cannot be moved without
+them."""
+
+DESIGNS = tuple(pair for pair in accuracy.DESIGNS if pair[0] in SERVED)
+"""Method and model of each module."""
 
 BACKGROUND = "#1a1c20"
 
@@ -87,9 +92,9 @@ START = {
 REFERENCES = {
     "method": {
         "title": "exact normals, same model",
-        "text": "Normals interpolated along the spans and brought to unit length exactly, with the same "
-        "reflection model: the error of the method and of its arithmetic.",
-        "curve": "normalised",
+        "text": "The exact normal of every pixel, perspective-correct, with the same reflection model: the error "
+        "of the method and of its arithmetic.",
+        "curve": "exact",
         "model": None,
     },
     "arithmetic": {
@@ -101,8 +106,8 @@ REFERENCES = {
     },
     "total": {
         "title": "exact normals, Blinn's power",
-        "text": "Exact normals along the spans, with the power that the reflection model stands for.",
-        "curve": "normalised",
+        "text": "The exact normal of every pixel, with the power that the reflection model stands for.",
+        "curve": "exact",
         "model": "blinn",
     },
 }
@@ -198,16 +203,19 @@ COLUMNS = (
     {"name": "length", "bytes": 2, "bias": 0},
     *({"name": f"normal_left.{c}", "bytes": 3, "bias": 1 << 17} for c in range(3)),
     *(
-        {"name": f"normal_right.{c}", "bytes": 3, "bias": 1 << 18, "from": f"normal_left.{c}"}
+        {"name": f"normal_{place}.{c}", "bytes": 3, "bias": 1 << 18, "from": f"normal_left.{c}"}
+        for place in ("right", "middle")
         for c in range(3)
     ),
+    {"name": "ratio", "bytes": 3, "bias": 1 << 23},
 )
 """Codes of the spans in a file, a column a field: as they are, or the change from the span before
 (``running``) or from another column (``from``); plus ``bias``, so that none is negative; in so many
-``bytes``."""
+``bytes``. The middle normal is the left one where the method takes none. The ratio is that of the lengths
+that the interpolated normals have at the ends, ``round(2^19 log2(m_r / m_l))``."""
 
 
-def encode(spans: Spans, visible: np.ndarray) -> bytes:
+def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -> bytes:
     """Spans of a view, and which of their fragments show, as bytes.
 
     Two counts in 32 bits, of spans and fragments; `COLUMNS`, the lowest byte of all codes first; a bit a
@@ -219,10 +227,14 @@ def encode(spans: Spans, visible: np.ndarray) -> bytes:
         With normals.
     visible : bool array
         Of the fragments in their order.
+    ratio : array, shape (spans,), optional
+        Length of the interpolated normal at the right end, over that at the left end.
     """
-    codes = {"x": spans.x, "y": spans.y, "length": spans.length}
-    for c in range(3):
-        codes |= {f"normal_left.{c}": spans.normal_left[:, c], f"normal_right.{c}": spans.normal_right[:, c]}
+    logarithm = np.clip(np.log2(np.broadcast_to(ratio, len(spans))), -15, 15)
+    codes = {"x": spans.x, "y": spans.y, "length": spans.length, "ratio": np.rint(2**19 * logarithm)}
+    middle = spans.normal_left if spans.normal_middle is None else spans.normal_middle
+    for name, normal in (("left", spans.normal_left), ("right", spans.normal_right), ("middle", middle)):
+        codes |= {f"normal_{name}.{c}": normal[:, c] for c in range(3)}
     parts = [np.array([len(spans), len(visible)], dtype="<u4").tobytes()]
     for column in COLUMNS:
         values = np.asarray(codes[column["name"]], dtype=np.int64)
@@ -257,19 +269,18 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
     camera = _cameras(mesh)[view]
     found: list[str] = []
     streams: dict[str, list[int]] = {}
-    cuts: dict[tuple, int] = {}
     for method in methods:
         design = preset(method)
         streams[method] = []
         for exponent in BANDS:
-            cut = design.interpolator.widest_span(exponent), design.interpolator.largest_deviation(exponent)
-            if cut not in cuts:
-                frame = prepare(scene_of(START | {"mesh": mesh, "view": view, "exponent": exponent}), design)
-                text = base64.b64encode(encode(frame.spans, frame.cut_raster.visible)).decode()
-                if text not in found:
-                    found.append(text)
-                cuts[cut] = found.index(text)
-            streams[method].append(cuts[cut])
+            frame = prepare(scene_of(START | {"mesh": mesh, "view": view, "exponent": exponent}), design)
+            cut = frame.cut_raster
+            ratio = cut.magnitude_right / np.where(cut.magnitude_left, cut.magnitude_left, 1.0)
+            data = encode(frame.spans, cut.visible, np.where(ratio, ratio, 1.0))
+            text = base64.b64encode(data).decode()
+            if text not in found:
+                found.append(text)
+            streams[method].append(found.index(text))
     axes = [*camera.axes[:2].tolist(), camera.viewer.tolist()]
     return {"axes": axes, "streams": streams, "data": found}
 
@@ -345,4 +356,5 @@ def method(name: str) -> dict[str, Any]:
     """What the page needs of a method."""
     interpolator = METHODS[name]
     text = inspect.getdoc(type(interpolator)).split("\n\n")[0]
-    return {"curve": interpolator.CURVE, "chord": interpolator.uses_chord, "text": " ".join(text.split())}
+    curve = "three" if interpolator.TAKES_MIDDLE else interpolator.CURVE
+    return {"curve": curve, "chord": interpolator.uses_chord, "text": " ".join(text.split())}

@@ -124,12 +124,18 @@ def test_other_scenes():
 
 
 def test_light_from_behind(capsys):
-    """Of the pixels where N·L is about 0 some switch; no other is off."""
-    chosen = ["--models", "cosquad", "--exponents", "1", "--view", "1", "0.2", "0.3"]
-    assert main([STRESS, *chosen, "--light", "-0.3", "0.2", "-1"]) == 0
-    cells = capsys.readouterr().out.splitlines()[2].strip("| ").split(" | ")
-    assert float(cells[4]) <= LARGEST < float(cells[7])
-    assert cells[6] == "0"
+    """Of the pixels where N·L is about 0 some switch by quadratics, none by chords; no other is off."""
+    rows = {}
+    for method in ("quadratic", "chord"):
+        chosen = ["--models", "cosquad", "--exponents", "1", "--view", "1", "0.2", "0.3", "--method", method]
+        assert main([STRESS, *chosen, "--light", "-0.3", "0.2", "-1"]) == 0
+        rows[method] = cells = capsys.readouterr().out.splitlines()[2].strip("| ").split(" | ")
+        assert float(cells[4]) <= LARGEST
+        assert cells[6] == "0"
+    assert rows["chord"][9] == "0"
+    assert float(rows["chord"][7]) <= LARGEST
+    cells = rows["quadratic"]
+    assert float(cells[7]) > LARGEST
     assert 0 < int(cells[9]) < 30
     # The fit's own error, 0.12 of 255 at most, and that of the arithmetic.
     assert float(cells[10]) < 0.12 / 255 + 2**-16
