@@ -11,12 +11,12 @@ from blysk.golden.frames.local import line_ends, local_values
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
-from blysk.golden.reference.raster import Raster
+from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.reference.renderer import render, shade_operands, shade_spans
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["Comparison", "compare", "method_in_float64"]
+__all__ = ["Comparison", "compare", "compare_image", "method_in_float64"]
 
 
 @dataclass(frozen=True)
@@ -29,11 +29,13 @@ class Comparison:
         The exact frame with the frame's model, in [0, 1]: per-pixel normals, perspective-correct and
         normalised, of the triangles as rasterised.
     arithmetic_error : ErrorFigures
-        Against the same method and model in float64.
+        Against the same method and model in float64; NaN where the spans are not known.
     method_error : ErrorFigures
         Against ``golden``.
     total_error : ErrorFigures
         Against the exact frame with Blinn's model, or that of a lobe's table.
+    visible_pixels : int
+        Pixels that show the surface.
     nmse : float
         Against the exact frame.
     mnse_published, mnse_published_share : float
@@ -46,6 +48,7 @@ class Comparison:
     arithmetic_error: ErrorFigures
     method_error: ErrorFigures
     total_error: ErrorFigures
+    visible_pixels: int
     nmse: float
     mnse_published: float
     mnse_published_share: float
@@ -96,17 +99,52 @@ def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
     """
     start = perf_counter()
     same_method = method_in_float64(scene, design, frame.cut_raster)
-    golden = render(scene, "phong", _model_of(design), raster=frame.raster).image
+    return _compare(scene, design, frame.image, frame.raster, same_method, start)
+
+
+def compare_image(scene: Scene, design: Design, image: np.ndarray) -> Comparison:
+    """Errors of a picture whose spans are not known, so that there is no arithmetic error.
+
+    Parameters
+    ----------
+    scene, design
+        As for `compare`.
+    image : uint8 array, shape (height, width, 3)
+        The frame buffer.
+    """
+    start = perf_counter()
+    return _compare(scene, design, image, rasterise(scene), None, start)
+
+
+def _compare(
+    scene: Scene,
+    design: Design,
+    image: np.ndarray,
+    raster: Raster,
+    same_method: np.ndarray | None,
+    start: float,
+) -> Comparison:
+    golden = render(scene, "phong", _model_of(design), raster=raster).image
     target = _model_of(design) if design.loads_tables else BLINN
-    exact = render(scene, "phong", target, raster=frame.raster)
+    exact = render(scene, "phong", target, raster=raster)
     seconds = perf_counter() - start
     nothing = ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))
     if not exact.mask.any():
-        return Comparison(golden, nothing, nothing, nothing, math.nan, math.nan, math.nan, seconds)
+        return Comparison(golden, nothing, nothing, nothing, 0, math.nan, math.nan, math.nan, seconds)
     arithmetic, method, total = (
-        error_figures(frame.image, reference * 255, exact.mask)
+        nothing if reference is None else error_figures(image, reference * 255, exact.mask)
         for reference in (same_method, golden, exact.image)
     )
-    shown, reference = frame.image[exact.mask], exact.image[exact.mask] * 255
-    published, share = mnse_published(shown, reference)
-    return Comparison(golden, arithmetic, method, total, nmse(shown, reference), published, share, seconds)
+    shown, reference = image[exact.mask], exact.image[exact.mask] * 255
+    published, shared = mnse_published(shown, reference)
+    return Comparison(
+        golden=golden,
+        arithmetic_error=arithmetic,
+        method_error=method,
+        total_error=total,
+        visible_pixels=int(exact.mask.sum()),
+        nmse=nmse(shown, reference),
+        mnse_published=published,
+        mnse_published_share=shared,
+        seconds=seconds,
+    )

@@ -5,6 +5,7 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.geometry.geometry import COUNTERS
+from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.triangles import ATTRIBUTES, GRID, Grid
 from blysk.hdl.core.stream import connect, connect_fifo
 from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit, serial_attribute_shape
@@ -14,6 +15,7 @@ from blysk.hdl.geometry.edge_walk import EdgeWalkUnit
 from blysk.hdl.geometry.gradient_setup import GradientSetupUnit
 from blysk.hdl.geometry.plane_assembler import PlaneAssemblerUnit
 from blysk.hdl.geometry.plane_setup import PlaneSetupUnit, scales_shape
+from blysk.hdl.geometry.span_adapter import LineAdapterUnit, line_spans_shape
 from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
 from blysk.hdl.geometry.span_clip import SpanClipUnit
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
@@ -42,7 +44,7 @@ class GeometryUnit(wiring.Component):
     - a span, or a piece of it, of p pixels: as many cycles as ``p - 1`` has bits, but at least 1 for 1 pixel,
       2 for 2 pixels and 3 for more. Never more than it has pixels.
 
-    The multipliers are `multipliers`: 10, in the compact style 8.
+    The multipliers are `multipliers`: 10, in the compact style 8; without normals 4 and 2.
 
     Parameters
     ----------
@@ -50,13 +52,15 @@ class GeometryUnit(wiring.Component):
         Fraction bits of the coordinates.
     compact : bool
         The compact style.
+    lines : bool
+        Spans keep the true line in place of unit normals: no span is cut, and none normalised.
 
     Members
     -------
     i : :py:`In(stream.Signature(triangle_shape(grid)))`
         Triangles.
     o : :py:`Out(stream.Signature(true_spans_shape()))`
-        Their spans.
+        Their spans; of lines in `line_spans_shape`.
     constants : :py:`In(frame_shape())`
         The frame; stays while triangles are inside.
     status : :py:`Out(counters_shape(*COUNTERS))`
@@ -65,21 +69,22 @@ class GeometryUnit(wiring.Component):
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
-    def __init__(self, grid: Grid = GRID, compact: bool = False):
-        self.grid, self.compact = grid, compact
+    def __init__(self, grid: Grid = GRID, compact: bool = False, lines: bool = False):
+        self.grid, self.compact, self.lines = grid, compact, lines
         self._sort, self._serialiser = VertexSortUnit(grid), AttributeSerialiserUnit()
         self._edges = EdgeSetupUnit(grid, *((1, 1) if compact else (3, 2)))
         self.interval = interval = self._edges.initiation_interval
         self._planes = PlaneSetupUnit(grid, interval)
         self._gradients = GradientSetupUnit(12 if compact else interval // ATTRIBUTES)
-        self._assembler, self._attributes = PlaneAssemblerUnit(), SpanAttributesUnit()
-        self._walk, self._clip, self._normals = EdgeWalkUnit(grid), SpanClipUnit(), EdgeNormalsUnit()
-        normaliser = 6
+        self._assembler = PlaneAssemblerUnit(PlaneAssembler(cuts=not lines))
+        self._attributes, self._walk, self._clip = SpanAttributesUnit(), EdgeWalkUnit(grid), SpanClipUnit()
+        self._normals = LineAdapterUnit() if lines else EdgeNormalsUnit()
+        normaliser = 0 if lines else 6
         self.multipliers = self._planes.multipliers + self._gradients.multipliers + normaliser
         super().__init__(
             {
                 "i": In(stream.Signature(triangle_shape(grid))),
-                "o": Out(stream.Signature(true_spans_shape())),
+                "o": Out(stream.Signature(line_spans_shape() if lines else true_spans_shape())),
                 "constants": In(frame_shape()),
                 "status": Out(counters_shape(*COUNTERS)),
             }
@@ -169,7 +174,7 @@ class GeometryUnit(wiring.Component):
             self.status.culled.eq(sort.culled),
             self.status.sliver.eq(sliver),
             self.status.cut.eq(attributes.cut),
-            self.status.repaired.eq(self._normals.status.repaired),
+            self.status.repaired.eq(0 if self.lines else self._normals.status.repaired),
         ]
 
 
