@@ -97,8 +97,8 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
         "frame, and the coefficients of a published variant count as arithmetic. *Method*: against the exact "
         "frame with the same model. *Total*: against the exact frame, Phong shading as on a GPU: normals "
         "exact at every pixel, Blinn's model. Methods of the documents stand here with their operand N.H, "
-        "with the more exact 1 - N.H, and, where it differs, as published. FLIP and CIEDE2000 tell what an eye sees of "
-        "an error; *identical to the eye* is a largest error "
+        "with the more exact 1 - N.H, and, where it differs, as published. FLIP and CIEDE2000 tell what an "
+        "eye sees of an error; *identical to the eye* is a largest error "
         f"of {LARGEST_LSB:g} LSB, or FLIP to {FLIP_P99:g} in 99 % of the pixels and {FLIP_MAX:g} in all, and "
         f"CIEDE2000 to {CIEDE2000_P99:g} and {CIEDE2000_MAX:g}."
     )

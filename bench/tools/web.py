@@ -41,7 +41,7 @@ from blysk.bench.tools.web_data import (
     tables,
 )
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.presets import METHODS, MODELS
+from blysk.golden.presets import MODELS
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import processors
 from blysk.sim.output import atomic_writer, files_within, write_json, write_text

@@ -13,7 +13,8 @@ import numpy as np
 from blysk.bench import accuracy
 from blysk.bench.report.cosine_quadratic_figures import sphere
 from blysk.golden.frame_constants import FIELDS_OF_A_FRAME, FIELDS_OF_A_LIGHT, LIGHT_STRIDE
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.cut import cut_by_angle, cut_spans
+from blysk.golden.frames.prepare import spans_for
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.unit_vector import COMPONENT, ONE
@@ -22,6 +23,7 @@ from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import (
     REFLECTION_MODELS,
     AngleCosine,
@@ -53,6 +55,7 @@ __all__ = [
     "model_table",
     "module_of",
     "scene_of",
+    "spans_of",
     "streams_of",
     "tables",
 ]
@@ -92,8 +95,8 @@ START = {
 REFERENCES = {
     "method": {
         "title": "exact normals, same model",
-        "text": "The exact normal of every pixel, perspective-correct, with the same reflection model: the error "
-        "of the method and of its arithmetic.",
+        "text": "The exact normal of every pixel, perspective-correct, with the same reflection model: the "
+        "error of the method and of its arithmetic.",
         "curve": "exact",
         "model": None,
     },
@@ -248,6 +251,29 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
     return zlib.compress(b"".join(parts), 9)
 
 
+def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raster, Spans]:
+    """Spans of a view, before and after the rounding of their normals, for a light that moves.
+
+    They are cut for the light of `START`; and of a method with a span limit, as the highlight may be anywhere,
+    to the widest angle of a lit span.
+
+    Parameters
+    ----------
+    mesh, view
+        As for `streams_of`.
+    exponent : int
+        One of `BANDS`.
+    design : Design
+        The pipeline.
+    """
+    scene = scene_of(START | {"mesh": mesh, "view": view, "exponent": exponent})
+    raster = rasterise(scene)
+    if design.span_limit is not None:
+        raster, _ = cut_by_angle(raster, design.span_limit.angle(exponent))
+    cut, _ = cut_spans(scene, raster, design)
+    return cut, spans_for(scene, cut, design)
+
+
 def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
     """Spans of a view for methods and `BANDS` of exponents.
 
@@ -273,10 +299,9 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
         design = preset(method)
         streams[method] = []
         for exponent in BANDS:
-            frame = prepare(scene_of(START | {"mesh": mesh, "view": view, "exponent": exponent}), design)
-            cut = frame.cut_raster
+            cut, spans = spans_of(mesh, view, exponent, design)
             ratio = cut.magnitude_right / np.where(cut.magnitude_left, cut.magnitude_left, 1.0)
-            data = encode(frame.spans, cut.visible, np.where(ratio, ratio, 1.0))
+            data = encode(spans, cut.visible, np.where(ratio, ratio, 1.0))
             text = base64.b64encode(data).decode()
             if text not in found:
                 found.append(text)

@@ -92,8 +92,14 @@ def test_streams_of_a_view():
         for method, numbers in found["streams"].items()
     }
     for k, exponent in enumerate(web_data.BANDS):
-        frame = prepare(web_data.scene_of(web_data.START | {"exponent": exponent}), preset("chord"))
-        assert counts["chord"][k] == len(frame.spans)
+        design = preset("chord")
+        frame = prepare(web_data.scene_of(web_data.START | {"exponent": exponent}), design)
+        _, spans = web_data.spans_of("teapot", 0, exponent, design)
+        # Those of the frame, cut further where another light may have its highlight.
+        assert counts["chord"][k] == len(spans) >= len(frame.spans)
+        codes = spans.normal_left, spans.normal_right
+        chord = np.linalg.norm(np.subtract(*codes), axis=1) / ((1 << 17) - 1)
+        assert np.degrees(2 * np.arcsin(chord / 2)).max() < design.span_limit.angle(exponent) + 1e-3
 
 
 def test_addresses_are_those_of_the_write_port():
