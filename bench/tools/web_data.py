@@ -254,8 +254,8 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
 def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raster, Spans]:
     """Spans of a view, before and after the rounding of their normals, for a light that moves.
 
-    They are cut for the light of `START`; and of a method with a span limit, as the highlight may be anywhere,
-    to the widest angle of a lit span.
+    They are cut for the light of `START`; and of a method with a span limit, as the highlight may be
+    anywhere, to the widest angle of a lit span.
 
     Parameters
     ----------
