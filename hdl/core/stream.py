@@ -233,10 +233,9 @@ class PipelinedUnit(wiring.Component):
         Distance in cycles of two inputs. With 1, `datapath` gets the input itself, and registers it;
         with more, it gets a register that holds the input on stages 1 to ``initiation_interval``.
     constants : ShapeLike or None
-        Shape of the port ``constants``: values that stay while beats are inside. ``None``: no such port.
+        Shape of the port ``constants``: values that are constant while beats are inside. ``None``: no port.
     spaced : bool
         Whether the next beat may come at any distance from ``initiation_interval`` on.
-        Shape of the port ``constants``: values that are constant while beats are inside. ``None``: no port.
     ports : mapping of str to Member, optional
         Further members, by name.
 
