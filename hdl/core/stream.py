@@ -216,9 +216,8 @@ class PipelinedUnit(wiring.Component):
     A beat that is accepted on one cycle is on the output ``latency`` cycles later, unless the output is
     stalled: then the whole unit is disabled, from the cycle after the first on which a beat was not accepted,
     and holds its payloads (`skid_buffer`). As long as a beat is inside, the next is accepted a whole multiple
-    of ``initiation_interval`` enabled cycles after it; of a *spaced* unit any number of enabled cycles that is
-    not less. ``i.ready`` and ``o.valid`` follow from the unit's
-    registers alone. Reset empties the unit.
+    of ``initiation_interval`` enabled cycles after it; of a *spaced* unit any number of enabled cycles that
+    is not less. ``i.ready`` and ``o.valid`` follow from the unit's registers alone. Reset empties the unit.
 
     A subclass describes its registers in `datapath`, as if they were enabled on every cycle. Control comes
     from the *stage* of a beat: `at` tells whether a beat was accepted so many enabled cycles ago.
