@@ -63,9 +63,8 @@ _SHADING = ("out_of_range_spans", "wide_spans")
 STATUS = (*COUNTERS, "spans", "pixels", "hidden", *_SHADING)
 """Counters of `RenderUnit`."""
 
-WAITING_SPANS = {1: 33, 2: 257}
-"""Spans between geometry and shading, by lanes of the setup: a memory of a power of two words, and a register
-behind it. More of them let two lanes run ahead of large triangles while small ones follow."""
+WAITING_SPANS = 33
+"""Spans between geometry and shading: a memory of 32 words, and a register behind it."""
 
 
 class RenderUnit(wiring.Component):
@@ -112,7 +111,6 @@ class RenderUnit(wiring.Component):
         self.parameters = parameters or Renderer()
         design, grid = self.parameters.design, self.parameters.geometry.grid
         compact = design.build.style == "compact"
-        self._setups = setups
         self.geometry = GeometryUnit(grid, compact, self.parameters.geometry.lines, setups)
         self.pipeline = ShadingPipelineUnit(design)
         self.depth = DepthTestUnit(design.x_bits, design.y_bits, size)
@@ -148,7 +146,7 @@ class RenderUnit(wiring.Component):
             made.valid.eq(geometry.o.valid),
             geometry.o.ready.eq(made.ready),
         ]
-        connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS[self._setups])
+        connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS)
         count = Signal(COUNTER_BITS, name="count_spans")
         with m.If(made.valid & made.ready):
             m.d.sync += count.eq(count + 1)
