@@ -33,7 +33,7 @@ def test_within_one_lsb_of_exact_normals(method, triangles, exponent):
 
 
 def test_true_lines_are_not_cut():
-    """One span a scanline and triangle, as the rasteriser's, hidden ones included; those of chord are more."""
+    """One span a scanline and triangle, as the rasteriser's, hidden ones included; chord has more."""
     drawn = scene("teapot", size=(160, 120), triangles=220, back_faces="cull")
     counts = {method: triangle_frame(drawn, Renderer(preset(method))).counts for method in METHODS}
     assert counts["renormalise"]["cut"] == 0 < counts["chord"]["cut"]
