@@ -56,7 +56,8 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         [camera]
         projection = "perspective"          # "orthographic"
         view = [0.4, 0.5, 1]                # from the mesh to the viewer: the camera shows all of the mesh
-        up = [0, 1, 0]
+        # or "front", "back", "left", "right", "top", "bottom"
+        up = [0, 1, 0]                      # or "x", "y", "z"
         field_of_view = 30                  # degrees, vertical, 1 to 179
         # position, target                  # in place of view, in the mesh's own units
         viewer = "distant"                  # "near": highlights as seen from a perspective camera
