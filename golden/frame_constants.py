@@ -7,12 +7,14 @@ import numpy as np
 
 from blysk.golden.lighting.intensity import MAX_INTENSITY, MAX_LIGHTS, Intensity
 from blysk.golden.lighting.lobe import LobeTable
+from blysk.golden.number.fixed import Format
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.reflection import ReflectionModel
 from blysk.golden.reference.scene import Scene
 
 __all__ = [
+    "BANK_ADDRESS",
     "FIELDS_OF_A_FRAME",
     "FIELDS_OF_A_LIGHT",
     "LIGHT_STRIDE",
@@ -38,7 +40,10 @@ LOBE_ADDRESS = 5
 """Address of writes that load tables of lobes, see `LobeTable.writes`; ``begins`` is bit 17."""
 
 THRESHOLD_ADDRESS = 6
-"""Address of a material's threshold of the highlight gate, where tables are loaded."""
+"""Address of a material's threshold, from which on there is no highlight, where tables are loaded."""
+
+BANK_ADDRESS = 7
+"""Address of the bank of a material's table, where there are several."""
 
 MAX_MATERIALS = 1024
 """Most materials of a pipeline."""
@@ -57,7 +62,8 @@ class FrameConstants:
     Parameters
     ----------
     exponent : int
-        Specular exponent, 1 to 1000.
+        Specular exponent, 1 to 1000; of a lobe the one of Blinn's power that is as steep, which decides how
+        wide spans may be.
     ambient : int array, shape (3,)
         Ambient colour operand, ``UQ(11, 6)`` in LSB.
     direction, halfway : int arrays, shape (lights, 3)
@@ -67,9 +73,9 @@ class FrameConstants:
     lobe : LobeTable, optional
         Table of the highlight, of a design whose specular unit has one; see `prepare.constants_of`.
     bank : int
-        Bank of that table: the address of the exponent then has it.
+        Bank of that table.
     threshold : int, optional
-        The highlight gate's T for that table, where there is a gate.
+        Of that table, see `Design.threshold_of`, where a gate or a span limit needs it.
     """
 
     exponent: int
@@ -165,8 +171,10 @@ class FrameConstants:
         address, data = ([], []) if index is None else ([MATERIAL_ADDRESS], [index])
         for name, (first, count) in FIELDS_OF_A_FRAME.items():
             address += range(first, first + count)
-            has_bank = name == "exponent" and self.lobe is not None
-            data += np.ravel(self.bank if has_bank else getattr(self, name)).tolist()
+            data += np.ravel(getattr(self, name)).tolist()
+        if self.lobe is not None and self.lobe.lobe.banks > 1:
+            address.append(BANK_ADDRESS)
+            data.append(self.bank)
         if self.threshold is not None:
             address.append(THRESHOLD_ADDRESS)
             data.append(self.threshold)
@@ -195,11 +203,12 @@ def writes_of(constants: Sequence[FrameConstants]) -> dict[str, np.ndarray]:
 
 
 _MEANINGS = {
-    "exponent": "specular exponent, 1 to 1000; of a lobe the bank of its table",
+    "exponent": "specular exponent, 1 to 1000; of a lobe that of Blinn's power as steep",
     "ambient": "ambient colour, red green blue, UQ(11, 6) in LSB of the channel",
     "material": "index of the material that exponent and colours written next belong to",
     "lobe": "the next value of a table, UQ(0, 17); with bit 17 the bank whose table begins",
-    "threshold": "threshold of the highlight gate, UQ(0, 17)",
+    "threshold": "of the table: where its highlight ends; {threshold}",
+    "bank": "bank of the material's table",
     "direction": "unit vector to the light, SQ(1, 17)",
     "halfway": "unit half-way vector, SQ(1, 17)",
     "diffuse": "diffuse colour, red green blue, UQ(11, 6)",
@@ -208,7 +217,11 @@ _MEANINGS = {
 
 
 def address_table(
-    lights: int, materials: int = 1, loads_tables: bool = False, has_threshold: bool = False
+    lights: int,
+    materials: int = 1,
+    banks: int = 0,
+    threshold: Format | None = None,
+    loads_tables: bool = False,
 ) -> list[str]:
     """Lines that tell the address of every constant of a pipeline with so many lights and materials.
 
@@ -216,23 +229,28 @@ def address_table(
     ----------
     lights, materials : int
         Their numbers.
+    banks : int
+        Number of tables of lobes.
+    threshold : Format or None
+        Format of a threshold for each table, where there is one.
     loads_tables : bool
-        Whether tables of lobes are loaded.
-    has_threshold : bool
-        Whether the highlight gate gets a threshold for each.
+        Whether tables are loaded.
     """
     rows = [(first, count, name) for name, (first, count) in FIELDS_OF_A_FRAME.items()]
     if materials > 1:
         rows.append((MATERIAL_ADDRESS, 1, "material"))
     if loads_tables:
         rows.append((LOBE_ADDRESS, 1, "lobe"))
-    if has_threshold:
+    if banks > 1:
+        rows.append((BANK_ADDRESS, 1, "bank"))
+    if threshold is not None:
         rows.append((THRESHOLD_ADDRESS, 1, "threshold"))
     for light in range(lights):
         base = (light + 1) * LIGHT_STRIDE
         rows += [(base + first, count, name) for name, (first, count) in FIELDS_OF_A_LIGHT.items()]
-    return [
-        f"  {first:>3}{f' to {first + count - 1}' if count > 1 else '':<8} {_MEANINGS[name]}"
-        + (f" (light {first // LIGHT_STRIDE - 1})" if first >= LIGHT_STRIDE else "")
-        for first, count, name in rows
-    ]
+    lines = []
+    for first, count, name in rows:
+        last = f" to {first + count - 1}" if count > 1 else ""
+        light = f" (light {first // LIGHT_STRIDE - 1})" if first >= LIGHT_STRIDE else ""
+        lines.append(f"  {first:>3}{last:<8} {_MEANINGS[name].format(threshold=threshold)}{light}")
+    return lines

@@ -3,23 +3,27 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
+from blysk.golden.cosines.chord_setup import SpanValues
+from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.lighting.lobe import Lobe
+from blysk.golden.lighting.lobe import Lobe, LobeTable
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
+from blysk.golden.lighting.value_gate import ValueGate
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator, Operands
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
-from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
-from blysk.golden.number.unit_vector import COMPONENT
+from blysk.golden.number.unit_vector import COMPONENT, quantise
+from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import Material
 
 __all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]
@@ -36,11 +40,15 @@ class Spans:
     length : int array, shape (spans,)
         Pixels, 0 to 4095. A span of length 0 gives no pixel; past the largest x, x goes on from 0.
     normal_left, normal_right : int arrays, shape (spans, 3)
-        Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``.
+        Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``; or what the method takes, in
+        its `Interpolator.END_FORMAT`.
     material : int array, shape (spans,), optional
         Index of the material; ``None``: 0 for all.
     values : SpanValues, optional
         Values of each light, for methods with `Interpolator.TAKES_VALUES`, which read no normals.
+    normal_middle : int array, shape (spans, 3), optional
+        Unit normals in the middle of each span, for methods with `Interpolator.TAKES_MIDDLE`; ``None``: the
+        bisectors of the two ends.
     """
 
     x: np.ndarray
@@ -50,10 +58,19 @@ class Spans:
     normal_right: np.ndarray
     material: np.ndarray = None  # type: ignore[assignment]  # becomes an array
     values: SpanValues | None = None
+    normal_middle: np.ndarray | None = None
 
     def __post_init__(self):
         if self.material is None:
             object.__setattr__(self, "material", np.zeros(len(self.length), dtype=np.int64))
+
+    @cached_property
+    def middle(self) -> np.ndarray:
+        """`normal_middle`, or the bisectors; of opposite ends, the left one."""
+        if self.normal_middle is not None:
+            return self.normal_middle
+        total = np.add(self.normal_left, self.normal_right)
+        return quantise(normalise(np.where(np.any(total, axis=1, keepdims=True), total, self.normal_left)))
 
     def __len__(self):
         return len(self.length)
@@ -62,7 +79,9 @@ class Spans:
         """Some of the spans, by a slice, indices or a mask."""
         values = self.values if self.values is None else SpanValues(*(codes[which] for codes in self.values))
         fields = ("x", "y", "length", "normal_left", "normal_right", "material")
-        return Spans(**{name: getattr(self, name)[which] for name in fields}, values=values)
+        middle = self.normal_middle if self.normal_middle is None else self.normal_middle[which]
+        chosen = {name: getattr(self, name)[which] for name in fields}
+        return Spans(**chosen, values=values, normal_middle=middle)
 
 
 @dataclass(frozen=True)
@@ -79,6 +98,8 @@ class Pixels:
         Whether a pixel is the last of its span.
     out_of_range_spans : int
         Spans of a larger angle than the method serves, whose pixels have no error bound.
+    wide_spans : int
+        Spans of a larger angle than the method's error bound allows at the exponent; see `SpanLimit`.
     """
 
     x: np.ndarray
@@ -86,6 +107,7 @@ class Pixels:
     color: np.ndarray
     last: np.ndarray
     out_of_range_spans: int
+    wide_spans: int = 0
 
 
 STYLES = ("throughput", "compact")
@@ -141,8 +163,8 @@ class Design:
     materials : int
         Number of materials, 1 to `frame_constants.MAX_MATERIALS`.
     gate : bool
-        Whether a `HighlightGate` decides which spans have no highlight. With unit normals that changes no
-        pixel.
+        Whether a gate decides which spans have no highlight, which changes no pixel: a `ValueGate` of the
+        chord methods, else a `HighlightGate`, for unit normals.
     grey : bool
         One channel in place of three: it has red's colour operands, and the pixel has it three times.
     x_bits, y_bits, length_bits : int
@@ -183,8 +205,7 @@ class Design:
         if self.gate and not (self.specular and self.lights):
             raise ValueError("without specular light there is nothing to gate")
         if self.gate and not self.interpolator.serves_gate:
-            lacks = "normals" if self.takes_values else "error bound"
-            raise ValueError(f"method {self.method} has no {lacks} for a gate")
+            raise ValueError(f"method {self.method} has no error bound for a gate")
         for name, least in (("x_bits", 1), ("y_bits", 1), ("length_bits", 2)):
             if not least <= getattr(self, name) <= LENGTH_BITS:
                 raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
@@ -193,10 +214,9 @@ class Design:
         """Refuse what a lobe's tables do not serve."""
         if self.build.exponent is not None:
             raise ValueError("a lobe has tables and no exponent; fix its tables")
-        if self.specular.operand == "one_minus_cosine" and self.specular.fraction_bits != 25:
-            raise ValueError(
-                f"1 - N·H has 25 fraction bits in a pipeline, the lobe {self.specular.fraction_bits}"
-            )
+        lobe = cast(Lobe, self.specular)
+        if lobe.operand == "one_minus_cosine" and lobe.fraction_bits != 25:
+            raise ValueError(f"1 - N·H has 25 fraction bits in a pipeline, the lobe {lobe.fraction_bits}")
 
     @property
     def loads_tables(self) -> bool:
@@ -209,8 +229,9 @@ class Design:
 
     def steepness(self, material: Material) -> float:
         """Exponent that decides how fine spans must be, see `ReflectionModel.steepness`."""
-        parameter = self.highlight_parameter(material)
-        return self.specular.model.steepness(parameter) if self.specular else parameter
+        if self.specular is None:
+            return material.exponent
+        return self.specular.model.steepness(self.highlight_parameter(material))
 
     def for_materials(self, materials: Sequence[Material]) -> "Design":
         """The same design for materials, with a bank for each of their lobes, at most `Lobe.MAX_BANKS`."""
@@ -240,10 +261,44 @@ class Design:
         return self.interpolator.TAKES_VALUES
 
     @cached_property
-    def highlight_gate(self) -> HighlightGate:
-        """Bit-accurate model of the highlight gate."""
+    def span_limit(self) -> SpanLimit | None:
+        """Model of the unit that flags wide spans; ``None`` of methods without one."""
+        return SpanLimit() if self.lights and self.interpolator.TAKES_MIDDLE else None
+
+    @cached_property
+    def highlight_gate(self) -> HighlightGate | ValueGate:
+        """Bit-accurate model of the gate."""
         assert self.specular is not None
+        if isinstance(self.interpolator, ChordInterpolator):
+            return ValueGate(self.specular)
         return HighlightGate(self.specular, interpolator=self.interpolator)
+
+    @property
+    def has_threshold(self) -> bool:
+        """Whether frame constants have a threshold: for a gate or a span limit, where tables are loaded."""
+        return self.loads_tables and (self.gate or self.span_limit is not None)
+
+    @property
+    def banks(self) -> int:
+        """Number of tables of lobes; 0 without."""
+        return cast(Lobe, self.specular).banks if self.loads_tables else 0
+
+    @property
+    def threshold_format(self) -> Format | None:
+        """Format of the threshold among the frame constants; ``None`` without."""
+        if not self.has_threshold:
+            return None
+        gate = self.highlight_gate
+        return gate.THRESHOLD_FORMAT if isinstance(gate, ValueGate) else gate.level_format
+
+    def threshold_of(self, table: LobeTable) -> Fixed:
+        """The highlight gate's threshold for a table."""
+        return self.highlight_gate.thresholds_of(np.array([table.last_lit_argument]))[0]
+
+    def _thresholds(self, constants: Sequence[FrameConstants]) -> Fixed:
+        """Those of the tables of materials."""
+        tables = [cast(LobeTable, of_material.lobe) for of_material in constants]
+        return self.highlight_gate.thresholds_of(np.array([table.last_lit_argument for table in tables]))
 
     def lit_spans(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> np.ndarray:
         """Spans that may have a highlight of each light, as the highlight gate decides.
@@ -258,14 +313,24 @@ class Design:
         bool array, shape (spans, lights)
         """
         constants = [constants] if isinstance(constants, FrameConstants) else constants
-        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
         gate = self.highlight_gate
+        exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
         if self.loads_tables:
-            arguments = [of_material.lobe.last_lit_argument for of_material in constants]
-            threshold = gate.thresholds_of(arguments)[spans.material]
+            threshold = self._thresholds(constants)[spans.material]
+        if isinstance(gate, ValueGate):
+            highlight = self._values(spans, constants[0]).highlight.copy()
+            short = np.asarray(spans.length) < 3
+            # Of two pixels there is none in the middle.
+            highlight[short, :, 1] = highlight[short][:, :, ::2].min(axis=-1)
+            one = np.asarray(spans.length) == 1
+            highlight[one] = highlight[one][:, :, :1]
+            if self.loads_tables:
+                return gate.compute_by(highlight, threshold[:, np.newaxis])
+            return gate.compute(highlight, exponent[:, np.newaxis])
+        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
+        if self.loads_tables:
             decide = partial(gate.compute_by, threshold=threshold)
         else:
-            exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
             decide = partial(gate.compute, exponent=exponent)
         lit = [decide(left, right, Fixed(COMPONENT, halfway)) for halfway in constants[0].halfway]
         return np.stack(lit, axis=-1)
@@ -316,7 +381,26 @@ class Design:
             color=color,
             last=step == length[span] - 1,
             out_of_range_spans=out_of_range,
+            wide_spans=self._wide_spans(spans, constants),
         )
+
+    def _values(self, spans: Spans, constants: FrameConstants) -> SpanValues:
+        """Values of spans for a chord method."""
+        if self.takes_values:
+            return spans.values
+        words = spans.normal_left, spans.middle, spans.normal_right, constants.direction, constants.halfway
+        return self.interpolator.values(*(Fixed(COMPONENT, codes) for codes in words))
+
+    def _wide_spans(self, spans: Spans, constants: Sequence[FrameConstants]) -> int:
+        """How many spans the span limit flags."""
+        if self.span_limit is None:
+            return 0
+        exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
+        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
+        operands = left, right, self._values(spans, constants[0]), spans.length, exponent
+        threshold = self._thresholds(constants)[spans.material] if self.loads_tables else None
+        wide = self.span_limit.compute(*operands, self.specular is not None, threshold)
+        return int(np.count_nonzero(wide))
 
     def _check(self, spans: Spans, constants: Sequence[FrameConstants]) -> None:
         """Refuse constants of another design, and codes out of range."""
@@ -327,7 +411,7 @@ class Design:
                 given = len(of_material.direction)
                 raise ValueError(f"the constants are for {given} lights, not {self.lights}")
             if self.loads_tables:
-                self.specular.check(of_material.lobe)
+                cast(Lobe, self.specular).check(cast(LobeTable, of_material.lobe))
             if self.build.exponent not in (None, of_material.exponent):
                 fixed = self.build.exponent
                 raise ValueError(f"the exponent is fixed at {fixed}, not {of_material.exponent}")
@@ -342,19 +426,38 @@ class Design:
         if spans.values is None or spans.values.diffuse.shape != (len(spans), self.lights, 3):
             raise ValueError(f"method {self.method} takes spans with values for {self.lights} lights")
 
+    def operands(self, spans: Spans, constants: FrameConstants) -> Operands:
+        """Bit-accurate operands of every pixel of spans of one pixel or more, in the order of the spans.
+
+        Parameters
+        ----------
+        spans : Spans
+            Spans.
+        constants : FrameConstants
+            L and H of each light.
+        """
+        every = np.arange(len(spans))
+        return self._operands_of(spans, every, np.asarray(spans.length), constants)(slice(None))
+
     def _operands_of(
         self, spans: Spans, kept: np.ndarray, length: np.ndarray, constants: FrameConstants
     ) -> Callable[[slice], Operands]:
         """Function from a part of the kept spans to the operands of its pixels."""
         if self.takes_values:
-            interpolator, values = cast(LocalChordInterpolator, self.interpolator), spans[kept].values
+            interpolator, values = cast(ChordInterpolator, self.interpolator), spans[kept].values
             assert values is not None
             return lambda part: interpolator.compute_values(
                 SpanValues(*(codes[part] for codes in values)), length[part]
             )
-        left, right = (Fixed(COMPONENT, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
+        format = self.interpolator.END_FORMAT
+        left, right = (Fixed(format, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
         vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]
-        return lambda part: self.interpolator.compute(left[part], right[part], length[part], *vectors)
+        middle = []
+        if self.interpolator.TAKES_MIDDLE:
+            middle = [Fixed(COMPONENT, spans.middle[kept])]
+        return lambda part: self.interpolator.compute(
+            left[part], right[part], length[part], *vectors, *(normal[part] for normal in middle)
+        )
 
     def _shade(
         self, cosine: Fixed, highlight: Fixed, dark: np.ndarray, constants: FrameConstants
@@ -365,7 +468,7 @@ class Design:
         diffuse = diffuse_unit.compute(cosine)
         specular = Fixed(Intensity.TERM_FORMAT, np.zeros(dark.shape, dtype=np.int64))
         if self.specular is not None:
-            specular = self.specular.compute(highlight, dark, constants.highlight)
+            specular = self.specular.compute(highlight, dark, cast(Any, constants.highlight))
         return self.intensity.compute(*self._colors(constants), diffuse, specular)
 
     def _ambient(self, constants: Sequence[FrameConstants], material: np.ndarray) -> np.ndarray:

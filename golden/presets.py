@@ -13,6 +13,7 @@ from blysk.golden.methods import (
     local_chord_interpolator,
     quadratic_interpolator,
     recurrence_interpolator,
+    renormalise_interpolator,
 )
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator, Operand
 from blysk.golden.pipeline import Build, Design
@@ -23,6 +24,7 @@ __all__ = ["LOBES", "METHODS", "MODELS", "PUBLISHED", "preset"]
 
 _MODULES = (
     linear_interpolator,
+    renormalise_interpolator,
     bisection_interpolator,
     quadratic_interpolator,
     angular_interpolator,
@@ -54,7 +56,7 @@ LOBES: dict[str, Lobe] = {
 
 
 def preset(
-    method: str = "quadratic",
+    method: str = "chord",
     model: str | ReflectionModel | None = "cosquad",
     lights: int = 1,
     *,

@@ -6,6 +6,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.frame_constants import (
+    BANK_ADDRESS,
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
     LIGHT_STRIDE,
@@ -13,8 +14,8 @@ from blysk.golden.frame_constants import (
     MAX_MATERIALS,
     THRESHOLD_ADDRESS,
 )
-from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import Specular
+from blysk.golden.number.fixed import Format
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.lighting.intensity import color_shape
 
@@ -26,18 +27,26 @@ def write_shape() -> data.StructLayout:
     return data.StructLayout({"address": unsigned(9), "data": unsigned(18)})
 
 
-def frame_constants_shape(lights: int, has_threshold: bool = False) -> data.StructLayout:
-    """Shape of all constants of a frame with so many lights, perhaps with the highlight gate's T."""
+def frame_constants_shape(lights: int, threshold: Format | None = None, banks: int = 1) -> data.StructLayout:
+    """Shape of all constants of a frame.
+
+    Parameters
+    ----------
+    lights, threshold, banks
+        Those of `FrameConstantsUnit`.
+    """
     light = {
         "direction": normal_shape(),
         "halfway": normal_shape(),
         "diffuse": color_shape(),
         "specular": color_shape(),
     }
-    threshold = {"threshold": unsigned(HighlightGate().fraction_bits)} if has_threshold else {}
+    tables = {} if threshold is None else {"threshold": unsigned(threshold.width)}
+    if banks > 1:
+        tables["bank"] = range(banks)
     return data.StructLayout(
         {
-            **threshold,
+            **tables,
             "exponent": unsigned(Specular.EXPONENT_BITS),
             "ambient": color_shape(),
             "lights": data.ArrayLayout(data.StructLayout(light), lights),
@@ -56,11 +65,12 @@ class FrameConstantsUnit(wiring.Component):
     ======================== ==========================================================
     address                  constant
     ======================== ==========================================================
-    0                        exponent, 1 to 1000; of a lobe the bank of its table
+    0                        exponent, 1 to 1000
     1 to 3                   ambient red, green, blue, ``UQ(11, 6)`` LSB
     4                        index of a material, where there are several
     5                        taken by the tables of lobes, where they are loaded: `LobeMemory`
-    6                        the highlight gate's T, ``UQ(0, 17)``, where tables are loaded
+    6                        threshold of a material's table
+    7                        bank of a material's table, where there are several
     16 (light + 1) + 0 to 2  direction to the light, ``SQ(1, 17)``
     16 (light + 1) + 3 to 5  half-way vector, ``SQ(1, 17)``
     16 (light + 1) + 6 to 8  diffuse red, green, blue, ``UQ(11, 6)`` LSB
@@ -78,8 +88,10 @@ class FrameConstantsUnit(wiring.Component):
         Number of lights.
     materials : int
         Number of materials, 1 to `MAX_MATERIALS`.
-    has_threshold : bool
-        Whether there is the highlight gate's T, for each material.
+    threshold : Format or None
+        Format of a threshold for each material, see `Design.threshold_of`. ``None``: there is none.
+    banks : int
+        Number of tables of lobes that materials choose from.
 
     Raises
     ------
@@ -94,22 +106,26 @@ class FrameConstantsUnit(wiring.Component):
         Whether no write is accepted.
     material : :py:`In(range(materials))`
         Only where there are several: the material whose constants are given.
-    constants : :py:`Out(frame_constants_shape(lights, has_threshold))`
+    constants : :py:`Out(frame_constants_shape(lights, threshold, banks))`
         The constants.
 
     Source: docs/theory/units.md#frame-constants.
     """
 
-    def __init__(self, lights: int, materials: int = 1, has_threshold: bool = False):
+    def __init__(self, lights: int, materials: int = 1, threshold: Format | None = None, banks: int = 1):
         if not 1 <= materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {materials}")
         self.lights = lights
         self.materials = materials
-        self.has_threshold = has_threshold
+        self.tables = {}
+        if threshold is not None:
+            self.tables[THRESHOLD_ADDRESS] = "threshold"
+        if banks > 1:
+            self.tables[BANK_ADDRESS] = "bank"
         members = {
             "write": In(stream.Signature(write_shape())),
             "hold": In(1),
-            "constants": Out(frame_constants_shape(lights, has_threshold)),
+            "constants": Out(frame_constants_shape(lights, threshold, banks)),
         }
         if materials > 1:
             members["material"] = In(range(materials))
@@ -124,9 +140,9 @@ class FrameConstantsUnit(wiring.Component):
             field = self.constants[name]
             words |= {first + k: field[k] if count > 1 else field for k in range(count)}
             of_material |= set(range(first, first + count))
-        if self.has_threshold:
-            words[THRESHOLD_ADDRESS] = self.constants.threshold
-            of_material.add(THRESHOLD_ADDRESS)
+        for address, name in self.tables.items():
+            words[address] = self.constants[name]
+            of_material.add(address)
         for light in range(self.lights):
             base = (light + 1) * LIGHT_STRIDE
             for name, (first, count) in FIELDS_OF_A_LIGHT.items():

@@ -10,6 +10,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.frame_constants import LOBE_ADDRESS
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.pipeline import Design
 from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
 from blysk.hdl.frame_constants import FrameConstantsUnit, write_shape
@@ -18,6 +19,7 @@ from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.hdl.lighting.light import SPECULAR_KINDS, LightUnit
 from blysk.hdl.lighting.lobe import LobeMemory
+from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
 
@@ -28,6 +30,7 @@ PORT_DESCRIPTIONS = {
     "i_y": "its row",
     "i_length": "pixels of the span; 0 gives none",
     "i_normal_left": "unit normal at the first pixel centre, times 2^17 - 1",
+    "i_normal_middle": "unit normal in the middle between them",
     "i_normal_right": "unit normal at the last pixel centre",
     "i_values": "codes of N.L and 1 - N.H of each light at the first pixel, the middle and the last pixel",
     "i_material": "index of the span's material",
@@ -40,6 +43,7 @@ PORT_DESCRIPTIONS = {
     "write_address": "frame constant to write, see above",
     "write_data": "its code; accepted when no span is inside",
     "status_out_of_range_spans": "spans since reset of an angle that the method does not serve, up to 65535",
+    "status_wide_spans": "spans since reset wider than the error bound of the exponent allows, up to 65535",
     "status_empty_spans": "spans of length 0 since reset, up to 65535",
     "status_overrun": "a span went past the largest column",
 }
@@ -78,11 +82,18 @@ def status_shape() -> data.StructLayout:
     """Shape of the pipeline's counters since reset, which stop at their largest value.
 
     ``out_of_range_spans``: spans of an angle that the method does not serve, whose pixels have no error
-    bound; counted some cycles after the span is accepted. ``empty_spans``: spans of length 0. ``overrun``:
+    bound; counted some cycles after the span is accepted. ``wide_spans``: spans that are wider than the error
+    bound of the exponent allows, of the chord method; see `SpanLimit`. ``empty_spans``: spans of length 0.
+    ``overrun``:
     whether a span went past the largest x, after which x goes on from 0.
     """
     return data.StructLayout(
-        {"out_of_range_spans": unsigned(16), "empty_spans": unsigned(16), "overrun": unsigned(1)}
+        {
+            "out_of_range_spans": unsigned(16),
+            "wide_spans": unsigned(16),
+            "empty_spans": unsigned(16),
+            "overrun": unsigned(1),
+        }
     )
 
 
@@ -175,6 +186,11 @@ class ShadingPipelineUnit(wiring.Component):
             product_interval = p.intensity.channels
             if setup_interval is None:
                 setup_interval = max(method.setup_intervals(p.interpolator), default=None)
+        value_gate = None
+        if p.gate and isinstance(p.highlight_gate, ValueGate):
+            value_gate = ValueGateUnit(
+                p.highlight_gate, p.lights, exponent=p.build.exponent, takes_threshold=p.loads_tables
+            )
         self._interpolator = method(
             p.interpolator,
             p.lights,
@@ -182,13 +198,15 @@ class ShadingPipelineUnit(wiring.Component):
             highlights=p.specular is not None,
             length_bits=p.length_bits,
             product_interval=product_interval,
+            gate=value_gate,
+            takes_threshold=p.has_threshold,
         )
         self.setup_interval = self._interpolator.setup_interval
         self._lights = self._light_units(compact)
         self._intensity = (CompactIntensityUnit if compact else IntensityUnit)(p.intensity)
         chain = (self._interpolator, self._lights[0], self._intensity, self._assembler)
         self.latency = sum(unit.latency for unit in chain)
-        if p.gate:
+        if p.gate and value_gate is None:
             interval = min(self.setup_interval, 3 + 12 * p.lights)
             self._gate = HighlightGateUnit(
                 p.highlight_gate,
@@ -237,7 +255,8 @@ class ShadingPipelineUnit(wiring.Component):
 
         17 are a memory of 16 words, and a register behind it.
         """
-        return max(-(-self.latency // self.setup_interval), 17)
+        interval = getattr(self._interpolator, "shortest_interval", None) or self.setup_interval
+        return max(-(-self.latency // interval), 17)
 
     @property
     def spans_inside(self) -> int:
@@ -249,8 +268,9 @@ class ShadingPipelineUnit(wiring.Component):
         m = Module()
         p = self.parameters
         m.submodules.pixel_assembler = assembler = self._assembler
-        has_threshold = self._gate is not None and self._gate.takes_threshold
-        m.submodules.frame_constants = frame = FrameConstantsUnit(p.lights, p.materials, has_threshold)
+        m.submodules.frame_constants = frame = FrameConstantsUnit(
+            p.lights, p.materials, p.threshold_format, p.banks
+        )
         sinks = [self._carry_coordinates(m)]
         if p.lights:
             sinks += self._shade(m, frame)
@@ -328,7 +348,9 @@ class ShadingPipelineUnit(wiring.Component):
                     m.d.sync += frame.material.eq(material)
             with m.Elif(~waited.all()):
                 m.d.sync += waited.eq(waited + 1)
-            m.d.comb += settled.eq((material == frame.material) & waited.all())
+            # Of no payload that is not valid: its bits may be unknown.
+            same = (material == frame.material) & waited.all()
+            m.d.comb += settled.eq(~self.i.valid | same)
         else:
             m.d.comb += settled.eq(1)
         return admit
@@ -338,6 +360,7 @@ class ShadingPipelineUnit(wiring.Component):
         span, status = self.i.payload, self.status
         for counter, event in (
             (status.out_of_range_spans, self._interpolator.out_of_range if self._interpolator else 0),
+            (status.wide_spans, getattr(self._interpolator, "wide", 0)),
             (status.empty_spans, self.i.valid & self.i.ready & (span.length == 0)),
             (status.overrun, admit & (span.x + span.length > 1 << self.parameters.x_bits)),
         ):
@@ -354,9 +377,13 @@ class ShadingPipelineUnit(wiring.Component):
         sinks = [(interpolator.i.valid, interpolator.i.ready)]
         words = interpolator.i.payload
         m.d.comb += [Value.cast(words[name]).eq(Value.cast(span[name])) for name in words.shape().members]
-        if not p.takes_values:
-            for vectors, light in zip(interpolator.constants, frame.constants.lights, strict=True):
-                m.d.comb += [vectors[name].eq(light[name]) for name in ("direction", "halfway")]
+        for vectors, light in zip(interpolator.light_vectors, frame.constants.lights, strict=False):
+            m.d.comb += [vectors[name].eq(light[name]) for name in ("direction", "halfway")]
+        if interpolator.exponent is not None:
+            exponent = frame.constants.exponent if p.build.exponent is None else p.build.exponent
+            m.d.comb += interpolator.exponent.eq(exponent)
+        if interpolator.threshold is not None:
+            m.d.comb += Value.cast(interpolator.threshold).eq(frame.constants.threshold)
         operands, gated = interpolator.o, None
         if self._gate is not None:
             operands, gated = self._decide(m, frame, sinks)
@@ -383,12 +410,14 @@ class ShadingPipelineUnit(wiring.Component):
                 intensity.i.payload.diffuse[index].eq(terms.diffuse),
                 intensity.i.payload.specular[index].eq(terms.specular),
             ]
-            if gated is not None:
-                m.d.comb += light.i.payload.gated.eq(gated[index])
+            if p.gate:
+                decision = words.gated if gated is None else gated[index]
+                m.d.comb += light.i.payload.gated.eq(decision)
             if self._slope is not None:
                 m.d.comb += light.constants.eq(self._slope.slope)
             elif "constants" in light.signature.members:
-                m.d.comb += light.constants.eq(frame.constants.exponent)
+                word = frame.constants.bank if p.loads_tables else frame.constants.exponent
+                m.d.comb += Value.cast(light.constants).eq(word)
         m.d.comb += intensity.constants.ambient.eq(frame.constants.ambient)
         connect(m, intensity.o, self._assembler.colors)
         return sinks

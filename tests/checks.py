@@ -9,7 +9,7 @@ from amaranth.lib import data
 from amaranth.lib.wiring import Component, Out
 from amaranth.sim import Simulator
 
-from blysk.bench.quality.mutation import Wrapped
+from blysk.bench.quality.mutation import Wrapped, flags_of
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.simulate import simulate
@@ -30,15 +30,17 @@ def assert_beats_equal(actual, expected, path="beat"):
 
 
 class Counted(Wrapped):
-    """A unit, with the number of cycles on which its ``out_of_range`` is high as status."""
+    """A unit, with the number of cycles on which each of its flags is high as status."""
 
     def __init__(self, unit: Component):
-        super().__init__(unit, status=Out(data.StructLayout({"out_of_range": unsigned(32)})))
+        self.flags = flags_of(unit)
+        super().__init__(unit, status=Out(data.StructLayout(dict.fromkeys(self.flags, unsigned(32)))))
 
     def elaborate(self, platform):
         m = super().elaborate(platform)
         m.submodules.unit = self.unit
-        m.d.sync += self.status.out_of_range.eq(self.status.out_of_range + self.unit.out_of_range)
+        for name in self.flags:
+            m.d.sync += self.status[name].eq(self.status[name] + getattr(self.unit, name))
         return m
 
 

@@ -23,7 +23,7 @@ from blysk.sim.engines.engine import CompilerMissing, Ports, Stimulus, Trace
 from blysk.sim.engines.simulate import stimulus_of
 from blysk.sim.units.record import Record
 
-__all__ = ["Mutants", "Wrapped", "killed", "mutate", "vectors_of"]
+__all__ = ["Mutants", "Wrapped", "flags_of", "killed", "mutate", "vectors_of"]
 
 
 def vectors_of(record: Record) -> list[tuple[Stimulus, Trace]]:
@@ -91,8 +91,8 @@ class Wrapped(Component):
 class _Observed(Wrapped):
     """A unit, an input that chooses a mutant, and outputs that are 0 where no partner of a stream looks.
 
-    A ``ready`` is seen while ``valid`` is high, a payload likewise. The cycles on which a unit's
-    ``out_of_range`` is high are its status, as in a pipeline.
+    A ``ready`` is seen while ``valid`` is high, a payload likewise. The cycles on which each flag of a unit
+    is high are its status, as in a pipeline.
 
     Parameters
     ----------
@@ -104,16 +104,18 @@ class _Observed(Wrapped):
 
     def __init__(self, unit: Component, width: int):
         members = {"mutant": In(width)}
-        if _flags(unit):
-            members["status"] = Out(32)
+        self.flags = flags_of(unit)
+        if self.flags:
+            members["status"] = Out(32 * len(self.flags))
         super().__init__(unit, **members)
 
     def elaborate(self, platform):
         """Add the unit."""
         m = super().elaborate(platform)
         m.submodules.unit = self.unit
-        if _flags(self.unit):
-            m.d.sync += self.status.eq(self.status + self.unit.out_of_range)
+        for index, name in enumerate(self.flags):
+            count = self.status.word_select(index, 32)
+            m.d.sync += count.eq(count + getattr(self.unit, name))
         payload = Value.cast(self.o.payload)
         m.d.comb += payload.eq(Mux(self.o.valid, Value.cast(self.unit.o.payload).as_unsigned(), 0))
         for name in ("i", "write"):
@@ -123,9 +125,11 @@ class _Observed(Wrapped):
         return m
 
 
-def _flags(unit: Component) -> bool:
-    """Whether a unit has a flag that no run of its own shows."""
-    return "out_of_range" in unit.signature.members and "status" not in unit.signature.members
+def flags_of(unit: Component) -> list[str]:
+    """Names of a unit's flags that no run of its own shows."""
+    if "status" in unit.signature.members:
+        return []
+    return [name for name in ("out_of_range", "wide") if name in unit.signature.members]
 
 
 # Reset is held low, so that it goes.
@@ -222,8 +226,8 @@ class Mutants(cxxrtl.Model):
 
     def __init__(self, unit: Component, folder: Path):
         self.ports = Ports(unit)
-        if _flags(unit):
-            self.ports.status = unsigned(32)
+        if flags := flags_of(unit):
+            self.ports.status = unsigned(32 * len(flags))
         source = resources.files(__package__).joinpath("mutants.cc").read_text(encoding="utf-8")
         driver = cxxrtl._members(self.ports) + cxxrtl._source("cxxrtl_driver.cc") + source
         compiler = next(find_compilers(), None)

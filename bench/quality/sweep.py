@@ -19,21 +19,16 @@ import numpy as np
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.cut import cut_local_spans, cut_wide_spans
-from blysk.golden.frames.local import local_values
-from blysk.golden.frames.prepare import quantise_spans
+from blysk.golden.frames.cut import cut_spans
+from blysk.golden.frames.prepare import spans_for
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
-from blysk.golden.methods.local_chord_interpolator import SpanValues
-from blysk.golden.number.fixed import Fixed
-from blysk.golden.number.unit_vector import COMPONENT
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity_of_cosines, saturate
-from blysk.golden.reference.raster import Raster, rasterise
+from blysk.golden.reference.raster import Raster, fragment_normals, rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import Scene
 from blysk.sim.errors import InputError
@@ -131,9 +126,7 @@ class Frame:
         self.scene = scene if light is None else replace(scene, lights=(Light(tuple(light)),))
         self.raster = raster = rasterise(self.scene)
         self._shown = np.flatnonzero(raster.visible)
-        span = raster.span[self._shown]
-        t = raster.offset[self._shown] / np.maximum(raster.length[span] - 1, 1)
-        normals = interpolate("normalised", raster.normal_left[span], raster.normal_right[span], t)
+        normals = fragment_normals(self.scene, raster, self._shown)
         (light,) = self.scene.lights
         halfway = halfway_vector(light.direction, self.scene.camera.viewer)
         self._cosine = normals @ np.asarray(light.direction)
@@ -166,13 +159,9 @@ class Frame:
 
     def spans_of(self, design: Design, exponent: int) -> tuple[Raster, Spans]:
         """Spans as `prepare` cuts and quantises them for a pipeline."""
-        method, material = design.interpolator, self.scene.mesh.material
-        if design.takes_values:
-            scene = self.scene_of(exponent)
-            cut, _ = cut_local_spans(scene, self.raster, method)
-            return cut, replace(quantise_spans(cut, material), values=local_values(scene, cut, 1))
-        cut, _ = cut_wide_spans(self.raster, method.widest_span(exponent), method.largest_deviation(exponent))
-        return cut, quantise_spans(cut, material)
+        scene = self.scene_of(exponent)
+        cut, _ = cut_spans(scene, self.raster, design)
+        return cut, spans_for(scene, cut, design)
 
     def points(self, exponent: int, models: Iterable[str], method: str = "chord") -> Iterator[Point]:
         """Errors of the frames at an exponent.
@@ -220,14 +209,7 @@ class Frame:
         fragment = self._shown[chosen]
         which, place = np.unique(cut.span[fragment], return_inverse=True)
         length = spans.length[which]
-        if design.takes_values:
-            values = SpanValues(*(codes[which] for codes in spans.values))
-            operands = design.interpolator.compute_values(values, length)
-        else:
-            ends = (Fixed(COMPONENT, codes[which]) for codes in (spans.normal_left, spans.normal_right))
-            light = (Fixed(COMPONENT, codes) for codes in (constants.direction, constants.halfway))
-            operands = design.interpolator.compute(*ends, length, *light)
-        cosine = operands.cosine.codes[:, 0]
+        cosine = design.operands(spans[which], constants).cosine.codes[:, 0]
         start = np.cumsum(length) - length
         of_model = cosine[start[place] + cut.offset[fragment]]
         exact = self._cosine[chosen]

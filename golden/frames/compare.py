@@ -1,15 +1,14 @@
 """Errors of a frame against its method in float64, exact interpolation and exact shading."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from time import perf_counter
-from typing import cast
 
 import numpy as np
 
 from blysk.golden.frames.frame import Frame
-from blysk.golden.frames.local import local_values
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.frames.local import line_ends, local_values
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import Raster
@@ -27,13 +26,14 @@ class Comparison:
     Parameters
     ----------
     golden : float64 array, shape (height, width, 3)
-        Exactly normalised Phong interpolation along the spans with the frame's model, in [0, 1].
+        The exact frame with the frame's model, in [0, 1]: per-pixel normals, perspective-correct and
+        normalised, of the triangles as rasterised.
     arithmetic_error : ErrorFigures
         Against the same method and model in float64.
     method_error : ErrorFigures
         Against ``golden``.
     total_error : ErrorFigures
-        Against the exact frame: Phong shading as on a GPU, Blinn's model, or that of a lobe's table.
+        Against the exact frame with Blinn's model, or that of a lobe's table.
     nmse : float
         Against the exact frame.
     mnse_published, mnse_published_share : float
@@ -68,12 +68,13 @@ def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarra
         In [0, 1].
     """
     interpolator = design.interpolator
-    if design.takes_values:
+    if isinstance(interpolator, ChordInterpolator):
         values = local_values(scene, raster)
-        cosine, one_minus_cosine = cast(LocalChordInterpolator, interpolator).exact_operands(
-            values, raster.length
-        )
+        cosine, one_minus_cosine = interpolator.exact_operands(values, raster.length)
         return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, _model_of(design))
+    if interpolator.takes_line:
+        left, right = line_ends(raster)
+        raster = replace(raster, normal_left=left, normal_right=right)
     return shade_spans(scene, raster, interpolator.exact_normals, _model_of(design), interpolator.uses_chord)
 
 
@@ -95,7 +96,7 @@ def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
     """
     start = perf_counter()
     same_method = method_in_float64(scene, design, frame.cut_raster)
-    golden = shade_spans(scene, frame.raster, "normalised", _model_of(design))
+    golden = render(scene, "phong", _model_of(design), raster=frame.raster).image
     target = _model_of(design) if design.loads_tables else BLINN
     exact = render(scene, "phong", target, raster=frame.raster)
     seconds = perf_counter() - start

@@ -1,149 +1,132 @@
 """Cutting of spans that are too wide for an interpolation method."""
 
-import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from blysk.golden.cosines.local_chord_setup import LocalChordSetup
+from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.cosines.span_limit import SpanLimit
+from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import CHUNK, SurfacePoints, along_spans, chunks
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.number.spans import pixels_of, runs_of
 from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.golden.pipeline import Design
-from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["cut_local_spans", "cut_spans", "cut_wide_spans"]
+__all__ = ["cut_by_angle", "cut_by_error", "cut_spans", "missed_spans"]
 
 
 def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int]:
     """Spans cut as the method of a pipeline needs them, and how many of the given ones were cut.
 
+    Every normal at a cut is the surface's own there, ``normalise((1-t) m_l N_l + t m_r N_r)`` of the span
+    that was cut, with the magnitudes of the rasteriser. A pixel more than half goes to the
+    right. The fragments stay as they are, in their order.
+
     Parameters
     ----------
     scene : Scene
-        Materials and, for methods that take values, lights and viewer.
+        Materials, lights and viewer.
     raster : Raster
         Spans from `rasterise`.
     design : Design
         The pipeline.
-    """
-    interpolator = design.interpolator
-    if design.takes_values:
-        steepness = [design.steepness(material) for material in scene.materials]
-        return cut_local_spans(scene, raster, interpolator, steepness)
-    exponents = [design.steepness(material) for material in scene.materials]
-    widest = min(map(interpolator.widest_span, exponents))
-    return cut_wide_spans(raster, widest, min(map(interpolator.largest_deviation, exponents)))
-
-
-def cut_wide_spans(
-    raster: Raster, largest_angle: float, largest_deviation: float = math.inf
-) -> tuple[Raster, int]:
-    """Halve spans until the normals at the ends of each are at most an angle apart.
-
-    A part of a span has a curve of its own: along ``normalise((1-t) N_l + t N_r)`` the angle does not grow
-    evenly, so that in the middle of the part the span's normal is not quite the middle normal of the part's
-    ends. Parts in which the two are further apart than ``largest_deviation`` are halved, too.
-
-    The normals at a cut are those of the span's own curve, ``normalise((1-t) N_l + t N_r)``, at the pixel
-    centres on both sides of it. A pixel more or less than half goes to the right. The fragments stay as they
-    are, in their order.
-
-    Parameters
-    ----------
-    raster : Raster
-        Spans; replaced are ``x, y, length, triangle, normal_left, normal_right, back, span, offset``.
-    largest_angle : float
-        Degrees, over 0.
-    largest_deviation : float
-        Radians, over 0.
 
     Returns
     -------
     raster : Raster
-        The same fragments in narrower spans; the rasteriser's own weights and magnitudes are empty.
+        The same fragments in narrower spans, with the weights and magnitudes of their ends.
     cut : int
         How many of the given spans were cut.
     """
+    interpolator, limits = design.interpolator, HighlightLimits.of(scene.materials, design)
+    if interpolator.CUT_BY_ERROR:
+        return cut_by_error(scene, raster, interpolator, limits)
+    return cut_by_angle(raster, min(map(interpolator.widest_span, limits.exponents)))
+
+
+def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
+    """Halve spans of more than two pixels while the normals at their ends are over an angle apart.
+
+    Parameters
+    ----------
+    raster : Raster
+        Spans.
+    largest_angle : float
+        Degrees, over 0.
+
+    Returns
+    -------
+    raster, cut
+        As of `cut_spans`.
+    """
+    cosine = np.cos(np.radians(largest_angle))
+
+    def is_wide(origin, first, last):
+        left, right = (_normals(raster, origin, place) for place in (first, last))
+        return (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
+
+    return _halve(raster, is_wide)
+
+
+def _normals(raster: Raster, span: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """True unit normals at pixels of spans, which need not be whole."""
+    _, line = along_spans(raster, span, place / np.maximum(raster.length[span] - 1, 1))
+    # Between opposite normals the line passes through 0, where any normal is as good.
+    return np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left[span])
+
+
+def _halve(raster: Raster, is_wide: Callable[..., np.ndarray]) -> tuple[Raster, int]:
+    """Spans, halved while ``is_wide(span, first pixel, last pixel)``; and how many were."""
     origin = np.arange(len(raster.length))
     first = np.zeros(len(origin), dtype=np.int64)
     last = raster.length.astype(np.int64) - 1
-
-    def normals(span, offset):
-        t = offset / np.maximum(raster.length[span] - 1, 1)
-        curve = interpolate("normalised", raster.normal_left[span], raster.normal_right[span], t)
-        # Between opposite normals the curve passes through 0, where any normal is as good.
-        return np.where(np.any(curve, axis=-1, keepdims=True), curve, raster.normal_left[span])
-
-    left, right = raster.normal_left, raster.normal_right
-    cosine = np.cos(np.radians(largest_angle))
-    while True:
-        out_of_range = (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
-        # A whole span bends evenly; a part of two pixels has nothing between them.
-        part = np.flatnonzero((last - first > 1) & (last - first < raster.length[origin] - 1) & ~out_of_range)
-        if len(part) and largest_deviation < math.inf:
-            own = normals(origin[part], (first[part] + last[part]) / 2)
-            bend = np.linalg.norm(own - normalise(left[part] + right[part]), axis=-1)
-            out_of_range[part[bend > largest_deviation]] = True
-        if not out_of_range.any():
-            break
-        middle = (first[out_of_range] + last[out_of_range] + 1) // 2
-        parts = [
-            (
-                origin[~out_of_range],
-                first[~out_of_range],
-                last[~out_of_range],
-                left[~out_of_range],
-                right[~out_of_range],
-            ),
-            (
-                origin[out_of_range],
-                first[out_of_range],
-                middle - 1,
-                left[out_of_range],
-                normals(origin[out_of_range], middle - 1),
-            ),
-            (
-                origin[out_of_range],
-                middle,
-                last[out_of_range],
-                normals(origin[out_of_range], middle),
-                right[out_of_range],
-            ),
-        ]
-        origin, first, last, left, right = (np.concatenate(field) for field in zip(*parts, strict=True))
-    result = _parts(raster, origin, first, last, left, right)
-    return result, int(np.count_nonzero(np.bincount(origin, minlength=1) > 1))
+    settled = []
+    while len(origin):
+        wide = np.zeros(len(origin), dtype=bool)
+        for part in chunks(len(origin)):
+            wide[part] = is_wide(origin[part], first[part], last[part])
+        settled.append((origin[~wide], first[~wide], last[~wide]))
+        origin, first, last = origin[wide], first[wide], last[wide]
+        middle = (first + last + 1) // 2
+        origin = np.concatenate((origin, origin))
+        first, last = np.concatenate((first, middle)), np.concatenate((middle - 1, last))
+    if settled:
+        origin, first, last = (np.concatenate(field) for field in zip(*settled, strict=True))
+    cut = int(np.count_nonzero(np.bincount(origin, minlength=1) > 1))
+    return (_parts(raster, origin, first, last) if cut else raster), cut
 
 
-def _parts(raster, origin, first, last, left, right, has_weights=False) -> Raster:
+def _parts(raster, origin, first, last) -> Raster:
     """Parts of spans, each of pixels first to last of its origin, in place of the spans."""
     order = np.lexsort((first, origin))
-    origin, first, last, left, right = (field[order] for field in (origin, first, last, left, right))
+    origin, first, last = (field[order] for field in (origin, first, last))
     length = (last - first + 1).astype(np.int32)
     start = np.cumsum(length) - length
     span = np.repeat(np.arange(len(length), dtype=np.int32), length)
-    nothing = np.empty((0, 3))
-    ends = dict.fromkeys(("weights_left", "weights_right"), nothing)
-    ends |= dict.fromkeys(("magnitude_left", "magnitude_right"), nothing[:, 0])
-    if has_weights:
-        steps = np.maximum(raster.length[origin] - 1, 1)
-        for side, place in (("left", first), ("right", last)):
-            weights, line = along_spans(raster, origin, place / steps)
-            ends |= {f"weights_{side}": weights, f"magnitude_{side}": np.linalg.norm(line, axis=1)}
+    steps = np.maximum(raster.length[origin] - 1, 1)
+    ends = {}
+    for side, place in (("left", first), ("right", last)):
+        weights, line = along_spans(raster, origin, place / steps)
+        # The rasteriser's own normals stay as they are, to the bit.
+        own = place == (0 if side == "left" else raster.length[origin] - 1)
+        given = getattr(raster, f"normal_{side}")[origin]
+        ends |= {
+            f"normal_{side}": np.where(own[:, np.newaxis], given, _normals(raster, origin, place)),
+            f"weights_{side}": weights,
+            f"magnitude_{side}": np.linalg.norm(line, axis=1),
+        }
     return replace(
         raster,
         x=(raster.x[origin] + first).astype(np.int32),
         y=raster.y[origin],
         length=length,
         triangle=raster.triangle[origin],
-        normal_left=left,
-        normal_right=right,
         **ends,
         back=raster.back[origin],
         span=span,
@@ -151,156 +134,239 @@ def _parts(raster, origin, first, last, left, right, has_weights=False) -> Raste
     )
 
 
-def cut_local_spans(
-    scene: Scene,
-    raster: Raster,
-    interpolator: LocalChordInterpolator | None = None,
-    exponents: Sequence[float] | None = None,
+def cut_by_error(
+    scene: Scene, raster: Raster, interpolator: Interpolator, limits: HighlightLimits | None = None
 ) -> tuple[Raster, int]:
-    """Halve spans until quadratics through three values serve every light, with L and H of each pixel's own.
+    """Halve spans until the method's own curve is near the exact one for every light.
 
-    N·L and u along a span are those of its own normals, ``normalise((1-t) N_l + t N_r)``, and of the places
-    on the surface, perspective-correct. A span is halved where
+    N·L and u along a span are those of its true normals and of the places on the surface,
+    perspective-correct. A span is halved where
 
-    - a word of `LocalChordSetup` would not hold its value;
-    - it has more than three pixels, so that some lie between those that the quadratics go through, and does
-      not keep what `LocalChordInterpolator` asks for: how far vectors may turn; the tolerances, that of the
-      highlight by the exponent of the span's material and the least u on the span, as it may be coarse where
-      it is dark;
+    - its angle is over the method's `Interpolator.widest_span`;
+    - the chord method would flag it: a word of `ChordSetup` would not hold its value, or it is wide, as
+      `SpanLimit` has it;
+    - it has pixels between those that the method's curve goes through, and vectors turn farther along it than
+      `ChordInterpolator` allows, or the curve misses the exact N·L or u by more than its tolerances, that of
+      the highlight by the exponent of the span's material and the least u on the span, as it may be coarse
+      where it is dark;
     - a light's N·L changes its sign, or nearly, where its highlight shows, and the pixels might not have the
       sign of the exact value at every one of them, unless that is within 2^-25 of 0.
 
     Of lights that are behind the surface along all of a span only the turn counts.
-
-    A pixel more or less than half goes to the right. The fragments stay as they are, in their order.
 
     Parameters
     ----------
     scene : Scene
         Mesh, lights, viewer and materials.
     raster : Raster
-        Spans from `rasterise`.
-    interpolator : LocalChordInterpolator, optional
+        Spans.
+    interpolator : Interpolator
         The method.
-    exponents : sequence of float, optional
-        Exponent, or steepness, of each material's highlight. By default the material's exponent.
+    limits : HighlightLimits, optional
+        What the materials' highlights ask. By default those of their exponents.
 
     Returns
     -------
-    raster : Raster
-        The same fragments in narrower spans. Their weights are those of their ends; the magnitudes are such
-        that ``normalise((1-t) m_l N_l + t m_r N_r)`` is the normal of the span that was cut.
-    cut : int
-        How many of the given spans were cut.
+    raster, cut
+        As of `cut_spans`.
     """
-    interpolator = interpolator or LocalChordInterpolator()
-    # The curve of the method's reference, whatever the perspective.
-    ones = np.ones(len(raster.length))
-    whole = replace(raster, magnitude_left=ones, magnitude_right=ones)
-    exponents = np.array(exponents or [material.exponent for material in scene.materials])
-    origin = np.arange(len(raster.length))
-    first = np.zeros(len(origin), dtype=np.int64)
-    last = raster.length.astype(np.int64) - 1
-    settled = []
-    while len(origin):
-        out_of_range = np.zeros(len(origin), dtype=bool)
-        for part in chunks(len(origin)):
-            exponent = exponents[scene.mesh.material[raster.triangle[origin[part]]]]
-            out_of_range[part] = _is_wide(
-                scene, whole, interpolator, exponent, origin[part], first[part], last[part]
-            )
-        settled.append((origin[~out_of_range], first[~out_of_range], last[~out_of_range]))
-        origin, first, last = origin[out_of_range], first[out_of_range], last[out_of_range]
-        middle = (first + last + 1) // 2
-        origin = np.concatenate((origin, origin))
-        first, last = np.concatenate((first, middle)), np.concatenate((middle - 1, last))
-    origin, first, last = (
-        (np.concatenate(field) for field in zip(*settled, strict=True)) if settled else (origin, first, last)
-    )
-    steps = np.maximum(raster.length[origin] - 1, 1)
+    limits = limits or HighlightLimits.of(scene.materials)
+    cosines = np.cos(np.radians([interpolator.widest_span(exponent) for exponent in limits.exponents]))
 
-    def normals(place):
-        _, line = along_spans(whole, origin, place / steps)
-        return np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left[origin])
+    def is_wide(origin, first, last):
+        material = scene.mesh.material[raster.triangle[origin]]
+        left, right = (_normals(raster, origin, place) for place in (first, last))
+        wide = (np.einsum("ij,ij->i", left, right) < cosines[material]) & (last > first)
+        rest = np.flatnonzero(~wide & (last - first > 1))
+        pieces = _Pieces.of(scene, raster, origin[rest], first[rest], last[rest])
+        wide[rest] = pieces.miss(interpolator, limits, material[rest])
+        return wide
 
-    result = _parts(whole, origin, first, last, normals(first), normals(last), has_weights=True)
-    return result, int(np.count_nonzero(np.bincount(origin, minlength=1) > 1))
+    return _halve(raster, is_wide)
 
 
-def _is_wide(scene, raster, interpolator, exponent, origin, first, last) -> np.ndarray:
-    """Whether pixels first to last of spans are too many for one quadratic."""
-    out_of_range = np.zeros(len(origin), dtype=bool)
-    # One pixel never is.
-    several = np.flatnonzero(last > first)
-    origin, first, last, exponent = origin[several], first[several], last[several], exponent[several]
-    steps = raster.length[origin] - 1
-    pixels = last - first + 1
-    ends = [SurfacePoints.at(scene, raster, origin, place / steps) for place in (first, last)]
-    turned = (pixels > 3) & ends[0].turned(ends[1], interpolator)
-    out_of_range[several[turned]] = True
-    # Of the rest, what lies between tells.
-    part = np.flatnonzero(~turned)
-    origin, first, last, steps = origin[part], first[part], last[part], steps[part]
-    between = [
-        SurfacePoints.at(scene, raster, origin, (first + (last - first) * k / 4) / steps) for k in (1, 2, 3)
-    ]
-    bad = np.zeros(len(part), dtype=bool)
-    checked = (pixels[part] > 3)[:, np.newaxis]
-    one = float(ONE_SQUARED.values)
-    p = LocalChordSetup
-    for name, bound, slope_format in (
-        ("diffuse", p.diffuse_error, p.DIFFUSE_SLOPE_FORMAT),
-        ("highlight", p.highlight_error, p.SLOPE_FORMAT),
-    ):
-        left, right = (getattr(end, name)[part] for end in ends)
-        quarter, middle, other = (getattr(place, name) for place in between)
-        # As in `local_values`.
-        middle = np.where(pixels[part][:, np.newaxis] == 2, (left + right) / 2, middle)
-        bend = 2 * (left + right - 2 * middle)
-        slope = right - left - bend
-        # A step of the rounding words less than they hold.
-        bad |= (np.abs(one * bend) > 2.0 ** (p.CURVATURE_FORMAT.integer_bits - 1) - 2.0**-19).any(axis=1)
-        bad |= (np.abs(one * slope) > 2.0 ** (slope_format.integer_bits - 1) - 2.0**-17).any(axis=1)
-        miss = np.maximum(
-            np.abs(left + slope / 4 + bend / 16 - quarter),
-            np.abs(left + slope * 3 / 4 + bend * 9 / 16 - other),
-        )
-        error = interpolator.MARGIN * miss + bound(np.abs(slope), np.abs(bend))
-        # The quadratic at its vertex, if that is on the span.
-        place = np.clip(-slope / np.where(bend, 2 * bend, 1.0), 0, 1)
-        vertex = left + place * (slope + place * bend)
-        least = np.minimum(np.minimum(left, right), vertex)
-        if name == "diffuse":
-            allowed = interpolator.diffuse_tolerance
-            in_front = np.maximum(np.maximum(left, right), vertex) + error >= 0
-            checked = checked & in_front
-            turns_dark = in_front & (least - error <= 0)
-            diffuse = left, slope, bend
+def missed_spans(
+    scene: Scene, raster: Raster, interpolator: Interpolator, limits: HighlightLimits | None = None
+) -> int:
+    """How many spans of a raster the method's own curve misses by more than its tolerances.
+
+    Parameters
+    ----------
+    scene, raster, interpolator, limits
+        As for `cut_by_error`.
+    """
+    limits = limits or HighlightLimits.of(scene.materials)
+    spans = np.flatnonzero(raster.length > 2)
+    missed = 0
+    for part in chunks(len(spans)):
+        origin = spans[part]
+        pieces = _Pieces.of(scene, raster, origin, np.zeros_like(origin), raster.length[origin] - 1)
+        material = scene.mesh.material[raster.triangle[origin]]
+        missed += int(np.count_nonzero(pieces.miss(interpolator, limits, material)))
+    return missed
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Pixels ``first`` to ``last`` of spans ``origin``, three or more, and what the surface has there."""
+
+    scene: Scene
+    raster: Raster
+    origin: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    places: tuple[SurfacePoints, ...]
+    """At t = 0, 1/4, 1/2, 3/4 and 1."""
+
+    @classmethod
+    def of(cls, scene, raster, origin, first, last) -> "_Pieces":
+        """Pieces and their places."""
+        steps = raster.length[origin] - 1
+        at = [(first + (last - first) * k / 4) / steps for k in range(5)]
+        places = tuple(SurfacePoints.at(scene, raster, origin, t) for t in at)
+        return cls(scene, raster, origin, first, last, places)
+
+    def miss(self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray) -> np.ndarray:
+        """Whether the curve of a method is too far from the exact one; bool, shape (pieces,)."""
+        pixels = (self.last - self.first + 1)[:, np.newaxis]
+        chord = isinstance(interpolator, ChordInterpolator)
+        # A curve through three values, or through two, has pixels between them from so many on.
+        between = pixels > (3 if chord else 2)
+        curves = {name: _Quadratic.of(self.places, name) for name in ("diffuse", "highlight")}
+        diffuse, highlight = curves.values()
+        if chord:
+            wrong = self._flagged(interpolator, limits, material, curves)
+            misses = {name: curve.miss(self.places, name) for name, curve in curves.items()}
         else:
-            least = np.maximum(least - miss, 0)
-            allowed = interpolator.highlight_tolerance(exponent[part][:, np.newaxis], least)
-            turns_dark &= interpolator.is_lit(exponent[part][:, np.newaxis], least)
-        bad |= ((error > allowed) & checked).any(axis=1)
-    chosen = np.flatnonzero(turns_dark.any(axis=1) & ~bad)
-    kept = (origin, first, last, turns_dark, *diffuse)
-    bad[chosen] = _mistakes_sign(scene, raster, *(values[chosen] for values in kept))
-    out_of_range[several[part[bad]]] = True
-    return out_of_range
+            wrong = np.zeros(len(self.origin), dtype=bool)
+            misses = self._misses_of_normals(interpolator)
+        wrong |= between[:, 0] & self.places[0].turned(self.places[-1], ChordInterpolator())
+        margin = self._margin()[:, np.newaxis]
+        errors = {name: margin * miss for name, miss in misses.items()}
+        if chord:
+            setup = interpolator.setup
+            errors["diffuse"] += setup.diffuse_error(*diffuse.sizes)
+            errors["highlight"] += setup.highlight_error(*highlight.sizes)
+        in_front = diffuse.largest + errors["diffuse"] >= 0
+        least = np.maximum(highlight.least - margin / ChordInterpolator.MARGIN * misses["highlight"], 0)
+        too_far = errors["diffuse"] > ChordInterpolator().diffuse_tolerance
+        too_far |= errors["highlight"] > limits.tolerance(material, least)
+        wrong |= (too_far & in_front & between).any(axis=1)
+        turns_dark = in_front & (diffuse.least - errors["diffuse"] <= 0) & limits.is_lit(material, least)
+        chosen = np.flatnonzero(turns_dark.any(axis=1) & ~wrong)
+        if chord:
+            kept = diffuse.left, diffuse.slope, diffuse.curvature
+            wrong[chosen] = _mistakes_sign(
+                self.scene,
+                self.raster,
+                *(field[chosen] for field in (self.origin, self.first, self.last, turns_dark, *kept)),
+            )
+        return wrong
+
+    def _margin(self) -> np.ndarray:
+        """Bound of the largest error on each piece, in multiples of that at its quarters.
+
+        `ChordInterpolator.MARGIN`, and no less than the ratio of the lengths that the interpolated normals
+        have at the two ends, or of the weights: the larger it is, the nearer to one end lies all change.
+        """
+        ends = []
+        for place in (self.first, self.last):
+            weights, line = along_spans(
+                self.raster, self.origin, place / (self.raster.length[self.origin] - 1)
+            )
+            ends.append([np.linalg.norm(line, axis=1), weights.sum(axis=1)])
+        smaller, larger = np.sort(ends, axis=0)
+        ratio = np.divide(larger, smaller, out=np.full_like(larger, 1e9), where=smaller > 0).max(axis=0)
+        return np.maximum(ratio, ChordInterpolator.MARGIN)
+
+    def _flagged(
+        self, interpolator: ChordInterpolator, limits: HighlightLimits, material, curves
+    ) -> np.ndarray:
+        """Whether the chord method flags a piece, for certain not if this says no."""
+        setup, limit, one = interpolator.setup, SpanLimit(), float(ONE_SQUARED.values)
+        formats = {"diffuse": setup.DIFFUSE_SLOPE_FORMAT, "highlight": setup.SLOPE_FORMAT}
+        flagged = np.zeros(len(self.origin), dtype=bool)
+        for name, curve in curves.items():
+            slope, curvature = (one * size for size in curve.sizes)
+            # A step of the rounding words less than they hold.
+            flagged |= (curvature > 2.0 ** (setup.CURVATURE_FORMAT.integer_bits - 1) - 2.0**-19).any(axis=1)
+            flagged |= (slope > 2.0 ** (formats[name].integer_bits - 1) - 2.0**-17).any(axis=1)
+        if interpolator.TAKES_VALUES:
+            return flagged
+        cosine = np.einsum("ij,ij->i", self.places[0].normal, self.places[-1].normal)
+        angle = np.degrees(np.arccos(np.minimum(cosine, 1)))
+        angles = np.array([limit.angle(word) for word in limits.words])[material]
+        lit = limits.least_dark[material]
+        values = (np.stack([getattr(self.places[k], name) for k in (0, 2, 4)], axis=-1) for name in curves)
+        diffuse, highlight = values
+        # Values are off by the rounding of N, L and H.
+        near = limit.least(highlight) / 2 < lit[:, np.newaxis] + 1e-4
+        near &= diffuse.max(axis=2) > float(limit.BEHIND.values) - 1e-4
+        wide = (angle > limit.WIDEST) | ((angle > angles) & near.any(axis=1))
+        return flagged | (wide & (self.last - self.first + 1 >= limit.SHORTEST))
+
+    def _misses_of_normals(self, interpolator: Interpolator) -> dict[str, np.ndarray]:
+        """Largest distance of N·L and of u of a method's normals from the exact ones, at three places."""
+        left, right = self.places[0].normal, self.places[-1].normal
+        misses = {"diffuse": 0.0, "highlight": 0.0}
+        for k, exact in enumerate(self.places[1:-1], 1):
+            normal = interpolator.exact_normals(left, right, np.full(len(left), k / 4))
+            own = exact.with_normal(normal, interpolator.uses_chord)
+            for name in misses:
+                misses[name] = np.maximum(misses[name], np.abs(getattr(own, name) - getattr(exact, name)))
+        return misses
 
 
-def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, bend) -> np.ndarray:
+@dataclass(frozen=True)
+class _Quadratic:
+    """Quadratics ``left + t slope + t^2 curvature``, shape (pieces, lights), through three exact values."""
+
+    left: np.ndarray
+    slope: np.ndarray
+    curvature: np.ndarray
+    least: np.ndarray
+    largest: np.ndarray
+
+    @classmethod
+    def of(cls, places: Sequence[SurfacePoints], name: str) -> "_Quadratic":
+        """Through the values at t = 0, 1/2 and 1."""
+        left, middle, right = (getattr(places[k], name) for k in (0, 2, 4))
+        curvature = 2 * (left + right - 2 * middle)
+        slope = right - left - curvature
+        # The quadratic at its vertex, if that is on the span.
+        t = np.clip(-slope / np.where(curvature, 2 * curvature, 1.0), 0, 1)
+        vertex = left + t * (slope + t * curvature)
+        three = left, right, vertex
+        return cls(left, slope, curvature, np.minimum.reduce(three), np.maximum.reduce(three))
+
+    @property
+    def sizes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Absolute values of P and G."""
+        return np.abs(self.slope), np.abs(self.curvature)
+
+    def miss(self, places: Sequence[SurfacePoints], name: str) -> np.ndarray:
+        """Largest distance from the exact values at t = 1/4 and 3/4."""
+        return np.maximum.reduce(
+            [
+                np.abs(self.left + t * (self.slope + t * self.curvature) - getattr(places[k], name))
+                for k, t in ((1, 0.25), (3, 0.75))
+            ]
+        )
+
+
+def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, curvature) -> np.ndarray:
     """Whether N·L of a pixel of a span might have the wrong sign, for the lights that are told."""
     result = np.zeros(len(origin), dtype=bool)
-    bound = LocalChordSetup.diffuse_error(np.abs(slope), np.abs(bend))
+    bound = ChordSetup().diffuse_error(np.abs(slope), np.abs(curvature))
     for run in runs_of(last - first + 1, CHUNK):
         span, step = pixels_of((last - first + 1)[run])
         of_pixel = run.start + span
         place = (first[of_pixel] + step) / (raster.length[origin[of_pixel]] - 1)
         exact = SurfacePoints.at(scene, raster, origin[of_pixel], place).diffuse
         t = (step / (last - first)[of_pixel])[:, np.newaxis]
-        fit = left[of_pixel] + t * (slope[of_pixel] + t * bend[of_pixel])
+        fit = left[of_pixel] + t * (slope[of_pixel] + t * curvature[of_pixel])
         wrong = np.where(exact > 0, fit <= bound[of_pixel], fit > -bound[of_pixel])
         # Nearer to 0 no word tells the sign.
-        wrong &= (np.abs(exact) > LocalChordSetup.DIFFUSE_FORMAT.step) & lights[of_pixel]
+        wrong &= (np.abs(exact) > ChordSetup.DIFFUSE_FORMAT.step) & lights[of_pixel]
         result |= np.bincount(of_pixel, wrong.any(axis=1), len(origin)) > 0
     return result

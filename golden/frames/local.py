@@ -1,17 +1,18 @@
 """Exact operands of lights along spans: N·L and 1 - N·H of points on the surface, perspective-correct."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
+from blysk.golden.cosines.chord_setup import SpanValues
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["CHUNK", "SurfacePoints", "along_spans", "chunks", "local_values"]
+__all__ = ["CHUNK", "SurfacePoints", "along_spans", "chunks", "line_ends", "local_values", "middle_normals"]
 
 CHUNK = 1 << 16
 """Spans worked on at once; bounds the memory, changes no result."""
@@ -21,9 +22,23 @@ def along_spans(raster: Raster, span: np.ndarray, t: np.ndarray) -> tuple[np.nda
     """Weights and normals, not of unit length, at t of each span; both are linear along a span."""
     t = t[:, np.newaxis]
     weights = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
-    left = raster.magnitude_left[span][:, np.newaxis] * raster.normal_left[span]
-    right = raster.magnitude_right[span][:, np.newaxis] * raster.normal_right[span]
-    return weights, (1 - t) * left + t * right
+    left, right = line_ends(raster)
+    return weights, (1 - t) * left[span] + t * right[span]
+
+
+def line_ends(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
+    """Normals at the ends of spans with the lengths that they have there, shape (spans, 3)."""
+    return (
+        raster.magnitude_left[:, np.newaxis] * raster.normal_left,
+        raster.magnitude_right[:, np.newaxis] * raster.normal_right,
+    )
+
+
+def middle_normals(raster: Raster) -> np.ndarray:
+    """True unit normals in the middle of spans, shape (spans, 3); between opposite ones, the left one."""
+    spans = np.arange(len(raster.length))
+    _, line = along_spans(raster, spans, np.full(len(spans), 0.5))
+    return np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left)
 
 
 @dataclass(frozen=True)
@@ -55,7 +70,18 @@ class SurfacePoints:
         highlight = np.where(halfway.any(axis=2).T, highlight, 2.0)
         return cls(normal, viewer, direction, np.clip(diffuse, -1, 1), np.clip(highlight, 0, 2))
 
-    def turned(self, other: "SurfacePoints", method: LocalChordInterpolator) -> np.ndarray:
+    def with_normal(self, normal: np.ndarray, chord: bool) -> "SurfacePoints":
+        """The same places with other normals, shape (count, 3): f, and u as the squared chord or 1 - N·H."""
+        diffuse = np.einsum("sk,lsk->sl", normal, self.direction)
+        halfway = halfway_vector(self.direction, self.viewer)
+        if chord:
+            highlight = np.square(normal - halfway).sum(axis=2).T / 2
+        else:
+            highlight = 1 - np.einsum("sk,lsk->sl", normal, halfway)
+        highlight = np.where(halfway.any(axis=2).T, highlight, 2.0)
+        return replace(self, normal=normal, diffuse=diffuse, highlight=highlight)
+
+    def turned(self, other: "SurfacePoints", method: ChordInterpolator) -> np.ndarray:
         """Whether a vector turns by more than the method allows from here to there; bool, shape (count,)."""
         least = np.cos(np.radians(method.MAX_VECTOR_ANGLE))
         result = np.einsum("sk,sk->s", self.normal, other.normal) < least
@@ -74,18 +100,18 @@ def chunks(count: int) -> Iterator[slice]:
 
 
 def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> SpanValues:
-    """What the local chord method needs of each span: exact values of N·L and u at three places, as codes.
+    """What the chord methods need of each span: exact values of N·L and u at three places, as codes.
 
     N, L and H are of unit length at each of the three. Where a point light is on the surface itself N·L is 0;
     where there is no half-way vector (``L = -V``) u is 2. A span of two pixels has nothing in the middle: it
-    gets the mean, and no bend.
+    gets the mean.
 
     Parameters
     ----------
     scene : Scene
         Mesh, lights and viewer.
     raster : Raster
-        Spans from `cut_local_spans`, in any order.
+        Spans from `cut_spans`, in any order.
     lights : int, optional
         Lights of the pipeline, by default those of the scene. Lights that the scene does not have have an
         N·L of 0, and are dark.

@@ -6,15 +6,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.cut import cut_spans
-from blysk.golden.frames.local import local_values
+from blysk.golden.frames.cut import cut_spans, missed_spans
+from blysk.golden.frames.highlight_limits import HighlightLimits
+from blysk.golden.frames.local import line_ends, local_values, middle_normals
+from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["PreparedFrame", "constants_of", "prepare", "quantise_spans", "sort_by_material", "with_tables"]
+__all__ = [
+    "PreparedFrame",
+    "constants_of",
+    "prepare",
+    "quantise_spans",
+    "sort_by_material",
+    "spans_for",
+    "with_tables",
+]
 
 
 @dataclass(frozen=True)
@@ -31,12 +41,16 @@ class PreparedFrame:
         Spans of ``raster`` that were cut.
     spans : Spans
         Spans of ``cut_raster``, quantised: the pipeline's input.
+    missed_spans : int
+        Of a method whose spans are not cut by its error: those that its curve misses by more than a quarter
+        of an LSB.
     """
 
     raster: Raster
     cut_raster: Raster
     spans_cut: int
     spans: Spans
+    missed_spans: int = 0
 
 
 def prepare(scene: Scene, design: Design) -> PreparedFrame:
@@ -52,10 +66,33 @@ def prepare(scene: Scene, design: Design) -> PreparedFrame:
     raster = rasterise(scene)
     cut, count = cut_spans(scene, raster, design)
     cut = sort_by_material(cut, scene.mesh.material)
+    method, missed = design.interpolator, 0
+    if not (method.CUT_BY_ERROR or method.takes_line):
+        missed = missed_spans(scene, cut, method, HighlightLimits.of(scene.materials, design))
+    return PreparedFrame(raster, cut, count, spans_for(scene, cut, design), missed)
+
+
+def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
+    """The input beats of a pipeline for spans that are cut for it: normals, true lines or values.
+
+    Parameters
+    ----------
+    scene : Scene
+        Materials, lights and viewer.
+    cut : Raster
+        Spans from `cut_spans`.
+    design : Design
+        The pipeline.
+    """
     spans = quantise_spans(cut, scene.mesh.material)
     if design.takes_values:
         spans = replace(spans, values=local_values(scene, cut, design.lights))
-    return PreparedFrame(raster, cut, count, spans)
+    elif design.interpolator.takes_line:
+        left, right = quantise_line(*line_ends(cut))
+        spans = replace(spans, normal_left=left, normal_right=right)
+    elif design.interpolator.TAKES_MIDDLE:
+        spans = replace(spans, normal_middle=quantise(middle_normals(cut)))
+    return spans
 
 
 def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
@@ -105,14 +142,14 @@ def with_tables(
             f"an equal {lobe.model.PARAMETER}, or build it with more banks, up to {lobe.MAX_BANKS}"
         )
     tables = [lobe.table(parameter) for parameter in banks]
-    thresholds = [None] * len(tables)
-    if design.gate:
-        arguments = [table.last_lit_argument for table in tables]
-        thresholds = design.highlight_gate.thresholds_of(arguments).codes.tolist()
+    thresholds = [
+        design.threshold_of(table).codes.item() if design.has_threshold else None for table in tables
+    ]
     chosen = map(banks.index, parameters)
+    exponents = HighlightLimits.of(materials, design).words.astype(np.int64).tolist()
     return [
-        replace(of_material, lobe=tables[bank], bank=bank, threshold=thresholds[bank])
-        for of_material, bank in zip(constants, chosen, strict=True)
+        replace(of_material, exponent=exponent, lobe=tables[bank], bank=bank, threshold=thresholds[bank])
+        for of_material, exponent, bank in zip(constants, exponents, chosen, strict=True)
     ]
 
 

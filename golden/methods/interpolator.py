@@ -68,13 +68,20 @@ class Interpolator:
     MAX_ANGLE : float
         Largest angle in degrees of the spans that the method serves. It flags those of a larger angle, most
         of them from there on; straight lines where a component of ``N_r - N_l`` is 1 or more, which takes 60
-        degrees and happens to half of the spans at 75; ``renormalise`` besides every span with a normal that
-        its renormaliser does not serve (unit normals: over 94 degrees).
+        degrees and happens to half of the spans at 75.
     CURVE : str
         The curve of `CURVES` on which the method's normals lie in exact arithmetic.
     TAKES_VALUES : bool
         Whether spans carry values of N·L and 1 - N·H of each light in place of normals, so that L and H may
         differ from pixel to pixel.
+    CUT_BY_ERROR : bool
+        Whether spans are cut until the method's curve is within a quarter of an LSB of exact normals; else
+        they are cut by their angle alone.
+    END_FORMAT : Format
+        Of the normals at a span's ends: unit normals in ``SQ(1, 17)``; else ends of the true line, which have
+        lengths, in proportion to the larger one.
+    TAKES_MIDDLE : bool
+        Whether spans carry the true normal in their middle besides those at their ends.
     """
 
     COSINE_FORMAT: ClassVar[Format] = DotProduct().result_format
@@ -82,6 +89,9 @@ class Interpolator:
     MAX_ANGLE: ClassVar[float] = MAX_SPAN_ANGLE
     CURVE: ClassVar[str] = "normalised"
     TAKES_VALUES: ClassVar[bool] = False
+    END_FORMAT: ClassVar[Format] = COMPONENT
+    TAKES_MIDDLE: ClassVar[bool] = False
+    CUT_BY_ERROR: ClassVar[bool] = True
 
     @property
     def name(self) -> str:
@@ -92,6 +102,11 @@ class Interpolator:
     def serves_gate(self) -> bool:
         """Whether a highlight gate can foresee the method's highlights: it has normals and an error bound."""
         return True
+
+    @property
+    def takes_line(self) -> bool:
+        """Whether the ends of a span have lengths."""
+        return self.END_FORMAT != COMPONENT
 
     @property
     def gate_angle(self) -> float:

@@ -1,4 +1,4 @@
-"""Renormaliser: a vector of about unit length divided by its length, each pixel by itself."""
+"""Renormaliser: a vector of any length divided by its length, each pixel by itself."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,58 +15,54 @@ __all__ = ["Renormaliser"]
 
 @dataclass(frozen=True)
 class Renormaliser:
-    """Unit vector ``N = v/sqrt(s)``, ``s = v . v``: the baseline, a normal divided by its length.
+    """Unit vector ``N = v / |v|`` of lengths from 2^-8 to 1: the exact normal, whatever the span.
 
-    Computed as ``N = v + e v`` with ``e = (ONE/2^17)/sqrt(s) - 1``, small where v is nearly a unit vector in
-    the codes of `unit_vector`. e is a quadratic ``c0 - u (c1 - u c2)`` in each of 18 segments of s, 1/32
-    wide, u from the start of the segment. Linear interpolation across spans up to 90 degrees needs the 16
-    segments from 1/2 to 1; one more on either side is for the rounding of the ends.
+    v is shifted left until its largest component is 1/2 or more, and rounded: ``w``. With ``s = w . w``, from
+    1/4 to 3, ``N = r w``, ``r = (ONE/2^17) / sqrt(s)``, as `unit_vector` has it. With q for the octave of s
+    and ``m = s 2^-q`` from 1 to 2, r is a quadratic ``c0 - x (c1 - x c2)`` in each of 16 segments of m in
+    each of the four octaves, x from the start of the segment.
 
     ============ ========== =================================================================
     word         format     why
     ============ ========== =================================================================
+    v            SQ(1, 22)  a normal of 1/256 of the largest length has 14 bits left
+    w            SQ(1, 17)  multiplier operand; rounded; saturates
     s            SQ(4, 34)  exact
-    u            UQ(-5, 22) 17 bits for the multipliers; cut
-    c0           SQ(0, 20)  fitted last, for what the others' rounding leaves
-    c1           UQ(1, 16)  its error counts 1/32
-    c2           UQ(2, 10)  its error counts 1/1024
-    c1 - u c2    UQ(1, 16)  17 bits for the multiplier; rounded
-    e            SQ(0, 18)  18 bits for the multipliers; -0.016 to 0.461; rounded
+    x            UQ(-4, 21) 17 bits for the multipliers; cut
+    c0           UQ(1, 18)  fitted last, for what the others' rounding leaves
+    c1           UQ(1, 16)  its error counts 1/16
+    c2           UQ(1, 11)  its error counts 1/256
+    c1 - x c2    UQ(1, 16)  17 bits for the multiplier; rounded
+    r            UQ(1, 16)  17 bits for the multipliers; 0.577 to 2; rounded
     N            SQ(1, 17)  rounded; saturates
     ============ ========== =================================================================
 
-    Lengths from 0.685 to 1.0155 are in range (`LOW` <= s < `HIGH`). Any other vector is flagged and stays as
-    it is.
-
-    The length of N is off by at most `ERROR`, 2^-16.3: |v| times the error of e, which is that of the fit
-    (|v| times it is at most `FIT`), the cut of u (2^-22 times c1, which is ``1/(2 |v|^3)``), the rounding of
-    ``c1 - u c2`` (2^-17 times 1/32) and of e (2^-19); then the rounding of three components,
-    ``sqrt(3) 2^-18``, which alone changes the direction.
+    A vector whose components are all from -`SHORTEST` to under `SHORTEST` is flagged; its N means nothing.
+    Else the direction of N is off by at most `DIRECTION_ERROR` radians, besides what the rounding of v itself
+    does: ``sqrt(3) 2^-18`` by the rounding of w, of length 1/2 or more, and as much by that of N. Its length
+    is off by at most `LENGTH_ERROR`: that of r, times |w| up to sqrt(3), and the rounding of N.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """
 
-    SEGMENT_BITS = 5
-    SEGMENTS = 18
-    LOW = 15 / 32
-    HIGH = 33 / 32
-    OFFSET_FORMAT = UQ(-5, 22)
-    C0_FORMAT = SQ(0, 20)
+    VECTOR_FORMAT = SQ(1, 22)
+    OCTAVES = 4
+    SEGMENT_BITS = 4
+    OFFSET_FORMAT = UQ(-4, 21)
+    C0_FORMAT = UQ(1, 18)
     C1_FORMAT = UQ(1, 16)
-    C2_FORMAT = UQ(2, 10)
-    FACTOR_FORMAT = SQ(0, 18)
+    C2_FORMAT = UQ(1, 11)
+    FACTOR_FORMAT = UQ(1, 16)
     FORMAT = COMPONENT
-    FIT = 3.0e-6
-    ERROR = FIT + 2.0**-22 / (2 * LOW) + np.sqrt(HIGH) * (2.0**-22 + 2.0**-19) + np.sqrt(3) * 2.0**-18
-
-    @staticmethod
-    def factor(square: np.ndarray) -> np.ndarray:
-        """Exact ``e`` in float64 of a squared length s."""
-        return ONE * COMPONENT.step / np.sqrt(square) - 1
+    SHORTEST = 2.0**-8
+    MAX_SHIFT = 7
+    FIT = 6.0e-6
+    DIRECTION_ERROR = 3 * np.sqrt(3) * 2.0**-18
+    LENGTH_ERROR = np.sqrt(3) * (FIT + 2.0**-21 + 2.0**-17 / 16 + 2.0**-17 + 2.0**-18)
 
     @cached_property
     def coefficients(self) -> tuple[Fixed, Fixed, Fixed]:
-        """Coefficients ``c0, c1, c2`` of every segment, shape (18,) each.
+        """Coefficients ``c0, c1, c2`` of every segment, shape (64,) each, by octave and segment.
 
         The Chebyshev series of a segment, nearly a minimax fit as the segment is short, gives c2; c1 follows
         from its linear term and the rounded c2, and c0 is the middle of the error that is left.
@@ -74,7 +70,9 @@ class Renormaliser:
         width = 2.0**-self.SEGMENT_BITS
         x = chebyshev.chebpts2(33)
         u = width / 2 * (1 + x)[:, np.newaxis]
-        exact = self.factor(self.LOW + width * np.arange(self.SEGMENTS) + u)
+        segments = np.arange(1 << self.SEGMENT_BITS)
+        octave, start = (part.ravel() for part in np.meshgrid(range(self.OCTAVES), segments, indexing="ij"))
+        exact = ONE * COMPONENT.step / np.sqrt((1 + width * start + u) * 2.0 ** (octave - 2))
         series = chebyshev.chebfit(x, exact, 6)
         # u^2 is (width/2)^2 (3/2 T0 + 2 T1 + 1/2 T2).
         c2 = Fixed.round(self.C2_FORMAT, 8 / width**2 * series[2])
@@ -82,53 +80,63 @@ class Renormaliser:
         rest = exact + u * (c1.values - u * c2.values)
         return Fixed.round(self.C0_FORMAT, (rest.min(axis=0) + rest.max(axis=0)) / 2), c1, c2
 
-    def correction(self, square: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Bit-accurate ``e`` of squared lengths.
+    def scaled(self, vector: Fixed) -> tuple[Fixed, np.ndarray]:
+        """w, and whether a vector is too short.
+
+        Parameters
+        ----------
+        vector : Fixed, shape (..., 3), SQ(1, 22)
+            v.
+        """
+        if vector.format != self.VECTOR_FORMAT:
+            raise ValueError(f"operand must be {self.VECTOR_FORMAT}, not {vector.format}")
+        magnitude = np.bitwise_or.reduce(np.where(vector.codes < 0, ~vector.codes, vector.codes), axis=-1)
+        bits = np.frexp(magnitude.astype(np.float64))[1]
+        shift = self.VECTOR_FORMAT.fraction_bits - bits
+        too_short = shift > self.MAX_SHIFT
+        shift = np.minimum(shift, self.MAX_SHIFT)[..., np.newaxis]
+        word = Fixed(self.VECTOR_FORMAT, vector.codes << shift).round_half_up(COMPONENT.fraction_bits)
+        return word.saturate(COMPONENT), too_short
+
+    def factor(self, square: Fixed) -> Fixed:
+        """Bit-accurate r of squared lengths.
 
         Parameters
         ----------
         square : Fixed, any shape, SQ(4, 34)
-            s.
-
-        Returns
-        -------
-        correction : Fixed, same shape, SQ(0, 18)
-            e; 0 for a length out of range.
-        out_of_range : bool array, same shape
-            Whether the length is out of range.
+            s; under 1/4 it counts as if its octave began there, and r means nothing.
         """
-        low = Fixed(UQ(0, 22), UQ(0, 22).code(self.LOW))
-        offset = (square.truncate(22) - low).codes
+        codes = square.codes
+        octave = sum((codes >> (33 + k)) > 0 for k in range(self.OCTAVES - 1))
+        fraction = (codes >> octave) >> 11
         bits = self.OFFSET_FORMAT.width
-        segment = offset >> bits
-        out_of_range = (segment < 0) | (segment >= self.SEGMENTS)
-        c0, c1, c2 = (c[np.where(out_of_range, 0, segment)] for c in self.coefficients)
-        u = Fixed(self.OFFSET_FORMAT, offset & ((1 << bits) - 1))
-        slope = (c1 - u * c2).round_half_up(16)
-        slope = slope.wrap(self.C1_FORMAT)
-        e = (c0 - u * slope).round_half_up(18).wrap(self.FACTOR_FORMAT)
-        return Fixed(e.format, np.where(out_of_range, 0, e.codes)), out_of_range
+        segment = (fraction >> bits) & ((1 << self.SEGMENT_BITS) - 1)
+        c0, c1, c2 = (c[(octave << self.SEGMENT_BITS) + segment] for c in self.coefficients)
+        x = Fixed(self.OFFSET_FORMAT, fraction & ((1 << bits) - 1))
+        slope = (c1 - x * c2).round_half_up(self.C1_FORMAT.fraction_bits).wrap(self.C1_FORMAT)
+        return (c0 - x * slope).round_half_up(self.FACTOR_FORMAT.fraction_bits).saturate(self.FACTOR_FORMAT)
 
     def compute(self, vector: Fixed) -> tuple[Fixed, np.ndarray]:
         """Bit-accurate unit vectors.
 
         Parameters
         ----------
-        vector : Fixed, shape (..., 3), SQ(1, 17)
+        vector : Fixed, shape (..., 3), SQ(1, 22)
             Vectors v.
 
         Returns
         -------
         normal : Fixed, shape (..., 3), SQ(1, 17)
-            N; v itself where ``out_of_range``.
+            N.
         out_of_range : bool array, shape (...)
-            Whether the length of v is out of range.
+            Whether v is too short.
 
         Raises
         ------
         ValueError
             If the operand has another format.
         """
-        e, out_of_range = self.correction(DotProduct().compute(vector, vector))
-        e = Fixed(e.format, e.codes[..., np.newaxis])
-        return (vector + e * vector).round_half_up(17).saturate(self.FORMAT), out_of_range
+        word, too_short = self.scaled(vector)
+        r = self.factor(DotProduct().compute(word, word))
+        r = Fixed(r.format, r.codes[..., np.newaxis])
+        return (word * r).round_half_up(COMPONENT.fraction_bits).saturate(self.FORMAT), too_short

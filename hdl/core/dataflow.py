@@ -65,8 +65,8 @@ class FunctionalUnit:
         Makes an instance: from a function that makes a register (value, name) and the operands, the result.
     left : list of int
         Uses that may still come.
-    free : list of list of bool
-        For each instance the slots that are free, one for every cycle of the interval.
+    taken : list of set of int
+        For each instance the stages at which it has a use.
     """
 
     name: str
@@ -74,12 +74,12 @@ class FunctionalUnit:
     latency: int
     make: Callable[..., Any]
     left: list[int]
-    free: list[list[bool]] = field(default_factory=list)
+    taken: list[set[int]] = field(default_factory=list)
 
     @property
     def count(self) -> int:
-        """Number of instances."""
-        return len(self.free)
+        """How many instances there are."""
+        return len(self.taken)
 
 
 class Dataflow:
@@ -88,8 +88,10 @@ class Dataflow:
     Every word gets the earliest stage at which its operands can be read. A shared functional unit, such as a
     multiplier, is issued when a slot of it is free: beats come a whole multiple of the initiation interval
     apart, so an instance has as many slots as the interval has cycles, and ``ceil(uses / interval)``
-    instances serve all. Uses get slots in the order in which they are added. A word that is read after its
-    lifetime is copied by `build`.
+    instances serve all. In a *spaced* graph beats come at any distance from the interval on: then the uses of
+    an instance lie within as many stages as the interval has cycles, and there are as many more instances as
+    that takes. Uses get slots in the order in which they are added. A word that is read after its lifetime is
+    copied by `build`.
 
     Parameters
     ----------
@@ -97,6 +99,8 @@ class Dataflow:
         Initiation interval of the unit, at least 1.
     multiplications : int
         How many there will be.
+    spaced : bool
+        Whether beats come at any distance from the interval on; see `PipelinedUnit`.
     low_latency : bool
         Whether a product takes a single register, two cycles in all.
 
@@ -106,10 +110,13 @@ class Dataflow:
         If the interval is less than 1.
     """
 
-    def __init__(self, interval: int, multiplications: int = 0, *, low_latency: bool = False):
+    def __init__(
+        self, interval: int, multiplications: int = 0, *, spaced: bool = False, low_latency: bool = False
+    ):
         if interval < 1:
             raise ValueError(f"interval must be at least 1, not {interval}")
         self.interval = interval
+        self.spaced = spaced
         self._makers: list[tuple[Word, Callable[[_Build], Any]]] = []
         latency, product = MULTIPLIER_LATENCY, registered_product
         if low_latency:
@@ -158,9 +165,23 @@ class Dataflow:
     ) -> FunctionalUnit:
         """A functional unit for so many uses; the parameters are those of `FunctionalUnit`."""
         instances = -(-uses // self.interval)
-        return FunctionalUnit(
-            name, shapes, latency, make, [uses], [[True] * self.interval for _ in range(instances)]
-        )
+        return FunctionalUnit(name, shapes, latency, make, [uses], [set() for _ in range(instances)])
+
+    def _serves(self, taken: set[int], stage: int) -> bool:
+        """Whether an instance with uses at these stages serves one more, in any two beats."""
+        if self.spaced:
+            return stage not in taken and max(taken | {stage}) - min(taken | {stage}) < self.interval
+        return all((stage - other) % self.interval for other in taken)
+
+    def _place(self, functional_unit: FunctionalUnit, stage: int) -> tuple[int, int]:
+        """Instance and stage of a use, at the earliest from a stage on."""
+        for later in range(stage, stage + 2 * self.interval):
+            for instance, taken in enumerate(functional_unit.taken):
+                if self._serves(taken, later):
+                    taken.add(later)
+                    return instance, later
+        functional_unit.taken.append({stage})
+        return functional_unit.count - 1, stage
 
     def use(
         self,
@@ -201,10 +222,7 @@ class Dataflow:
         functional_unit.left[0] -= 1
         latency = functional_unit.latency if latency is None else latency
         stage = max(since - 1 - latency, *(word.stage for word in words))
-        while not any(slots[stage % self.interval] for slots in functional_unit.free):
-            stage += 1
-        instance = next(k for k, slots in enumerate(functional_unit.free) if slots[stage % self.interval])
-        functional_unit.free[instance][stage % self.interval] = False
+        instance, stage = self._place(functional_unit, stage)
 
         def make(build):
             given = operands(*(build.at(word, stage) for word in words))

@@ -15,17 +15,19 @@ def normal_shape() -> data.ArrayLayout:
     return data.ArrayLayout(FixedShape(COMPONENT), 3)
 
 
-def span_normals_shape(length_bits: int = LENGTH_BITS) -> data.StructLayout:
-    """Shape of a span: the normals at its ends, and its length in pixels.
+def span_normals_shape(length_bits: int = LENGTH_BITS, *, middle: bool = False) -> data.StructLayout:
+    """Shape of a span: the normals at its ends, perhaps that in its middle, and its length in pixels.
 
     Parameters
     ----------
     length_bits : int
         Bits of the length.
+    middle : bool
+        Whether there is ``normal_middle``.
     """
-    return data.StructLayout(
-        {"normal_left": normal_shape(), "normal_right": normal_shape(), "length": unsigned(length_bits)}
-    )
+    places = ("left", "middle", "right") if middle else ("left", "right")
+    normals = {f"normal_{place}": normal_shape() for place in places}
+    return data.StructLayout(normals | {"length": unsigned(length_bits)})
 
 
 def light_vectors_shape(lights: int) -> data.ArrayLayout:

@@ -153,7 +153,9 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
 
 
 def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
-    """Connect two streams through a register, which takes `SLICE_LATENCY`; the source's ready is one, too.
+    """Connect two streams through registers that hold two payloads; one takes `SLICE_LATENCY` cycles.
+
+    The source's ready follows from registers alone.
 
     Parameters
     ----------
@@ -168,9 +170,10 @@ def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -
     require_same_shape(source.payload.shape(), sink.payload.shape())
     valid = Signal(name="valid")
     payload = Signal(Shape.cast(source.payload.shape()).width, name="payload", reset_less=True)
-    advance = skid_buffer(m, sink, valid, payload)
-    m.d.comb += source.ready.eq(advance)
-    with m.If(advance):
+    # With one payload waiting beyond the register there is room for one more in it.
+    accepts = skid_buffer(m, sink, valid, payload) | ~valid
+    m.d.comb += source.ready.eq(accepts)
+    with m.If(accepts):
         m.d.sync += [valid.eq(source.valid), payload.eq(source.payload)]
 
 
@@ -213,7 +216,8 @@ class PipelinedUnit(wiring.Component):
     A beat that is accepted on one cycle is on the output ``latency`` cycles later, unless the output is
     stalled: then the whole unit is disabled, from the cycle after the first on which a beat was not accepted,
     and holds its payloads (`skid_buffer`). As long as a beat is inside, the next is accepted a whole multiple
-    of ``initiation_interval`` enabled cycles after it. ``i.ready`` and ``o.valid`` follow from the unit's
+    of ``initiation_interval`` enabled cycles after it; of a *spaced* unit any number of enabled cycles that is
+    not less. ``i.ready`` and ``o.valid`` follow from the unit's
     registers alone. Reset empties the unit.
 
     A subclass describes its registers in `datapath`, as if they were enabled on every cycle. Control comes
@@ -229,6 +233,9 @@ class PipelinedUnit(wiring.Component):
         Distance in cycles of two inputs. With 1, `datapath` gets the input itself, and registers it;
         with more, it gets a register that holds the input on stages 1 to ``initiation_interval``.
     constants : ShapeLike or None
+        Shape of the port ``constants``: values that stay while beats are inside. ``None``: no such port.
+    spaced : bool
+        Whether the next beat may come at any distance from ``initiation_interval`` on.
         Shape of the port ``constants``: values that are constant while beats are inside. ``None``: no port.
     ports : mapping of str to Member, optional
         Further members, by name.
@@ -256,12 +263,14 @@ class PipelinedUnit(wiring.Component):
         latency: int,
         initiation_interval: int = 1,
         constants: ShapeLike | None = None,
+        spaced: bool = False,
         ports: Mapping[str, Member] | None = None,
     ):
         if latency < 1 or initiation_interval < 1:
             raise ValueError("latency and initiation_interval must be at least 1")
         self.latency = latency
         self.initiation_interval = initiation_interval
+        self._spaced = spaced
         members = {"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))}
         if constants is not None:
             members["constants"] = In(constants)
@@ -295,7 +304,8 @@ class PipelinedUnit(wiring.Component):
         if self.initiation_interval == 1:
             m.d.comb += self.i.ready.eq(advance)
         else:
-            m.d.comb += self.i.ready.eq(self._turn(m, advance, accept))
+            schedule = self._wait if self._spaced else self._turn
+            m.d.comb += self.i.ready.eq(schedule(m, advance, accept))
         m.d.comb += accept.eq(self.i.valid & self.i.ready)
         with m.If(advance):
             m.d.sync += self._stages.eq(Cat(accept, self._stages[:-1]))
@@ -309,6 +319,21 @@ class PipelinedUnit(wiring.Component):
         m.submodules.datapath = EnableInserter(advance)(inner)
         m.d.comb += advance.eq(skid_buffer(m, self.o, self._stages[-1], result))
         return m
+
+    def _wait(self, m: Module, advance: Value, accept: Value) -> Value:
+        """Whether a beat may come: ``initiation_interval`` enabled cycles after the last one, or more.
+
+        A register, worked out a clock ahead.
+        """
+        ready = Signal(name="ready", init=1)
+        left = Signal(range(self.initiation_interval), name="left")
+        following = Signal.like(left, name="following")
+        m.d.comb += following.eq(
+            Mux(accept, self.initiation_interval - 1, Mux((left != 0) & advance, left - 1, left))
+        )
+        waits = self.o.valid & ~self.o.ready
+        m.d.sync += [left.eq(following), ready.eq(~waits & (following == 0))]
+        return ready
 
     def _turn(self, m: Module, advance: Value, accept: Value) -> Value:
         """Whether a beat may come: shared parts serve beats of several stages in fixed slots.

@@ -1,5 +1,6 @@
 """Interpolators: units that take a span to the operands of its pixels, by any method."""
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from amaranth.hdl import Module, Value
@@ -10,9 +11,18 @@ from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
 from blysk.hdl.core.stream import connect
+from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.light_products import LightProductsUnit, operands_shape
 
-__all__ = ["InterpolatorUnit", "NormalInterpolatorUnit", "span_words"]
+__all__ = ["InterpolatorUnit", "NormalInterpolatorUnit", "span_words", "spelled"]
+
+
+def spelled(numbers: Sequence[int]) -> str:
+    """Numbers in ascending order in words: ``1 to 6``, or ``3, 9 or 18``."""
+    if len(numbers) > 1 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"{numbers[0]} to {numbers[-1]}"
+    *others, last = map(str, numbers)
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 def span_words(span: data.View) -> list[tuple[str, Value]]:
@@ -45,6 +55,10 @@ class InterpolatorUnit(wiring.Component):
         Bits of the length.
     product_interval : int
         Least cycles from a pixel to the next in the products with L and H, of methods that find normals.
+    gate : ValueGateUnit or None
+        Decides which spans have no highlight, of the chord methods; operands then have ``gated``.
+    takes_threshold : bool
+        Whether a threshold tells where highlights end, in place of the exponent; see `Design.threshold_of`.
 
     Members
     -------
@@ -68,15 +82,37 @@ class InterpolatorUnit(wiring.Component):
 
     cycles_per_pixel = 1
 
+    shortest_interval: int | None = None
+    """Least cycles from a span to the next, where a short one takes fewer than `setup_interval`."""
+
     def __init_subclass__(cls, *, parameters: type[Interpolator] | None = None, **options):
         super().__init_subclass__(**options)
         if parameters is not None:
             InterpolatorUnit.UNITS[parameters] = cls
 
     @classmethod
-    def setup_intervals(cls, parameters: Interpolator) -> range:
+    def setup_intervals(cls, parameters: Interpolator) -> Sequence[int]:
         """Setup intervals that the method can be built for; empty where it has no choice."""
-        return range(0)
+        return ()
+
+    def further_members(self) -> dict[str, wiring.Member]:
+        """Ports of a method's own, or in place of the common ones."""
+        return {}
+
+    @property
+    def light_vectors(self) -> data.View | tuple:
+        """L and H of each light, of the constants; none of methods with `TAKES_VALUES`."""
+        return () if self.parameters.TAKES_VALUES else self.constants
+
+    @property
+    def exponent(self) -> Value | None:
+        """The specular exponent, of the constants; ``None`` where the method does not need it."""
+        return None
+
+    @property
+    def threshold(self) -> Value | None:
+        """The threshold, of the constants; ``None`` where there is none."""
+        return None
 
     @classmethod
     def span_shape(cls, lights: int, *, highlights: bool = True, length_bits: int = LENGTH_BITS):
@@ -98,26 +134,35 @@ class InterpolatorUnit(wiring.Component):
         highlights: bool = True,
         length_bits: int = LENGTH_BITS,
         product_interval: int = 1,
+        gate: ValueGateUnit | None = None,
+        takes_threshold: bool = False,
     ):
         intervals = self.setup_intervals(parameters)
         if setup_interval not in (None, *intervals):
-            choice = f"1 to {intervals[-1]}" if intervals else "left out"
+            choice = spelled(intervals) if intervals else "left out"
             raise ValueError(f"setup_interval of {parameters.name} must be {choice}, not {setup_interval}")
         if intervals:
-            self.setup_interval = setup_interval or min(4, intervals[-1])
+            self.setup_interval = setup_interval or max(interval for interval in intervals if interval <= 4)
         self.parameters = parameters
         self.lights = lights
         self.highlights = highlights
         self.length_bits = length_bits
         self.product_interval = product_interval
+        self.gate = gate
+        self.takes_threshold = takes_threshold
         span = self.span_shape(lights, highlights=highlights, length_bits=length_bits)
         members = {
             "i": In(stream.Signature(span)),
-            "o": Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights))),
+            "o": Out(
+                stream.Signature(
+                    operands_shape(parameters, lights, highlights=highlights, gated=gate is not None)
+                )
+            ),
             "out_of_range": Out(1),
         }
         if not parameters.TAKES_VALUES:
             members["constants"] = In(light_vectors_shape(lights))
+        members |= self.further_members()
         super().__init__(members)
 
 

@@ -15,7 +15,9 @@ from blysk.hdl.cosines.chord import chord
 __all__ = ["LightProductsUnit", "operands_shape"]
 
 
-def operands_shape(parameters: Interpolator, lights: int, *, highlights: bool = True) -> data.ArrayLayout:
+def operands_shape(
+    parameters: Interpolator, lights: int, *, highlights: bool = True, gated: bool = False
+) -> data.ArrayLayout:
     """Shape of the operands of a pixel: for each light N·L, and N·H or 1 - N·H.
 
     Parameters
@@ -26,10 +28,14 @@ def operands_shape(parameters: Interpolator, lights: int, *, highlights: bool = 
         Number of lights.
     highlights : bool
         Whether there is specular light.
+    gated : bool
+        Whether a gate's decision, that there is no highlight, comes with them.
     """
     operands = {"cosine": FixedShape(parameters.COSINE_FORMAT)}
     if highlights:
         operands["highlight"] = FixedShape(Specular(operand=parameters.operand).operand_format)
+    if gated:
+        operands["gated"] = 1
     return data.ArrayLayout(data.StructLayout(operands), lights)
 
 

@@ -1,23 +1,23 @@
 """The chord method for point lights and a near viewer: three values of N·L and of the chord a span."""
 
-from amaranth.hdl import Module
-from amaranth.lib import wiring
+from amaranth.hdl import Module, Signal, Value, unsigned
+from amaranth.lib import data, wiring
 
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
-from blysk.hdl.core.stream import SLICE_LATENCY, connect, connect_slice
-from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit, span_values_shape
-from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
+from blysk.hdl.core.stream import connect
+from blysk.hdl.cosines.chord_setup import span_values_shape
+from blysk.hdl.methods.chord_interpolator import ChordSpansUnit
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 
 __all__ = ["LocalChordInterpolatorUnit"]
 
 
 class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpolator):
-    """Local chord setup, then accumulators: spans with values in, the operands of their pixels out.
+    """Chord setup, then accumulators: spans with values in, the operands of their pixels out.
 
-    `LocalChordInterpolator` is the bit-accurate model. No multiplier a pixel; those of the setup are
-    ``ceil((1 + 5 lights) / setup_interval)``, without highlights ``ceil((1 + 2 lights) / setup_interval)``.
+    `LocalChordInterpolator` is the bit-accurate model. No multiplier a pixel; the attribute ``multipliers``
+    tells those of the setup. A span of two pixels takes two cycles, as two of one.
 
     Spans carry values in place of normals, so there are no vectors of lights. A span is flagged if one of its
     words does not fit.
@@ -31,38 +31,78 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
     options
         As for `InterpolatorUnit`; ``setup_interval`` is 1 to 6.
 
+    Members
+    -------
+    constants : :py:`In(10)` or :py:`In(18)`
+        Specular exponent or threshold, constant while spans are inside; only of a gate that has it as a port.
+
     Source: docs/theory/chord.md#local-lights.
     """
 
+    shortest_interval = 1
+
     @classmethod
     def setup_intervals(cls, parameters):
-        """Initiation intervals of the local chord setup that save multipliers of one light."""
-        return range(1, 7)
+        """Initiation intervals of the chord setup that save multipliers of one light."""
+        return (1, 2, 3, 6)
 
     @classmethod
     def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS):
         """Three values of each operand of each light, and the length."""
-        return span_values_shape(lights, highlights, length_bits)
+        values = span_values_shape(lights, highlights)
+        return data.StructLayout({"values": values, "length": unsigned(length_bits)})
 
     def __init__(self, parameters: LocalChordInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
-        self._setup = LocalChordSetupUnit(
-            None,
+        self._spans = ChordSpansUnit(
+            parameters,
             lights,
             initiation_interval=self.setup_interval,
-            length_bits=self.length_bits,
             highlights=self.highlights,
+            length_bits=self.length_bits,
+            gate=self.gate,
         )
-        self._accumulator = ChordAccumulatorUnit(lights=lights, highlights=self.highlights)
-        self.latency = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
+        self.multipliers = self._spans.multipliers
+        self.latency = self._spans.latency
 
     def elaborate(self, platform):
-        """A register slice between the two holds spans, so that short spans after a long one are ready."""
+        """Two pixels one after the other, the second from registers; anything else as it comes."""
         m = Module()
-        m.submodules.local_chord_setup = setup = self._setup
-        m.submodules.chord_accumulator = accumulator = self._accumulator
-        connect(m, wiring.flipped(self.i), setup.i)
-        connect_slice(m, setup.o, accumulator.i)
-        connect(m, accumulator.o, wiring.flipped(self.o))
-        m.d.comb += self.out_of_range.eq(setup.o.valid & setup.o.ready & setup.o.payload.out_of_range)
+        m.submodules.chord_spans = spans = self._spans
+        span, second, pair = self.i.payload, Signal(name="second"), Signal()
+        m.d.comb += [
+            pair.eq(span.length == 2),
+            spans.i.valid.eq(self.i.valid | second),
+            spans.i.payload.eq(span),
+            self.i.ready.eq(spans.i.ready & ~second),
+            self.out_of_range.eq(spans.out_of_range),
+        ]
+        with m.If(pair | second):
+            m.d.comb += spans.i.payload.length.eq(1)
+        with m.If(spans.i.valid & spans.i.ready):
+            m.d.sync += second.eq(pair & ~second)
+        for index, (given, light) in enumerate(zip(spans.i.payload["values"], span["values"], strict=True)):
+            for name in light.shape().members:
+                end = Signal.like(light[name][2], name=f"{name}_{index}_end", reset_less=True)
+                with m.If(second):
+                    m.d.comb += Value.cast(given[name][0]).eq(Value.cast(end))
+                with m.Else():
+                    m.d.sync += Value.cast(end).eq(Value.cast(light[name][2]))
+        connect(m, spans.o, wiring.flipped(self.o))
+        if "constants" in spans.signature.members:
+            m.d.comb += spans.constants.eq(self.constants)
         return m
+
+    def further_members(self):
+        """Exponent or threshold of a gate."""
+        return {} if self.gate is None else self.gate.ports
+
+    @property
+    def exponent(self):
+        """Exponent of a gate, if it is a port."""
+        return None if self.takes_threshold else getattr(self, "constants", None)
+
+    @property
+    def threshold(self):
+        """Threshold of a gate, if it is a port."""
+        return getattr(self, "constants", None) if self.takes_threshold else None

@@ -40,9 +40,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit, parameters=RecurrenceInterpol
 
     def __init__(self, parameters: RecurrenceInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
-        self._setup = RecurrenceSetupUnit(
-            parameters.setup, lights, initiation_interval=self.setup_interval
-        )
+        self._setup = RecurrenceSetupUnit(parameters.setup, lights, initiation_interval=self.setup_interval)
         self._recurrences = [RecurrenceUnit(parameters.setup.recurrence) for _ in range(lights)]
         unit = self._recurrences[0]
         self.latency = self._setup.latency + SLICE_LATENCY + unit.latency

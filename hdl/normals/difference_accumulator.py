@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from amaranth.hdl import Module, ShapeLike, Signal, ValueCastable
+from amaranth.hdl import Module, ShapeLike, Signal, Value, ValueCastable
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -31,6 +31,8 @@ class AccumulatorUnit(wiring.Component):
     output_shape : ShapeLike
         Shape of the values of a pixel.
 
+    A subclass may carry further words of a span to its pixels; see `carried`.
+
     Members
     -------
     i : :py:`In(stream.Signature(input_shape))`
@@ -52,6 +54,10 @@ class AccumulatorUnit(wiring.Component):
         """Name, model, (start, first, second) and element of ``values`` of each quadratic."""
         raise NotImplementedError
 
+    def carried(self, values: ValueCastable) -> Iterator[tuple[Value, Value]]:
+        """Words of the span, and elements of ``values`` that have them at each of its pixels."""
+        yield from ()
+
     def elaborate(self, platform):
         """Accumulators, a pixel counter, and a register for the saturated values."""
         m = Module()
@@ -65,6 +71,12 @@ class AccumulatorUnit(wiring.Component):
         ]
         with m.If(advance):
             m.d.sync += valid.eq(active)
+        for index, (word, result) in enumerate(self.carried(values)):
+            of_span = Signal(len(word), name=f"carried_{index}")
+            with m.If(load):
+                m.d.sync += of_span.eq(word)
+            with m.If(advance):
+                m.d.sync += result.eq(of_span)
         for name, p, (start, first, second), result in self.quadratics(values):
             value = Signal(FixedShape(p.format), name=name)
             difference = Signal(FixedShape(p.difference_format), name=f"{name}_difference")

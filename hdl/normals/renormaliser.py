@@ -1,28 +1,32 @@
-"""Renormaliser: a vector of about unit length divided by its length, one in every cycle."""
+"""Renormaliser: a vector of any length divided by its length, one in every cycle."""
 
 from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
 from amaranth.lib import data
 from amaranth.lib.memory import Memory
 
 from blysk.golden.normals.renormaliser import Renormaliser
-from blysk.golden.number.fixed import SQ, UQ
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.normals.dot_product import DotProductUnit
 
-__all__ = ["RenormaliserUnit"]
+__all__ = ["RenormaliserUnit", "vector_shape"]
+
+
+def vector_shape() -> data.ArrayLayout:
+    """Shape of a vector of any length: three components ``SQ(1, 22)``."""
+    return data.ArrayLayout(FixedShape(Renormaliser.VECTOR_FORMAT), 3)
 
 
 class RenormaliserUnit(PipelinedUnit):
-    """Unit vector ``N = v/sqrt(v . v)``, by a reciprocal square root in 18 quadratic segments.
+    """Unit vector ``N = v / |v|`` by a shift and a reciprocal square root in 64 quadratic segments.
 
-    `Renormaliser`, the bit-accurate model, has segments, formats, error bound and flag.
+    `Renormaliser`, the bit-accurate model, has segments, formats, error bounds and flag.
 
-    The latency is 12 cycles (dot product 3, segment, table, four for the polynomial, scaling, sum,
-    saturation), the initiation interval 1. Eight multipliers: three squares, two in the polynomial,
-    three scalings. The table holds 18 words of 49 bits.
+    The latency is 16 cycles (leading one, its place, two for the shift, dot product 3, octave, table, four
+    for the polynomial, product, rounding, saturation), the initiation interval 1. Eight multipliers: three
+    squares, two in the polynomial, three products with the factor. The table holds 64 words of 48 bits.
 
     Parameters
     ----------
@@ -31,10 +35,10 @@ class RenormaliserUnit(PipelinedUnit):
 
     Members
     -------
-    i : :py:`In(stream.Signature(ArrayLayout(SQ(1, 17), 3)))`
-        Vectors.
-    o : :py:`Out(stream.Signature(StructLayout({"normal", "out_of_range"})))`
-        Unit vector, ``SQ(1, 17)``; ``out_of_range``: the length is, and the vector is that of the input.
+    i : :py:`In(stream.Signature(StructLayout({"vector": vector_shape(), "span": 1})))`
+        Vectors, with a bit that passes through.
+    o : :py:`Out(stream.Signature(StructLayout({"normal", "out_of_range", "span"})))`
+        Unit vector, ``SQ(1, 17)``; whether the vector was too short, and the normal means nothing; the bit.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """
@@ -42,73 +46,88 @@ class RenormaliserUnit(PipelinedUnit):
     def __init__(self, parameters: Renormaliser | None = None):
         self.parameters = parameters or Renormaliser()
         super().__init__(
-            normal_shape(),
-            data.StructLayout({"normal": normal_shape(), "out_of_range": unsigned(1)}),
-            latency=12,
+            data.StructLayout({"vector": vector_shape(), "span": 1}),
+            data.StructLayout({"normal": normal_shape(), "out_of_range": unsigned(1), "span": 1}),
+            latency=16,
         )
+
+    def _delayed(self, m, value, name, first, last):
+        """A value, from the register of a stage to that of a later one."""
+        for stage in range(first, last + 1):
+            value = self.register(m, value, f"{name}_{stage}")
+        return value
 
     def datapath(self, m, operands):
-        """Square, segment and offset in it, ``c0 - u (c1 - u c2)``, and ``v + e v``."""
+        """Shift, square, octave and offset in its segment, ``c0 - x (c1 - x c2)``, ``r w``."""
         p, register = self.parameters, self.register
+        word, too_short = self._scaled(m, operands.vector)
         m.submodules.dot_product = dot_product = DotProductUnit()
-        m.d.comb += [
-            dot_product.i.payload.a.eq(operands),
-            dot_product.i.payload.b.eq(operands),
-            dot_product.i.valid.eq(1),
-            dot_product.o.ready.eq(1),
-        ]
-        vector = [operands]
-        for stage in range(1, 11):
-            vector.append(register(m, vector[-1], f"vector_{stage}"))
+        for c in range(3):
+            m.d.comb += [dot_product.i.payload.a[c].eq(word[c]), dot_product.i.payload.b[c].eq(word[c])]
+        m.d.comb += [dot_product.i.valid.eq(1), dot_product.o.ready.eq(1)]
+        word = [self._delayed(m, word[c], f"word_{c}", 5, 13) for c in range(3)]
 
-        square = dot_product.o.payload.truncate(p.OFFSET_FORMAT.fraction_bits)
-        low = FixedValue.constant(UQ(0, 22), p.LOW)
-        offset = Value.cast(register(m, square - low, "offset"))
+        square = dot_product.o.payload.as_value()
+        octave = sum(square[33 + k :].any() for k in range(p.OCTAVES - 1))
+        fraction = (square[11:37].as_unsigned() >> octave)[: p.SEGMENT_BITS + p.OFFSET_FORMAT.width]
+        octave = register(m, octave[:2], "octave")
+        fraction = register(m, fraction, "fraction")
         bits = p.OFFSET_FORMAT.width
-        segment = offset[bits:]
-        # A negative offset has high bits, too.
-        out_of_range = register(m, segment >= p.SEGMENTS, "out_of_range_5")
-        u = FixedValue(p.OFFSET_FORMAT, register(m, offset[:bits], "u_5"))
-        c0, c1, c2 = self._coefficients(m, segment[: p.SEGMENT_BITS])
+        c0, c1, c2 = self._coefficients(m, Cat(fraction[bits:], octave))
+        x = FixedValue(p.OFFSET_FORMAT, register(m, fraction[:bits], "x_9"))
 
-        square_term = register(m, u * c2, "square_term")
-        c0, c1, u = register(m, c0, "c0_6"), register(m, c1, "c1_6"), register(m, u, "u_6")
-        with_half = FixedValue(UQ(1, 17), Cat(Const(1, 1), Value.cast(c1)))
-        slope = register(m, (with_half - square_term).truncate(16).wrap(p.C1_FORMAT), "slope")
-        c0, u = register(m, c0, "c0_7"), register(m, u, "u_7")
-        linear_term = register(m, u * slope, "linear_term")
-        c0 = register(m, c0, "c0_8")
-        for stage in range(6, 9):
-            out_of_range = register(m, out_of_range, f"out_of_range_{stage}")
-        e = (c0 - linear_term).truncate(18).wrap(p.FACTOR_FORMAT)
-        e = FixedValue(p.FACTOR_FORMAT, register(m, Mux(out_of_range, 0, Value.cast(e)), "e"))
-        for stage in range(9, 13):
-            out_of_range = register(m, out_of_range, f"out_of_range_{stage}")
+        square_term = register(m, x * c2, "square_term")
+        c0, c1, x = register(m, c0, "c0_10"), register(m, c1, "c1_10"), register(m, x, "x_10")
+        slope = (c1 - square_term).round_half_up(p.C1_FORMAT.fraction_bits).wrap(p.C1_FORMAT)
+        slope = register(m, slope, "slope")
+        c0, x = register(m, c0, "c0_11"), register(m, x, "x_11")
+        linear_term = register(m, x * slope, "linear_term")
+        c0 = register(m, c0, "c0_12")
+        r = (c0 - linear_term).round_half_up(p.FACTOR_FORMAT.fraction_bits).saturate(p.FACTOR_FORMAT)
+        r = register(m, r, "r")
 
         result = Signal(self.o.payload.shape())
-        m.d.comb += result.out_of_range.eq(out_of_range)
+        m.d.comb += result.out_of_range.eq(self._delayed(m, too_short, "too_short", 3, 16))
+        m.d.comb += result.span.eq(self._delayed(m, operands.span, "span", 1, 16))
         for c in range(3):
-            scaled = register(m, e * vector[9][c], f"scaled_{c}")
-            with_half = FixedValue(SQ(1, 18), Cat(Const(1, 1), Value.cast(vector[10][c])))
-            total = register(m, (with_half + scaled).truncate(17), f"total_{c}")
-            m.d.comb += result.normal[c].eq(register(m, total.saturate(COMPONENT), f"normal_{c}"))
+            product = register(m, word[c] * r, f"product_{c}")
+            rounded = register(m, product.round_half_up(COMPONENT.fraction_bits), f"rounded_{c}")
+            m.d.comb += result.normal[c].eq(register(m, rounded.saturate(COMPONENT), f"normal_{c}"))
         return result
 
+    def _scaled(self, m, vector):
+        """w, four cycles after the vector; and whether it is too short, two cycles after it."""
+        p, register = self.parameters, self.register
+        codes = [vector[c].as_value() for c in range(3)]
+        magnitudes = [Mux(code[-1], ~code, code)[:-1] for code in codes]
+        magnitude = register(m, magnitudes[0] | magnitudes[1] | magnitudes[2], "magnitude")
+        codes = [register(m, code, f"code_{c}") for c, code in enumerate(codes)]
+        shift, bits = unsigned(3), len(magnitude)
+        # The place of the leading one, from the lowest that counts.
+        place = p.MAX_SHIFT
+        for k in reversed(range(p.MAX_SHIFT)):
+            place = Mux(magnitude[bits - 1 - k], k, place)
+        too_short = register(m, ~magnitude[bits - 1 - p.MAX_SHIFT :].any(), "too_short_2")
+        place = register(m, Value.cast(place)[: shift.width], "place")
+        codes = [register(m, code, f"code_{c}_2") for c, code in enumerate(codes)]
+        coarse = [(code << Cat(Const(0, 2), place[2]))[: len(code)] for code in codes]
+        coarse = [register(m, code, f"coarse_{c}") for c, code in enumerate(coarse)]
+        place = register(m, place[:2], "place_3")
+        word = []
+        for c, code in enumerate(coarse):
+            fine = FixedValue(p.VECTOR_FORMAT, (code << place)[: len(code)].as_signed())
+            rounded = fine.round_half_up(COMPONENT.fraction_bits).saturate(COMPONENT)
+            word.append(register(m, rounded, f"word_{c}_4"))
+        return word, too_short
+
     def _coefficients(self, m, segment):
-        """``c0``, ``c1`` and ``c2`` of the segment, one cycle later; c0 with half a step of e added."""
+        """``c0``, ``c1`` and ``c2`` of the segment, one cycle later."""
         p = self.parameters
-        c0, c1, c2 = p.coefficients
-        layout = data.StructLayout(
-            {
-                "c0": FixedShape(p.C0_FORMAT),
-                "c1": FixedShape(p.C1_FORMAT),
-                "c2": FixedShape(p.C2_FORMAT),
-            }
-        )
-        half = p.FACTOR_FORMAT.step / 2
-        rows = zip((c0.values + half).tolist(), c1.values.tolist(), c2.values.tolist(), strict=True)
-        rows = [dict(zip(("c0", "c1", "c2"), row, strict=True)) for row in rows]
-        m.submodules.coefficients = table = Memory(shape=layout, depth=1 << p.SEGMENT_BITS, init=rows)
+        names, formats = ("c0", "c1", "c2"), (p.C0_FORMAT, p.C1_FORMAT, p.C2_FORMAT)
+        layout = data.StructLayout(dict(zip(names, map(FixedShape, formats), strict=True)))
+        rows = zip(*(word.values.tolist() for word in p.coefficients), strict=True)
+        rows = [dict(zip(names, row, strict=True)) for row in rows]
+        m.submodules.coefficients = table = Memory(shape=layout, depth=len(rows), init=rows)
         port = table.read_port()
         m.d.comb += port.addr.eq(segment)
         return port.data.c0, port.data.c1, port.data.c2

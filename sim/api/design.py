@@ -5,11 +5,14 @@ from dataclasses import replace
 from importlib.metadata import version
 from typing import Any, Unpack
 
+from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.frame_constants import address_table
+from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import Design
 from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED, preset
 from blysk.hdl.emit.verilog import emit
+from blysk.hdl.methods.interpolator import spelled
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit
 from blysk.sim.api.options import COUNTS, DESIGN, DesignOptions
@@ -27,7 +30,7 @@ def design(*, lights: int = 1, materials: int = 1, **options: Unpack[DesignOptio
     lights, materials : int
         How many it serves: 1 to 16, and 1 to 1024.
     method : str
-        Interpolation along a span: one of `METHODS`, by default ``"quadratic"``.
+        Interpolation along a span: one of `METHODS`, by default ``"chord"``.
     model : str
         Reflection model: one of `MODELS` or `LOBES`, by default ``"cosquad"``; or the curve of a file.
     operand : {"cosine", "one_minus_cosine"}
@@ -70,16 +73,15 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
         remedy = f"use one of {', '.join(served)}"
         raise settings.refuse("model", "the pipeline finds N.H, not R.V", remedy)
     if settings["gate"] and not (METHODS | PUBLISHED)[method].serves_gate:
-        lacks = "error bound" if method in PUBLISHED else "normals"
-        raise settings.refuse("gate", f"{method} has no {lacks} for one", "leave it out", "")
+        raise settings.refuse("gate", f"{method} has no error bound for one", "leave it out", "")
     options: dict[str, Any] = {name: settings[name] for name in DESIGN if name not in ("method", "model")}
     try:
         made = preset(method, settings["model"], lights, **options)
     except ValueError as error:
         raise settings.refuse("operand", str(error), "leave it out") from None
-    intervals = unit_of(made.interpolator).setup_intervals(made.interpolator)
-    if settings["setup_interval"] not in (None, *intervals):
-        remedy = f"give 1 to {max(intervals)}" if intervals else "leave it out"
+    served = unit_of(made.interpolator).setup_intervals(made.interpolator)
+    if settings["setup_interval"] not in (None, *served):
+        remedy = f"give {spelled(served)}" if served else "leave it out"
         raise settings.refuse("setup_interval", f"method {method} is not built for it", remedy)
     if isinstance(made.specular, Lobe):
         made = replace(made, specular=replace(made.specular, banks=min(materials, Lobe.MAX_BANKS)))
@@ -90,13 +92,38 @@ def header_of(unit: ShadingPipelineUnit) -> list[str]:
     """What a pipeline is, in lines: version, design and cycles."""
     made = unit.parameters
     gate = ", highlight gate" if made.gate else ""
-    return [
-        f"blysk {version('blysk')} shading pipeline",
+    lines = [
+        f"blysk {version('blysk')} shading pipeline, MIT licence",
         f"method {made.method}, model {made.model}, lights {made.lights}, materials {made.materials}, "
         f"{made.build.style} style{gate}",
         f"latency {unit.latency} cycles, {unit.cycles_per_pixel} a pixel",
         f"a span takes at most max({unit.cycles_per_pixel} length, {unit.setup_interval}) cycles",
+        "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign",
     ]
+    if made.takes_values:
+        formats = ChordSetup.DIFFUSE_FORMAT, ChordSetup.HIGHLIGHT_FORMAT
+        lines += [
+            f"i_values: a light's three codes of N.L, {formats[0]}, and three of 1 - N.H, {formats[1]},",
+            "times (1 - 2^-17)^2: at the first pixel, the middle, the last pixel; no L and H are read",
+        ]
+    elif made.interpolator.takes_line:
+        lines.append(
+            "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, "
+            f"in {made.interpolator.END_FORMAT}"
+        )
+    elif made.lights:
+        lines.append("i_normal_*, L and H: unit vectors in SQ(1, 17), code = component (2^17 - 1)")
+    if made.span_limit:
+        angles = ", ".join(f"{n}: {made.span_limit.angle(n):.1f}" for n in (1, 10, 50, 100, 200, 500, 1000))
+        lines += [
+            f"safe angle of a lit span of 4 pixels or more, degrees by exponent: {angles}; unlit: "
+            f"{made.span_limit.WIDEST:g}; wider ones are counted in status_wide_spans",
+        ]
+    lines += [
+        f"colour constants: {Intensity.COLOR_FORMAT}, 255 times coefficient times light",
+        "before the first span: rst high for a cycle, then write every frame constant in any order",
+    ]
+    return lines
 
 
 def verilog(design: Design | None = None, name: str = "blysk") -> str:
@@ -125,7 +152,7 @@ def verilog_and_unit(design: Design, name: str) -> tuple[str, ShadingPipelineUni
     p = unit.parameters
     lobe = p.specular if isinstance(p.specular, Lobe) else None
     loads = lobe is not None and lobe.fixed is None
-    constants = address_table(p.lights, p.materials, loads, has_threshold=lobe is not None and p.gate)
+    constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads)
     header = [*header_of(unit), "", "Frame constants, through the write port:", *constants]
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
     descriptions = {

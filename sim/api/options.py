@@ -283,7 +283,7 @@ SCENE: dict[str, Option] = {
 DESIGN: dict[str, Option] = {
     "method": Option(
         Choice("method", METHODS | PUBLISHED),
-        "quadratic",
+        "chord",
         "Interpolation along a span.",
         "pipeline.method",
     ),

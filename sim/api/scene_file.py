@@ -74,7 +74,7 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         exponent = 50
 
         [pipeline]
-        method = "quadratic"
+        method = "chord"
         model = "cosquad"
         operand = "cosine"                  # "one_minus_cosine"
         setup_interval = 4

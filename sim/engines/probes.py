@@ -20,6 +20,7 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 __all__ = ["ObservedPipeline", "Probe", "probes_of"]
 
 _GATED_BITS = 32
+_CHORD_SPANS = "interpolator.chord_spans"
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,10 @@ class Probe:
         the word is that of the pixel; before that, less than 0.
     exact : str
         Name of what the word would be in exact arithmetic, empty for a mark: ``normal_x``, ``normal_y``,
-        ``normal_z``, and ``line_x`` to ``line_z`` of the straight line; ``cosine`` (N·L),
-        ``highlight_cosine`` (N·H), ``one_minus_cosine`` (1 - N·H); ``product`` (k times that), ``base``,
-        ``base_2``, ``base_4``, ``base_8`` (its powers); ``diffuse``, ``specular``; ``red_diffuse``,
-        ``red_specular``, ``red`` in LSB, not limited; ``r``, ``g``, ``b`` limited.
+        ``normal_z``; ``cosine`` (N·L), ``highlight_cosine`` (N·H), ``one_minus_cosine`` (1 - N·H);
+        ``product`` (k times that), ``base``, ``base_2``, ``base_4``, ``base_8`` (its powers); ``diffuse``,
+        ``specular``; ``red_diffuse``, ``red_specular``, ``red`` in LSB, not limited; ``r``, ``g``, ``b``
+        limited.
     unit : float
         Value that stands for 1.
     """
@@ -110,7 +111,8 @@ class ObservedPipeline(Component):
                 source.ready.eq(sink.ready),
             ]
         gated = Signal(_GATED_BITS)
-        decision = _unit(fragment, "highlight_gate").o
+        gate = _unit(fragment, "highlight_gate") or _unit(fragment, f"{_CHORD_SPANS}.value_gate")
+        decision = gate.o
         m.d.sync += gated.eq(gated + (decision.valid & decision.ready & ~decision.payload[0]))
         operands, taken = _unit(fragment, "interpolator").o, _unit(fragment, "light_0").i
         m.d.comb += [
@@ -254,7 +256,7 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
 
 def _accumulators(fragment, design: Design, number, one: float, one_squared: float):
     """Sums of the methods that have them, and what is added to them."""
-    words = _registers(_part(fragment, "interpolator.chord_accumulator"))
+    words = _registers(_part(fragment, f"{_CHORD_SPANS}.chord_accumulator"))
     if words:
         for name, title, exact in (
             ("diffuse", "sum for N·L", "cosine"),
@@ -264,15 +266,10 @@ def _accumulators(fragment, design: Design, number, one: float, one_squared: flo
             yield from _sums(number, words, f"{name}_0", title, exact, formats, -1, one_squared)
     words = _registers(_part(fragment, "interpolator.difference_accumulator"))
     if words:
-        interpolator, renormaliser = (
-            _unit(fragment, "interpolator"),
-            _unit(fragment, "interpolator.renormaliser"),
-        )
-        age = -1 - interpolator.product_latency - (renormaliser.latency if renormaliser else 0)
+        age = -1 - _unit(fragment, "interpolator").product_latency
         for c, axis in enumerate("xyz"):
-            formats = DifferenceAccumulator()
-            exact = f"line_{axis}" if renormaliser else f"normal_{axis}"
-            yield from _sums(number, words, f"normal_{c}", f"sum for N, {axis}", exact, formats, age, one)
+            formats, title = DifferenceAccumulator(), f"sum for N, {axis}"
+            yield from _sums(number, words, f"normal_{c}", title, f"normal_{axis}", formats, age, one)
 
 
 def _sums(number, words, own, title, exact, formats: DifferenceAccumulator, age: int, unit: float):

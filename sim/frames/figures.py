@@ -25,8 +25,8 @@ __all__ = [
 
 ERRORS = {
     "arithmetic": "the same method and model in float64",
-    "method": "exactly normalised Phong interpolation, same model",
-    "total": "the exact Blinn frame, one viewing direction",
+    "method": "exact normals of every pixel, same model",
+    "total": "exact normals of every pixel, Blinn's power",
 }
 """Name of each error, and the frame that it is against."""
 
@@ -74,6 +74,8 @@ def frame_figures(
             "repaired_span_normals": raster.repaired_normals,
             "hidden_spans": raster.hidden_spans,
             "cut_spans": frame.prepared.spans_cut,
+            "missed_spans": frame.prepared.missed_spans,
+            "wide_spans": frame.wide_spans,
             "out_of_range_spans": frame.out_of_range_spans,
         },
         "seconds": {**frame.seconds, "golden": comparison.seconds},

@@ -6,10 +6,10 @@ from time import perf_counter
 
 import numpy as np
 
+from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.frame import Frame, frame_buffer
 from blysk.golden.frames.prepare import constants_of, prepare, with_tables
-from blysk.golden.methods.local_chord_interpolator import SpanValues
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.lighting import Material
@@ -49,7 +49,9 @@ def beats_of(unit: ShadingPipelineUnit, spans: Spans) -> dict[str, np.ndarray]:
         What it is to shade.
     """
     members = unit.i.payload.shape().members
-    beats = {name: getattr(spans, name) for name in members if name != "values"}
+    beats = {name: getattr(spans, name) for name in members if name not in ("values", "normal_middle")}
+    if "normal_middle" in members:
+        beats["normal_middle"] = spans.middle
     if "values" in members:
         beats["values"] = values = np.zeros(len(spans), dtype_of(members["values"]))
         for name in members["values"].elem_shape.members:
@@ -146,6 +148,7 @@ class FrameSimulator:
             image=frame_buffer(scene, raster, _colors(run.beats)),
             prepared=prepared,
             out_of_range_spans=int(run.status["out_of_range_spans"]),
+            wide_spans=int(run.status["wide_spans"]),
             seconds={"raster": rastered - start, "simulate": perf_counter() - rastered},
             cycles=run.total_cycles,
             engine=run.engine,

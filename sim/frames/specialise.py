@@ -11,7 +11,6 @@ import numpy as np
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import PreparedFrame, constants_of, prepare
-from blysk.golden.number.unit_vector import values
 from blysk.golden.pipeline import Design
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
@@ -81,10 +80,10 @@ def specialise(
 
     Left out are: lights that light nothing; the specular path, where no span has specular light; the
     highlight gate, where there is nothing to gate; the memory of materials, for equal ones; the PROM, for one
-    exponent, or the writes of a lobe's tables; two of three channels, where all colours are grey; and the
-    upper bits of coordinates and lengths. No word of the arithmetic changes its width, so that no pixel does.
-    If not ``exact``, the chord method also has fewer terms in its polynomial where all spans are narrow, and
-    fewer bits in its differences where all are short: its error bound stays, its pixels may change.
+    exponent; two of three channels, where all colours are grey; and the upper bits of coordinates and
+    lengths. No word of the arithmetic changes its width, so that no pixel does. If not ``exact``, the chord
+    method also has fewer bits in its differences where all spans are short: its error bound stays, its pixels
+    may change.
 
     Parameters
     ----------
@@ -129,8 +128,8 @@ def _without_dark_lights(
 ) -> tuple[tuple[Scene, ...], list[Reduction]]:
     constants = _constants(scenes[0], full.lights)
     bright = np.any([of.diffuse | of.specular for of in constants], axis=(0, 2))
-    # With values, spans are cut by every light's, dark or not.
-    if bright.all() or (full.takes_values and bright.any()):
+    # Spans are cut by every light's, dark or not.
+    if bright.all() or (full.interpolator.CUT_BY_ERROR and bright.any()):
         return scenes, []
     count = int(np.count_nonzero(bright))
     kept = tuple(light for light, lit in zip(scenes[0].lights, bright, strict=False) if lit)
@@ -225,19 +224,8 @@ def _with_fewer_bits(full: Design, scene: Scene, longest: int) -> list[Reduction
 
 
 def _with_shorter_words(prepared: Sequence[PreparedFrame], longest: int) -> list[Reduction]:
-    """What narrow and short spans allow the chord method."""
+    """What short spans allow the chord method."""
     found = []
-    left, right = (
-        values(np.concatenate([getattr(frame.spans, name) for frame in prepared]))
-        for name in ("normal_left", "normal_right")
-    )
-    half = np.linalg.norm(left - right, axis=-1).max(initial=0) / 2
-    angle = float(np.degrees(2 * np.arcsin(min(half, 1.0))))
-    # A code may be off by some thousandths of a degree.
-    terms = [terms for terms, widest in ChordSetup.ANGLES.items() if angle < widest - 0.01]
-    if terms and min(terms) < 3:
-        reason = f"polynomial of {min(terms)} in place of 3 terms: the widest span has {angle:.2f} degrees"
-        found.append(Reduction(reason, {"interpolator": {"terms": min(terms)}}))
     bits = min(bits for bits in range(36, 47, 2) if longest <= ChordSetup(fraction_bits=bits).longest)
     if bits < 46:
         reason = f"differences of {bits} in place of 46 fraction bits: the longest span has {longest} pixels"

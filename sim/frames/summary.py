@@ -17,6 +17,8 @@ _COUNTS = {
     "repaired_span_normals": "span ends whose normal was 0",
     "hidden_spans": "spans wholly hidden, left out",
     "cut_spans": "spans cut to the range of the method",
+    "missed_spans": "spans that this method misses by over 0.25 LSB (chord and renormalise do not)",
+    "wide_spans": "spans wider than the error bound of the exponent allows",
     "out_of_range_spans": "spans out of range in the pipeline",
 }
 

@@ -98,7 +98,12 @@ def vectors(unit: ShadingPipelineUnit) -> dict[str, dict[str, np.ndarray]]:
         "pixels": ("o", pixel_beats(pixels)),
         "status": (
             "status",
-            {"out_of_range_spans": [pixels.out_of_range_spans], "empty_spans": [1], "overrun": [0]},
+            {
+                "out_of_range_spans": [pixels.out_of_range_spans],
+                "wide_spans": [pixels.wide_spans],
+                "empty_spans": [1],
+                "overrun": [0],
+            },
         ),
     }
     return {name: dict(_columns(*table)) for name, table in tables.items()}

@@ -19,7 +19,7 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
-from blysk.sim.units.cosines.local_chord_setup import values_of
+from blysk.sim.units.cosines.chord_setup import values_of
 from blysk.sim.units.methods.interpolator import SPAN
 from blysk.sim.units.methods.quadratic_interpolator import STILL
 from blysk.sim.units.operands import (
@@ -35,6 +35,7 @@ from blysk.sim.units.pipeline_spans import (
     any_spans,
     axes_about,
     constants_written,
+    ends_for,
     flat_spans,
     joined,
     operands_of,
@@ -73,7 +74,8 @@ def _measure(rng, count, design):
             viewer = sphere(rng, 1)
             light = turned(rng, viewer, rng.uniform(0, 120, 1))
             halfway = normalise(light + viewer)
-            largest = min(interpolator.widest_span(exponent), 45.0)
+            widest = design.span_limit.angle if design.span_limit else interpolator.widest_span
+            largest = min(widest(exponent), 45.0)
             around = np.repeat(halfway, len(length), axis=0)
             left = turned(rng, around, rng.permutation(spread_angles(rng, len(length), 60.0)))
             right = turned(rng, left, rng.permutation(spread_angles(rng, len(length), largest)))
@@ -81,7 +83,8 @@ def _measure(rng, count, design):
             colors = (grey[name][np.newaxis] for name in ("diffuse", "specular"))
             constants = FrameConstants(exponent, grey["ambient"], light, halfway, *colors)
             zero = np.zeros_like(length)
-            found = design.compute(Spans(zero, zero, length, left, right), constants).color[:, 0]
+            spans = ends_for(design, Spans(zero, zero, length, left, right))
+            found = design.compute(spans, constants).color[:, 0]
             span, pixel = pixels_of(length)
             t = pixel / np.maximum(length - 1, 1)[span]
             ends = [normalise(end / ONE)[span] for end in (left, right)]
@@ -109,7 +112,8 @@ def spans_of(beats) -> Spans:
     none = np.zeros((len(beats["length"]), 3), dtype=np.int64)
     normals = (beats.get(name, none) for name in ("normal_left", "normal_right"))
     values = values_of(beats) if "values" in beats else None
-    return Spans(beats["x"], beats["y"], beats["length"], *normals, beats.get("material"), values)
+    of_span = (beats[name] for name in ("x", "y", "length"))
+    return Spans(*of_span, *normals, beats.get("material"), values, beats.get("normal_middle"))
 
 
 def _pixels(unit, case):
@@ -122,9 +126,10 @@ def _expect(unit, case):
 
 
 def _status(unit, case):
-    length, most = case.beats["length"], 65535
+    length, pixels, most = case.beats["length"], _pixels(unit, case), 65535
     return {
-        "out_of_range_spans": min(_pixels(unit, case).out_of_range_spans, most),
+        "out_of_range_spans": min(pixels.out_of_range_spans, most),
+        "wide_spans": min(pixels.wide_spans, most),
         "empty_spans": min(int(np.count_nonzero(length == 0)), most),
         "overrun": int(np.any(case.beats["x"] + length > 1 << unit.parameters.x_bits)),
     }
@@ -138,7 +143,7 @@ def case_of(unit, spans: Spans, constants, *before: int) -> Case:
     write = writes_of(constants if isinstance(constants, list) else [constants])
     parts = [{"address": write["address"], "data": np.full_like(write["data"], code)} for code in before]
     write = {name: np.concatenate([part[name] for part in (*parts, write)]) for name in write}
-    return Case(beats_of(unit, spans), write=write)
+    return Case(beats_of(unit, ends_for(unit.parameters, spans)), write=write)
 
 
 def _spans(unit, rng, count):
@@ -280,7 +285,8 @@ LONG_DESIGNS: dict[str, Design] = {
     "quadratic of a chord": preset("quadratic", "coscos2", 2, operand="one_minus_cosine"),
     "quadratic-eval of a chord": preset("quadratic-eval", "exp", operand="one_minus_cosine"),
     "quadratic-horner of a chord": preset("quadratic-horner", operand="one_minus_cosine"),
-    "renormalise of a chord": preset("renormalise", lights=2, operand="one_minus_cosine"),
+    "renormalise, N.H": preset("renormalise", lights=2, operand="cosine"),
+    "renormalise, power, compact": preset("renormalise", "blinn", style="compact"),
     "quadratic, power": preset("quadratic", "blinn"),
     "values, 2 lights": preset("chord-local", lights=2),
     "values, compact, 3 materials": preset("chord-local", materials=3, style="compact"),
@@ -292,7 +298,7 @@ LONG_DESIGNS: dict[str, Design] = {
     "gate, bisection": preset("bisection", "exp", gate=True),
     "gate, angular": preset("angular", gate=True),
     "gate, recurrence": preset("recurrence", lights=2, gate=True),
-    "gate, renormalise": preset("renormalise", "blinn", gate=True),
+    "gate, values": preset("chord-local", "blinn", 2, gate=True),
     "gate, compact, power": preset("quadratic-horner", "blinn", gate=True, style="compact"),
     "gate, exponent": replace(_FULL, build=Build(exponent=20)),
     "grey": preset("chord", None, grey=True),

@@ -1,5 +1,7 @@
 """Spans and constants for the pipeline: anywhere, and where the last bits of a result decide a pixel."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from blysk.golden.frame_constants import (
@@ -16,7 +18,7 @@ from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.geometry import normalise
-from blysk.sim.units.cosines.local_chord_setup import any_values
+from blysk.sim.units.cosines.chord_setup import any_values
 from blysk.sim.units.operands import pairs_at, pairs_chosen, turned, unit_codes
 
 __all__ = [
@@ -24,6 +26,7 @@ __all__ = [
     "any_spans",
     "axes_about",
     "constants_written",
+    "ends_for",
     "flat_spans",
     "joined",
     "operands_of",
@@ -107,6 +110,14 @@ def any_spans(rng: np.random.Generator, design: Design, length: np.ndarray) -> S
         material=np.sort(rng.integers(0, design.materials, count)),
         values=any_values(rng, count, design.lights) if design.takes_values else None,
     )
+
+
+def ends_for(design: Design, spans: Spans) -> Spans:
+    """Spans between unit normals, with the ends in the format that the method takes."""
+    shift = design.interpolator.END_FORMAT.fraction_bits - COMPONENT.fraction_bits
+    if not shift:
+        return spans
+    return replace(spans, normal_left=spans.normal_left << shift, normal_right=spans.normal_right << shift)
 
 
 def flat_spans(normals: np.ndarray) -> Spans:
@@ -236,7 +247,5 @@ def axes_about(rng: np.random.Generator, largest: float) -> Spans:
 
 def operands_of(design: Design, spans: Spans, constants: FrameConstants) -> tuple[Fixed, Fixed, np.ndarray]:
     """N.L, the specular operand, and whether the light is behind, by the bit-accurate model."""
-    vectors = (spans.normal_left, spans.normal_right, constants.direction, constants.halfway)
-    left, right, direction, halfway = (Fixed(COMPONENT, codes) for codes in vectors)
-    operands = design.interpolator.compute(left, right, spans.length, direction, halfway)
+    operands = design.operands(ends_for(design, spans), constants)
     return operands.cosine, operands.highlight, Diffuse(operands.cosine.format).dark(operands.cosine)

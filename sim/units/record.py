@@ -265,7 +265,7 @@ class Record:
         By name; the first serves for any number of beats, in other simulators too.
     status : callable, optional
         Takes the component and a `Case`; gives expected members of the port ``status`` after a run, by name.
-        Of a component without that port: ``out_of_range``, on how many cycles that port is high.
+        Of a component without that port: ``out_of_range`` and ``wide``, on how many cycles each port is high.
     axis : str
         What errors are drawn against; empty for nothing.
     logarithmic : bool

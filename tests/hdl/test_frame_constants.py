@@ -237,6 +237,12 @@ class Driver:
         self.reset = Signal()
         self.module.submodules.unit = ResetInserter(self.reset)(unit)
 
+    def normals(self, spans):
+        """Of both ends, and of the middle where the method takes one."""
+        middle = self.unit.parameters.interpolator.TAKES_MIDDLE
+        ends = {"left": spans.normal_left, "right": spans.normal_right}
+        return ends | ({"middle": spans.middle} if middle else {})
+
     async def run(self, ctx, cycles, spans, writes, late=None, stalls=(False,)):
         """Writes, then spans; ``late = (cycle, writes)`` offers more writes from that cycle on.
 
@@ -263,8 +269,8 @@ class Driver:
                     {
                         **{name: int(getattr(spans, name)[index]) for name in ("x", "y", "length")},
                         **{
-                            name: [c * 2.0**-17 for c in getattr(spans, name)[index].tolist()]
-                            for name in ("normal_left", "normal_right")
+                            f"normal_{place}": [c * 2.0**-17 for c in normals[index].tolist()]
+                            for place, normals in self.normals(spans).items()
                         },
                         **({"material": int(spans.material[index])} if self.several else {}),
                     },
@@ -293,16 +299,18 @@ def pixels_of(design, spans, constants):
 
 
 @pytest.mark.parametrize(
-    ("late_cycle", "materials"),
+    ("late_cycle", "materials", "method"),
     [
-        (18, 1),
-        pytest.param(80, 1, marks=pytest.mark.long),
-        pytest.param(150, 1, marks=pytest.mark.long),
-        (150, 3),
-        pytest.param(220, 3, marks=pytest.mark.long),
+        (18, 1, "quadratic"),
+        pytest.param(80, 1, "quadratic", marks=pytest.mark.long),
+        pytest.param(150, 1, "quadratic", marks=pytest.mark.long),
+        pytest.param(150, 3, "quadratic", marks=pytest.mark.long),
+        pytest.param(220, 3, "quadratic", marks=pytest.mark.long),
+        pytest.param(80, 1, "chord", marks=pytest.mark.long),
+        (150, 3, "chord"),
     ],
 )
-def test_constants_never_change_under_a_span(late_cycle, materials, normal_pairs):
+def test_constants_never_change_under_a_span(late_cycle, materials, method, normal_pairs):
     """A second frame is written while spans of the first are inside, and while more are offered.
 
     What was taken before keeps the first frame's constants to its last pixel; what is taken after has the
@@ -310,7 +318,7 @@ def test_constants_never_change_under_a_span(late_cycle, materials, normal_pairs
     materials the second frame writes all, and the spans come in six runs of one.
     """
     rng = np.random.default_rng(late_cycle)
-    design = preset(materials=materials)
+    design = preset(method, materials=materials)
     first, second = random_materials(rng, 1, materials), random_materials(rng, 1, materials)
     spans = random_spans(rng, rng.integers(1, 12, 60), normal_pairs)
     spans = replace(spans, material=np.arange(60) // 10 % materials)
@@ -340,19 +348,21 @@ def test_constants_never_change_under_a_span(late_cycle, materials, normal_pairs
 
 
 @pytest.mark.parametrize(
-    ("reset_at", "materials"),
+    ("reset_at", "materials", "method"),
     [
-        pytest.param(25, 1, marks=pytest.mark.long),
-        (90, 1),
-        pytest.param(131, 1, marks=pytest.mark.long),
-        pytest.param(131, 2, marks=pytest.mark.long),
-        (180, 2),
+        pytest.param(25, 1, "quadratic", marks=pytest.mark.long),
+        (90, 1, "quadratic"),
+        pytest.param(131, 1, "quadratic", marks=pytest.mark.long),
+        pytest.param(131, 2, "quadratic", marks=pytest.mark.long),
+        pytest.param(180, 2, "quadratic", marks=pytest.mark.long),
+        pytest.param(60, 1, "chord", marks=pytest.mark.long),
+        (131, 2, "chord"),
     ],
 )
-def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, normal_pairs):
+def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, method, normal_pairs):
     """Spans in the setup, in the FIFOs and half shaded: after a reset the pipeline does as from power-up."""
     rng = np.random.default_rng(reset_at)
-    design = preset(materials=materials)
+    design = preset(method, materials=materials)
     spans = random_spans(rng, np.r_[40, rng.integers(0, 12, 11)], normal_pairs)
     spans = replace(spans, material=np.arange(12) // 4 % materials)
     constants = random_materials(rng, 1, materials)

@@ -22,7 +22,7 @@ from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.units.operands import pairs_at
 from blysk.sim.units.pipeline import RECORD, case_of
-from blysk.sim.units.pipeline_spans import any_constants, any_spans, operands_of
+from blysk.sim.units.pipeline_spans import any_constants, any_spans, ends_for, operands_of
 
 from ..checks import assert_beats_equal
 
@@ -72,7 +72,7 @@ def test_cycles(method, interval):
     rng = np.random.default_rng(interval)
     design = preset(method, setup_interval=interval)
     unit = ShadingPipelineUnit(design)
-    lengths = np.r_[rng.integers(1, 12, 20), np.full(12, 1), 40, 1, 1]
+    lengths = np.r_[5, rng.integers(1, 12, 20), np.full(12, 1), 40, 1, 1]
     found = shade(unit, *spans_in_range(rng, design, lengths), engine="pysim")
     first = found.cycles[np.cumsum(lengths) - lengths]
     taken, length = np.diff(first), lengths[:-1]
@@ -84,34 +84,48 @@ def test_cycles(method, interval):
         return
     assert first[0] == found.input_cycles[0] + unit.latency
     assert np.all(within == unit.cycles_per_pixel)
+    if method == "chord":
+        # A third of the interval for each of the values at up to three pixels; first pixels of short spans
+        # come earlier, so that their distances count in sum.
+        turn = unit.setup_interval // 3
+        cost = np.maximum(length, np.minimum(length, 3) * turn)
+        assert np.all(np.cumsum(taken) <= np.cumsum(cost) + unit.setup_interval)
+        np.testing.assert_array_equal(taken[26:31], turn)
+        assert unit.setup_interval == (interval or 3)
+        return
     assert np.all(taken <= np.maximum(length * unit.cycles_per_pixel, unit.setup_interval))
     if interval is not None:
         # In a run of single pixels each costs the interval.
-        assert np.all(taken[26:31] == interval == unit.setup_interval)
+        assert unit.setup_interval == interval
+        assert np.all(taken[26:31] == interval)
 
 
 @pytest.mark.parametrize("lights", [1, pytest.param(3, marks=pytest.mark.long)])
-def test_cycles_of_long_spans(lights):
+@pytest.mark.parametrize(
+    ("method", "latency", "interval"), [("quadratic", 94, 4), ("renormalise", 66, 4), ("chord", 58, 3)]
+)
+def test_cycles_of_long_spans(method, latency, interval, lights):
     """Spans that the register slice holds ready cost their length alone."""
     rng = np.random.default_rng(7)
-    lengths = np.r_[rng.integers(4, 40, 300), [4095, 4095, 4]]
-    design = preset(lights=lights)
+    lengths = np.r_[rng.integers(interval, 40, 300), [4095, 4095, interval]]
+    design = preset(method, lights=lights)
     unit = ShadingPipelineUnit(design)
-    found = shade(unit, *spans_in_range(rng, design, lengths))
-    assert unit.latency == 94 + math.ceil(math.log2(2 * lights + 1))
-    assert unit.setup_interval == 4
+    found = shade(unit, *spans_in_range(rng, design, lengths, 40.0))
+    assert unit.latency == latency + math.ceil(math.log2(2 * lights + 1))
+    assert unit.setup_interval == interval
     np.testing.assert_array_equal(np.diff(found.cycles[np.cumsum(lengths) - lengths]), lengths[:-1])
 
 
 INTERVALS = {
     "linear": range(1, 8),
-    "bisection": range(0),
+    "bisection": (),
     "quadratic": range(1, 8),
-    "quadratic-eval": range(0),
-    "quadratic-horner": range(0),
+    "quadratic-eval": (),
+    "quadratic-horner": (),
     "angular": range(1, 7),
-    "renormalise": range(1, 8),
-    "chord": range(1, 27),
+    "renormalise": (1, 2, 3, 4, 5, 9),
+    "chord": (3, 9, 18),
+    "chord-local": (1, 2, 3, 6),
     "recurrence": range(1, 47),
 }
 
@@ -128,12 +142,19 @@ def never_built():
 @pytest.mark.usefixtures("never_built")
 @pytest.mark.parametrize("method", INTERVALS)
 def test_setup_intervals(method):
-    """Those that there are; 4 if that is among them; others are refused."""
+    """Those that there are; the largest to 4 by default; others are refused."""
     interpolator, choice = METHODS[method], INTERVALS[method]
-    assert unit_of(interpolator).setup_intervals(interpolator) == choice
-    assert (ShadingPipelineUnit(preset(method)).setup_interval == 4) == (4 in choice)
-    words = f"{choice[0]} to {choice[-1]}" if choice else "left out"
-    for interval in (0, choice[-1] + 1 if choice else 4):
+    assert tuple(unit_of(interpolator).setup_intervals(interpolator)) == tuple(choice)
+    if choice:
+        assert ShadingPipelineUnit(preset(method)).setup_interval == max(k for k in choice if k <= 4)
+    spelled = {
+        "renormalise": "1, 2, 3, 4, 5 or 9",
+        "chord": "3, 9 or 18",
+        "chord-local": "1, 2, 3 or 6",
+    }
+    words = spelled.get(method) or (f"{choice[0]} to {choice[-1]}" if choice else "left out")
+    between = {"renormalise": 6, "chord": 4, "chord-local": 5}.get(method, 0)
+    for interval in (0, between, choice[-1] + 1 if choice else 4):
         text = f"setup_interval of {method} must be {words}, not {interval}"
         with pytest.raises(ValueError, match=f"^{text}$"):
             ShadingPipelineUnit(preset(method, setup_interval=interval))
@@ -198,8 +219,8 @@ def test_every_method_with_every_model(method, model):
     rng = np.random.default_rng(len(model))
     design = preset(method, model)
     spans = any_spans(rng, design, np.r_[1, 2, 3, 16, 0, rng.integers(1, 41, 19)])
-    unit = ShadingPipelineUnit(design)
-    shade(unit, spans, any_constants(rng, design, spans), engine="pysim", output_stalls=rng.random(101) < 0.3)
+    unit, constants = ShadingPipelineUnit(design), any_constants(rng, design, spans)
+    shade(unit, spans, constants, engine="pysim", output_stalls=rng.random(101) < 0.3)
 
 
 # Next to either side of the largest angle that each method serves. Linear normals of 45 degrees differ by
@@ -208,12 +229,12 @@ def test_every_method_with_every_model(method, model):
     ("method", "in_range", "out_of_range", "flagged"),
     [
         ("linear", 45.0, 140.0, 20),
-        ("renormalise", 45.0, 140.0, 20),
+        # Ends that are opposite meet at 0 in the middle of spans of three pixels alone.
+        ("renormalise", 179.0, 180.0, 9),
         pytest.param("bisection", 89.99, 90.1, 50, marks=pytest.mark.long),
         ("quadratic", 44.99, 45.1, 50),
         pytest.param("quadratic-horner", 44.99, 45.1, 50, marks=pytest.mark.long),
         ("angular", 150.0, 180.0, 50),
-        ("chord", 22.49, 22.52, 50),
     ],
 )
 def test_spans_out_of_range_are_counted(method, in_range, out_of_range, flagged):
@@ -225,8 +246,25 @@ def test_spans_out_of_range_are_counted(method, in_range, out_of_range, flagged)
         right[50:] = -left[50:]
     spans = Spans(np.zeros(100, int), np.zeros(100, int), rng.integers(1, 4, 100), left, right)
     constants = any_constants(rng, design, spans)
+    for part in (slice(50), slice(50, None)):
+        pixels = design.compute(ends_for(design, spans)[part], constants)
+        assert pixels.out_of_range_spans >= flagged if part.start else not pixels.out_of_range_spans
     found = shade(ShadingPipelineUnit(design), spans, constants, engine="pysim")
     assert flagged <= found.status["out_of_range_spans"] <= 50
+
+
+def test_wide_spans_of_the_chord_method_are_counted():
+    """Spans of 30 degrees are wide, whatever the light, and narrower ones where they have a highlight."""
+    rng = np.random.default_rng(12)
+    design = preset("chord")
+    left, right = pairs_at(rng, 100, np.repeat([9.9, 30.2], 50))
+    left, right = quantise(left), quantise(right)
+    spans = Spans(np.zeros(100, int), np.zeros(100, int), np.full(100, 4), left, right)
+    (constants,) = any_constants(rng, design, spans)
+    constants = replace(constants, exponent=63)
+    assert design.compute(spans[:50], constants).wide_spans == 0
+    found = shade(ShadingPipelineUnit(design), spans, [constants], engine="pysim")
+    assert found.status["wide_spans"] == 50
 
 
 @pytest.mark.parametrize(("x", "flagged"), [(4086, 0), (4087, 1)])
@@ -278,9 +316,12 @@ def test_less_hardware_shades_the_same(part, style):
 
 @pytest.mark.usefixtures("never_built")
 def test_multipliers():
-    """Without lights none; compact a colour one, a term one; products with normals two a light."""
+    """Without lights none; compact a colour one, a term one; products with normals two a light.
+
+    Three values, setup and span limit of the chord method have one each.
+    """
     assert cost_of(ShadingPipelineUnit(preset(lights=0, materials=2))).multiplier_count == 0
-    assert cost_of(ShadingPipelineUnit(preset("chord", style="compact"))).multiplier_count == 3
+    assert cost_of(ShadingPipelineUnit(preset("chord", style="compact"))).multiplier_count == 5
     for method, lights in (("quadratic", 1), ("renormalise", 2)):
         units = (ShadingPipelineUnit(preset(method, lights=lights, style=style)) for style in STYLES)
         counts = [cost_of(unit._interpolator._products).multiplier_count for unit in units]

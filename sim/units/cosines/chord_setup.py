@@ -1,44 +1,76 @@
-"""Record of the chord setup."""
+"""Record of the chord setup, and the values of spans that it shares with the methods'."""
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
-from blysk.golden.cosines.chord_setup import ChordSetup
-from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED
+from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
 from blysk.sim.engines.beats import dtype_of
 from blysk.sim.units.operands import (
     LONG,
+    any_codes,
     any_lengths,
-    any_pairs,
-    component_words,
-    degrees_between,
     dot,
-    light_constants,
     log_lengths,
     pixel_of,
-    setup_spans,
-    span_ends,
-    unit_codes,
-    vectors_near,
+    sphere,
+    spread_angles,
+    turned,
 )
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
-__all__ = ["RECORD", "difference_beats", "value_at"]
+__all__ = [
+    "FORMATS",
+    "LOCAL",
+    "RECORD",
+    "any_values",
+    "local_curves",
+    "parabola",
+    "three_values",
+    "value_at",
+    "value_beats",
+    "values_of",
+]
+
+LOCAL = "lights and viewer 2 to 4 away, spans to 0.3 and 15 degrees"
+FORMATS = {"diffuse": ChordSetup.DIFFUSE_FORMAT, "highlight": ChordSetup.HIGHLIGHT_FORMAT}
 
 
-def difference_beats(unit, words, length, out_of_range) -> np.ndarray:
-    """Output beats of a setup of differences: those of N·L and, if it has them, of u; length and flag."""
-    expected = np.zeros(len(length), dtype_of(unit.o.payload.shape()))
-    for name, differences in zip(("diffuse", "highlight"), words, strict=True):
-        if name in expected["lights"].dtype.names:
-            for field in ("start", "first", "second"):
-                expected["lights"][name][field] = getattr(differences, field).codes
-    expected["length"], expected["out_of_range"] = length, out_of_range
-    return expected
+def local_curves(rng: np.random.Generator, spans: int) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """N·L and ``1 - N·H`` along spans with near lights and a near viewer: a function of span and t."""
+    start = rng.normal(size=(spans, 3))
+    step = rng.uniform(0, 0.3, (spans, 1)) * sphere(rng, spans)
+    to_viewer = sphere(rng, spans)
+    to_light = turned(rng, to_viewer, rng.uniform(0, 120, spans))
+    viewer, light = (start + rng.uniform(2, 4, (spans, 1)) * way for way in (to_viewer, to_light))
+    left = turned(rng, normalise(to_viewer + to_light), rng.permutation(spread_angles(rng, spans, 90.0)))
+    right = turned(rng, left, rng.permutation(spread_angles(rng, spans, 15.0)))
+
+    def at(span, t):
+        position = start[span] + t[:, np.newaxis] * step[span]
+        ways = [normalise(point[span] - position) for point in (light, viewer)]
+        normal = interpolate("normalised", left[span], right[span], t)
+        return np.stack([dot(normal, ways[0]), 1 - dot(normal, normalise(ways[0] + ways[1]))])
+
+    return at
+
+
+def three_values(at, spans: int) -> tuple[np.ndarray, SpanValues]:
+    """Exact values at the ends and in the middle, shape (2, spans, 3), and their codes for one light."""
+    exact = np.stack([at(np.arange(spans), np.full(spans, t)) for t in (0.0, 0.5, 1.0)], axis=-1)
+    return exact, SpanValues.quantise(*exact[:, :, np.newaxis])
+
+
+def parabola(values: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Quadratic through values at t = 0, 1/2 and 1, which are along the last axis."""
+    left, middle, right = np.moveaxis(values, -1, 0)
+    return left + t * (4 * middle - right - 3 * left + t * 2 * (left + right - 2 * middle))
 
 
 def value_at(differences, pixel) -> np.ndarray:
@@ -51,114 +83,126 @@ def value_at(differences, pixel) -> np.ndarray:
 def _measure(rng, count):
     """N·L and u at any pixel, by the differences in exact arithmetic; 1 is the product of unit vectors."""
     length = log_lengths(rng, count, 2)
-    left, right = span_ends(rng, count, ChordSetup.MAX_ANGLE)
-    light, halfway = unit_codes(rng, count), vectors_near(rng, left, right)
     pixel = pixel_of(rng, length)
-    # Each span has lights of its own.
-    lights = (vector[:, np.newaxis] for vector in (light, halfway))
-    diffuse, highlight, _ = ChordSetup().compute(*component_words(left, right, *lights), length)
-    t = pixel / (length - 1)
-    normals = interpolate("quadratic", *(normalise(end / ONE) for end in (left, right)), t)
-    exact = np.stack([dot(normals, normalise(light / ONE)), 1 - dot(normals, normalise(halfway / ONE))])
-    found = np.stack([value_at(words, pixel) for words in (diffuse, highlight)])
-    return Sample(found, exact, exact, degrees_between(left, right)[:, 0])
+    exact, values = three_values(local_curves(rng, count), count)
+    words = (Fixed(format, codes) for format, codes in zip(FORMATS.values(), values, strict=True))
+    *differences, out_of_range = ChordSetup().compute(*words, length)
+    kept = ~out_of_range
+    found = np.stack([value_at(words, pixel) for words in differences])[:, kept]
+    exact = parabola(exact, pixel / (length - 1))[:, kept]
+    return Sample(found, exact, exact, pixel[kept])
+
+
+def values_of(beats) -> SpanValues:
+    """Values that input beats carry; those of u are 0 in beats without highlights."""
+    values = beats["values"]
+    diffuse = values["diffuse"]
+    return SpanValues(diffuse, values["highlight"] if "highlight" in values.dtype.names else 0 * diffuse)
 
 
 def _expect(unit, case):
     beats = case.beats
-    words = (beats["normal_left"], beats["normal_right"])
-    words += (case.constants["direction"], case.constants["halfway"])
-    *differences, out_of_range = unit.parameters.compute(*component_words(*words), beats["length"])
-    return difference_beats(unit, differences, beats["length"], out_of_range)
+    words = (Fixed(format, code) for format, code in zip(FORMATS.values(), values_of(beats), strict=True))
+    *differences, out_of_range = unit.parameters.compute(*words, beats["length"])
+    expected = np.zeros(len(out_of_range), dtype_of(unit.o.payload.shape()))
+    lights = expected["lights"]
+    for name, of_function in zip(FORMATS, differences, strict=True):
+        for field in ("first", "second") if name in lights.dtype.names else ():
+            lights[name][field] = getattr(of_function, field).codes
+    expected["out_of_range"] = out_of_range
+    return expected
+
+
+def any_values(rng: np.random.Generator, count: int, lights: int) -> SpanValues:
+    """Three values of each function: of every eighth span any codes, else on curves of every size."""
+    values = []
+    for format in FORMATS.values():
+        codes = any_codes(rng, format, count, lights, 3)
+        change = 10.0 ** rng.uniform(-5, -0.5, (count, 1, 1)) * rng.uniform(-0.3, 0.3, (count, lights, 3))
+        curve = np.clip(codes[..., :1] + change * format.max_code, format.min_code, format.max_code)
+        values.append(np.where(np.arange(count)[:, None, None] % 8, curve.astype(np.int64), codes))
+    return SpanValues(*values)
+
+
+def value_beats(unit, values: SpanValues, length: np.ndarray) -> np.ndarray:
+    """Input beats of a unit that takes values of spans."""
+    beats = np.zeros(len(length), dtype_of(unit.i.payload.shape()))
+    for name, codes in zip(FORMATS, values, strict=True):
+        if name in beats["values"].dtype.names:
+            beats["values"][name] = codes
+    beats["length"] = length
+    return beats
+
+
+def _lengths(unit, rng, count):
+    return np.maximum(any_lengths(rng, count) % (1 << unit.length_bits), 1)
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any distance, every sixteenth of any words; lengths by their logarithm."""
-    left, right = any_pairs(rng, count)
-    beats = {"normal_left": left, "normal_right": right, "length": any_lengths(rng, count)}
-    beats["length"] %= 1 << unit.length_bits
-    beats["length"] = np.maximum(beats["length"], 1)
-    return Case(beats, light_constants(unit, *(unit_codes(rng, unit.lights) for _ in range(2))))
+    """Curves of every size, every eighth span of any words; lengths by their logarithm."""
+    return Case(value_beats(unit, any_values(rng, count, unit.lights), _lengths(unit, rng, count)))
 
 
 def _corners(unit, rng, count):
-    """Angles about the widest, ends of words, the largest differences, N that is H, N - H of -1."""
-    beats = setup_spans(rng, count, 22.4, 22.6)
-    beats["normal_left"][100:104], beats["normal_right"][100:104] = COMPONENT.max_code, COMPONENT.min_code
-    direction, halfway = (unit_codes(rng, unit.lights) for _ in range(2))
-    halfway = np.abs(halfway)
-    # Near the peak of a highlight u and its differences are small.
-    beats["normal_left"][:50] = halfway[0]
-    # The largest difference of components that is not halved.
-    less = np.repeat(np.vstack([np.eye(3, dtype=np.int64), [1, 1, 1]]) << 17, 10, axis=0)
-    beats["normal_left"][50:90] = beats["normal_right"][60:100] = halfway[0] - less
-    return Case(beats, light_constants(unit, direction, halfway))
+    """P and G in range, about the ends of their words and beyond; equal values; ends of words."""
+    values = []
+    for format in FORMATS.values():
+        start = rng.uniform(format.min_code * 0.9, format.max_code * 0.9, (count, unit.lights))
+        size = 10.0 ** rng.uniform(-6, 0.1, (count, 1))
+        slope = rng.uniform(-0.5, 0.5, start.shape) * size / format.step
+        curvature = rng.uniform(-0.125, 0.125, start.shape) * size / format.step
+        slope[:40] = 0.5 / format.step + rng.integers(-200, 200, (40, unit.lights))
+        curvature[40:80] = 0.125 / format.step + rng.integers(-200, 200, (40, unit.lights))
+        slope[20:60] *= -1
+        curvature[60:80] *= -1
+        codes = np.stack([start + t * (slope + t * curvature) for t in (0, 0.5, 1)], axis=2)
+        codes = np.clip(np.rint(codes), format.min_code, format.max_code).astype(np.int64)
+        codes[80:120] = rng.choice([format.min_code, format.max_code, 0, 1], (40, unit.lights, 3))
+        codes[120:160] = codes[120:160, :, :1]
+        values.append(codes)
+    length = rng.integers(1, 1 << unit.length_bits, count)
+    length[160:172] = np.minimum([1, 2, 3, 4, 5, 16, 17, 2048, 2049, 2050, 4094, 4095], length.max())
+    return Case(rng.permutation(value_beats(unit, SpanValues(*values), length)))
 
 
 def _last_bits(unit, rng, count):
     """Many spans: the last bits of products and of sums are rounded off and rarely matter."""
-    beats = setup_spans(rng, count, 22.4, 22.6)
-    return Case(beats, light_constants(unit, *(unit_codes(rng, unit.lights) for _ in range(2))))
+    return _corners(unit, rng, count)
 
 
 def _variants():
-    for interval in (4, 1, 26):
-        yield (
-            f"interval {interval}",
-            Variant(
-                partial(ChordSetupUnit, ChordSetup(), 1, initiation_interval=interval),
-                _measure,
-                f"spans to 22.5 degrees, {LONG}",
-                note="of N.L and u at any pixel that the differences lead to; exact: the quadratic",
-                long=interval != 4,
-            ),
-        )
-    for lights, interval in ((1, 2), (1, 3), (1, 5), (1, 7), (1, 13), (2, 4)):
-        unit = partial(ChordSetupUnit, ChordSetup(), lights, initiation_interval=interval)
+    yield (
+        "interval 3",
+        Variant(
+            ChordSetupUnit,
+            _measure,
+            f"{LOCAL}, {LONG}",
+            note="of N.L and u at any pixel that the differences lead to; exact: the quadratic",
+        ),
+    )
+    for lights, interval in (*((1, i) for i in (1, 2, 4, 6, 9, 18)), (2, 3), (3, 18)):
+        unit = partial(ChordSetupUnit, None, lights, initiation_interval=interval)
         yield f"{lights} lights, interval {interval}", Variant(unit, long=lights == 1)
-    for terms, bits, interval in ((1, 36, 4), (2, 46, 5), (3, 40, 1)):
-        unit = partial(ChordSetupUnit, ChordSetup(terms, bits), 1, initiation_interval=interval)
-        yield f"{terms} terms, {bits} bits", Variant(unit, long=True)
-    unit = partial(ChordSetupUnit, ChordSetup(), 1, length_bits=9)
-    yield "9 bits of length", Variant(unit, long=True)
-    yield "no highlights", Variant(partial(ChordSetupUnit, ChordSetup(), 1, highlights=False), long=True)
+    for bits in (36, 40):
+        yield f"{bits} fraction bits", Variant(partial(ChordSetupUnit, ChordSetup(bits)), long=bits == 40)
+    yield "9 bits of length", Variant(partial(ChordSetupUnit, length_bits=9), long=True)
+    unit = partial(ChordSetupUnit, None, 2, initiation_interval=2, highlights=False)
+    yield "no highlights", Variant(unit)
 
 
 RECORD = Record(
     name="chord_setup",
-    title="Forward differences of N·L and of half the squared chord from N to H",
+    title="Forward differences of N·L and of half the squared chord from three values",
     source="docs/theory/chord.md#differences",
     variants=dict(_variants()),
     expect=_expect,
     stimuli={
         "spans": Stimulus(_spans, 500),
         "corners": Stimulus(_corners, 500),
-        "last bits": Stimulus(_last_bits, 5000, stalled=False, repeats=4),
+        "last bits": Stimulus(_last_bits, 30_000, stalled=False),
     },
-    waivers={
-        "f_*_rise": "The slope wraps to -1/2 to 1/2 and is rounded: the bits above and below are cut off.",
-        "u_*_rise": "The slope wraps to -1/2 to 1/2: the sign, three bits above its own, is cut off.",
-        "square": "The square of a reciprocal is normalised: its first bit is 1 already.",
-        "*_far": "A difference of 1 or more, halved, makes w at least 1/8, too, where it saturates.",
-    },
-    still={
-        "the second bit of a square is 0": "*_square_2[1] u_?_right_square_0[1]",
-        "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
-            "*_square_2[35] u_?_right_square_0[35] *_square_partial[36] *_square_total[36-37] "
-            "*_aligned[38-39]"
-        ),
-        "from the unit vector H to three components up to 1 the squared distance is less than 8": (
-            "u_*_aligned[37]"
-        ),
-        "a reciprocal and its square are normalised, so that their first bit is 1": (
-            "reciprocals.port__data[16] reciprocal[16] square_rounded[16] square[16]"
-        ),
-        "no square of the table rounds to 1": "square_rounded[17]",
-        "a length of 12 bits takes shifts up to 12, and of a square up to 25": "shift[4] square_shift[5]",
-        "inner sums of the polynomial are 0.046 to 0.050, and 0.125 to 0.132": (
-            "horner_2[14-16] horner_1[12-16]"
-        ),
-        "the polynomial is less than 0.017": "e_rounded[18]",
-        "twice a number is even": "*_second[0] top.spare[83] top.spare[214]",
-    },
+    axis="pixel of the span",
+    logarithmic=True,
+    waivers={},
+    still={},
 )

@@ -129,11 +129,11 @@ def options(method: Interpolator, lights: int = 1, *, as_published: bool = False
 # Expected results.
 
 
-def operand_beats(unit: Component, operands: Operands) -> np.ndarray:
-    """Output beats of a unit with these operands."""
+def operand_beats(unit: Component, operands: Operands, **others: np.ndarray) -> np.ndarray:
+    """Output beats of a unit with these operands, and with codes of fields that are none."""
     beats = np.zeros(operands.cosine.codes.shape, dtype_of(unit.o.payload.shape().elem_shape))
     for name in beats.dtype.names:
-        beats[name] = getattr(operands, name).codes
+        beats[name] = others[name] if name in others else getattr(operands, name).codes
     return beats
 
 

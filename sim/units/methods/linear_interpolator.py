@@ -11,41 +11,36 @@ from blysk.sim.units.record import Record, Stimulus
 
 __all__ = ["RECORD"]
 
-_LINE, _RENORMALISED = LinearInterpolator(), LinearInterpolator(renormalised=True)
+_LINE = LinearInterpolator()
 
 
 def _flags(unit, rng, count):
-    """Spans out of range by the difference, by a pixel alone, and in range: of a kind, then mixed."""
+    """Spans out of range and in range: of a kind, then mixed."""
     left, right = code_pairs_at(rng, 8 * count, rng.uniform(0, 180, 8 * count))
     some = rng.random(8 * count) < 0.4
     left[some], right[some] = rng.choice([0, 1, -1, ONE // 2, ONE], (2, np.count_nonzero(some), 3))
     length = rng.integers(1, 12, 8 * count)
-    far, flagged = (
-        method.normals(*component_words(left, right), length)[1] for method in (_LINE, _RENORMALISED)
-    )
-    kinds = [np.flatnonzero(kind)[:count] for kind in (far, flagged & ~far, ~flagged)]
+    _, flagged = _LINE.normals(*component_words(left, right), length)
+    kinds = [np.flatnonzero(kind)[:count] for kind in (flagged, ~flagged)]
     order = np.concatenate([*kinds, rng.permutation(np.concatenate(kinds))])
     return case_of(unit, rng, left[order], right[order], length[order])
 
 
 RECORD = Record(
     name="linear_interpolator",
-    title="Normals on a straight line, as they are or brought to unit length",
+    title="Normals on a straight line",
     source="docs/theory/interpolation.md#spans; [T] 2.1",
     variants={
         "linear": measured(_LINE),
-        "renormalise": measured(_RENORMALISED, source="docs/theory/interpolation.md#renormaliser"),
         "linear, interval 1, of a chord": options(
             LinearInterpolator("one_minus_cosine"), 2, setup_interval=1, length_bits=9
         ),
         "linear, interval 7, no highlights": options(_LINE, setup_interval=7, highlights=False),
-        "renormalise, interval 1": options(_RENORMALISED, setup_interval=1),
-        "renormalise, interval 7, compact": options(_RENORMALISED, 2, setup_interval=7, product_interval=3),
+        "linear, interval 7, compact": options(_LINE, 2, setup_interval=7, product_interval=3),
     },
     expect=expect,
     status=status,
-    stimuli=STIMULI
-    | {"flags": Stimulus(_flags, 100, variants=("linear", "renormalise", "renormalise, interval 1"))},
+    stimuli=STIMULI | {"flags": Stimulus(_flags, 100, variants=("linear",))},
     waivers={
         "spare": "A straight line has no second difference: the bit is 0 already.",
         "payload": "A straight line has no second difference: the bit is 0 already.",

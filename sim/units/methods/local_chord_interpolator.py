@@ -4,11 +4,13 @@ from functools import partial
 
 import numpy as np
 
+from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
-from blysk.sim.units.cosines.local_chord_setup import (
+from blysk.sim.units.cosines.chord_setup import (
+    FORMATS,
     LOCAL,
     any_values,
     local_curves,
@@ -17,9 +19,12 @@ from blysk.sim.units.cosines.local_chord_setup import (
     value_beats,
     values_of,
 )
-from blysk.sim.units.cosines.local_chord_setup import RECORD as SETUP
-from blysk.sim.units.methods.interpolator import long_lengths, of_setup, operand_beats, options
-from blysk.sim.units.operands import short_lengths, span_lengths
+from blysk.sim.units.cosines.chord_setup import RECORD as SETUP
+from blysk.sim.units.lighting.specular import any_exponent
+from blysk.sim.units.lighting.value_gate import parabolas_near
+from blysk.sim.units.methods.chord_interpolator import EXPONENT, gated, gated_beats, mixed_lengths
+from blysk.sim.units.methods.interpolator import of_setup, options
+from blysk.sim.units.operands import any_codes, short_lengths, span_lengths
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
 __all__ = ["RECORD"]
@@ -43,21 +48,22 @@ def _measure(rng, count):
     return Sample(found[:, kept], exact[:, kept], formula[:, kept], pixel[kept])
 
 
-def _operands(unit, case):
-    return unit.parameters.compute_values(values_of(case.beats), case.beats["length"])
-
-
 def _expect(unit, case):
-    return operand_beats(unit, _operands(unit, case))
+    values, length = values_of(case.beats), case.beats["length"]
+    operands = unit.parameters.compute_values(values, length)
+    return gated_beats(unit, operands, values, length, case.constants)
 
 
 def _status(unit, case):
-    return {"out_of_range": int(np.count_nonzero(_operands(unit, case).out_of_range))}
+    operands = unit.parameters.compute_values(values_of(case.beats), case.beats["length"])
+    return {"out_of_range": int(np.count_nonzero(operands.out_of_range))}
 
 
-def _case(unit, rng, length):
+def _case(unit, rng, length, values=None, exponent=EXPONENT):
     length = np.maximum(length % (1 << unit.length_bits), 1)
-    return Case(value_beats(unit, any_values(rng, len(length), unit.lights), length))
+    values = values or any_values(rng, len(length), unit.lights)
+    constants = exponent if "constants" in unit.signature.members else None
+    return Case(value_beats(unit, values, length), constants)
 
 
 def _spans(unit, rng, count):
@@ -65,14 +71,44 @@ def _spans(unit, rng, count):
     return _case(unit, rng, short_lengths(rng, count, 1))
 
 
+def _short_spans(unit, rng, count):
+    """Spans of 1 to 4 pixels in runs and mixed, any values of which those of every second fit."""
+    values = any_values(rng, count, unit.lights)
+    values.highlight[::2] = any_codes(rng, FORMATS["highlight"], *values.highlight[::2].shape)
+    return _case(unit, rng, mixed_lengths(rng, count), values)
+
+
+def _gate(unit, rng, count):
+    """The least u about the threshold of the gate, spans of 1 to 40 pixels; any exponent."""
+    exponent = unit.gate.exponent or any_exponent(rng)
+    nearest = min(unit.gate.parameters.thresholds.values[exponent] / 2, 2.0)
+    least = nearest + 1e-3 * rng.normal(size=count * unit.lights)
+    u = parabolas_near(rng, least).reshape(count, unit.lights, 3)
+    diffuse = any_values(rng, count, unit.lights).diffuse
+    return _case(unit, rng, mixed_lengths(rng, count), SpanValues(diffuse, u), exponent)
+
+
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels, where the last bits of the differences count; shorter ones."""
-    return _case(unit, rng, long_lengths(rng, count))
+    """Spans of 3000 to 4095 pixels, where the last bits of the differences count."""
+    length = rng.integers(3000, 4096, count // 3500)
+    length[:2] = 4095
+    return _case(unit, rng, length)
 
 
 def _last_bits(unit, rng, count):
     """Many short spans: a bit that is rounded off decides a result once in thousands."""
     return _case(unit, rng, rng.integers(1, 8, count))
+
+
+class _Gated:
+    """Makes the unit with a gate; a gate belongs to one unit."""
+
+    def __init__(self, lights, exponent=None, **build):
+        self.arguments = lights, exponent, build
+
+    def __call__(self):
+        lights, exponent, build = self.arguments
+        return LocalChordInterpolatorUnit(_METHOD, lights, gate=gated(lights, exponent), **build)
 
 
 RECORD = Record(
@@ -90,30 +126,18 @@ RECORD = Record(
         "2 lights, interval 1": options(_METHOD, 2, setup_interval=1),
         "3 lights, interval 6": options(_METHOD, 3, setup_interval=6),
         "no highlights": options(_METHOD, 2, setup_interval=2, highlights=False, length_bits=5),
+        "gated": Variant(_Gated(1)),
+        "2 lights, gated, exponent 60": Variant(_Gated(2, 60, setup_interval=6)),
     },
     expect=_expect,
     status=_status,
     stimuli={
         "spans": Stimulus(_spans, 2000),
+        "short spans": Stimulus(_short_spans, 800),
+        "gate": Stimulus(_gate, 500, repeats=4, variants=("gated", "2 lights, gated, exponent 60")),
         "long spans": Stimulus(_long_spans, 60_000, stalled=False),
         "last bits": Stimulus(_last_bits, 8000, stalled=False),
         "corners": of_setup(SETUP),
-    },
-    waivers={
-        "reciprocal": "The address stays for four cycles: what is read sooner is the same word.",
-        "multiplier_0_b_1": "A reciprocal and its square are normalised: their first bit is 1 already.",
-        "values": "It is for values of 2 or more, and N.L, -1 to 1 at the start, leaves that by 5/8 at most.",
-    },
-    still=SETUP.still
-    | {
-        "twice a number is even": (
-            "*_0_second[0] *_second_difference[0] {top,local_chord_setup}.spare[83] "
-            "{top,local_chord_setup}.spare[214] top.payload[83] top.payload[214]"
-        ),
-        "values have 9 bits less than starts, and those of u are less than 2": (
-            "{top,local_chord_setup}.spare[0-8] {top,local_chord_setup}.spare[130-138] "
-            "{top,local_chord_setup}.spare[166] top.payload[0-8] top.payload[130-138] top.payload[166]"
-        ),
     },
     axis="pixel of the span",
     logarithmic=True,

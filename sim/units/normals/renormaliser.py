@@ -3,97 +3,95 @@
 import numpy as np
 
 from blysk.golden.normals.renormaliser import Renormaliser
-from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import ONE
 from blysk.hdl.normals.renormaliser import RenormaliserUnit
-from blysk.sim.units.operands import any_codes, component_words, dot, sphere, unit_codes, word_ends
+from blysk.sim.units.operands import any_codes, sphere
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
 __all__ = ["RECORD"]
 
-
-def _codes(vectors):
-    return np.clip(np.rint(vectors / COMPONENT.step), COMPONENT.min_code, COMPONENT.max_code).astype(np.int64)
+_FORMAT = Renormaliser.VECTOR_FORMAT
 
 
-def _vectors(rng, count, shortest, longest):
-    return _codes(sphere(rng, count) * rng.uniform(shortest, longest, (count, 1)))
+def _vectors(rng, count, shortest=Renormaliser.SHORTEST * 1.8):
+    length = shortest ** rng.random((count, 1))
+    return np.rint(sphere(rng, count) * length * _FORMAT.max_code).astype(np.int64)
 
 
 def _measure(rng, count):
-    model, margin = Renormaliser(), 2.0**-15
-    length = rng.uniform(np.sqrt(model.LOW) + margin, np.sqrt(model.HIGH) - margin, count)
-    vector = _codes(sphere(rng, count) * length[:, np.newaxis])
-    found, out_of_range = model.compute(*component_words(vector))
-    value = vector * COMPONENT.step
-    square = dot(value, value)
-    offset = (square - model.LOW) * 2**model.SEGMENT_BITS
-    segment = np.clip(np.floor(offset).astype(np.int64), 0, model.SEGMENTS - 1)
-    u = (offset - segment) / 2**model.SEGMENT_BITS
-    c0, c1, c2 = (c.values[segment] for c in model.coefficients)
-    formula = value * (1 + c0 - u * (c1 - u * c2))[:, np.newaxis]
-    exact = value * np.sqrt(ONE_SQUARED.values / square)[:, np.newaxis]
-    kept = ~out_of_range
-    return Sample(found.values[kept], exact[kept], formula[kept], np.sqrt(square)[kept, np.newaxis])
+    """Components of N."""
+    vector = _vectors(rng, count)
+    found, too_short = Renormaliser().compute(Fixed(_FORMAT, vector))
+    length = np.linalg.norm(vector, axis=1, keepdims=True)
+    exact = vector / length
+    kept = ~too_short
+    return Sample(found.codes[kept] / ONE, exact[kept], None, length[kept] * _FORMAT.step)
 
 
 def _expect(unit, case):
-    normal, out_of_range = unit.parameters.compute(*component_words(case.beats))
-    return {"normal": normal.codes, "out_of_range": out_of_range}
+    normal, too_short = unit.parameters.compute(Fixed(_FORMAT, case.beats["vector"]))
+    return {"normal": normal.codes, "out_of_range": too_short, "span": case.beats["span"]}
+
+
+def _case(rng, vector):
+    return Case({"vector": vector, "span": rng.integers(0, 2, len(vector))})
 
 
 def _lengths(unit, rng, count):
-    """Vectors of lengths 0.5 to 1, and any words."""
-    vector = np.rint(unit_codes(rng, count) * rng.uniform(0.5, 1, (count, 1))).astype(np.int64)
-    vector[::8] = any_codes(rng, COMPONENT, *vector[::8].shape)
-    return Case(vector)
+    """Vectors of lengths 1/256 to 1, and any words."""
+    vector = _vectors(rng, count)
+    vector[::8] = any_codes(rng, _FORMAT, *vector[::8].shape)
+    return _case(rng, vector)
 
 
 def _corners(unit, rng, count):
-    """Squares next to each border of a segment; axes; lengths 0 and 1 +- 1/256; ends of words."""
+    """Ends of the words, 0 and its neighbours; a largest component next to every power of two; axes."""
+    words = [_FORMAT.min_code, -1, 0, 1, _FORMAT.max_code]
+    ends = np.array(np.meshgrid(*[words] * 3)).reshape(3, -1).T
+    powers = (1 << np.arange(_FORMAT.fraction_bits))[:, np.newaxis] + np.arange(-1, 2)
+    largest = np.where(rng.random(powers.size) < 0.5, powers.ravel(), -powers.ravel())
+    others = np.rint(rng.uniform(-1, 1, (largest.size, 2)) * np.abs(largest)[:, np.newaxis]).astype(np.int64)
+    near = np.column_stack([largest, others])
+    near = np.vstack([np.roll(near, k, axis=1) for k in range(3)])
+    axes = np.vstack([near * axis for axis in np.eye(3, dtype=np.int64)])
+    return _case(rng, np.clip(np.vstack([ends, near, axes]), _FORMAT.min_code, _FORMAT.max_code))
+
+
+def _segments(unit, rng, count):
+    """Squared lengths next to each border of a segment and of an octave."""
     model = unit.parameters
-    borders = (model.LOW + np.arange(model.SEGMENTS + 1) / 2**model.SEGMENT_BITS) * 2.0**34
-    x = np.floor(np.sqrt(borders) * 0.7).astype(np.int64)
-    y = np.sqrt(borders - x * x).astype(np.int64)
-    near = [np.stack([x, y + offset, np.zeros_like(x)], axis=1) for offset in (-1, 0, 1, 2)]
-    axes = ONE * np.vstack([np.eye(3, dtype=np.int64), -np.eye(3, dtype=np.int64)])
-    slanted = ONE * np.array([[0.6, 0.8, 0], [0.48, 0.6, 0.64]])
-    slanted = [np.rint(slanted * length).astype(np.int64) for length in (1 - 1 / 256, 1, 1 + 1 / 256)]
-    ends = np.array(np.meshgrid(*[[COMPONENT.min_code, -1, 0, 1, COMPONENT.max_code]] * 3)).reshape(3, -1).T
-    few = np.vstack([*near, axes, axes - np.sign(axes), *slanted, *(-v for v in slanted), ends])
-    return Case(rng.permutation(np.vstack([few, word_ends(rng, count, 3), _vectors(rng, count, 0.6, 1.1)])))
+    starts = 1 + np.arange(1 << model.SEGMENT_BITS) / (1 << model.SEGMENT_BITS)
+    squares = np.ravel([starts * 2.0**octave for octave in (-2, -1, 0, 1)])
+    squares = squares[squares < 2.9] * 2.0**44
+    x = np.floor(np.sqrt(squares) * 0.58).astype(np.int64) // 32 * 32
+    y = np.sqrt((squares - x * x) * 0.5).astype(np.int64) // 32 * 32
+    z = np.sqrt(squares - x * x - y * y).astype(np.int64) // 32 * 32
+    near = [np.stack([x, y, z + offset * 32], axis=1) for offset in (-1, 0, 1, 2)]
+    near = np.clip(np.vstack(near), _FORMAT.min_code, _FORMAT.max_code)
+    return _case(rng, near)
 
 
 def _last_bits(unit, rng, count):
-    """Many vectors, for the last bits of products; along an axis, where sums saturate at 1."""
-    along = np.arange(90_000, COMPONENT.max_code, 3)[:, np.newaxis]
-    axes = (along * axis for axis in np.eye(3, dtype=np.int64))
-    return Case(np.vstack([_vectors(rng, count, 0.68, 1.02), *axes]))
+    """Many vectors, for the last bits of products."""
+    return _case(rng, _vectors(rng, count))
 
 
 RECORD = Record(
     name="renormaliser",
     title="Vector divided by its length",
     source="docs/theory/interpolation.md#renormaliser",
-    variants={"": Variant(RenormaliserUnit, _measure, "lengths 0.685 to 1.0155")},
+    variants={"": Variant(RenormaliserUnit, _measure, "lengths 1/142 to 1")},
     expect=_expect,
     stimuli={
         "lengths": Stimulus(_lengths, 1000),
         "corners": Stimulus(_corners, 500),
-        "last bits": Stimulus(_last_bits, 300_000, stalled=False),
+        "segments": Stimulus(_segments, 500),
+        "last bits": Stimulus(_last_bits, 100_000, stalled=False),
     },
     axis="length of the vector",
+    logarithmic=True,
     waivers={
-        "linear_term": (
-            "Subtracted from a word that ends in zeros, the bit counts at an exact tie only, once in 2^20 "
-            "vectors."
-        ),
-        "square_term": (
-            "Subtracted from a constant half step, the bit counts at an exact tie only, by 2^-16 of a factor."
-        ),
-        "total_2": "The lowest of 18 bits that are cut off: it carries past them once in 2^18 sums.",
-        "normal_?": (
-            "It is for the saturation below -1, which no component reaches, as vectors get no longer than 1."
-        ),
         "dot_product.*": "The dot product inside is accepted at once, so that its skid buffer never shows.",
     },
 )

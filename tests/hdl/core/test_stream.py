@@ -201,8 +201,14 @@ def test_counter_follows_the_span(cycles):
 class Delay(PipelinedUnit):
     """The input, plus 1 for every register but the first; one register a clock of latency."""
 
-    def __init__(self, latency, initiation_interval=1):
-        super().__init__(unsigned(16), unsigned(16), latency=latency, initiation_interval=initiation_interval)
+    def __init__(self, latency, initiation_interval=1, spaced=False):
+        super().__init__(
+            unsigned(16),
+            unsigned(16),
+            latency=latency,
+            initiation_interval=initiation_interval,
+            spaced=spaced,
+        )
 
     def datapath(self, m, operands):
         value = operands
@@ -250,7 +256,10 @@ def test_constants_are_a_member_only_where_asked_for():
 UNITS = [
     pytest.param(make, id=f"{make.func.__name__}-{'-'.join(map(str, make.args))}")
     for make in (
-        *(partial(Delay, *timing) for timing in ((1, 1), (4, 1), (2, 2), (5, 3), (9, 4))),
+        *(
+            partial(Delay, *timing)
+            for timing in ((1, 1), (4, 1), (2, 2), (5, 3), (9, 4), (2, 2, True), (9, 4, True))
+        ),
         partial(Registers, 1),
         partial(Registers, 3),
     )
@@ -331,6 +340,38 @@ def test_beats_are_whole_turns_apart(interval):
     assert (distance[inside] % interval == 0).all()
     assert inside.any()
     assert (distance[~inside] % interval != 0).any()
+
+
+@pytest.mark.parametrize("interval", [2, 3, 5])
+@pytest.mark.parametrize("output_share", [0, 0.4])
+def test_spaced_beats_come_at_any_distance(interval, output_share):
+    """From the interval on, not counting the cycles of standing still; never sooner."""
+    unit = Delay(9, interval, True)
+    rng = np.random.default_rng(interval)
+    codes = rng.integers(0, 2**15, 300)
+    stalls = {"input_stalls": rng.random(997) < 0.6, "output_stalls": rng.random(89) < output_share}
+    run = simulate(unit, codes, count=300, engine="pysim", **stalls)
+    np.testing.assert_array_equal(run.beats, codes + unit.added)
+    distance = np.diff(run.input_cycles)
+    assert distance.min() == interval
+    if not output_share:
+        # Any distance occurs, and no beat waits for one that the source does not make.
+        assert {interval, interval + 1, interval + 2} <= set(distance.tolist())
+        np.testing.assert_array_equal(run.cycles, run.input_cycles + 9)
+    else:
+        assert (run.cycles - run.input_cycles >= 9).all()
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_slices_lose_no_cycle_to_a_payload_that_waits(count):
+    """A sink that takes one of two, a source that pauses: each register holds one more while one waits."""
+    unit = Registers(count)
+    codes = np.arange(60)
+    stalls = {"input_stalls": np.arange(4) % 4 == 1, "output_stalls": np.arange(4) % 4 == 3}
+    run = simulate(unit, codes, count=60, engine="pysim", **stalls)
+    np.testing.assert_array_equal(run.beats, codes)
+    # Three of four cycles, on both sides, whatever their phases.
+    assert run.cycles[-1] - run.cycles[10] <= 49 * 4 // 3 + 1
 
 
 def drive(unit, codes, stalls, reset_at=None):

@@ -1,56 +1,77 @@
 # amaranth: UnusedElaboratable=no
-"""Chord setup: multipliers at every interval, and refusals; `tests.test_units` holds it against its model."""
+"""Chord setup: multipliers and refusals, beats at any distance, waiting output; see `tests.test_units`."""
 
+import numpy as np
 import pytest
 
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
 from blysk.hdl.emit.cost import cost_of
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.units.cosines.chord_setup import RECORD
 
 from ..variants import mostly_long
 
+MULTIPLIERS = {
+    **{(1, 1): 6, (1, 2): 4, (1, 3): 3, (1, 4): 3, (1, 6): 3, (1, 9): 1, (1, 18): 1},
+    **{(2, 3): 5, (2, 9): 2, (3, 18): 1},
+}
+"""Of numbers of lights and intervals: not always as few as ``ceil((1 + 5 lights) / interval)``.
 
-@pytest.mark.parametrize(
-    ("lights", "interval"), mostly_long([*((1, i) for i in (1, 2, 3, 4, 5, 7, 13, 26)), (2, 4)], (1, 4))
-)
+A multiplier serves products that are less than an interval apart, as beats may come at any distance.
+"""
+
+
+@pytest.mark.parametrize(("lights", "interval"), mostly_long(list(MULTIPLIERS), (1, 3)))
 def test_multipliers(lights, interval):
-    """7 products a span and 19 a light, as even as the interval allows; all of 18 bits."""
+    """1 product a span and 5 a light, all of 18 bits."""
     unit = ChordSetupUnit(None, lights, initiation_interval=interval)
     cost = cost_of(unit)
-    assert cost.multipliers == {(18, 18): -(-(7 + 19 * lights) // interval)}
-    assert unit.multipliers == cost.multiplier_count
+    assert cost.multipliers == {(18, 18): MULTIPLIERS[lights, interval]}
+    assert unit.multipliers == cost.multiplier_count >= -(-(1 + 5 * lights) // interval)
     assert cost.constant_multipliers == 0
-    # The latency grows with the interval by the cycles that products wait for a multiplier.
     assert unit.latency >= ChordSetupUnit(None, lights, initiation_interval=1).latency
 
 
-def test_default_interval():
+def test_options():
     unit = ChordSetupUnit()
-    assert (unit.lights, unit.initiation_interval, unit.multipliers) == (1, 4, 7)
+    assert (unit.lights, unit.initiation_interval, unit.multipliers, unit.latency) == (1, 3, 3, 24)
+    assert cost_of(ChordSetupUnit(length_bits=9)).rom_bits == 17 << 8
+    assert ChordSetupUnit(None, 2, initiation_interval=1, highlights=False).multipliers == 5
 
 
 @pytest.mark.parametrize(
-    ("terms", "fraction_bits", "interval"), mostly_long([(1, 36, 4), (2, 46, 5), (3, 40, 1)], ())
+    ("arguments", "message"),
+    [
+        *(({"initiation_interval": i}, f"interval must be at least 1, not {i}") for i in (0, -1)),
+        *(({"length_bits": bits}, f"length_bits must be 2 to 12, not {bits}") for bits in (1, 13)),
+    ],
 )
-def test_each_term_is_a_product(terms, fraction_bits, interval):
-    unit = ChordSetupUnit(ChordSetup(terms, fraction_bits), initiation_interval=interval)
-    assert cost_of(unit).multiplier_count == -(-(4 + terms + 19) // interval)
+def test_refuses(arguments, message):
+    with pytest.raises(ValueError, match=rf"^{message}$"):
+        ChordSetupUnit(**arguments)
 
 
-@pytest.mark.long
-def test_shorter_spans_need_a_smaller_table():
-    assert cost_of(ChordSetupUnit(length_bits=9)).rom_bits == 17 << 8
+@pytest.mark.parametrize("interval", [3, pytest.param(9, marks=pytest.mark.long)])
+def test_beats_at_any_distance(interval):
+    """Each distance from the interval to three of it: taken at once, and the model's words."""
+    unit = ChordSetupUnit(ChordSetup(), 1, initiation_interval=interval)
+    case = RECORD.stimuli["spans"].make(unit, np.random.default_rng(3), 200)
+    distances = np.tile(np.arange(interval, 3 * interval + 1), 40)[:199]
+    stalls = np.ones(int(distances.sum()) + 2, dtype=bool)
+    stalls[np.r_[0, np.cumsum(distances)]] = False
+    run = simulate(unit, case.beats, count=200, engine="auto", input_stalls=stalls)
+    np.testing.assert_array_equal(run.beats, RECORD.expect(unit, case))
+    np.testing.assert_array_equal(np.diff(run.input_cycles), distances)
+    np.testing.assert_array_equal(run.cycles, run.input_cycles + unit.latency)
 
 
-def test_refusals():
-    for interval in (0, -1):
-        with pytest.raises(ValueError, match=rf"^interval must be at least 1, not {interval}$"):
-            ChordSetupUnit(initiation_interval=interval)
-    for bits in (1, 13):
-        with pytest.raises(ValueError, match=rf"^length_bits must be 2 to 12, not {bits}$"):
-            ChordSetupUnit(length_bits=bits)
-    with pytest.raises(ValueError, match=r"^terms must be 1 to 3, not 4$"):
-        ChordSetup(terms=4)
-    for bits in (34, 37, 48):
-        with pytest.raises(ValueError, match=rf"^fraction_bits must be even and 36 to 46, not {bits}$"):
-            ChordSetup(fraction_bits=bits)
+def test_waiting_output_blocks_the_input():
+    """Of each pair of beats the first waits at the output: the second enters one cycle after it has left."""
+    unit = ChordSetupUnit()
+    case = RECORD.stimuli["spans"].make(unit, np.random.default_rng(3), 40)
+    stalls = {"input_stalls": np.arange(60) != 0, "output_stalls": np.arange(120) < 65}
+    run = simulate(unit, case.beats, count=40, engine="auto", **stalls)
+    np.testing.assert_array_equal(run.beats, RECORD.expect(unit, case))
+    np.testing.assert_array_equal(run.input_cycles[1::2], run.cycles[::2] + 1)
+    np.testing.assert_array_equal(run.cycles[1::2], run.input_cycles[1::2] + unit.latency)

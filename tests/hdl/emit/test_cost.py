@@ -88,7 +88,8 @@ def test_multipliers(name):
 
 @pytest.mark.parametrize("lights", [2, pytest.param(3, marks=pytest.mark.long)])
 def test_lights_cost_fourteen_multipliers_each(lights):
-    assert cost_of(ShadingPipelineUnit(preset(lights=lights))).multiplier_count == 5 + 14 * lights
+    design = preset("quadratic", lights=lights)
+    assert cost_of(ShadingPipelineUnit(design)).multiplier_count == 5 + 14 * lights
     assert cost_of(IntensityUnit(Intensity(lights))).multiplier_count == 6 * lights
 
 

@@ -6,7 +6,7 @@ from blysk.hdl.normals.renormaliser import RenormaliserUnit
 
 def test_times_and_parts():
     unit = RenormaliserUnit()
-    assert (unit.latency, unit.initiation_interval) == (12, 1)
+    assert (unit.latency, unit.initiation_interval) == (16, 1)
     cost = cost_of(unit)
     assert cost.multiplier_count == 8
-    assert cost.rom_bits == 32 * 49
+    assert cost.rom_bits == 64 * 48

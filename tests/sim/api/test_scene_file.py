@@ -55,7 +55,7 @@ def test_documented_example(write):
         "diffuse": (0.75, 0.42, 0.2),
         "specular": (0.6, 0.6, 0.6),
         "exponent": 50,
-        "method": "quadratic",
+        "method": "chord",
         "model": "cosquad",
         "operand": "cosine",
         "setup_interval": 4,

@@ -23,7 +23,7 @@ def test_verilog_with_a_gate(capsys):
     assert main(["verilog", "--method", "chord", "--gate"]) == 0
     output = capsys.readouterr().out
     assert "throughput style, highlight gate" in output
-    assert "highlight_gate" in output.partition("module")[2]
+    assert "value_gate" in output.partition("module")[2]
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["render", "--help"], ["verilog", "-h"]])

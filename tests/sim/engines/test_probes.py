@@ -100,7 +100,7 @@ def test_needs_a_light_and_a_gate():
     ("method", "model"),
     [
         *(("chord", "cosquad"), ("chord", "lyon3_refitted"), ("linear", "exp")),
-        *(("renormalise", "coscos4"), ("quadratic", "blinn")),
+        *(("quadratic", "coscos4"), ("quadratic", "blinn")),
     ],
 )
 def test_formats_fit(method, model):
@@ -126,7 +126,7 @@ def test_words_are_those_of_the_twin(observed):
 
     vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]
     ends = [Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right)]
-    operands = DESIGN.interpolator.compute(*ends, spans.length, *vectors)
+    operands = DESIGN.interpolator.compute(*ends, spans.length, *vectors, Fixed(COMPONENT, spans.middle))
     lit = np.repeat(DESIGN.lit_spans(spans, constants)[:, 0], spans.length)
     cosine, u = operands.cosine.codes[:, 0], operands.highlight.codes[:, 0]
     dark = (cosine <= 0) | ~lit

@@ -11,9 +11,8 @@ import pytest
 import blysk.sim.frames.frame
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.compare import compare
-from blysk.golden.frames.cut import cut_wide_spans
-from blysk.golden.frames.prepare import prepare, quantise_spans
-from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE
+from blysk.golden.frames.cut import cut_spans
+from blysk.golden.frames.prepare import prepare, spans_for
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.curves import interpolate
@@ -28,7 +27,7 @@ from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.teapot import teapot
 
-DESIGN = preset(lights=3)
+DESIGN = preset("quadratic", lights=3)
 LIGHTS = (
     Light((-0.5, 0.8, 0.7)),
     Light((0.9, 0.1, 0.4), (0.2, 0.3, 0.9)),
@@ -64,11 +63,8 @@ def simulator():
 
 
 def model_pixels(scene):
-    bend = DESIGN.interpolator.largest_deviation(scene.materials[0].exponent)
-    cut, _ = cut_wide_spans(rasterise(scene), MAX_SPAN_ANGLE, bend)
-    return cut, DESIGN.compute(
-        quantise_spans(cut, scene.mesh.material), FrameConstants.of(scene, DESIGN.lights)
-    )
+    cut, _ = cut_spans(scene, rasterise(scene), DESIGN)
+    return cut, DESIGN.compute(spans_for(scene, cut, DESIGN), FrameConstants.of(scene, DESIGN.lights))
 
 
 def test_frame_is_the_model_after_a_depth_test(simulator):
@@ -276,12 +272,9 @@ def test_frame_of_three_materials(engine):
     one = preset(lights=1)
     for index, material in enumerate(MATERIALS):
         alone = dataclasses.replace(lone, material=material)
-        method = several.interpolator
-        widest = min(method.widest_span(material.exponent) for material in MATERIALS)
-        bend = min(method.largest_deviation(material.exponent) for material in MATERIALS)
-        cut, _ = cut_wide_spans(rasterise(alone), widest, bend)
-        spans = quantise_spans(cut, alone.mesh.material)
-        pixels = one.compute(spans, FrameConstants.of(alone, 1))
+        # Spans are cut by the exponents of their own materials.
+        cut, _ = cut_spans(scene, rasterise(alone), several)
+        pixels = one.compute(spans_for(alone, cut, one), FrameConstants.of(alone, 1))
         image = np.zeros((scene.height * scene.width, 3), dtype=np.uint8)
         image[cut.pixel[cut.visible]] = pixels.color[cut.visible]
         own = owner == index

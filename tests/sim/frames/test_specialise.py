@@ -138,19 +138,21 @@ def test_equal_materials():
 
 
 def test_black_lights():
+    """Of methods whose spans are not cut by what the lights show."""
     scene = scene_of(lights=(KEY, BLACK, FILL))
-    special = specialise(scene, full_of(scene))
+    assert "lights" not in reasons(specialise(scene, full_of(scene)))
+    special = specialise(scene, preset("linear", lights=3))
     assert reasons(special)["lights"] == "1 of 3 lights: they light nothing"
     assert special.scenes[0].lights == (KEY, FILL)
     assert_same_frame(scene, special)
 
 
 def test_methods_that_no_gate_serves():
-    """Spans that carry values are cut by all lights, the dark one too, and have no normals for a gate."""
+    """Spans that are cut by their error are cut by all lights, the dark one too."""
     scene = scene_of(replace(CLAY, exponent=400), (KEY, BLACK, FILL))
-    for method in ("chord-local", "quadratic-published"):
+    for method in ("chord-local", "quadratic-published", "renormalise"):
         special = specialise(scene, preset(method, lights=3))
-        assert ("lights" in reasons(special)) == (method != "chord-local")
+        assert ("lights" in reasons(special)) == (not preset(method).interpolator.CUT_BY_ERROR)
         assert reasons(special)["exponent"] == "exponent fixed at 400: PROM folded"
         assert_same_frame(scene, special)
     dark = scene_of(lights=(BLACK,))

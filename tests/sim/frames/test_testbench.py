@@ -128,7 +128,8 @@ def test_what_is_in_the_folder(made):
     ):
         assert f"| `{table}.csv` | {len(rows(made / 'vectors' / f'{table}.csv'))} {counted}" in readme
     status = rows(made / "vectors" / "status.csv")
-    assert status == [{"status_out_of_range_spans": 0, "status_empty_spans": 1, "status_overrun": 0}]
+    expected = {"out_of_range_spans": 0, "wide_spans": 0, "empty_spans": 1, "overrun": 0}
+    assert status == [{f"status_{name}": count for name, count in expected.items()}]
 
 
 def test_imports_nothing_of_the_project(made):

@@ -1,0 +1,89 @@
+"""Chord values: N·L and half the squared chord from N to H of a normal, for every light."""
+
+from dataclasses import dataclass
+
+from blysk.golden.cosines.chord import Chord
+from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT
+
+__all__ = ["ChordValues"]
+
+
+@dataclass(frozen=True)
+class ChordValues:
+    """``f = N·L`` and ``u = |N - H|^2 / 2`` of a unit normal, in the formats of `ChordSetup`.
+
+    f is the exact dot product and u that of `Chord`; both are rounded half up, and saturate. Six products a
+    light, three without highlights.
+
+    ====== ========== ==========================================
+    word   format     why
+    ====== ========== ==========================================
+    f      SQ(1, 25)  rounded from 34 fraction bits
+    u      UQ(1, 26)  rounded from 35 fraction bits; 2 saturates
+    ====== ========== ==========================================
+
+    Against the exact values of the vectors' directions, in units of `ONE_SQUARED`: `diffuse_error` and
+    `highlight_error`.
+
+    Source: docs/theory/chord.md#differences; [Lyon93].
+    """
+
+    DIFFUSE_FORMAT = ChordSetup.DIFFUSE_FORMAT
+    HIGHLIGHT_FORMAT = ChordSetup.HIGHLIGHT_FORMAT
+
+    def compute(self, normal: Fixed, direction: Fixed, halfway: Fixed) -> tuple[Fixed, Fixed]:
+        """Bit-accurate f and u.
+
+        Parameters
+        ----------
+        normal : Fixed, shape (normals, 3), SQ(1, 17)
+            Unit normals.
+        direction, halfway : Fixed, shape (lights, 3), SQ(1, 17)
+            Unit vectors L and H of each light.
+
+        Returns
+        -------
+        diffuse : Fixed, shape (normals, lights), SQ(1, 25)
+        highlight : Fixed, shape (normals, lights), UQ(1, 26)
+
+        Raises
+        ------
+        ValueError
+            If an operand has another format.
+        """
+        if {v.format for v in (normal, direction, halfway)} != {COMPONENT}:
+            raise ValueError(f"operands must be {COMPONENT}")
+        normal = Fixed(COMPONENT, normal.codes[:, None])
+        diffuse, highlight = self.DIFFUSE_FORMAT, self.HIGHLIGHT_FORMAT
+        cosine, chord = DotProduct().compute(normal, direction), Chord().compute(normal, halfway)
+        return (
+            cosine.round_half_up(diffuse.fraction_bits).saturate(diffuse),
+            chord.round_half_up(highlight.fraction_bits).saturate(highlight),
+        )
+
+    @classmethod
+    def diffuse_error(cls) -> float:
+        """Largest error of f: with d for that of a vector's length, ``2 d + d^2``, and half a step."""
+        d = CODE_LENGTH_ERROR
+        return 2 * d + d**2 + cls.DIFFUSE_FORMAT.step / 2
+
+    @classmethod
+    def highlight_error(cls, u: float) -> float:
+        """Largest error of u near a value.
+
+        ``(d_N - d_H)^2 / 2 + (d_N + d_H) u`` of the lengths, half a step, and from ``u = 1/2`` on the cut of
+        `Chord`; 2 itself saturates, which costs a step more.
+
+        Parameters
+        ----------
+        u : float
+            Largest value, 0 to 2.
+        """
+        d = CODE_LENGTH_ERROR
+        error = 2 * d**2 + 2 * d * (1 + d) * u + cls.HIGHLIGHT_FORMAT.step * 1.5
+        if u >= 0.5 - 2.0**-15:
+            error += 3**0.5 * COMPONENT.step * 2 + 3 * 2.0**-35
+        return error

@@ -1,0 +1,124 @@
+"""Highlight limits: how far operands of a scene's highlights may be off, and where there is no highlight."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from blysk.golden.cosines.span_limit import SpanLimit
+from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.pipeline import Design
+from blysk.golden.reference.lighting import Material
+from blysk.golden.reference.reflection import ReflectionModel
+
+__all__ = ["HighlightLimits"]
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """The same from the curve S(u) of a lobe, for one parameter; u = 1 - N·H."""
+
+    model: ReflectionModel
+    parameter: float | None
+
+    @cached_property
+    def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Arguments u in ascending order; the steepest ``|dS/du|`` and the largest S from each u on."""
+        u = np.r_[0, np.geomspace(1e-7, 1 - 1e-12, 4_000)]
+        value = self.model.reflect(1 - u, self.parameter)
+        slope = np.abs(np.diff(value)) / np.diff(u)
+        return u[:-1], *(np.maximum.accumulate(of[::-1])[::-1] for of in (slope, value[:-1]))
+
+    def _from(self, values: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return values[np.clip(np.searchsorted(self._points[0], u, "right") - 1, 0, None)]
+
+    def tolerance(self, u: np.ndarray) -> np.ndarray:
+        """As of `HighlightLimits`."""
+        slope = np.maximum(self._from(self._points[1], u), 1.0)
+        return ChordInterpolator.HIGHLIGHT_BUDGET / (255 * slope)
+
+    def is_lit(self, u: np.ndarray) -> np.ndarray:
+        """As of `HighlightLimits`."""
+        return (self._from(self._points[2], u) > 1 / 1020) & (u < 1)
+
+
+@dataclass(frozen=True)
+class HighlightLimits:
+    """What the highlights of materials ask of spans.
+
+    Of a polynomial or a power it follows from the exponent, as `ChordInterpolator` has it; of a lobe from its
+    curve: the error of u that keeps the budget is that budget over the steepest slope from u on.
+
+    Parameters
+    ----------
+    exponents : float array, shape (materials,)
+        Exponent, or `ReflectionModel.steepness`, of each material.
+    curves : sequence of _Curve or None
+        Of each material that has a lobe.
+    least_dark : float array, shape (materials,)
+        u from which on `SpanLimit` takes a span as not lit.
+
+    Source: docs/theory/chord.md#where-spans-are-cut.
+    """
+
+    exponents: np.ndarray
+    curves: Sequence[_Curve | None]
+    least_dark: np.ndarray
+
+    @classmethod
+    def of(cls, materials: Sequence[Material], design: Design | None = None) -> "HighlightLimits":
+        """Of materials, with the specular unit of a design; without one, of their exponents."""
+        if design is None or design.specular is None:
+            exponents = [material.exponent for material in materials]
+        else:
+            exponents = [design.steepness(material) for material in materials]
+        words = np.clip(np.ceil(exponents), 1, MAX_EXPONENT)
+        dark = [SpanLimit.lit(word) for word in words]
+        curves: list[_Curve | None] = [None] * len(materials)
+        if design is not None and design.loads_tables:
+            model = design.specular.model
+            made = {}
+            for index, material in enumerate(materials):
+                parameter = design.highlight_parameter(material)
+                if parameter not in made:
+                    level = 2.0
+                    if design.has_threshold:
+                        level = design.threshold_of(design.specular.table(parameter)).values.item() / 2
+                    made[parameter] = _Curve(model, parameter), level
+                curves[index], dark[index] = made[parameter]
+        return cls(np.asarray(exponents, dtype=np.float64), tuple(curves), np.asarray(dark))
+
+    @property
+    def words(self) -> np.ndarray:
+        """The exponents that `SpanLimit` takes: whole, 1 to 1000."""
+        return np.clip(np.ceil(self.exponents), 1, MAX_EXPONENT)
+
+    def tolerance(self, material: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Largest error of u that keeps `ChordInterpolator.HIGHLIGHT_BUDGET`, where no smaller u occurs.
+
+        Parameters
+        ----------
+        material : int array, shape (pieces,)
+            Material of each piece of a span.
+        u : array, shape (pieces, lights)
+            Least value of u, at least 0.
+        """
+        return self._of("tolerance", ChordInterpolator().highlight_tolerance, material, u)
+
+    def is_lit(self, material: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Whether a highlight may be over a quarter of an LSB, where no smaller u occurs.
+
+        Parameters are those of `tolerance`.
+        """
+        return self._of("is_lit", ChordInterpolator.is_lit, material, u)
+
+    def _of(self, name, by_exponent, material, u):
+        result = by_exponent(self.exponents[material][:, np.newaxis], u)
+        for curve in dict.fromkeys(self.curves):
+            if curve is not None:
+                which = np.flatnonzero([self.curves[index] is curve for index in range(len(self.curves))])
+                rows = np.isin(material, which)
+                result[rows] = getattr(curve, name)(u[rows])
+        return result

@@ -1,0 +1,104 @@
+"""Value gate: which spans of the chord methods can hold a visible highlight, from three values of u."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.cosines.span_limit import SpanLimit
+from blysk.golden.lighting.specular import MAX_EXPONENT, HighlightOperand, Specular
+from blysk.golden.number.fixed import UQ, Fixed
+
+__all__ = ["ValueGate"]
+
+
+@dataclass(frozen=True)
+class ValueGate:
+    """Whether a span may be lit, from ``u = |N - H|^2 / 2`` at its first pixel, middle and last pixel.
+
+    The pixels' u lie on a quadratic, ``u_l + P t + G t^2`` with ``G = 2 (u_l + u_r - 2 u_m)``. It is the
+    straight line from u_l to u_r less ``G t (1 - t)``, hence at least ``min(u_l, u_r) - max(G, 0) / 4``;
+    twice that is `SpanLimit.least`. A span is lit unless
+
+    - ``|u_l + u_r - 2 u_m| < 2^-5`` and ``|u_r - u_l| < 2^-3``, so that ``|G| < 1/16`` and ``|P| < 3/16``,
+      whose words hold them; and
+    - `SpanLimit.least` is at least a threshold, from a PROM addressed by the exponent.
+
+    A pixel's u is off the quadratic through the values by less than ``2^-23 + ChordSetup.walk_error(3/16,
+    1/16) + 2^-26`` (`margin`): the rounding of G, the reciprocal of the length and the drift, and the
+    rounding of the result. The threshold is twice the largest argument to which the specular unit may give a
+    term
+    (`HighlightOperand.last_lit_arguments`), a step and the margin more. **So no pixel of a span that is not
+    lit has a specular term other than 0**, and the picture is the same to the bit. No multiplication.
+
+    Of a single pixel all three values are its own.
+
+    Parameters
+    ----------
+    specular : Specular or Power
+        The unit that is gated; its operand is 1 - N·H.
+
+    Source: docs/theory/units.md#highlight-gate.
+    """
+
+    specular: HighlightOperand = field(default_factory=lambda: Specular(operand="one_minus_cosine"))
+
+    LEVEL_FORMAT = SpanLimit.LEVEL_FORMAT
+    THRESHOLD_FORMAT = UQ(2, 16)
+    LARGEST_BULGE = 1 << ChordSetup.HIGHLIGHT_FORMAT.fraction_bits - 5
+    LARGEST_RISE = 1 << ChordSetup.HIGHLIGHT_FORMAT.fraction_bits - 3
+
+    @cached_property
+    def margin(self) -> float:
+        """Largest distance of a pixel's u from the quadratic through the values."""
+        return float(2.0**-23 + ChordSetup().walk_error(3 / 16, 1 / 16) + 2.0**-26)
+
+    @cached_property
+    def thresholds(self) -> Fixed:
+        """The PROM for exponents 0 to 1023, UQ(2, 16)."""
+        return self.thresholds_of(self.specular.last_lit_arguments)
+
+    def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
+        """Thresholds by the largest argument whose term is over 0, in steps of 2^-25; rounded up.
+
+        Twice the least u is at most 4. Where every argument may be lit the threshold is the largest word.
+        """
+        format = self.THRESHOLD_FORMAT
+        nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25 + self.margin
+        codes = np.ceil(2 * nearest / format.step).astype(np.int64)
+        return Fixed(format, np.minimum(codes, format.max_code))
+
+    def compute(self, highlight: np.ndarray, exponent: int | np.ndarray) -> np.ndarray:
+        """Bit-accurate decisions.
+
+        Parameters
+        ----------
+        highlight : int64 array, shape (..., 3)
+            Codes of u, UQ(1, 26).
+        exponent : int or int array, broadcast to (...)
+            1 to 1000.
+
+        Returns
+        -------
+        bool array, shape (...)
+            False: every pixel of the span has a specular term of 0.
+
+        Raises
+        ------
+        ValueError
+            If an exponent is out of range.
+        """
+        exponent = np.asarray(exponent, dtype=np.int64)
+        if exponent.size and not 1 <= exponent.min() <= exponent.max() <= MAX_EXPONENT:
+            raise ValueError(f"exponents must be 1 to {MAX_EXPONENT}")
+        return self.compute_by(highlight, self.thresholds[exponent])
+
+    def compute_by(self, highlight: np.ndarray, threshold: Fixed) -> np.ndarray:
+        """The same by thresholds in place of exponents, UQ(2, 16)."""
+        left, middle, right = np.moveaxis(highlight, -1, 0)
+        held = (np.abs(left + right - 2 * middle) < self.LARGEST_BULGE) & (
+            np.abs(right - left) < self.LARGEST_RISE
+        )
+        level = threshold.extend(self.LEVEL_FORMAT).codes
+        return ~held | (SpanLimit.least(highlight) < level)

@@ -1,0 +1,95 @@
+"""Span limit unit: which spans are wider than the chord method's error bound allows at an exponent."""
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data
+
+from blysk.golden.cosines.span_limit import SpanLimit
+from blysk.golden.number.fixed import Fixed
+from blysk.hdl.core.dataflow import Dataflow
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.shapes import normal_shape
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.cosines.chord import chord
+
+__all__ = ["SpanLimitUnit", "octave_limit"]
+
+
+def octave_limit(m: Module, name: str, exponent: Value, limits: Fixed) -> FixedValue:
+    """The limit of an exponent, from one for each number of its bits: a register, one clock.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the register.
+    name : str
+        Of the register.
+    exponent : Value
+        Ten bits.
+    limits : Fixed
+        By the number of bits of the exponent, 0 to 10.
+    """
+    chosen = limits.codes[0].item()
+    for bits, limit in enumerate(limits.codes.tolist()[1:]):
+        chosen = Mux(exponent[bits], limit, chosen)
+    register = Signal(FixedShape(limits.format), name=name, reset_less=True)
+    m.d.sync += Value.cast(register).eq(chosen)
+    return register
+
+
+class SpanLimitUnit(PipelinedUnit):
+    """Whether spans are wide; `SpanLimit` is the bit-accurate model.
+
+    Three products share one multiplier at an interval of 3. Beats come at any distance from that on.
+
+    Parameters
+    ----------
+    parameters : SpanLimit
+        Bit-accurate model.
+    highlights : bool
+        Whether there is specular light.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"normal_left": ..., "normal_right": ...})))`
+        Unit normals at the ends of spans.
+    o : :py:`Out(stream.Signature(StructLayout({"wide": 1, "wide_if_lit": 1})))`
+        Whether a span of four pixels or more is wide, whatever the light; or if a light that is not behind
+        the span may have a highlight there.
+    constants : :py:`In(10)`
+        Specular exponent, 1 to 1000, constant from 2 cycles before a beat. Only with highlights.
+
+    Source: docs/theory/chord.md#where-spans-are-cut.
+    """
+
+    def __init__(self, parameters: SpanLimit | None = None, *, highlights: bool = True):
+        self.parameters = parameters or SpanLimit()
+        self.highlights = highlights
+        self._graph = g = Dataflow(3, 3, spaced=True)
+        left, right = (
+            g.input(name, lambda operands, name=name: operands[name])
+            for name in ("normal_left", "normal_right")
+        )
+        self._chord = chord(g, "chord", right, left)
+        self._result = g.register("result", self._compare, self._chord)
+        self.multipliers = g.multiplier.count
+        super().__init__(
+            data.StructLayout({"normal_left": normal_shape(), "normal_right": normal_shape()}),
+            data.StructLayout({"wide": 1, "wide_if_lit": 1}),
+            latency=self._result.stage,
+            initiation_interval=3,
+            constants=unsigned(self.parameters.EXPONENT_BITS) if highlights else None,
+            spaced=True,
+        )
+
+    def _compare(self, chord):
+        p = self.parameters
+        wide = Value.cast(chord) > p.widest.codes.item()
+        lit = Value.cast(chord) > Value.cast(self._limit) if self.highlights else wide
+        return Cat(wide, lit)
+
+    def datapath(self, m, operands):
+        """Describe the registers of the graph."""
+        if self.highlights:
+            self._limit = octave_limit(m, "limit", self.constants, self.parameters.chords)
+        value = self._graph.build(m, self, operands)
+        return self.o.payload.shape()(value(self._result, self.latency))

@@ -1,0 +1,107 @@
+"""Value gate unit: which spans of the chord methods can hold a visible highlight, from three values of u."""
+
+from amaranth.hdl import Cat, Const, Mux, Signal, unsigned
+from amaranth.lib import data
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import Member
+
+from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.lighting.value_gate import ValueGate
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import PipelinedUnit
+
+__all__ = ["ValueGateUnit"]
+
+
+class ValueGateUnit(PipelinedUnit):
+    """Whether a span may be lit; 0 only where every pixel of it has a specular term of 0.
+
+    `ValueGate` is the bit-accurate model. Latency 3 cycles, initiation interval 1, no multiplier. The PROM,
+    which all lights share, holds 1024 words of 18 bits.
+
+    Parameters
+    ----------
+    parameters : ValueGate
+        Bit-accurate model.
+    lights : int
+        Number of lights, at least 1.
+    exponent : int or None
+        The exponent, fixed at build time, 1 to 1000: no PROM. ``None``: the exponent is a port.
+    takes_threshold : bool
+        Whether the threshold is a port in place of the exponent: no PROM, as for the tables of a `Lobe`.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(ArrayLayout(ArrayLayout(UQ(1, 26), 3), lights)))`
+        u of each light at the first pixel, in the middle and at the last pixel.
+    o : :py:`Out(stream.Signature(unsigned(lights)))`
+        Whether the span may be lit, a bit for each light, the first lowest.
+    constants : :py:`In(10)` or :py:`In(18)`
+        The exponent or the threshold, where it is a port; constant from 2 cycles before a beat.
+
+    Source: docs/theory/units.md#highlight-gate.
+    """
+
+    def __init__(
+        self,
+        parameters: ValueGate | None = None,
+        lights: int = 1,
+        *,
+        exponent: int | None = None,
+        takes_threshold: bool = False,
+    ):
+        self.parameters = p = parameters or ValueGate()
+        self.lights = lights
+        self.exponent = exponent
+        self.takes_threshold = takes_threshold
+        constants = unsigned(p.specular.EXPONENT_BITS) if exponent is None else None
+        if takes_threshold:
+            constants = unsigned(p.THRESHOLD_FORMAT.width)
+        values = data.ArrayLayout(FixedShape(ChordSetup.HIGHLIGHT_FORMAT), 3)
+        super().__init__(
+            data.ArrayLayout(values, lights),
+            unsigned(lights),
+            latency=3,
+            constants=constants,
+        )
+
+    @property
+    def ports(self) -> dict[str, Member]:
+        """The port of exponent or threshold, for what passes it on; none if the exponent is fixed."""
+        return {name: member for name, member in self.signature.members.items() if name == "constants"}
+
+    def datapath(self, m, operands):
+        """Sums and differences; the least u, and whether it holds; the comparison."""
+        p = self.parameters
+        shift = p.LEVEL_FORMAT.fraction_bits - p.THRESHOLD_FORMAT.fraction_bits
+        threshold = self._threshold(m) << shift
+        lit = []
+        for i, values in enumerate(operands):
+            left, middle, right = (value.as_value() for value in values)
+            smaller = self.register(m, Mux(left < right, left, right), f"smaller_{i}")
+            bulge = self.register(m, left + right - (middle << 1), f"bulge_{i}")
+            rise = self.register(m, right - left, f"rise_{i}")
+            held = [
+                (word < limit) & (word > -limit)
+                for word, limit in ((bulge, p.LARGEST_BULGE), (rise, p.LARGEST_RISE))
+            ]
+            held = self.register(m, held[0] & held[1], f"held_{i}")
+            least = self.register(m, (smaller << 1) - Mux(bulge > 0, bulge, 0), f"least_{i}")
+            lit.append(~held | (least < threshold))
+        return self.register(m, Cat(lit), "lit")
+
+    def _threshold(self, m):
+        """The word of the PROM, two cycles after the exponent."""
+        p, width = self.parameters, self.parameters.THRESHOLD_FORMAT.width
+        if self.takes_threshold:
+            return self.register(m, self.constants, "threshold")
+        if self.exponent is not None:
+            return Const(p.thresholds.codes[self.exponent].item(), width)
+        m.submodules.thresholds = prom = Memory(
+            shape=width, depth=1 << p.specular.EXPONENT_BITS, init=p.thresholds.codes.tolist()
+        )
+        port = prom.read_port()
+        threshold = Signal(width, name="threshold", reset_less=True)
+        m.d.comb += port.addr.eq(self.constants)
+        m.d.sync += threshold.eq(port.data)
+        return threshold

@@ -1,0 +1,128 @@
+"""Renormalisation at every pixel: exact perspective-correct normals of any span."""
+
+from amaranth.hdl import Signal
+from amaranth.lib import data, stream
+
+from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
+from blysk.golden.number.spans import LENGTH_BITS
+from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.core.shapes import normal_shape, span_normals_shape
+from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
+from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
+from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
+from blysk.hdl.normals.line_setup import LineSetupUnit, line_shape
+from blysk.hdl.normals.renormaliser import RenormaliserUnit, vector_shape
+
+__all__ = ["LineAccumulatorUnit", "RenormaliseInterpolatorUnit"]
+
+
+class LineAccumulatorUnit(AccumulatorUnit):
+    """Vectors of a straight line, and a bit that is another for the pixels of the next span.
+
+    Parameters
+    ----------
+    parameters : RenormaliseInterpolator
+        Formats.
+    length_bits : int
+        Bits of the length.
+    """
+
+    def __init__(self, parameters: RenormaliseInterpolator, length_bits: int = LENGTH_BITS):
+        self.parameters = parameters
+        members = {"line": line_shape(length_bits), "length": line_shape(length_bits)["length"].shape}
+        super().__init__(
+            data.StructLayout(members | {"span": 1}),
+            data.StructLayout({"vector": vector_shape(), "span": 1}),
+        )
+
+    def carried(self, values):
+        """The bit."""
+        yield self.i.payload.span, values.span
+
+    def quadratics(self, values):
+        """The components; of second difference 0."""
+        p, line = self.parameters.accumulator, self.i.payload.line
+        zero = FixedValue.constant(p.difference_format, 0)
+        for c in range(3):
+            yield f"vector_{c}", p, (line.start[c], line.step[c], zero), values.vector[c]
+
+
+class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=RenormaliseInterpolator):
+    """Line setup, accumulator, renormaliser; `RenormaliseInterpolator` is the bit-accurate model.
+
+    Eight multipliers for the renormaliser, ``ceil(9 / setup_interval)`` for the setup. A span is flagged at
+    its first pixel that is out of range.
+
+    Parameters
+    ----------
+    parameters : RenormaliseInterpolator
+        The specular operand.
+    lights : int
+        Number of lights, at least 1.
+    options
+        As for `InterpolatorUnit`; ``setup_interval`` is 1 to 5 or 9.
+
+    Source: docs/theory/interpolation.md#renormaliser.
+    """
+
+    @classmethod
+    def setup_intervals(cls, parameters):
+        """Initiation intervals of the line setup that save multipliers."""
+        return (1, 2, 3, 4, 5, 9)
+
+    @classmethod
+    def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS):
+        """Ends of the line, vectors in ``SQ(1, 22)``, and the length."""
+        members = span_normals_shape(length_bits).members
+        ends = dict.fromkeys(("normal_left", "normal_right"), vector_shape())
+        return data.StructLayout({**members, **ends})
+
+    def __init__(self, parameters: RenormaliseInterpolator, lights: int, **options):
+        super().__init__(parameters, lights, **options)
+        self._setup = LineSetupUnit(initiation_interval=self.setup_interval, length_bits=self.length_bits)
+        self._accumulator = LineAccumulatorUnit(parameters, self.length_bits)
+        self._renormaliser = RenormaliserUnit()
+        units = self._setup, self._accumulator, self._renormaliser
+        self.latency = sum(unit.latency for unit in units) + SLICE_LATENCY + self.product_latency
+
+    def source(self, m):
+        """Lines, their vectors, unit vectors; spans of which a vector was too short."""
+        m.submodules.line_setup = setup = self._setup
+        m.submodules.line_accumulator = accumulator = self._accumulator
+        m.submodules.renormaliser = renormaliser = self._renormaliser
+        line = stream.Signature(accumulator.i.payload.shape()).create(path=("line",))
+        parity = Signal()
+        m.d.comb += [
+            *(setup.i.payload[name].eq(self.i.payload[name]) for name in self.i.payload.shape().members),
+            setup.i.valid.eq(self.i.valid),
+            self.i.ready.eq(setup.i.ready),
+            line.payload.line.eq(setup.o.payload),
+            line.payload.length.eq(setup.o.payload.length),
+            line.payload.span.eq(parity),
+            line.valid.eq(setup.o.valid),
+            setup.o.ready.eq(line.ready),
+        ]
+        with m.If(line.valid & line.ready):
+            m.d.sync += parity.eq(~parity)
+        connect_slice(m, line, accumulator.i)
+        normals = stream.Signature(normal_shape()).create(path=("normals",))
+        result = renormaliser.o.payload
+        m.d.comb += [
+            renormaliser.i.payload.eq(accumulator.o.payload),
+            renormaliser.i.valid.eq(accumulator.o.valid),
+            accumulator.o.ready.eq(renormaliser.i.ready),
+            normals.payload.eq(result.normal),
+            normals.valid.eq(renormaliser.o.valid),
+            renormaliser.o.ready.eq(normals.ready),
+        ]
+        # Spans alternate in the bit, from 0 on: before the first there was one of 1.
+        last, flagged, out_of_range = Signal(init=1), Signal(), Signal()
+        before = flagged & (last == result.span)
+        m.d.sync += out_of_range.eq(0)
+        with m.If(normals.valid & normals.ready):
+            m.d.sync += [
+                out_of_range.eq(result.out_of_range & ~before),
+                flagged.eq(result.out_of_range | before),
+                last.eq(result.span),
+            ]
+        return normals, out_of_range

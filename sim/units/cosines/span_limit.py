@@ -1,0 +1,117 @@
+"""Record of the span limit."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.golden.cosines.span_limit import SpanLimit
+from blysk.golden.number.unit_vector import quantise
+from blysk.hdl.cosines.span_limit import SpanLimitUnit
+from blysk.sim.units.operands import (
+    any_pairs,
+    code_pairs_at,
+    component_words,
+    degrees_between,
+    exponents,
+    sphere,
+    turned,
+    word_ends,
+)
+from blysk.sim.units.record import Case, Decisions, Record, Stimulus, Variant
+
+__all__ = ["RECORD"]
+
+EXPONENT = 60
+"""Exponent of a run that needs but one."""
+
+
+def _measure(rng, count):
+    """Whether a span is wide if it is lit, and whether its angle is over that of the octave."""
+
+    def samples():
+        for exponent, share in exponents(rng, count):
+            limit = SpanLimit.angle(exponent)
+            left, right = code_pairs_at(rng, share, rng.uniform(0, 2 * limit, share))
+            _, wide = SpanLimit().exceeds(*component_words(left, right), np.full(share, exponent))
+            degrees = degrees_between(left, right)[:, 0]
+            yield Decisions.of(wide, degrees > limit, degrees)
+
+    return Decisions.joined(samples())
+
+
+def _expect(unit, case):
+    beats = case.beats
+    words = component_words(beats["normal_left"], beats["normal_right"])
+    exponent = 1 if case.constants is None else case.constants
+    wide, wide_if_lit = unit.parameters.exceeds(*words, np.full(len(words[0].codes), exponent))
+    return {"wide": wide, "wide_if_lit": wide_if_lit if unit.highlights else wide}
+
+
+def _case(unit, exponent, left, right):
+    beats = {"normal_left": left, "normal_right": right}
+    return Case(beats, exponent if unit.highlights else None)
+
+
+def _spans(unit, rng, count, exponent=EXPONENT):
+    """Pairs of unit normals at any angle, of any size; of every sixteenth any words, ends of words."""
+    left, right = any_pairs(rng, count)
+    for ends in (left, right):
+        ends[7::32] = word_ends(rng, len(ends[7::32]), 3)
+    return _case(unit, exponent, left, right)
+
+
+def _limits(unit, rng, count):
+    """Angles about the limit of the exponent and about the widest, off by the normals' rounding or more."""
+    p, exponent = unit.parameters, int(rng.choice([1 << rng.integers(10), 1000, rng.integers(1, 1001)]))
+    degrees = rng.choice([p.angle(exponent), p.WIDEST], count) + rng.normal(size=count) * 10.0 ** (
+        rng.uniform(-5, 0, count)
+    )
+    left = sphere(rng, count)
+    right = turned(rng, left, np.abs(degrees))
+    return _case(unit, exponent, quantise(left), quantise(right))
+
+
+def _last_bits(unit, rng, count):
+    """Half the squared chord a few codes about the two limits: every bit of a comparison decides."""
+    p = unit.parameters
+    exponent = 1 << int(rng.integers(10))
+    limit = np.where(np.arange(count) % 2, p.chords.codes[exponent.bit_length()], p.widest.codes)
+    # From two axes, of which one component is any, the chord has any code with so many bits.
+    chord = np.maximum(limit + rng.integers(-3, 4, count) * (1 << rng.integers(0, 20, count)), 0)
+    rest = chord.copy()
+    difference = np.zeros((count, 3), dtype=np.int64)
+    for c in range(3):
+        # Half a squared difference of 34 fraction bits has 35.
+        difference[:, c] = np.floor(np.sqrt(rest))
+        rest -= difference[:, c] ** 2
+    left = np.zeros_like(difference)
+    left[:] = difference // 2
+    return _case(unit, exponent, left, left - difference)
+
+
+def _variants():
+    yield (
+        "",
+        Variant(
+            SpanLimitUnit,
+            _measure,
+            "spans to twice the angle of the octave, n 1 to 1000",
+            "rate",
+            note="of all spans; model: flagged below the angle; arithmetic: not flagged above it",
+        ),
+    )
+    yield "no highlights", Variant(partial(SpanLimitUnit, highlights=False))
+
+
+RECORD = Record(
+    name="span_limit",
+    title="Whether the angle of a span is over the chord method's limits",
+    source="docs/theory/chord.md#where-spans-are-cut",
+    variants=dict(_variants()),
+    expect=_expect,
+    stimuli={
+        "spans": Stimulus(_spans, 600),
+        "limits": Stimulus(_limits, 600, stalled=False, repeats=30),
+        "last bits": Stimulus(_last_bits, 2000, stalled=False, repeats=20),
+    },
+)

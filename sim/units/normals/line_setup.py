@@ -1,0 +1,89 @@
+"""Record of the line setup."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.golden.normals.line_setup import LineSetup, quantise_line
+from blysk.golden.number.fixed import Fixed
+from blysk.hdl.normals.line_setup import LineSetupUnit
+from blysk.sim.units.operands import LONG, any_codes, any_lengths, log_lengths, pixel_of, sphere
+from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
+
+__all__ = ["RECORD", "any_lines"]
+
+_FORMAT = LineSetup.VECTOR_FORMAT
+
+
+def any_lines(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Codes of the ends of lines: lengths to 1:100, any angle; every eighth of any words."""
+    ends = [sphere(rng, count) * 10.0 ** -rng.uniform(0, 2, (count, 1)) for _ in range(2)]
+    left, right = quantise_line(*ends)
+    left[::8], right[::8] = any_codes(rng, _FORMAT, 2, *left[::8].shape)
+    return left, right
+
+
+def _measure(rng, count):
+    """Component of a point of the line at any pixel."""
+    left, right = quantise_line(*(sphere(rng, count) * rng.uniform(0.1, 1, (count, 1)) for _ in range(2)))
+    length = log_lengths(rng, count, 2)
+    pixel = pixel_of(rng, length)[:, np.newaxis]
+    step = LineSetup().compute(Fixed(_FORMAT, left), Fixed(_FORMAT, right), length)
+    exact = (left + (right - left) * (pixel / (length - 1)[:, np.newaxis])) * _FORMAT.step
+    found = left * _FORMAT.step + pixel * step.values
+    return Sample(found, exact, exact, pixel)
+
+
+def _expect(unit, case):
+    beats = case.beats
+    left, right = (Fixed(_FORMAT, beats[f"normal_{side}"]) for side in ("left", "right"))
+    step = unit.parameters.compute(left, right, beats["length"])
+    return {"start": left.codes, "step": step.codes, "length": beats["length"]}
+
+
+def _lengths(unit, rng, count):
+    return np.maximum(any_lengths(rng, count) % (1 << unit.length_bits), 1)
+
+
+def _lines(unit, rng, count):
+    """Ends in any proportion and at any angle, every eighth of any words; lengths by their logarithm."""
+    left, right = any_lines(rng, count)
+    return Case({"normal_left": left, "normal_right": right, "length": _lengths(unit, rng, count)})
+
+
+def _corners(unit, rng, count):
+    """Ends of the words, and differences next to a border of their lower word."""
+    left, right = any_lines(rng, count)
+    words = np.array([_FORMAT.min_code, -1, 0, 1, _FORMAT.max_code])
+    left[: count // 2] = rng.choice(words, (count // 2, 3))
+    right[: count // 4] = rng.choice(words, (count // 4, 3))
+    near = slice(count // 2, count)
+    right[near] = np.clip(
+        left[near] + (rng.integers(-64, 65, left[near].shape) << 7) + rng.integers(-1, 2, left[near].shape),
+        _FORMAT.min_code,
+        _FORMAT.max_code,
+    )
+    return Case({"normal_left": left, "normal_right": right, "length": _lengths(unit, rng, count)})
+
+
+RECORD = Record(
+    name="line_setup",
+    title="Step from pixel to pixel of a straight line between two vectors",
+    source="docs/theory/interpolation.md#renormaliser",
+    variants={
+        "interval 4": Variant(LineSetupUnit, _measure, f"lengths of 0.1 to 1 at any angle, {LONG}"),
+        **{
+            f"interval {interval}": Variant(partial(LineSetupUnit, initiation_interval=interval), long=True)
+            for interval in (1, 2, 3, 5, 9)
+        },
+        "9 bits of length": Variant(partial(LineSetupUnit, length_bits=9), long=True),
+    },
+    expect=_expect,
+    stimuli={
+        "lines": Stimulus(_lines, 500),
+        "corners": Stimulus(_corners, 500),
+        "last bits": Stimulus(_lines, 20_000, stalled=False),
+    },
+    axis="pixel of the span",
+    logarithmic=True,
+)

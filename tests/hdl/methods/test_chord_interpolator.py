@@ -1,0 +1,250 @@
+# amaranth: UnusedElaboratable=no
+"""The chord method: multipliers, latencies, a pixel in every cycle for spans of any length, resets.
+
+`tests.test_units` holds both units against their models under stalls.
+"""
+
+import numpy as np
+import pytest
+from amaranth.hdl import ResetInserter, Signal, Value
+from amaranth.sim import Simulator
+
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.number.spans import pixels_of
+from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit
+from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
+from blysk.sim.engines.beats import pack
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.units.methods.chord_interpolator import RECORD as CHORD
+from blysk.sim.units.methods.chord_interpolator import gated
+from blysk.sim.units.methods.local_chord_interpolator import RECORD as LOCAL
+from blysk.sim.units.record import Case, first
+
+from ...checks import assert_beats_equal, words_of
+from ..variants import mostly_long
+
+
+def chord(lights=1, **options):
+    return ChordInterpolatorUnit(ChordInterpolator(), lights, **options)
+
+
+def local(lights=1, **options):
+    return LocalChordInterpolatorUnit(LocalChordInterpolator(), lights, **options)
+
+
+RECORDS = {chord: CHORD, local: LOCAL}
+
+
+def case_of(make, unit, length, seed=1):
+    """Spans of these lengths, most of which fit."""
+    case = RECORDS[make].stimuli["last bits"].make(unit, np.random.default_rng(seed), len(length))
+    case.beats["length"][:] = length
+    return case
+
+
+# Multipliers, latency and cycles.
+
+FIGURES = {
+    (chord, 1, 3): (10, 41),
+    (chord, 1, 9): (5, None),
+    (chord, 1, 18): (3, None),
+    (chord, 2, 3): (18, None),
+    (local, 1, 1): (6, None),
+    (local, 1, 3): (3, 27),
+    (local, 1, 6): (3, None),
+    (local, 2, 3): (5, None),
+}
+"""Multipliers and latency, of numbers of lights and setup intervals."""
+
+
+@pytest.mark.parametrize(("make", "lights", "interval"), mostly_long(list(FIGURES), (chord, 1, 3)))
+def test_multipliers_and_latency(make, lights, interval):
+    """All of 18 bits; none of them a pixel's. The first pixel of a long span comes after the latency."""
+    unit = make(lights, setup_interval=interval)
+    multipliers, latency = FIGURES[make, lights, interval]
+    assert unit.multipliers == multipliers
+    assert cost_of(unit).multipliers == {(18, 18): multipliers}
+    assert latency in (unit.latency, None)
+    case = case_of(make, unit, [3, 1])
+    run = simulate(unit, case.beats, count=4, constants=case.constants, engine="auto")
+    assert run.cycles[0] == run.input_cycles[0] + unit.latency
+
+
+def test_highlights_and_gates_cost_no_multiplier_a_pixel():
+    assert cost_of(chord(highlights=False)).multiplier_count == 6
+    assert cost_of(chord(gate=gated(1))).multiplier_count == 10
+    assert cost_of(local(gate=gated(1))).multiplier_count == 3
+
+
+def runs_of(lengths):
+    """Lengths as the parameter of a test."""
+    return [pytest.param(length, id=name) for name, length in lengths.items()]
+
+
+RNG = np.random.default_rng(7)
+LENGTHS = {
+    "1": [1] * 90,
+    "2": [2] * 90,
+    "3": [3] * 90,
+    "4": [4] * 90,
+    "1 and 3": [1, 3] * 45,
+    "3 and 2": [3, 2] * 45,
+    "any short": RNG.integers(1, 5, 200).tolist(),
+    "any": np.where(RNG.random(200) < 0.9, RNG.integers(1, 7, 200), RNG.integers(1, 40, 200)).tolist(),
+    "after a long one": [70, *[1] * 90, 3, 4, 1, 2],
+}
+
+
+@pytest.mark.parametrize("make", [chord, local])
+@pytest.mark.parametrize("length", runs_of(LENGTHS))
+@pytest.mark.parametrize("with_gate", [False, True])
+def test_a_pixel_in_every_cycle(make, length, with_gate):
+    """Spans of any length, mixed: from the first pixel of a long span on one in every cycle."""
+    unit = make(gate=gated(1)) if with_gate else make()
+    # A span of three pixels comes first: short ones then wait for it, and none comes before its turn.
+    length = np.array([3, *length])
+    case = case_of(make, unit, length)
+    run = simulate(unit, case.beats, count=int(length.sum()), constants=case.constants, engine="auto")
+    assert_beats_equal(run.beats, RECORDS[make].expect(unit, case))
+    np.testing.assert_array_equal(run.cycles, run.cycles[0] + np.arange(length.sum()))
+    assert run.cycles[0] == run.input_cycles[0] + unit.latency
+
+
+@pytest.mark.parametrize("make", [chord, local])
+@pytest.mark.parametrize("length", [1, 2])
+def test_short_spans_come_sooner(make, length):
+    """By the cycles of the setup: nothing of them goes through it."""
+    unit = make()
+    case = case_of(make, unit, np.full(50, length))
+    run = simulate(unit, case.beats, count=50 * length, constants=case.constants, engine="auto")
+    np.testing.assert_array_equal(run.cycles, run.cycles[0] + np.arange(50 * length))
+    setup = unit._spans
+    assert unit.latency - (run.cycles[0] - run.input_cycles[0]) >= setup.latency - setup.short_latency
+
+
+@pytest.mark.parametrize("interval", [3, 9, 18])
+def test_cycles_of_a_span(interval):
+    """A span of k pixels takes ``min(k, 3)`` turns of the values, or its pixels, whichever is more."""
+    for length in (1, 2, 3, 4, 9, 20, 40):
+        unit = chord(setup_interval=interval)
+        count = 30
+        case = case_of(chord, unit, np.full(count, length))
+        run = simulate(unit, case.beats, count=count * length, constants=case.constants, engine="auto")
+        ends = run.cycles[length - 1 :: length]
+        cycles = max(min(length, 3) * interval // 3, length)
+        # Values, setup and accumulators take spans side by side, so that the slowest counts.
+        np.testing.assert_array_equal(np.diff(ends)[5:], cycles)
+
+
+@pytest.mark.parametrize("make", [chord, local])
+def test_waiting_output_holds_the_input(make):
+    """While no pixel is taken as many spans enter as fit, then none; afterwards all leave in a row."""
+    unit = make()
+    length = np.tile([4, 1, 3, 2], 40)
+    case = case_of(make, unit, length)
+    stalls = np.zeros(2000, dtype=bool)
+    stalls[30:530] = True
+    run = simulate(
+        unit,
+        case.beats,
+        count=int(length.sum()),
+        constants=case.constants,
+        engine="auto",
+        output_stalls=stalls,
+    )
+    assert_beats_equal(run.beats, RECORDS[make].expect(unit, case))
+    entered = np.count_nonzero((run.input_cycles >= 200) & (run.input_cycles < 530))
+    assert entered == 0
+    after = run.cycles[run.cycles >= 530]
+    np.testing.assert_array_equal(after, 530 + np.arange(len(after)))
+
+
+# Flags and resets.
+
+
+def drive(unit, case, ready, cycles, reset_at=()):
+    """Pixels, cycles of each flag, by cycle, in Amaranth's simulator; resets at some cycles.
+
+    After a reset the spans begin again.
+    """
+    words = words_of(unit.i, case.beats)
+    constants = None
+    if case.constants is not None:
+        (row,) = pack(unit.constants.shape(), single(case.constants))
+        constants = int.from_bytes(row.astype("<u4").tobytes(), "little")
+    reset, runs = Signal(), []
+
+    async def bench(context):
+        if constants is not None:
+            context.set(Value.cast(unit.constants).as_unsigned(), constants)
+        taken, flags, sent = [], {"out_of_range": 0, "wide": 0}, 0
+        for cycle in range(cycles):
+            context.set(reset, cycle in reset_at)
+            context.set(unit.i.valid, sent < len(words))
+            context.set(Value.cast(unit.i.payload).as_unsigned(), words[min(sent, len(words) - 1)])
+            context.set(unit.o.ready, ready(cycle))
+            if cycle in reset_at:
+                runs.append((taken, flags))
+                taken, flags, sent = [], {"out_of_range": 0, "wide": 0}, 0
+            else:
+                sent += context.get(unit.i.valid & unit.i.ready)
+                if context.get(unit.o.valid & unit.o.ready):
+                    taken.append(context.get(Value.cast(unit.o.payload).as_unsigned()))
+                for name in flags:
+                    if name in unit.signature.members:
+                        flags[name] += context.get(getattr(unit, name))
+            await context.tick()
+        runs.append((taken, flags))
+
+    simulator = Simulator(ResetInserter(reset)(unit))
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(bench)
+    simulator.run()
+    return runs
+
+
+def single(beat):
+    """One beat of constants."""
+    if isinstance(beat, dict):
+        return {name: single(value) for name, value in beat.items()}
+    return np.asarray(beat)[np.newaxis]
+
+
+@pytest.mark.parametrize("make", [chord, local])
+def test_reset_in_mid_span_leaves_nothing(make):
+    """Resets at every stage of a span, also between its three normals: the spans then come as at first."""
+    unit = make()
+    length = np.tile([5, 1, 2, 3], 3)
+    case = case_of(make, unit, length)
+    expected = words_of(unit.o, RECORDS[make].expect(unit, case))
+    starts, gap = [], 110
+    resets = [gap * k + offset for k, offset in enumerate((1, 2, 3, 4, 5, 14, 17, 28, 30, 42, 47, 52), 1)]
+    runs = drive(unit, case, lambda cycle: True, resets[-1] + 200, resets)
+    assert len(runs) == len(resets) + 1
+    for taken, _ in runs:
+        # A run that was cut short has the first pixels of all.
+        assert taken == expected[: len(taken)]
+        starts.append(len(taken))
+    assert starts[-1] == len(expected)
+    assert all(count == len(expected) for count in starts[1:])
+
+
+def test_flags_are_high_once_a_span():
+    """As often as the model flags spans, under stalls; spans of one or two pixels are not flagged."""
+    unit = chord()
+    rng = np.random.default_rng(3)
+    case = CHORD.stimuli["limits"].make(unit, rng, 60)
+    wide = CHORD.stimuli["spans"].make(unit, rng, 500)
+    case = Case(
+        {name: np.concatenate([first(case.beats[name], 60), wide.beats[name][:40]]) for name in case.beats},
+        case.constants,
+    )
+    case.beats["length"][:] = rng.integers(1, 6, len(case.beats["length"]))
+    status = CHORD.status(unit, case)
+    assert min(status.values()) > 5
+    ready = rng.random(3000) < 0.6
+    ((taken, flags),) = drive(unit, case, lambda cycle: int(ready[cycle]), 1200)
+    assert len(taken) == pixels_of(case.beats["length"])[0].size
+    assert flags == status

@@ -1,0 +1,142 @@
+"""A small ray caster: own camera, own intersection, own formulas, from `docs/theory` alone.
+
+It takes plain numbers and arrays and imports nothing of blysk. A ray goes through each pixel centre; of a
+triangle that it meets, the barycentric coordinates in space weight the normals of the corners, whose sum is
+normalised. That is what perspective-correct interpolation means, without a line of rasterisation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+MODELS = {
+    "blinn": lambda c, n: np.maximum(c, 0) ** n,
+    "cosquad": lambda c, n: np.maximum(1 - n / 2 * (1 - c), 0) ** 2,
+    "cosquad7": lambda c, n: np.maximum(1 - 7 * n / 16 * (1 - c), 0) ** 2,
+    "cosquad_lin": lambda c, n: np.maximum(1 - (0.448 * n + 0.099) * (1 - c), 0) ** 2,
+}
+"""Reflection models by their formulas in docs/theory/models.md; c is N·H."""
+
+
+def unit(v):
+    """Vectors of length 1."""
+    v = np.asarray(v, dtype=np.float64)
+    return v / np.sqrt((v * v).sum(axis=-1, keepdims=True))
+
+
+@dataclass
+class View:
+    """Where the camera stands and what it sees; angles in degrees, pixels are square."""
+
+    position: tuple
+    target: tuple
+    width: int
+    height: int
+    perspective: bool
+    field_of_view: float
+    world_height: float
+    near: float
+
+    def __post_init__(self):
+        self.forward = unit(np.subtract(self.target, self.position))
+        self.right = unit(np.cross(self.forward, (0.0, 1.0, 0.0)))
+        self.up = np.cross(self.right, self.forward)
+
+    def on_plane(self, x, y):
+        """Offset from the line of sight, at depth 1 or at any, of places in pixels from the upper left."""
+        extent = 2 * np.tan(np.radians(self.field_of_view) / 2) if self.perspective else self.world_height
+        size = extent / self.height
+        across = (np.asarray(x) - self.width / 2) * size
+        above = (self.height / 2 - np.asarray(y)) * size
+        return across[..., None] * self.right + above[..., None] * self.up
+
+    def rays(self, x, y):
+        """Origin and direction of the rays through places in pixels."""
+        offset = self.on_plane(x, y)
+        if self.perspective:
+            return np.broadcast_to(self.position, offset.shape), offset + self.forward
+        return self.position + offset, np.broadcast_to(self.forward, offset.shape)
+
+    def places(self, points):
+        """Places in pixels and depths of points."""
+        relative = points - np.asarray(self.position)
+        depth = relative @ self.forward
+        extent = 2 * np.tan(np.radians(self.field_of_view) / 2) if self.perspective else self.world_height
+        scale = self.height / extent / (depth if self.perspective else 1.0)
+        return (
+            self.width / 2 + relative @ self.right * scale,
+            self.height / 2 - relative @ self.up * scale,
+            depth,
+        )
+
+    def snapped(self, points, steps):
+        """Points moved, at their depth, to the nearest of so many places a pixel."""
+        x, y, depth = self.places(points)
+        x, y = (np.round(place * steps) / steps for place in (x, y))
+        offset = self.on_plane(x, y) * (depth[..., None] if self.perspective else 1.0)
+        return self.position + offset + depth[..., None] * self.forward
+
+
+@dataclass
+class Picture:
+    """What the caster sees at every pixel; arrays of the picture's size."""
+
+    color: np.ndarray
+    cosine: np.ndarray
+    hit: np.ndarray
+    margin: np.ndarray
+    """The lesser of the least barycentric coordinate and the relative distance to the next surface behind."""
+
+
+def cast(vertices, faces, normals, view, light, coefficients, exponent, model, steps=None):
+    """Colours 0 to 255, not rounded, of one directional white light.
+
+    ``coefficients`` are k_a, k_d and k_s, each of three channels; with ``steps``, corners stand on a grid of
+    so many places a pixel. Normals are turned where the triangle is seen from behind.
+    """
+    shape = (view.height, view.width)
+    depth, second = np.full(shape, np.inf), np.full(shape, np.inf)
+    normal, inside = np.zeros((*shape, 3)), np.zeros(shape)
+    for face in np.asarray(faces):
+        corners = np.asarray(vertices, dtype=np.float64)[face]
+        x, y, far = view.places(corners)
+        first, last = np.zeros(2, dtype=int), np.array(shape)
+        if far.min() > view.near:
+            if steps:
+                corners = view.snapped(corners, steps)
+            first = np.maximum(np.floor([y.min(), x.min()]).astype(int) - 1, 0)
+            last = np.minimum(np.ceil([y.max(), x.max()]).astype(int) + 2, shape)
+        if far.max() < view.near or (last <= first).any():
+            continue
+        place = np.s_[first[0] : last[0], first[1] : last[1]]
+        j, i = np.mgrid[place]
+        origin, ray = view.rays(i + 0.5, j + 0.5)
+        # Moeller and Trumbore: origin + t ray = (1 - u - v) a + u b + v c.
+        a, ab, ac = corners[0], corners[1] - corners[0], corners[2] - corners[0]
+        p, s = np.cross(ray, ac), origin - a
+        q, volume = np.cross(s, ab), p @ ab
+        # A ray along the triangle's plane meets it nowhere.
+        volume = np.where(volume == 0, np.nan, volume)
+        u, v, t = (s * p).sum(axis=-1) / volume, (ray * q).sum(axis=-1) / volume, q @ ac / volume
+        least = np.minimum(np.minimum(u, v), 1 - u - v)
+        hit = (least >= 0) & (t > view.near)
+        nearer = hit & (t < depth[place])
+        second[place] = np.where(
+            nearer, depth[place], np.where(hit, np.minimum(second[place], t), second[place])
+        )
+        depth[place] = np.where(nearer, t, depth[place])
+        inside[place] = np.where(nearer, least, inside[place])
+        weights = np.stack([1 - u - v, u, v], axis=-1)
+        towards = np.where((ray @ np.cross(ab, ac) > 0)[..., None], -1.0, 1.0)
+        own = unit(weights @ np.asarray(normals, dtype=np.float64)[face]) * towards
+        normal[place] = np.where(nearer[..., None], own, normal[place])
+    hit = np.isfinite(depth)
+    to_light, to_viewer = unit(light), -view.forward
+    cosine = normal @ to_light
+    highlight = normal @ unit(to_light + to_viewer)
+    k_a, k_d, k_s = (np.asarray(k, dtype=np.float64) for k in coefficients)
+    term = MODELS[model](highlight, exponent) * (cosine > 0)
+    color = k_a + k_d * np.maximum(cosine, 0)[..., None] + k_s * term[..., None]
+    behind = np.where(np.isfinite(second), second, 2 * np.where(hit, depth, 1))
+    margin = np.where(hit, np.minimum(inside, behind / np.where(hit, depth, 1) - 1), 0)
+    return Picture(255 * np.clip(color, 0, 1), cosine, hit, margin)

@@ -1,0 +1,161 @@
+"""Frames of the pipelines against the ray caster: coarse and fine meshes, both projections, camera inside."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.frames.compare import compare
+from blysk.golden.frames.frame import model_frame
+from blysk.golden.presets import preset
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.renderer import shade_spans
+from blysk.golden.reference.scene import Scene
+from blysk.sim.meshes.teapot import teapot
+
+from .caster import View, cast, unit
+
+SIZE = 384, 288
+LIGHT = -0.5, 0.8, 0.7
+COEFFICIENTS = (0.05,) * 3, (0.4, 0.3, 0.2), (0.55, 0.5, 0.6)
+SURE = 1e-4
+"""Margin from which on the triangle that a pixel shows is not in doubt."""
+
+
+def torus(around: int, across: int) -> Mesh:
+    """A torus of so many sides."""
+    u, v = np.meshgrid(*(np.arange(n) * 2 * np.pi / n for n in (around, across)), indexing="ij")
+    normal = np.stack([np.cos(u) * np.cos(v), np.sin(v), np.sin(u) * np.cos(v)], axis=-1)
+    points = np.stack([np.cos(u), 0 * u, np.sin(u)], axis=-1) + 0.45 * normal
+    i, j = np.meshgrid(np.arange(around), np.arange(across), indexing="ij")
+
+    def at(a, b):
+        return a % around * across + b % across
+
+    faces = [[at(i, j), at(i, j + 1), at(i + 1, j)], [at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)]]
+    faces = np.concatenate([np.stack(face, axis=-1).reshape(-1, 3) for face in faces])
+    return Mesh(points.reshape(-1, 3), faces, normal.reshape(-1, 3))
+
+
+def triangle() -> Mesh:
+    """One that starts close to the camera and goes far away, with normals 100 degrees apart."""
+    points = np.array([[-1.0, -1.0, 0.9], [1.0, -1.0, -6.0], [0.0, 1.2, 0.0]])
+    return Mesh(points, np.array([[0, 1, 2]]), unit([[-0.7, -0.3, 0.6], [0.8, 0.1, 0.7], [0.1, 0.8, 0.4]]))
+
+
+def needle() -> Mesh:
+    """A sliver across the picture, its normals 60 degrees apart."""
+    points = np.array([[-1.2, -0.40, 0.5], [1.3, 0.35, -2.0], [-1.2, -0.38, 0.5]])
+    return Mesh(points, np.array([[0, 1, 2]]), unit([[-0.5, 0.1, 0.8], [0.6, 0.3, 0.7], [-0.5, 0.4, 0.8]]))
+
+
+MESHES = {
+    "coarse torus": torus(9, 6),
+    "fine torus": torus(48, 24),
+    "teapot": teapot(1000),
+    "triangle": triangle(),
+    "needle": needle(),
+}
+
+
+def camera_of(name: str, projection: str) -> Camera:
+    """A camera that shows all of a mesh; of the single triangles one that stands close to them."""
+    if len(MESHES[name].faces) > 1:
+        return Camera.framing(MESHES[name].vertices, (0.4, 0.5, 1.0), projection, SIZE[0] / SIZE[1], 30.0)
+    return Camera((0.1, 0.2, 2.2), (0.0, 0.0, 0.0), projection=projection, height=2.4, field_of_view=70.0)
+
+
+def held(scene: Scene, design) -> tuple[np.ndarray, float]:
+    """Errors at the pixels that are not in doubt, in LSB; and the project's own method error."""
+    camera, (width, height) = scene.camera, SIZE
+    view = View(
+        camera.position,
+        camera.target,
+        width,
+        height,
+        camera.projection == "perspective",
+        camera.field_of_view,
+        camera.height,
+        camera.near,
+    )
+    mesh = scene.mesh
+    seen = cast(
+        mesh.vertices,
+        mesh.faces,
+        mesh.normals,
+        view,
+        LIGHT,
+        COEFFICIENTS,
+        scene.materials[0].exponent,
+        design.model,
+        steps=256,
+    )
+    frame = model_frame(scene, design)
+    shown = np.any(frame.image != 0, axis=-1)
+    sure = seen.hit & (seen.margin > SURE) & (np.abs(seen.cosine) > 0.002)
+    assert np.count_nonzero(sure) > 0.9 * np.count_nonzero(shown) - 400
+    assert shown[sure].all()
+    # A pixel that only one of the two shows lies on an edge.
+    assert np.count_nonzero(shown != seen.hit) <= 0.002 * shown.size
+    return np.abs(frame.image[sure] - seen.color[sure]), compare(scene, design, frame).method_error.max_lsb
+
+
+def scene_of(mesh: Mesh, camera: Camera, exponent: int) -> Scene:
+    """One white light from above on the left."""
+    material = Material(*COEFFICIENTS, exponent)
+    return Scene(mesh, camera, *SIZE, material, (Light(LIGHT),))
+
+
+FRAMES = [
+    (method, name, projection, exponent)
+    for method in ("chord", "renormalise")
+    for name in MESHES
+    for projection in ("perspective", "orthographic")
+    for exponent in (1, 50, 1000)
+]
+SHORT = {
+    ("chord", "coarse torus", "perspective", 1000),
+    ("chord", "coarse torus", "orthographic", 1),
+    ("chord", "triangle", "perspective", 50),
+    ("chord", "needle", "perspective", 1000),
+    ("renormalise", "triangle", "perspective", 1000),
+}
+"""Frames of the short run."""
+
+
+@pytest.mark.parametrize(
+    ("method", "name", "projection", "exponent"),
+    [frame if frame in SHORT else pytest.param(*frame, marks=pytest.mark.long) for frame in FRAMES],
+)
+def test_frame(method, name, projection, exponent):
+    scene = scene_of(MESHES[name], camera_of(name, projection), exponent)
+    errors, own = held(scene, preset(method))
+    assert errors.max() <= 1.0
+    # What the project says of itself is what the caster finds, but for pixels in doubt.
+    assert errors.max() <= own + 0.05
+
+
+@pytest.mark.parametrize("model", [pytest.param("blinn", marks=pytest.mark.long), "cosquad7", "cosquad_lin"])
+def test_models(model):
+    errors, _ = held(
+        scene_of(MESHES["coarse torus"], camera_of("coarse torus", "perspective"), 100),
+        preset("chord", model),
+    )
+    assert errors.max() <= 1.0
+
+
+@pytest.mark.parametrize("exponent", [20, 500])
+def test_camera_inside(exponent):
+    """In the tube of a torus, at a wall that crosses the near plane."""
+    camera = Camera((1.0, 0.0, 0.05), (0.4, 0.1, 1.0), projection="perspective", field_of_view=80.0)
+    errors, _ = held(scene_of(MESHES["coarse torus"], camera, exponent), preset("chord"))
+    assert np.quantile(errors, 0.999) <= 1.0
+
+
+def test_caster_finds_a_wrong_curve():
+    """Ends joined without their magnitudes, as an earlier version did, are 10 LSB and more off."""
+    scene = scene_of(MESHES["triangle"], camera_of("triangle", "perspective"), 50)
+    wrong = shade_spans(scene, rasterise(scene), "normalised", preset("chord").specular.model)
+    right = compare(scene, preset("chord"), model_frame(scene, preset("chord"))).golden
+    assert 255 * np.abs(wrong - right).max() > 10
