@@ -47,8 +47,8 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
         Of the camera.
     view : three floats or str
         Direction from the mesh to the viewer: the camera shows all of the mesh. By default (0.4, 0.5, 1) to
-        the right, up and front; ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``, ``"bottom"``. The
-        front is (0, 0, 1), with z as the upright (0, -1, 0); right is upright times front.
+        the right, up and front; ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``, ``"bottom"``.
+        The front is (0, 0, 1), with z as the upright (0, -1, 0); right is upright times front.
     position, target : three floats
         The camera, in place of ``view``, and the point in the middle of its picture, by default the middle of
         the mesh; in the mesh's units.

@@ -52,6 +52,11 @@ def cli():
     Example:
         blysk render teapot --exponent 100 --compare teapot.png
     """
+    try:
+        os.getcwd()
+    except OSError as error:
+        reason = f"cannot be used ({error.strerror})"
+        raise InputError("the current folder", reason, "change to one that exists") from error
     provide_caches()
 
 

@@ -72,13 +72,17 @@ def provide_caches() -> None:
     InputError
         If there is no temporary folder, either.
     """
-    home, folder = Path.home(), Path(platformdirs.user_cache_path())
-    no_home = _unwritable(home)
+    folder = Path("of the user")
     try:
+        folder, home = Path(platformdirs.user_cache_path()), Path.home()
+        no_home = _unwritable(home)
         # A home that does not exist is not made.
         if no_home is None or not folder.is_relative_to(home):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         reason = _unwritable(folder)
+    # A user of no name, and no HOME.
+    except RuntimeError:
+        reason = no_home = "there is no home folder"
     except OSError as error:
         reason = error.strerror
     if reason is not None:
@@ -86,8 +90,9 @@ def provide_caches() -> None:
         os.environ["XDG_CACHE_HOME"] = str(private)
         os.environ.setdefault("YOWASP_CACHE_DIR", str(private / "YoWASP"))
         os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(private / "zig"))
-        text = f"cache folder {folder} cannot be written ({reason}): Yosys and other tools start slowly"
-        warnings.warn(f"{text}, set XDG_CACHE_HOME to a folder that can be", RuntimeWarning, stacklevel=3)
+        text = f"cache folder {folder} cannot be written ({reason}): models and tools are compiled anew"
+        remedy = "set XDG_CACHE_HOME to a folder that can be"
+        warnings.warn(f"{text}; {remedy}", RuntimeWarning, stacklevel=3)
     if reason is not None or no_home is not None:
         os.environ.setdefault("MPLCONFIGDIR", str(private_folder() / "matplotlib"))
 
