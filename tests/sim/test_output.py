@@ -176,7 +176,8 @@ def test_all_or_none(tmp_path, existing):
             write_text(second, "new")
             raise RuntimeError
 
-    pytest.raises(RuntimeError, fail)
+    with pytest.raises(RuntimeError):
+        fail()
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"] * existing
     with all_or_none():
         write_text(first, "1")
