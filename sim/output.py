@@ -124,7 +124,8 @@ def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
     Within `all_or_none` it takes it when that ends. Until then a file that was there stays as it was;
     whatever ends the block early (an interrupt, too) removes the temporary file. The file's permissions are
     those of the one it replaces, or those that the umask gives a new file. A link is followed: its target is
-    replaced. A path that is no regular file (``/dev/stdout``, a pipe) is given as it is, and written directly.
+    replaced. A path that is no regular file (``/dev/stdout``, a pipe) is given as it is, and written
+    directly.
 
     Parameters
     ----------

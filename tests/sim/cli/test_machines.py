@@ -1,4 +1,4 @@
-"""Machines without a home, a cache or a folder that can be written: one line, and what can be done is done."""
+"""Machines without a home, a cache or a folder that can be written: one line, and the work is done or not."""
 
 import os
 import subprocess
