@@ -19,7 +19,6 @@ from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator, Operands
-from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
 from blysk.golden.number.unit_vector import COMPONENT, quantise
@@ -182,7 +181,7 @@ class Design:
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
 
-    interpolator: Interpolator = field(default_factory=QuadraticInterpolator)
+    interpolator: Interpolator = field(default_factory=ChordInterpolator)
     specular: Specular | Power | Lobe | None = field(default_factory=Specular)
     lights: int = 1
     materials: int = 1

@@ -9,7 +9,7 @@ from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.geometry.depth_test import DepthTest
 from blysk.golden.geometry.edge_normals import TrueSpans
 from blysk.golden.geometry.geometry import Geometry
-from blysk.golden.geometry.span_adapter import shading_spans
+from blysk.golden.geometry.span_adapter import LineSpans, shading_spans
 from blysk.golden.geometry.triangles import Frame, Triangles
 from blysk.golden.pipeline import Design
 
@@ -30,12 +30,14 @@ class DrawnPixels:
         0 to 2^24 - 2.
     triangle : int64 array, shape (P,)
         Index of the triangle.
-    spans : TrueSpans
+    spans : TrueSpans or LineSpans
         What was shaded.
     counts : dict of str to int
-        `COUNTERS` of geometry; ``pixels`` shaded and how many of them were ``hidden``.
+        `COUNTERS` of geometry; ``spans`` and ``pixels`` shaded and how many of them were ``hidden``.
     out_of_range_spans : int
         Spans of a larger angle than the method serves.
+    wide_spans : int
+        Spans of a larger angle than the method's error bound allows at the exponent; see `SpanLimit`.
     """
 
     x: np.ndarray
@@ -43,9 +45,10 @@ class DrawnPixels:
     color: np.ndarray
     depth: np.ndarray
     triangle: np.ndarray
-    spans: TrueSpans
+    spans: TrueSpans | LineSpans
     counts: dict[str, int]
     out_of_range_spans: int
+    wide_spans: int
 
     @property
     def beats(self) -> dict:
@@ -63,22 +66,29 @@ class Renderer:
     design : Design
         The shading pipeline, of a method that takes normals.
     geometry : Geometry
-        Triangles to spans.
+        Triangles to spans; of a method that takes the true line with ``lines``. ``None``: as the method has
+        it.
 
     Raises
     ------
     ValueError
-        If the method takes values.
+        If the method takes values, or something other than the geometry gives.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
     design: Design = field(default_factory=Design)
-    geometry: Geometry = field(default_factory=Geometry)
+    geometry: Geometry = None  # type: ignore[assignment]  # becomes one
 
     def __post_init__(self):
+        lines = self.design.interpolator.takes_line
+        if self.geometry is None:
+            object.__setattr__(self, "geometry", Geometry(lines=lines))
         if self.design.takes_values:
             raise ValueError(f"method {self.design.method} takes no normals, which is what triangles give")
+        if self.geometry.lines != lines:
+            taken, given = ("unit normals", "true lines")[lines], ("unit normals", "true lines")[not lines]
+            raise ValueError(f"method {self.design.method} takes {taken}, the geometry gives {given}")
 
     def compute(
         self, triangles: Triangles, frame: Frame, constants: FrameConstants | Sequence[FrameConstants]
@@ -107,6 +117,7 @@ class Renderer:
             depth=depth[drawn],
             triangle=np.repeat(spans.triangle, spans.length)[drawn],
             spans=spans,
-            counts=counts | {"pixels": len(drawn), "hidden": int((~drawn).sum())},
+            counts=counts | {"spans": len(spans), "pixels": len(drawn), "hidden": int((~drawn).sum())},
             out_of_range_spans=pixels.out_of_range_spans,
+            wide_spans=pixels.wide_spans,
         )

@@ -13,16 +13,59 @@ from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.depth_test import DepthMemory, DepthTestUnit, drawn_pixel_shape
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.geometry.span_adapter import connect_shading_span
-from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
+from blysk.hdl.geometry.triangles import COUNTER_BITS, counters_shape, frame_shape, triangle_shape
 from blysk.hdl.pipeline import ShadingPipelineUnit
 
-__all__ = ["STATUS", "WAITING_SPANS", "RenderUnit"]
+__all__ = ["PORT_DESCRIPTIONS", "STATUS", "WAITING_SPANS", "RenderUnit"]
 
-STATUS = (*COUNTERS, "pixels", "hidden", "out_of_range_spans")
+PORT_DESCRIPTIONS = {
+    "i_x": "columns of the three corners, in any order",
+    "i_y": "their rows",
+    "i_depth": "their depths, less is nearer",
+    "i_normal": "component (second index) of a corner's (first index) N/W",
+    "i_material": "index of the triangle's material",
+    "o_x": "column of the pixel",
+    "o_y": "row",
+    "o_r": "red",
+    "o_g": "green",
+    "o_b": "blue",
+    "o_depth": "its depth",
+    "write_address": "frame constant to write, see above",
+    "write_data": "its code; accepted when no span is inside",
+    "constants_left": "first column of the picture on the grid; o_x counts from it",
+    "constants_top": "first row; o_y counts from it",
+    "constants_right": "the column after the last",
+    "constants_bottom": "the row after the last",
+    "constants_back_faces": "see above",
+    "constants_limit": "widest span, see above",
+    "status_empty": "triangles that cover no pixel",
+    "status_zero_area": "triangles without area",
+    "status_culled": "back faces left out",
+    "status_sliver": "triangles at most 1/256 pixel wide",
+    "status_cut": "spans that were cut",
+    "status_repaired": "normals of length 0 in whose place the one before stands",
+    "status_spans": "spans shaded",
+    "status_pixels": "pixels shaded",
+    "status_hidden": "of them those behind others",
+    "status_out_of_range_spans": "spans of an angle that the method does not serve",
+    "status_wide_spans": "spans wider than the error bound of the exponent allows",
+    "memory_read_place": "pixel whose depth is read",
+    "memory_read_enable": "reads; else the data stays",
+    "memory_read_data": "its depth, on the next clock",
+    "memory_write_place": "pixel whose depth is written",
+    "memory_write_enable": "writes",
+    "memory_write_data": "its depth",
+}
+"""Ports without a ``size``, for the table in Verilog."""
+
+_SHADING = ("out_of_range_spans", "wide_spans")
+
+STATUS = (*COUNTERS, "spans", "pixels", "hidden", *_SHADING)
 """Counters of `RenderUnit`."""
 
-WAITING_SPANS = 33
-"""Spans between geometry and shading: a memory of 32 words, and a register behind it."""
+WAITING_SPANS = {1: 33, 2: 257}
+"""Spans between geometry and shading, by lanes of the setup: a memory of a power of two words, and a register
+behind it. More of them let two lanes run ahead of large triangles while small ones follow."""
 
 
 class RenderUnit(wiring.Component):
@@ -42,6 +85,8 @@ class RenderUnit(wiring.Component):
         Bit-accurate model.
     size : (int, int) or None
         As `DepthTestUnit` has it.
+    setups : int
+        As `GeometryUnit` has it.
 
     Members
     -------
@@ -61,10 +106,14 @@ class RenderUnit(wiring.Component):
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
-    def __init__(self, parameters: Renderer | None = None, size: tuple[int, int] | None = None):
+    def __init__(
+        self, parameters: Renderer | None = None, size: tuple[int, int] | None = None, setups: int = 1
+    ):
         self.parameters = parameters or Renderer()
         design, grid = self.parameters.design, self.parameters.geometry.grid
-        self.geometry = GeometryUnit(grid, design.build.style == "compact")
+        compact = design.build.style == "compact"
+        self._setups = setups
+        self.geometry = GeometryUnit(grid, compact, self.parameters.geometry.lines, setups)
         self.pipeline = ShadingPipelineUnit(design)
         self.depth = DepthTestUnit(design.x_bits, design.y_bits, size)
         members = {
@@ -99,7 +148,10 @@ class RenderUnit(wiring.Component):
             made.valid.eq(geometry.o.valid),
             geometry.o.ready.eq(made.ready),
         ]
-        connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS)
+        connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS[self._setups])
+        count = Signal(COUNTER_BITS, name="count_spans")
+        with m.If(made.valid & made.ready):
+            m.d.sync += count.eq(count + 1)
         shape = data.StructLayout(deep)
         m.submodules.depths = depths = fifo.SyncFIFOBuffered(
             width=Shape.cast(shape).width, depth=pipeline.spans_inside + 1
@@ -120,7 +172,8 @@ class RenderUnit(wiring.Component):
             pixel.ready.eq(depth.i.ready & depths.r_rdy),
             depths.r_en.eq(moves & pixel.payload.last),
             *(self.status[name].eq(geometry.status[name]) for name in COUNTERS),
+            self.status.spans.eq(count),
             *(self.status[name].eq(depth.status[name]) for name in ("pixels", "hidden")),
-            self.status.out_of_range_spans.eq(pipeline.status.out_of_range_spans),
+            *(self.status[name].eq(pipeline.status[name]) for name in _SHADING),
         ]
         return m

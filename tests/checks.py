@@ -17,7 +17,7 @@ from blysk.sim.units.record import Case, first, length_of
 
 __all__ = ["assert_beats_equal", "assert_equals_model", "resets"]
 
-FEW = 60
+FEW = 24
 """Input beats that both simulators are compared by; fewer, but 8, where the input stalls often."""
 
 
@@ -57,7 +57,7 @@ def with_status(unit: Component, run) -> Component:
 
 
 def assert_equals_model(unit, run, engine="auto"):
-    """Every beat, the status, of a pipelined unit without stalls every cycle; few beats in both engines."""
+    """Every beat, the status, of a pipelined unit without stalls every cycle; of some runs both engines."""
     case, component = run.case, with_status(unit, run)
     options = {"constants": case.constants, "write": case.write, **run.stalls}
     found = simulate(component, case.beats, count=run.count, engine=engine, **options)
@@ -70,7 +70,7 @@ def assert_equals_model(unit, run, engine="auto"):
         expected = start + np.arange(run.count) * unit.initiation_interval
         np.testing.assert_array_equal(found.input_cycles, expected)
         np.testing.assert_array_equal(found.cycles, found.input_cycles + unit.latency)
-    if run.stalls:
+    if run.slow:
         # Where the input stalls often, a cycle without a beat costs as much as one with it.
         share = 1 - np.mean(run.stalls.get("input_stalls", 0))
         few = min(length_of(case.beats), max(8, int(FEW * share)))

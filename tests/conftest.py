@@ -1,4 +1,4 @@
-"""What the tests of every hardware unit share: one way to hold RTL against its twin."""
+"""What the tests of every hardware unit share: one way to hold RTL against its bit-accurate model."""
 
 import signal
 import threading
@@ -13,6 +13,19 @@ from amaranth.sim import Simulator
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED, quantise
 from blysk.sim.engines.beats import dtype_of, pack
 from blysk.sim.engines.simulate import simulate
+
+
+def pytest_collection_modifyitems(items):
+    """Groups of ``--dist loadgroup``: a file, or of the tests of every unit a unit, which come first.
+
+    A worker compiles a unit once, and the longest tests do not come last.
+    """
+    for item in items:
+        group = item.nodeid.partition("::")[0]
+        if group == "tests/test_units.py":
+            group += item.callspec.params["name"]
+        item.add_marker(pytest.mark.xdist_group(group))
+    items.sort(key=lambda item: not item.nodeid.startswith("tests/test_units.py"))
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -54,7 +67,7 @@ def assert_beats_equal(actual, expected, path="beat"):
 
 @pytest.fixture
 def verify():
-    """Hold a unit of fixed latency against its twin: every beat, every clock, both engines, random stalls."""
+    """Hold a unit of fixed latency against its bit-accurate model: beats, cycles, both engines, stalls."""
 
     def verify(unit, beats, expected, *, constants=None, seed=2026):
         rng = np.random.default_rng(seed)

@@ -4,7 +4,7 @@
 white light and with a grey, glossy material, at every exponent from 1 to 1000 with the model cosquad and at
 30 of them with every other model. Each frame goes through `Design.compute`, which the simulated
 pipeline equals to the bit (``python -m blysk.bench.report.pairs`` and the tests of `pipeline`), and is held
-against exactly normalised interpolation with the same model. ``--json`` keeps the figures of every frame. The
+against exact normals of every pixel with the same model. ``--json`` keeps the figures of every frame. The
 exit status is 1 when a pixel is more than 1 LSB off, other than where a light is on in one and off in the
 other (see `Point`), 2 for a mesh that cannot be read.
 """
@@ -142,9 +142,9 @@ class Frame:
         return replace(self.scene, material=replace(self.scene.material, exponent=exponent))
 
     def golden(self, model: str, exponent: int) -> np.ndarray:
-        """Exactly normalised interpolation, in LSB: float64 array, shape (pixels, 3).
+        """Exact normals of every pixel, in LSB: float64 array, shape (pixels, 3).
 
-        What `shade_spans` draws, pixel by pixel in the order of the fragments.
+        What `render` draws, pixel by pixel in the order of the fragments.
         """
         scene = self.scene_of(exponent)
         shaded = intensity_of_cosines(

@@ -27,9 +27,9 @@ EXPONENTS = (2, 50, 1000)
 BLOCKS: dict[str, tuple[str, ...]] = {
     "frame constants": ("frame_constants", "slope"),
     "admission": ("top", "coordinates"),
-    "highlight gate": ("highlight_gate", "undecided", "lengths", "decisions"),
-    "setup of spans": ("interpolator.chord_setup", "interpolator.prepared"),
-    "sums of pixels": ("interpolator",),
+    "setup of spans": ("interpolator",),
+    "highlight gate": ("interpolator.chord_spans.value_gate", "interpolator.chord_spans.decisions"),
+    "sums of pixels": ("interpolator.chord_spans.chord_accumulator",),
     "diffuse": ("light_0.diffuse",),
     "specular": ("light_0.specular",),
     "intensity": ("intensity",),

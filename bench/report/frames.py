@@ -22,12 +22,13 @@ from blysk.bench.speed.renderer import timed
 from blysk.golden.frames.compare import method_in_float64
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import prepare
+from blysk.golden.methods.interpolator import Operand
 from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.metrics import error_figures
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.golden.reference.renderer import render, shade_spans
+from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -131,7 +132,12 @@ def scenes_of(view: Mapping[str, Any], exponents: Sequence[int]) -> list[Scene]:
 
 
 def frames(
-    method: str, model: str, view: Mapping[str, Any], exponents: Sequence[int], simulated: bool
+    method: str,
+    model: str,
+    view: Mapping[str, Any],
+    exponents: Sequence[int],
+    simulated: bool,
+    operand: Operand | None = None,
 ) -> list[dict[str, Any]]:
     """Frames of a design: their errors, cycles and pictures.
 
@@ -141,7 +147,7 @@ def frames(
       GPU) with the design's model, against the same with Blinn's; both in float64. No arithmetic cures it;
     - ``arithmetic``: the frame against the same method and model in float64; coefficients as published
       count as arithmetic;
-    - ``method``: the frame against exactly normalised interpolation along the spans with the same model;
+    - ``method``: the frame against Phong shading with the same model;
     - ``total``: the frame against the exact one, Phong shading with Blinn's model.
 
     Parameters
@@ -155,6 +161,8 @@ def frames(
         One frame each.
     simulated : bool
         Whether the frames are simulated; else they are those of the bit-accurate model, equal to the bit.
+    operand : str, optional
+        Of the specular unit, where it is not that of the method.
 
     Returns
     -------
@@ -163,13 +171,14 @@ def frames(
         (``total``, ``method``: whether they look identical), ``pictures`` (see `section`), ``pixels`` shaded,
         ``shown`` ones, ``spans``, ``out_of_range_spans`` and ``cycles`` (``None`` if not simulated).
     """
-    design = preset(method, model)
+    design = preset(method, model, operand=operand)
     simulator = FrameSimulator(design, "cxxrtl") if simulated else None
     results = []
     for scene in scenes_of(view, exponents):
         frame = simulator.render(scene) if simulator else model_frame(scene, design)
         same_method = method_in_float64(scene, design, frame.cut_raster)
         names = {"method": method, "model": model, "engine": simulator.engine if simulator else "model"}
+        names |= {"operand": operand} if operand else {}
         results.append(
             {
                 "settings": {**_settings(view, scene), **names},
@@ -246,10 +255,9 @@ def _judged(
     if not exact.mask.any():
         size = f"{scene.width}x{scene.height}"
         raise InputError(view["source"], f"no pixel shows the surface at {size}", "choose another mesh")
-    golden = shade_spans(scene, raster, "normalised", REFLECTION_MODELS[model])
-    of_model = render(scene, "phong", REFLECTION_MODELS[model], raster=raster)
+    golden = render(scene, "phong", REFLECTION_MODELS[model], raster=raster).image
     pairs = {
-        "model": (of_model.image * 255, exact.image),
+        "model": (golden * 255, exact.image),
         "arithmetic": (image, same_method),
         "method": (image, golden),
         "total": (image, exact.image),
@@ -269,7 +277,7 @@ def _judged(
     }
 
 
-def hardware(method: str, model: str) -> dict[str, int]:
+def hardware(method: str, model: str, operand: Operand | None = None) -> dict[str, int]:
     """What the pipeline of a design takes before technology mapping, see `Cost`.
 
     Returns
@@ -277,17 +285,22 @@ def hardware(method: str, model: str) -> dict[str, int]:
     dict
         See `Cost.totals`.
     """
-    return cost_of(ShadingPipelineUnit(preset(method, model))).totals
+    return cost_of(ShadingPipelineUnit(preset(method, model, operand=operand))).totals
 
 
 def speeds(
-    method: str, model: str, view: Mapping[str, Any], exponents: Sequence[int], simulated: bool
+    method: str,
+    model: str,
+    view: Mapping[str, Any],
+    exponents: Sequence[int],
+    simulated: bool,
+    operand: Operand | None = None,
 ) -> list[dict[str, float | None]]:
     """Run times of a design in software, the best of three.
 
     Parameters
     ----------
-    method, model, view, exponents, simulated
+    method, model, view, exponents, simulated, operand
         As for `frames`.
 
     Returns
@@ -297,7 +310,7 @@ def speeds(
         ones included, in a second of its simulation (``None`` if not simulated), and ``golden_ns_per_pixel``,
         nanoseconds a shown pixel to shade the same spans by the same method and model in float64 NumPy.
     """
-    design = preset(method, model)
+    design = preset(method, model, operand=operand)
     simulator = FrameSimulator(design, "cxxrtl") if simulated else None
     results = []
     for scene in scenes_of(view, exponents):

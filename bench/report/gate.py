@@ -26,9 +26,7 @@ from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
-from blysk.golden.number.unit_vector import COMPONENT
 from blysk.golden.pipeline import Design, Pixels, Spans
 from blysk.golden.presets import MODELS as ALL_MODELS
 from blysk.golden.presets import preset
@@ -57,7 +55,7 @@ MODELS = ("cosquad", "coscos4", "blinn")
 EXPONENTS = (2, 10, 50, 200, 1000)
 
 _SPECULAR = ("light_0.specular",)
-_GATE = ("highlight_gate", "undecided", "lengths", "decisions")
+_GATE = ("interpolator.chord_spans.value_gate", "interpolator.chord_spans.decisions")
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ class Activity(NamedTuple):
     specular : int
         Inside the specular unit.
     gate : int
-        Inside the gate and the FIFOs that lead to it and on.
+        Inside the gate and the FIFO of its decisions.
     pipeline : int
         In the whole pipeline, both of these included.
     """
@@ -139,21 +137,12 @@ class GateRow:
 
 def shares_of(design: Design, spans: Spans, constants: FrameConstants) -> Shares:
     """Count what the gate of a design of one light and one material would do; it need not have one."""
-    kept = np.flatnonzero(spans.length)
-    length = np.asarray(spans.length, dtype=np.int64)[kept]
-    left, right, direction, halfway = (
-        Fixed(COMPONENT, codes)
-        for codes in (
-            spans.normal_left[kept],
-            spans.normal_right[kept],
-            constants.direction,
-            constants.halfway,
-        )
-    )
-    operands = design.interpolator.compute(left, right, length, direction, halfway)
+    spans = spans[np.flatnonzero(spans.length)]
+    length = np.asarray(spans.length, dtype=np.int64)
+    operands = design.operands(spans, constants)
     behind = Diffuse(operands.cosine.format).dark(operands.cosine)
     dark = design.specular.compute(operands.highlight, behind, constants.exponent).codes[:, 0] == 0
-    gated = ~design.lit_spans(spans, constants)[kept, 0]
+    gated = ~design.lit_spans(spans, constants)[:, 0]
     span, _ = pixels_of(length)
     dark_span = np.bincount(span[~dark], minlength=len(length)) == 0
     return Shares(

@@ -38,6 +38,7 @@ from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.errors import InputError
 
 __all__ = [
+    "BEST",
     "DESIGNS",
     "GROUPS",
     "QUICK_SIMULATED",
@@ -62,7 +63,13 @@ DESIGNS += [("chord", model) for model in MODELS if model != "cosquad"]
 DESIGNS += [("renormalise", "exp"), ("renormalise", "blinn"), ("linear", "blinn")]
 
 DESIGNS += [(method, "cosquad") for method in PUBLISHED]
-"""Method and model of the hardware's points."""
+"""Method and model of the hardware's points, the operand of the specular unit being that of the method."""
+
+BEST = [method for method, interpolator in METHODS.items() if interpolator.operand == "cosine"]
+"""Methods with the operand of their documents, N·H, that are more exact with 1 - N·H: they have points of
+both, so that each method is compared in its best form too. Those as published are `PUBLISHED`."""
+
+_BEST_OPERAND = {"operand": "one_minus_cosine"}
 
 QUICK_SIMULATED = [
     ("linear", "cosquad"),
@@ -100,19 +107,32 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
     for source in ("teapot", *dict.fromkeys(meshes)):
         view = view_of(source, triangles, width, height)
         where = {"view": view, "exponents": exponents}
-        for method, model in DESIGNS:
-            simulated = compiles and (not quick or (method, model) in QUICK_SIMULATED)
-            settings = {"method": method, "model": model, **where, "simulated": simulated}
+        for design in _designs():
+            pair = design["method"], design["model"]
+            simulated = compiles and (not quick or (pair in QUICK_SIMULATED and "operand" not in design))
+            settings = {**design, **where, "simulated": simulated}
             found += [Task(frames, settings), Task(speeds, settings, timed=True)]
         for shading in SHADINGS:
             settings = {"shading": shading, **where}
             found += [Task(software_frames, settings), Task(software_speeds, settings, timed=True)]
-    for method, model in DESIGNS:
-        if not quick or (method, model) in QUICK_SIMULATED:
-            found.append(Task(hardware, {"method": method, "model": model}))
-        if not quick and all(tool_versions().values()):
-            found.append(place_and_route.task(method, model))
+    for design in _designs():
+        pair = design["method"], design["model"]
+        if not quick or pair in QUICK_SIMULATED:
+            found.append(Task(hardware, design))
+        if not quick and "operand" not in design and all(tool_versions().values()):
+            found.append(place_and_route.task(*pair))
     return found
+
+
+def _designs() -> list[dict[str, str]]:
+    """Options of the hardware's points."""
+    designs = [{"method": method, "model": model} for method, model in DESIGNS]
+    return designs + [{"method": method, "model": "cosquad"} | _BEST_OPERAND for method in BEST]
+
+
+def _design_of(settings: Mapping[str, Any]) -> tuple[str, ...]:
+    """Method, model and, if it is not the method's own, operand."""
+    return tuple(settings[name] for name in ("method", "model", "operand") if name in settings)
 
 
 def _group(method: str) -> str:
@@ -138,6 +158,7 @@ def _command(settings: Mapping[str, Any]) -> str:
     words = ["blysk", "render", settings["source"]]
     if settings["triangles"] is not None:
         words += ["--triangles", str(settings["triangles"])]
+    words += ["--operand", settings["operand"]] if "operand" in settings else []
     for name in ("method", "model", "exponent", "ambient", "diffuse", "specular"):
         words += [f"--{name}", str(settings[name])]
     words += ["--size", f"{settings['width']}x{settings['height']}"]
@@ -151,7 +172,7 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
     for task, result in zip(tasks, results, strict=True):
         if task.function in (hardware, place_and_route.measure):
             taken = result if task.function is hardware else {"fmax_mhz": result.get("fmax_median_mhz")}
-            of_design.setdefault((task.settings["method"], task.settings["model"]), {}).update(taken)
+            of_design.setdefault(_design_of(task.settings), {}).update(taken)
         elif task.function in (speeds, software_speeds):
             for key, speed in zip(_keys(task), result, strict=True):
                 of_frame[key] = speed
@@ -161,15 +182,15 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
             continue
         for key, found in zip(_keys(task), result, strict=True):
             settings = found["settings"]
-            method, model = settings["method"], settings["model"]
+            method = settings["method"]
             software = task.function is software_frames
-            taken = {} if software else of_design.get((method, model), {})
+            taken = {} if software else of_design.get(_design_of(settings), {})
             fmax = taken.get("fmax_mhz")
             cycles = None if found["cycles"] is None else found["cycles"] / found["pixels"]
             points.append(
                 {
                     "id": "/".join(map(str, key)),
-                    "label": f"{method}, software" if software else f"{method}, {model}",
+                    "label": f"{method}, software" if software else _label(settings),
                     "group": "software" if software else _group(method),
                     "settings": settings,
                     "command": _command(settings),
@@ -198,10 +219,15 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
     )
 
 
+def _label(settings: Mapping[str, Any]) -> str:
+    """Name of a hardware design."""
+    return f"{settings['method']}, {settings['model']}" + ", 1 - N.H" * ("operand" in settings)
+
+
 def _keys(task: Task) -> list[tuple]:
     """What tells the points of a task apart."""
     settings = task.settings
-    design = (settings["shading"],) if "shading" in settings else (settings["method"], settings["model"])
+    design = (settings["shading"],) if "shading" in settings else _design_of(settings)
     return [(settings["view"]["source"], *design, exponent) for exponent in settings["exponents"]]
 
 
@@ -214,7 +240,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
       - ``id``, ``label``: texts; ``group``: a key of ``groups``;
       - ``settings``: everything that the frame depends on; among them ``source`` (the mesh), ``exponent``,
-        ``method``, ``model``, ``width``, ``height``, ``engine`` (``cxxrtl``: simulated, ``model``: its
+        ``method``, ``model``, ``width``, ``height``, ``operand`` if it is not the method's own,
+        ``engine`` (``cxxrtl``: simulated, ``model``: its
         bit-accurate model, ``float64``: the golden renderer);
       - ``command``: a line for a shell that makes it again;
       - ``errors``: value or ``None`` by key of ``errors``; ``times``: by key of ``times``;

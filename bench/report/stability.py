@@ -112,7 +112,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         f"{len(methods)} methods in {sum(map(len, cases[methods[0]].values()))} stiff and extreme cases of "
         f"{len(GROUPS)} groups. The pixels are those of the bit-accurate model, which the simulated hardware "
         f"equals to the bit, with the model `{MODEL}`; group {STREAM_GROUP} is simulated hardware. Each is "
-        "held against exactly normalised interpolation in float64 with the same model; 0.5 LSB is a "
+        "held against exact normals of every pixel in float64 with the same model; 0.5 LSB is a "
         "correctly rounded pixel. Where N.L is 0 but for the arithmetic, lit and dark are both right.",
         f"*Good* is an error to {GOOD:g} LSB. *Fair* is a larger one of which the user is told: the pipeline "
         "flags the span, or the method serves it and its documentation states such an error (its own curve "
@@ -199,8 +199,9 @@ def _range_table(ranges: dict[str, dict]) -> Table:
     note = (
         "`blysk` cuts wider spans before the pipeline, and counts them; the pipeline counts those that it "
         f"gets and can tell, some or all. Errors at exponent {SWEEP_EXPONENT}, spans of 16 pixels with the "
-        "highlight in them; no figure where every span is flagged. Of `chord-local` the widest span is "
-        "measured: it depends on the light, and is that of which none of a sample is cut."
+        "highlight in them; no figure where every span is flagged. Of `chord` the widest span is the widest "
+        "lit one that the pipeline does not count as wide; of `chord-local` it is measured, as it depends on "
+        "the light: that of which none of a sample is cut."
     )
     title = "Range of each method: served whole, exact to a step, flagged; and what it does outside"
     return Table("safe-ranges", title, [*columns, "pixels of a span", "exponents"], rows, note, grades)

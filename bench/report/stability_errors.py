@@ -16,19 +16,20 @@ from blysk.bench.report.stability_cases import (
     cases_of,
     single_spans,
 )
+from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.local import local_values
+from blysk.golden.frames.prepare import spans_for
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.methods.interpolator import Operands
+from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
-from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import METHODS, preset
-from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import halfway_vector, intensity_of_cosines, saturate
-from blysk.golden.reference.raster import Raster
+from blysk.golden.reference.raster import Raster, fragment_normals
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_operands, shade_spans
 
@@ -91,36 +92,80 @@ def _design(case: Case, method: str) -> Design:
     return preset(method, MODEL, lights=len(case.scene.lights))
 
 
-def spans_of(case: Case, design: Design, raster: Raster, codes: Sequence[np.ndarray]) -> Spans:
-    """Spans of a case as a design takes them."""
-    spans = Spans(raster.x, raster.y, raster.length, *codes)
-    return replace(spans, values=local_values(case.scene, raster)) if design.takes_values else spans
-
-
-def _operands(design: Design, spans: Spans, constants: FrameConstants) -> Operands:
+def spans_of(case: Case, design: Design, raster: Raster) -> Spans:
+    """Spans of a case as a design takes them: as `spans_for` makes them, or of the case's own codes."""
+    if case.codes is None:
+        return spans_for(case.scene, raster, design)
+    left, right = case.codes
     if design.takes_values:
-        return design.interpolator.compute_values(spans.values, spans.length)
-    vectors = (spans.normal_left, spans.normal_right, constants.direction, constants.halfway)
-    left, right, direction, halfway = (Fixed(COMPONENT, codes) for codes in vectors)
-    return design.interpolator.compute(left, right, spans.length, direction, halfway)
+        values = local_values(case.scene, raster)
+        return Spans(raster.x, raster.y, raster.length, left, right, values=values)
+    if design.interpolator.takes_line:
+        # The same numbers.
+        shift = design.interpolator.END_FORMAT.fraction_bits - COMPONENT.fraction_bits
+        return Spans(raster.x, raster.y, raster.length, left << shift, right << shift)
+    return Spans(raster.x, raster.y, raster.length, left, right, normal_middle=_middle_codes(left, right))
 
 
-def _shade(case: Case, design: Design, raster: Raster, codes: Sequence[np.ndarray]) -> _Shaded:
-    """Errors of the model against exactly normalised interpolation in float64."""
+def _middle_codes(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Codes of bisectors, as long as the ends are on average; of opposite ends 0."""
+    total = left + right
+    length = (np.linalg.norm(left, axis=1) + np.linalg.norm(right, axis=1))[:, np.newaxis] / 2
+    middle = length * np.where(total.any(axis=1, keepdims=True), normalise(total), 0.0)
+    return np.clip(np.rint(middle), COMPONENT.min_code, COMPONENT.max_code).astype(np.int64)
+
+
+def _flagged(design: Design, spans: Spans, constants: FrameConstants) -> np.ndarray:
+    """Spans that the pipeline counts as out of range or as wide; bool, shape (spans,)."""
+    flagged = design.operands(spans, constants).out_of_range
+    if design.span_limit is None:
+        return flagged
+    values, (left, _, right) = _three_values(design, spans, constants)
+    exponent = np.full(len(spans), constants.exponent)
+    return flagged | design.span_limit.compute(left, right, values, spans.length, exponent)
+
+
+def _three_values(
+    design: Design, spans: Spans, constants: FrameConstants
+) -> tuple[SpanValues, tuple[Fixed, Fixed, Fixed]]:
+    """Values of the chord method, and the normals that they are of."""
+    codes = spans.normal_left, spans.middle, spans.normal_right, constants.direction, constants.halfway
+    *normals, direction, halfway = (Fixed(COMPONENT, of) for of in codes)
+    return design.interpolator.values(*normals, direction, halfway), tuple(normals)
+
+
+def _own(case: Case, design: Design, raster: Raster, spans: Spans) -> np.ndarray:
+    """Picture of the method's own curve in float64, from the codes on."""
+    scene, model, method = case.scene, REFLECTION_MODELS[MODEL], design.interpolator
+    if method.TAKES_MIDDLE or design.takes_values:
+        values = spans.values
+        if values is None:
+            values, _ = _three_values(design, spans, FrameConstants.of(scene))
+        cosine, u = method.exact_operands(values, spans.length)
+        return shade_operands(scene, raster, cosine, 1 - u, model)
+    ends = [codes.astype(np.float64) for codes in (spans.normal_left, spans.normal_right)]
+    left, right = ends if method.takes_line else map(normalise, ends)
+    given = replace(raster, normal_left=left, normal_right=right)
+    return shade_spans(scene, given, method.exact_normals, model, method.uses_chord)
+
+
+def _shade(case: Case, design: Design, raster: Raster) -> _Shaded:
+    """Errors of the model against exact normals in float64, perspective-correct and normalised per pixel."""
     scene, material = case.scene, case.scene.materials[0]
-    spans, constants = spans_of(case, design, raster, codes), FrameConstants.of(scene)
+    spans, constants = spans_of(case, design, raster), FrameConstants.of(scene)
     color = design.compute(spans, constants).color
-    out_of_range = _operands(design, spans, constants).out_of_range
+    out_of_range = _flagged(design, spans, constants)
 
-    degrees = np.minimum(_angles(raster), design.interpolator.MAX_ANGLE).max(initial=0)
+    degrees = _line_angles(spans) if design.interpolator.takes_line else _angles(raster)
+    degrees = np.minimum(degrees, design.interpolator.MAX_ANGLE).max(initial=0)
     error = design.interpolator.operand_error(int(raster.length.max(initial=1)), float(degrees))
-    error += min(_length_excess(codes), LENGTH_TOLERANCE)
-    shown, whole = raster.visible, case.raster
-    t = whole.offset / np.maximum(whole.length[whole.span] - 1, 1)
-    normals = interpolate("normalised", whole.normal_left[whole.span], whole.normal_right[whole.span], t)
+    if not (design.takes_values or design.interpolator.takes_line):
+        error += min(_length_excess((spans.normal_left, spans.normal_right)), LENGTH_TOLERANCE)
+    shown = raster.visible
+    normals = fragment_normals(scene, case.raster, shown)
     direction = np.array([light.direction for light in scene.lights])
     halfway = halfway_vector(direction, scene.camera.viewer)
-    cosine, highlight = (normals[shown] @ vectors.T for vectors in (direction, halfway))
+    cosine, highlight = (normals @ vectors.T for vectors in (direction, halfway))
     # Where N·L is 0 but for the arithmetic, either side of the terminator is right.
     near = np.abs(cosine) <= error + 3 * _STEP
     exact = [
@@ -137,17 +182,7 @@ def _shade(case: Case, design: Design, raster: Raster, codes: Sequence[np.ndarra
         for side in (0.0, 2.0**-60)
     ]
 
-    if design.takes_values:
-        cosine, u = design.interpolator.exact_operands(spans.values, spans.length)
-        own = shade_operands(scene, raster, cosine, 1 - u, REFLECTION_MODELS[MODEL])
-    else:
-        # From the codes on.
-        given = replace(raster, normal_left=normalise(codes[0]), normal_right=normalise(codes[1]))
-        uses_chord = design.interpolator.uses_chord
-        own = shade_spans(
-            scene, given, design.interpolator.exact_normals, REFLECTION_MODELS[MODEL], uses_chord
-        )
-    own = own.reshape(-1, 3)[raster.pixel[shown]] * 255
+    own = _own(case, design, raster, spans).reshape(-1, 3)[raster.pixel[shown]] * 255
     light = np.sum([light.color for light in scene.lights], axis=0)
     terms = np.multiply(material.diffuse, error)
     terms = terms + np.multiply(material.specular, material.exponent * error + design.specular.error)
@@ -162,6 +197,26 @@ def _angles(raster: Raster) -> np.ndarray:
     """Angles of spans in degrees."""
     half = np.linalg.norm(raster.normal_right - raster.normal_left, axis=1) / 2
     return np.degrees(2 * np.arcsin(np.minimum(half, 1)))
+
+
+def _line_angles(spans: Spans) -> np.ndarray:
+    """Angle, in degrees, between ends of length 1 with a line that comes as near to 0 as that of a span."""
+    left, right = (
+        codes / Renormaliser.VECTOR_FORMAT.max_code for codes in (spans.normal_left, spans.normal_right)
+    )
+    chord = right - left
+    square = np.einsum("ij,ij->i", chord, chord)
+    t = np.clip(-np.einsum("ij,ij->i", left, chord) / np.where(square, square, 1.0), 0, 1)
+    nearest = np.linalg.norm(left + t[:, np.newaxis] * chord, axis=1)
+    return 2 * np.degrees(np.arccos(np.minimum(nearest, 1)))
+
+
+def _has_unit_length(design: Design, codes: Sequence[np.ndarray]) -> np.ndarray:
+    """Whether both ends of spans have length 1 within `LENGTH_TOLERANCE`, of a line the longer end."""
+    lengths = np.linalg.norm(np.stack(codes) / ONE, axis=2)
+    if design.interpolator.takes_line:
+        lengths = lengths.max(axis=0, keepdims=True)
+    return (np.abs(lengths - 1) <= LENGTH_TOLERANCE + _STEP).all(axis=0)
 
 
 def _length_excess(codes: Sequence[np.ndarray]) -> float:
@@ -201,7 +256,7 @@ def _figures(shaded: _Shaded, inside: np.ndarray) -> dict[str, Any]:
 def measure_case(case: Case, method: str) -> dict[str, Any]:
     """Errors of a method in a case, by the bit-accurate model.
 
-    The error is the largest of a channel against exactly normalised interpolation in float64 with the same
+    The error is the largest of a channel against exact normals of each pixel in float64 with the same
     model, in LSB; 0.5 is a correctly rounded pixel. Where N·L is 0 but for the stated errors, lit and dark
     are both right. An error is
 
@@ -211,7 +266,8 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
       exponent in a highlight, come to the rest;
     - bad otherwise: nothing tells of it.
 
-    A method serves spans that `spans` leaves whole, with normals of length 1 within `LENGTH_TOLERANCE`.
+    A method serves spans that `cut_spans` leaves whole, or, of one that takes two normals, to its
+    `Interpolator.widest_span`; with normals of length 1 within `LENGTH_TOLERANCE`.
 
     Returns
     -------
@@ -223,29 +279,26 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
         ``prepared`` is ``None`` where the spans are refused.
     """
     design = _design(case, method)
-    # The normals along a span are those of its ends, whatever the perspective.
-    ones = np.ones(len(case.raster.length))
-    raster = replace(case.raster, magnitude_left=ones, magnitude_right=ones)
-    cut, _ = cut_spans(case.scene, case.raster, design)
+    raster = case.raster
+    cut, _ = cut_spans(case.scene, raster, design)
     first = np.flatnonzero(cut.offset == 0)
     parts = np.bincount(raster.span[first], minlength=len(raster.length))
-    codes = case.codes or (quantise(raster.normal_left), quantise(raster.normal_right))
-    lengths = np.stack([np.linalg.norm(end / ONE, axis=1) for end in codes])
-    inside = parts == 1
-    if not design.takes_values:
+    if design.takes_values or design.span_limit:
+        inside = parts == 1
+    else:
         widest = design.interpolator.widest_span(case.scene.materials[0].exponent)
         inside = _angles(raster) <= widest + _SLACK
-    inside &= (np.abs(lengths - 1) <= LENGTH_TOLERANCE + _STEP).all(axis=0)
+    if case.codes is not None:
+        inside &= _has_unit_length(design, case.codes)
     prepared = None
     if case.codes is None:
-        ends = quantise(cut.normal_left), quantise(cut.normal_right)
-        prepared = _figures(_shade(case, design, cut, ends), np.ones(len(cut.length), dtype=bool))
+        prepared = _figures(_shade(case, design, cut), np.ones(len(cut.length), dtype=bool))
     return {
         "case": case.name,
         "spans": len(raster.length),
         "inside": int(np.count_nonzero(inside)),
         "cut": int(np.count_nonzero(parts > 1)),
-        "given": _figures(_shade(case, design, raster, codes), inside),
+        "given": _figures(_shade(case, design, raster), inside),
         "prepared": prepared,
     }
 
@@ -272,13 +325,19 @@ def _flags(method: str, degrees: np.ndarray) -> np.ndarray:
     ends = arcs(rng, HALFWAY, degrees, rng.uniform(0, 1, len(degrees)), rng.uniform(0, 30, len(degrees)))
     case = single_spans(2, "", ends, 5, SWEEP_EXPONENT)
     design = _design(case, method)
-    spans = spans_of(case, design, case.raster, [quantise(end) for end in ends])
-    return _operands(design, spans, FrameConstants.of(case.scene)).out_of_range
+    return _flagged(design, spans_of(case, design, case.raster), FrameConstants.of(case.scene))
 
 
 def widest_span(method: str, exponent: int) -> float:
-    """Widest span in degrees that is left whole: of ``chord-local``, none of a sample is cut."""
-    if not preset(method, MODEL).takes_values:
+    """Widest span in degrees that a method serves.
+
+    Of a method with a span limit, the widest lit one that is not flagged as wide; of ``chord-local``, that of
+    which none of a sample is cut; else the widest that is left whole.
+    """
+    design = preset(method, MODEL)
+    if design.span_limit is not None:
+        return design.span_limit.angle(exponent)
+    if not design.takes_values:
         return METHODS[method].widest_span(exponent)
     low, high = 0.0, 45.0
     while high - low > 0.05:

@@ -11,7 +11,6 @@ from amaranth.lib import wiring
 from blysk.bench.report.stability_cases import HALFWAY, STREAM_GROUP, arcs, single_spans
 from blysk.bench.report.stability_errors import MODEL, spans_of
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.number.unit_vector import quantise
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import pack
@@ -118,8 +117,7 @@ def measure_stream(method: str, quick: bool) -> list[dict[str, Any]]:
     lengths = np.array([5, 0, 1, 1, 0, 0, 9, 2, 3, 0])
     ends = arcs(rng, HALFWAY, rng.uniform(0, 8, 10), 0.5, rng.uniform(0, 20, 10))
     case = single_spans(STREAM_GROUP, "", ends, np.maximum(lengths, 1), 20)
-    codes = [quantise(end) for end in ends]
-    spans = replace(spans_of(case, design, case.raster, codes), length=lengths)
+    spans = replace(spans_of(case, design, case.raster), length=lengths)
     constants = FrameConstants.of(case.scene)
     expected = design.compute(spans, constants)
     beats, write = beats_of(unit, spans), constants.writes()

@@ -45,7 +45,7 @@ UNITS = {
     "middle normal, one a cycle": ("middle_normal", "exact, interval 1"),
     "forward differences": ("difference_accumulator", ""),
     "recurrence": ("recurrence", "reinsch, interleaved"),
-    "renormalise interpolator": ("linear_interpolator", "renormalise"),
+    "renormalise interpolator": ("renormalise_interpolator", "renormalise"),
     "bisection interpolator": ("bisection_interpolator", "bisection"),
     "quadratic interpolator": ("quadratic_interpolator", "quadratic"),
     "recurrence interpolator": ("recurrence_interpolator", "recurrence"),

@@ -11,7 +11,8 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,8 +20,9 @@ from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.golden.reference.renderer import render
+from blysk.golden.reference.renderer import Frame, render
 from blysk.golden.reference.scene import Scene
+from blysk.sim.frames.workers import local_executor
 from blysk.sim.meshes.teapot import teapot
 
 __all__ = ["LARGEST_MEMORY", "LONGEST_SECONDS", "Timing", "main", "scene_for", "timed", "vtk_image"]
@@ -29,7 +31,7 @@ LONGEST_SECONDS = 3.0
 """Target: seconds for a frame on one core."""
 
 LARGEST_MEMORY = 2 * 2**30
-"""Target: bytes of the process at its largest."""
+"""Target: bytes of a process that renders, at its largest."""
 
 
 @dataclass(frozen=True)
@@ -187,6 +189,36 @@ def vtk_image(scene: Scene) -> tuple[Callable[[], np.ndarray], str]:
     return draw, name
 
 
+class _Golden(NamedTuple):
+    """What the golden renderer takes: a timing by model, the last frame, and bytes of its process."""
+
+    timings: dict[str, Timing]
+    frame: Frame
+    memory: int
+
+
+def _golden(triangles: int, width: int, height: int, repeats: int) -> _Golden:
+    """Measure the golden renderer, in a process that does nothing else."""
+    scene = scene_for(triangles, width, height)
+    timings = {}
+    for model in ("blinn", "phong"):
+        timings[model], frame = timed(
+            lambda model=model: render(scene, "phong", REFLECTION_MODELS[model]), repeats
+        )
+    return _Golden(timings, frame, _peak_memory())
+
+
+def _peak_memory() -> int:
+    """Bytes of this process at its largest."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        # Of a process that another began, `ru_maxrss` on Linux counts what that one had.
+        fields = dict(line.split(":", 1) for line in status.read_text().splitlines())
+        return int(fields["VmHWM"].split()[0]) * 1024
+    # macOS counts in bytes, others in KiB.
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
 def main(triangles: int = 100_000, width: int = 1920, height: int = 1080, repeats: int = 3) -> int:
     """Measure, print, and judge.
 
@@ -210,15 +242,11 @@ def main(triangles: int = 100_000, width: int = 1920, height: int = 1080, repeat
         f"{raster.hidden_spans:,} more hidden"
     )
     del raster
-    golden = {}
-    for model in ("blinn", "phong"):
-        golden[model], frame = timed(
-            lambda model=model: render(scene, "phong", REFLECTION_MODELS[model]), repeats
-        )
-        print(f"golden, {model:5}: {golden[model].wall:.3f} s, {golden[model].cpu:.3f} s of processor time")
-    # Linux counts in KiB, macOS in bytes. Read before VTK is loaded.
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-    print(f"golden: {memory / 2**20:.0f} MiB, the process at its largest, mesh and imports included")
+    with local_executor(1) as pool:
+        golden, frame, memory = pool.submit(_golden, triangles, width, height, repeats).result()
+    for model, timing in golden.items():
+        print(f"golden, {model:5}: {timing.wall:.3f} s, {timing.cpu:.3f} s of processor time")
+    print(f"golden: {memory / 2**20:.0f} MiB, its process at the largest, mesh and imports included")
 
     try:
         draw, name = vtk_image(scene)

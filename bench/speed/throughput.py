@@ -2,9 +2,9 @@
 
 ``python -m blysk.bench.speed.throughput [TRIANGLES ...]`` draws teapots of 1,000, 10,000, 100,000 and
 1,000,000 triangles at 1920x1080, and sends their spans through the simulated pipelines of the methods chord
-and quadratic, with setup intervals 1, 2, 4 and 7. It prints two tables in Markdown: how long the spans are,
-and how many cycles they take. ``--json`` prints the same as JSON. The exit status is 1 when spans of 16
-pixels and more take over 1.05 cycles a pixel.
+and quadratic, with those of the setup intervals 1, 2, 3, 4, 7 and 9 that each is built for. It prints two
+tables in Markdown: how long the spans are, and how many cycles they take. ``--json`` prints the same as JSON.
+The exit status is 1 when spans of 16 pixels and more take over 1.05 cycles a pixel.
 """
 
 import argparse
@@ -22,6 +22,7 @@ from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Spans
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
+from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import beats_of
@@ -32,7 +33,8 @@ __all__ += ["main", "measure", "spans_of"]
 
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
 METHODS = ("chord", "quadratic")
-INTERVALS = (1, 2, 4, 7)
+INTERVALS = (1, 2, 3, 4, 7, 9)
+"""Setup intervals; a method takes those that it can be built for."""
 
 BINS = (1, 2, 3, 4, 8, 16, 32)
 """Shortest span of each class of the table."""
@@ -157,13 +159,20 @@ def measure(
     return len(run.beats), run.total_cycles
 
 
+def _intervals_of(method: str, intervals: Sequence[int]) -> list[int]:
+    """Those of some setup intervals that a method can be built for."""
+    interpolator = preset(method).interpolator
+    return [i for i in intervals if i in unit_of(interpolator).setup_intervals(interpolator)]
+
+
 def _frames(
     triangles: Iterable[int], methods: Sequence[str], intervals: Sequence[int], width: int, height: int
 ) -> Iterator[tuple[Lengths, list[Throughput]]]:
+    served = {method: _intervals_of(method, intervals) for method in methods}
     units = {
         (method, interval): ShadingPipelineUnit(preset(method, setup_interval=interval))
         for method in methods
-        for interval in intervals
+        for interval in served[method]
     }
     for count in triangles:
         mesh = teapot(count)
@@ -181,7 +190,7 @@ def _frames(
                         *measure(units[method, interval], spans, constants),
                         *measure(units[method, interval], long, constants),
                     )
-                    for interval in intervals
+                    for interval in served[method]
                 ],
             )
 

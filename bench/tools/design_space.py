@@ -57,7 +57,7 @@ OPERANDS = get_args(Operand)
 """Operands of the specular unit."""
 
 
-DEGREES = {ChordInterpolator: (1, 2, 3), QuadraticInterpolator: (2, 3), BisectionInterpolator: (1, 2)}
+DEGREES = {QuadraticInterpolator: (2, 3), BisectionInterpolator: (1, 2)}
 """Degrees of a method's polynomial."""
 
 _FITS = {2: "minimax_2", 3: "exact"}
@@ -76,7 +76,7 @@ class Candidate:
         See `Design`.
     degree : int, optional
         Of the method's polynomial in the angle: of the middle normal (``quadratic`` and its forms: 2, a plain
-        minimax fit, or 3), of the chord method's bend (1 to 3), of the bisection's factor (1 or 2).
+        minimax fit, or 3), or of the bisection's factor (1 or 2).
     fraction_bits : int, optional
         Of the chord method's differences.
     style : str
@@ -104,17 +104,16 @@ class Candidate:
         """Its pipeline, and bit-accurate model."""
         usual = preset(self.method, self.model, self.lights, operand=self.operand, style=self.style)
         interpolator, changes = usual.interpolator, {}
-        if isinstance(interpolator, ChordInterpolator):
-            changes = {"terms": self.degree, "fraction_bits": self.fraction_bits}
-        elif self.fraction_bits is not None:
+        if self.fraction_bits is not None and not isinstance(interpolator, ChordInterpolator):
             raise ValueError(f"method {self.method} has no choice of words")
-        elif self.degree not in (None, *_degrees(self.method)):
+        if self.degree not in (None, *_degrees(self.method)):
             raise ValueError(f"method {self.method} has no polynomial of degree {self.degree}")
+        if self.fraction_bits is not None:
+            changes = {"fraction_bits": self.fraction_bits}
         elif self.degree is not None and isinstance(interpolator, QuadraticInterpolator):
             changes = {"middle_normal": MiddleNormal(_FITS[self.degree])}
         elif self.degree is not None:
             changes = {"bisection": replace(interpolator.bisection, degree=self.degree)}
-        changes = {name: value for name, value in changes.items() if value is not None}
         return replace(usual, interpolator=replace(interpolator, **changes))
 
     def unit(self) -> ShadingPipelineUnit:

@@ -123,7 +123,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             "polynomial is for narrower ones."
         )
     for given, which in (
-        (False, "The cheapest within 1 LSB of exactly normalised interpolation"),
+        (False, "The cheapest within 1 LSB of exact normals"),
         (True, "The cheapest that is given values of each light with a span, and counts none of that work,"),
     ):
         those = [designs[k] for k in best if designs[k].candidate.design.takes_values == given]
@@ -169,7 +169,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
                 "Each mark is a pipeline; the line is the Pareto front of those that no other beats in both, "
                 "whose marks are edged in black. Those of chord-local are not on it: they are given values "
                 "of each light with a span, and what it takes to work these out is not counted. Above: "
-                "against exactly normalised interpolation with the same model. Below: against the exact "
+                "against exact normals of every pixel with the same model. Below: against the exact "
                 "Blinn frame.",
             ),
             Table("design-space", "Designs", columns, rows, note),
@@ -296,7 +296,7 @@ _USUAL = Sweep()
     type=Choice("error", ERRORS),
     default="method",
     show_default=True,
-    help="Against the same method and model in float64, exactly normalised interpolation with the same "
+    help="Against the same method and model in float64, exact normals of every pixel with the same "
     "model, or the exact Blinn frame.",
 )
 @click.option(

@@ -31,6 +31,7 @@ from blysk.bench.tools.web_data import (
     HEIGHT,
     MESHES,
     REFERENCES,
+    SERVED,
     START,
     WIDTH,
     method,
@@ -40,7 +41,7 @@ from blysk.bench.tools.web_data import (
     tables,
 )
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.presets import METHODS, MODELS
+from blysk.golden.presets import MODELS
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import processors
 from blysk.sim.output import atomic_writer, files_within, write_json, write_text
@@ -301,9 +302,8 @@ class _Design(click.ParamType):
         if isinstance(value, tuple):
             return value
         method, _, model = value.partition("/")
-        served = [name for name in METHODS if METHODS[name].serves_gate]
-        if method not in served:
-            raise InputError(f"--design {value}", "unknown method", f"use one of {', '.join(served)}")
+        if method not in SERVED:
+            raise InputError(f"--design {value}", "unknown method", f"use one of {', '.join(SERVED)}")
         if model not in MODELS:
             raise InputError(f"--design {value}", "unknown model", f"use one of {', '.join(MODELS)}")
         return method, model

@@ -13,7 +13,8 @@ import numpy as np
 from blysk.bench import accuracy
 from blysk.bench.report.cosine_quadratic_figures import sphere
 from blysk.golden.frame_constants import FIELDS_OF_A_FRAME, FIELDS_OF_A_LIGHT, LIGHT_STRIDE
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.cut import cut_by_angle, cut_spans
+from blysk.golden.frames.prepare import spans_for
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.unit_vector import COMPONENT, ONE
@@ -22,6 +23,7 @@ from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import (
     REFLECTION_MODELS,
     AngleCosine,
@@ -43,6 +45,7 @@ __all__ = [
     "HEIGHT",
     "MESHES",
     "REFERENCES",
+    "SERVED",
     "START",
     "WIDTH",
     "Body",
@@ -52,6 +55,7 @@ __all__ = [
     "model_table",
     "module_of",
     "scene_of",
+    "spans_of",
     "streams_of",
     "tables",
 ]
@@ -63,8 +67,12 @@ WIDTH, HEIGHT = 320, 240
 BANDS = (100, MAX_EXPONENT)
 """Spans are cut for these exponents; a frame has those of the smallest that is not under its own."""
 
-DESIGNS = tuple(pair for pair in accuracy.DESIGNS if not preset(pair[0]).takes_values)
-"""Method and model of each module. Where spans carry values of the light, it cannot be moved without them."""
+SERVED = tuple(name for name, method in METHODS.items() if method.serves_gate and not method.TAKES_VALUES)
+"""Methods of modules, which have a gate. Where spans carry values of the light, it cannot be moved without
+them."""
+
+DESIGNS = tuple(pair for pair in accuracy.DESIGNS if pair[0] in SERVED)
+"""Method and model of each module."""
 
 BACKGROUND = "#1a1c20"
 
@@ -87,9 +95,9 @@ START = {
 REFERENCES = {
     "method": {
         "title": "exact normals, same model",
-        "text": "Normals interpolated along the spans and brought to unit length exactly, with the same "
-        "reflection model: the error of the method and of its arithmetic.",
-        "curve": "normalised",
+        "text": "The exact normal of every pixel, perspective-correct, with the same reflection model: the "
+        "error of the method and of its arithmetic.",
+        "curve": "exact",
         "model": None,
     },
     "arithmetic": {
@@ -101,8 +109,8 @@ REFERENCES = {
     },
     "total": {
         "title": "exact normals, Blinn's power",
-        "text": "Exact normals along the spans, with the power that the reflection model stands for.",
-        "curve": "normalised",
+        "text": "The exact normal of every pixel, with the power that the reflection model stands for.",
+        "curve": "exact",
         "model": "blinn",
     },
 }
@@ -198,16 +206,19 @@ COLUMNS = (
     {"name": "length", "bytes": 2, "bias": 0},
     *({"name": f"normal_left.{c}", "bytes": 3, "bias": 1 << 17} for c in range(3)),
     *(
-        {"name": f"normal_right.{c}", "bytes": 3, "bias": 1 << 18, "from": f"normal_left.{c}"}
+        {"name": f"normal_{place}.{c}", "bytes": 3, "bias": 1 << 18, "from": f"normal_left.{c}"}
+        for place in ("right", "middle")
         for c in range(3)
     ),
+    {"name": "ratio", "bytes": 3, "bias": 1 << 23},
 )
 """Codes of the spans in a file, a column a field: as they are, or the change from the span before
 (``running``) or from another column (``from``); plus ``bias``, so that none is negative; in so many
-``bytes``."""
+``bytes``. The middle normal is the left one where the method takes none. The ratio is that of the lengths
+that the interpolated normals have at the ends, ``round(2^19 log2(m_r / m_l))``."""
 
 
-def encode(spans: Spans, visible: np.ndarray) -> bytes:
+def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -> bytes:
     """Spans of a view, and which of their fragments show, as bytes.
 
     Two counts in 32 bits, of spans and fragments; `COLUMNS`, the lowest byte of all codes first; a bit a
@@ -219,10 +230,14 @@ def encode(spans: Spans, visible: np.ndarray) -> bytes:
         With normals.
     visible : bool array
         Of the fragments in their order.
+    ratio : array, shape (spans,), optional
+        Length of the interpolated normal at the right end, over that at the left end.
     """
-    codes = {"x": spans.x, "y": spans.y, "length": spans.length}
-    for c in range(3):
-        codes |= {f"normal_left.{c}": spans.normal_left[:, c], f"normal_right.{c}": spans.normal_right[:, c]}
+    logarithm = np.clip(np.log2(np.broadcast_to(ratio, len(spans))), -15, 15)
+    codes = {"x": spans.x, "y": spans.y, "length": spans.length, "ratio": np.rint(2**19 * logarithm)}
+    middle = spans.normal_left if spans.normal_middle is None else spans.normal_middle
+    for name, normal in (("left", spans.normal_left), ("right", spans.normal_right), ("middle", middle)):
+        codes |= {f"normal_{name}.{c}": normal[:, c] for c in range(3)}
     parts = [np.array([len(spans), len(visible)], dtype="<u4").tobytes()]
     for column in COLUMNS:
         values = np.asarray(codes[column["name"]], dtype=np.int64)
@@ -234,6 +249,29 @@ def encode(spans: Spans, visible: np.ndarray) -> bytes:
         parts += [split[:, byte].tobytes() for byte in range(column["bytes"])]
     parts.append(np.packbits(visible, bitorder="little").tobytes())
     return zlib.compress(b"".join(parts), 9)
+
+
+def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raster, Spans]:
+    """Spans of a view, before and after the rounding of their normals, for a light that moves.
+
+    They are cut for the light of `START`; and of a method with a span limit, as the highlight may be
+    anywhere, to the widest angle of a lit span.
+
+    Parameters
+    ----------
+    mesh, view
+        As for `streams_of`.
+    exponent : int
+        One of `BANDS`.
+    design : Design
+        The pipeline.
+    """
+    scene = scene_of(START | {"mesh": mesh, "view": view, "exponent": exponent})
+    raster = rasterise(scene)
+    if design.span_limit is not None:
+        raster, _ = cut_by_angle(raster, design.span_limit.angle(exponent))
+    cut, _ = cut_spans(scene, raster, design)
+    return cut, spans_for(scene, cut, design)
 
 
 def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
@@ -257,19 +295,17 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
     camera = _cameras(mesh)[view]
     found: list[str] = []
     streams: dict[str, list[int]] = {}
-    cuts: dict[tuple, int] = {}
     for method in methods:
         design = preset(method)
         streams[method] = []
         for exponent in BANDS:
-            cut = design.interpolator.widest_span(exponent), design.interpolator.largest_deviation(exponent)
-            if cut not in cuts:
-                frame = prepare(scene_of(START | {"mesh": mesh, "view": view, "exponent": exponent}), design)
-                text = base64.b64encode(encode(frame.spans, frame.cut_raster.visible)).decode()
-                if text not in found:
-                    found.append(text)
-                cuts[cut] = found.index(text)
-            streams[method].append(cuts[cut])
+            cut, spans = spans_of(mesh, view, exponent, design)
+            ratio = cut.magnitude_right / np.where(cut.magnitude_left, cut.magnitude_left, 1.0)
+            data = encode(spans, cut.visible, np.where(ratio, ratio, 1.0))
+            text = base64.b64encode(data).decode()
+            if text not in found:
+                found.append(text)
+            streams[method].append(found.index(text))
     axes = [*camera.axes[:2].tolist(), camera.viewer.tolist()]
     return {"axes": axes, "streams": streams, "data": found}
 
@@ -345,4 +381,5 @@ def method(name: str) -> dict[str, Any]:
     """What the page needs of a method."""
     interpolator = METHODS[name]
     text = inspect.getdoc(type(interpolator)).split("\n\n")[0]
-    return {"curve": interpolator.CURVE, "chord": interpolator.uses_chord, "text": " ".join(text.split())}
+    curve = "three" if interpolator.TAKES_MIDDLE else interpolator.CURVE
+    return {"curve": curve, "chord": interpolator.uses_chord, "text": " ".join(text.split())}

@@ -109,7 +109,7 @@ class SpanLimit:
             Specular exponent, 1 to 1000.
         highlights : bool
             Whether there is specular light.
-        threshold : Fixed, shape (spans,), UQ(2, 16), optional
+        threshold : Fixed, shape (spans,), UQ(3, 15), optional
             In place of twice `lit` of the exponent: `ValueGate.thresholds_of` of a lobe's table.
 
         Raises

@@ -12,12 +12,12 @@ from blysk.golden.frames.local import line_ends, local_values
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
-from blysk.golden.reference.raster import Raster
+from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.reference.renderer import render, shade_operands, shade_spans
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["Comparison", "compare", "method_in_float64"]
+__all__ = ["Comparison", "compare", "compare_image", "method_in_float64"]
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,13 @@ class Comparison:
         The exact frame with the frame's model, in [0, 1]: per-pixel normals, perspective-correct and
         normalised, of the triangles as rasterised.
     arithmetic_error : ErrorFigures
-        Against the same method and model in float64.
+        Against the same method and model in float64; NaN where the spans are not known.
     method_error : ErrorFigures
         Against ``golden``.
     total_error : ErrorFigures
         Against the exact frame with Blinn's model, or that of a lobe's table.
+    visible_pixels : int
+        Pixels that show the surface.
     nmse : float
         Against the exact frame.
     mnse_published, mnse_published_share : float
@@ -56,6 +58,7 @@ class Comparison:
     arithmetic_error: ErrorFigures
     method_error: ErrorFigures
     total_error: ErrorFigures
+    visible_pixels: int
     nmse: float
     mnse_published: float
     mnse_published_share: float
@@ -104,32 +107,52 @@ def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
     frame : Frame
         Its frame.
     """
+    return _compare(scene, design, frame.image, frame.raster, frame.cut_raster)
+
+
+def compare_image(scene: Scene, design: Design, image: np.ndarray) -> Comparison:
+    """Errors of a picture whose spans are not known, so that there is no arithmetic error.
+
+    Parameters
+    ----------
+    scene, design
+        As for `compare`.
+    image : uint8 array, shape (height, width, 3)
+        The frame buffer.
+    """
+    return _compare(scene, design, image, rasterise(scene), None)
+
+
+def _compare(
+    scene: Scene, design: Design, image: np.ndarray, raster: Raster, cut_raster: Raster | None
+) -> Comparison:
+    """One float64 frame after the other, as the largest have 400 MB; without spans only two of three."""
+    nothing = ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))
     start = perf_counter()
     target = _model_of(design) if design.loads_tables else BLINN
-    exact = render(scene, "phong", target, raster=frame.raster)
+    exact = render(scene, "phong", target, raster=raster)
     seconds = perf_counter() - start
-    # One float64 frame after the other: the largest have 400 MB.
     mask = exact.mask
-    figures: dict[str, Any] = {}
+    figures: dict[str, Any] = {"visible_pixels": int(mask.sum()), "arithmetic_error": nothing}
     if mask.any():
-        figures["total_error"] = error_figures(frame.image, exact.image, mask, scale=255)
-        shown, reference = frame.image[mask], exact.image[mask]
+        figures["total_error"] = error_figures(image, exact.image, mask, scale=255)
+        shown, reference = image[mask], exact.image[mask]
         del exact
         reference *= 255
         figures["nmse"] = nmse(shown, reference)
         figures["mnse_published"], figures["mnse_published_share"] = mnse_published(shown, reference)
-        del reference
+        del shown, reference
+    if cut_raster is not None:
+        start = perf_counter()
+        same_method = method_in_float64(scene, design, cut_raster)
+        seconds += perf_counter() - start
+        if mask.any():
+            figures["arithmetic_error"] = error_figures(image, same_method, mask, scale=255)
+        del same_method
     start = perf_counter()
-    same_method = method_in_float64(scene, design, frame.cut_raster)
-    seconds += perf_counter() - start
-    if mask.any():
-        figures["arithmetic_error"] = error_figures(frame.image, same_method, mask, scale=255)
-    del same_method
-    start = perf_counter()
-    golden = render(scene, "phong", _model_of(design), raster=frame.raster).image
+    golden = render(scene, "phong", _model_of(design), raster=raster).image
     seconds += perf_counter() - start
     if not mask.any():
-        nothing = ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))
-        return Comparison(golden, nothing, nothing, nothing, math.nan, math.nan, math.nan, seconds)
-    figures["method_error"] = error_figures(frame.image, golden, mask, scale=255)
+        return Comparison(golden, nothing, nothing, nothing, 0, math.nan, math.nan, math.nan, seconds)
+    figures["method_error"] = error_figures(image, golden, mask, scale=255)
     return Comparison(golden=golden, seconds=seconds, **figures)

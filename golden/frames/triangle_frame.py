@@ -5,16 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.geometry.scene_triangles import SceneTriangles, scene_triangles
 from blysk.golden.geometry.triangles import Frame
+from blysk.golden.pipeline import Design
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
-__all__ = ["SPAN_ANGLE", "TriangleFrame", "frame_of_pixels", "sent_triangles", "triangle_frame"]
+__all__ = ["TriangleFrame", "frame_of_pixels", "sent_triangles", "span_angle", "triangle_frame"]
 
-SPAN_ANGLE = 5.0
-"""Widest piece of a span in degrees, for at most 1 LSB at every exponent; the chord's setup serves 22.5."""
+_SPAN_ANGLE = 5.0
+"""Widest piece of a span in degrees, of methods without a `SpanLimit`."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,25 @@ class TriangleFrame:
     counts: Mapping[str, int]
 
 
-def sent_triangles(scene: Scene, renderer: Renderer, angle: float = SPAN_ANGLE) -> SceneTriangles:
+def span_angle(scene: Scene, design: Design) -> float:
+    """Widest piece of a span in degrees: `SpanLimit.angle` of the steepest highlight, or without one 5."""
+    limit = design.span_limit
+    if limit is None:
+        return _SPAN_ANGLE
+    return min(limit.angle(word) for word in HighlightLimits.of(scene.materials, design).words)
+
+
+def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None) -> SceneTriangles:
     """The triangles of a scene for a renderer, sorted by material, with spans cut at an angle.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to draw.
+    renderer : Renderer
+        Geometry and shading.
+    angle : float, optional
+        In degrees, 0 to 59; by default `span_angle`. True lines are not cut.
 
     Raises
     ------
@@ -49,6 +68,7 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float = SPAN_ANGLE) 
     """
     if scene.local:
         raise ValueError("point lights and a near viewer need spans with values, which triangles do not give")
+    angle = span_angle(scene, renderer.design) if angle is None else angle
     return scene_triangles(scene, renderer.geometry.grid, Frame.limit_of(angle)).by_material()
 
 
@@ -75,7 +95,7 @@ def frame_of_pixels(scene: Scene, x: np.ndarray, y: np.ndarray, color: np.ndarra
     return image
 
 
-def triangle_frame(scene: Scene, renderer: Renderer, angle: float = SPAN_ANGLE) -> TriangleFrame:
+def triangle_frame(scene: Scene, renderer: Renderer, angle: float | None = None) -> TriangleFrame:
     """Frame by the bit-accurate models: the image of the simulated hardware to the bit.
 
     Parameters
@@ -84,8 +104,8 @@ def triangle_frame(scene: Scene, renderer: Renderer, angle: float = SPAN_ANGLE) 
         What to draw: at most as many lights as the design has, and as many materials.
     renderer : Renderer
         Geometry and shading.
-    angle : float
-        Widest piece of a span in degrees, 0 to 59.
+    angle : float, optional
+        As for `sent_triangles`.
 
     Raises
     ------

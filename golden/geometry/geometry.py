@@ -11,6 +11,7 @@ from blysk.golden.geometry.edge_walk import EdgeWalk
 from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.plane_assembler import PlaneAssembler, Planes
 from blysk.golden.geometry.plane_setup import PlaneSetup
+from blysk.golden.geometry.span_adapter import LineAdapter, LineSpans
 from blysk.golden.geometry.span_attributes import SpanAttributes
 from blysk.golden.geometry.span_clip import ClippedRows, SpanClip
 from blysk.golden.geometry.triangles import ATTRIBUTE, GRID, Frame, Grid, Triangles
@@ -31,11 +32,14 @@ class Geometry:
     ----------
     grid : Grid
         Fraction bits of the coordinates.
+    lines : bool
+        Spans keep the true line N/W in place of unit normals: none is cut, and none normalised.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
     grid: Grid = GRID
+    lines: bool = False
 
     def rows(
         self, triangles: Triangles, frame: Frame
@@ -52,10 +56,12 @@ class Geometry:
         scales = PlaneSetup(self.grid).compute(drawn, EdgeSetup(self.grid).compute(drawn))
         corners = (Fixed(ATTRIBUTE, drawn.triangles.attributes[:, k]) for k in range(3))
         gradients = GradientSetup().compute(*corners, scales)
-        planes = PlaneAssembler().compute(gradients, AttributeSerialiser().least(drawn.triangles), frame)
+        planes = PlaneAssembler(not self.lines).compute(
+            gradients, AttributeSerialiser().least(drawn.triangles), frame
+        )
         return planes, int(scales.sliver.sum())
 
-    def compute(self, triangles: Triangles, frame: Frame) -> tuple[TrueSpans, dict[str, int]]:
+    def compute(self, triangles: Triangles, frame: Frame) -> tuple[TrueSpans | LineSpans, dict[str, int]]:
         """Bit-accurate spans, and what was counted.
 
         Parameters
@@ -67,7 +73,7 @@ class Geometry:
 
         Returns
         -------
-        spans : TrueSpans
+        spans : TrueSpans, or of lines LineSpans
             In the order of the triangles, of one from top to bottom, of a scanline from the long edge on;
             their ``triangle`` is the index among those that came.
         counts : dict of str to int
@@ -76,7 +82,7 @@ class Geometry:
         drawn, rows, _, counts = self.rows(triangles, frame)
         planes, sliver = self.planes(drawn, frame)
         pieces, more = SpanAttributes().compute(rows, planes)
-        spans, repaired = EdgeNormals().compute(pieces)
+        spans, repaired = (LineAdapter().compute(pieces), 0) if self.lines else EdgeNormals().compute(pieces)
         counts = {
             **counts,
             "empty": counts["empty"] + more["empty"],

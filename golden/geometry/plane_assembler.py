@@ -51,8 +51,15 @@ class PlaneAssembler:
     most that bound times the frame's limit. Single pixels have no chord, so that there is nothing that a
     triangle could not be cut to.
 
+    Parameters
+    ----------
+    cuts : bool
+        Whether spans are cut; else ``piece`` is 12, more pixels than a span has.
+
     Source: docs/theory/geometry.md#normals; C. F. Dunkl, K. S. Williams, *A simple norm inequality*, 1964.
     """
+
+    cuts: bool = True
 
     LARGEST = 12
 
@@ -68,6 +75,8 @@ class PlaneAssembler:
         frame : Frame
             Its ``limit``.
         """
+        if not self.cuts:
+            return Planes(gradients, np.full(len(least), self.LARGEST))
         size = gradients.size[:, :3]
         norm = size.max(axis=1) + size.sum(axis=1)
         allowed = least * frame.limit

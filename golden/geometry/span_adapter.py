@@ -1,20 +1,132 @@
 """The span adapter: what the shading pipeline reads of the spans that geometry makes."""
 
+from dataclasses import dataclass
+
+import numpy as np
+
 from blysk.golden.geometry.edge_normals import TrueSpans
+from blysk.golden.geometry.span_attributes import SPAN_NORMAL, Pieces
+from blysk.golden.normals.line_setup import LineSetup
+from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.pipeline import Spans
 
-__all__ = ["shading_spans"]
+__all__ = ["LineAdapter", "LineSpans", "shading_spans"]
 
 
-def shading_spans(spans: TrueSpans) -> Spans:
-    """Spans of the shading pipeline: place, length, unit normals at both ends, material.
-
-    Geometry gives more than that, which no method reads yet: the true middle normal, and N/W at both ends.
+@dataclass(frozen=True)
+class LineSpans:
+    """Spans with the ends of their true lines.
 
     Parameters
     ----------
-    spans : TrueSpans
-        From `EdgeNormals`.
+    x, y, length : int64 arrays, shape (S,)
+        First pixel, and pixels from there on, 1 or more.
+    normal_left, normal_right : int64 arrays, shape (S, 3)
+        Ends of the line at the first and at the last pixel's centre, SQ(1, 22).
+    depth, depth_last, depth_step, material, triangle : int64 arrays, shape (S,)
+        As `TrueSpans` has them.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    length: np.ndarray
+    normal_left: np.ndarray
+    normal_right: np.ndarray
+    depth: np.ndarray
+    depth_last: np.ndarray
+    depth_step: np.ndarray
+    material: np.ndarray
+    triangle: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    @property
+    def beats(self) -> dict:
+        """What the hardware gives."""
+        return {name: value for name, value in vars(self).items() if name != "triangle"}
+
+
+@dataclass(frozen=True)
+class LineAdapter:
+    """Ends of a span's true line for `LineSetup`: N/W at both, shifted together and rounded.
+
+    The six components are shifted left by as many places as none of them needs, at most `LARGEST_SHIFT`, and
+    rounded half up to 22 fraction bits, within ``1 - 2^-22``. Where ``flip`` is set they are negated. What
+    all six share does not change a direction, so that the unit normals along the line are those of N/W:
+
+    ========== ============ =====================================================================
+    word       format       why
+    ========== ============ =====================================================================
+    N/W        SQ(1, 26)    of `SpanAttributes`
+    ends       SQ(1, 22)    of `LineSetup`; the largest component is 1/2 or more where the shift reaches
+    ========== ============ =====================================================================
+
+    Rounding moves each component of an end by at most `ERROR`, 2^-23, besides what N/W itself is off.
+
+    Source: docs/theory/geometry.md#composition; not in the documents.
+    """
+
+    LARGEST_SHIFT = 7
+    FORMAT = LineSetup.VECTOR_FORMAT
+    ERROR = 2.0**-23
+
+    def compute(self, pieces: Pieces) -> LineSpans:
+        """Bit-accurate spans.
+
+        Parameters
+        ----------
+        pieces : Pieces
+            From `SpanAttributes`.
+        """
+        left, right = self.ends(pieces.left, pieces.right, pieces.flip)
+        return LineSpans(
+            x=pieces.x,
+            y=pieces.y,
+            length=pieces.length,
+            normal_left=left,
+            normal_right=right,
+            depth=pieces.depth.codes,
+            depth_last=pieces.depth_last.codes,
+            depth_step=pieces.depth_step.codes,
+            material=pieces.material,
+            triangle=pieces.triangle,
+        )
+
+    def ends(self, left: Fixed, right: Fixed, flip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Bit-accurate codes of both ends, SQ(1, 22).
+
+        Parameters
+        ----------
+        left, right : Fixed, shape (S, 3), SQ(1, 26)
+            N/W at the first and at the last pixel.
+        flip : bool array, shape (S,)
+            Whether the normals are negated.
+
+        Raises
+        ------
+        ValueError
+            If an operand has another format.
+        """
+        if {left.format, right.format} != {SPAN_NORMAL}:
+            raise ValueError(f"operands must be {SPAN_NORMAL}")
+        codes = np.concatenate((left.codes, right.codes), axis=-1)
+        used = np.bitwise_or.reduce(np.where(codes < 0, ~codes, codes), axis=-1)
+        free = SPAN_NORMAL.fraction_bits - np.frexp(used.astype(np.float64))[1].astype(np.int64)
+        shift = np.minimum(free, self.LARGEST_SHIFT)[:, np.newaxis]
+        turned = np.where(np.asarray(flip, dtype=bool)[:, np.newaxis], -codes, codes) << shift
+        rounded = Fixed(SQ(2, SPAN_NORMAL.fraction_bits), turned).round_half_up(self.FORMAT.fraction_bits)
+        ends = np.clip(rounded.codes, -self.FORMAT.max_code, self.FORMAT.max_code)
+        return ends[:, :3], ends[:, 3:]
+
+
+def shading_spans(spans: TrueSpans | LineSpans) -> Spans:
+    """Spans of the shading pipeline: first pixel, length, material, and normals or the true line.
+
+    Parameters
+    ----------
+    spans : TrueSpans or LineSpans
+        From `EdgeNormals`, with left, middle and right unit normals; or from `LineAdapter`.
     """
     return Spans(
         x=spans.x,
@@ -23,4 +135,5 @@ def shading_spans(spans: TrueSpans) -> Spans:
         normal_left=spans.normal_left,
         normal_right=spans.normal_right,
         material=spans.material,
+        normal_middle=spans.normal_middle if isinstance(spans, TrueSpans) else None,
     )

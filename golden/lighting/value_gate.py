@@ -45,7 +45,7 @@ class ValueGate:
     specular: HighlightOperand = field(default_factory=lambda: Specular(operand="one_minus_cosine"))
 
     LEVEL_FORMAT = SpanLimit.LEVEL_FORMAT
-    THRESHOLD_FORMAT = UQ(2, 16)
+    THRESHOLD_FORMAT = UQ(3, 15)
     LARGEST_BULGE = 1 << ChordSetup.HIGHLIGHT_FORMAT.fraction_bits - 5
     LARGEST_RISE = 1 << ChordSetup.HIGHLIGHT_FORMAT.fraction_bits - 3
 
@@ -56,13 +56,13 @@ class ValueGate:
 
     @cached_property
     def thresholds(self) -> Fixed:
-        """The PROM for exponents 0 to 1023, UQ(2, 16)."""
+        """The PROM for exponents 0 to 1023, UQ(3, 15)."""
         return self.thresholds_of(self.specular.last_lit_arguments)
 
     def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
         """Thresholds by the largest argument whose term is over 0, in steps of 2^-25; rounded up.
 
-        Twice the least u is at most 4. Where every argument may be lit the threshold is the largest word.
+        Where every argument may be lit it is over 4, which no least u twice is.
         """
         format = self.THRESHOLD_FORMAT
         nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25 + self.margin
@@ -95,7 +95,7 @@ class ValueGate:
         return self.compute_by(highlight, self.thresholds[exponent])
 
     def compute_by(self, highlight: np.ndarray, threshold: Fixed) -> np.ndarray:
-        """The same by thresholds in place of exponents, UQ(2, 16)."""
+        """The same by thresholds in place of exponents, UQ(3, 15)."""
         left, middle, right = np.moveaxis(highlight, -1, 0)
         held = (np.abs(left + right - 2 * middle) < self.LARGEST_BULGE) & (
             np.abs(right - left) < self.LARGEST_RISE

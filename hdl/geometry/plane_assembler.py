@@ -34,7 +34,13 @@ class PlaneAssemblerUnit(wiring.Component):
     With the first gradient the product of bound and limit begins, two bits of the limit a cycle; after the
     third ``piece`` is searched for, a bit a cycle. If gradients are at least 3 cycles apart a triangle is
     offered 2 cycles after its fourth one at the earliest, and the next one's first is taken in from 2 cycles
-    after that on; so one each four cycles never waits. No multipliers.
+    after that on; so one each four cycles never waits. No multipliers. Where spans are not cut there is
+    neither product nor search.
+
+    Parameters
+    ----------
+    parameters : PlaneAssembler
+        Bit-accurate model.
 
     Members
     -------
@@ -48,7 +54,8 @@ class PlaneAssemblerUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    def __init__(self):
+    def __init__(self, parameters: PlaneAssembler | None = None):
+        self.parameters = parameters or PlaneAssembler()
         super().__init__(
             {
                 "i": In(stream.Signature(gradient_shape())),
@@ -71,8 +78,12 @@ class PlaneAssemblerUnit(wiring.Component):
                     word.eq(other)
                     for word, other in zip(words, [*words[1:], Value.cast(gradient[name])], strict=True)
                 ]
-        allowed, multiplied = self._allowed(m, accept & (count == 0), gradient.least)
-        found = self._search(m, accept, count, gradient.size, allowed, multiplied, result.piece)
+        if self.parameters.cuts:
+            allowed, multiplied = self._allowed(m, accept & (count == 0), gradient.least)
+            found = self._search(m, accept, count, gradient.size, allowed, multiplied, result.piece)
+        else:
+            found = 1
+            m.d.comb += result.piece.eq(PlaneAssembler.LARGEST)
         m.d.comb += [self.o.valid.eq(full & found), self.o.payload.eq(result)]
         with m.If(self.o.valid & self.o.ready):
             m.d.sync += full.eq(0)

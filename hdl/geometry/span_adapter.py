@@ -1,24 +1,99 @@
 """The span adapter: what the shading pipeline reads of the spans that geometry makes."""
 
-from amaranth.hdl import Module, Value
+from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import data
 
-__all__ = ["connect_shading_span"]
+from blysk.golden.geometry.span_adapter import LineAdapter
+from blysk.golden.geometry.span_attributes import SPAN_NORMAL
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.geometry.span_attributes import pieces_shape, span_words_shape
+
+__all__ = ["LineAdapterUnit", "connect_shading_span", "line_spans_shape"]
+
+
+def line_spans_shape() -> data.StructLayout:
+    """Shape of a span with the ends of its true line, in ``SQ(1, 22)``, and what a piece has beside them."""
+    end = data.ArrayLayout(FixedShape(LineAdapter.FORMAT), 3)
+    words = {name: shape for name, shape in span_words_shape().items() if name != "flip"}
+    return data.StructLayout({"normal_left": end, "normal_right": end} | words)
+
+
+class LineAdapterUnit(PipelinedUnit):
+    """Ends of true lines for a method that takes them: `LineAdapter` is the bit-accurate model.
+
+    The latency is 3: the bits that are used; the shift and the sign; the rounding. The initiation interval is
+    1. No multipliers.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(pieces_shape()))`
+        Spans of `SpanAttributesUnit`.
+    o : :py:`Out(stream.Signature(line_spans_shape()))`
+        The same with ends in ``SQ(1, 22)``.
+
+    Source: docs/theory/geometry.md#composition; not in the documents.
+    """
+
+    def __init__(self):
+        super().__init__(pieces_shape(), line_spans_shape(), latency=3)
+
+    def datapath(self, m, operands):
+        """Shared bits, shared shift, sign, rounding."""
+        p, bits = LineAdapter(), SPAN_NORMAL.fraction_bits
+        codes = [Value.cast(operands[side][k]).as_signed() for side in ("left", "right") for k in range(3)]
+        names = [name for name in self.o.payload.shape().members if not name.startswith("normal")]
+        words = {name: Value.cast(operands[name]) for name in names}
+        for age in range(1, 4):
+            words = {name: self.register(m, word, f"{name}_{age}") for name, word in words.items()}
+        used = 0
+        for code in codes:
+            used = used | (code[:bits] ^ code[-1].replicate(bits))
+        used = self.register(m, used, "used")
+        codes = [self.register(m, code, f"vector_{k}") for k, code in enumerate(codes)]
+        flip = self.register(m, operands.flip, "flip_1")
+        for step in (4, 2, 1):
+            empty = ~used[-step:].any()
+            used = Mux(empty, used << step, used)[:bits]
+            codes = [Mux(empty, code << step, code)[: bits + 1].as_signed() for code in codes]
+        codes = [self.register(m, code, f"shifted_{k}") for k, code in enumerate(codes)]
+        flip = self.register(m, flip, "flip_2")
+        result = Signal(self.o.payload.shape(), name="result")
+        m.d.comb += [Value.cast(result[name]).eq(word) for name, word in words.items()]
+        cut, most = bits - p.FORMAT.fraction_bits, p.FORMAT.max_code
+        for k, code in enumerate(codes):
+            # The sign's other 1 is the lowest bit's, together with the half step of the rounding.
+            turned = (code[:] ^ flip.replicate(bits + 1)).as_signed() + flip + (1 << (cut - 1))
+            rounded = turned >> cut
+            clipped = Mux(rounded > most, most, Mux(rounded < -most, -most, rounded))
+            end = result.normal_left if k < 3 else result.normal_right
+            word = self.register(m, clipped[: p.FORMAT.width], f"end_{k}")
+            m.d.comb += Value.cast(end[k % 3]).eq(word)
+        return result
 
 
 def connect_shading_span(m: Module, span: data.View, shaded: data.View) -> None:
-    """Wire a span of `EdgeNormalsUnit` to a span of the shading pipeline: `shading_spans` in hardware.
+    """Wire a span of geometry to a span of the shading pipeline: `shading_spans` in hardware.
 
-    Places and lengths lose the first bits that the pipeline does not have, as the picture is no larger.
+    Coordinates, lengths and materials lose the first bits that the pipeline does not have, as the picture is
+    no larger.
 
     Parameters
     ----------
     m : Module
         Module that gets the wires.
     span : View
-        Of `true_spans_shape`.
+        Of `true_spans_shape` or `line_spans_shape`.
     shaded : View
         Of `blysk.hdl.pipeline.span_shape`.
+
+    Raises
+    ------
+    TypeError
+        If normals have another format on the other side.
     """
-    for name in shaded.shape().members:
+    given = span.shape().members
+    for name, shape in shaded.shape().members.items():
+        if name.startswith("normal") and shape != given[name]:
+            raise TypeError(f"{name} is {given[name]!r} on one side, {shape!r} on the other")
         m.d.comb += Value.cast(shaded[name]).eq(Value.cast(span[name]))

@@ -271,7 +271,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
 
     Members
     -------
-    constants : :py:`In(StructLayout({"lights": ..., "exponent": 10, "threshold": UQ(2, 16)}))`
+    constants : :py:`In(StructLayout({"lights": ..., "exponent": 10, "threshold": UQ(3, 15)}))`
         L and H of each light, with highlights the specular exponent for `SpanLimit`, of tables a threshold;
         constant while spans are inside.
     wide : :py:`Out(1)`

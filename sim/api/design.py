@@ -3,23 +3,28 @@
 import re
 from dataclasses import replace
 from importlib.metadata import version
-from typing import Any, Unpack
+from typing import Any, Literal, Unpack
 
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.frame_constants import address_table
+from blysk.golden.geometry.triangles import ATTRIBUTE
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import Design
 from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED, preset
+from blysk.golden.reference.scene import BACK_FACES
+from blysk.golden.render import Renderer
 from blysk.hdl.emit.verilog import emit
 from blysk.hdl.methods.interpolator import spelled
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit
-from blysk.sim.api.options import COUNTS, DESIGN, DesignOptions
-from blysk.sim.api.settings import Settings, read_settings
+from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
+from blysk.hdl.render import RenderUnit
+from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, DesignOptions
+from blysk.sim.api.settings import Settings, checked, read_settings
 from blysk.sim.errors import OptionError
 
-__all__ = ["design", "design_of", "header_of", "verilog", "verilog_and_unit"]
+__all__ = ["design", "design_of", "header_of", "renderer_of", "verilog", "verilog_and_unit"]
 
 
 def design(*, lights: int = 1, materials: int = 1, **options: Unpack[DesignOptions]) -> Design:
@@ -88,6 +93,21 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
     return replace(made, materials=materials)
 
 
+def renderer_of(design: Design) -> Renderer:
+    """Triangles to pixels with a shading pipeline.
+
+    Raises
+    ------
+    OptionError
+        If its method takes values.
+    """
+    try:
+        return Renderer(design)
+    except ValueError:
+        reason = f"triangles give normals, and {design.method} takes values"
+        raise OptionError("geometry", "hardware", reason, "use another method, or software") from None
+
+
 def header_of(unit: ShadingPipelineUnit) -> list[str]:
     """What a pipeline is, in lines: version, design and cycles."""
     made = unit.parameters
@@ -126,7 +146,32 @@ def header_of(unit: ShadingPipelineUnit) -> list[str]:
     return lines
 
 
-def verilog(design: Design | None = None, name: str = "blysk") -> str:
+def _render_header(unit: RenderUnit) -> list[str]:
+    """What triangles to pixels are, in lines: those of the pipeline inside without its input's, and more."""
+    first, *lines = (line for line in header_of(unit.pipeline) if not line.startswith("i_"))
+    geometry, grid = unit.geometry, unit.parameters.geometry.grid
+    spans = "their true lines, uncut" if geometry.lines else "three unit normals, wide ones cut"
+    return [
+        first.replace("shading pipeline", "triangles to pixels"),
+        *lines,
+        f"geometry: at most a triangle in {geometry.interval} cycles; spans with {spans}; {grid.coordinate} "
+        "coordinates",
+        "i_normal_*: vertex normal times 1/W over the largest 1/W of the triangle, "
+        f"{ATTRIBUTE}; i_depth: linear on the screen",
+        f"constants_*: the picture's borders in pixels; back faces {', '.join(map(_numbered, BACK_FACES))}; "
+        "largest chord of a span in 1/1024",
+        "memory_*: a depth for each pixel; read data a clock after the place; all ones before a frame",
+        "status_*: counters since reset",
+    ]
+
+
+def _numbered(name: str) -> str:
+    return f"{BACK_FACES.index(name)}: {name}"
+
+
+def verilog(
+    design: Design | None = None, name: str = "blysk", geometry: Literal["software", "hardware"] = "software"
+) -> str:
     """Verilog-2001 of a pipeline for synthesis, with a table of its ports and frame constants.
 
     Parameters
@@ -135,29 +180,38 @@ def verilog(design: Design | None = None, name: str = "blysk") -> str:
         The pipeline, as `design` makes it; by default that of the defaults.
     name : str
         Name of the top module.
+    geometry : {"software", "hardware"}
+        Whether the pipeline takes spans, or triangles, with a depth test and a port to a memory of depths.
 
     Raises
     ------
     InputError
-        If the name is none in Verilog.
+        If the name is none in Verilog, or the method takes values and geometry is hardware.
     """
-    return verilog_and_unit(Design() if design is None else design, name)[0]
+    return verilog_and_unit(Design() if design is None else design, name, geometry)[0]
 
 
-def verilog_and_unit(design: Design, name: str) -> tuple[str, ShadingPipelineUnit]:
-    """The same, and the pipeline that it is of."""
+def verilog_and_unit(
+    design: Design, name: str, geometry: str = "software"
+) -> tuple[str, ShadingPipelineUnit | RenderUnit]:
+    """The same, and the hardware that it is of."""
+    (chosen,) = checked({"geometry": geometry}, GEOMETRY).values()
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise OptionError("name", name, "no Verilog name", "use letters, digits and underscores")
-    unit = ShadingPipelineUnit(design)
-    p = unit.parameters
+    hardware = chosen == "hardware"
+    unit = RenderUnit(renderer_of(design)) if hardware else ShadingPipelineUnit(design)
+    p = design
     lobe = p.specular if isinstance(p.specular, Lobe) else None
     loads = lobe is not None and lobe.fixed is None
     constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads)
-    header = [*header_of(unit), "", "Frame constants, through the write port:", *constants]
+    lines = _render_header(unit) if isinstance(unit, RenderUnit) else header_of(unit)
+    header = [*lines, "", "Frame constants, through the write port:", *constants]
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
     descriptions = {
         port: text for port, text in PORT_DESCRIPTIONS.items() if not port.startswith("i_") or port in fields
     }
+    if isinstance(unit, RenderUnit):
+        descriptions = RENDER_PORT_DESCRIPTIONS
     try:
         return emit(unit, name, header=header, descriptions=descriptions), unit
     except ValueError as error:

@@ -26,6 +26,8 @@ __all__ = [
     "COEFFICIENTS",
     "COUNTS",
     "DESIGN",
+    "GEOMETRIES",
+    "GEOMETRY",
     "RENDERING",
     "SCENE",
     "SLOW_SIZE",
@@ -51,6 +53,10 @@ ColorLike = str | float | Triple
 
 Source = str | os.PathLike[str] | Mesh
 """``"teapot"``, a mesh file, a scene file (``.toml``), or a mesh."""
+
+
+GEOMETRIES = ("software", "hardware")
+"""Who turns triangles into spans."""
 
 
 class Option(NamedTuple):
@@ -323,7 +329,18 @@ COUNTS: dict[str, Option] = {
 }
 """Counts of a design, which a scene gives where there is one."""
 
+GEOMETRY: dict[str, Option] = {
+    "geometry": Option(
+        Choice("geometry", GEOMETRIES),
+        "software",
+        "Who turns triangles into spans: hardware simulates that, too, and the depth test.",
+        "pipeline.geometry",
+    ),
+}
+"""Option of a rendering and of Verilog."""
+
 RENDERING: dict[str, Option] = {
+    **GEOMETRY,
     "specialise": Option(
         Truth(),
         False,
@@ -379,5 +396,6 @@ class DesignOptions(TypedDict, total=False):
 class RenderOptions(SceneOptions, DesignOptions, total=False):
     """Options of a rendering, by their names in Python."""
 
+    geometry: Literal["software", "hardware"]
     specialise: bool
     short_words: bool

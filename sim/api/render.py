@@ -16,22 +16,24 @@ from typing import Any, Literal, Unpack
 import numpy as np
 from PIL import Image
 
-from blysk.golden.frames.compare import Comparison, compare
+from blysk.golden.frames.compare import Comparison, compare, compare_image
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures
 from blysk.golden.reference.scene import Scene
+from blysk.golden.render import Renderer
 from blysk.sim.api.design import design_of
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE, SLOW_SIZE, RenderOptions, Source
 from blysk.sim.api.scene import load, scenes_of
 from blysk.sim.api.settings import Settings, read_settings
 from blysk.sim.engines.engine import CompilerMissing
 from blysk.sim.errors import OptionError
-from blysk.sim.frames.figures import difference_figures, frame_figures, saving_figures
+from blysk.sim.frames.figures import difference_figures, frame_figures, saving_figures, triangle_figures
 from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
 from blysk.sim.frames.picture import write_comparison, write_image
 from blysk.sim.frames.specialise import Specialisation, specialise
 from blysk.sim.frames.summary import frame_lines, specialisation_lines
+from blysk.sim.frames.triangles import SimulatedTriangleFrame, TriangleSimulator
 from blysk.sim.meshes.mesh import LoadedMesh
 from blysk.sim.output import atomic_writer
 
@@ -53,8 +55,8 @@ class RenderedFrame:
         What was drawn.
     design : Design
         The pipeline; of a specialised one the full pipeline.
-    simulated : SimulatedFrame
-        The frame with its spans, as the pipeline gave it.
+    simulated : SimulatedFrame or SimulatedTriangleFrame
+        The frame with its spans, or by triangles, as the hardware gave it.
     name : str
         Of the mesh.
     details : dict
@@ -64,7 +66,7 @@ class RenderedFrame:
 
     scene: Scene
     design: Design
-    simulated: SimulatedFrame
+    simulated: SimulatedFrame | SimulatedTriangleFrame
     name: str
     details: dict[str, Any]
 
@@ -80,12 +82,12 @@ class RenderedFrame:
 
     @property
     def cycles(self) -> int:
-        """Cycles from the first write of a constant to the last pixel."""
+        """Cycles from the first write of a constant, or the first triangle, to the last pixel."""
         return self.simulated.cycles
 
     @property
     def spans(self) -> int:
-        """Number of spans that went into the pipeline."""
+        """Number of spans that went into the shading pipeline."""
         return self.simulated.spans
 
     @property
@@ -100,13 +102,18 @@ class RenderedFrame:
 
     @cached_property
     def comparison(self) -> Comparison:
-        """The golden frame, and the errors against three references."""
+        """The golden frame, and the errors against three references; by triangles against two."""
+        if isinstance(self.simulated, SimulatedTriangleFrame):
+            return compare_image(self.scene, self.design, self.simulated.image)
         return compare(self.scene, self.design, self.simulated)
 
     @cached_property
     def figures(self) -> dict[str, Any]:
         """Every figure that the command line prints, by name."""
-        figures = frame_figures(self.scene, self.design, self.simulated, self.comparison)
+        if isinstance(self.simulated, SimulatedTriangleFrame):
+            figures = triangle_figures(self.scene, self.design, self.simulated, self.comparison)
+        else:
+            figures = frame_figures(self.scene, self.design, self.simulated, self.comparison)
         return {
             "mesh": self.name,
             **figures,
@@ -196,8 +203,8 @@ class Rendering:
         Whether it was.
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
-    simulator : FrameSimulator or None
-        The pipeline's simulator; ``None`` where there is no compiler and none is needed.
+    simulator : FrameSimulator or TriangleSimulator or None
+        The hardware's simulator; ``None`` where there is no compiler and none is needed.
     seconds : dict
         Of loading and building.
     """
@@ -207,7 +214,7 @@ class Rendering:
     specialisation: Specialisation
     is_specialised: bool
     engine: str
-    simulator: FrameSimulator | None
+    simulator: FrameSimulator | TriangleSimulator | None
     seconds: dict[str, float]
 
     @property
@@ -260,7 +267,7 @@ def prepare_rendering(
     *,
     design: Design | None = None,
     engine: Engine | str = "auto",
-    frames: int = 1,
+    frames: int = 0,
     remote: bool = False,
     stage: Callable[[str], object] = lambda text: None,
 ) -> Rendering:
@@ -276,7 +283,7 @@ def prepare_rendering(
         Where ``"auto"`` finds no compiler, pictures are at most `SLOW_SIZE`, with a warning; those of a scene
         that is given keep their size.
     frames : int
-        Of a turntable.
+        Of a turntable; 0: a single picture.
     remote : bool
         Whether others draw the frames, so that a missing compiler does not matter here.
     stage : callable
@@ -285,12 +292,13 @@ def prepare_rendering(
     start = perf_counter()
     with settings.located():
         made = design or _design(settings)
+        _check_geometry(settings, made, frames)
         stage("loading the mesh")
         loaded = load(settings)
         seconds = {"load": perf_counter() - start}
         simulator = None
         while True:
-            scenes = tuple(scenes_of(loaded, settings, frames))
+            scenes = tuple(scenes_of(loaded, settings, frames or 1))
             if design is None:
                 made = made.for_materials(scenes[0].materials)
             _check_lobes(scenes[0], made, settings)
@@ -299,7 +307,8 @@ def prepare_rendering(
             smallest = _specialised(scenes, made, settings)
             stage(f"building the model{_large(smallest.design)}")
             try:
-                simulator = FrameSimulator(smallest.design, "pysim" if engine == "pysim" else "cxxrtl")
+                used = "pysim" if engine == "pysim" else "cxxrtl"
+                simulator = _simulator(smallest.design, scenes[0], settings, used)
                 break
             except CompilerMissing as error:
                 if remote:
@@ -318,6 +327,30 @@ def _large(design: Design) -> str:
     counts = {"lights": design.lights, "materials": design.materials}
     many = ", ".join(f"{count:,} {what}" for what, count in counts.items() if count > 2)
     return f" of {many}: up to a minute, once" if many else ""
+
+
+def _simulator(
+    design: Design, scene: Scene, settings: Settings, engine: str
+) -> FrameSimulator | TriangleSimulator:
+    """The simulator of the geometry that is asked for."""
+    if settings["geometry"] == "software":
+        return FrameSimulator(design, engine)
+    return TriangleSimulator(Renderer(design), (scene.width, scene.height), engine)
+
+
+def _check_geometry(settings: Settings, design: Design, frames: int) -> None:
+    """Refuse what triangles cannot be drawn with."""
+    if settings["geometry"] == "software":
+        return
+    reason = None
+    if design.takes_values:
+        reason, remedy = f"triangles give normals, and {design.method} takes values", "use another method"
+    elif settings["specialise"]:
+        reason, remedy = "a specialised pipeline takes spans", "leave out specialise"
+    elif frames:
+        reason, remedy = "draws one picture", "leave out frames"
+    if reason is not None:
+        raise settings.refuse("geometry", reason, f"{remedy}, or use software")
 
 
 def _check_lobes(scene: Scene, design: Design, settings: Settings) -> None:
@@ -391,8 +424,9 @@ def render(
     progress : callable, optional
         Called now and then with the number of pixels so far and in all.
     **options
-        Those of `scene` and of `design`, by the names of the command line; ``specialise``: whether to build
-        only what the scene needs; ``short_words``: with words as short as the error bound allows.
+        Those of `scene` and of `design`, by the names of the command line; ``geometry``: ``"hardware"``
+        simulates triangles to pixels, ``"software"`` spans to pixels; ``specialise``: whether to build only
+        what the scene needs; ``short_words``: with words as short as the error bound allows.
 
     Raises
     ------

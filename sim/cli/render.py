@@ -113,7 +113,7 @@ def command(context, mesh, engine, output, comparison, figures, vcd, frames, job
         ready = prepare_rendering(
             settings,
             engine="pysim" if vcd else engine,
-            frames=frames or 1,
+            frames=frames or 0,
             remote=bool(address),
             stage=stage.set_description_str,
         )

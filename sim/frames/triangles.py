@@ -8,13 +8,15 @@ import numpy as np
 
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.prepare import constants_of
-from blysk.golden.frames.triangle_frame import SPAN_ANGLE, frame_of_pixels, sent_triangles
+from blysk.golden.frames.triangle_frame import frame_of_pixels, sent_triangles
 from blysk.golden.geometry.scene_triangles import SceneTriangles
+from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, Frame, Triangles
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.hdl.render import STATUS, RenderUnit
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
+from blysk.sim.frames.frame import sample_constants
 
 __all__ = ["SimulatedTriangleFrame", "TriangleSimulator"]
 
@@ -33,6 +35,8 @@ class SimulatedTriangleFrame:
         `RenderUnit`'s counters.
     written : int
         Pixels written, those that something nearer replaced later included.
+    visible : int
+        Pixels of the picture that show the surface.
     cycles : int
         Cycles from the first triangle to the last pixel.
     input_cycles : int
@@ -47,10 +51,21 @@ class SimulatedTriangleFrame:
     sent: SceneTriangles
     counts: dict[str, int]
     written: int
+    visible: int
     cycles: int
     input_cycles: int
     engine: str
     seconds: dict[str, float]
+
+    @property
+    def spans(self) -> int:
+        """Number of spans that were shaded."""
+        return self.counts["spans"]
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels that were shaded, hidden ones included."""
+        return self.counts["pixels"]
 
 
 class TriangleSimulator:
@@ -64,8 +79,17 @@ class TriangleSimulator:
         Width and height of the depth memory.
     engine : str
         ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
-    angle : float
-        Widest piece of a span in degrees.
+    angle : float, optional
+        Widest piece of a span in degrees; by default `span_angle`.
+    setups : int
+        As `GeometryUnit` has it.
+
+    Raises
+    ------
+    SimulationError
+        If the pixels of the new model are not those of the bit-accurate model.
+    CompilerMissing
+        If the engine is ``"cxxrtl"`` and no C++ compiler works.
     """
 
     def __init__(
@@ -73,13 +97,49 @@ class TriangleSimulator:
         renderer: Renderer,
         size: tuple[int, int],
         engine: str = "auto",
-        angle: float = SPAN_ANGLE,
+        angle: float | None = None,
+        setups: int = 1,
     ):
         self.renderer, self.size, self.engine, self.angle = renderer, size, engine, angle
-        self._unit = RenderUnit(renderer, size)
+        self._unit = RenderUnit(renderer, size, setups)
+        self._check()
+
+    def _check(self) -> None:
+        """A few triangles by the new model, against the bit-accurate one."""
+        rng = np.random.default_rng(2025)
+        steps, count = self.renderer.geometry.grid.steps, 12
+        frame = Frame.centred(*self.size)
+        middle = np.array([frame.left, frame.top]) * steps + rng.integers(0, 16 * steps, (count, 1, 2))
+        corner = middle + rng.integers(-8 * steps, 8 * steps, (count, 3, 2))
+        most = ATTRIBUTE.max_code
+        triangles = Triangles(
+            x=corner[..., 0],
+            y=corner[..., 1],
+            depth=rng.integers(0, DEPTH.max_code, (count, 3)),
+            normal=most // 2 + rng.integers(-most // 4, most // 4, (count, 3, 3)),
+            material=np.arange(count) * self.renderer.design.materials // count,
+        )
+        constants = sample_constants(self.renderer.design)
+        expected = self.renderer.compute(triangles, frame, constants)
+        run = simulate(
+            self._unit,
+            triangles.beats,
+            count=len(expected.x),
+            constants=frame.codes,
+            write=writes_of(constants),
+            engine=self.engine,
+        )
+        # What "auto" stands for: its warning comes once.
+        self.engine = run.engine
+        if not all(np.array_equal(run.beats[name], value) for name, value in expected.beats.items()):
+            raise SimulationError("the simulated hardware's pixels are not those of its bit-accurate model")
 
     def render(
-        self, scene: Scene, progress: Callable[[int], object] | None = None, count: int | None = None
+        self,
+        scene: Scene,
+        progress: Callable[[int, int], object] | None = None,
+        count: int | None = None,
+        vcd: str | None = None,
     ) -> SimulatedTriangleFrame:
         """Send a scene's triangles, and collect its pixels.
 
@@ -88,9 +148,11 @@ class TriangleSimulator:
         scene : Scene
             What to draw, of the simulator's size.
         progress : callable, optional
-            Called now and then with the number of pixels written so far.
+            Called now and then with the number of pixels written so far and, as all are not known, again.
         count : int, optional
             How many pixels will be written, where that is known: less than waiting for more.
+        vcd : str, optional
+            File for the waveforms; engine ``"pysim"`` only.
 
         Raises
         ------
@@ -100,7 +162,8 @@ class TriangleSimulator:
             If the scene has another size, point lights or a near viewer, or does not fit the design.
         """
         if (scene.width, scene.height) != self.size:
-            raise ValueError(f"the scene is {scene.width}x{scene.height}, the memory {self.size}")
+            width, height = self.size
+            raise ValueError(f"the scene is {scene.width}x{scene.height}, the memory {width}x{height}")
         start = perf_counter()
         sent = sent_triangles(scene, self.renderer, self.angle)
         ready = perf_counter()
@@ -108,7 +171,7 @@ class TriangleSimulator:
             image = frame_of_pixels(scene, *np.zeros((2, 0), dtype=int), np.zeros((0, 3), dtype=np.uint8))
             seconds = {"triangles": ready - start, "simulate": 0.0}
             return SimulatedTriangleFrame(
-                image, sent, dict.fromkeys(STATUS, 0), 0, 0, 0, self.engine, seconds
+                image, sent, dict.fromkeys(STATUS, 0), 0, 0, 0, 0, self.engine, seconds
             )
         run = simulate(
             self._unit,
@@ -117,10 +180,10 @@ class TriangleSimulator:
             constants=sent.frame.codes,
             write=writes_of(constants_of(scene, self.renderer.design)),
             engine=self.engine,
-            progress=progress,
+            progress=None if progress is None else lambda done: progress(done, done),
+            vcd=vcd,
             idle_timeout=self._longest_silence(sent),
         )
-        self.engine = run.engine
         counts = {name: int(run.status[name]) for name in STATUS}
         if count is None and counts["pixels"] - counts["hidden"] != len(run.beats):
             raise SimulationError("the hardware counted other pixels than it gave")
@@ -131,6 +194,7 @@ class TriangleSimulator:
             sent=sent,
             counts=counts,
             written=len(beats),
+            visible=len(np.unique(beats["y"].astype(np.int64) * scene.width + beats["x"])),
             cycles=int(max(run.cycles.max(initial=0), run.input_cycles[-1]) - run.input_cycles[0] + 1),
             input_cycles=int(run.input_cycles[-1] - run.input_cycles[0] + 1),
             engine=run.engine,

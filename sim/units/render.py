@@ -35,7 +35,7 @@ def _made(unit, case):
 
 def _status(unit, case):
     made = _made(unit, case)
-    return made.counts | {"out_of_range_spans": made.out_of_range_spans}
+    return made.counts | {"out_of_range_spans": made.out_of_range_spans, "wide_spans": made.wide_spans}
 
 
 def _triangles(unit, rng, count, size=6.0, spread=0.2):

@@ -8,16 +8,18 @@ import blysk.hdl.methods.bisection_interpolator
 import blysk.hdl.methods.chord_interpolator
 import blysk.hdl.methods.interpolator
 import blysk.hdl.methods.linear_interpolator
-import blysk.hdl.methods.local_chord_interpolator
 import blysk.hdl.methods.quadratic_interpolator
 import blysk.hdl.methods.recurrence_interpolator
+import blysk.hdl.methods.renormalise_interpolator
 import blysk.hdl.normals.difference_accumulator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedValue
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
+from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
+from blysk.hdl.methods.renormalise_interpolator import LineAccumulatorUnit
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit, DifferenceAccumulatorUnit
 from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
@@ -55,8 +57,16 @@ def left(span):
     return span.normal_left[0]
 
 
-def middle_value(span):
-    return span["values"][0].diffuse[0]
+def value(span, place=0):
+    return span["values"][0].diffuse[place]
+
+
+def line_start(span):
+    return span.line.start[0]
+
+
+def line_vector(pixel):
+    return pixel.vector[0]
 
 
 def constant_coefficient(span):
@@ -68,7 +78,16 @@ def start(span):
 
 
 def light_start(span):
-    return span.lights[0].diffuse.start
+    return span.start[0].diffuse
+
+
+def light_difference(span):
+    return span.lights[0].diffuse.first
+
+
+def gate_word(span):
+    """Of a span, decided by the stub of a gate."""
+    return Value.cast(span["values"][0].highlight[0])[0]
 
 
 def phase(span):
@@ -96,10 +115,25 @@ def difference_setup(span, gives):
     yield gives.length.eq(span.length)
 
 
-def chord_setup(span, gives):
-    find = middle_value if "values" in span.shape().members else left
-    yield put(light_start(gives), first_word(find(span)))
+def line_setup(span, gives):
+    yield put(gives.start[0], first_word(left(span)))
     yield gives.length.eq(span.length)
+
+
+def chord_values(normal, gives):
+    yield put(gives[0].diffuse, word(normal[0]))
+
+
+def chord_setup(span, gives):
+    yield put(light_difference(gives), first_word(value(span)))
+
+
+def nothing(operands, gives):
+    yield from ()
+
+
+def value_gate(values, gives):
+    yield gives.eq(Value.cast(values[0][0])[0])
 
 
 def middle_normal(span, gives):
@@ -111,7 +145,7 @@ def coefficients(span, gives):
 
 
 def renormaliser(vector, gives):
-    yield put(gives.normal[0], word(vector[0]))
+    yield put(gives.normal[0], word(line_vector(vector)))
 
 
 def products(vector, gives):
@@ -189,23 +223,31 @@ class Evaluator(Line):
     quadratics = walk(constant_coefficient, normal)
 
 
+def gate() -> ValueGateUnit:
+    """A gate of one cycle."""
+    return short(ValueGateUnit, value_gate, 1)()
+
+
 def replace_parts(monkeypatch) -> None:
     """Put units of 2 or 3 cycles, and accumulators of few bits, in the place of parts: they hand words on."""
     for module, name, hand_on, latency in (
         (blysk.hdl.methods.interpolator, "LightProductsUnit", products, 2),
         (blysk.hdl.methods.linear_interpolator, "DifferenceSetupUnit", difference_setup, 3),
-        (blysk.hdl.methods.linear_interpolator, "RenormaliserUnit", renormaliser, 2),
+        (blysk.hdl.methods.renormalise_interpolator, "LineSetupUnit", line_setup, 3),
+        (blysk.hdl.methods.renormalise_interpolator, "RenormaliserUnit", renormaliser, 2),
         # A length takes three cycles round these two.
         (blysk.hdl.methods.quadratic_interpolator, "MiddleNormalUnit", middle_normal, 3),
         (blysk.hdl.methods.quadratic_interpolator, "GPQUnit", coefficients, 1),
         (blysk.hdl.methods.quadratic_interpolator, "DifferenceSetupUnit", difference_setup, 3),
         (blysk.hdl.methods.chord_interpolator, "ChordSetupUnit", chord_setup, 3),
-        (blysk.hdl.methods.local_chord_interpolator, "LocalChordSetupUnit", chord_setup, 3),
+        (blysk.hdl.methods.chord_interpolator, "ChordValuesUnit", chord_values, 2),
+        (blysk.hdl.methods.chord_interpolator, "SpanLimitUnit", nothing, 2),
         (blysk.hdl.methods.angular_interpolator, "AngularSetupUnit", angular_setup, 3),
         (blysk.hdl.methods.recurrence_interpolator, "RecurrenceSetupUnit", recurrence_setup, 3),
     ):
         monkeypatch.setattr(module, name, short(getattr(module, name), hand_on, latency))
     monkeypatch.setattr(DifferenceAccumulatorUnit, "quadratics", walk(start, normal))
+    monkeypatch.setattr(LineAccumulatorUnit, "quadratics", walk(line_start, line_vector))
     monkeypatch.setattr(ChordAccumulatorUnit, "quadratics", walk(light_start, cosine))
     monkeypatch.setattr(HighlightCosineUnit, "latency", 3)
     monkeypatch.setattr(HighlightCosineUnit, "_wave", short_wave(angle))

@@ -1,13 +1,18 @@
 # amaranth: UnusedElaboratable=no
 """Proofs about every unit of the records: beats that wait stay, are as many as came, and none is stuck."""
 
+from functools import partial
+
 import pytest
 from amaranth.hdl import Cat, Mux, Signal
 
 import blysk.hdl.core.stream
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
+from blysk.hdl.methods.renormalise_interpolator import LineAccumulatorUnit
 from blysk.hdl.normals.dot_product import DotProductUnit
 from blysk.sim.units.registry import RECORDS
 
@@ -19,10 +24,11 @@ pytestmark = pytest.mark.prove
 # Of each record the default variant, and others that have another control.
 FURTHER = {
     "arccos": ("refitted, sequential",),
+    "chord_interpolator": ("gated",),
+    "chord_values": ("1 lights, interval 3",),
     "intensity": ("2 lights, compact",),
     "light": ("cosquad, interval 3",),
     "light_products": ("cosines, 2 lights, interval 3",),
-    "linear_interpolator": ("renormalise",),
     "pipeline": ("chord, cosquad", "compact", "gate"),
     "power": ("sequential",),
     "quadratic_evaluator": ("horner",),
@@ -33,8 +39,14 @@ UNITS = {
     f"{name}-{variant}" if variant else name: record.variants[variant].unit
     for name, record in RECORDS.items()
     for variant in (record.default, *FURTHER.get(name, ()))
-} | {"chord_accumulator": ChordAccumulatorUnit}
-PIPELINED = [name for name, make in UNITS.items() if issubclass(getattr(make, "func", make), PipelinedUnit)]
+} | {
+    "chord_accumulator": partial(ChordAccumulatorUnit, ChordInterpolator(), 1),
+    "line_accumulator": partial(LineAccumulatorUnit, RenormaliseInterpolator()),
+}
+KINDS = {name: getattr(make, "func", make) for name, make in UNITS.items()}
+PIPELINED = [
+    name for name, kind in KINDS.items() if isinstance(kind, type) and issubclass(kind, PipelinedUnit)
+]
 
 SLOW = "specular-" + FURTHER["specular"][0]
 """A unit with an initiation interval of more than 1."""
@@ -43,7 +55,8 @@ SLOW = "specular-" + FURTHER["specular"][0]
 COUNTED = [
     name
     for name in UNITS
-    if name.partition("-")[0] in ("chord_accumulator", "difference_accumulator", "recurrence")
+    if name.partition("-")[0]
+    in ("chord_accumulator", "difference_accumulator", "line_accumulator", "recurrence")
 ]
 
 

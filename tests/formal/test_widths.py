@@ -12,26 +12,31 @@ from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.normals.bisection_chain import BisectionChain
 from blysk.golden.normals.difference_setup import DifferenceSetup
+from blysk.golden.normals.line_setup import LineSetup
 from blysk.golden.normals.middle_normal import MIDDLE_NORMAL_FITS, MiddleNormal
 from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
+from blysk.hdl.cosines.chord_values import ChordValuesUnit
 from blysk.hdl.cosines.half_chord import HalfChordUnit
-from blysk.hdl.cosines.local_chord_setup import LocalChordSetupUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
+from blysk.hdl.cosines.span_limit import SpanLimitUnit
 from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
+from blysk.hdl.methods.renormalise_interpolator import LineAccumulatorUnit
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 from blysk.hdl.normals.bisection import BisectionUnit
 from blysk.hdl.normals.bisection_chain import BisectionChainUnit
 from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
 from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
+from blysk.hdl.normals.line_setup import LineSetupUnit
 from blysk.hdl.normals.middle_normal import MiddleNormalUnit
 from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 from blysk.hdl.normals.renormaliser import RenormaliserUnit
@@ -41,13 +46,12 @@ from .bounds import cut_by, registers_of, unknown, wrapped_by
 from .widths import (
     of_bisection,
     of_bisection_chain,
-    of_chord_differences,
     of_chord_setup,
     of_chord_sums,
     of_difference_setup,
     of_half_chord,
+    of_line_setup,
     of_lines,
-    of_local_chord_setup,
     of_middle_normal,
     of_normals,
     of_quadratic_evaluator,
@@ -57,6 +61,7 @@ from .widths import (
     of_renormaliser,
     of_segments,
     of_specular_slopes,
+    of_true_lines,
 )
 
 pytestmark = [pytest.mark.prove, pytest.mark.usefixtures("wraps")]
@@ -70,7 +75,8 @@ UNITS = {
         f"quadratic_evaluator-{form}": partial(QuadraticEvaluatorUnit, QuadraticEvaluator(form))
         for form in QUADRATIC_FORMS
     },
-    "local_chord_setup": LocalChordSetupUnit,
+    **{f"chord_setup-{bits}": partial(ChordSetupUnit, ChordSetup(bits)) for bits in range(36, 47, 2)},
+    "line_setup": LineSetupUnit,
 }
 """Units wrap in no other formats than their models, to which they are equal to the bit (`tests/hdl`)."""
 
@@ -80,10 +86,10 @@ WHOLE = {
     "difference_setup": partial(of_difference_setup, False),
     "difference_setup-published": partial(of_difference_setup, True),
     **{f"quadratic_evaluator-{form}": partial(of_quadratic_evaluator, form) for form in QUADRATIC_FORMS},
-    "local_chord_setup": of_local_chord_setup,
-    **{f"chord_setup-{bits}": partial(of_chord_differences, bits) for bits in range(36, 47, 2)},
+    **{f"chord_setup-{bits}": partial(of_chord_setup, bits) for bits in range(36, 47, 2)},
+    "line_setup": of_line_setup,
 }
-"""Any codes of the operands: in the chord setup of P and G."""
+"""Any codes of the operands."""
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -91,13 +97,6 @@ def test_no_word_wraps_whatever_the_operands(wraps, name):
     """By bounds: any code of every operand, whatever angle and lengths vectors have; 1 to 4095 pixels."""
     WHOLE[name]()
     assert name not in UNITS or wrapped_by(UNITS[name]()) <= set(wraps)
-
-
-@pytest.mark.parametrize(("terms", "bits"), [*product((1, 2, 3), (36, 46))])
-def test_slopes_of_the_chord_setup_do_not_wrap(monkeypatch, wraps, terms, bits):
-    """By bounds, for every word of w up to the flag; with the words above all of the chord setup."""
-    of_chord_setup(monkeypatch, terms, bits)
-    assert wrapped_by(ChordSetupUnit(parameters=ChordSetup(terms, bits))) <= set(wraps)
 
 
 @pytest.mark.parametrize("parameters", [*product((1, 2), (45, 90), (False, True))])
@@ -154,6 +153,8 @@ def test_shifts_of_the_recurrence_a_bit_too_short_are_found(bits):
 CUTS = {
     "blysk.hdl.core.reciprocal.reciprocal_words": "the leading one of m - 1; m is 1 or more",
     "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._prepare_segment": "2^levels - 1",
+    "blysk.hdl.normals.renormaliser.RenormaliserUnit._scaled": "copies of the sign, above the leading one",
+    "blysk.hdl.normals.renormaliser.RenormaliserUnit.datapath": "the leading one of the octave",
     "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._reciprocal": "as of m - 1 above",
     "blysk.hdl.cosines.half_chord.normalised_words": "v: `test_angular_setup`",
     "blysk.hdl.cosines.half_chord.half_chord_words": "half a turn less psi, as the model wraps it",
@@ -172,9 +173,10 @@ def test_sums_are_cut_in_these_places_alone():
     units = (
         *(make() for make in UNITS.values()),
         *(make() for make in (BisectionUnit, BisectionChainUnit, RenormaliserUnit, HalfChordUnit)),
-        *(make() for make in (ChordSetupUnit, RecurrenceSetupUnit, RecurrenceUnit)),
+        *(make() for make in (ChordValuesUnit, SpanLimitUnit, RecurrenceSetupUnit, RecurrenceUnit)),
         *(make() for make in (DifferenceAccumulatorUnit, AdaptiveNormaliserUnit)),
-        ChordAccumulatorUnit(),
+        ChordAccumulatorUnit(ChordInterpolator(), 1),
+        LineAccumulatorUnit(RenormaliseInterpolator()),
     )
     assert set.union(*map(cut_by, units)) == set(CUTS)
 
@@ -218,6 +220,12 @@ def test_sums_of_straight_lines_do_not_wrap(wraps):
     assert wrapped_by(DifferenceAccumulatorUnit()) <= set(wraps)
 
 
+def test_sums_of_lines_before_they_are_renormalised_do_not_wrap(wraps):
+    """The same, for any two ends of any length."""
+    of_true_lines()
+    assert wrapped_by(LineAccumulatorUnit(RenormaliseInterpolator())) <= set(wraps)
+
+
 @pytest.mark.parametrize("levels", range(AdaptiveNormaliser(2.0**-14).depth + 1))
 def test_sums_of_segments_do_not_wrap(wraps, levels):
     """The same, for any two ends of a segment, and as many segments as there can be."""
@@ -228,9 +236,9 @@ def test_sums_of_segments_do_not_wrap(wraps, levels):
 
 @pytest.mark.parametrize(("name", "bits"), [("diffuse", 46), ("highlight", 36), ("highlight", 46)])
 def test_sums_of_chords_do_not_wrap(wraps, name, bits):
-    """The same, for unit vectors and any P and G; so differences of a pixel to the next. Local chords too."""
+    """The same, for any values, P and G; so differences of a pixel to the next. Of local chords too."""
     of_chord_sums(name, bits)
-    assert wrapped_by(ChordAccumulatorUnit(ChordInterpolator(fraction_bits=bits))) <= set(wraps)
+    assert wrapped_by(ChordAccumulatorUnit(ChordInterpolator(fraction_bits=bits), 1)) <= set(wraps)
 
 
 def test_bounds_hold():
@@ -264,17 +272,13 @@ SHORTER_FORMATS = {
         "format",
         property(lambda p: SQ(0, p.fraction_bits)),
     ),
-    "differences of local chords": (
-        WHOLE["local_chord_setup"],
-        ChordSetup,
-        "format",
-        property(lambda p: SQ(0, p.fraction_bits)),
-    ),
+    "high word of the slope of chords": (WHOLE["chord_setup-46"], ChordSetup, "HIGH_FORMAT", SQ(-1, 18)),
+    "differences of lines": (WHOLE["line_setup"], LineSetup, "FORMAT", SQ(1, 40)),
+    "high word of a line": (WHOLE["line_setup"], LineSetup, "HIGH_FORMAT", SQ(1, 15)),
     # It stays between the ends of the segment, so that of its two integer bits one is to spare.
     "sum of a segment": (partial(of_segments, 2), AdaptiveNormaliser, "ACCUMULATOR_FORMAT", SQ(0, 32)),
     "step of a segment": (partial(of_segments, 2), AdaptiveNormaliser, "STEP_FORMAT", SQ(0, 32)),
     "slope": (partial(of_specular_slopes, "cosquad"), Specular, "SLOPE_FORMAT", UQ(8, 18)),
-    "factor of the renormaliser": (of_renormaliser, Renormaliser, "FACTOR_FORMAT", SQ(-1, 18)),
 }
 
 
@@ -285,15 +289,6 @@ def test_formats_a_bit_too_short_are_found(monkeypatch, word):
     monkeypatch.setattr(*change)
     with pytest.raises(AssertionError, match=" wraps in "):
         prove()
-
-
-@pytest.mark.parametrize("format", ["SLOPE_FORMAT", "HIGH_FORMAT"])
-def test_slopes_a_bit_too_short_are_found(monkeypatch, format):
-    """The same."""
-    full = getattr(ChordSetup, format)
-    monkeypatch.setattr(ChordSetup, format, SQ(full.integer_bits - 1, full.fraction_bits))
-    with pytest.raises(AssertionError, match=" wraps in "):
-        of_chord_setup(monkeypatch, 3, 46)
 
 
 def test_slope_of_the_recurrence_a_bit_too_short_is_found(monkeypatch):
@@ -330,9 +325,10 @@ SHORTER_WORDS = {
         partial(of_bisection_chain, 2, 90, False),
         *(Bisection, "factor", "wrap(self.FACTOR_FORMAT)", "wrap(SQ(-2, 19))"),
     ),
+    # It stays under 1, so that its integer bit is to spare.
     "slope of the renormaliser": (
         of_renormaliser,
-        *(Renormaliser, "correction", "wrap(self.C1_FORMAT)", "wrap(UQ(0, 16))"),
+        *(Renormaliser, "factor", "wrap(self.C1_FORMAT)", "wrap(UQ(-1, 16))"),
     ),
     "sums of the half chord": (
         of_half_chord,
@@ -366,6 +362,7 @@ SHORTER_SUMS = {
     "straight line": partial(of_lines, SQ(1, 42)),
     "N.L": partial(of_chord_sums, "diffuse", 46, SQ(1, 46)),
     "u": partial(of_chord_sums, "highlight", 46, SQ(2, 46)),
+    "true lines": partial(of_true_lines, SQ(0, 40)),
     "first steps of the recurrence": partial(of_recurrence_prologue, SQ(1, 44)),
 }
 

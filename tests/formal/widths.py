@@ -8,11 +8,11 @@ import pytest
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.half_chord import HalfChord
-from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.normals.bisection_chain import BisectionChain
@@ -20,13 +20,14 @@ from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.normals.gpq import GPQ
+from blysk.golden.normals.line_setup import LineSetup
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
 from blysk.golden.normals.renormaliser import Renormaliser
-from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.fixed import UQ, Fixed
 from blysk.golden.number.reciprocal import reciprocal_address
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of
-from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT, ONE_SQUARED
+from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 
 from .bounds import Bounds, unknown, word
@@ -48,39 +49,14 @@ def of_quadratic_evaluator(form):
     unit.evaluate(*(word(format, 1, 1) for format in (GPQ.G_FORMAT, GPQ.P_FORMAT, GPQ.Q_FORMAT)), parameter)
 
 
-def of_local_chord_setup():
-    unit = LocalChordSetup()
+def of_chord_setup(fraction_bits):
+    """Any three values, whether they fit or not: P and G saturate."""
+    unit = ChordSetup(fraction_bits)
     unit.compute(word(unit.DIFFUSE_FORMAT, 1, 1, 3), word(unit.HIGHLIGHT_FORMAT, 1, 1, 3), LENGTHS)
 
 
-def of_chord_differences(fraction_bits):
-    unit = ChordSetup(fraction_bits=fraction_bits)
-    slope, bend = word(unit.SLOPE_FORMAT, 1, 1), word(unit.CURVATURE_FORMAT, 1, 1)
-    unit.differences(None, slope, bend, *unit.steps(LENGTHS))
-
-
-def of_chord_setup(monkeypatch, terms, fraction_bits):
-    """Every w that is not flagged.
-
-    ``u_r - u_l`` is ``(|N_r|^2 - |N_l|^2)/2 - (N_r - N_l).H``, so it is at most the chord, ``sqrt(2 w)``,
-    twice an error of the length, and what `Chord` cuts of two; ``f_r - f_l`` is at most the chord.
-    """
-    unit = ChordSetup(terms, fraction_bits)
-    w = np.arange(unit.widest.codes + 1)
-    chord = np.sqrt(2 * (w + 0.5) * unit.ANGLE_FORMAT.step)[:, np.newaxis]
-    cut = 2 * np.sqrt(3) * COMPONENT.step + 3 * 2.0**-35
-    one = 1 << 35
-    u_left = unknown(0, (2 + cut) * one)
-    u_right = (u_left + unknown(-one, one, chord + 2 * CODE_LENGTH_ERROR + 2 * cut)).known(0, (2 + cut) * one)
-    f_left = unknown(-one / 2, one / 2)
-    f_right = (f_left + unknown(-one / 2, one / 2, chord)).known(-one / 2, one / 2)
-    chords = iter([Fixed(Chord.FORMAT, code) for code in (w << 15, u_left, u_right)])
-    cosines = iter([Fixed(DotProduct().result_format, code) for code in (f_left, f_right)])
-    monkeypatch.setattr(Chord, "compute", lambda *_: next(chords))
-    monkeypatch.setattr(DotProduct, "compute", lambda *_: next(cosines))
-    normals = (Fixed(COMPONENT, np.zeros((len(w), 3), dtype=np.int64)) for _ in range(2))
-    vectors = (Fixed(COMPONENT, np.zeros((1, 3), dtype=np.int64)) for _ in range(2))
-    unit.compute(*normals, *vectors, np.full(len(w), 2))
+def of_line_setup():
+    LineSetup().compute(*(word(LineSetup.VECTOR_FORMAT, 1, 3) for _ in range(2)), LENGTHS)
 
 
 def parts_of_lengths():
@@ -137,6 +113,19 @@ def of_lines(format=DifferenceSetup.FORMAT):
         walk(DifferenceAccumulator(format=format), Fixed(COMPONENT, n), *differences, span, step)
 
 
+def of_true_lines(format=None):
+    """Lines before they are renormalised: any ends."""
+    sums, ends = RenormaliseInterpolator().accumulator, RenormaliseInterpolator.END_FORMAT
+    if format is not None:
+        sums = replace(sums, format=format)
+    left, right = (unknown(ends.min_code, ends.max_code) for _ in range(2))
+    for lengths, span, step in parts_of_lengths():
+        words = [Fixed(ends, rows(bounds, lengths)) for bounds in (left, right)]
+        first = LineSetup().compute(*words, lengths)
+        zero = Fixed(first.format, rows(Bounds.of([[0]]), lengths))
+        walk(sums, words[0], first, zero, span, step)
+
+
 def of_segments(levels):
     """Any two ends; of those further apart than the word of a difference, left is on the other side of 0."""
     unit = AdaptiveNormaliser()
@@ -156,19 +145,19 @@ def of_segments(levels):
 
 
 def of_chord_sums(name, fraction_bits, format=None):
-    """Any slope and bend; starts of unit vectors: f from -1 to 1, u to 2 and what `Chord` cuts."""
+    """Any values at the first pixel, any P and G."""
     unit = ChordInterpolator(fraction_bits=fraction_bits)
     sums, setup = unit.accumulators[name], unit.setup
     if format is not None:
         sums = replace(sums, format=format)
-    one = 1 << sums.start_format.fraction_bits
-    start = unknown(*{"diffuse": (-one, one), "highlight": (0, 2.001 * one)}[name])
-    slope, bend = (unknown(f.min_code, f.max_code) for f in (setup.SLOPE_FORMAT, setup.CURVATURE_FORMAT))
+    slope_format = {"diffuse": setup.DIFFUSE_SLOPE_FORMAT, "highlight": setup.SLOPE_FORMAT}[name]
+    formats = sums.start_format, slope_format, setup.CURVATURE_FORMAT
+    start, slope, curvature = (unknown(f.min_code, f.max_code) for f in formats)
     for lengths, span, step in parts_of_lengths():
-        words = Fixed(sums.start_format, rows(start, lengths)), Fixed(setup.SLOPE_FORMAT, slope)
+        words = Fixed(sums.start_format, rows(start, lengths)), Fixed(slope_format, slope)
         walk(
             sums,
-            *setup.differences(*words, Fixed(setup.CURVATURE_FORMAT, bend), *setup.steps(lengths)),
+            *setup.differences(*words, Fixed(setup.CURVATURE_FORMAT, curvature), *setup.steps(lengths)),
             span,
             step,
         )
@@ -207,9 +196,12 @@ def of_bisection_chain(degree, max_angle, as_published):
 
 
 def of_renormaliser():
-    unit = Renormaliser()
-    offset = np.arange(unit.SEGMENTS << unit.OFFSET_FORMAT.width)
-    unit.correction(Fixed(SQ(4, 34), offset + UQ(0, 22).code(unit.LOW) << 12))
+    """Every segment and x of the four octaves of s."""
+    unit, width = Renormaliser(), Renormaliser.SEGMENT_BITS + Renormaliser.OFFSET_FORMAT.width
+    square = DotProduct().result_format
+    codes = (1 << square.fraction_bits - 2) + (np.arange(1 << width) << square.fraction_bits - 2 - width)
+    for octave in range(unit.OCTAVES):
+        unit.factor(Fixed(square, codes << octave))
 
 
 def of_half_chord():

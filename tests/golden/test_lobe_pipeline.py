@@ -7,7 +7,13 @@ import pytest
 
 from blysk.bench.accuracy import scene_for
 from blysk.bench.report.cosine_quadratic_figures import sphere
-from blysk.golden.frame_constants import LOBE_ADDRESS, THRESHOLD_ADDRESS, FrameConstants, writes_of
+from blysk.golden.frame_constants import (
+    BANK_ADDRESS,
+    LOBE_ADDRESS,
+    THRESHOLD_ADDRESS,
+    FrameConstants,
+    writes_of,
+)
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import constants_of
@@ -105,7 +111,7 @@ def test_equal_lobes_share_a_bank():
     assert len(loads) == 2 * 338
     assert loads[[0, 338]].tolist() == [1 << 17, 1 << 17 | 1]
     assert (writes["address"] == THRESHOLD_ADDRESS).sum() == 3
-    assert writes["data"][writes["address"] == 0].tolist() == [0, 1, 0]
+    assert writes["data"][writes["address"] == BANK_ADDRESS].tolist() == [0, 1, 0]
 
 
 def test_banks_that_do_not_suffice_are_refused():

@@ -119,7 +119,7 @@ def test_one_multiplier_a_light():
             "blinn": plain + 18 * lights,
         }
         if lights == 1:
-            assert multipliers["blinn_table"] == 14
+            assert multipliers["blinn_table"] == 17
 
 
 def test_latency_and_rate_are_those_of_cosquad():

@@ -58,7 +58,8 @@ def intervals():
         choice = unit_of(METHODS[method]).setup_intervals(METHODS[method])
         if method in ("linear", "quadratic", "angular", "chord", "recurrence"):
             for interval in choice:
-                marks = () if interval in (choice[0], choice[-1]) else pytest.mark.long
+                quick = interval in (choice[0], choice[-1]) and method in ("quadratic", "chord")
+                marks = () if quick else pytest.mark.long
                 yield pytest.param(method, interval, marks=marks)
         yield method, None
 
@@ -102,7 +103,12 @@ def test_cycles(method, interval):
 
 @pytest.mark.parametrize("lights", [1, pytest.param(3, marks=pytest.mark.long)])
 @pytest.mark.parametrize(
-    ("method", "latency", "interval"), [("quadratic", 94, 4), ("renormalise", 66, 4), ("chord", 58, 3)]
+    ("method", "latency", "interval"),
+    [
+        pytest.param("quadratic", 94, 4, marks=pytest.mark.long),
+        pytest.param("renormalise", 66, 4, marks=pytest.mark.long),
+        ("chord", 58, 3),
+    ],
 )
 def test_cycles_of_long_spans(method, latency, interval, lights):
     """Spans that the register slice holds ready cost their length alone."""

@@ -150,7 +150,7 @@ def test_camera_inside(exponent):
     """In the tube of a torus, at a wall that crosses the near plane."""
     camera = Camera((1.0, 0.0, 0.05), (0.4, 0.1, 1.0), projection="perspective", field_of_view=80.0)
     errors, _ = held(scene_of(MESHES["coarse torus"], camera, exponent), preset("chord"))
-    assert np.quantile(errors, 0.999) <= 1.0
+    assert errors.max() <= 1.0
 
 
 def test_caster_finds_a_wrong_curve():

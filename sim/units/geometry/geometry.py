@@ -12,7 +12,7 @@ __all__ = ["RECORD"]
 
 
 def _spans(unit, case):
-    return Geometry(unit.grid).compute(Triangles(**case.beats), frame_of(case.constants))
+    return Geometry(unit.grid, unit.lines).compute(Triangles(**case.beats), frame_of(case.constants))
 
 
 def _small(unit, rng, count):
@@ -41,6 +41,8 @@ RECORD = Record(
     variants={
         "": Variant(GeometryUnit),
         "compact": Variant(partial(GeometryUnit, compact=True)),
+        "true lines": Variant(partial(GeometryUnit, lines=True)),
+        "two lanes": Variant(partial(GeometryUnit, setups=2), long=True),
         "4 fraction bits": Variant(partial(GeometryUnit, Grid(4)), long=True),
     },
     expect=lambda unit, case: _spans(unit, case)[0].beats,

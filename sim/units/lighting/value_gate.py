@@ -9,6 +9,7 @@ from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.lighting.value_gate import ValueGateUnit
@@ -20,6 +21,9 @@ __all__ = ["RECORD", "parabolas_near"]
 
 EXPONENT = 60
 """Exponent of a run that needs but one."""
+
+THRESHOLD = "2 lights, threshold"
+"""Variant that takes a threshold in place of the exponent."""
 
 FORMAT = ChordSetup.HIGHLIGHT_FORMAT
 
@@ -70,16 +74,18 @@ def _measure(rng, count):
     return Decisions.joined(samples())
 
 
-def _exponent(unit, case):
-    return unit.exponent or case.constants
-
-
 def _expect(unit, case):
-    lit = unit.parameters.compute(case.beats, _exponent(unit, case))
+    p = unit.parameters
+    if unit.takes_threshold:
+        lit = p.compute_by(case.beats, Fixed(p.THRESHOLD_FORMAT, np.int64(case.constants)))
+    else:
+        lit = p.compute(case.beats, unit.exponent or case.constants)
     return lit @ (1 << np.arange(unit.lights))
 
 
 def _case(unit, values, exponent):
+    if unit.takes_threshold:
+        return Case(values, int(unit.parameters.thresholds.codes[exponent]))
     return Case(values, exponent if unit.exponent is None else None)
 
 
@@ -122,6 +128,16 @@ def _borders(unit, rng, count):
     return _case(unit, np.stack([left, (left + right - bulge) // 2, right], axis=-1), unit.exponent or 1000)
 
 
+def _thresholds(unit, rng, count):
+    """Thresholds of no exponent, the least and the largest word among them, and the least u about them."""
+    format = unit.parameters.THRESHOLD_FORMAT
+    code = rng.choice([0, 1, format.max_code, rng.integers(format.max_code), 1 << rng.integers(format.width)])
+    nearest = min(code * format.step / 2, 2.0)
+    spread = rng.choice([1e-3, 2 * FORMAT.step])
+    values = parabolas_near(rng, nearest + rng.normal(size=count * unit.lights) * spread)
+    return Case(values.reshape(count, unit.lights, 3), int(code))
+
+
 def _variants():
     yield (
         "cosquad",
@@ -140,6 +156,7 @@ def _variants():
         yield name, Variant(partial(ValueGateUnit, ValueGate(specular)), long=True)
     yield "3 lights", Variant(partial(ValueGateUnit, None, 3))
     yield "2 lights, exponent 60", Variant(partial(ValueGateUnit, None, 2, exponent=60))
+    yield THRESHOLD, Variant(partial(ValueGateUnit, None, 2, takes_threshold=True))
 
 
 RECORD = Record(
@@ -153,6 +170,7 @@ RECORD = Record(
         "exponents": Stimulus(_exponents, 600, stalled=False, repeats=40),
         "last bits": Stimulus(_last_bits, 3000, stalled=False, repeats=40),
         "borders": Stimulus(_borders, 3000, stalled=False),
+        "thresholds": Stimulus(_thresholds, 300, stalled=False, repeats=20, variants=(THRESHOLD,)),
     },
     axis="n u in the middle of the span",
     logarithmic=True,

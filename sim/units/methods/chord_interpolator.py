@@ -10,6 +10,7 @@ from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Operands
+from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE, ONE_SQUARED, quantise
 from blysk.golden.reference.geometry import normalise
@@ -80,17 +81,17 @@ def _chord(normals, halfway):
     return dot(difference, difference) / 2
 
 
-def gated(lights: int, exponent: int | None = None) -> ValueGateUnit:
+def gated(lights: int, exponent: int | None = None, *, takes_threshold: bool = False) -> ValueGateUnit:
     """Gate of an interpolator.
 
     Parameters
     ----------
     lights : int
         Number of lights.
-    exponent : int or None
+    exponent, takes_threshold
         As for `ValueGateUnit`.
     """
-    return ValueGateUnit(ValueGate(), lights, exponent=exponent)
+    return ValueGateUnit(ValueGate(), lights, exponent=exponent, takes_threshold=takes_threshold)
 
 
 def _variant(lights=1, fraction_bits=46, long=True, **build):
@@ -106,18 +107,25 @@ class _Gated:
 
     def __call__(self):
         lights, exponent, build = self.arguments
-        return ChordInterpolatorUnit(_CHORD, lights, gate=gated(lights, exponent), **build)
+        gate = gated(lights, exponent, takes_threshold=build.get("takes_threshold", False))
+        return ChordInterpolatorUnit(_CHORD, lights, gate=gate, **build)
 
 
 # Expected results.
 
 
 def gated_beats(
-    unit: Component, operands: Operands, values: SpanValues, length: np.ndarray, exponent: int
+    unit: Component,
+    operands: Operands,
+    values: SpanValues,
+    length: np.ndarray,
+    exponent: int,
+    threshold: int | None = None,
 ) -> np.ndarray:
     """Output beats of a unit with these operands, and the decisions of its gate, if it has one.
 
-    A pixel of a span of one or two is decided by its own u, those of a longer span together.
+    A pixel of a span of one or two is decided by its own u, those of a longer span together; by the
+    threshold's code in place of the exponent, if there is one.
     """
     if unit.gate is None:
         return operand_beats(unit, operands)
@@ -125,8 +133,12 @@ def gated_beats(
     u = values.highlight[span].astype(np.int64)
     own = np.where(pixel[:, np.newaxis] == 0, u[..., 0], u[..., 2])
     u = np.where((length[span] < 3)[:, np.newaxis, np.newaxis], own[..., np.newaxis], u)
-    exponent = unit.gate.exponent or exponent
-    return operand_beats(unit, operands, gated=~unit.gate.parameters.compute(u, exponent))
+    gate = unit.gate.parameters
+    if threshold is None:
+        lit = gate.compute(u, unit.gate.exponent or exponent)
+    else:
+        lit = gate.compute_by(u, Fixed(gate.THRESHOLD_FORMAT, np.int64(threshold)))
+    return operand_beats(unit, operands, gated=~lit)
 
 
 def _values(unit, case):
@@ -142,14 +154,17 @@ def _exponent(case):
 def _expect(unit, case):
     values, length = _values(unit, case), case.beats["length"]
     operands = unit.parameters.compute_values(values, length)
-    return gated_beats(unit, operands, values, length, _exponent(case))
+    return gated_beats(unit, operands, values, length, _exponent(case), case.constants.get("threshold"))
 
 
 def _status(unit, case):
     values, length = _values(unit, case), case.beats["length"]
     ends = component_words(case.beats["normal_left"], case.beats["normal_right"])
     exponent = np.full(len(length), _exponent(case))
-    wide = SpanLimit().compute(*ends, values, length, exponent, unit.highlights)
+    threshold = None
+    if unit.takes_threshold:
+        threshold = Fixed(ValueGate.THRESHOLD_FORMAT, np.full(len(length), case.constants["threshold"]))
+    wide = SpanLimit().compute(*ends, values, length, exponent, unit.highlights, threshold)
     if not unit.highlights:
         # Without words of u there is none that does not fit.
         values = SpanValues(values.diffuse, 0 * values.highlight)
@@ -190,6 +205,9 @@ def _case(unit, rng, left, right, length, exponent=None):
     constants = {"lights": light_constants(unit, direction, halfway)}
     if unit.highlights:
         constants["exponent"] = exponent or EXPONENT
+    if unit.takes_threshold:
+        # That of a lobe goes with no exponent.
+        constants["threshold"] = int(ValueGate().thresholds.codes[any_exponent(rng)])
     beats = {"normal_left": left, "normal_middle": _middles(rng, left, right), "normal_right": right}
     return Case(beats | {"length": length}, constants)
 
@@ -258,6 +276,8 @@ RECORD = Record(
         "36 bits, interval 3": _variant(fraction_bits=36, setup_interval=3),
         "gated": Variant(_Gated(1)),
         "2 lights, interval 9, gated, exponent 60": Variant(_Gated(2, 60, setup_interval=9), long=True),
+        "threshold": _variant(long=False, takes_threshold=True),
+        "2 lights, gated, threshold": Variant(_Gated(2, takes_threshold=True), long=True),
     },
     expect=_expect,
     status=_status,

@@ -51,7 +51,8 @@ def _measure(rng, count):
 def _expect(unit, case):
     values, length = values_of(case.beats), case.beats["length"]
     operands = unit.parameters.compute_values(values, length)
-    return gated_beats(unit, operands, values, length, case.constants)
+    constant = {"threshold" if unit.takes_threshold else "exponent": case.constants}
+    return gated_beats(unit, operands, values, length, **{"exponent": 1} | constant)
 
 
 def _status(unit, case):
@@ -63,6 +64,8 @@ def _case(unit, rng, length, values=None, exponent=EXPONENT):
     length = np.maximum(length % (1 << unit.length_bits), 1)
     values = values or any_values(rng, len(length), unit.lights)
     constants = exponent if "constants" in unit.signature.members else None
+    if unit.takes_threshold:
+        constants = int(unit.gate.parameters.thresholds.codes[exponent])
     return Case(value_beats(unit, values, length), constants)
 
 
@@ -108,7 +111,15 @@ class _Gated:
 
     def __call__(self):
         lights, exponent, build = self.arguments
-        return LocalChordInterpolatorUnit(_METHOD, lights, gate=gated(lights, exponent), **build)
+        gate = gated(lights, exponent, takes_threshold=build.get("takes_threshold", False))
+        return LocalChordInterpolatorUnit(_METHOD, lights, gate=gate, **build)
+
+
+_GATED = {
+    "gated": Variant(_Gated(1)),
+    "2 lights, gated, exponent 60": Variant(_Gated(2, 60, setup_interval=6)),
+    "gated, threshold": Variant(_Gated(1, takes_threshold=True)),
+}
 
 
 RECORD = Record(
@@ -126,15 +137,14 @@ RECORD = Record(
         "2 lights, interval 1": options(_METHOD, 2, setup_interval=1),
         "3 lights, interval 6": options(_METHOD, 3, setup_interval=6),
         "no highlights": options(_METHOD, 2, setup_interval=2, highlights=False, length_bits=5),
-        "gated": Variant(_Gated(1)),
-        "2 lights, gated, exponent 60": Variant(_Gated(2, 60, setup_interval=6)),
+        **_GATED,
     },
     expect=_expect,
     status=_status,
     stimuli={
         "spans": Stimulus(_spans, 2000),
         "short spans": Stimulus(_short_spans, 800),
-        "gate": Stimulus(_gate, 500, repeats=4, variants=("gated", "2 lights, gated, exponent 60")),
+        "gate": Stimulus(_gate, 500, repeats=4, variants=tuple(_GATED)),
         "long spans": Stimulus(_long_spans, 60_000, stalled=False),
         "last bits": Stimulus(_last_bits, 8000, stalled=False),
         "corners": of_setup(SETUP),

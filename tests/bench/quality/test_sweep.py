@@ -17,7 +17,7 @@ from blysk.golden.presets import MODELS, preset
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.golden.reference.renderer import shade_spans
+from blysk.golden.reference.renderer import render
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.teapot import teapot
 
@@ -32,11 +32,9 @@ def test_exponents():
 
 @pytest.mark.parametrize(("model", "exponent"), [("cosquad", 1), ("blinn", 30), ("coscos4", 700)])
 def test_reference_is_the_renderer(model, exponent):
-    """Worked out once a mesh, the exact frame is that which the golden renderer draws from the spans."""
+    """Worked out once a mesh, the exact frame is that which the golden renderer draws."""
     frame = Frame(teapot(1000), 96, 72)
-    image = shade_spans(
-        frame.scene_of(exponent), frame.raster, "normalised", REFLECTION_MODELS[model]
-    ).reshape(-1, 3)
+    image = render(frame.scene_of(exponent), model=REFLECTION_MODELS[model]).image.reshape(-1, 3)
     shown = frame.raster.pixel[frame.raster.visible]
     assert len(shown) == frame.pixels > 1500
     np.testing.assert_allclose(frame.golden(model, exponent), 255 * image[shown], rtol=0, atol=1e-9)
@@ -126,12 +124,18 @@ def test_other_scenes():
 
 
 def test_light_from_behind(capsys):
-    """Of the pixels where N·L is about 0 some switch; no other is off."""
-    chosen = ["--models", "cosquad", "--exponents", "1", "--view", "1", "0.2", "0.3"]
-    assert main([STRESS, *chosen, "--light", "-0.3", "0.2", "-1"]) == 0
-    cells = capsys.readouterr().out.splitlines()[2].strip("| ").split(" | ")
-    assert float(cells[4]) <= LARGEST < float(cells[7])
-    assert cells[6] == "0"
+    """Of the pixels where N·L is about 0 some switch by quadratics, none by chords; no other is off."""
+    rows = {}
+    for method in ("quadratic", "chord"):
+        chosen = ["--models", "cosquad", "--exponents", "1", "--view", "1", "0.2", "0.3", "--method", method]
+        assert main([STRESS, *chosen, "--light", "-0.3", "0.2", "-1"]) == 0
+        rows[method] = cells = capsys.readouterr().out.splitlines()[2].strip("| ").split(" | ")
+        assert float(cells[4]) <= LARGEST
+        assert cells[6] == "0"
+    assert rows["chord"][9] == "0"
+    assert float(rows["chord"][7]) <= LARGEST
+    cells = rows["quadratic"]
+    assert float(cells[7]) > LARGEST
     assert 0 < int(cells[9]) < 30
     # The fit's own error, 0.12 of 255 at most, and that of the arithmetic.
     assert float(cells[10]) < 0.12 / 255 + 2**-16

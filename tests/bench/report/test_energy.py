@@ -30,8 +30,8 @@ def test_inner_submodules_count():
         "light_0.specular": 2,
         "light_0.specular.datapath": 4,
         "light_0.diffuse": 8,
-        "interpolator.chord_setup.datapath.reciprocals": 16,
-        "interpolator.chord_accumulator": 32,
+        "interpolator.chord_spans.chord_setup.datapath.reciprocals": 16,
+        "interpolator.chord_spans.chord_accumulator": 32,
         "something": 64,
     }
     found = by_block(toggles)
@@ -73,7 +73,10 @@ def frame(same=True, **toggles):
 
 def test_section():
     quick = tasks(quick=True)
-    off, on = frame(intensity=300, slope=100), frame(intensity=280, slope=100, highlight_gate=40)
+    off, on = (
+        frame(intensity=300, slope=100),
+        frame(intensity=280, slope=100, **{"interpolator.chord_spans.value_gate": 40}),
+    )
     made = section(quick, [[off], [on]])
     assert made.name == "energy"
     [table] = (part for part in made.parts if isinstance(part, Table))

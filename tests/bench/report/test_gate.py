@@ -23,7 +23,6 @@ from blysk.bench.report.gate import (
 )
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
-from blysk.golden.pipeline import Spans
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.toggles import ToggleCounter
@@ -82,12 +81,10 @@ def test_shares_are_those_of_the_pixels(model, exponent):
 def test_empty_spans_do_not_count():
     design = preset("chord")
     spans, constants = frame(design, 300, 50, 40, 30)
-    fields = {name: getattr(spans, name) for name in ("x", "y", "length", "normal_left", "normal_right")}
-    longer = Spans(**{name: np.repeat(codes, 2, axis=0) for name, codes in fields.items()})
+    longer = spans[np.repeat(np.arange(len(spans)), 2)]
     longer.length[1::2] = 0
     assert shares_of(design, longer, constants) == shares_of(design, spans, constants)
-    nothing = Spans(**{name: codes[:0] for name, codes in fields.items()})
-    assert shares_of(design, nothing, constants) == Shares(*[0] * 8)
+    assert shares_of(design, spans[:0], constants) == Shares(*[0] * 8)
 
 
 @pytest.mark.long
@@ -137,9 +134,9 @@ def test_activity_counts_every_register_once():
 
     assert named(found.pipeline) == set(paths)
     assert named(found.specular) == {"light_0.specular", "light_0.specular.datapath"}
-    gate_paths = {"highlight_gate", "highlight_gate.datapath", "highlight_gate.datapath.thresholds"}
-    fifos = {"undecided", "lengths", "decisions"}
-    assert named(found.gate) == gate_paths | fifos | {f"{name}.storage" for name in fifos}
+    inside = "interpolator.chord_spans"
+    gate_paths = {f"{inside}.value_gate{part}" for part in ("", ".datapath", ".datapath.thresholds")}
+    assert named(found.gate) == gate_paths | {f"{inside}.decisions", f"{inside}.decisions.storage"}
 
 
 SHARES = Shares(100, 1000, 40, 500, 45, 600, 700, 100)

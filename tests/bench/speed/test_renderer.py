@@ -1,3 +1,4 @@
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,7 +28,10 @@ def test_report_and_exit_status(monkeypatch, capsys):
     monkeypatch.setattr(
         renderer, "vtk_image", lambda scene: (lambda: np.zeros((12, 16, 3), np.uint8), "nothing")
     )
+    # What this process has does not count.
+    held = np.ones(2**28, dtype=np.uint8)
     assert renderer.main(triangles=100, width=16, height=12, repeats=1) == 0
+    del held
     report = capsys.readouterr().out
     for part in (
         "16x12",
@@ -39,6 +43,8 @@ def test_report_and_exit_status(monkeypatch, capsys):
         "mean",
     ):
         assert part in report
+    (memory,) = re.findall(r"golden: (\d+) MiB", report)
+    assert 30 < int(memory) < 256
     monkeypatch.setattr(renderer, "LONGEST_SECONDS", 0.0)
     assert renderer.main(triangles=100, width=16, height=12, repeats=1) == 1
     assert "missed: phong took" in capsys.readouterr().out

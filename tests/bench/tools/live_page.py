@@ -9,7 +9,7 @@ import numpy as np
 from blysk.bench.tools import web_data
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.frame import frame_buffer
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.prepare import PreparedFrame
 from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.probes import ObservedPipeline
 from blysk.sim.engines.simulate import simulate
@@ -75,7 +75,8 @@ def prepared(state):
     """Scene, design and spans of the page's settings."""
     design = web_data.design_of(state["method"], state["model"])
     band = next(most for most in web_data.BANDS if state["exponent"] <= most)
-    return web_data.scene_of(state), design, prepare(web_data.scene_of(state | {"exponent": band}), design)
+    cut, spans = web_data.spans_of(state["mesh"], state["view"], band, design)
+    return web_data.scene_of(state), design, PreparedFrame(cut, cut, 0, spans)
 
 
 UNITS = {}

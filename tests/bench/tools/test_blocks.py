@@ -15,7 +15,6 @@ from blysk.golden.cosines.arccos import Arccos
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
-from blysk.golden.cosines.local_chord_setup import LocalChordSetup
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
 from blysk.golden.geometry.gradient_setup import GradientSetup
@@ -52,7 +51,9 @@ PARTS = {
     "InterpolatorUnit": "base class of methods",
     "NormalInterpolatorUnit": "base class of methods that find normals",
     "ChordAccumulatorUnit": "difference accumulators, in the chord interpolator",
-    "ChordDifferencesUnit": "base class of chord setups",
+    "ChordSpansUnit": "three values a span and their differences, in the chord interpolator",
+    "LineAccumulatorUnit": "difference accumulators, in the renormalising interpolator",
+    "LineAdapterUnit": "true lines of spans, in the render unit",
     "SlopeUnit": "in every specular unit",
 }
 # What the units state of themselves: latency, interval, multipliers, bits of ROM.
@@ -67,12 +68,12 @@ STATED = {
     ("recurrence", "reinsch"): (3, 4, {"18x18": 2}, 0),
     ("recurrence", "direct"): (3, 3, {"18x18": 2}, 0),
     ("recurrence", "reinsch, interleaved"): (3, 1, {"18x18": 2}, 0),
-    ("chord_setup", "interval 4"): (55, 4, {"18x18": 7}, 2048 * 17),
+    ("chord_setup", "interval 3"): (24, 3, {"18x18": 3}, 2048 * 17),
     ("intensity", "1 light, compact"): (11, 6, {"17x17": 1}, 0),
 }
 WHOLE = {
     ("pipeline", "quadratic, cosquad"): (94 + 2, 1, {"18x18": 11, "17x17": 8}, 34816 + 17408),
-    ("pipeline", "chord, cosquad"): (77, 1, {"18x18": 7, "17x17": 8}, 34816 + 17408),
+    ("pipeline", "chord, cosquad"): (60, 1, {"18x18": 10, "17x17": 8}, 34816 + 17408),
 }
 # Units with every kind of cell that are quickly measured.
 FEW_ENTRIES = [
@@ -157,6 +158,7 @@ def test_json_equals_the_table_of_all(tmp_path):
     check_stated(check_json_equals_the_table(ENTRIES, tmp_path), STATED | WHOLE)
 
 
+@pytest.mark.long
 def test_rows_do_not_depend_on_each_other_or_on_the_number_of_processes():
     few = [entry_of("gpq", ""), entry_of("diffuse", ""), entry_of("chord", "")]
     lines = list(rows(few, 1000, 5))
@@ -276,35 +278,38 @@ def specular_bounds(variant):
 
 def interpolator_bounds(method):
     p = METHODS[method]
+    if p.takes_line:
+        # The true line, at 120 degrees and lengths of 1 to 4: as near to 0 as one of 158 of equal ones.
+        return 0, p.operand_error(4095, 158.5)
     # At 45 degrees: a straight line's length; slerp against normalised, 0.46 degrees; a quadratic against
-    # slerp; of the chord method, which ends at half the angle, an eighth of that. Straight parts of an arc
-    # are too short by the threshold.
+    # slerp. Straight parts of an arc are too short by the threshold.
     slerp = np.radians(0.46) + 5e-5
     model = {"linear": 0.0765, "normalised": 1e-12, "slerp": slerp, "quadratic": slerp + 3.95e-3}[p.CURVE]
     if method == "bisection":
         model = slerp + p.threshold
-    if method == "chord":
-        model /= 7.9
     return model, p.highlight_excess + 3 * CODE_LENGTH_ERROR
 
 
 def chord_setup_bounds(_):
-    setup = ChordSetup()
-    return 0, max(
-        error(setup.MAX_ANGLE) for error in (setup.highlight_error, setup.diffuse_error)
-    ) / ONE_VALUE
-
-
-def local_chord_setup_bounds(_):
     # The largest P and G that are not flagged.
-    size = 0.5, 0.125
-    return 0, max(LocalChordSetup.highlight_error(*size), LocalChordSetup.diffuse_error(*size)) / ONE_VALUE
+    setup = ChordSetup()
+    slope, curvature = (
+        2.0 ** (word.integer_bits - 1) for word in (setup.DIFFUSE_SLOPE_FORMAT, setup.CURVATURE_FORMAT)
+    )
+    error = max(setup.highlight_error(slope, curvature), setup.diffuse_error(slope, curvature))
+    return 0, error / ONE_VALUE
+
+
+def chord_interpolator_bounds(_):
+    # A quadratic through three true values is off by 0.0481/6 of the third derivative: of a cosine of 15
+    # degrees psi^3, thrice that with a line's angle, which ends 5 % apart in length make half more.
+    return 4.5 * 0.0481 / 6 * np.radians(15) ** 3, METHODS["chord"].operand_error(4095, 15)
 
 
 def local_chord_interpolator_bounds(_):
     # Normals turn by 15 degrees, L and H by up to 10: a quadratic through three values of a cosine is off by
     # 0.0481/6 of the third power, 6.7e-4; that the angle does not grow evenly adds to it.
-    return 1.2 * 0.0481 / 6 * np.radians(25) ** 3, local_chord_setup_bounds(_)[1] + 2.0**-25
+    return 1.2 * 0.0481 / 6 * np.radians(25) ** 3, chord_setup_bounds(_)[1] + 2.0**-25
 
 
 def recurrence_setup_bounds(_):
@@ -324,6 +329,7 @@ def lobe_bounds(name):
 
 
 # Bounds of the model's error and of the arithmetic's, and of the total where it is not their sum.
+RENORMALISED = Renormaliser.LENGTH_ERROR + Renormaliser.DIRECTION_ERROR
 UNIT_VECTOR_ERROR = VectorNormaliser.LENGTH_ERROR + VectorNormaliser.DIRECTION_ERROR
 BOUNDS = {
     "plane_setup": lambda _: (None, None, PlaneSetup.WIDTH_ERROR),
@@ -340,7 +346,7 @@ BOUNDS = {
     "bisection": bisection_bounds,
     "bisection_chain": chain_bounds,
     "adaptive_normaliser": normaliser_bounds,
-    "renormaliser": lambda _: (Renormaliser.ERROR, Renormaliser.ERROR, Renormaliser.ERROR),
+    "renormaliser": lambda _: (None, None, RENORMALISED),
     "arccos": arccos_bounds,
     "half_chord": half_chord_bounds,
     "highlight_cosine": highlight_cosine_bounds,
@@ -359,7 +365,7 @@ BOUNDS = {
     "chord": lambda _: (0, 3**0.5 * 2.0**-16 + 3 * 2.0**-35 + 2.0**-25),
     "chord_setup": chord_setup_bounds,
     "recurrence_setup": recurrence_setup_bounds,
-    "local_chord_setup": local_chord_setup_bounds,
+    "chord_interpolator": chord_interpolator_bounds,
     "local_chord_interpolator": local_chord_interpolator_bounds,
     "lobe": lobe_bounds,
 }

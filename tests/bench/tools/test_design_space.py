@@ -48,13 +48,13 @@ def view(width=40, height=30):
 
 
 def test_candidates_are_the_pipelines_that_they_name():
-    assert Candidate("chord", degree=2, fraction_bits=40).design == preset("chord", terms=2, fraction_bits=40)
+    assert Candidate("chord", fraction_bits=40).design == preset("chord", fraction_bits=40)
     assert Candidate("linear", "exp", 2, "one_minus_cosine").design == preset(
         "linear", "exp", 2, operand="one_minus_cosine"
     )
     assert Candidate("quadratic", degree=2).design.interpolator.middle_normal.fit == "minimax_2"
     assert Candidate("bisection", degree=1).design.interpolator.bisection.degree == 1
-    for method, degree in (("quadratic", 3), ("quadratic-horner", 3), ("bisection", 2), ("chord", 3)):
+    for method, degree in (("quadratic", 3), ("quadratic-horner", 3), ("bisection", 2)):
         assert Candidate(method, degree=degree).design.interpolator == METHODS[method]
 
 
@@ -68,7 +68,7 @@ def test_another_degree_keeps_the_operand():
     [
         {"method": "linear", "degree": 2},
         {"method": "quadratic", "degree": 1},
-        {"method": "chord", "degree": 4},
+        {"method": "chord", "degree": 3},
         {"method": "linear", "fraction_bits": 46},
         {"method": "chord", "fraction_bits": 41},
         {"method": "angular", "operand": "cosine"},
@@ -76,7 +76,7 @@ def test_another_degree_keeps_the_operand():
     ],
 )
 def test_impossible_candidates_are_refused(values):
-    with pytest.raises(ValueError, match=r"method|fraction_bits|terms"):
+    with pytest.raises(ValueError, match=r"method|fraction_bits"):
         Candidate(**values)
 
 
@@ -91,9 +91,9 @@ def test_sweep_has_every_design_once_and_counts_the_impossible():
         styles=("compact",),
     )
     found, impossible = sweep.candidates()
-    assert len(set(found)) == len(found) == 4 * (2 + 1 + 2 * 3 + 2)
+    assert len(set(found)) == len(found) == 4 * (2 + 1 + 3 + 2)
     assert impossible == {
-        "angular, chord: finds no normals, and gives 1 - cos gamma": 4 * (1 + 2 * 3),
+        "angular, chord: finds no normals, and gives 1 - cos gamma": 4 * (1 + 3),
         "quadratic: has no polynomial of degree 1": 4 * 2,
     }
     assert {one.style for one in found} == {"compact"}
@@ -112,8 +112,8 @@ def test_every_method_is_in_the_default_sweep():
     [
         (Candidate("linear"), True),
         (Candidate("quadratic", "exp", 2, "one_minus_cosine", 3, style="compact"), True),
-        (Candidate("chord", degree=3, fraction_bits=46), True),
-        (Candidate("chord", "cosquad7", 2, None, 2, 40, "compact"), False),
+        (Candidate("chord", fraction_bits=46), True),
+        (Candidate("chord", "cosquad7", 2, None, None, 40, "compact"), False),
         (Candidate("quadratic", operand="one_minus_cosine", degree=2), False),
         (Candidate("bisection", degree=1), False),
         (Candidate("recurrence-direct"), False),
@@ -147,10 +147,10 @@ def test_command_of_a_design_makes_it(candidate, is_plain, monkeypatch, capsys):
 
 
 def test_errors_are_those_of_the_simulated_frame():
-    candidate = Candidate("chord", degree=2, fraction_bits=38)
+    candidate = Candidate("chord", fraction_bits=38)
     (scene,) = explore.scenes_of(view(16, 12), [EXPONENT])
     frame = FrameSimulator(candidate.design, "pysim").render(scene)
-    result = errors_of({"method": "chord", "degree": 2, "fraction_bits": 38}, view(16, 12), EXPONENT)
+    result = errors_of({"method": "chord", "fraction_bits": 38}, view(16, 12), EXPONENT)
     expected = compare(scene, candidate.design, frame)
     for name in ERRORS:
         figures = getattr(expected, f"{name}_error")
@@ -159,12 +159,6 @@ def test_errors_are_those_of_the_simulated_frame():
         }
     assert result["out_of_range_spans"] == frame.out_of_range_spans
     assert sum(length * count for length, count in result["lengths"]) == frame.pixels
-
-
-def test_narrow_polynomials_flag_wide_spans():
-    narrow, usual = (errors_of({"method": "chord", "degree": degree}, view(), EXPONENT) for degree in (1, 3))
-    assert narrow["out_of_range_spans"] > 0
-    assert usual["out_of_range_spans"] == 0
 
 
 def test_several_lights_are_as_bright_as_one_and_all_used():

@@ -131,7 +131,7 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
         (["--json", "missing/folder.json"], "missing/folder.json: cannot be written"),
         (
             ["--methods", "chord", "--operands", "cosine"],
-            "the sweep: holds no possible design, 36 of chord: finds no normals",
+            "the sweep: holds no possible design, 12 of chord: finds no normals",
         ),
     ],
 )
@@ -186,9 +186,9 @@ def test_what_is_given_is_told(monkeypatch):
 def test_impossible_ones_are_told(monkeypatch):
     made_up(monkeypatch)
     output = run("--methods", "chord,quadratic", "--models", "exp", "--styles", "compact").output
-    # chord without a dot product: 3 degrees of 2 words; quadratic without degree 1: 2 operands.
+    # chord without a dot product: 2 words; quadratic without degree 1: 2 operands.
     assert output.startswith(
-        "impossible  8 combinations: 6 of chord: finds no normals, and gives 1 - cos gamma; "
+        "impossible  4 combinations: 2 of chord: finds no normals, and gives 1 - cos gamma; "
         "2 of quadratic: has no polynomial of degree 1\n"
     )
 

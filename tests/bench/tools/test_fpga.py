@@ -91,8 +91,8 @@ def test_designs():
     assert names(fpga._units(gates)) == gates
     forms = names(fpga._units(["quadratic_evaluator"]))
     assert forms == [f"quadratic_evaluator {form}" for form in QUADRATIC_FORMS]
-    full = {"method": "chord", "style": "compact", "setup_interval": 7, "gate": True}
-    whole = "pipeline chord, cosquad, 2 lights, compact, interval 7, gate"
+    full = {"method": "chord", "style": "compact", "setup_interval": 9, "gate": True}
+    whole = "pipeline chord, cosquad, 2 lights, compact, interval 9, gate"
     assert names(fpga._pipelines(full, 2, False)) == [whole]
     assert names(fpga._pipelines({}, 1, True)) == [f"pipeline {m}, cosquad, 1 light" for m in fpga.METHODS]
 
@@ -137,6 +137,7 @@ def test_missing_tools_are_one_line_that_names_the_extra(which, family, capsys, 
     assert errors == f"blysk: fpga: {text}; pip install 'blysk[fpga]'\n"
 
 
+@pytest.mark.long
 @tools
 @pytest.mark.skipif(os.name != "posix", reason="a signal to a process")
 def test_interrupt_leaves_nothing_behind(cache, tmp_path):

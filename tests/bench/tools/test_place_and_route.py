@@ -283,6 +283,7 @@ def period(place):
     return pytest.approx(1000 / place.fmax, rel=1e-3) == place.logic + place.routing
 
 
+@pytest.mark.long
 @tools
 @pytest.mark.parametrize(
     ("family", "kinds"),
@@ -325,6 +326,7 @@ def test_parts_and_times_of_a_product(cache):
         assert 120 < place.fmax < 180
 
 
+@pytest.mark.long
 @tools
 def test_times_of_a_multiplier_with_registers_of_its_own(cache):
     """On Nexus the multiplier is timed between its own registers, and between others."""

@@ -1,36 +1,27 @@
-"""Spans under point lights or a near viewer: three values of each light, cut where a parabola fits."""
+"""Spans with values of each light, cut by error, against float64."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from blysk.golden.frames.cut import cut_local_spans
+from blysk.golden.frames.cut import cut_by_error
 from blysk.golden.frames.local import local_values
 from blysk.golden.frames.prepare import sort_by_material
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
-from blysk.golden.number.unit_vector import ONE
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import Mesh, normalise
-from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.lighting import Light
 from blysk.golden.reference.raster import fragment_normals, rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import fragment_positions, shade_spans
 from blysk.golden.reference.scene import Scene
 from blysk.sim.meshes.teapot import teapot
 
-from .test_cut import origins
+from .cuts import METHOD, ONE_VALUE, exact_operands, line_at, material, origins
 
-METHOD = LocalChordInterpolator()
-ONE_VALUE = (ONE / 2**17) ** 2
 CENTRE = np.array([0.0, 1.575, 0.0])
-
-
-def material(exponent):
-    return Material((0.1,) * 3, (0.7,) * 3, (0.6,) * 3, exponent)
 
 
 def lit_teapot(exponent, triangles=1000, viewer="near"):
@@ -50,28 +41,10 @@ def floor(lamps, exponent=50, viewer="near", eye=(0, 1.5, 5)):
     return Scene(mesh, camera, 320, 200, material(exponent), lights, back_faces="show", viewer=viewer)
 
 
-def exact_operands(scene, raster):
-    """N·L and u of every fragment, each vector normalised there."""
-    span = raster.span
-    t = raster.offset / np.maximum(raster.length[span] - 1, 1)
-    normal = interpolate("normalised", raster.normal_left[span], raster.normal_right[span], t)
-    point = fragment_positions(scene, raster, np.arange(len(span)))
-    viewer = scene.camera.position - point if scene.viewer == "near" else scene.camera.viewer
-    viewer = viewer / np.linalg.norm(viewer, axis=-1, keepdims=True)
-    cosine, u = [], []
-    for light in scene.lights:
-        towards = light.direction if light.position is None else light.position - point
-        towards = normalise(np.broadcast_to(towards, point.shape))
-        halfway = normalise(towards + viewer)
-        cosine.append((normal * towards).sum(axis=1))
-        u.append(((normal - halfway) ** 2).sum(axis=1) / 2)
-    return np.stack(cosine, axis=1), np.stack(u, axis=1)
-
-
 def local_errors(scene, by_material=False):
     """Errors in LSB of full reflection over all fragments and lights, diffuse and specular; the cut spans."""
     raster = rasterise(scene)
-    cut, count = cut_local_spans(scene, raster)
+    cut, count = cut_by_error(scene, raster, METHOD)
     if by_material:
         cut = sort_by_material(cut, scene.mesh.material)
     values = local_values(scene, cut)
@@ -119,8 +92,8 @@ def test_local_operands_of_the_teapot(exponent, triangles):
     )
     assert count > 0
     assert np.count_nonzero(expected > 0.1) > 20
-    assert 0.05 < diffuse <= METHOD.DIFFUSE_BUDGET + 0.01
-    assert 0.05 < specular <= METHOD.HIGHLIGHT_BUDGET + 0.05
+    assert 0.03 < diffuse <= METHOD.DIFFUSE_BUDGET + 0.01
+    assert 0.03 < specular <= METHOD.HIGHLIGHT_BUDGET + 0.05
 
 
 LAMPS = {
@@ -164,8 +137,8 @@ def test_a_light_behind_cuts_nothing_but_what_turns():
     """Where N·L stays negative the light gives nothing, however badly the quadratics fit."""
     scene = floor([(0.5, -9.0, 0.5)], 10, "distant")
     above = replace(scene, lights=(Light(position=(0.5, 9.0, 0.5)),))
-    fine, _ = cut_local_spans(above, rasterise(scene))
-    cut, _ = cut_local_spans(scene, rasterise(scene))
+    fine, _ = cut_by_error(above, rasterise(scene), METHOD)
+    cut, _ = cut_by_error(scene, rasterise(scene), METHOD)
     operands = METHOD.compute_values(local_values(scene, cut), cut.length)
     assert (operands.cosine.codes < 0).all()
     assert len(cut.length) < 0.8 * len(fine.length)
@@ -174,7 +147,7 @@ def test_a_light_behind_cuts_nothing_but_what_turns():
 def test_local_cut_keeps_fragments():
     scene = lit_teapot(50, 100)
     raster = rasterise(scene)
-    cut, count = cut_local_spans(scene, raster)
+    cut, count = cut_by_error(scene, raster, METHOD)
     assert count == np.count_nonzero(np.bincount(origins(raster, cut)[0]) > 1)
     for name in ("pixel", "visible"):
         assert np.array_equal(getattr(cut, name), getattr(raster, name))
@@ -185,19 +158,15 @@ def test_local_cut_keeps_fragments():
     everything = np.arange(len(raster.span))
     points = (fragment_positions(scene, r, everything) for r in (raster, cut))
     assert np.abs(np.subtract(*points)).max() < 1e-12
-    curve = interpolate(
-        "normalised",
-        raster.normal_left[raster.span],
-        raster.normal_right[raster.span],
-        raster.offset / np.maximum(raster.length[raster.span] - 1, 1),
-    )
+    t = raster.offset / np.maximum(raster.length[raster.span] - 1, 1)
+    curve = normalise(line_at(raster, raster.span, t))
     assert np.abs(fragment_normals(scene, cut, everything) - curve).max() < 1e-12
 
 
 def test_local_values_by_hand():
     """Of one span: first, middle and last, rounded to codes in units of ONE_SQUARED."""
     scene = floor([(0.5, 0.4, 0.5), (-1, 2, 1)])
-    cut, _ = cut_local_spans(scene, rasterise(scene))
+    cut, _ = cut_by_error(scene, rasterise(scene), METHOD)
     values = local_values(scene, cut)
     span = int(np.argmax(cut.length))
     length = int(cut.length[span])
@@ -225,7 +194,7 @@ def test_local_values_by_hand():
 def test_short_local_spans_do_not_bend():
     """A span of one pixel has one value, one of two the mean in the middle."""
     scene = lit_teapot(1000, 1000)
-    cut, _ = cut_local_spans(scene, rasterise(scene))
+    cut, _ = cut_by_error(scene, rasterise(scene), METHOD)
     values = local_values(scene, cut)
     for codes in values:
         alone, pairs = codes[cut.length == 1], codes[cut.length == 2]
@@ -238,7 +207,7 @@ def test_short_local_spans_do_not_bend():
 def test_a_pipeline_of_more_lights():
     """The lights that the scene has not are dark in every pixel."""
     scene = lit_teapot(10, 100)
-    cut, _ = cut_local_spans(scene, rasterise(scene))
+    cut, _ = cut_by_error(scene, rasterise(scene), METHOD)
     three, five = local_values(scene, cut), local_values(scene, cut, 5)
     for a, b in zip(three, five, strict=True):
         assert np.array_equal(a, b[:, :3])
@@ -248,11 +217,11 @@ def test_a_pipeline_of_more_lights():
 
 def test_no_light_and_no_span():
     scene = replace(lit_teapot(10, 100), lights=())
-    cut, count = cut_local_spans(scene, rasterise(scene))
+    cut, count = cut_by_error(scene, rasterise(scene), METHOD)
     assert local_values(scene, cut).diffuse.shape == (len(cut.length), 0, 3)
     assert count == np.count_nonzero(np.bincount(origins(rasterise(scene), cut)[0]) > 1)
     empty = replace(scene, mesh=replace(scene.mesh, faces=scene.mesh.faces[:0], material=None))
-    cut, count = cut_local_spans(empty, rasterise(empty))
+    cut, count = cut_by_error(empty, rasterise(empty), METHOD)
     assert (count, len(cut.length), len(local_values(empty, cut).diffuse)) == (0, 0, 0)
 
 
@@ -262,7 +231,7 @@ def test_local_results_do_not_depend_on_the_chunks(monkeypatch):
     results = []
     for chunk in (1 << 16, 97):
         monkeypatch.setattr("blysk.golden.frames.local.CHUNK", chunk)
-        cut, count = cut_local_spans(scene, raster)
+        cut, count = cut_by_error(scene, raster, METHOD)
         results.append((cut.length, count, *local_values(scene, cut)))
     for a, b in zip(*results, strict=True):
         assert np.array_equal(a, b)

@@ -122,10 +122,8 @@ def test_stiff_normals_of_wrong_length_by_other_methods(method):
 @pytest.mark.parametrize(
     ("method", "operand", "short", "long"),
     [
-        ("renormalise", None, True, False),
         ("bisection", None, True, False),
         ("quadratic", "one_minus_cosine", True, False),
-        ("chord", None, True, False),
         ("angular", None, False, True),
         ("recurrence", None, False, True),
     ],
@@ -133,13 +131,12 @@ def test_stiff_normals_of_wrong_length_by_other_methods(method):
 def test_stiff_normals_of_wrong_length_lose_highlights(method, operand, short, long):
     """Where the gate does not hold for lengths off by 1/256: these methods count on unit normals.
 
-    The gate goes by the N.H of the codes. A renormaliser or a bisection makes short normals longer, and a
-    chord does not feel that they are short: a pixel is up to 1/256 nearer to H than the gate knows. Too long
-    ones make the angle of a chord wider than that of the dot product. The other way round nothing is lost,
-    nor with unit normals.
+    The gate goes by the N.H of the codes. A bisection makes short normals longer: a pixel is up to 1/256
+    nearer to H than the gate knows. Too long ones make the angle of a half chord wider than that of the dot
+    product. The other way round nothing is lost, nor with unit normals.
     """
     # One call a span costs more than arithmetic.
-    count = 120 if method in ("angular", "recurrence", "chord") else 4000
+    count = 120 if method in ("angular", "recurrence") else 4000
     threshold = np.sqrt(HighlightGate().thresholds.values[100])
     for scale, loses in ((1 - 1 / 256, short), (1.0, False), (1 + 1 / 256, long)):
         rng = np.random.default_rng(14)

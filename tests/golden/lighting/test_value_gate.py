@@ -79,7 +79,7 @@ def test_every_exponent_at_its_threshold(name):
     """Three equal values, at the threshold and a code less: not lit and dark; lit."""
     gate = GATES[name]
     for exponent in range(1, 1001):
-        code = -(-gate.thresholds.codes[exponent].item() // 2)
+        code = -(-gate.thresholds[exponent].extend(gate.LEVEL_FORMAT).codes.item() // 2)
         if code > FORMAT.max_code:
             continue
         u = np.full((2, 3), code)
@@ -92,7 +92,7 @@ def test_every_exponent_at_its_threshold(name):
 def test_every_small_parabola(exponent):
     """All bulges and rises of some codes about the threshold, at lengths of 3 to 20 pixels and long ones."""
     gate = ValueGate()
-    code = gate.thresholds.codes[exponent].item() // 2
+    code = gate.thresholds[exponent].extend(gate.LEVEL_FORMAT).codes.item() // 2
     left, bulge, rise = (grid.ravel() for grid in np.mgrid[-24:25, -16:17, -8:9])
     left = code + left
     right = left + rise
@@ -153,7 +153,7 @@ def test_what_is_not_held_is_lit():
 
 @pytest.mark.parametrize("exponent", [10, 100, 1000])
 def test_few_dark_spans_are_lit(exponent):
-    """Of spans whose least u is over 1.05 times the last lit one none is lit; straight ones from 1.001 on."""
+    """Of spans whose least u is over 1.05 times the last lit one none is lit; straight ones a step on."""
     gate, rng = ValueGate(), np.random.default_rng(exponent)
     last = (gate.specular.last_lit_arguments[exponent] + 1) * 2.0**-25
     least = last * rng.uniform(1.05, 1.5, 4000)
@@ -161,7 +161,9 @@ def test_few_dark_spans_are_lit(exponent):
     held = np.abs(u[:, 2] - u[:, 0]) < ValueGate.LARGEST_RISE
     assert held.mean() > 0.7
     assert not gate.compute(u[held], exponent).any()
-    straight = np.rint(np.full((1, 3), last * 1.001 + 2e-6) / FORMAT.step).astype(np.int64)
+    straight = np.rint(
+        np.full((1, 3), last * 1.001 + 2e-6 + ValueGate.THRESHOLD_FORMAT.step / 2) / FORMAT.step
+    ).astype(np.int64)
     assert not gate.compute(straight, exponent).any()
 
 

@@ -81,9 +81,9 @@ def test_command_line_prints_and_writes_the_same(frame, tmp_path, capsys):
 
 
 def test_design_and_verilog(capsys):
-    design = blysk.design(method="chord", lights=2, materials=3, gate=True, style="compact", setup_interval=7)
-    build = Build(style="compact", setup_interval=7)
-    assert design == preset("chord", lights=2, materials=3, gate=True, style="compact", setup_interval=7)
+    design = blysk.design(method="chord", lights=2, materials=3, gate=True, style="compact", setup_interval=9)
+    build = Build(style="compact", setup_interval=9)
+    assert design == preset("chord", lights=2, materials=3, gate=True, style="compact", setup_interval=9)
     assert design.build == build
     assert blysk.design() == preset() == blysk.Design()
     assert main(["verilog", "--method", "linear", "--name", "core"]) == 0
@@ -173,7 +173,7 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
         ("teapot", {"target": (1, 2, 3)}, "target 1,2,3: the camera has no position; "),
         ("teapot", {"model": "phong"}, "model phong: the pipeline finds N.H, not R.V; use one of cosquad, "),
         ("teapot", {"method": "chord", "operand": "cosine"}, "operand cosine: method chord finds no normals"),
-        ("teapot", {"viewer": "near"}, "method quadratic: point lights and a near viewer need "),
+        ("teapot", {"viewer": "near"}, "method chord: point lights and a near viewer need "),
         ("teapot", {"short_words": True}, "short_words: nothing is specialised; "),
         ("teapot", {"vcd": "a", "engine": "cxxrtl"}, "vcd: the engine cxxrtl writes no waveforms; "),
         ("no.toml", {}, "no.toml: there is no such file; "),

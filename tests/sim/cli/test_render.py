@@ -83,7 +83,7 @@ def test_figures(rendered):
     figures = json.loads((folder / "a.json").read_text())
     fixed = {
         "mesh": "teapot",
-        "method": "quadratic",
+        "method": "chord",
         "model": "cosquad",
         "exponent": 50,
         "lights": 1,

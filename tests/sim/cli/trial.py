@@ -209,7 +209,7 @@ def _simulate_by_model() -> None:
         def render(self, scene, progress=None, vcd=None):
             frame = model_frame(scene, self.design)
             seconds = {"raster": 1.0, "simulate": 1.0}
-            return SimulatedFrame(frame.image, frame.prepared, frame.out_of_range_spans, seconds, 1, "model")
+            return SimulatedFrame(**vars(frame) | {"seconds": seconds}, cycles=1, engine="model")
 
     blysk.sim.api.render.FrameSimulator = Stub
 

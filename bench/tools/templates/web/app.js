@@ -463,7 +463,6 @@ const blysk = (() => {
   function exactValues({ spans, from, settings, model, curve, chord, trace, design }) {
     const { one } = site.tables;
     const normal = [0, 0, 0];
-    const line = [0, 0, 0];
     const shade = core.shader(settings, settings.viewer, model, chord);
     const terms = core.termsOf(settings);
     const slope = model.slopes?.[settings.exponent - 1];
@@ -475,7 +474,6 @@ const blysk = (() => {
         const span = spans.span[fragment];
         const t = (fragment - spans.first[span]) / Math.max(spans.codes.length[span] - 1, 1);
         core.curveOf(curve, spans, span, one, normal)(t);
-        core.curveOf("linear", spans, span, one, line)(t);
         const { cosine, highlight, diffuse, specular, color } = shade(normal);
         const away = 1 - highlight;
         const product = cosine > 0 && slope !== undefined && slope * away < 1 ? slope * away : null;
@@ -483,7 +481,6 @@ const blysk = (() => {
         const power = (exponent) => (base === null ? null : base ** exponent);
         found.set(n, {
           ...{ normal_x: normal[0], normal_y: normal[1], normal_z: normal[2] },
-          ...{ line_x: line[0], line_y: line[1], line_z: line[2] },
           ...{ cosine, highlight_cosine: highlight, one_minus_cosine: away },
           ...{ product, base, base_2: power(2), base_4: power(4), base_8: power(8), diffuse, specular },
           red_diffuse: 255 * diffuse * terms.diffuse[0],

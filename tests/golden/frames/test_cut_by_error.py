@@ -1,0 +1,186 @@
+"""Cutting spans by error: the method's own curve against float64, every pixel."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blysk.golden.cosines.span_limit import SpanLimit
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.cut import cut_by_angle, cut_by_error, cut_spans
+from blysk.golden.frames.local import middle_normals
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, quantise
+from blysk.golden.presets import METHODS, preset
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.lighting import Light
+from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.golden.reference.scene import Scene
+
+from .cuts import METHOD, ONE_VALUE, angles, exact_operands, material, origins, raster_of
+
+EXPONENTS = (1, 2, 10, 50, 100, 300, 1000)
+
+
+def lit_spans(rng, normal_pairs, count, angle, longest, spread, lights=2):
+    """Spans anywhere under distant lights, each of one of the exponents; half near the H of a light."""
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    faces = len(EXPONENTS)
+    mesh = Mesh(
+        corners, np.tile([0, 1, 2], (faces, 1)), np.tile([0.0, 0, 1], (3, 1)), material=np.arange(faces)
+    )
+    camera = Camera((0, 0, 5), (0, 0, 0))
+    ways = normalise(rng.normal(size=(lights, 3)) + np.array([0, 0, 1.5]))
+    scene = Scene(
+        mesh, camera, 64, 64, tuple(material(n) for n in EXPONENTS), tuple(Light(tuple(way)) for way in ways)
+    )
+    left, right = map(normalise, normal_pairs(rng, count, angle))
+    raster = raster_of(rng, left, right, rng.integers(1, longest, count, endpoint=True), spread)
+    raster = replace(raster, triangle=rng.integers(0, faces, count).astype(np.int32))
+    near = normalise(ways + normalise(np.asarray(camera.viewer)))[rng.integers(0, lights, count)]
+    n = np.array(EXPONENTS)[raster.triangle][:, np.newaxis]
+    near = normalise(near + rng.normal(size=near.shape) * np.minimum(1.5 / np.sqrt(n), 0.5))
+    half = np.arange(count) % 2 == 0
+    # The span turned as a whole, so that its left end is near H.
+    turned = normalise(near + (right - left))
+    ends = {
+        "normal_left": np.where(half[:, None], near, left),
+        "normal_right": np.where(
+            (half & (raster.length > 1))[:, None], turned, np.where(half[:, None], near, right)
+        ),
+    }
+    return scene, replace(raster, **ends)
+
+
+def chord_operands(scene, cut):
+    """What the chord method makes of spans, as the pipeline takes them; and its flags."""
+    constants = FrameConstants.of(scene, len(scene.lights))
+    words = (
+        Fixed(COMPONENT, codes)
+        for codes in (
+            *(quantise(v) for v in (cut.normal_left, cut.normal_right)),
+            constants.direction,
+            constants.halfway,
+            quantise(middle_normals(cut)),
+        )
+    )
+    left, right, direction, halfway, middle = words
+    chord = ChordInterpolator()
+    values = chord.values(left, middle, right, direction, halfway)
+    exponent = np.array([m.exponent for m in scene.materials])[scene.mesh.material[cut.triangle]]
+    wide = SpanLimit().compute(left, right, values, cut.length, exponent)
+    return chord.compute_values(values, cut.length), wide
+
+
+def reflected(u, exponent):
+    """Specular terms, each pixel of its own exponent."""
+    terms = np.empty_like(u)
+    for n in EXPONENTS:
+        terms[exponent == n] = REFLECTION_MODELS["cosquad"].reflect(1 - u[exponent == n], n)
+    return terms
+
+
+def moved(exponent):
+    """LSB by which the rounding of N and of H moves a term; N counts 1.25 times in a quadratic."""
+    return 2.25 * 255 * 0.77 * np.sqrt(exponent) * np.sqrt(3) / 2 * COMPONENT.step
+
+
+CASES = {
+    "narrow": (10.0, 40, 0.05),
+    "long": (6.0, 1500, 0.02),
+    "magnitudes": (15.0, 40, 0.5),
+    "needles": (60.0, 12, 1.5),
+    "wide": (179.0, 60, 0.3),
+}
+"""Largest angle, longest span, spread of the lengths of the ends."""
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_errors_of_the_chord_method_are_in_the_budgets(case, normal_pairs):
+    """Every pixel of random true spans, n 1 to 1000: fit, arithmetic, rounding of N and H; no flag at all."""
+    angle, longest, spread = CASES[case]
+    rng = np.random.default_rng(len(case))
+    count = 3000 if longest < 1000 else 150
+    scene, raster = lit_spans(rng, normal_pairs, count, rng.uniform(0, angle, count), longest, spread)
+    cut, spans_cut = cut_by_error(scene, raster, ChordInterpolator())
+    assert spans_cut == np.count_nonzero(np.bincount(origins(raster, cut)[0]) > 1)
+    assert 0 < spans_cut <= count
+    operands, wide = chord_operands(scene, cut)
+    assert not operands.out_of_range.any()
+    assert not wide.any()
+    cosine, u = exact_operands(scene, raster)
+    exponent = np.array(EXPONENTS)[raster.triangle[raster.span]]
+    # Where the light is behind nothing is asked of either.
+    front = cosine > 4 * np.sqrt(3) * COMPONENT.step
+    diffuse = 255 * np.abs(operands.cosine.values / ONE_VALUE - cosine)
+    print(f"{case}: {diffuse[front].max():.3f} LSB, {len(cut.length)} of {count}")
+    assert diffuse[front].max() <= METHOD.DIFFUSE_BUDGET + moved(1)
+    terms = [reflected(value, exponent) for value in (operands.highlight.values / ONE_VALUE, u)]
+    specular = 255 * np.abs(terms[0] - terms[1])
+    assert np.count_nonzero(terms[1][front] > 0.1) > 300
+    for n in EXPONENTS:
+        which = front & (exponent == n)[:, np.newaxis]
+        largest = specular[which].max()
+        print(f"{case}, n = {n}: {largest:.3f} LSB")
+        assert largest <= METHOD.HIGHLIGHT_BUDGET + moved(n)
+    assert specular[front].max() > 0.1
+
+
+@pytest.mark.parametrize("case", ["narrow", "wide"])
+def test_flags_before_the_cut(case, normal_pairs):
+    """Some of the uncut spans are flagged, or wide; of those of up to three pixels none is wide."""
+    angle, longest, spread = CASES[case]
+    rng = np.random.default_rng(3)
+    scene, raster = lit_spans(rng, normal_pairs, 2000, rng.uniform(5, angle, 2000), longest, spread)
+    operands, wide = chord_operands(scene, raster)
+    assert wide.any()
+    assert not wide[raster.length < 4].any()
+    assert operands.out_of_range.any() == (case == "wide")
+    assert not operands.out_of_range[raster.length < 3].any()
+
+
+@pytest.mark.parametrize("method", ["linear", "quadratic", "angular", "chord", "chord-local"])
+def test_cut_by_error_of_every_method(method, normal_pairs):
+    """No part is over the method's angle; one or two pixels stay; the curve is right at its quarters."""
+    rng = np.random.default_rng(7)
+    scene, raster = lit_spans(rng, normal_pairs, 1500, rng.uniform(0, 90, 1500), 50, 0.2)
+    interpolator = METHODS[method]
+    cut, count = cut_by_error(scene, raster, interpolator)
+    assert count > 100
+    assert np.array_equal(cut.pixel, raster.pixel)
+    assert (angles(cut)[cut.length > 1] <= max(map(interpolator.widest_span, EXPONENTS)) + 1e-9).all()
+    if isinstance(interpolator, ChordInterpolator):
+        return
+    # Normals of the method against true ones, at every pixel, by the highlight of the first light.
+    span = cut.span
+    t = cut.offset / np.maximum(cut.length - 1, 1)[span]
+    own = interpolator.exact_normals(cut.normal_left[span], cut.normal_right[span], t)
+    cosine, u = exact_operands(scene, raster)
+    light = scene.lights[0]
+    halfway = normalise(np.asarray(light.direction) + scene.camera.viewer)
+    found = np.square(own - halfway).sum(axis=1) / 2 if interpolator.uses_chord else 1 - own @ halfway
+    exponent = np.array(EXPONENTS)[raster.triangle[raster.span]]
+    terms = [reflected(value, exponent) for value in (found, u[:, 0])]
+    front = cosine[:, 0] > 1e-3
+    error = 255 * np.abs(terms[0] - terms[1])[front]
+    print(f"{method}: {error.max():.3f} LSB, {len(cut.length)} of {len(raster.length)}")
+    assert error.max() <= METHOD.HIGHLIGHT_BUDGET * 1.1
+
+
+def test_cut_spans_chooses(normal_pairs):
+    """By error for methods with a fit, by angle alone for those that hold at every angle."""
+    rng = np.random.default_rng(8)
+    scene, raster = lit_spans(rng, normal_pairs, 300, rng.uniform(0, 120, 300), 30, 0.2)
+    for method, interpolator in METHODS.items():
+        design = preset(method, lights=2, materials=len(EXPONENTS))
+        found, count = cut_spans(scene, raster, design)
+        widest = min(map(interpolator.widest_span, EXPONENTS))
+        expected = (
+            cut_by_error(scene, raster, interpolator)
+            if interpolator.CUT_BY_ERROR
+            else cut_by_angle(raster, widest)
+        )
+        assert count == expected[1]
+        assert np.array_equal(found.length, expected[0].length)
