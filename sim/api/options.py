@@ -31,6 +31,7 @@ __all__ = [
     "RENDERING",
     "SCENE",
     "SLOW_SIZE",
+    "VIEW_WORDS",
     "ColorLike",
     "DesignOptions",
     "Lights",
@@ -170,6 +171,35 @@ class Lights(Value):
         return Light(**parts)
 
 
+class Direction(Vector):
+    """A direction, or a word for one.
+
+    Parameters
+    ----------
+    words : mapping of str
+        What each word stands for: a vector, or itself where other values tell its vector.
+    """
+
+    def __init__(self, words: Mapping[str, str | Triple]):
+        super().__init__("a direction", metavar=f"X,Y,Z|{'|'.join(words)}", direction=True)
+        self.words = words
+        self.remedy = f"give X,Y,Z, a vector other than 0, or one of {', '.join(words)}"
+
+    def parse(self, text):
+        """A word as it is, or numbers with commas between them."""
+        return text if text in self.words else super().parse(text)
+
+    def check(self, value):
+        """A tuple of `float`, or a word that stands for itself."""
+        if isinstance(value, str) and value in self.words:
+            return self.words[value]
+        return super().check(value)
+
+
+VIEW_WORDS = ("front", "back", "left", "right", "top", "bottom")
+_UP_WORDS: dict[str, str | Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
 def shown_key(name: str) -> str:
     """A key of a file in a message."""
     return name if re.fullmatch("[A-Za-z0-9_-]{1,40}", name) else shown(name)
@@ -204,9 +234,10 @@ SCENE: dict[str, Option] = {
         Choice("projection", PROJECTIONS), "perspective", "Of the camera.", "camera.projection"
     ),
     "view": Option(
-        Vector("a direction", direction=True),
+        Direction({word: word for word in VIEW_WORDS}),
         (0.4, 0.5, 1.0),
-        "Direction from the mesh to the viewer: the camera shows all of the mesh.",
+        "Direction from the mesh to the viewer: the camera shows all of the mesh. The words and the default "
+        "turn with --up.",
         "camera.view",
     ),
     "position": Option(
@@ -222,7 +253,10 @@ SCENE: dict[str, Option] = {
         "camera.target",
     ),
     "up": Option(
-        Vector("a direction", direction=True), (0.0, 1.0, 0.0), "Upright in the picture.", "camera.up"
+        Direction(_UP_WORDS),
+        (0.0, 1.0, 0.0),
+        "Upright in the picture: z for most STL files and those of CAD programs, whatever the format.",
+        "camera.up",
     ),
     "field_of_view": Option(
         Number(1, 179, "degrees"), 30.0, "Vertical angle of the picture, degrees.", "camera.field_of_view"
@@ -334,10 +368,10 @@ class SceneOptions(TypedDict, total=False):
     crease: float
     materials: Literal["file", "one"]
     projection: Literal["perspective", "orthographic"]
-    view: Triple
+    view: Triple | Literal["front", "back", "left", "right", "top", "bottom"]
     position: Triple
     target: Triple
-    up: Triple
+    up: Triple | Literal["x", "y", "z"]
     field_of_view: float
     viewer: Literal["distant", "near"]
     lights: Sequence[Light]
