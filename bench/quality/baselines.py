@@ -129,7 +129,7 @@ def _parts_of_unit(entry: Entry) -> dict[str, int]:
 def _entries() -> dict[str, Callable[[], dict[str, int]]]:
     pipelines = [_Pipeline(method, style=style) for style in STYLES for method in METHODS]
     pipelines += [_Pipeline(gate=True), _Pipeline("linear", gate=True)]
-    pipelines += [_Pipeline(model="blinn", style="compact", gate=gate) for gate in (False, True)]
+    pipelines += [_Pipeline(model="blinn_product", style="compact", gate=gate) for gate in (False, True)]
     entries = {f"frames: {pipeline.name}": pipeline.cycles for pipeline in pipelines}
     # In this style a model moves the cycles by its latency alone.
     pipelines += [_Pipeline(model=model) for model in MODELS if model != "cosquad"]

@@ -46,7 +46,7 @@ _MODELS = {
     "quadratic-horner": "exp",
     "angular": "coscos2",
     "recurrence": "coscos4",
-    "renormalise": "blinn",
+    "renormalise": "blinn_product",
 }
 """Models of methods; others have the first of the documents."""
 

@@ -29,7 +29,6 @@ from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity_of_cosines, saturate
 from blysk.golden.reference.raster import Raster, fragment_normals, rasterise
-from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import Scene
 from blysk.sim.errors import InputError
 from blysk.sim.meshes.mesh import load_mesh
@@ -153,7 +152,7 @@ class Frame:
             scene.ambient_light,
             self._cosine[:, np.newaxis],
             self._highlight[:, np.newaxis],
-            REFLECTION_MODELS[model],
+            MODELS[model].model,
         )
         return 255 * saturate(shaded)
 

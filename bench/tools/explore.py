@@ -42,7 +42,7 @@ from blysk.bench.tools.design_space import (
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.pipeline import STYLES
-from blysk.golden.presets import METHODS, MODELS, PUBLISHED
+from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
 from blysk.golden.reference.raster import rasterise
 from blysk.sim.errors import InputError
 from blysk.sim.frames.figures import ERRORS
@@ -62,6 +62,9 @@ _WORDS = range(36, 47, 2)
 """Fraction bits of the chord method's differences."""
 
 _MARKERS = dict(zip(STYLES, ("o", "^"), strict=True))
+
+SERVED = {"blinn": LOBES["blinn"]} | MODELS
+"""Specular units by reflection models that have an exponent."""
 
 EXPONENT = 50
 """Of the default sweep."""
@@ -308,7 +311,7 @@ _USUAL = Sweep()
     _USUAL.methods,
     f"Interpolation along a span; also {', '.join(PUBLISHED)}.",
 )
-@_option("--models", MODELS, _USUAL.models, f"Of the reflection models {', '.join(MODELS)}.")
+@_option("--models", SERVED, _USUAL.models, f"Of the reflection models {', '.join(SERVED)}.")
 @_option("--lights", range(1, MAX_LIGHTS + 1), _USUAL.lights, f"Numbers of lights, to {MAX_LIGHTS}.")
 @_option("--operands", OPERANDS, OPERANDS, "Operands of the specular unit.")
 @_option(

@@ -295,7 +295,7 @@ DESIGN: dict[str, Option] = {
     ),
     "model": Option(
         Model(),
-        "cosquad",
+        "blinn",
         "Reflection model; every method serves all but phong. A file holds a curve of N.H, measured.",
         "pipeline.model",
     ),

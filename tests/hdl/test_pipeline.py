@@ -198,7 +198,7 @@ def test_compact_style_takes_three_cycles_a_term():
 def test_gate_spares_the_compact_style_cycles():
     """A power takes 42 cycles a pixel, but for pixels behind the light and in spans without a highlight."""
     rng = np.random.default_rng(3)
-    design = preset("chord", "blinn", style="compact")
+    design = preset("chord", "blinn_product", style="compact")
     spans, (constants,) = spans_in_range(rng, design, np.full(30, 40), 20.0)
     constants.direction[:] = constants.halfway
     constants = replace(constants, exponent=300)

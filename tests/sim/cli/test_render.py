@@ -69,7 +69,7 @@ def test_picture_is_the_simulated_frame(rendered):
         lights=[Light((-0.5, 0.8, 0.7))],
         background=gray,
     )
-    expected = FrameSimulator(preset()).render(scene).image
+    expected = FrameSimulator(preset("chord", "blinn")).render(scene).image
     folder, _ = rendered
     assert np.array_equal(picture(folder / "a.png"), expected)
     both = picture(folder / "both.png")
@@ -84,7 +84,7 @@ def test_figures(rendered):
     fixed = {
         "mesh": "teapot",
         "method": "chord",
-        "model": "cosquad",
+        "model": "blinn",
         "exponent": 50,
         "lights": 1,
         "engine": "cxxrtl",
