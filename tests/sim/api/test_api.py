@@ -83,7 +83,9 @@ def test_command_line_prints_and_writes_the_same(frame, tmp_path, capsys):
 def test_design_and_verilog(capsys):
     design = blysk.design(method="chord", lights=2, materials=3, gate=True, style="compact", setup_interval=9)
     build = Build(style="compact", setup_interval=9)
-    assert design == preset("chord", "blinn", lights=2, materials=3, gate=True, style="compact", setup_interval=9)
+    assert design == preset(
+        "chord", "blinn", lights=2, materials=3, gate=True, style="compact", setup_interval=9
+    )
     assert design.build == build
     assert blysk.design() == preset(model="blinn") == blysk.Design()
     assert main(["verilog", "--method", "linear", "--name", "core"]) == 0
