@@ -11,7 +11,7 @@ from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.pipeline import STYLES
-from blysk.golden.presets import LOBES, METHODS, PUBLISHED
+from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
 from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Triple
@@ -92,7 +92,7 @@ class Model(Choice):
     """A reflection model by its name, or the curve of a CSV file of measured points, see `TabulatedModel`."""
 
     def __init__(self):
-        super().__init__("reflection model", REFLECTION_MODELS | LOBES)
+        super().__init__("reflection model", REFLECTION_MODELS | LOBES | MODELS)
         points = "give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1"
         self.remedy = f"{points}, or {self.remedy}"
 

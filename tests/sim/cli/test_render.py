@@ -108,7 +108,7 @@ def test_figures(rendered):
         assert error["p999_lsb"] <= error["max_lsb"]
         assert error["psnr_db"] == pytest.approx(20 * np.log10(255 / error["rmse_lsb"]), rel=1e-12)
     # Half an LSB of rounding and as much of arithmetic; the model itself is off by tens of LSB.
-    assert figures["arithmetic_error"]["max_lsb"] <= 1 < figures["total_error"]["max_lsb"]
+    assert figures["arithmetic_error"]["max_lsb"] <= figures["total_error"]["max_lsb"] < 0.75
     assert 0 < figures["nmse"] < 1
     assert figures["mnse_published"] > 0
 
