@@ -73,8 +73,8 @@ class Lobe(HighlightOperand):
     == == ===== ======================== ======================== =======================================
 
     The default has at most 0.05 LSB for every exponent from 1 to 1000 and for ``ggx`` from alpha = 0.0025
-    (roughness 0.05) on. Beckmann's distribution with a large alpha falls to 0 just before u = 1, where steps
-    are long.
+    (roughness 0.05) on, of the table alone: the error of u is not in it. Beckmann's distribution with a large
+    alpha falls to 0 just before u = 1, where steps are long: 0.55 LSB at alpha = 1.
 
     *Error of u.* It comes on top, times the slope of the lobe: n for Blinn's power, ``4/alpha^2`` for
     ``ggx``. A step of 2^-25 is 0.008 LSB for n = 1000, and for ``ggx`` 0.3 LSB at alpha = 0.01, 4.9 at
