@@ -10,18 +10,17 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.hdl.core.stream import FIFO_LATENCY, connect
 from blysk.hdl.frame_constants import write_shape
-from blysk.hdl.pipeline import PORT_DESCRIPTIONS as PIPELINE_PORT_DESCRIPTIONS
-from blysk.hdl.pipeline import ShadingPipelineUnit, span_shape, status_shape
+from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit, span_shape, status_shape
 from blysk.hdl.pixel_assembler import pixel_shape
 from blysk.hdl.pixel_lanes import PixelLanesUnit, lanes_shape
 from blysk.hdl.pixel_merger import PixelMergerUnit
 
 __all__ = [
-    "PORT_DESCRIPTIONS",
     "WAITING_SPANS",
     "MergedPipelinesUnit",
     "PixelPipelinesUnit",
     "WidePipelinesUnit",
+    "port_descriptions",
 ]
 
 WAITING_SPANS = 513
@@ -33,8 +32,22 @@ spare, and each that a full FIFO takes from it is lost: of 10,712 triangles of t
 pipelines give 3.3 times the pixels of one with 32 words, and 3.6 times with 512.
 """
 
-PORT_DESCRIPTIONS = PIPELINE_PORT_DESCRIPTIONS | {"write_data": "its code; accepted when no span is inside"}
-"""Ports of merged pipelines, for the table in Verilog."""
+
+def port_descriptions(pipes: int) -> dict[str, str]:
+    """Ports of `PixelPipelinesUnit`, for the table in its Verilog.
+
+    Parameters
+    ----------
+    pipes : int
+        Number of pipelines.
+    """
+    texts = dict(PORT_DESCRIPTIONS)
+    pixels = {name: texts.pop(name) for name in PORT_DESCRIPTIONS if name.startswith("o_")}
+    for pipe in range(pipes):
+        texts |= {
+            name.replace("o_", f"o_{pipe}_"): f"{text}; pipeline {pipe}" for name, text in pixels.items()
+        }
+    return texts
 
 
 class PixelPipelinesUnit(wiring.Component):
