@@ -98,9 +98,8 @@ def test_merged_stream_is_that_of_one_pipeline():
     spans = any_spans(rng, PLAIN, rng.integers(4, 9, 100))
     constants = any_constants(rng, PLAIN, spans)
     expected = unit.parameters.compute(spans, constants)
-    run = simulate(
-        unit, beats_of(unit, spans), count=len(expected.x), write=writes_of(constants), engine="auto"
-    )
+    sent = {"count": len(expected.x), "write": writes_of(constants), "engine": "auto"}
+    run = simulate(unit, beats_of(unit, spans), **sent)
     np.testing.assert_array_equal(run.beats["x"], expected.x)
     np.testing.assert_array_equal(run.beats["y"], expected.y)
     assert run.cycles[0] == run.input_cycles[0] + unit.latency
@@ -157,9 +156,8 @@ def test_a_port_that_waits_stops_its_pipeline_alone():
     bench(unit, process)
     for lane, pipe in zip(found, (0, 1), strict=True):
         mine = spans[spans.y % 2 == pipe]
-        assert lane == [
-            (x + k, y) for x, y in zip(mine.x.tolist(), mine.y.tolist(), strict=True) for k in (0, 1)
-        ]
+        starts = zip(mine.x.tolist(), mine.y.tolist(), strict=True)
+        assert lane == [(x + k, y) for x, y in starts for k in (0, 1)]
 
 
 def test_writes_between_frames():

@@ -151,6 +151,22 @@ def test_without_a_compiler(monkeypatch):
         blysk.render("teapot", method="linear", engine="cxxrtl", **TINY)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [{"method": "linear", "specialise": True}, pytest.param({}, marks=pytest.mark.long)],
+    ids=str,
+)
+def test_several_pipelines_give_the_same_picture(options):
+    """In fewer cycles; and the figures say how many they are."""
+    options |= {"size": (64, 48), "triangles": 400}
+    one, two = (blysk.render("teapot", pipes=pipes, **options) for pipes in (1, 2))
+    np.testing.assert_array_equal(two.image, one.image)
+    assert (one.pixels, one.simulated.wide_spans) == (two.pixels, two.simulated.wide_spans)
+    assert two.cycles < 0.8 * one.cycles
+    assert (one.figures["pipes"], two.figures["pipes"]) == (1, 2)
+    assert any(line.endswith(", 2 pipelines") for line in two.lines())
+
+
 SCENE_OF_ITS_OWN = blysk.scene(**TINY)
 
 
