@@ -42,9 +42,6 @@ __all__ = [
 ]
 
 
-_MANY_PIPES = 4
-"""Pipelines from which on the larger device is the default."""
-
 _HEAD = ("design", "LUT", "FF", "mult", "BRAM", "LUTRAM", "min", "median", "max", "slowest path, ns")
 
 
@@ -107,7 +104,7 @@ def _pipelines(
     type=Choice("family", DEVICES),
     help="Of FPGAs: "
     + ", ".join(f"{name}: {family.device}" for name, family in DEVICES.items())
-    + ".  [default: ecp5; of 4 pipelines and more ecp5-85f]",
+    + ".  [default: ecp5; of several pipelines ecp5-85f]",
 )
 @click.option("--lights", type=Whole(1, MAX_LIGHTS), default=1, show_default=True, help="Number of lights.")
 @click.option("--every-method", is_flag=True, help="The pipeline of every method.")
@@ -145,7 +142,7 @@ def command(context, family_name, lights, pipes, every_method, units, seeds, job
         blysk fpga --pipes 4 --seeds 1
     """
     pipes = pipes or PIPES["pipes"].default
-    family = DEVICES[family_name] if family_name else ECP5_85F if pipes >= _MANY_PIPES else ECP5
+    family = DEVICES[family_name] if family_name else ECP5_85F if pipes > 1 else ECP5
     chosen = given_options(context, list(DESIGN))
     given = [*chosen, *given_options(context, ["lights", "pipes", "every_method"])]
     if units and given:

@@ -87,13 +87,13 @@ def test_command(options, family, calls, cache, tmp_path, capsys):
     ("options", "device"),
     [
         ([], ECP5),
-        (["--pipes", "2"], ECP5),
+        (["--pipes", "2", "--family", "ecp5"], ECP5),
         (["--pipes", "4"], ECP5_85F),
         (["--family", "ecp5-85f"], ECP5_85F),
     ],
 )
 def test_device_by_the_number_of_pipelines(options, device, capsys, monkeypatch):
-    """Four take the larger device, unless another is asked for."""
+    """Several take the larger device, unless another is asked for."""
 
     def lays_out(name, unit, seeds, jobs, progress, family):
         return Layout(name, Parts(1, 2, 3, 4, 5), (Place(1, 130.0, "a", "b", 4.0, 3.0, {}),))
