@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from blysk.bench.report import pipes as report
+from blysk.bench.report import several_pipelines as report
 from blysk.bench.speed import pipes
 from blysk.bench.speed.pipes import Rate, main, measure, missed, table, times
 
