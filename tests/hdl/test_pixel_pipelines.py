@@ -161,7 +161,7 @@ def test_a_port_that_waits_stops_its_pipeline_alone():
 
 
 def test_writes_between_frames():
-    """A write that comes while spans wait in FIFOs is accepted after their pixels, and before any new span."""
+    """A write that comes while spans wait is accepted after their pixels, and before any new span."""
     unit = MergedPipelinesUnit(PixelPipelines(PLAIN, 4), 5)
     rng = np.random.default_rng(10)
     frames = []
