@@ -8,7 +8,7 @@ from amaranth.lib import fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.pixel_pipelines import PixelPipelines
-from blysk.hdl.core.stream import FIFO_LATENCY, connect
+from blysk.hdl.core.stream import FIFO_LATENCY, SLICE_LATENCY, connect, connect_slice
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit, span_shape, status_shape
 from blysk.hdl.pixel_assembler import pixel_shape
@@ -48,6 +48,10 @@ def port_descriptions(pipes: int) -> dict[str, str]:
             name.replace("o_", f"o_{pipe}_"): f"{text}; pipeline {pipe}" for name, text in pixels.items()
         }
     return texts
+
+
+_IN_SLICE = 2
+"""Spans in the registers of a slice."""
 
 
 class PixelPipelinesUnit(wiring.Component):
@@ -109,13 +113,13 @@ class PixelPipelinesUnit(wiring.Component):
         )
         self.pipelines = tuple(ShadingPipelineUnit(p.design) for _ in range(p.pipes))
         first = self.pipelines[0]
-        self.latency = FIFO_LATENCY + first.latency
+        self.latency = FIFO_LATENCY + SLICE_LATENCY + first.latency
         self.cycles_per_pixel, self.setup_interval = first.cycles_per_pixel, first.setup_interval
 
     @property
     def spans_inside(self) -> int:
         """Spans that are inside one pipeline and its FIFO at most."""
-        return self.pipelines[0].spans_inside + self._waiting
+        return self.pipelines[0].spans_inside + self._waiting + _IN_SLICE
 
     def elaborate(self, platform):
         """A FIFO and a pipeline for each remainder of y; writes to all; sums of the counters."""
@@ -127,17 +131,20 @@ class PixelPipelinesUnit(wiring.Component):
         for k, pipeline in enumerate(self.pipelines):
             m.submodules[f"pipeline_{k}"] = pipeline
             m.submodules[f"spans_{k}"] = spans = fifo.SyncFIFOBuffered(width=width, depth=self._waiting)
+            first = pipeline.i.signature.flip().create(path=(f"first_{k}",))
             m.d.comb += [
                 spans.w_data.eq(span.payload),
                 spans.w_en.eq(span.valid & ~write.valid & (pipe == k)),
-                Value.cast(pipeline.i.payload).eq(spans.r_data),
-                pipeline.i.valid.eq(spans.r_rdy),
-                spans.r_en.eq(pipeline.i.ready),
+                Value.cast(first.payload).eq(spans.r_data),
+                first.valid.eq(spans.r_rdy),
+                spans.r_en.eq(first.ready),
                 Value.cast(pipeline.write.payload).eq(write.payload.as_value()),
                 pipeline.write.valid.eq(write.valid & drained),
             ]
+            # A block RAM gives its word late in the cycle: no logic before the next register.
+            connect_slice(m, first, pipeline.i)
             connect(m, pipeline.o, wiring.flipped(self.o[k]))
-            idle.append((spans.level == 0) & pipeline.write.ready)
+            idle.append((spans.level == 0) & ~pipeline.i.valid & pipeline.write.ready)
             room.append(spans.w_rdy | (pipe != k))
         m.d.comb += [
             # Of no payload that is not valid: its bits may be unknown.

@@ -123,7 +123,7 @@ RECORD = Record(
             "sum_empty_spans[15] sum_overrun[0] status[47-48]"
         ),
         "a pipeline has scanlines of one remainder": (
-            "assembler.{y[0],spare[6],payload[6],$signal[6]} r_port__data[6]"
+            "assembler.{y[0],spare[6],payload[6],$signal[6]} r_port__data[6] pipelines.{payload,spare}[6]"
         ),
     },
 )
