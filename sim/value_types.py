@@ -10,7 +10,19 @@ import click
 from blysk.golden.reference.scene import LARGEST_SIDE
 from blysk.sim.errors import InputError, one_line
 
-__all__ = ["Choice", "Color", "Number", "OutputFile", "Size", "Truth", "Value", "Vector", "Whole", "shown"]
+__all__ = [
+    "Choice",
+    "Color",
+    "Few",
+    "Number",
+    "OutputFile",
+    "Size",
+    "Truth",
+    "Value",
+    "Vector",
+    "Whole",
+    "shown",
+]
 
 
 class Value(click.ParamType):
@@ -96,6 +108,25 @@ class Whole(Value):
             raise ValueError("not a whole number")
         if not self.least <= value <= self.most:
             raise ValueError("out of range")
+        return value
+
+
+class Few(Whole):
+    """One of a few whole numbers."""
+
+    def __init__(self, *numbers: int):
+        super().__init__(min(numbers), max(numbers))
+        self.numbers = numbers
+        self.remedy = f"give one of {', '.join(map(str, numbers))}"
+
+    def get_metavar(self, param, ctx=None):
+        """The numbers."""
+        return f"[{'|'.join(map(str, self.numbers))}]"
+
+    def check(self, value):
+        """An `int` among them."""
+        if super().check(value) not in self.numbers:
+            raise ValueError("no such number")
         return value
 
 

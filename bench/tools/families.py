@@ -1,11 +1,13 @@
 """Families of FPGAs: what Yosys and nextpnr need to know of each, and what a netlist takes of it."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 __all__ = [
     "DEVICE",
+    "DEVICES",
     "ECP5",
+    "ECP5_85F",
     "FAMILIES",
     "NEXUS",
     "Family",
@@ -117,6 +119,14 @@ synth_lattice -family ecp5 -top top -abc9""",
     registers="Multipliers are used without the registers inside them, through which the tool does not time.",
 )
 
+ECP5_85F = replace(
+    ECP5,
+    device="ECP5-85F, CABGA381, speed grade 6",
+    capacity=Parts(83640, 83640, 156, 208, 10455),
+    options=("--85k", *ECP5.options[1:]),
+)
+"""The largest of the same family, for several pipelines."""
+
 NEXUS = Family(
     device="LIFCL-40, CABGA400, speed grade 7",
     capacity=Parts(32256, 32256, 56, 84, 4032),
@@ -141,6 +151,9 @@ synth_lattice -family lifcl -top top -noiopad -run map_cells:""",
 )
 
 FAMILIES = {"ecp5": ECP5, "nexus": NEXUS}
+
+DEVICES = FAMILIES | {"ecp5-85f": ECP5_85F}
+"""Families, each by the device that figures are of, and larger devices."""
 
 DEVICE = ECP5.device
 """What figures are of when no family is chosen."""

@@ -25,13 +25,12 @@ from amaranth.lib import wiring
 from tqdm import tqdm
 
 from blysk.bench.tools.blocks import ENTRIES
-from blysk.bench.tools.families import ECP5, FAMILIES, Family
+from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F, Family
 from blysk.bench.tools.place_and_route import SEEDS, Layout, TooLarge, lay_out, versions_of
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.presets import METHODS
-from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.sim.api.design import design
-from blysk.sim.api.options import DESIGN
+from blysk.sim.api.design import design, pixel_pipelines
+from blysk.sim.api.options import DESIGN, PIPES
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.errors import InputError
 from blysk.sim.output import check_writable, write_json
@@ -80,7 +79,7 @@ def _units(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Comp
 
 
 def _pipelines(
-    given: Mapping[str, Any], lights: int, every: bool
+    given: Mapping[str, Any], lights: int, every: bool, pipes: int = 1
 ) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
     """The pipeline, of one method or every one, by the options that are given."""
     for method in METHODS if every else (given.get("method", DESIGN["method"].default),):
@@ -92,18 +91,20 @@ def _pipelines(
         name += [made.build.style] if made.build.style != "throughput" else []
         name += [f"interval {chosen['setup_interval']}"] if "setup_interval" in chosen else []
         name += ["gate"] if made.gate else []
-        yield ", ".join(name), partial(ShadingPipelineUnit, made)
+        name += [f"{pipes} pipelines"] if pipes > 1 else []
+        yield ", ".join(name), partial(pixel_pipelines, made, pipes)
 
 
 @click.command(short_help="Place and route for an FPGA: parts, clock rate.")
 @options_of(DESIGN)
+@options_of(PIPES)
 @click.option(
     "--family",
     "family_name",
-    type=Choice("family", FAMILIES),
-    default="ecp5",
-    show_default=True,
-    help="Of FPGAs: " + ", ".join(f"{name}: {family.device}" for name, family in FAMILIES.items()) + ".",
+    type=Choice("family", DEVICES),
+    help="Of FPGAs: "
+    + ", ".join(f"{name}: {family.device}" for name, family in DEVICES.items())
+    + ".  [default: ecp5; of several pipelines ecp5-85f]",
 )
 @click.option("--lights", type=Whole(1, MAX_LIGHTS), default=1, show_default=True, help="Number of lights.")
 @click.option("--every-method", is_flag=True, help="The pipeline of every method.")
@@ -125,7 +126,7 @@ def _pipelines(
 )
 @click.option("--json", "figures", type=OutputFile(), help="Every figure, and the slowest path of each seed.")
 @click.pass_context
-def command(context, family_name, lights, every_method, units, seeds, jobs, figures, **_):
+def command(context, family_name, lights, pipes, every_method, units, seeds, jobs, figures, **_):
     """Place and route the pipeline on an FPGA, and print its parts and clock rate.
 
     LUT: look-up tables of four inputs, with those that serve as carries and memories; FF: flip-flops, without
@@ -138,10 +139,12 @@ def command(context, family_name, lights, every_method, units, seeds, jobs, figu
     Examples:
         blysk fpga --method chord --seeds 3 --json chord.json
         blysk fpga --family nexus --unit specular
+        blysk fpga --pipes 4 --seeds 1
     """
-    family = FAMILIES[family_name]
+    pipes = pipes or PIPES["pipes"].default
+    family = DEVICES[family_name] if family_name else ECP5_85F if pipes > 1 else ECP5
     chosen = given_options(context, list(DESIGN))
-    given = [*chosen, *given_options(context, ["lights", "every_method"])]
+    given = [*chosen, *given_options(context, ["lights", "pipes", "every_method"])]
     if units and given:
         option = f"--{given[0].replace('_', '-')}"
         raise InputError(option, "is for the pipeline", "leave it out, or --unit")
@@ -149,7 +152,7 @@ def command(context, family_name, lights, every_method, units, seeds, jobs, figu
         raise InputError("--method", "is one of every method", "leave it out, or --every-method")
     if figures:
         check_writable(figures)
-    designs = list(_units(units) if units else _pipelines(chosen, lights, every_method))
+    designs = list(_units(units) if units else _pipelines(chosen, lights, every_method, pipes))
     tools = versions_of(family)
     layouts, too_large = [], {}
     with tqdm(total=len(designs) * seeds, unit=" placements", leave=False, disable=None) as bar:

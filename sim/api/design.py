@@ -11,6 +11,7 @@ from blysk.golden.geometry.triangles import ATTRIBUTE
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import Design
+from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.scene import BACK_FACES
 from blysk.golden.render import Renderer
@@ -18,13 +19,26 @@ from blysk.hdl.emit.verilog import emit
 from blysk.hdl.methods.interpolator import spelled
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit
+from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, port_descriptions
 from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
 from blysk.hdl.render import RenderUnit
-from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, DesignOptions
+from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES, DesignOptions
 from blysk.sim.api.settings import Settings, checked, read_settings
 from blysk.sim.errors import OptionError
 
-__all__ = ["design", "design_of", "header_of", "renderer_of", "verilog", "verilog_and_unit"]
+__all__ = [
+    "ShadingUnit",
+    "design",
+    "design_of",
+    "header_of",
+    "pixel_pipelines",
+    "renderer_of",
+    "verilog",
+    "verilog_and_unit",
+]
+
+ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
+"""Hardware from spans to pixels."""
 
 
 def design(*, lights: int = 1, materials: int = 1, **options: Unpack[DesignOptions]) -> Design:
@@ -112,9 +126,38 @@ def renderer_of(design: Design) -> Renderer:
         raise OptionError("geometry", "hardware", reason, "use another method, or software") from None
 
 
-def header_of(unit: ShadingPipelineUnit) -> list[str]:
-    """What a pipeline is, in lines: version, design and cycles."""
+def pixel_pipelines(design: Design, pipes: int, merged: bool = False) -> ShadingUnit:
+    """One shading pipeline of a design, or several that take spans of different scanlines.
+
+    Parameters
+    ----------
+    design : Design
+        Of each.
+    pipes : int
+        How many: 1, 2, 4 or 8.
+    merged : bool
+        Whether several give one stream of pixels, in the order of one pipeline.
+
+    Raises
+    ------
+    OptionError
+        If there cannot be so many.
+    """
+    (chosen,) = checked({"pipes": pipes}, PIPES).values()
+    if chosen == 1:
+        return ShadingPipelineUnit(design)
+    try:
+        several = PixelPipelines(design, chosen)
+    except ValueError as error:
+        raise OptionError("pipes", str(pipes), str(error), "give fewer") from None
+    return MergedPipelinesUnit(several) if merged else PixelPipelinesUnit(several)
+
+
+def header_of(unit: ShadingUnit) -> list[str]:
+    """What a pipeline is, in lines: version, design and cycles; of several, what each of them is."""
     made = unit.parameters
+    several = made if isinstance(made, PixelPipelines) else None
+    made = several.design if several else made
     gate = ", highlight gate" if made.gate else ""
     lines = [
         f"blysk {version('blysk')} shading pipeline, MIT licence",
@@ -122,6 +165,7 @@ def header_of(unit: ShadingPipelineUnit) -> list[str]:
         f"{made.build.style} style{gate}",
         f"latency {unit.latency} cycles, {unit.cycles_per_pixel} a pixel",
         f"a span takes at most max({unit.cycles_per_pixel} length, {unit.setup_interval}) cycles",
+        *_several_lines(several, unit),
         "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign",
     ]
     if made.takes_values:
@@ -150,6 +194,16 @@ def header_of(unit: ShadingPipelineUnit) -> list[str]:
     return lines
 
 
+def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[str]:
+    """What several pipelines are."""
+    if several is None:
+        return []
+    streams = (
+        "o_k_*: its pixels" if isinstance(unit, PixelPipelinesUnit) else "o_*: pixels in the spans' order"
+    )
+    return [f"{several.pipes} pipelines; pipeline k takes spans with y mod {several.pipes} = k; {streams}"]
+
+
 def _render_header(unit: RenderUnit) -> list[str]:
     """What triangles to pixels are, in lines: those of the pipeline inside without its input's, and more."""
     first, *lines = (line for line in header_of(unit.pipeline) if not line.startswith("i_"))
@@ -174,7 +228,11 @@ def _numbered(name: str) -> str:
 
 
 def verilog(
-    design: Design | None = None, name: str = "blysk", geometry: Literal["software", "hardware"] = "software"
+    design: Design | None = None,
+    name: str = "blysk",
+    geometry: Literal["software", "hardware"] = "software",
+    pipes: int = 1,
+    merged: bool = False,
 ) -> str:
     """Verilog-2001 of a pipeline for synthesis, with a table of its ports and frame constants.
 
@@ -186,24 +244,34 @@ def verilog(
         Name of the top module.
     geometry : {"software", "hardware"}
         Whether the pipeline takes spans, or triangles, with a depth test and a port to a memory of depths.
+    pipes : int
+        Number of pipelines, 1, 2, 4 or 8, that take spans of different scanlines.
+    merged : bool
+        Whether several give one stream of pixels in place of one each.
 
     Raises
     ------
     InputError
-        If the name is none in Verilog, or the method takes values and geometry is hardware.
+        If the name is none in Verilog, or the method takes values and geometry is hardware, or there
+        cannot be so many pipelines.
     """
-    return verilog_and_unit(_default() if design is None else design, name, geometry)[0]
+    return verilog_and_unit(_default() if design is None else design, name, geometry, pipes, merged)[0]
 
 
 def verilog_and_unit(
-    design: Design, name: str, geometry: str = "software"
-) -> tuple[str, ShadingPipelineUnit | RenderUnit]:
+    design: Design, name: str, geometry: str = "software", pipes: int = 1, merged: bool = False
+) -> tuple[str, ShadingUnit | RenderUnit]:
     """The same, and the hardware that it is of."""
     (chosen,) = checked({"geometry": geometry}, GEOMETRY).values()
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise OptionError("name", name, "no Verilog name", "use letters, digits and underscores")
     hardware = chosen == "hardware"
-    unit = RenderUnit(renderer_of(design)) if hardware else ShadingPipelineUnit(design)
+    shading = pixel_pipelines(design, pipes, merged)
+    if hardware and pipes > 1:
+        raise OptionError("pipes", str(pipes), "triangles go to one pipeline", "leave it out, or use spans")
+    if merged and pipes == 1:
+        raise OptionError("merged", "", "one pipeline has one stream", "give pipes, too")
+    unit = RenderUnit(renderer_of(design)) if hardware else shading
     p = design
     lobe = p.specular if isinstance(p.specular, Lobe) else None
     loads = lobe is not None and lobe.fixed is None
@@ -211,9 +279,8 @@ def verilog_and_unit(
     lines = _render_header(unit) if isinstance(unit, RenderUnit) else header_of(unit)
     header = [*lines, "", "Frame constants, through the write port:", *constants]
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
-    descriptions = {
-        port: text for port, text in PORT_DESCRIPTIONS.items() if not port.startswith("i_") or port in fields
-    }
+    texts = port_descriptions(pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
+    descriptions = {port: text for port, text in texts.items() if not port.startswith("i_") or port in fields}
     if isinstance(unit, RenderUnit):
         descriptions = RENDER_PORT_DESCRIPTIONS
     try:

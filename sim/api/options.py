@@ -11,6 +11,7 @@ from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.pipeline import STYLES
+from blysk.golden.pixel_pipelines import PIPES as PIPE_COUNTS
 from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
 from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.geometry import Mesh
@@ -20,7 +21,7 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import BACK_FACES, VIEWERS
 from blysk.sim.meshes.mesh import DEFAULT_CREASE, DEFAULT_TRIANGLES
 from blysk.sim.meshes.teapot import MAX_TRIANGLES, MIN_TRIANGLES
-from blysk.sim.value_types import Choice, Color, Number, Size, Truth, Value, Vector, Whole, shown
+from blysk.sim.value_types import Choice, Color, Few, Number, Size, Truth, Value, Vector, Whole, shown
 
 __all__ = [
     "COEFFICIENTS",
@@ -28,6 +29,7 @@ __all__ = [
     "DESIGN",
     "GEOMETRIES",
     "GEOMETRY",
+    "PIPES",
     "RENDERING",
     "SCENE",
     "SLOW_SIZE",
@@ -339,8 +341,19 @@ GEOMETRY: dict[str, Option] = {
 }
 """Option of a rendering and of Verilog."""
 
+PIPES: dict[str, Option] = {
+    "pipes": Option(
+        Few(*PIPE_COUNTS),
+        1,
+        "Number of pipelines, each for the scanlines y of a remainder of y by it: so many pixels a cycle.",
+        "pipeline.pipes",
+    ),
+}
+"""Option of a rendering, of Verilog and of place and route."""
+
 RENDERING: dict[str, Option] = {
     **GEOMETRY,
+    **PIPES,
     "specialise": Option(
         Truth(),
         False,
@@ -397,5 +410,6 @@ class RenderOptions(SceneOptions, DesignOptions, total=False):
     """Options of a rendering, by their names in Python."""
 
     geometry: Literal["software", "hardware"]
+    pipes: Literal[1, 2, 4, 8]
     specialise: bool
     short_words: bool

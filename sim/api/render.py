@@ -207,6 +207,8 @@ class Rendering:
         The hardware's simulator; ``None`` where there is no compiler and none is needed.
     seconds : dict
         Of loading and building.
+    pipes : int
+        Number of pipelines.
     """
 
     loaded: LoadedMesh
@@ -216,6 +218,7 @@ class Rendering:
     engine: str
     simulator: FrameSimulator | TriangleSimulator | None
     seconds: dict[str, float]
+    pipes: int = 1
 
     @property
     def design(self) -> Design:
@@ -244,7 +247,7 @@ class Rendering:
         if self.is_specialised:
             details["specialisation"] = {**saving_figures(self.specialisation), "cycles": frame.cycles}
             if vcd is None:
-                whole = FrameSimulator(self.design, self.engine).render(self.scenes[0])
+                whole = FrameSimulator(self.design, self.engine, self.pipes).render(self.scenes[0])
                 details["specialisation"]["full_cycles"] = whole.cycles
                 details["specialisation"] |= difference_figures(frame, whole)
         return RenderedFrame(self.scenes[0], self.design, frame, self.loaded.name, details)
@@ -319,7 +322,9 @@ def prepare_rendering(
                 _shrink(settings, error)
     seconds["build"] = perf_counter() - start - seconds["load"]
     used = "pysim" if engine == "pysim" else "cxxrtl"
-    return Rendering(loaded, scenes, smallest, settings["specialise"], used, simulator, seconds)
+    return Rendering(
+        loaded, scenes, smallest, settings["specialise"], used, simulator, seconds, settings["pipes"]
+    )
 
 
 def _large(design: Design) -> str:
@@ -333,8 +338,12 @@ def _simulator(
     design: Design, scene: Scene, settings: Settings, engine: str
 ) -> FrameSimulator | TriangleSimulator:
     """The simulator of the geometry that is asked for."""
+    pipes = settings["pipes"]
+    if pipes > scene.height:
+        reason = f"the picture has {scene.height} row{'s' * (scene.height > 1)}"
+        raise settings.refuse("pipes", reason, "give at most one for each row")
     if settings["geometry"] == "software":
-        return FrameSimulator(design, engine)
+        return FrameSimulator(design, engine, pipes)
     return TriangleSimulator(Renderer(design), (scene.width, scene.height), engine)
 
 
@@ -347,6 +356,8 @@ def _check_geometry(settings: Settings, design: Design, frames: int) -> None:
         reason, remedy = f"triangles give normals, and {design.method} takes values", "use another method"
     elif settings["specialise"]:
         reason, remedy = "a specialised pipeline takes spans", "leave out specialise"
+    elif settings["pipes"] > 1:
+        reason, remedy = "triangles go to one pipeline", "leave out pipes"
     elif frames:
         reason, remedy = "draws one picture", "leave out frames"
     if reason is not None:
@@ -426,7 +437,8 @@ def render(
     **options
         Those of `scene` and of `design`, by the names of the command line; ``geometry``: ``"hardware"``
         simulates triangles to pixels, ``"software"`` spans to pixels; ``specialise``: whether to build only
-        what the scene needs; ``short_words``: with words as short as the error bound allows.
+        what the scene needs; ``short_words``: with words as short as the error bound allows; ``pipes``: 1,
+        2, 4 or 8 pipelines for different scanlines.
 
     Raises
     ------

@@ -164,7 +164,7 @@ def _animation(
     """Render and write the frames of a turntable; the figures of all."""
     start = perf_counter()
     smallest = ready.specialisation
-    animation = Animation(smallest.scenes[0], smallest.design, ready.engine, ready.design)
+    animation = Animation(smallest.scenes[0], smallest.design, ready.engine, ready.design, ready.pipes)
     cameras = [scene.camera for scene in ready.scenes]
     if address:
         workers = dask_executor(animation, address)

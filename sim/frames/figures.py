@@ -51,6 +51,7 @@ def frame_figures(
     visible = int(np.count_nonzero(frame.cut_raster.visible))
     return {
         **_figures(scene, design, frame, raster.triangles, visible),
+        "pipes": frame.pipes,
         **_errors(comparison, ERRORS),
         "counts": {
             "degenerate_triangles": raster.degenerate,
@@ -149,6 +150,7 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         Of `frame_figures`, of one scene and pipeline.
     """
     same = ("method", "model", "exponent", "lights", "materials", "engine", "width", "height", "triangles")
+    same += ("pipes",)
     pixels, cycles = (sum(frame[key] for frame in frames) for key in ("pixels", "cycles"))
     return {
         **{key: frames[0][key] for key in same},

@@ -12,9 +12,11 @@ from blysk.golden.frames.frame import Frame, frame_buffer
 from blysk.golden.frames.prepare import constants_of, prepare, with_tables
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.pipeline import Design, Spans
+from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.hdl.pixel_pipelines import WidePipelinesUnit
 from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import Run, simulate
@@ -32,13 +34,20 @@ class SimulatedFrame(Frame):
         Cycles from the first write of a constant to the last pixel.
     engine : {"cxxrtl", "pysim"}
         The simulator.
+    pipes : int
+        Number of pipelines.
     """
 
     cycles: int
     engine: str
+    pipes: int = 1
 
 
-def beats_of(unit: ShadingPipelineUnit, spans: Spans) -> dict[str, np.ndarray]:
+_IDLE = 1000
+"""Cycles without a transfer after which several pipelines are done: a pixel takes less."""
+
+
+def beats_of(unit: ShadingPipelineUnit | WidePipelinesUnit, spans: Spans) -> dict[str, np.ndarray]:
     """Input beats of a pipeline, as `simulate` takes them.
 
     Parameters
@@ -59,8 +68,22 @@ def beats_of(unit: ShadingPipelineUnit, spans: Spans) -> dict[str, np.ndarray]:
     return beats
 
 
+def _in_order(beats: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Pixels of wide beats in the order of one pipeline, whose pixels have these scanlines.
+
+    Of a scanline both have them in the order of its spans.
+    """
+    lanes = beats["pixels"].shape[1]
+    pixels = beats["pixels"][(beats["present"][:, np.newaxis] >> np.arange(lanes) & 1).astype(bool)]
+    if len(pixels) != len(y):
+        raise SimulationError(f"the simulated pipelines gave {len(pixels)} pixels of {len(y)}")
+    ordered = np.empty_like(pixels)
+    ordered[np.argsort(y, kind="stable")] = pixels[np.argsort(pixels["y"], kind="stable")]
+    return ordered
+
+
 class FrameSimulator:
-    """A pipeline, built once, that renders any number of frames.
+    """A pipeline, or several, built once, that renders any number of frames.
 
     Parameters
     ----------
@@ -68,6 +91,8 @@ class FrameSimulator:
         Method, reflection model, number of lights.
     engine : str
         ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
+    pipes : int
+        Number of pipelines, see `PixelPipelines`.
 
     Attributes
     ----------
@@ -84,29 +109,37 @@ class FrameSimulator:
         If the engine is ``"cxxrtl"`` and no C++ compiler works.
     """
 
-    def __init__(self, design: Design, engine: str = "auto"):
+    def __init__(self, design: Design, engine: str = "auto", pipes: int = 1):
         start = perf_counter()
         self.design = design
         self.engine = engine
-        self._unit = ShadingPipelineUnit(design)
+        self.pipes = pipes
+        several = PixelPipelines(design, pipes)
+        self._unit = ShadingPipelineUnit(design) if pipes == 1 else WidePipelinesUnit(several)
         spans, constants = _sample(design)
         expected = design.compute(spans, constants)
-        run = self._run(spans, constants, len(expected.x))
+        run, beats = self._run(spans, constants, expected.y)
         # What "auto" stands for: its warning comes once.
         self.engine = run.engine
-        if not np.array_equal(_colors(run.beats), expected.color):
+        if not np.array_equal(_colors(beats), expected.color):
             raise SimulationError("the simulated pipeline's pixels are not those of its bit-accurate model")
         self.build_seconds = perf_counter() - start
 
-    def _run(self, spans: Spans, constants: Sequence[FrameConstants], count: int, **options) -> Run:
-        return simulate(
+    def _run(
+        self, spans: Spans, constants: Sequence[FrameConstants], y: np.ndarray, **options
+    ) -> tuple[Run, np.ndarray]:
+        """A run, and the pixels in the order of the spans; ``y`` are their scanlines."""
+        # How many wide beats come depends on how many pixels leave on a cycle.
+        ends = {"count": len(y)} if self.pipes == 1 else {"count": None, "idle_timeout": _IDLE}
+        run = simulate(
             self._unit,
             beats_of(self._unit, spans),
-            count=count,
             write=writes_of(constants),
             engine=self.engine,
+            **ends,
             **options,
         )
+        return run, run.beats if self.pipes == 1 else _in_order(run.beats, y)
 
     def render(
         self,
@@ -138,20 +171,22 @@ class FrameSimulator:
         rastered = perf_counter()
         raster = prepared.cut_raster
         count = len(raster.span)
-        report = None if progress is None else lambda done: progress(done, count)
-        run = self._run(prepared.spans, constants, count, progress=report, vcd=vcd)
+        report = None if progress is None else lambda done: progress(min(done * self.pipes, count), count)
+        y = raster.pixel // scene.width
+        run, beats = self._run(prepared.spans, constants, y, progress=report, vcd=vcd)
         assert run.status is not None
-        pixel = run.beats["y"].astype(np.int64) * scene.width + run.beats["x"]
+        pixel = beats["y"].astype(np.int64) * scene.width + beats["x"]
         if not np.array_equal(pixel, raster.pixel):
             raise SimulationError("the simulated pipeline answered with other pixels than it was asked for")
         return SimulatedFrame(
-            image=frame_buffer(scene, raster, _colors(run.beats)),
+            image=frame_buffer(scene, raster, _colors(beats)),
             prepared=prepared,
             out_of_range_spans=int(run.status["out_of_range_spans"]),
             wide_spans=int(run.status["wide_spans"]),
             seconds={"raster": rastered - start, "simulate": perf_counter() - rastered},
             cycles=run.total_cycles,
             engine=run.engine,
+            pipes=self.pipes,
         )
 
 

@@ -99,7 +99,8 @@ def specialisation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 def _pixel_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     yield _line("pixels", f"{figures['pixels']:,} shaded, {figures['visible_pixels']:,} visible")
     rate = f", {figures['cycles_per_pixel']:.3f} a pixel" if figures["pixels"] else ""
-    yield _line("cycles", f"{figures['cycles']:,}{rate}")
+    pipes = f", {figures['pipes']} pipelines" if figures.get("pipes", 1) > 1 else ""
+    yield _line("cycles", f"{figures['cycles']:,}{rate}{pipes}")
 
 
 def _error_lines(figures: Mapping[str, Any]) -> Iterator[str]:

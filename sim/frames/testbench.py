@@ -12,10 +12,12 @@ import numpy as np
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.pipeline import Design, Pixels, Spans
+from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.hdl.pixel_pipelines import MergedPipelinesUnit
 from blysk.sim.errors import InputError
 from blysk.sim.frames.frame import beats_of, sample_material
 from blysk.sim.meshes.mesh import load_mesh
@@ -77,13 +79,13 @@ def teapot_frame(
     return spans, constants, design.compute(spans, constants)
 
 
-def vectors(unit: ShadingPipelineUnit) -> dict[str, dict[str, np.ndarray]]:
+def vectors(unit: ShadingPipelineUnit | MergedPipelinesUnit) -> dict[str, dict[str, np.ndarray]]:
     """What goes into a pipeline for a small frame, and what must come out, by the ports of its Verilog.
 
     Parameters
     ----------
-    unit : ShadingPipelineUnit
-        The pipeline.
+    unit : ShadingPipelineUnit or MergedPipelinesUnit
+        The pipeline, or several with one stream of pixels.
 
     Returns
     -------
@@ -91,7 +93,8 @@ def vectors(unit: ShadingPipelineUnit) -> dict[str, dict[str, np.ndarray]]:
         Of ``writes``, ``spans``, ``pixels`` and ``status``: a column of codes for each port, all equally
         long. See `teapot_frame`.
     """
-    spans, constants, pixels = teapot_frame(unit.parameters)
+    several = isinstance(unit.parameters, PixelPipelines)
+    spans, constants, pixels = teapot_frame(unit.parameters.design if several else unit.parameters)
     tables = {
         "writes": ("write", writes_of(constants)),
         "spans": ("i", beats_of(unit, spans)),
@@ -143,7 +146,11 @@ def check_folder(folder: str | os.PathLike) -> None:
 
 
 def write_testbench(
-    folder: str | os.PathLike, unit: ShadingPipelineUnit, name: str, text: str, about: Sequence[str]
+    folder: str | os.PathLike,
+    unit: ShadingPipelineUnit | MergedPipelinesUnit,
+    name: str,
+    text: str,
+    about: Sequence[str],
 ) -> None:
     """Write a bench, its vectors and the Verilog into a folder. Each file is whole or not there.
 
@@ -151,8 +158,8 @@ def write_testbench(
     ----------
     folder : path
         New or empty, see `check_folder`.
-    unit : ShadingPipelineUnit
-        The pipeline.
+    unit : ShadingPipelineUnit or MergedPipelinesUnit
+        The pipeline, or several with one stream of pixels.
     name, text : str
         Its top module, and its Verilog.
     about : sequence of str

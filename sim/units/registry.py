@@ -1,8 +1,9 @@
 """Every record, found in its file: in the order of the rooms, within a room by name.
 
-A file without a record holds parts that records share. Three components have no record: the frame constants
-and the pixel assembler, whose ports are not a stream ``i`` to a stream ``o``, and the accumulator of the
-chord method. The records of the pipeline and of the chord interpolators, of which they are parts, cover them.
+A file without a record holds parts that records share. Components without a record: the frame constants, the
+pixel assembler and the pixel merger, whose ports are not a stream ``i`` to a stream ``o``, and the
+accumulator of the chord method. The records of the pipelines and of the chord interpolators, of which they
+are parts, cover them. Beats of the pixel lanes depend on the cycles: they have tests of their own.
 """
 
 import pkgutil

@@ -46,6 +46,10 @@ FEW = 4000
 PARTS = {
     "FrameConstantsUnit": "registers behind a write port",
     "PixelAssemblerUnit": "joins two streams",
+    "PixelLanesUnit": "a register of the pixels of several pipelines",
+    "PixelMergerUnit": "in the pixel pipelines, takes turns",
+    "PixelPipelinesUnit": "the same without the merger, which gives the streams a record needs",
+    "WidePipelinesUnit": "the same with wide beats, whose order depends on the cycles",
     "PipelinedUnit": "base class of units",
     "AccumulatorUnit": "base class of difference accumulators",
     "InterpolatorUnit": "base class of methods",

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from blysk.bench.tools import fpga, place_and_route
-from blysk.bench.tools.families import ECP5, FAMILIES, NEXUS, Parts, Place
+from blysk.bench.tools.families import ECP5, ECP5_85F, FAMILIES, NEXUS, Parts, Place
 from blysk.bench.tools.fpga import table
 from blysk.bench.tools.place_and_route import (
     Layout,
@@ -83,6 +83,29 @@ def test_command(options, family, calls, cache, tmp_path, capsys):
         assert [place["seed"] for place in design["seeds"]] == [1, 2]
 
 
+@pytest.mark.parametrize(
+    ("options", "device"),
+    [
+        ([], ECP5),
+        (["--pipes", "2", "--family", "ecp5"], ECP5),
+        (["--pipes", "4"], ECP5_85F),
+        (["--family", "ecp5-85f"], ECP5_85F),
+    ],
+)
+def test_device_by_the_number_of_pipelines(options, device, capsys, monkeypatch):
+    """Several take the larger device, unless another is asked for."""
+
+    def lays_out(name, unit, seeds, jobs, progress, family):
+        return Layout(name, Parts(1, 2, 3, 4, 5), (Place(1, 130.0, "a", "b", 4.0, 3.0, {}),))
+
+    monkeypatch.setattr(fpga, "lay_out", lays_out)
+    monkeypatch.setattr(fpga, "versions_of", lambda family: {})
+    assert main(["fpga", "--method", "linear", *options]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1].startswith(device.device)
+    assert ("pipelines" in lines[2]) == ("--pipes" in options)
+
+
 def test_designs():
     def names(designs):
         return [name for name, _ in designs]
@@ -100,6 +123,8 @@ def test_designs():
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
+        (["--pipes", "3"], "blysk: --pipes 3: no such number; give one of 1, 2, 4, 8"),
+        (["--unit", "gpq", "--pipes", "2"], "blysk: --pipes: is for the pipeline; leave it out, or --unit"),
         (["--seeds", "0"], "blysk: --seeds 0: out of range; give a whole number from 1 to 100"),
         (["--jobs", "no"], "blysk: --jobs no: not a whole number; give"),
         (

@@ -153,6 +153,22 @@ def test_without_a_compiler(monkeypatch):
         blysk.render("teapot", method="linear", engine="cxxrtl", **TINY)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [{"method": "linear", "specialise": True}, pytest.param({}, marks=pytest.mark.long)],
+    ids=str,
+)
+def test_several_pipelines_give_the_same_picture(options):
+    """In fewer cycles; and the figures say how many they are."""
+    options |= {"size": (64, 48), "triangles": 400}
+    one, two = (blysk.render("teapot", pipes=pipes, **options) for pipes in (1, 2))
+    np.testing.assert_array_equal(two.image, one.image)
+    assert (one.pixels, one.simulated.wide_spans) == (two.pixels, two.simulated.wide_spans)
+    assert two.cycles < 0.8 * one.cycles
+    assert (one.figures["pipes"], two.figures["pipes"]) == (1, 2)
+    assert any(line.endswith(", 2 pipelines") for line in two.lines())
+
+
 SCENE_OF_ITS_OWN = blysk.scene(**TINY)
 
 
@@ -176,6 +192,10 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
         ("teapot", {"model": "phong"}, "model phong: the pipeline finds N.H, not R.V; use one of cosquad, "),
         ("teapot", {"method": "chord", "operand": "cosine"}, "operand cosine: method chord finds no normals"),
         ("teapot", {"viewer": "near"}, "method chord: point lights and a near viewer need "),
+        ("teapot", {"pipes": 3}, "pipes 3: no such number; give one of 1, 2, 4, 8"),
+        ("teapot", {"pipes": 16}, "pipes 16: out of range; give one of 1, 2, 4, 8"),
+        ("teapot", {"pipes": 8, "size": (40, 7)}, "pipes 8: the picture has 7 rows; give at most one for "),
+        ("teapot", {"pipes": 2, "geometry": "hardware"}, "geometry hardware: triangles go to one pipeline; "),
         ("teapot", {"short_words": True}, "short_words: nothing is specialised; "),
         ("teapot", {"vcd": "a", "engine": "cxxrtl"}, "vcd: the engine cxxrtl writes no waveforms; "),
         ("no.toml", {}, "no.toml: there is no such file; "),
@@ -198,6 +218,10 @@ def test_other_refusals(tmp_path):
         blysk.design(lights=17)
     with pytest.raises(OptionError, match=r"^name 1up: no Verilog name"):
         blysk.verilog(name="1up")
+    with pytest.raises(OptionError, match=r"^pipes 4: triangles go to one pipeline"):
+        blysk.verilog(geometry="hardware", pipes=4)
+    with pytest.raises(OptionError, match=r"^merged: one pipeline has one stream"):
+        blysk.verilog(merged=True)
     with pytest.raises(TypeError, match="there is no option 'shine'; use one of method, "):
         blysk.design(shine=3)
     path = tmp_path / "a.toml"

@@ -50,6 +50,7 @@ model = "cosquad"
 setup_interval = 3
 gate = false
 short_words = false
+pipes = 2
 """
 
 

@@ -1,0 +1,66 @@
+"""The report's section on several pipelines: pixels a cycle by mesh and number of pipelines."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from blysk.bench.report.section import Cell, Section, Table
+from blysk.bench.speed import pipes
+from blysk.bench.store import Task
+from blysk.golden.pixel_pipelines import PIPES
+
+__all__ = ["measure", "section", "tasks"]
+
+
+def measure(count: int, meshes: Sequence[str], size: Sequence[int], method: str) -> list[dict[str, Any]]:
+    """Fields of a `pipes.Rate` for each mesh.
+
+    Parameters
+    ----------
+    count : int
+        Pipelines.
+    meshes, method
+        As for `pipes.measure`.
+    size : sequence of int
+        Width and height.
+    """
+    return [asdict(rate) for rate in pipes.measure(count, meshes, *size, method)]
+
+
+def tasks(quick: bool) -> list[Task]:
+    """A task a number of pipelines; quick ones are small."""
+    counts = (1, 2) if quick else PIPES
+    meshes = pipes.MESHES[:2] if quick else pipes.MESHES
+    settings = {
+        "meshes": list(meshes),
+        "size": [160, 120] if quick else [640, 480],
+        "method": "linear" if quick else "chord",
+    }
+    return [Task(measure, {"count": count, **settings}) for count in counts]
+
+
+def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
+    """Pixels a cycle, what limits them, and whether the pictures are those of one pipeline."""
+    rates = [pipes.Rate(**fields) for result in results for fields in result]
+    same = sum(rate.same for rate in rates)
+    settings = tasks[0].settings
+    width, height = settings["size"]
+    text = [
+        f"N pipelines of the method {settings['method']} at {width}x{height}; pipeline k takes the spans of "
+        "the scanlines y with y mod N = k, from a FIFO of its own. "
+        f"{same} of {len(rates)} pictures are those of the bit-accurate model of one pipeline.",
+        "One span is taken in a cycle. So a mesh gives at most as many pixels a cycle as its spans have on "
+        "average: small triangles leave pipelines idle. Where that number is about N, each cycle on which a "
+        "full FIFO stops the port is lost, too.",
+    ]
+    columns = ("mesh", "triangles", "pipelines", "pixels a span", "cycles", "pixels a cycle", "times one")
+    rows: list[tuple[Cell, ...]] = [
+        (
+            *(rate.mesh.split()[0], rate.triangles, rate.pipes, rate.pixels_a_span, rate.cycles),
+            *(rate.pixels_a_cycle, pipes.times(rates, rate)),
+        )
+        for rate in sorted(rates, key=lambda rate: settings["meshes"].index(rate.mesh))
+    ]
+    note = "Cycles from the first write of a constant to the last pixel, simulated, without stalls."
+    table = Table("several-pipelines", "Pixels a cycle of several pipelines", columns, rows, note)
+    return Section("several-pipelines", "More than one pixel a cycle", text, [table])

@@ -1,0 +1,68 @@
+"""Several shading pipelines that take spans of different scanlines, and their bit-accurate model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.pipeline import Design, Pixels, Spans
+
+__all__ = ["PIPES", "PixelPipelines"]
+
+PIPES = (1, 2, 4, 8)
+"""How many pipelines there may be."""
+
+
+@dataclass(frozen=True)
+class PixelPipelines:
+    """Shading pipelines of one design, of which pipeline k takes the scanlines y with ``y mod pipes = k``.
+
+    The pixels are those of one pipeline. Those of a scanline come from one pipeline, so that their order
+    is that of its spans; of different scanlines any may come first.
+
+    Parameters
+    ----------
+    design : Design
+        Of every pipeline.
+    pipes : int
+        Number of pipelines: one of `PIPES`, at most the scanlines that the design has.
+
+    Raises
+    ------
+    ValueError
+        If there cannot be so many.
+
+    Source: docs/theory/units.md#pipeline.
+    """
+
+    design: Design = field(default_factory=Design)
+    pipes: int = 4
+
+    def __post_init__(self):
+        if self.pipes not in PIPES:
+            raise ValueError(f"pipes must be one of {', '.join(map(str, PIPES))}, not {self.pipes}")
+        if self.pipes > 1 << self.design.y_bits:
+            rows = 1 << self.design.y_bits
+            raise ValueError(f"pipes must be at most the number of scanlines, {rows}, not {self.pipes}")
+
+    def pipe_of(self, y: np.ndarray) -> np.ndarray:
+        """Index of the pipeline of each scanline: y mod `pipes`."""
+        return np.asarray(y) % self.pipes
+
+    def compute(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> Pixels:
+        """Bit-accurate pixels in the order of the spans: those of the merged stream; see `Design.compute`."""
+        return self.design.compute(spans, constants)
+
+    def compute_each(
+        self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]
+    ) -> tuple[Pixels, ...]:
+        """Bit-accurate pixels of each pipeline, in the order of its spans.
+
+        Parameters
+        ----------
+        spans, constants
+            As for `Design.compute`.
+        """
+        pipe = self.pipe_of(spans.y)
+        return tuple(self.design.compute(spans[pipe == k], constants) for k in range(self.pipes))

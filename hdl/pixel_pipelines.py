@@ -1,0 +1,276 @@
+"""Several shading pipelines that take spans of different scanlines: more than one pixel a cycle."""
+
+from functools import reduce
+from operator import and_
+
+from amaranth.hdl import Module, Shape, Signal, Value
+from amaranth.lib import fifo, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.pixel_pipelines import PixelPipelines
+from blysk.hdl.core.stream import FIFO_LATENCY, SLICE_LATENCY, connect, connect_slice
+from blysk.hdl.frame_constants import write_shape
+from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit, span_shape, status_shape
+from blysk.hdl.pixel_assembler import pixel_shape
+from blysk.hdl.pixel_lanes import PixelLanesUnit, lanes_shape
+from blysk.hdl.pixel_merger import PixelMergerUnit
+
+__all__ = [
+    "WAITING_SPANS",
+    "MergedPipelinesUnit",
+    "PixelPipelinesUnit",
+    "WidePipelinesUnit",
+    "port_descriptions",
+]
+
+WAITING_SPANS = 513
+"""Spans that wait before a pipeline: a memory of 512 words, and a register behind it.
+
+Block RAMs hold 512 words, and a memory in look-up tables of 32 words takes more logic than the block RAMs'
+ports. A mesh whose spans have about as many pixels as there are pipelines leaves the span port no cycle to
+spare, and each that a full FIFO takes from it is lost: of 10,712 triangles of the teapot at 640x480 four
+pipelines give 3.3 times the pixels of one with 32 words, and 3.6 times with 512.
+"""
+
+
+def port_descriptions(pipes: int) -> dict[str, str]:
+    """Ports of `PixelPipelinesUnit`, for the table in its Verilog.
+
+    Parameters
+    ----------
+    pipes : int
+        Number of pipelines.
+    """
+    texts = dict(PORT_DESCRIPTIONS)
+    pixels = {name: texts.pop(name) for name in PORT_DESCRIPTIONS if name.startswith("o_")}
+    for pipe in range(pipes):
+        texts |= {
+            name.replace("o_", f"o_{pipe}_"): f"{text}; pipeline {pipe}" for name, text in pixels.items()
+        }
+    return texts
+
+
+_IN_SLICE = 2
+"""Spans in the registers of a slice."""
+
+
+class PixelPipelinesUnit(wiring.Component):
+    """Shading pipelines of one design; pipeline k takes the spans of scanlines y with ``y mod pipes = k``.
+
+    Each has a stream of pixels of its own, with its own back-pressure, so that as many pixels leave on a
+    cycle as there are pipelines. `PixelPipelines` is the bit-accurate model. A scanline belongs to one
+    pipeline: its pixels keep the order of its spans. Between scanlines no order holds.
+
+    One span is accepted a cycle, into the FIFO before its pipeline; a full FIFO stops the port. So the pixels
+    a cycle are at most the mean number of pixels of a span, and less where many spans in a row are of one
+    pipeline. Spans triangle by triangle, which go from scanline to scanline, keep all pipelines busy; a frame
+    sorted by scanlines keeps one busy as soon as a scanline has more spans than a FIFO.
+
+    A write goes to all pipelines. It is accepted when no span is inside, in a FIFO or a pipeline, and no span
+    is accepted while a write waits. The first pixel leaves an idle unit `latency` cycles after its span was
+    accepted. Every pipeline has its own frame constants, and waits for itself alone where the material
+    changes.
+
+    Counters of ``status`` are the sums of those of the pipelines and stop at their largest value, like those
+    of one pipeline; they come a cycle later for each doubling of the pipelines.
+
+    Parameters
+    ----------
+    parameters : PixelPipelines
+        Bit-accurate model.
+    waiting : int
+        Spans that wait before a pipeline, 3 or more.
+
+    Raises
+    ------
+    ValueError
+        If the method is not built for the setup interval.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(span_shape(design)))`
+        Spans.
+    o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits))).array(pipes)`
+        Pixels of each pipeline.
+    write : :py:`In(stream.Signature(write_shape()))`
+        Frame constants; see `FrameConstantsUnit` for the addresses.
+    status : :py:`Out(status_shape())`
+        Counters.
+
+    Source: docs/theory/units.md#pipeline.
+    """
+
+    def __init__(self, parameters: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
+        self.parameters = p = parameters or PixelPipelines()
+        self._waiting = waiting
+        super().__init__(
+            {
+                "i": In(stream.Signature(span_shape(p.design))),
+                "o": Out(stream.Signature(pixel_shape(p.design.x_bits, p.design.y_bits))).array(p.pipes),
+                "write": In(stream.Signature(write_shape())),
+                "status": Out(status_shape()),
+            }
+        )
+        self.pipelines = tuple(ShadingPipelineUnit(p.design) for _ in range(p.pipes))
+        first = self.pipelines[0]
+        self.latency = FIFO_LATENCY + SLICE_LATENCY + first.latency
+        self.cycles_per_pixel, self.setup_interval = first.cycles_per_pixel, first.setup_interval
+
+    @property
+    def spans_inside(self) -> int:
+        """Spans that are inside one pipeline and its FIFO at most."""
+        return self.pipelines[0].spans_inside + self._waiting + _IN_SLICE
+
+    def elaborate(self, platform):
+        """A FIFO and a pipeline for each remainder of y; writes to all; sums of the counters."""
+        m = Module()
+        span, write = self.i, self.write
+        width = Shape.cast(span.payload.shape()).width
+        pipe = span.payload.y[: (len(self.pipelines) - 1).bit_length()]
+        drained, idle, room = Signal(), [], []
+        for k, pipeline in enumerate(self.pipelines):
+            m.submodules[f"pipeline_{k}"] = pipeline
+            m.submodules[f"spans_{k}"] = spans = fifo.SyncFIFOBuffered(width=width, depth=self._waiting)
+            first = pipeline.i.signature.flip().create(path=(f"first_{k}",))
+            m.d.comb += [
+                spans.w_data.eq(span.payload),
+                spans.w_en.eq(span.valid & ~write.valid & (pipe == k)),
+                Value.cast(first.payload).eq(spans.r_data),
+                first.valid.eq(spans.r_rdy),
+                spans.r_en.eq(first.ready),
+                Value.cast(pipeline.write.payload).eq(write.payload.as_value()),
+                pipeline.write.valid.eq(write.valid & drained),
+            ]
+            # A block RAM gives its word late in the cycle: no logic before the next register.
+            connect_slice(m, first, pipeline.i)
+            connect(m, pipeline.o, wiring.flipped(self.o[k]))
+            idle.append((spans.level == 0) & ~pipeline.i.valid & pipeline.write.ready)
+            room.append(spans.w_rdy | (pipe != k))
+        m.d.comb += [
+            # Of no payload that is not valid: its bits may be unknown.
+            span.ready.eq(~write.valid & (~span.valid | reduce(and_, room))),
+            write.ready.eq(drained),
+        ]
+        # While a write waits no span comes: what is drained stays so.
+        m.d.sync += drained.eq(write.valid & reduce(and_, idle))
+        self._count(m)
+        return m
+
+    def _count(self, m: Module) -> None:
+        """Sums of the pipelines' counters, a register for each pair of them."""
+        each = [pipeline.status for pipeline in self.pipelines]
+        for name in self.status.shape().members:
+            counts = [status[name] for status in each]
+            while len(counts) > 1:
+                sums = []
+                for a, b in zip(counts[::2], counts[1::2], strict=True):
+                    total, size = Signal(len(a), name=f"sum_{name}"), len(a)
+                    if size == 1:
+                        m.d.sync += total.eq(a | b)
+                    else:
+                        m.d.sync += total.eq((a + b)[:size] | (a + b)[size].replicate(size))
+                    sums.append(total)
+                counts = sums
+            m.d.comb += self.status[name].eq(counts[0])
+
+
+class WidePipelinesUnit(wiring.Component):
+    """`PixelPipelinesUnit` with one wide stream of pixels, a lane for each pipeline: for simulation.
+
+    A pipeline waits for no other; the first pixel leaves an idle unit `latency` cycles after its span was
+    accepted.
+
+    Parameters
+    ----------
+    parameters, waiting
+        Those of `PixelPipelinesUnit`.
+
+    Members
+    -------
+    i, write, status
+        Those of `PixelPipelinesUnit`.
+    o : :py:`Out(stream.Signature(lanes_shape(pipes, x_bits, y_bits)))`
+        Pixels that leave on one cycle.
+
+    Source: docs/theory/units.md#pipeline.
+    """
+
+    def __init__(self, parameters: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
+        self.pipelines = PixelPipelinesUnit(parameters, waiting)
+        self.parameters = p = self.pipelines.parameters
+        self._lanes = PixelLanesUnit(p.pipes, p.design.x_bits, p.design.y_bits)
+        self.latency = self.pipelines.latency + self._lanes.latency
+        members = dict(self.pipelines.signature.members)
+        wide = lanes_shape(p.pipes, p.design.x_bits, p.design.y_bits)
+        super().__init__(members | {"o": Out(stream.Signature(wide))})
+
+    def elaborate(self, platform):
+        """The pipelines, and their pixels on a cycle as one beat."""
+        m = Module()
+        m.submodules.pipelines, m.submodules.lanes = pipelines, lanes = self.pipelines, self._lanes
+        connect(m, wiring.flipped(self.i), pipelines.i)
+        connect(m, wiring.flipped(self.write), pipelines.write)
+        m.d.comb += self.status.eq(pipelines.status)
+        for pixels, lane in zip(pipelines.o, lanes.i, strict=True):
+            connect(m, pixels, lane)
+        connect(m, lanes.o, wiring.flipped(self.o))
+        return m
+
+
+class MergedPipelinesUnit(wiring.Component):
+    """`PixelPipelinesUnit` with one stream of pixels, in the order of the spans: that of one pipeline.
+
+    It gives a pixel a cycle at most. Of pipelines that take several cycles a pixel, as those of the compact
+    style do, it gives the pixels of all.
+
+    Parameters
+    ----------
+    parameters, waiting
+        Those of `PixelPipelinesUnit`.
+
+    Members
+    -------
+    i, write, status
+        Those of `PixelPipelinesUnit`.
+    o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits)))`
+        Pixels.
+
+    Source: docs/theory/units.md#pipeline.
+    """
+
+    def __init__(self, parameters: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
+        self.pipelines = PixelPipelinesUnit(parameters, waiting)
+        self.parameters = p = self.pipelines.parameters
+        self._merger = PixelMergerUnit(p.pipes, p.design.x_bits, p.design.y_bits)
+        # A turn is in its FIFO before the first pixel of its span is there.
+        self.latency = self.pipelines.latency + self._merger.latency
+        self.cycles_per_pixel, self.setup_interval = (
+            self.pipelines.cycles_per_pixel,
+            self.pipelines.setup_interval,
+        )
+        members = dict(self.pipelines.signature.members)
+        pixels = stream.Signature(pixel_shape(p.design.x_bits, p.design.y_bits))
+        super().__init__(members | {"o": Out(pixels)})
+
+    def elaborate(self, platform):
+        """The pipelines, a FIFO of the pipelines that the spans went to, and the merger."""
+        m = Module()
+        m.submodules.pipelines, m.submodules.merger = pipelines, merger = self.pipelines, self._merger
+        turn = merger.turns.payload
+        m.submodules.turns = turns = fifo.SyncFIFOBuffered(width=len(turn), depth=pipelines.spans_inside)
+        m.d.comb += [
+            Value.cast(pipelines.i.payload).eq(self.i.payload.as_value()),
+            pipelines.i.valid.eq(self.i.valid & turns.w_rdy),
+            self.i.ready.eq(pipelines.i.ready & turns.w_rdy),
+            turns.w_data.eq(self.i.payload.y),
+            turns.w_en.eq(self.i.valid & pipelines.i.ready & (self.i.payload.length != 0)),
+            turn.eq(turns.r_data),
+            merger.turns.valid.eq(turns.r_rdy),
+            turns.r_en.eq(merger.turns.ready),
+            self.status.eq(pipelines.status),
+        ]
+        connect(m, wiring.flipped(self.write), pipelines.write)
+        for pixels, lane in zip(pipelines.o, merger.i, strict=True):
+            connect(m, pixels, lane)
+        connect(m, merger.o, wiring.flipped(self.o))
+        return m

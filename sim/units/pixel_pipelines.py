@@ -1,0 +1,129 @@
+"""Record of the shading pipelines for different scanlines, with their merged stream."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from blysk.golden.frame_constants import MATERIAL_ADDRESS, writes_of
+from blysk.golden.pipeline import Spans
+from blysk.golden.pixel_pipelines import PixelPipelines
+from blysk.golden.presets import preset
+from blysk.hdl.pixel_pipelines import MergedPipelinesUnit
+from blysk.sim.frames.frame import beats_of
+from blysk.sim.frames.testbench import pixel_beats
+from blysk.sim.units.operands import short_lengths
+from blysk.sim.units.pipeline import spans_of
+from blysk.sim.units.pipeline_spans import any_constants, any_spans, constants_written, ends_for
+from blysk.sim.units.record import Case, Record, Stimulus, Variant
+
+__all__ = ["RECORD"]
+
+_COUNTED = (1 << 16) + 2
+"""Spans that a counter of 16 bits does not hold."""
+
+_DEFAULT = "2 pipelines, without lights"
+
+_MOST = 65535
+"""Of a counter."""
+
+
+def _pixels(unit, case):
+    design = unit.parameters.design
+    return unit.parameters.compute(spans_of(case.beats), constants_written(design, case.write))
+
+
+def _status(unit, case):
+    length, pixels = case.beats["length"], _pixels(unit, case)
+    return {
+        "out_of_range_spans": min(pixels.out_of_range_spans, _MOST),
+        "wide_spans": min(pixels.wide_spans, _MOST),
+        "empty_spans": min(int(np.count_nonzero(length == 0)), _MOST),
+        "overrun": int(np.any(case.beats["x"] + length > 1 << unit.parameters.design.x_bits)),
+    }
+
+
+def _case(unit, rng, spans: Spans) -> Case:
+    design = unit.parameters.design
+    constants = any_constants(rng, design, spans)
+    return Case(beats_of(unit, ends_for(design, spans)), write=writes_of(constants))
+
+
+def _spans(unit, rng, count):
+    """Spans of every length and angle on any scanline, some of them empty."""
+    return _case(unit, rng, any_spans(rng, unit.parameters.design, short_lengths(rng, count)))
+
+
+def _scanlines(unit, rng, count):
+    """Many spans in a row for one pipeline, then as many for the next: FIFOs fill up and run empty."""
+    pipes, design = unit.parameters.pipes, unit.parameters.design
+    spans = any_spans(rng, design, rng.integers(0, 16, count // 8))
+    turn = np.arange(len(spans)) // 40
+    return _case(unit, rng, replace(spans, y=(spans.y // pipes * pipes + turn) % (1 << design.y_bits)))
+
+
+def _constants(unit, rng, count):
+    """Constants of any codes, written over others; the material changes often."""
+    design = unit.parameters.design
+    spans = any_spans(rng, design, rng.integers(0, 5, count))
+    spans = replace(spans, material=np.arange(count) // 7 % design.materials)
+    constants = [
+        replace(each, exponent=int(rng.integers(1, 1 << 10)), ambient=rng.integers(0, 255 * 64, 3))
+        for each in any_constants(rng, design, spans)
+    ]
+    write = writes_of(constants)
+    others = rng.integers(0, 1 << 18, (6, len(write["data"])))
+    # The index of a material is that of one.
+    others = np.where(write["address"] == MATERIAL_ADDRESS, write["data"], others)
+    address = np.tile(write["address"], len(others) + 1)
+    beats = beats_of(unit, ends_for(design, spans))
+    return Case(beats, write={"address": address, "data": np.r_[others.ravel(), write["data"]]})
+
+
+def _counters(unit, rng, count):
+    """More empty spans than the counters hold, for all pipelines; one past the last x."""
+    design, pipes = unit.parameters.design, unit.parameters.pipes
+    kinds = any_spans(rng, design, np.array([0, 2]))
+    spans = kinds[np.r_[np.zeros(_COUNTED, dtype=int), 1]]
+    spans.x[-1] = (1 << design.x_bits) - 1
+    return _case(unit, rng, replace(spans, y=np.arange(len(spans)) % pipes))
+
+
+def _variants():
+    few = {"x_bits": 6, "y_bits": 3, "length_bits": 4}
+    for name, pipes, waiting, design in (
+        (_DEFAULT, 2, 5, preset(lights=0, materials=2, **few)),
+        ("4 pipelines, linear", 4, 9, preset("linear", y_bits=4)),
+        ("4 pipelines, chord, 3 materials", 4, 33, preset("chord", materials=3)),
+        ("8 pipelines, quadratic, compact", 8, 17, preset("quadratic", style="compact")),
+    ):
+        unit = partial(MergedPipelinesUnit, PixelPipelines(design, pipes), waiting)
+        yield name, Variant(unit, long=pipes > 2)
+
+
+RECORD = Record(
+    name="pixel_pipelines",
+    title="Several pipelines, each for spans of other scanlines, and their pixels in the order of the spans",
+    source="docs/theory/units.md#pipeline",
+    variants=dict(_variants()),
+    expect=lambda unit, case: pixel_beats(_pixels(unit, case)),
+    status=_status,
+    stimuli={
+        "spans": Stimulus(_spans, 1500),
+        "scanlines": Stimulus(_scanlines, 1500),
+        "constants": Stimulus(_constants, 250, repeats=12, variants=(_DEFAULT,)),
+        "counters": Stimulus(_counters, stalled=False),
+    },
+    axis="",
+    still={
+        "without an interpolator no span is out of range, or wide": (
+            "pipelines.sum_out_of_range_spans[0-15] pipelines.sum_wide_spans[0-15] seen[0] status[0-31]"
+        ),
+        "a counter stops at its largest value, and a flag that is set stays": (
+            "sum_empty_spans[15] sum_overrun[0] status[47-48]"
+        ),
+        "a pipeline has scanlines of one remainder": (
+            "assembler.{y[0],spare[6],payload[6],$signal[6]} r_port__data[6] pipelines.{payload,spare}[6]"
+        ),
+    },
+)

@@ -1,0 +1,21 @@
+"""Proof about several pipelines with wide beats; `test_units` has that of the merged stream."""
+
+import pytest
+
+from blysk.golden.pixel_pipelines import PixelPipelines
+from blysk.golden.presets import preset
+from blysk.hdl.pixel_pipelines import WidePipelinesUnit
+
+from .prover import Harness
+from .rules import stays
+
+pytestmark = pytest.mark.prove
+
+
+def test_wide_beats_that_wait_stay(prove):
+    """Inductive: no lane gets a pixel while the beat of the others waits."""
+    design = preset(lights=0, x_bits=4, y_bits=2, length_bits=2, grey=True)
+    unit = WidePipelinesUnit(PixelPipelines(design, 2), 3)
+    harness = Harness(unit)
+    stays(harness, unit.o)
+    prove(harness)
