@@ -77,7 +77,7 @@ class RenderedFrame:
 
     @property
     def error(self) -> ErrorFigures:
-        """Errors against exactly normalised Phong interpolation with the same model, in LSB and dB."""
+        """Errors against exact normals of every pixel with the same model, in LSB and dB."""
         return self.comparison.method_error
 
     @property
@@ -140,7 +140,7 @@ class RenderedFrame:
         subtitle = "no pixel shows the surface"
         if self.figures["visible_pixels"]:
             subtitle = (
-                "simulated RTL beside normalised Phong interpolation in float64: largest error "
+                "simulated RTL beside exact normals of every pixel in float64: largest error "
                 f"{self.error.max_lsb:.2f} LSB, {self.cycles:,} cycles for {self.pixels:,} pixels"
             )
         title = f"{self.name}: {self.design.method}, {self.design.model}{highlight}"
