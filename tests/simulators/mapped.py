@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -12,11 +11,10 @@ from amaranth.hdl import Value
 from amaranth.lib.wiring import Component, Out
 
 from blysk.bench.quality.equivalence import yosys
-from blysk.bench.tools.absorb_registers import Absorbed, absorb_registers
 from blysk.bench.tools.families import ECP5
 from blysk.bench.tools.place_and_route import _AFTER, _BEFORE
 
-__all__ = ["absorbed_core", "cells", "core", "map_component", "same", "verilog_of"]
+__all__ = ["cells", "core", "map_component", "same", "verilog_of"]
 
 _YOSYS_CELLS = ("LUT2", "LUT4", "PFUMX", "L6MUX21", "TRELLIS_FF", "TRELLIS_DPR16X4", "CCU2C")
 """Cells that Yosys has models of."""
@@ -76,17 +74,6 @@ def core(component: Component, text: str) -> str:
     )
     joined = ", ".join(f".{port}({name})" for port, (name, *_) in zip(inner, ports, strict=True))
     return f"module core ({listed});\n{declared}  top whole ({joined});\nendmodule\n{text}{cells()}"
-
-
-def absorbed_core(
-    component: Component,
-    folder: Path,
-    change: Callable[[dict[str, Any]], None] = lambda cells: None,
-) -> tuple[str, Absorbed]:
-    """`core` of a component whose registers were absorbed, after a change of its cells."""
-    netlist, absorbed = absorb_registers(map_component(component, folder))
-    change(netlist["modules"]["top"]["cells"])
-    return core(component, verilog_of(netlist, folder)), absorbed
 
 
 # Black boxes stand for what the step leaves alone.
