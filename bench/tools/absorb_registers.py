@@ -199,27 +199,47 @@ class _Netlist:
         self.use(cell, _OUTPUT, control)
         return True
 
-    def absorb_operand(self, cell: str, operand: str) -> bool:
-        """Move the flip-flops before an operand in; one that has another reader stays for it."""
-        moved: dict[str, str] = {}
+    def beside_operand(self, cell: str, operand: str) -> tuple[_Control, dict[str, str]] | None:
+        """Control of the flip-flops before an operand, and these by port; ``None`` if they cannot move."""
+        found: dict[str, str] = {}
         for k in range(_OPERAND_BITS):
             bit = self.net(cell, f"{operand}{k}")
             # A register of a constant 1 would not have it on the first cycle.
             if bit in ("0", "x"):
                 continue
             if bit not in self.by_output:
-                return False
-            moved[f"{operand}{k}"] = self.by_output[bit]
-        control = self.fits(cell, {self.control(name) for name in moved.values()})
-        if control is None:
-            return False
-        for port, name in moved.items():
-            self.connect(cell, port, self.net(name, "DI"))
-        for name in set(moved.values()):
+                return None
+            found[f"{operand}{k}"] = self.by_output[bit]
+        control = self.fits(cell, {self.control(name) for name in found.values()})
+        return None if control is None else (control, found)
+
+    def absorb_operands(self, cell: str, closes: bool) -> int:
+        """Move the flip-flops before both operands in, or of one behind other flip-flops; how many operands.
+
+        nextpnr times a multiplier with a register for one operand alone as if it had none there. What is
+        before that register is then on a path through the multiplier: with a register of the product, and
+        nothing but flip-flops before, such a path is still short.
+        """
+        beside = {operand: self.beside_operand(cell, operand) for operand in "AB"}
+        if None in beside.values():
+            beside = {
+                operand: given
+                for operand, given in beside.items()
+                if closes
+                and given
+                and all(self.net(name, "DI") in self.by_output for name in given[1].values())
+            }
+        if len({control.clock for control, _ in beside.values()}) > 1:
+            return 0
+        for operand, (control, found) in beside.items():
+            for port, name in found.items():
+                self.connect(cell, port, self.net(name, "DI"))
+            self.use(cell, f"INPUT{operand}", control)
+        # One may be before both.
+        for name in {name for _, found in beside.values() for name in found.values()}:
             if self.pins[self.net(name, "Q")] == {(name, "Q", 0)}:
                 self.remove(name)
-        self.use(cell, f"INPUT{operand}", control)
-        return True
+        return len(beside)
 
 
 def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict[str, Any], Absorbed]:
@@ -228,7 +248,8 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
     All bits of an operand, or of a product, must be flip-flops of one clock and one enable that have no
     reset, are 0 at power-up, and are not at a port of the module. Bits of an operand may also be constant 0.
     A product must have no reader but its flip-flops, one each. A flip-flop of an operand that has another
-    reader stays for that one. An enable that flip-flops use inverted gets one look-up table, for all
+    reader stays for that one. Of one operand alone they move only if flip-flops are before them and the
+    product has a register, too. An enable that flip-flops use inverted gets one look-up table, for all
     multipliers.
 
     Parameters
@@ -251,10 +272,10 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
     operands = products = closed = 0
     for name in sorted(name for name, cell in work.cells.items() if cell["type"] == _MULTIPLIER):
         product = work.absorb_product(name)
-        inputs = [work.absorb_operand(name, operand) for operand in "AB"]
+        inputs = work.absorb_operands(name, product)
         products += product
-        operands += sum(inputs)
-        closed += product and all(inputs)
+        operands += inputs
+        closed += product and inputs == 2
     modules = {**netlist["modules"], top: {**module, "cells": work.cells}}
     found = Absorbed(operands, products, work.removed, len(work.inverted), closed)
     return {**netlist, "modules": modules}, found

@@ -89,6 +89,11 @@ def narrow(register, a, b, enable):
     return (register(a * b, "p_0"),)
 
 
+def behind_logic(register, a, b, enable):
+    """One operand that may move, behind gates: as if it had no register, to nextpnr."""
+    return (register(register(a ^ b, "a_1") * register(b, "b_1", reset_less=False), "p_0"),)
+
+
 def chained(register, a, b, enable):
     """One register between two multipliers: it goes into one of them."""
     between = register((a * b)[18:].as_signed(), "between")
@@ -117,6 +122,7 @@ CASES = {
     "a shared operand": (shared, Absorbed(4, 2, 18 * 3 + 72, 0, 2)),
     "halves of different enables": (half_enabled, Absorbed(1, 1, 54, 0, 0)),
     "narrow operands": (narrow, Absorbed(2, 1, 9 + 12 + 21, 0, 1)),
+    "one operand, behind logic": (behind_logic, Absorbed(0, 1, 36, 0, 0)),
     "no register at hand": (lambda register, a, b, enable: (a * b,), Absorbed()),
 }
 
