@@ -16,7 +16,9 @@ __all__ = ["DESIGNS", "EXPONENTS", "measure", "scene_for"]
 EXPONENTS = (1, 10, 100, 1000)
 
 DESIGNS = [(method, "cosquad") for method in METHODS]
-DESIGNS += [("chord", model) for model in ("cosquad7", "cosquad_lin", "lyon3_refitted", "exp", "blinn")]
+_MODELS = ("cosquad7", "cosquad_lin", "lyon3_refitted", "exp", "blinn_product", "blinn")
+
+DESIGNS += [("chord", model) for model in _MODELS]
 """Method and model of each row of README's table."""
 
 

@@ -182,7 +182,7 @@ class Design:
     """
 
     interpolator: Interpolator = field(default_factory=ChordInterpolator)
-    specular: Specular | Power | Lobe | None = field(default_factory=Specular)
+    specular: Specular | Power | Lobe | None = field(default_factory=Lobe)
     lights: int = 1
     materials: int = 1
     gate: bool = False

@@ -45,13 +45,10 @@ They have no error bound for a highlight gate."""
 
 MODELS: dict[str, Specular | Power] = {
     model.name: Specular(model) for model in REFLECTION_MODELS.values() if isinstance(model, Specular.SERVED)
-} | {"blinn": Power()}
+} | {"blinn_product": Power()}
 """Specular units of the reflection models; every method serves each."""
 
-LOBES: dict[str, Lobe] = {
-    "blinn_table": Lobe(BLINN),
-    **{model.name: Lobe(model) for model in (COPLANAR_PHONG, BECKMANN, GGX)},
-}
+LOBES: dict[str, Lobe] = {model.name: Lobe(model) for model in (BLINN, COPLANAR_PHONG, BECKMANN, GGX)}
 """Specular units by a table, which is written for each frame; every method serves each."""
 
 

@@ -84,6 +84,8 @@ class RenderUnit(wiring.Component):
         Bit-accurate model.
     size : (int, int) or None
         As `DepthTestUnit` has it.
+    setups : int
+        As `GeometryUnit` has it.
 
     Members
     -------
@@ -103,11 +105,13 @@ class RenderUnit(wiring.Component):
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
-    def __init__(self, parameters: Renderer | None = None, size: tuple[int, int] | None = None):
+    def __init__(
+        self, parameters: Renderer | None = None, size: tuple[int, int] | None = None, setups: int = 1
+    ):
         self.parameters = parameters or Renderer()
         design, grid = self.parameters.design, self.parameters.geometry.grid
         compact = design.build.style == "compact"
-        self.geometry = GeometryUnit(grid, compact, self.parameters.geometry.lines)
+        self.geometry = GeometryUnit(grid, compact, self.parameters.geometry.lines, setups)
         self.pipeline = ShadingPipelineUnit(design)
         self.depth = DepthTestUnit(design.x_bits, design.y_bits, size)
         members = {

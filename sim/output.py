@@ -5,19 +5,32 @@ import json
 import math
 import os
 import secrets
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
 from blysk.sim.errors import InputError
 
-__all__ = ["atomic_writer", "check_writable", "files_within", "plain", "write_json", "write_text"]
+__all__ = [
+    "all_or_none",
+    "atomic_writer",
+    "check_writable",
+    "files_within",
+    "plain",
+    "write_json",
+    "write_text",
+]
 
+# Files that wait for the end of `all_or_none`: path as given, temporary file, target.
+_PENDING: ContextVar[list[tuple[Path, Path, Path]] | None] = ContextVar("pending", default=None)
 _REASONS = {
     errno.ENOSPC: ("the disk is full", "free some space or choose another disk"),
     errno.EDQUOT: ("your disk quota is used up", "free some space or choose another disk"),
     errno.EROFS: ("the file system is read-only", "choose another folder"),
+    errno.ENOENT: ("its folder takes no files", "choose another folder"),
     errno.EACCES: ("permission denied", "choose a folder that you may write to"),
     errno.EPERM: ("permission denied", "choose a folder that you may write to"),
     errno.ENAMETOOLONG: ("the name is too long", "choose a shorter name"),
@@ -32,7 +45,10 @@ def _unwritable(path: Path, error: OSError) -> InputError:
 
 
 def check_writable(path: str | os.PathLike) -> None:
-    """Check, before long work, that a file can be written; writes nothing.
+    """Check, before long work, that a file can be written; leaves nothing behind.
+
+    A temporary file in its folder is made and removed: permissions alone do not tell of file systems that are
+    read-only or take no files, nor anything to the superuser.
 
     Parameters
     ----------
@@ -59,6 +75,10 @@ def check_writable(path: str | os.PathLike) -> None:
         for target in (parent, path):
             if target.exists() and not os.access(target, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        if path.is_file() or not path.exists():
+            handle, name = tempfile.mkstemp(prefix=".blysk-", dir=parent)
+            os.close(handle)
+            os.unlink(name)
     except OSError as error:
         raise _unwritable(path, error) from error
 
@@ -101,10 +121,11 @@ def files_within(folder: str | os.PathLike, first: str) -> list[str]:
 def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
     """Path of a temporary file beside ``path``, which takes its name when the block ends without an error.
 
-    Until then a file that was there stays as it was; whatever ends the block early (an interrupt, too)
-    removes the temporary file. The file's permissions are those of the one it replaces, or those that
-    the umask gives a new file. A link is followed: its target is replaced. A path that is no regular
-    file (``/dev/stdout``, a pipe) is given as it is, and written directly.
+    Within `all_or_none` it takes it when that ends. Until then a file that was there stays as it was;
+    whatever ends the block early (an interrupt, too) removes the temporary file. The file's permissions are
+    those of the one it replaces, or those that the umask gives a new file. A link is followed: its target is
+    replaced. A path that is no regular file (``/dev/stdout``, a pipe) is given as it is, and written
+    directly.
 
     Parameters
     ----------
@@ -131,6 +152,7 @@ def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
             raise _unwritable(path, error) from error
         return
     target = Path(os.path.realpath(path))
+    kept = False
     temporary = target.with_name(f".{target.stem[:100]}-{secrets.token_hex(8)}{target.suffix}")
     try:
         # The mode is cut by the umask, as that of any new file.
@@ -138,14 +160,47 @@ def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
         if target.exists():
             temporary.chmod(target.stat().st_mode & 0o777)
         yield temporary
-        os.replace(temporary, target)
+        pending = _PENDING.get()
+        if pending is None:
+            os.replace(temporary, target)
+        else:
+            pending.append((path, temporary, target))
+            kept = True
     except OSError as error:
         # Errors of the block about another file are its own.
         if error.filename is not None and Path(error.filename) not in (temporary, target):
             raise
         raise _unwritable(path, error) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        if not kept:
+            temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def all_or_none() -> Iterator[None]:
+    """Within the block, files of `atomic_writer` take their names when the block ends, all of them together.
+
+    If it ends with an error there is none of them, and those that were there stay as they were. Paths that
+    are no regular files are written at once.
+
+    Raises
+    ------
+    InputError
+        If a file cannot take its name.
+    """
+    pending: list[tuple[Path, Path, Path]] = []
+    token = _PENDING.set(pending)
+    try:
+        yield
+        for path, temporary, target in pending:
+            try:
+                os.replace(temporary, target)
+            except OSError as error:
+                raise _unwritable(path, error) from error
+    finally:
+        _PENDING.reset(token)
+        for _, temporary, _ in pending:
+            temporary.unlink(missing_ok=True)
 
 
 def write_text(path: str | os.PathLike, text: str) -> None:

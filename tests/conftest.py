@@ -22,10 +22,10 @@ def pytest_collection_modifyitems(items):
     """
     for item in items:
         group = item.nodeid.partition("::")[0]
-        if group.endswith("/test_units.py"):
+        if group == "tests/test_units.py":
             group += item.callspec.params["name"]
         item.add_marker(pytest.mark.xdist_group(group))
-    items.sort(key=lambda item: item.path.name != "test_units.py")
+    items.sort(key=lambda item: not item.nodeid.startswith("tests/test_units.py"))
 
 
 @pytest.fixture(scope="session", autouse=True)

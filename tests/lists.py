@@ -8,7 +8,7 @@ __all__ = ["COSCOS_MODELS", "FURTHER_MODELS", "LINE_MODELS", "SPECULAR_MODELS"]
 SPECULAR_MODELS = ("cosquad", "cosquad7", "cosquad_lin")
 """Those of the documents' figures, all of one latency."""
 
-FURTHER_MODELS = tuple(name for name in MODELS if name not in (*SPECULAR_MODELS, "blinn"))
+FURTHER_MODELS = tuple(name for name in MODELS if name not in (*SPECULAR_MODELS, "blinn_product"))
 """The others that the specular unit serves."""
 
 LINE_MODELS = tuple(name for name, model in REFLECTION_MODELS.items() if isinstance(model, PolynomialModel))

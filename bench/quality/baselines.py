@@ -24,7 +24,7 @@ from blysk.bench.accuracy import scene_for
 from blysk.bench.command import run
 from blysk.bench.store import Task, results_of
 from blysk.bench.tools.blocks import ENTRIES as UNITS
-from blysk.bench.tools.blocks import Entry
+from blysk.bench.tools.blocks import Entry, entries_of
 from blysk.golden.pipeline import STYLES, Design
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.geometry import Mesh, normalise
@@ -36,6 +36,7 @@ from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.meshes.teapot import teapot
 from blysk.sim.output import check_writable, write_json
+from blysk.sim.units.registry import RECORDS
 from blysk.sim.value_types import Whole
 
 __all__ = [
@@ -128,13 +129,15 @@ def _parts_of_unit(entry: Entry) -> dict[str, int]:
 def _entries() -> dict[str, Callable[[], dict[str, int]]]:
     pipelines = [_Pipeline(method, style=style) for style in STYLES for method in METHODS]
     pipelines += [_Pipeline(gate=True), _Pipeline("linear", gate=True)]
-    pipelines += [_Pipeline(model="blinn", style="compact", gate=gate) for gate in (False, True)]
+    pipelines += [_Pipeline(model="blinn_product", style="compact", gate=gate) for gate in (False, True)]
     entries = {f"frames: {pipeline.name}": pipeline.cycles for pipeline in pipelines}
     # In this style a model moves the cycles by its latency alone.
     pipelines += [_Pipeline(model=model) for model in MODELS if model != "cosquad"]
     entries |= {f"parts: {pipeline.name}": pipeline.parts for pipeline in pipelines}
     # Pipelines have lines of their own, with styles and gates.
     of_units = [entry for entry in UNITS if entry.record.kind is not ShadingPipelineUnit]
+    # Units of geometry whose errors are in no table.
+    of_units += [Entry(record, record.default) for record in RECORDS.values() if not entries_of(record)]
     entries |= {f"parts: {entry.title}": partial(_parts_of_unit, entry) for entry in of_units}
     return entries
 

@@ -10,6 +10,7 @@ import functools
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from blysk.bench.store import Task, results_of, version_of
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.number.unit_vector import ONE, quantise
+from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.geometry import normalise
@@ -45,7 +46,7 @@ _MODELS = {
     "quadratic-horner": "exp",
     "angular": "coscos2",
     "recurrence": "coscos4",
-    "renormalise": "blinn",
+    "renormalise": "blinn_product",
 }
 """Models of methods; others have the first of the documents."""
 
@@ -174,6 +175,11 @@ def measure(
     while totals["pixels"] < pixels:
         constants = random_constants(rng)
         spans = random_spans(rng, min(_BATCH, pixels - totals["pixels"]), constants.halfway[0] / ONE)
+        if design.interpolator.takes_line:
+            # Unit vectors, in the format of a line's ends.
+            shift = design.interpolator.END_FORMAT.fraction_bits - COMPONENT.fraction_bits
+            left, right = spans.normal_left << shift, spans.normal_right << shift
+            spans = replace(spans, normal_left=left, normal_right=right)
         shaded = design.compute(spans, constants)
         expected, beats = pixel_beats(shaded), beats_of(unit, spans)
         shares = rng.choice([0.0, 0.5], 2) * rng.random(2)
@@ -192,6 +198,7 @@ def measure(
             "empty_spans": np.count_nonzero(spans.length == 0),
             "overrun": np.any((spans.x + spans.length > 4096) & (spans.length > 0)),
         }
+        status |= {"wide_spans": shaded.wide_spans} if design.span_limit else {}
         _hold("cxxrtl", f"{where}, status", found.status[None], {k: np.array([v]) for k, v in status.items()})
         if verilated is not None:
             stimulus = free_stimulus(verilated.ports, beats, constants.writes(), len(shaded.x), _IDLE_TIMEOUT)

@@ -4,7 +4,7 @@
 white light and with a grey, glossy material, at every exponent from 1 to 1000 with the model cosquad and at
 30 of them with every other model. Each frame goes through `Design.compute`, which the simulated
 pipeline equals to the bit (``python -m blysk.bench.report.pairs`` and the tests of `pipeline`), and is held
-against exactly normalised interpolation with the same model. ``--json`` keeps the figures of every frame. The
+against exact normals of every pixel with the same model. ``--json`` keeps the figures of every frame. The
 exit status is 1 when a pixel is more than 1 LSB off, other than where a light is on in one and off in the
 other (see `Point`), 2 for a mesh that cannot be read.
 """
@@ -29,7 +29,6 @@ from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity_of_cosines, saturate
 from blysk.golden.reference.raster import Raster, fragment_normals, rasterise
-from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import Scene
 from blysk.sim.errors import InputError
 from blysk.sim.meshes.mesh import load_mesh
@@ -153,7 +152,7 @@ class Frame:
             scene.ambient_light,
             self._cosine[:, np.newaxis],
             self._highlight[:, np.newaxis],
-            REFLECTION_MODELS[model],
+            MODELS[model].model,
         )
         return 255 * saturate(shaded)
 

@@ -23,7 +23,7 @@ from blysk.golden.frames.compare import method_in_float64
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.methods.interpolator import Operand
-from blysk.golden.presets import preset
+from blysk.golden.presets import LOBES, MODELS, preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.metrics import error_figures
 from blysk.golden.reference.raster import Raster, rasterise
@@ -255,7 +255,7 @@ def _judged(
     if not exact.mask.any():
         size = f"{scene.width}x{scene.height}"
         raise InputError(view["source"], f"no pixel shows the surface at {size}", "choose another mesh")
-    golden = render(scene, "phong", REFLECTION_MODELS[model], raster=raster).image
+    golden = render(scene, "phong", (MODELS | LOBES)[model].model, raster=raster).image
     pairs = {
         "model": (golden * 255, exact.image),
         "arithmetic": (image, same_method),

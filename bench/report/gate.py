@@ -51,7 +51,7 @@ __all__ = [
     "shares_of",
 ]
 
-MODELS = ("cosquad", "coscos4", "blinn")
+MODELS = ("cosquad", "coscos4", "blinn_product")
 EXPONENTS = (2, 10, 50, 200, 1000)
 
 _SPECULAR = ("light_0.specular",)

@@ -56,7 +56,7 @@ SIZES = ((8, 16), (12, 16), (12, 32), (14, 32), (15, 16), (15, 32), (20, 16))
 MESHES = ("teapot", "sphere", "torus", "waves")
 """Surfaces of the frames."""
 
-FRONT = ("blinn_table", "cosquad", "lyon3_refitted", "exp", "blinn")
+FRONT = ("blinn", "cosquad", "lyon3_refitted", "exp", "blinn_product")
 """Models of the pipelines that are compared: the table, and its baselines."""
 
 EXPONENTS = (1, 10, 100, 1000)
@@ -257,7 +257,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         model: max(row["total"] for _, of, row in frames if of == model)
         for model in dict.fromkeys(of for _, of, _ in frames)
     }
-    table, cosquad = pipelines["blinn_table"], pipelines["cosquad"]
+    table, cosquad = pipelines["blinn"], pipelines["cosquad"]
     text = [
         "A table of 336 words, addressed by the octave of 1 - N·H, with one multiplier gives Blinn's power "
         "at every exponent, and any other curve of N·H: Beckmann's and GGX among them.",
@@ -265,7 +265,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         f"{cosquad['multipliers']}; both take a span to its first pixel in {table['latency']} and "
         f"{cosquad['latency']} cycles, and give a pixel every {table['cycles_per_pixel']} and "
         f"{cosquad['cycles_per_pixel']} cycles. Its largest error against exact shading with Blinn's power "
-        f"is {worst['blinn_table']:.2f} LSB, that of `cosquad` {worst['cosquad']:.2f}.",
+        f"is {worst['blinn']:.2f} LSB, that of `cosquad` {worst['cosquad']:.2f}.",
         "What is left is the method's: it turns normals evenly along a span on the screen, and the "
         "exact frame evenly on the surface. The column *spans alone* has that error by itself.",
     ]
@@ -336,7 +336,7 @@ def _front(pipelines: dict[str, dict], worst: dict[str, float]) -> Drawing:
     axes = figure.subplots()
     for model, cost in pipelines.items():
         x, y = cost["multipliers"], worst[model]
-        axes.plot(x, y, "o", color="#d55e00" if model == "blinn_table" else "#0072b2")
+        axes.plot(x, y, "o", color="#d55e00" if model == "blinn" else "#0072b2")
         axes.annotate(model, (x, y), xytext=(6, 4), textcoords="offset points")
     axes.set(xlabel="multipliers of the pipeline", ylabel="largest error, LSB", yscale="log")
     axes.margins(x=0.15, y=0.15)

@@ -24,7 +24,7 @@ __all__ = [
 
 AXES = {
     "total": "Against the exact frame: Phong shading as on a GPU, with Blinn's model.",
-    "method": "Against exactly normalised interpolation along the spans with the same model.",
+    "method": "Against the exact frame, the normal of every pixel, with the same model.",
     "arithmetic": "Against the same method and model in float64: what the words' widths cost.",
     "model": "The reflection model against Blinn's, both exact, in float64: no arithmetic cures it.",
     "max_lsb": "The largest over all pixels and channels; 1 LSB is a step of an 8-bit channel.",

@@ -46,7 +46,7 @@ PIXELS = 1 << 14
 """Pixels that the ways in software work on at once; their arrays stay in a cache."""
 
 _METHOD = "chord"
-_HARDWARE_MODELS = ("cosquad", "blinn")
+_HARDWARE_MODELS = ("cosquad", "blinn_product")
 _EXPONENT = 50
 _TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
 

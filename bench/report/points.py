@@ -58,9 +58,9 @@ GROUPS = {
 
 DESIGNS = [(method, "cosquad") for method in METHODS]
 
-DESIGNS += [("chord", model) for model in MODELS if model != "cosquad"]
+DESIGNS += [("chord", model) for model in ("blinn", *MODELS) if model != "cosquad"]
 
-DESIGNS += [("renormalise", "exp"), ("renormalise", "blinn"), ("linear", "blinn")]
+DESIGNS += [("renormalise", "exp"), ("renormalise", "blinn_product"), ("linear", "blinn_product")]
 
 DESIGNS += [(method, "cosquad") for method in PUBLISHED]
 """Method and model of the hardware's points, the operand of the specular unit being that of the method."""

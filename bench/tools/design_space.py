@@ -151,7 +151,7 @@ class Sweep(NamedTuple):
     """
 
     methods: Sequence[str] = tuple(METHODS)
-    models: Sequence[str] = ("cosquad", "lyon3_refitted", "exp")
+    models: Sequence[str] = ("blinn", "cosquad", "lyon3_refitted", "exp")
     lights: Sequence[int] = (1,)
     operands: Sequence[Operand | None] = OPERANDS
     degrees: Sequence[int] = (1, 2, 3)

@@ -42,7 +42,7 @@ from blysk.bench.tools.design_space import (
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.pipeline import STYLES
-from blysk.golden.presets import METHODS, MODELS, PUBLISHED
+from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
 from blysk.golden.reference.raster import rasterise
 from blysk.sim.errors import InputError
 from blysk.sim.frames.figures import ERRORS
@@ -62,6 +62,9 @@ _WORDS = range(36, 47, 2)
 """Fraction bits of the chord method's differences."""
 
 _MARKERS = dict(zip(STYLES, ("o", "^"), strict=True))
+
+SERVED = {"blinn": LOBES["blinn"]} | MODELS
+"""Specular units by reflection models that have an exponent."""
 
 EXPONENT = 50
 """Of the default sweep."""
@@ -123,7 +126,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             "polynomial is for narrower ones."
         )
     for given, which in (
-        (False, "The cheapest within 1 LSB of exactly normalised interpolation"),
+        (False, "The cheapest within 1 LSB of exact normals"),
         (True, "The cheapest that is given values of each light with a span, and counts none of that work,"),
     ):
         those = [designs[k] for k in best if designs[k].candidate.design.takes_values == given]
@@ -169,7 +172,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
                 "Each mark is a pipeline; the line is the Pareto front of those that no other beats in both, "
                 "whose marks are edged in black. Those of chord-local are not on it: they are given values "
                 "of each light with a span, and what it takes to work these out is not counted. Above: "
-                "against exactly normalised interpolation with the same model. Below: against the exact "
+                "against exact normals of every pixel with the same model. Below: against the exact "
                 "Blinn frame.",
             ),
             Table("design-space", "Designs", columns, rows, note),
@@ -296,7 +299,7 @@ _USUAL = Sweep()
     type=Choice("error", ERRORS),
     default="method",
     show_default=True,
-    help="Against the same method and model in float64, exactly normalised interpolation with the same "
+    help="Against the same method and model in float64, exact normals of every pixel with the same "
     "model, or the exact Blinn frame.",
 )
 @click.option(
@@ -308,7 +311,7 @@ _USUAL = Sweep()
     _USUAL.methods,
     f"Interpolation along a span; also {', '.join(PUBLISHED)}.",
 )
-@_option("--models", MODELS, _USUAL.models, f"Of the reflection models {', '.join(MODELS)}.")
+@_option("--models", SERVED, _USUAL.models, f"Of the reflection models {', '.join(SERVED)}.")
 @_option("--lights", range(1, MAX_LIGHTS + 1), _USUAL.lights, f"Numbers of lights, to {MAX_LIGHTS}.")
 @_option("--operands", OPERANDS, OPERANDS, "Operands of the specular unit.")
 @_option(

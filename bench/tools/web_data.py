@@ -19,13 +19,12 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.pipeline import Design, Spans
-from blysk.golden.presets import METHODS, MODELS, preset
+from blysk.golden.presets import LOBES, METHODS, MODELS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import (
-    REFLECTION_MODELS,
     AngleCosine,
     PolynomialModel,
     PowerModel,
@@ -254,8 +253,8 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
 def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raster, Spans]:
     """Spans of a view, before and after the rounding of their normals, for a light that moves.
 
-    They are cut for the light of `START`; and of a method with a span limit, as the highlight may be anywhere,
-    to the widest angle of a lit span.
+    They are cut for the light of `START`; and of a method with a span limit, as the highlight may be
+    anywhere, to the widest angle of a lit span.
 
     Parameters
     ----------
@@ -351,7 +350,8 @@ def module_of(method: str, model: str) -> dict[str, Any]:
 def model_table(model: str) -> dict[str, Any]:
     """What float64 needs of a reflection model: its ``kind``; slopes or scales for exponents 1 to 1000."""
     exponents = range(1, MAX_EXPONENT + 1)
-    unit, reflection = MODELS[model], REFLECTION_MODELS[model]
+    unit = (MODELS | LOBES)[model]
+    reflection = unit.model
     if isinstance(reflection, PowerModel):
         return {"kind": "power"}
     if isinstance(reflection, PolynomialModel):

@@ -306,11 +306,17 @@ class _Pieces:
         return flagged | (wide & (self.last - self.first + 1 >= limit.SHORTEST))
 
     def _misses_of_normals(self, interpolator: Interpolator) -> dict[str, np.ndarray]:
-        """Largest distance of N·L and of u of a method's normals from the exact ones, at three places."""
+        """Largest distance of N·L and of u of a method's normals from the exact ones, where it is checked."""
         left, right = self.places[0].normal, self.places[-1].normal
         misses = {"diffuse": 0.0, "highlight": 0.0}
-        for k, exact in enumerate(self.places[1:-1], 1):
-            normal = interpolator.exact_normals(left, right, np.full(len(left), k / 4))
+        known = {k / 4: place for k, place in enumerate(self.places)}
+        steps = self.raster.length[self.origin] - 1
+        for t in interpolator.CHECKED_AT:
+            exact = known.get(t)
+            if exact is None:
+                at = (self.first + (self.last - self.first) * t) / steps
+                exact = SurfacePoints.at(self.scene, self.raster, self.origin, at)
+            normal = interpolator.exact_normals(left, right, np.full(len(left), t))
             own = exact.with_normal(normal, interpolator.uses_chord)
             for name in misses:
                 misses[name] = np.maximum(misses[name], np.abs(getattr(own, name) - getattr(exact, name)))

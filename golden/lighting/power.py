@@ -59,8 +59,8 @@ class Power(HighlightOperand):
 
     @property
     def name(self) -> str:
-        """Name of the reflection model."""
-        return self.model.name
+        """Name among the specular units: that of the reflection model is the unit's by a table."""
+        return f"{self.model.name}_product"
 
     @property
     def last_lit_arguments(self):

@@ -42,6 +42,8 @@ class BisectionInterpolator(NormalInterpolator):
     bisection: Bisection = field(default_factory=Bisection)
 
     MAX_ANGLE = 90.0
+    # At no end of a straight line, which are at multiples of 1/2^k.
+    CHECKED_AT = (0.09, 0.31, 0.45, 0.64, 0.82)
 
     def __post_init__(self):
         super().__post_init__()

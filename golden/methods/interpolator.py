@@ -82,6 +82,8 @@ class Interpolator:
         lengths, in proportion to the larger one.
     TAKES_MIDDLE : bool
         Whether spans carry the true normal in their middle besides those at their ends.
+    CHECKED_AT : tuple of float
+        Shares of a span at which its curve is held against exact normals, to decide whether it is cut.
     """
 
     COSINE_FORMAT: ClassVar[Format] = DotProduct().result_format
@@ -92,6 +94,7 @@ class Interpolator:
     END_FORMAT: ClassVar[Format] = COMPONENT
     TAKES_MIDDLE: ClassVar[bool] = False
     CUT_BY_ERROR: ClassVar[bool] = True
+    CHECKED_AT: ClassVar[tuple[float, ...]] = (0.25, 0.5, 0.75)
 
     @property
     def name(self) -> str:

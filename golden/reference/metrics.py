@@ -1,6 +1,7 @@
 """How far one image is from another."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,8 +31,13 @@ class ErrorFigures:
     psnr_db: float
 
 
+# Values looked at at once; bounds the memory.
+_CHUNK = 1 << 20
+
+
 def _pair(image: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    image = np.asarray(image, dtype=np.float64)
+    """The image as it is, and the reference in float64, so that their difference is, too."""
+    image = np.asarray(image)
     reference = np.asarray(reference, dtype=np.float64)
     if image.shape != reference.shape:
         raise ValueError(f"the images must have one shape, not {image.shape} and {reference.shape}")
@@ -40,7 +46,16 @@ def _pair(image: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndar
     return image, reference
 
 
-def error_figures(image: np.ndarray, reference: np.ndarray, mask: np.ndarray | None = None) -> ErrorFigures:
+def _chunks(*arrays: np.ndarray) -> Iterator[list[np.ndarray]]:
+    """The same parts of arrays of one shape, flat."""
+    flat = [array.reshape(-1) for array in arrays]
+    for start in range(0, len(flat[0]), _CHUNK):
+        yield [array[start : start + _CHUNK] for array in flat]
+
+
+def error_figures(
+    image: np.ndarray, reference: np.ndarray, mask: np.ndarray | None = None, scale: float = 1
+) -> ErrorFigures:
     """Largest, 99.9th percentile and root mean square error, and PSNR.
 
     Parameters
@@ -49,6 +64,8 @@ def error_figures(image: np.ndarray, reference: np.ndarray, mask: np.ndarray | N
         Values in LSB, 0 to 255, of any type; a float64 reference stays unrounded.
     mask : bool array, shape (height, width), optional
         The pixels that count; all by default.
+    scale : float
+        LSB of the reference's unit, where that is another: 255 for a reference in [0, 1].
 
     Raises
     ------
@@ -56,29 +73,41 @@ def error_figures(image: np.ndarray, reference: np.ndarray, mask: np.ndarray | N
         If the shapes differ or no pixel counts.
     """
     image, reference = _pair(image, reference)
-    error = np.abs(image - reference)
-    if mask is not None:
-        mask = np.asarray(mask, dtype=bool)
-        if mask.shape != error.shape[:2]:
-            raise ValueError(f"the mask must have shape {error.shape[:2]}, not {mask.shape}")
-        error = error[mask]
-        if not error.size:
-            raise ValueError("the mask must hold at least one pixel")
-    rmse = math.sqrt(np.mean(error * error))
+    if mask is None:
+        mask = np.ones(image.shape[:2], dtype=bool)
+    mask = np.asarray(mask, dtype=bool)
+    if mask.shape != image.shape[:2]:
+        raise ValueError(f"the mask must have shape {image.shape[:2]}, not {mask.shape}")
+    count = int(mask.sum())
+    if not count:
+        raise ValueError("the mask must hold at least one pixel")
+    error = np.empty((count, *image.shape[2:]))
+    rows, done = max(1, _CHUNK // max(1, image[0].size)), 0
+    for start in range(0, len(image), rows):
+        part = slice(start, start + rows)
+        shown = mask[part]
+        difference = reference[part][shown] * scale
+        difference -= image[part][shown]
+        error[done : done + len(difference)] = np.abs(difference)
+        done += len(difference)
+    rmse = math.sqrt(sum(float((part * part).sum()) for (part,) in _chunks(error)) / error.size)
     return ErrorFigures(
         max_lsb=float(error.max()),
-        p999_lsb=float(np.percentile(error, 99.9)),
+        p999_lsb=float(np.percentile(error, 99.9, overwrite_input=True)),
         rmse_lsb=rmse,
         psnr_db=20 * math.log10(255 / rmse) if rmse else math.inf,
     )
 
 
-def _deviation(reference: np.ndarray) -> np.ndarray:
-    deviation = reference - reference.mean()
+def _deviations(image: np.ndarray, reference: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Parts of the difference of two images, and of the reference's deviation from its mean."""
+    mean = reference.mean()
     # The mean is rounded, so a flat image is a few units in the last place away from its own mean.
-    noise = 64 * np.finfo(np.float64).eps * np.abs(reference).max()
-    deviation[np.abs(deviation) <= noise] = 0.0
-    return deviation
+    noise = 64 * np.finfo(np.float64).eps * max(abs(reference.max()), abs(reference.min()))
+    for shown, exact in _chunks(image, reference):
+        deviation = exact - mean
+        deviation[np.abs(deviation) <= noise] = 0.0
+        yield exact - shown, deviation
 
 
 def nmse(image: np.ndarray, reference: np.ndarray) -> float:
@@ -100,8 +129,10 @@ def nmse(image: np.ndarray, reference: np.ndarray) -> float:
         If the shapes differ or there is no pixel.
     """
     image, reference = _pair(image, reference)
-    error = float(((reference - image) ** 2).sum())
-    spread = float((_deviation(reference) ** 2).sum())
+    error = spread = 0.0
+    for difference, deviation in _deviations(image, reference):
+        error += float((difference**2).sum())
+        spread += float((deviation**2).sum())
     if error == 0:
         return 0.0
     return error / spread if spread else math.inf
@@ -128,9 +159,10 @@ def mnse_published(image: np.ndarray, reference: np.ndarray) -> tuple[float, flo
         If the shapes differ or there is no pixel.
     """
     image, reference = _pair(image, reference)
-    deviation = _deviation(reference)
-    defined = deviation != 0
-    if not defined.any():
-        return math.nan, 0.0
-    ratio = (reference - image)[defined] / deviation[defined]
-    return float(np.mean(ratio * ratio)), float(defined.mean())
+    total, count = 0.0, 0
+    for difference, deviation in _deviations(image, reference):
+        defined = deviation != 0
+        ratio = difference[defined] / deviation[defined]
+        total += float((ratio * ratio).sum())
+        count += len(ratio)
+    return (total / count if count else math.nan), count / image.size

@@ -216,9 +216,8 @@ class PipelinedUnit(wiring.Component):
     A beat that is accepted on one cycle is on the output ``latency`` cycles later, unless the output is
     stalled: then the whole unit is disabled, from the cycle after the first on which a beat was not accepted,
     and holds its payloads (`skid_buffer`). As long as a beat is inside, the next is accepted a whole multiple
-    of ``initiation_interval`` enabled cycles after it; of a *spaced* unit any number of enabled cycles that is
-    not less. ``i.ready`` and ``o.valid`` follow from the unit's
-    registers alone. Reset empties the unit.
+    of ``initiation_interval`` enabled cycles after it; of a *spaced* unit any number of enabled cycles that
+    is not less. ``i.ready`` and ``o.valid`` follow from the unit's registers alone. Reset empties the unit.
 
     A subclass describes its registers in `datapath`, as if they were enabled on every cycle. Control comes
     from the *stage* of a beat: `at` tells whether a beat was accepted so many enabled cycles ago.
@@ -233,10 +232,9 @@ class PipelinedUnit(wiring.Component):
         Distance in cycles of two inputs. With 1, `datapath` gets the input itself, and registers it;
         with more, it gets a register that holds the input on stages 1 to ``initiation_interval``.
     constants : ShapeLike or None
-        Shape of the port ``constants``: values that stay while beats are inside. ``None``: no such port.
+        Shape of the port ``constants``: values that are constant while beats are inside. ``None``: no port.
     spaced : bool
         Whether the next beat may come at any distance from ``initiation_interval`` on.
-        Shape of the port ``constants``: values that are constant while beats are inside. ``None``: no port.
     ports : mapping of str to Member, optional
         Further members, by name.
 

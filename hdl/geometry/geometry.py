@@ -1,6 +1,6 @@
 """Geometry ([T] figure 4.10): triangles to spans."""
 
-from amaranth.hdl import Module, Signal, unsigned
+from amaranth.hdl import Array, Module, Signal, Value, unsigned
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -11,15 +11,15 @@ from blysk.hdl.core.stream import connect, connect_fifo
 from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit, serial_attribute_shape
 from blysk.hdl.geometry.edge_normals import EdgeNormalsUnit, true_spans_shape
 from blysk.hdl.geometry.edge_setup import EdgeSetupUnit
-from blysk.hdl.geometry.edge_walk import EdgeWalkUnit
+from blysk.hdl.geometry.edge_walk import EdgeWalkUnit, walk_shape
 from blysk.hdl.geometry.gradient_setup import GradientSetupUnit
-from blysk.hdl.geometry.plane_assembler import PlaneAssemblerUnit
+from blysk.hdl.geometry.plane_assembler import PlaneAssemblerUnit, planes_shape
 from blysk.hdl.geometry.plane_setup import PlaneSetupUnit, scales_shape
 from blysk.hdl.geometry.span_adapter import LineAdapterUnit, line_spans_shape
 from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
 from blysk.hdl.geometry.span_clip import SpanClipUnit
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
-from blysk.hdl.geometry.vertex_sort import VertexSortUnit
+from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
 
 __all__ = ["GeometryUnit"]
 
@@ -30,21 +30,8 @@ _SCALES = 4
 """Triangles whose scales wait for their attributes."""
 
 
-class GeometryUnit(wiring.Component):
-    """Triangles to spans, up to one triangle each 16 cycles and one span a cycle: `Geometry` is the model.
-
-    The units of the room in a row. Corners go to the edges and, one attribute after the other, to a FIFO,
-    where they meet the scales of their triangle; edges wait in a FIFO until their planes are there. In the
-    *compact* style one divider finds one quotient bit a cycle, and attributes share a multiplier.
-
-    A triangle takes as long as the slowest of its units, while others work on its neighbours:
-
-    - setup: `interval` cycles where it is drawn, 16 or compact 67; 5 to 9 where it is dropped by the sort;
-    - the walk: a cycle for a scanline without pixels in the picture;
-    - a span, or a piece of it, of p pixels: as many cycles as ``p - 1`` has bits, but at least 1 for 1 pixel,
-      2 for 2 pixels and 3 for more. Never more than it has pixels.
-
-    The multipliers are `multipliers`: 10, in the compact style 8; without normals 4 and 2.
+class _TriangleSetup(wiring.Component):
+    """From sorted triangles to what is walked and to planes: one of the lanes of `GeometryUnit`.
 
     Parameters
     ----------
@@ -52,68 +39,36 @@ class GeometryUnit(wiring.Component):
         Fraction bits of the coordinates.
     compact : bool
         The compact style.
-    lines : bool
-        Spans keep the true line in place of unit normals: no span is cut, and none normalised.
-
-    Members
-    -------
-    i : :py:`In(stream.Signature(triangle_shape(grid)))`
-        Triangles.
-    o : :py:`Out(stream.Signature(true_spans_shape()))`
-        Their spans; of lines in `line_spans_shape`.
-    constants : :py:`In(frame_shape())`
-        The frame; stays while triangles are inside.
-    status : :py:`Out(counters_shape(*COUNTERS))`
-        What was counted since the reset.
-
-    Source: docs/theory/geometry.md#composition; [T] figure 4.10.
+    cuts : bool
+        Whether spans are cut.
     """
 
-    def __init__(self, grid: Grid = GRID, compact: bool = False, lines: bool = False):
-        self.grid, self.compact, self.lines = grid, compact, lines
-        self._sort, self._serialiser = VertexSortUnit(grid), AttributeSerialiserUnit()
+    def __init__(self, grid: Grid, compact: bool, cuts: bool):
+        self._serialiser = AttributeSerialiserUnit()
         self._edges = EdgeSetupUnit(grid, *((1, 1) if compact else (3, 2)))
         self.interval = interval = self._edges.initiation_interval
         self._planes = PlaneSetupUnit(grid, interval)
         self._gradients = GradientSetupUnit(12 if compact else interval // ATTRIBUTES)
-        self._assembler = PlaneAssemblerUnit(PlaneAssembler(cuts=not lines))
-        self._attributes, self._walk, self._clip = SpanAttributesUnit(), EdgeWalkUnit(grid), SpanClipUnit()
-        self._normals = LineAdapterUnit() if lines else EdgeNormalsUnit()
-        normaliser = 0 if lines else 6
-        self.multipliers = self._planes.multipliers + self._gradients.multipliers + normaliser
+        self._assembler = PlaneAssemblerUnit(PlaneAssembler(cuts=cuts))
+        self.multipliers = self._planes.multipliers + self._gradients.multipliers
         super().__init__(
             {
-                "i": In(stream.Signature(triangle_shape(grid))),
-                "o": Out(stream.Signature(line_spans_shape() if lines else true_spans_shape())),
+                "i": In(stream.Signature(sorted_triangle_shape(grid))),
+                "walks": Out(stream.Signature(walk_shape(grid))),
+                "planes": Out(stream.Signature(planes_shape())),
                 "constants": In(frame_shape()),
-                "status": Out(counters_shape(*COUNTERS)),
+                "sliver": Out(1),
             }
         )
 
     def elaborate(self, platform):
-        """The units, what waits between them, and the counters."""
+        """The units, and what waits between them."""
         m = Module()
-        for name in ("sort", "serialiser", "edges", "planes", "gradients", "assembler", "attributes"):
+        for name in ("serialiser", "edges", "planes", "gradients", "assembler"):
             m.submodules[name] = getattr(self, f"_{name}")
-        for name in ("walk", "clip", "normals"):
-            m.submodules[name] = getattr(self, f"_{name}")
-        for unit in (self._sort, self._walk, self._clip, self._assembler):
-            m.d.comb += unit.constants.eq(self.constants)
-        connect(m, wiring.flipped(self.i), self._sort.i)
-        walks = self._set_up(m)
-        connect(m, walks, self._walk.i)
-        connect(m, self._walk.o, self._clip.i)
-        self._walk_planes(m)
-        connect(m, self._attributes.o, self._normals.i)
-        connect(m, self._normals.o, wiring.flipped(self.o))
-        self._count(m)
-        return m
-
-    def _set_up(self, m: Module) -> stream.Interface:
-        """From the sort to gradients; what is to be walked."""
-        sort, serialiser, edges, planes = self._sort, self._serialiser, self._edges, self._planes
-        drawn = _between("drawn", sort.o)
-        connect_fifo(m, "waiting_triangles", sort.o, drawn, depth=_SORTED)
+        serialiser, edges, planes = self._serialiser, self._edges, self._planes
+        drawn = wiring.flipped(self.i)
+        m.d.comb += self._assembler.constants.eq(self.constants)
         _fork(m, drawn, edges.i, serialiser.i)
         for to in (edges.i.payload, serialiser.i.payload):
             m.d.comb += [to[name].eq(drawn.payload[name]) for name in to.shape().members]
@@ -121,13 +76,12 @@ class GeometryUnit(wiring.Component):
         # How many triangles are between their edges and their planes at most.
         delay = planes.latency + self._gradients.latency + ATTRIBUTES * self._gradients.initiation_interval
         inside = delay // self.interval + 3
-        corners, walks = _between("corners", planes.i), _between("walks", self._walk.i)
+        corners, walks = _between("corners", planes.i), _between("walk", self.walks)
         _fork(m, edges.o, corners, walks)
         for to in (corners.payload, walks.payload):
             m.d.comb += [to[name].eq(edges.o.payload[name]) for name in to.shape().members]
         connect_fifo(m, "waiting_corners", corners, planes.i, depth=3)
-        waiting = _between("walk", self._walk.i)
-        connect_fifo(m, "waiting_walks", walks, waiting, depth=inside)
+        connect_fifo(m, "waiting_walks", walks, wiring.flipped(self.walks), depth=inside)
 
         ahead = (edges.latency + planes.latency) // self.interval + 3
         attributes, scales = _between("attribute", serialiser.o), _between("scale", planes.o)
@@ -143,14 +97,128 @@ class GeometryUnit(wiring.Component):
             scales.ready.eq(moves & (turn == ATTRIBUTES - 1)),
             *(to.payload[name].eq(attributes.payload[name]) for name in serial_attribute_shape().members),
             *(to.payload[name].eq(scales.payload[name]) for name in scales_shape()),
+            self.sliver.eq(scales.ready & scales.payload.sliver),
         ]
         connect(m, self._gradients.o, self._assembler.i)
-        self._sliver = scales.ready & scales.payload.sliver
-        return waiting
+        connect(m, self._assembler.o, wiring.flipped(self.planes))
+        return m
 
-    def _walk_planes(self, m: Module) -> None:
+
+class GeometryUnit(wiring.Component):
+    """Triangles to spans, up to one triangle each 16 cycles and one span a cycle: `Geometry` is the model.
+
+    The units of the room in a row. Corners go to the edges and, one attribute after the other, to a FIFO,
+    where they meet the scales of their triangle; edges wait in a FIFO until their planes are there. In the
+    *compact* style one divider finds one quotient bit a cycle, and attributes share a multiplier.
+
+    A triangle takes as long as the slowest of its units, while others work on its neighbours:
+
+    - setup: `interval` cycles where it is drawn, 16 or compact 67, with two lanes half of that; 5 to 9 where
+      it is dropped by the sort;
+    - the walk: a cycle for a scanline without pixels in the picture;
+    - a span, or a piece of it, of p pixels: as many cycles as ``p - 1`` has bits, but at least 1 for 1 pixel,
+      2 for 2 pixels and 3 for more. Never more than it has pixels.
+
+    The multipliers are `multipliers`: 10, in the compact style 8; without normals 4 and 2; a second lane
+    has 4, compact 2.
+
+    Parameters
+    ----------
+    grid : Grid
+        Fraction bits of the coordinates.
+    compact : bool
+        The compact style.
+    lines : bool
+        Spans keep the true line in place of unit normals: no span is cut, and none normalised.
+    setups : int
+        Lanes from the edges to the planes that triangles take in turns, 1 or 2.
+
+    Raises
+    ------
+    ValueError
+        If ``setups`` is another number.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(triangle_shape(grid)))`
+        Triangles.
+    o : :py:`Out(stream.Signature(true_spans_shape()))`
+        Their spans; of lines in `line_spans_shape`.
+    constants : :py:`In(frame_shape())`
+        The frame; stays while triangles are inside.
+    status : :py:`Out(counters_shape(*COUNTERS))`
+        What was counted since the reset.
+
+    Source: docs/theory/geometry.md#composition; [T] figure 4.10.
+    """
+
+    def __init__(self, grid: Grid = GRID, compact: bool = False, lines: bool = False, setups: int = 1):
+        if setups not in (1, 2):
+            raise ValueError(f"setups must be 1 or 2, not {setups!r}")
+        self.grid, self.compact, self.lines = grid, compact, lines
+        self._sort = VertexSortUnit(grid)
+        self._lanes = [_TriangleSetup(grid, compact, not lines) for _ in range(setups)]
+        self.interval = -(-self._lanes[0].interval // setups)
+        self._attributes, self._walk, self._clip = SpanAttributesUnit(), EdgeWalkUnit(grid), SpanClipUnit()
+        self._normals = LineAdapterUnit() if lines else EdgeNormalsUnit()
+        normaliser = 0 if lines else 6
+        self.multipliers = sum(lane.multipliers for lane in self._lanes) + normaliser
+        super().__init__(
+            {
+                "i": In(stream.Signature(triangle_shape(grid))),
+                "o": Out(stream.Signature(line_spans_shape() if lines else true_spans_shape())),
+                "constants": In(frame_shape()),
+                "status": Out(counters_shape(*COUNTERS)),
+            }
+        )
+
+    def elaborate(self, platform):
+        """The units, what waits between them, and the counters."""
+        m = Module()
+        for name in ("sort", "attributes", "walk", "clip", "normals"):
+            m.submodules[name] = getattr(self, f"_{name}")
+        for k, lane in enumerate(self._lanes):
+            m.submodules[f"setup_{k}"] = lane
+        for unit in (self._sort, self._walk, self._clip, *self._lanes):
+            m.d.comb += unit.constants.eq(self.constants)
+        connect(m, wiring.flipped(self.i), self._sort.i)
+        walks, planes = self._set_up(m)
+        connect(m, walks, self._walk.i)
+        connect(m, self._walk.o, self._clip.i)
+        self._walk_planes(m, planes)
+        connect(m, self._attributes.o, self._normals.i)
+        connect(m, self._normals.o, wiring.flipped(self.o))
+        self._count(m)
+        return m
+
+    def _set_up(self, m: Module) -> tuple[stream.Interface, stream.Interface]:
+        """From the sort, through the lanes in turns, to what is walked and to planes."""
+        drawn = _between("drawn", self._sort.o)
+        connect_fifo(m, "waiting_triangles", self._sort.o, drawn, depth=_SORTED)
+        lanes = self._lanes
+        if len(lanes) == 1:
+            connect(m, drawn, lanes[0].i)
+            return lanes[0].walks, lanes[0].planes
+        turn = _turns(m, "lane", drawn, len(lanes))
+        for k, lane in enumerate(lanes):
+            m.d.comb += [lane.i.payload.eq(drawn.payload), lane.i.valid.eq(drawn.valid & (turn == k))]
+        m.d.comb += drawn.ready.eq(Array(lane.i.ready for lane in lanes)[turn])
+        merged = []
+        for name in ("walks", "planes"):
+            sources = [getattr(lane, name) for lane in lanes]
+            joined = _between(name, sources[0])
+            turn = _turns(m, name, joined, len(lanes))
+            m.d.comb += [
+                joined.valid.eq(Array(source.valid for source in sources)[turn]),
+                Value.cast(joined.payload).eq(Array(Value.cast(source.payload) for source in sources)[turn]),
+                *(source.ready.eq(joined.ready & (turn == k)) for k, source in enumerate(sources)),
+            ]
+            merged.append(joined)
+        return tuple(merged)
+
+    def _walk_planes(self, m: Module, planes: stream.Interface) -> None:
         """Scanlines meet their planes: the first of a triangle waits for them, the others do not."""
-        rows, planes, to = self._clip.o, self._assembler.o, self._attributes.i
+        rows, to = self._clip.o, self._attributes.i
         first = Signal(name="first", init=1)
         with m.If(rows.valid & rows.ready):
             m.d.sync += first.eq(rows.payload.last)
@@ -165,8 +233,7 @@ class GeometryUnit(wiring.Component):
     def _count(self, m: Module) -> None:
         """Counters of the units; those that two have are added."""
         sliver = Signal(unsigned(len(self.status.sliver)), name="slivers")
-        with m.If(self._sliver):
-            m.d.sync += sliver.eq(sliver + 1)
+        m.d.sync += sliver.eq(sliver + sum(lane.sliver for lane in self._lanes))
         sort, attributes = self._sort.status, self._attributes.status
         m.d.comb += [
             self.status.empty.eq(sort.empty + attributes.empty),
@@ -181,6 +248,14 @@ class GeometryUnit(wiring.Component):
 def _between(name: str, port: stream.Interface) -> stream.Interface:
     """A stream of the shape of a unit's, between two of them."""
     return stream.Signature(port.payload.shape()).create(path=(name,))
+
+
+def _turns(m: Module, name: str, moving: stream.Interface, count: int) -> Signal:
+    """Whose turn it is, the next one's with each payload."""
+    turn = Signal(range(count), name=f"turn_of_{name}")
+    with m.If(moving.valid & moving.ready):
+        m.d.sync += turn.eq(turn + 1)
+    return turn
 
 
 def _fork(m: Module, source: stream.Interface, first: stream.Interface, second: stream.Interface) -> None:

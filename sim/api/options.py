@@ -11,7 +11,7 @@ from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.pipeline import STYLES
-from blysk.golden.presets import LOBES, METHODS, PUBLISHED
+from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
 from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Triple
@@ -31,6 +31,7 @@ __all__ = [
     "RENDERING",
     "SCENE",
     "SLOW_SIZE",
+    "VIEW_WORDS",
     "ColorLike",
     "DesignOptions",
     "Lights",
@@ -91,7 +92,7 @@ class Model(Choice):
     """A reflection model by its name, or the curve of a CSV file of measured points, see `TabulatedModel`."""
 
     def __init__(self):
-        super().__init__("reflection model", REFLECTION_MODELS | LOBES)
+        super().__init__("reflection model", REFLECTION_MODELS | LOBES | MODELS)
         points = "give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1"
         self.remedy = f"{points}, or {self.remedy}"
 
@@ -170,6 +171,35 @@ class Lights(Value):
         return Light(**parts)
 
 
+class Direction(Vector):
+    """A direction, or a word for one.
+
+    Parameters
+    ----------
+    words : mapping of str
+        What each word stands for: a vector, or itself where other values tell its vector.
+    """
+
+    def __init__(self, words: Mapping[str, str | Triple]):
+        super().__init__("a direction", metavar=f"X,Y,Z|{'|'.join(words)}", direction=True)
+        self.words = words
+        self.remedy = f"give X,Y,Z, a vector other than 0, or one of {', '.join(words)}"
+
+    def parse(self, text):
+        """A word as it is, or numbers with commas between them."""
+        return text if text in self.words else super().parse(text)
+
+    def check(self, value):
+        """A tuple of `float`, or a word that stands for itself."""
+        if isinstance(value, str) and value in self.words:
+            return self.words[value]
+        return super().check(value)
+
+
+VIEW_WORDS = ("front", "back", "left", "right", "top", "bottom")
+_UP_WORDS: dict[str, str | Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
 def shown_key(name: str) -> str:
     """A key of a file in a message."""
     return name if re.fullmatch("[A-Za-z0-9_-]{1,40}", name) else shown(name)
@@ -204,9 +234,10 @@ SCENE: dict[str, Option] = {
         Choice("projection", PROJECTIONS), "perspective", "Of the camera.", "camera.projection"
     ),
     "view": Option(
-        Vector("a direction", direction=True),
+        Direction({word: word for word in VIEW_WORDS}),
         (0.4, 0.5, 1.0),
-        "Direction from the mesh to the viewer: the camera shows all of the mesh.",
+        "Direction from the mesh to the viewer: the camera shows all of the mesh. The words and the default "
+        "turn with --up.",
         "camera.view",
     ),
     "position": Option(
@@ -222,7 +253,10 @@ SCENE: dict[str, Option] = {
         "camera.target",
     ),
     "up": Option(
-        Vector("a direction", direction=True), (0.0, 1.0, 0.0), "Upright in the picture.", "camera.up"
+        Direction(_UP_WORDS),
+        (0.0, 1.0, 0.0),
+        "Upright in the picture: z for most STL files and those of CAD programs, whatever the format.",
+        "camera.up",
     ),
     "field_of_view": Option(
         Number(1, 179, "degrees"), 30.0, "Vertical angle of the picture, degrees.", "camera.field_of_view"
@@ -261,7 +295,7 @@ DESIGN: dict[str, Option] = {
     ),
     "model": Option(
         Model(),
-        "cosquad",
+        "blinn",
         "Reflection model; every method serves all but phong. A file holds a curve of N.H, measured.",
         "pipeline.model",
     ),
@@ -334,10 +368,10 @@ class SceneOptions(TypedDict, total=False):
     crease: float
     materials: Literal["file", "one"]
     projection: Literal["perspective", "orthographic"]
-    view: Triple
+    view: Triple | Literal["front", "back", "left", "right", "top", "bottom"]
     position: Triple
     target: Triple
-    up: Triple
+    up: Triple | Literal["x", "y", "z"]
     field_of_view: float
     viewer: Literal["distant", "near"]
     lights: Sequence[Light]

@@ -305,7 +305,7 @@ def prepare_rendering(
             constants_of(scenes[0], made)
             stage("finding out what the scene needs" if settings["specialise"] else "")
             smallest = _specialised(scenes, made, settings)
-            stage("building the model")
+            stage(f"building the model{_large(smallest.design)}")
             try:
                 used = "pysim" if engine == "pysim" else "cxxrtl"
                 simulator = _simulator(smallest.design, scenes[0], settings, used)
@@ -320,6 +320,13 @@ def prepare_rendering(
     seconds["build"] = perf_counter() - start - seconds["load"]
     used = "pysim" if engine == "pysim" else "cxxrtl"
     return Rendering(loaded, scenes, smallest, settings["specialise"], used, simulator, seconds)
+
+
+def _large(design: Design) -> str:
+    """What a design has many of, which takes time where it is simulated for the first time."""
+    counts = {"lights": design.lights, "materials": design.materials}
+    many = ", ".join(f"{count:,} {what}" for what, count in counts.items() if count > 2)
+    return f" of {many}: up to a minute, once" if many else ""
 
 
 def _simulator(

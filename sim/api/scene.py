@@ -45,13 +45,17 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
         Whether the mesh file's materials count.
     projection : {"perspective", "orthographic"}
         Of the camera.
-    view : three floats
-        Direction from the mesh to the viewer: the camera shows all of the mesh. By default (0.4, 0.5, 1).
+    view : three floats or str
+        Direction from the mesh to the viewer: the camera shows all of the mesh. By default (0.4, 0.5, 1) to
+        the right, up and front; ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``, ``"bottom"``.
+        The front is (0, 0, 1), with z as the upright (0, -1, 0); right is upright times front.
     position, target : three floats
         The camera, in place of ``view``, and the point in the middle of its picture, by default the middle of
         the mesh; in the mesh's units.
-    up, field_of_view
-        See `Camera`; by default (0, 1, 0) and 30.
+    up : three floats or {"x", "y", "z"}
+        Upright in the picture, by default y for all formats; many STL files have z.
+    field_of_view : float
+        See `Camera`; by default 30.
     viewer : {"distant", "near"}
         See `Scene`; ``"near"`` needs the method ``chord-local``.
     lights : sequence of Light

@@ -16,6 +16,9 @@ __all__ = ["MAX_BYTES", "SceneFile", "key_lines", "read_scene_file"]
 MAX_BYTES = 100_000
 """Largest scene file; a mesh is a file of its own."""
 
+_MAX_DOTS = 256
+"""Most dots in a line: `tomllib` takes memory with the square of the parts of a key."""
+
 
 @dataclass(frozen=True)
 class SceneFile:
@@ -56,7 +59,8 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         [camera]
         projection = "perspective"          # "orthographic"
         view = [0.4, 0.5, 1]                # from the mesh to the viewer: the camera shows all of the mesh
-        up = [0, 1, 0]
+        # or "front", "back", "left", "right", "top", "bottom"
+        up = [0, 1, 0]                      # or "x", "y", "z"
         field_of_view = 30                  # degrees, vertical, 1 to 179
         # position, target                  # in place of view, in the mesh's own units
         viewer = "distant"                  # "near": highlights as seen from a perspective camera
@@ -88,7 +92,7 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
     Parameters
     ----------
     path : path
-        The file, in UTF-8, at most 100,000 bytes.
+        The file, in UTF-8, at most 100,000 bytes, and 256 dots in a line.
 
     Raises
     ------
@@ -129,6 +133,9 @@ def _parse(path: Path) -> dict:
         raise PartError(
             "", f"is over {MAX_BYTES:,} bytes", "keep the mesh in a file of its own, and name it by mesh.file"
         )
+    for line, text in enumerate(data.split(b"\n"), 1):
+        if text.count(b".") > _MAX_DOTS:
+            raise PartError("", f"has over {_MAX_DOTS} dots in line {line}", "break the line")
     try:
         return tomllib.loads(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:

@@ -1,12 +1,15 @@
 """Values of options: those that a caller gives, over those of a scene file, over the defaults."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from blysk.golden.reference.geometry import Mesh
+import numpy as np
+
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.lighting import Triple
 from blysk.golden.reference.scene import Scene
 from blysk.sim.api.options import SCENE, Option, PartError, Source
 from blysk.sim.api.scene_file import read_scene_file
@@ -117,10 +120,40 @@ def read_settings(
         source = values.pop("mesh")
     every = checked({**{name: option.default for name, option in table.items()}, **defaults}, table)
     merged = dict.fromkeys(table) | every | values | given
+    if "view" in merged:
+        _turn_view(merged, {*given, *values})
     settings = Settings(source, merged, frozenset(given) | frozenset(values), origins)
     with settings.located():
         _check_pairs(settings)
     return settings
+
+
+def _turn_view(values: dict[str, Any], given: Collection[str]) -> None:
+    """Put vectors in place of a word for the view, and of the default one if the upright is another.
+
+    The front of a mesh is where z points to; of one whose upright is z, where -y does. Right is the upright
+    times the front. From the top and the bottom the front is below and above in the picture.
+    """
+    view, up = values["view"], np.array(values["up"], dtype=np.float64)
+    if not isinstance(view, str) and ("view" in given or "up" not in given):
+        return
+    up = normalise(up)
+    front = np.array([0.0, -1.0, 0.0] if np.abs(up).argmax() == 2 else [0.0, 0.0, 1.0])
+    front = normalise(front - (front @ up) * up)
+    right = np.cross(up, front)
+    if not isinstance(view, str):
+        values["view"] = _triple(view[0] * right + view[1] * up + view[2] * front)
+        return
+    sides = {"front": front, "right": right, "top": up}
+    opposites = {"back": front, "left": right, "bottom": up}
+    values["view"] = _triple(sides[view] if view in sides else -opposites[view])
+    if view in ("top", "bottom"):
+        values["up"] = _triple(-front if view == "top" else front)
+
+
+def _triple(vector: np.ndarray) -> Triple:
+    x, y, z = (vector + 0.0).tolist()
+    return x, y, z
 
 
 _INSTEAD = {"view": ("position", "target"), "position": ("view", "target")}

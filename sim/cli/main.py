@@ -1,6 +1,7 @@
 """The command line: commands of this folder, and those of installed packages."""
 
 import os
+import re
 import signal
 import sys
 import threading
@@ -15,6 +16,7 @@ from tqdm import tqdm
 
 from blysk.hdl.emit.yosys import NetlistError
 from blysk.sim.cli.options import option_error
+from blysk.sim.engines.cache import provide_caches
 from blysk.sim.engines.engine import CompilerMissing, SimulationError
 from blysk.sim.errors import InputError, OptionError, one_line
 
@@ -50,6 +52,12 @@ def cli():
     Example:
         blysk render teapot --exponent 100 --compare teapot.png
     """
+    try:
+        os.getcwd()
+    except OSError as error:
+        reason = f"cannot be used ({error.strerror})"
+        raise InputError("the current folder", reason, "change to one that exists") from error
+    provide_caches()
 
 
 def _run(arguments: list[str]) -> int:
@@ -60,6 +68,15 @@ def _run(arguments: list[str]) -> int:
     except click.exceptions.Exit as stop:
         return stop.exit_code
     return 0
+
+
+def _without_traceback(text: str) -> str:
+    """What another program says, of a traceback its last line and without the exception's name."""
+    start, mark, rest = text.partition("Traceback (most recent call last)")
+    if not mark:
+        return text
+    last = rest.strip().splitlines()[-1].strip()
+    return start + re.sub(r"^([A-Za-z_]\w*\.)*[A-Z]\w*(Error|Exception|Trap): *", "", last)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -99,7 +116,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"blysk: {error}", file=sys.stderr)
         return 2
     except (NetlistError, SimulationError) as error:
-        print(f"blysk: {one_line(str(error))}", file=sys.stderr)
+        print(f"blysk: {one_line(_without_traceback(str(error)))}", file=sys.stderr)
         return 1
     except MemoryError:
         print("blysk: out of memory; use a smaller --size or mesh", file=sys.stderr)

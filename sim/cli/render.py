@@ -20,7 +20,7 @@ from blysk.sim.frames.figures import animation_figures
 from blysk.sim.frames.picture import write_image
 from blysk.sim.frames.summary import animation_lines
 from blysk.sim.frames.workers import check_address, processors
-from blysk.sim.output import atomic_writer, write_json
+from blysk.sim.output import all_or_none, atomic_writer, write_json
 from blysk.sim.value_types import Choice, OutputFile, Whole
 
 __all__ = ["command"]
@@ -107,7 +107,9 @@ def command(context, mesh, engine, output, comparison, figures, vcd, frames, job
     else:
         check_outputs(inputs, pictures=[output, comparison], others=[figures, vcd])
         written = {"frame": output, "comparison": comparison}
-    with tqdm(bar_format="{desc}", leave=False, disable=None) as stage:
+    # The frames of an animation are written as they are done.
+    together = nullcontext() if frames else all_or_none()
+    with together, tqdm(bar_format="{desc}", leave=False, disable=None) as stage:
         ready = prepare_rendering(
             settings,
             engine="pysim" if vcd else engine,

@@ -1,4 +1,4 @@
-"""The folder of compiled models."""
+"""The folder of compiled models, and those where other tools keep what they compile."""
 
 import atexit
 import functools
@@ -10,7 +10,9 @@ from pathlib import Path
 
 import platformdirs
 
-__all__ = ["cache_folder", "private_folder", "warn_of_cache"]
+from blysk.sim.errors import InputError
+
+__all__ = ["cache_folder", "private_folder", "provide_caches", "warn_of_cache"]
 
 
 def _unsafe(folder: Path) -> str | None:
@@ -32,10 +34,67 @@ def _unsafe(folder: Path) -> str | None:
 
 @functools.cache
 def private_folder() -> Path:
-    """A folder of this process, removed at its end."""
-    folder = Path(tempfile.mkdtemp(prefix="blysk-"))
+    """A folder of this process, removed at its end.
+
+    Raises
+    ------
+    InputError
+        If there is no temporary folder that can be written.
+    """
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="blysk-"))
+    except OSError as error:
+        remedy = "free some space there, or name another folder in TMPDIR"
+        raise InputError("the temporary folder", f"cannot be used ({error.strerror})", remedy) from error
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
+
+
+def _unwritable(folder: Path) -> str | None:
+    """Why nothing can be kept in a folder, or ``None``; found out by trying, as root may write anywhere."""
+    try:
+        os.rmdir(tempfile.mkdtemp(prefix=".blysk-", dir=folder))
+    except OSError as error:
+        return error.strerror
+    return None
+
+
+@functools.cache
+def provide_caches() -> None:
+    """Let the tools that are started keep what they compile in a private folder, if they have no other.
+
+    Yosys (as WebAssembly), nextpnr, Zig, Matplotlib: each has a cache below the user's cache or home folder,
+    and some end with an error where that cannot be written. A warning says so once; it takes time, as the
+    next run compiles again. Environment variables that name a tool's own folder count as they are.
+
+    Raises
+    ------
+    InputError
+        If there is no temporary folder, either.
+    """
+    folder = Path("of the user")
+    try:
+        folder, home = Path(platformdirs.user_cache_path()), Path.home()
+        no_home = _unwritable(home)
+        # A home that does not exist is not made.
+        if no_home is None or not folder.is_relative_to(home):
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        reason = _unwritable(folder)
+    # A user of no name, and no HOME.
+    except RuntimeError:
+        reason = no_home = "there is no home folder"
+    except OSError as error:
+        reason = error.strerror
+    if reason is not None:
+        private = private_folder()
+        os.environ["XDG_CACHE_HOME"] = str(private)
+        os.environ.setdefault("YOWASP_CACHE_DIR", str(private / "YoWASP"))
+        os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(private / "zig"))
+        text = f"cache folder {folder} cannot be written ({reason}): models and tools are compiled anew"
+        remedy = "set XDG_CACHE_HOME to a folder that can be"
+        warnings.warn(f"{text}; {remedy}", RuntimeWarning, stacklevel=3)
+    if reason is not None or no_home is not None:
+        os.environ.setdefault("MPLCONFIGDIR", str(private_folder() / "matplotlib"))
 
 
 def cache_folder() -> Path:
@@ -49,6 +108,7 @@ def cache_folder() -> Path:
     Path
         An existing folder.
     """
+    provide_caches()
     chosen = os.environ.get("BLYSK_CACHE")
     folder = Path(chosen).absolute() if chosen else platformdirs.user_cache_path("blysk")
     reason = _unsafe(folder)

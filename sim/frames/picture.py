@@ -15,7 +15,7 @@ _COMMON = ".png, .jpg, .bmp, .ppm, .tiff or .webp"
 
 
 def check_image_path(path: str | os.PathLike) -> None:
-    """Check, before long work, that a picture can be written to a file; writes nothing.
+    """Check, before long work, that a picture can be written to a file; leaves nothing behind.
 
     Raises
     ------

@@ -81,6 +81,8 @@ class TriangleSimulator:
         ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
     angle : float, optional
         Widest piece of a span in degrees; by default `span_angle`.
+    setups : int
+        As `GeometryUnit` has it.
 
     Raises
     ------
@@ -96,9 +98,10 @@ class TriangleSimulator:
         size: tuple[int, int],
         engine: str = "auto",
         angle: float | None = None,
+        setups: int = 1,
     ):
         self.renderer, self.size, self.engine, self.angle = renderer, size, engine, angle
-        self._unit = RenderUnit(renderer, size)
+        self._unit = RenderUnit(renderer, size, setups)
         self._check()
 
     def _check(self) -> None:
@@ -159,7 +162,8 @@ class TriangleSimulator:
             If the scene has another size, point lights or a near viewer, or does not fit the design.
         """
         if (scene.width, scene.height) != self.size:
-            raise ValueError(f"the scene is {scene.width}x{scene.height}, the memory {self.size}")
+            width, height = self.size
+            raise ValueError(f"the scene is {scene.width}x{scene.height}, the memory {width}x{height}")
         start = perf_counter()
         sent = sent_triangles(scene, self.renderer, self.angle)
         ready = perf_counter()

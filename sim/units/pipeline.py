@@ -269,7 +269,7 @@ DESIGNS: dict[str, Design] = {
     "3 lights": preset(model="cosquad7", lights=3),
     "3 materials": preset(lights=2, materials=3, operand="one_minus_cosine"),
     "compact": preset("chord", "lyon3", 2, style="compact"),
-    "compact, normals and a power": preset("linear", "blinn", style="compact"),
+    "compact, normals and a power": preset("linear", "blinn_product", style="compact"),
     "gate": preset("chord", "coscos2", gate=True),
     "gate, compact": preset("quadratic", "lyon3", gate=True, style="compact"),
     "exponent": preset("chord", "coscos4", 2, exponent=60),
@@ -286,8 +286,8 @@ LONG_DESIGNS: dict[str, Design] = {
     "quadratic-eval of a chord": preset("quadratic-eval", "exp", operand="one_minus_cosine"),
     "quadratic-horner of a chord": preset("quadratic-horner", operand="one_minus_cosine"),
     "renormalise, N.H": preset("renormalise", lights=2, operand="cosine"),
-    "renormalise, power, compact": preset("renormalise", "blinn", style="compact"),
-    "quadratic, power": preset("quadratic", "blinn"),
+    "renormalise, power, compact": preset("renormalise", "blinn_product", style="compact"),
+    "quadratic, power": preset("quadratic", "blinn_product"),
     "values, 2 lights": preset("chord-local", lights=2),
     "values, compact, 3 materials": preset("chord-local", materials=3, style="compact"),
     "compact, chord": preset("chord", style="compact"),
@@ -298,8 +298,8 @@ LONG_DESIGNS: dict[str, Design] = {
     "gate, bisection": preset("bisection", "exp", gate=True),
     "gate, angular": preset("angular", gate=True),
     "gate, recurrence": preset("recurrence", lights=2, gate=True),
-    "gate, values": preset("chord-local", "blinn", 2, gate=True),
-    "gate, compact, power": preset("quadratic-horner", "blinn", gate=True, style="compact"),
+    "gate, values": preset("chord-local", "blinn_product", 2, gate=True),
+    "gate, compact, power": preset("quadratic-horner", "blinn_product", gate=True, style="compact"),
     "gate, exponent": replace(_FULL, build=Build(exponent=20)),
     "grey": preset("chord", None, grey=True),
     "few bits": replace(_FULL, **_LESS),
@@ -310,7 +310,7 @@ LONG_DESIGNS: dict[str, Design] = {
 def _variants():
     designs = [("quadratic", model) for model in ("cosquad", "cosquad7", "cosquad_lin")]
     designs += [(method, "cosquad") for method in METHODS if method not in ("quadratic", "chord-local")]
-    designs += [("chord", "exp"), ("chord", "blinn")]
+    designs += [("chord", "exp"), ("chord", "blinn_product")]
     for method, model in designs:
         design = preset(method, model)
         note = "; the bisection's fit counts as arithmetic" * (method == "bisection")

@@ -24,7 +24,7 @@ from blysk.bench.speed.web_speed import OPTIONS, find_chromium
 from blysk.bench.store import Task
 from blysk.bench.svg import svg
 
-DESIGNS = [*points.DESIGNS[:10], ("chord", "exp"), ("renormalise", "blinn"), points.DESIGNS[-1]]
+DESIGNS = [*points.DESIGNS[:10], ("chord", "exp"), ("renormalise", "blinn_product"), points.DESIGNS[-1]]
 EXPONENTS = [10, 100]
 
 

@@ -43,7 +43,10 @@ UNITS = {
     "chord_accumulator": partial(ChordAccumulatorUnit, ChordInterpolator(), 1),
     "line_accumulator": partial(LineAccumulatorUnit, RenormaliseInterpolator()),
 }
-PIPELINED = [name for name, make in UNITS.items() if issubclass(getattr(make, "func", make), PipelinedUnit)]
+KINDS = {name: getattr(make, "func", make) for name, make in UNITS.items()}
+PIPELINED = [
+    name for name, kind in KINDS.items() if isinstance(kind, type) and issubclass(kind, PipelinedUnit)
+]
 
 SLOW = "specular-" + FURTHER["specular"][0]
 """A unit with an initiation interval of more than 1."""

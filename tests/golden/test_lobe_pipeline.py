@@ -41,11 +41,12 @@ def several(parameters, name="roughness"):
 @pytest.mark.parametrize("exponent", [1, 10, 100, 1000])
 def test_frame_is_exact_blinn(exponent):
     """No channel is off by more than rounding and 0.05 LSB of the method in float64."""
-    design = preset("chord", "blinn_table")
+    design = preset("chord", "blinn")
     given = scene(exponent, mesh=teapot(2000))
     found = compare(given, design, model_frame(given, design))
     assert found.arithmetic_error.max_lsb < 0.55
-    of_products = compare(given, preset("chord", "blinn"), model_frame(given, preset("chord", "blinn")))
+    product = preset("chord", "blinn_product")
+    of_products = compare(given, product, model_frame(given, product))
     assert found.total_error.max_lsb < of_products.total_error.max_lsb + 0.03
     of_squares = compare(given, preset("chord"), model_frame(given, preset("chord")))
     assert found.total_error.rmse_lsb < (0.5 if exponent < 1000 else 0.6) * of_squares.total_error.rmse_lsb
@@ -80,7 +81,7 @@ def test_every_method_serves_every_lobe(method, model):
 
 
 @pytest.mark.parametrize("cutoff", [0, 1 / 510])
-@pytest.mark.parametrize(("model", "parameters"), [("blinn_table", (3, 40, 900)), ("ggx", (0.2, 0.35, 0.9))])
+@pytest.mark.parametrize(("model", "parameters"), [("blinn", (3, 40, 900)), ("ggx", (0.2, 0.35, 0.9))])
 def test_gate_changes_no_pixel(model, parameters, cutoff):
     given = several(parameters, "roughness" if model == "ggx" else "exponent")
     plain, gated = (preset("chord", model, materials=3, gate=gate, cutoff=cutoff) for gate in (False, True))
@@ -126,7 +127,7 @@ def test_banks_that_do_not_suffice_are_refused():
 def test_fixed_tables():
     """They take no writes, and the pixels are the same; other lobes are refused."""
     given = scene(40)
-    fixed, loaded = preset("chord", "blinn_table", exponent=40), preset("chord", "blinn_table")
+    fixed, loaded = preset("chord", "blinn", exponent=40), preset("chord", "blinn")
     np.testing.assert_array_equal(model_frame(given, fixed).image, model_frame(given, loaded).image)
     (constants,) = constants_of(given, fixed)
     assert LOBE_ADDRESS not in constants.writes()["address"]
@@ -153,12 +154,12 @@ def test_a_curve_of_ones_own():
     ("options", "message"),
     [
         ({"model": "ggx", "exponent": 20}, r"^model ggx has no exponent to fix$"),
-        ({"model": "blinn_table", "roughness": 0.2}, r"^model blinn has no roughness to fix$"),
+        ({"model": "blinn", "roughness": 0.2}, r"^model blinn has no roughness to fix$"),
         ({"model": "cosquad", "roughness": 0.2}, r"^model cosquad has no roughness to fix$"),
         ({"model": "ggx", "roughness": 1.5}, r"^roughness must be greater than 0 and at most 1, not 1.5$"),
         (
             {"model": "phong"},
-            r"^model must be one of .*, blinn_table, phong_coplanar, beckmann, ggx, not 'phong'$",
+            r"^model must be one of .*, blinn, phong_coplanar, beckmann, ggx, not 'phong'$",
         ),
         ({"model": "cosquad", "banks": 2}, r"^method chord has no option banks$"),
         ({"model": "ggx", "banks": 65}, r"^banks must be 1 to 64, not 65$"),

@@ -220,7 +220,7 @@ GATED = [(name, None) for name in METHODS if not name.startswith("chord") and na
 ]
 
 
-@pytest.mark.parametrize("model", ["cosquad", "coscos4", "exp", "blinn"])
+@pytest.mark.parametrize("model", ["cosquad", "coscos4", "exp", "blinn_product"])
 @pytest.mark.parametrize(("method", "operand"), GATED)
 def test_gated_spans_have_no_highlight(method, operand, model):
     """About the threshold of each exponent, where the gate has to let spans through that seem dark."""

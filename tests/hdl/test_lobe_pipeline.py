@@ -22,11 +22,11 @@ from blysk.sim.units.lighting.highlight_gate import spans_about
 from blysk.sim.units.operands import component_words, sphere
 
 DESIGNS = {
-    "chord": preset("chord", "blinn_table"),
+    "chord": preset("chord", "blinn"),
     "materials, lights, gate": preset("chord", "ggx", materials=3, lights=2, gate=True),
     "two banks of three materials": preset("chord", "beckmann", materials=3, banks=2),
     "compact, gate": preset("quadratic", "beckmann", materials=3, style="compact", gate=True, cutoff=1 / 510),
-    "fixed, gate, compact": preset("chord", "blinn_table", 2, exponent=20, gate=True, style="compact"),
+    "fixed, gate, compact": preset("chord", "blinn", 2, exponent=20, gate=True, style="compact"),
     "fixed roughness": preset("linear", "ggx", roughness=0.3),
     "values": preset("chord-local", "ggx"),
     "other size": preset("chord", "ggx", octaves=12, steps=32),
@@ -109,21 +109,21 @@ def test_one_multiplier_a_light():
     for lights in (1, 2):
         multipliers = {
             model: cost_of(ShadingPipelineUnit(preset("chord", model, lights))).totals["multipliers"]
-            for model in (None, "blinn_table", "cosquad", "blinn")
+            for model in (None, "blinn", "cosquad", "blinn_product")
         }
-        plain = multipliers["blinn_table"] - lights
+        plain = multipliers["blinn"] - lights
         assert multipliers == {
             None: multipliers[None],
-            "blinn_table": plain + lights,
+            "blinn": plain + lights,
             "cosquad": plain + 2 * lights,
-            "blinn": plain + 18 * lights,
+            "blinn_product": plain + 18 * lights,
         }
         if lights == 1:
-            assert multipliers["blinn_table"] == 17
+            assert multipliers["blinn"] == 17
 
 
 def test_latency_and_rate_are_those_of_cosquad():
-    units = [ShadingPipelineUnit(preset("chord", model)) for model in ("blinn_table", "cosquad")]
+    units = [ShadingPipelineUnit(preset("chord", model)) for model in ("blinn", "cosquad")]
     assert len({(unit.latency, unit.cycles_per_pixel, unit.setup_interval) for unit in units}) == 1
     assert units[0].cycles_per_pixel == 1
 
@@ -133,7 +133,7 @@ def test_one_memory_for_all_lights():
     for lights, materials in ((1, 1), (3, 1), (2, 4)):
         with_table, without = (
             cost_of(ShadingPipelineUnit(preset("chord", model, lights, materials=materials)))
-            for model in ("blinn_table", None)
+            for model in ("blinn", None)
         )
         assert with_table.ram_bits - without.ram_bits >= materials * 336 * 35
         assert with_table.rom_bits == without.rom_bits

@@ -58,7 +58,8 @@ def intervals():
         choice = unit_of(METHODS[method]).setup_intervals(METHODS[method])
         if method in ("linear", "quadratic", "angular", "chord", "recurrence"):
             for interval in choice:
-                marks = () if interval in (choice[0], choice[-1]) else pytest.mark.long
+                quick = interval in (choice[0], choice[-1]) and method in ("quadratic", "chord")
+                marks = () if quick else pytest.mark.long
                 yield pytest.param(method, interval, marks=marks)
         yield method, None
 
@@ -102,7 +103,12 @@ def test_cycles(method, interval):
 
 @pytest.mark.parametrize("lights", [1, pytest.param(3, marks=pytest.mark.long)])
 @pytest.mark.parametrize(
-    ("method", "latency", "interval"), [("quadratic", 94, 4), ("renormalise", 66, 4), ("chord", 58, 3)]
+    ("method", "latency", "interval"),
+    [
+        pytest.param("quadratic", 94, 4, marks=pytest.mark.long),
+        pytest.param("renormalise", 66, 4, marks=pytest.mark.long),
+        ("chord", 58, 3),
+    ],
 )
 def test_cycles_of_long_spans(method, latency, interval, lights):
     """Spans that the register slice holds ready cost their length alone."""
@@ -192,7 +198,7 @@ def test_compact_style_takes_three_cycles_a_term():
 def test_gate_spares_the_compact_style_cycles():
     """A power takes 42 cycles a pixel, but for pixels behind the light and in spans without a highlight."""
     rng = np.random.default_rng(3)
-    design = preset("chord", "blinn", style="compact")
+    design = preset("chord", "blinn_product", style="compact")
     spans, (constants,) = spans_in_range(rng, design, np.full(30, 40), 20.0)
     constants.direction[:] = constants.halfway
     constants = replace(constants, exponent=300)

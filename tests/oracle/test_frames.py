@@ -88,7 +88,7 @@ def held(scene: Scene, design) -> tuple[np.ndarray, float]:
         LIGHT,
         COEFFICIENTS,
         scene.materials[0].exponent,
-        design.model,
+        design.specular.model.name,
         steps=256,
     )
     frame = model_frame(scene, design)
@@ -136,7 +136,9 @@ def test_frame(method, name, projection, exponent):
     assert errors.max() <= own + 0.05
 
 
-@pytest.mark.parametrize("model", [pytest.param("blinn", marks=pytest.mark.long), "cosquad7", "cosquad_lin"])
+@pytest.mark.parametrize(
+    "model", [pytest.param("blinn_product", marks=pytest.mark.long), "blinn", "cosquad7", "cosquad_lin"]
+)
 def test_models(model):
     errors, _ = held(
         scene_of(MESHES["coarse torus"], camera_of("coarse torus", "perspective"), 100),

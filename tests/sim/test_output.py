@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from blysk.sim.errors import InputError
-from blysk.sim.output import atomic_writer, check_writable, write_json, write_text
+from blysk.sim.output import all_or_none, atomic_writer, check_writable, write_json, write_text
 
 
 @pytest.fixture
@@ -161,6 +161,48 @@ def test_two_writers_at_once(tmp_path):
         thread.join()
     assert path.read_text() in texts
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("existing", [True, False])
+def test_all_or_none(tmp_path, existing):
+    first, second = tmp_path / "a", tmp_path / "b"
+    if existing:
+        first.write_text("old")
+
+    def fail():
+        with all_or_none():
+            write_text(first, "new")
+            assert first.exists() == existing
+            write_text(second, "new")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail()
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["old"] * existing
+    with all_or_none():
+        write_text(first, "1")
+        write_text(second, "2")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "1", "b": "2"}
+    write_text(first, "3")
+    assert first.read_text() == "3"
+
+
+def test_all_or_none_with_a_name_that_was_taken(tmp_path):
+    def take():
+        with all_or_none():
+            write_text(tmp_path / "b", "new")
+            (tmp_path / "b").mkdir()
+
+    with pytest.raises(InputError, match="b: cannot be written, "):
+        take()
+    assert [path.name for path in tmp_path.iterdir()] == ["b"]
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no /proc")
+def test_folder_that_takes_no_files():
+    """To the superuser its permissions say that it does."""
+    with pytest.raises(InputError, match=r"^/proc/a: cannot be written, .*; choose a(nother)? folder"):
+        check_writable("/proc/a")
 
 
 def test_pipe(tmp_path):

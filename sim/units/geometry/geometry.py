@@ -42,6 +42,7 @@ RECORD = Record(
         "": Variant(GeometryUnit),
         "compact": Variant(partial(GeometryUnit, compact=True)),
         "true lines": Variant(partial(GeometryUnit, lines=True)),
+        "two lanes": Variant(partial(GeometryUnit, setups=2), long=True),
         "4 fraction bits": Variant(partial(GeometryUnit, Grid(4)), long=True),
     },
     expect=lambda unit, case: _spans(unit, case)[0].beats,

@@ -27,6 +27,7 @@ from blysk.hdl.normals.dot_product import DotProductUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.errors import InputError
+from blysk.sim.units.registry import RECORDS
 
 BASELINES = read()
 
@@ -54,6 +55,9 @@ def test_every_entry_has_a_baseline_and_every_baseline_an_entry():
 
 def test_entries_are_every_unit_method_model_and_style():
     assert {f"parts: {entry.title}" for entry in UNITS if entry.record.name != "pipeline"} <= set(ENTRIES)
+    titles = {name.removeprefix("parts: ").split(",")[0] for name in ENTRIES}
+    for name, record in RECORDS.items():
+        assert any(f"{name} {variant}".rstrip().split(",")[0] in titles for variant in record.variants)
     for method in METHODS:
         for style in STYLES:
             assert {f"{kind}: pipeline {method}, cosquad, {style}" for kind in ("frames", "parts")} <= set(

@@ -30,7 +30,7 @@ def test_exponents():
     assert {1, 2, 3, 10, 100, 500, 1000} <= set(FEW_EXPONENTS) <= set(EXPONENTS)
 
 
-@pytest.mark.parametrize(("model", "exponent"), [("cosquad", 1), ("blinn", 30), ("coscos4", 700)])
+@pytest.mark.parametrize(("model", "exponent"), [("cosquad", 1), ("blinn_product", 30), ("coscos4", 700)])
 def test_reference_is_the_renderer(model, exponent):
     """Worked out once a mesh, the exact frame is that which the golden renderer draws."""
     frame = Frame(teapot(1000), 96, 72)
@@ -83,7 +83,7 @@ def test_switched_pixels_are_told_apart(side):
     product = quantise(normals) @ quantise(light)
     # The model's N·L is cut to 25 of these 34 fraction bits.
     (normal, *_) = normals[side * product < -(2**10)]
-    (point,) = Frame(flat(normal), 16, 12).points(1, ["blinn"])
+    (point,) = Frame(flat(normal), 16, 12).points(1, ["blinn_product"])
     assert point.over == point.switched == point.pixels > 20
     assert point.switched_cosine == pytest.approx(1e-9, rel=0.01)
     assert point.max_lsb > 5
@@ -100,7 +100,7 @@ def test_a_wrong_sign_is_no_excuse(monkeypatch):
     monkeypatch.setattr(
         sweep.FrameConstants, "of", lambda *_: replace(constants, direction=-constants.direction)
     )
-    (point,) = frame.points(1, ["blinn"])
+    (point,) = frame.points(1, ["blinn_product"])
     assert point.over == point.pixels > 20
     assert point.switched == 0
     assert point.steady_lsb == point.max_lsb > 5
@@ -120,7 +120,7 @@ def test_other_scenes():
     assert frame.scene_of(7).material == Material((0,) * 3, (0,) * 3, (1,) * 3, 7)
     assert frame.scene.lights == (Light((1, 0, 0)),)
     np.testing.assert_allclose(frame.scene.camera.viewer, normalise([0, 1, 0.5]), atol=1e-12)
-    assert frame.golden("blinn", 1).shape == (frame.pixels, 3)
+    assert frame.golden("blinn_product", 1).shape == (frame.pixels, 3)
 
 
 def test_light_from_behind(capsys):
@@ -150,7 +150,7 @@ def test_summary():
         "m",
         [
             point("exp", 1, 9.0, 0.5, 3, 3, 1e-6),
-            point("blinn", 1, 0.7, 0.7),
+            point("blinn_product", 1, 0.7, 0.7),
             point("exp", 2, 1.25, 1.25, 4, 1, 1e-7),
         ],
     )
@@ -158,7 +158,7 @@ def test_summary():
     assert (first.steady_lsb, first.steady_exponent, first.over) == (1.25, 2, 3)
     assert (first.max_lsb, first.exponent, first.switched, first.switched_cosine) == (9.0, 1, 4, 1e-6)
     assert first.missed == (2,)
-    assert (second.model, second.exponents, second.missed) == ("blinn", 1, ())
+    assert (second.model, second.exponents, second.missed) == ("blinn_product", 1, ())
 
 
 SMALL = [STRESS, "--width", "64", "--height", "48"]

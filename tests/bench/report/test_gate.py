@@ -49,7 +49,7 @@ def dark_pixels(design, spans, constants, term):
     return ~pixels.color.any(axis=1)
 
 
-@pytest.mark.parametrize(("model", "exponent"), [("cosquad", 20), ("coscos4", 200), ("blinn", 50)])
+@pytest.mark.parametrize(("model", "exponent"), [("cosquad", 20), ("coscos4", 200), ("blinn_product", 50)])
 def test_shares_are_those_of_the_pixels(model, exponent):
     """Counted in pictures of the terms alone, span by span."""
     design = preset("chord", model)
@@ -90,7 +90,7 @@ def test_empty_spans_do_not_count():
 @pytest.mark.long
 def test_gate_saves_cycles_of_the_compact_style_and_no_pixel_changes():
     """Blinn's power takes 42 cycles a pixel: a gated pixel takes 3, one a channel of its diffuse term."""
-    off, on = (preset("chord", "blinn", gate=gate) for gate in (False, True))
+    off, on = (preset("chord", "blinn_product", gate=gate) for gate in (False, True))
     spans, constants = frame(off, 300, 200, 10, 8)
     expected = off.compute(spans, constants)
     runs = frames(
@@ -142,7 +142,7 @@ def test_activity_counts_every_register_once():
 SHARES = Shares(100, 1000, 40, 500, 45, 600, 700, 100)
 ROW = GateRow(
     "teapot",
-    "blinn",
+    "blinn_product",
     50,
     SHARES,
     cycles=(1100, 1100),
@@ -174,7 +174,7 @@ def test_tables(counted, capsys):
     assert counted["size"] == (320, 240)
     lines = capsys.readouterr().out.splitlines()
     rows = [line.strip("| ").split(" | ") for line in lines if line.startswith("| teapot")]
-    head = ["teapot", "blinn", "50"]
+    head = ["teapot", "blinn_product", "50"]
     assert rows == [
         [*head, "100", "1,000", "40.0%", "50.0%", "60.0%", "70.0%", "10.0%"],
         [*head, "42,000", "21,000", "50.0%", "1,100", "1,100", "0.0%"],
@@ -185,9 +185,10 @@ def test_tables(counted, capsys):
 
 def test_json(counted, capsys, tmp_path):
     path = tmp_path / "gate.json"
-    arguments = ["teapot", "--size", "64x48", "--model", "blinn", "--exponent", "7", "--json", str(path)]
+    arguments = ["teapot", "--size", "64x48", "--model", "blinn_product", "--exponent", "7"]
+    arguments += ["--json", str(path)]
     assert main(arguments) == 0
-    assert (counted["models"], counted["exponents"], counted["size"]) == (("blinn",), (7,), (64, 48))
+    assert (counted["models"], counted["exponents"], counted["size"]) == (("blinn_product",), (7,), (64, 48))
     figures = json.loads(path.read_text())
     assert (figures["width"], figures["height"]) == (64, 48)
     [row] = figures["frames"]

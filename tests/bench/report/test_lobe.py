@@ -25,7 +25,7 @@ def test_meshes_have_unit_normals_that_are_those_of_their_faces(mesh):
 @pytest.mark.parametrize("mesh", ["sphere", "torus", "waves"])
 def test_frames_are_exact(mesh):
     """Half an LSB is the rounding of a pixel; spans cost the rest."""
-    for model, values in (("blinn_table", (1, 100)), ("ggx", (0.2, 0.7))):
+    for model, values in (("blinn", (1, 100)), ("ggx", (0.2, 0.7))):
         for row in lobe.frame_errors(mesh, model, values, SIZE):
             assert row["units"] <= 0.6
             assert row["total"] <= 0.5 + row["total_spans"] + 0.1
@@ -40,8 +40,8 @@ def test_errors_of_a_model_that_is_not_exact_count_against_blinn():
 
 def test_front_has_the_table_and_its_baselines():
     assert set(lobe.FRONT) <= {*MODELS, *LOBES}
-    costs = {model: lobe.pipeline_cost(model) for model in ("blinn_table", "cosquad")}
-    assert costs["blinn_table"]["multipliers"] <= costs["cosquad"]["multipliers"] + 1
+    costs = {model: lobe.pipeline_cost(model) for model in ("blinn", "cosquad")}
+    assert costs["blinn"]["multipliers"] <= costs["cosquad"]["multipliers"] + 1
     assert lobe.unit_cost("lobe, memory outside")["memory_bits"] == 0
 
 

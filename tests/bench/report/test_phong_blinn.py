@@ -122,7 +122,7 @@ def made():
         found.append(
             {"triangles": triangles, "pixels": pixels, "raster": raster, "phong": phong, "blinn": blinn}
         )
-        for model, more in (("cosquad", 0), ("blinn", 50)):
+        for model, more in (("cosquad", 0), ("blinn_product", 50)):
             chosen.append(Task(hardware_cycles, {"model": model, **settings}))
             found.append({"triangles": triangles, "pixels": pixels, "cycles": cycles + more})
     return section(chosen, json.loads(json.dumps(found)))

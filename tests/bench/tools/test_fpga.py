@@ -154,6 +154,7 @@ def test_missing_tools_are_one_line_that_names_the_extra(which, family, capsys, 
     assert errors == f"blysk: fpga: {text}; pip install 'blysk[fpga]'\n"
 
 
+@pytest.mark.long
 @tools
 @pytest.mark.skipif(os.name != "posix", reason="a signal to a process")
 def test_interrupt_leaves_nothing_behind(cache, tmp_path):

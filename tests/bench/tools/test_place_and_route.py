@@ -291,6 +291,7 @@ def period(place):
     return pytest.approx(1000 / place.fmax, rel=1e-3) == place.logic + place.routing
 
 
+@pytest.mark.long
 @tools
 @pytest.mark.parametrize(
     ("family", "kinds"),
@@ -355,6 +356,7 @@ def test_times_of_a_multiplier_with_absorbed_registers(cache):
         assert kept.places[0].closed == 0
 
 
+@pytest.mark.long
 @tools
 def test_times_of_a_multiplier_with_registers_of_its_own(cache):
     """On Nexus the multiplier is timed between its own registers, and between others."""

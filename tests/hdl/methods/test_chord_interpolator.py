@@ -124,7 +124,7 @@ def test_short_spans_come_sooner(make, length):
     assert unit.latency - (run.cycles[0] - run.input_cycles[0]) >= setup.latency - setup.short_latency
 
 
-@pytest.mark.parametrize("interval", [3, 9, 18])
+@pytest.mark.parametrize("interval", [3, *(pytest.param(k, marks=pytest.mark.long) for k in (9, 18))])
 def test_cycles_of_a_span(interval):
     """A span of k pixels takes ``min(k, 3)`` turns of the values, or its pixels, whichever is more."""
     for length in (1, 2, 3, 4, 9, 20, 40):

@@ -51,7 +51,7 @@ def test_every_option_has_a_type_for_checkers():
 def test_frame_is_that_of_the_model(frame):
     expected = model_frame(frame.scene, frame.design)
     np.testing.assert_array_equal(frame.image, expected.image)
-    assert frame.design == preset("chord")
+    assert frame.design == preset("chord", "blinn")
     assert frame.error == compare(frame.scene, frame.design, expected).method_error
     assert (frame.spans, frame.pixels) == (expected.spans, expected.pixels)
     assert frame.cycles == frame.figures["cycles"] > frame.pixels
@@ -64,7 +64,7 @@ def test_frame_in_a_notebook(frame):
         np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(png))), frame.image)
     assert f"{frame.cycles:,}" in frame._repr_html_()
     assert f"{frame.error.max_lsb:.3f} LSB" in frame._repr_html_()
-    assert repr(frame) == f"<RenderedFrame teapot 64x48, chord, cosquad, {frame.cycles:,} cycles>"
+    assert repr(frame) == f"<RenderedFrame teapot 64x48, chord, blinn, {frame.cycles:,} cycles>"
 
 
 def test_command_line_prints_and_writes_the_same(frame, tmp_path, capsys):
@@ -83,9 +83,11 @@ def test_command_line_prints_and_writes_the_same(frame, tmp_path, capsys):
 def test_design_and_verilog(capsys):
     design = blysk.design(method="chord", lights=2, materials=3, gate=True, style="compact", setup_interval=9)
     build = Build(style="compact", setup_interval=9)
-    assert design == preset("chord", lights=2, materials=3, gate=True, style="compact", setup_interval=9)
+    assert design == preset(
+        "chord", "blinn", lights=2, materials=3, gate=True, style="compact", setup_interval=9
+    )
     assert design.build == build
-    assert blysk.design() == preset() == blysk.Design()
+    assert blysk.design() == preset(model="blinn") == blysk.Design()
     assert main(["verilog", "--method", "linear", "--name", "core"]) == 0
     assert blysk.verilog(blysk.design(method="linear"), name="core") == capsys.readouterr().out
 

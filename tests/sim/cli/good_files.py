@@ -47,7 +47,7 @@ exponent = 50
 [pipeline]
 method = "chord-local"
 model = "cosquad"
-setup_interval = 4
+setup_interval = 3
 gate = false
 short_words = false
 """

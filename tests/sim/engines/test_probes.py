@@ -100,7 +100,7 @@ def test_needs_a_light_and_a_gate():
     ("method", "model"),
     [
         *(("chord", "cosquad"), ("chord", "lyon3_refitted"), ("linear", "exp")),
-        *(("quadratic", "coscos4"), ("quadratic", "blinn")),
+        *(("quadratic", "coscos4"), ("quadratic", "blinn_product")),
     ],
 )
 def test_formats_fit(method, model):
@@ -110,7 +110,7 @@ def test_formats_fit(method, model):
     assert isinstance(probes["specular"].shape, FixedShape)
     assert ("highlight_0_sum" in probes) == (method == "chord")
     assert ("normal_2_sum" in probes) == (method != "chord")
-    assert ("argument" in probes) == (model != "blinn")
+    assert ("argument" in probes) == (model != "blinn_product")
     assert ("base" in probes) == (model in ("cosquad", "lyon3_refitted"))
     assert ("square_3" in probes) == (model == "lyon3_refitted")
 

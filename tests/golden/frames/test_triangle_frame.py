@@ -1,0 +1,64 @@
+"""Frames by the models of geometry, shading and depth test, against exact normals of every pixel."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.frames.compare import compare_image
+from blysk.golden.frames.triangle_frame import span_angle, triangle_frame
+from blysk.golden.geometry.geometry import Geometry
+from blysk.golden.presets import preset
+from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.renderer import render
+from blysk.golden.render import Renderer
+from blysk.sim.api.scene import scene
+
+METHODS = "chord", "renormalise"
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("triangles", "exponent"), [(220, 1), (1000, 20), (220, 100), (1000, 1000)])
+def test_within_one_lsb_of_exact_normals(method, triangles, exponent):
+    """At every pixel of a frame, and at the pixels of the rasteriser in float64, all and no others."""
+    drawn = scene("teapot", size=(160, 120), triangles=triangles, exponent=exponent)
+    renderer = Renderer(preset(method))
+    frame = triangle_frame(drawn, renderer)
+    exact = render(drawn, "phong", renderer.design.specular.model)
+    np.testing.assert_array_equal(frame.owner >= 0, exact.mask)
+    error = np.abs(frame.image - exact.image * 255)[exact.mask]
+    assert 0.4 < error.max() < 0.6
+    compared = compare_image(drawn, renderer.design, frame.image)
+    assert compared.method_error.max_lsb == pytest.approx(error.max())
+    assert compared.visible_pixels == exact.mask.sum()
+    assert np.isnan(compared.arithmetic_error.max_lsb)
+
+
+def test_true_lines_are_not_cut():
+    """One span a scanline and triangle, as the rasteriser's, hidden ones included; chord has more."""
+    drawn = scene("teapot", size=(160, 120), triangles=220, back_faces="cull")
+    counts = {method: triangle_frame(drawn, Renderer(preset(method))).counts for method in METHODS}
+    assert counts["renormalise"]["cut"] == 0 < counts["chord"]["cut"]
+    raster = rasterise(drawn)
+    assert counts["renormalise"]["spans"] == len(raster.length) + raster.hidden_spans
+    assert counts["renormalise"]["spans"] < counts["chord"]["spans"]
+    assert counts["renormalise"]["pixels"] == counts["chord"]["pixels"]
+
+
+def test_widest_span():
+    """By the steepest highlight of the materials; 5 degrees of methods without a limit of their own."""
+    angles = []
+    for exponent in (1, 100, 1000):
+        drawn = scene("teapot", size=(16, 12), triangles=200, exponent=exponent)
+        angles.append(span_angle(drawn, preset("chord")))
+        assert span_angle(drawn, preset("quadratic")) == 5
+        assert angles[-1] == preset("chord").span_limit.angle(exponent)
+    assert 15 >= angles[0] > angles[1] > angles[2] > 5
+
+
+def test_methods_and_geometry_must_fit():
+    """Values are not what triangles give, nor normals where lines are taken."""
+    with pytest.raises(ValueError, match="takes no normals"):
+        Renderer(preset("chord-local"))
+    with pytest.raises(ValueError, match="takes unit normals, the geometry gives true lines"):
+        Renderer(preset("chord"), Geometry(lines=True))
+    with pytest.raises(ValueError, match="takes true lines, the geometry gives unit normals"):
+        Renderer(preset("renormalise"), Geometry())

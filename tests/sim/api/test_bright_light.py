@@ -1,0 +1,37 @@
+"""Errors of bright light: in proportion to the largest channel of all terms together."""
+
+import pytest
+
+import blysk
+from blysk.golden.frames.compare import compare
+from blysk.golden.frames.frame import model_frame
+from blysk.golden.reference.lighting import Light
+
+LIGHTS = ((-0.5, 0.8, 0.7), (0.9, 0.2, 0.5))
+
+
+@pytest.mark.parametrize("color", range(1, 9))
+@pytest.mark.parametrize("method", ["chord", "chord-local", "renormalise"])
+def test_errors_are_in_proportion(method, color):
+    """Of one light and of two, diffuse and shining surfaces, at exponents that are cut much and little.
+
+    A dim material under a bright light and a bright one under a dim light are the same: what counts is the
+    product. So this goes to a brightness of 8, the most that a term may have.
+    """
+    for exponent, diffuse, number in ((1, 0.4, 1), (20, 0.2, 2), (200, 0.0, 1)):
+        share = color / number
+        lights = [Light(to, (share, share / 2, share)) for to in LIGHTS[:number]]
+        scene = blysk.scene(
+            "teapot",
+            triangles=600,
+            size=(160, 120),
+            lights=lights,
+            ambient=0,
+            diffuse=diffuse,
+            specular=1 - diffuse,
+            exponent=exponent,
+        )
+        design = blysk.design(method=method, lights=number)
+        errors = compare(scene, design, model_frame(scene, design))
+        assert 0.4 < errors.arithmetic_error.max_lsb <= 0.5 + color / 16
+        assert errors.method_error.max_lsb <= 0.5 + color / 16 + color / 4

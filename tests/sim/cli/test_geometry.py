@@ -1,0 +1,92 @@
+"""``--geometry hardware``: triangles to pixels by simulated hardware, and its Verilog."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import blysk
+from blysk.golden.frames.triangle_frame import triangle_frame
+from blysk.golden.render import Renderer
+from blysk.sim.cli.main import main
+
+from .commandline import SMALL, picture
+
+pytestmark = pytest.mark.usefixtures("folder")
+
+HARDWARE = "--geometry", "hardware"
+
+
+def test_picture_and_figures(capsys):
+    """The model's picture; errors against exact normals of every pixel; counters and cycles."""
+    assert main(["render", *SMALL, *HARDWARE, "-o", "a.png", "--json", "a.json"]) == 0
+    figures = json.loads(Path("a.json").read_text())
+    drawn = blysk.scene("teapot", triangles=500, size=(64, 48))
+    model = triangle_frame(drawn, Renderer(blysk.design()))
+    np.testing.assert_array_equal(picture("a.png"), model.image)
+    assert figures["geometry"] == "hardware"
+    assert 0.3 < figures["method_error"]["max_lsb"] < 0.6
+    assert "arithmetic_error" not in figures
+    assert figures["spans"] == model.counts["spans"]
+    assert figures["pixels"] == model.counts["pixels"]
+    assert figures["visible_pixels"] == np.count_nonzero(model.owner >= 0)
+    assert figures["counts"]["hidden_pixels"] == model.counts["hidden"]
+    assert figures["counts"]["cut_spans"] == model.counts["cut"]
+    assert 0 < figures["triangle_cycles"] <= figures["cycles"]
+    printed = capsys.readouterr().out
+    assert f"hardware, the last triangle taken in after {figures['triangle_cycles']:,} cycles" in printed
+    assert "the same method and model in float64" not in printed
+    frame = blysk.render(drawn, geometry="hardware")
+    np.testing.assert_array_equal(frame.image, model.image)
+    assert frame.cycles == figures["cycles"]
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--specialise"], "a specialised pipeline takes spans; leave out specialise"),
+        (["--frames", "2"], "draws one picture; leave out frames"),
+        (["--method", "chord-local"], "triangles give normals, and chord-local takes values"),
+    ],
+)
+def test_what_triangles_cannot_be_drawn_with(refused, options, says):
+    """One line of reason and remedy."""
+    refused("render", *SMALL, *HARDWARE, *options, thing="--geometry hardware", says=says)
+
+
+def test_scene_file_names_the_key(refused):
+    """Where the file asks for it."""
+    Path("a.toml").write_text(
+        '[mesh]\nfile = "teapot"\n[pipeline]\ngeometry = "hardware"\nspecialise = true\n'
+    )
+    refused("render", "a.toml", thing="a.toml, pipeline.geometry", says="takes spans")
+
+
+def test_unknown(refused):
+    """Both commands know the two names."""
+    for command in (["render", "teapot"], ["verilog"]):
+        refused(*command, "--geometry", "x", thing="--geometry x", says="use one of software, hardware")
+
+
+def test_verilog(capsys):
+    """Triangles in, pixels and a memory of depths out; of lines without a normaliser."""
+    assert main(["verilog", *HARDWARE, "-o", "a.v"]) == 0
+    text = Path("a.v").read_text()
+    header, body = text.split("module blysk (", 1)
+    assert "triangles to pixels" in header
+    assert "spans with three unit normals" in header
+    for port in ("i_normal_2_2", "memory_read_data", "status_hidden", "constants_limit", "o_depth"):
+        assert f"// {port} " in header
+    assert "_geometry_normals_normaliser" in body
+    assert blysk.verilog(blysk.design(), geometry="hardware") == text
+    assert main(["verilog", *HARDWARE, "--method", "renormalise"]) == 0
+    text = capsys.readouterr().out
+    assert "true lines, uncut" in text
+    assert "_geometry_normals_normaliser" not in text
+
+
+def test_verilog_refuses(refused):
+    """Values of spans; and a bench that would send spans."""
+    refused("verilog", *HARDWARE, "--method", "chord-local", thing="--geometry hardware", says="takes values")
+    refused("verilog", *HARDWARE, "--testbench", "a", thing="--testbench", says="takes triangles")

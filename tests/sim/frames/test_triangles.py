@@ -1,0 +1,63 @@
+"""Frames by simulated geometry, shading and depth test, against their bit-accurate models."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.frames.triangle_frame import triangle_frame
+from blysk.golden.presets import preset
+from blysk.golden.render import Renderer
+from blysk.sim.api.scene import scene
+from blysk.sim.engines.engine import SimulationError
+from blysk.sim.frames.triangles import TriangleSimulator
+
+SIZE = 64, 48
+
+
+@pytest.fixture(scope="module")
+def simulator():
+    return TriangleSimulator(Renderer(preset("chord")), SIZE)
+
+
+@pytest.mark.parametrize(("triangles", "back_faces"), [(200, "flip"), (1000, "cull")])
+def test_frame_is_the_model_s(simulator, triangles, back_faces):
+    """Picture and counters; and no more cycles than setup or pixels of each triangle ask for."""
+    drawn = scene("teapot", size=SIZE, triangles=triangles, back_faces=back_faces)
+    frame, model = simulator.render(drawn), triangle_frame(drawn, simulator.renderer)
+    np.testing.assert_array_equal(frame.image, model.image)
+    assert {name: frame.counts[name] for name in model.counts} == model.counts
+    assert frame.visible == np.count_nonzero(model.owner >= 0)
+    assert frame.spans == model.counts["spans"]
+    assert frame.pixels == model.counts["pixels"]
+    sent = frame.sent.triangles
+    spans, _ = simulator.renderer.geometry.compute(sent, frame.sent.frame)
+    pixels = np.bincount(spans.triangle, spans.length, len(sent))
+    assert frame.cycles < np.maximum(16, pixels).sum() + 600
+
+
+def test_an_empty_picture(simulator):
+    """No triangle of the mesh is in front of the camera."""
+    away = scene("teapot", size=SIZE, triangles=200, position=(0, 0, 9), target=(0, 0, 99))
+    frame = simulator.render(away)
+    assert frame.cycles == frame.pixels == frame.visible == 0
+    assert len(np.unique(frame.image.reshape(-1, 3), axis=0)) == 1
+
+
+def test_another_size_is_refused(simulator):
+    """The memory of depths has the size of the picture."""
+    with pytest.raises(ValueError, match="the scene is 16x12, the memory 64x48"):
+        simulator.render(scene("teapot", size=(16, 12), triangles=200))
+
+
+def test_a_wrong_model_is_found(monkeypatch):
+    """A simulator checks some triangles of its own before a scene's."""
+    renderer = Renderer(preset("chord"))
+    compute = Renderer.compute
+
+    def wrong(self, *operands):
+        drawn = compute(self, *operands)
+        drawn.color[-1] ^= 1
+        return drawn
+
+    monkeypatch.setattr(Renderer, "compute", wrong)
+    with pytest.raises(SimulationError, match="not those of its bit-accurate model"):
+        TriangleSimulator(renderer, SIZE)
