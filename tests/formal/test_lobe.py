@@ -61,7 +61,7 @@ class OfUnit:
         """A value so many enabled cycles ago; it means something from that age on."""
         value = Value.cast(value)
         for _ in range(cycles):
-            past = Signal(value.shape(), name="past")
+            past = Signal(value.shape(), name="past", reset_less=True)
             with self.m.If(self.moves):
                 self.m.d.sync += past.eq(value)
             value = past
