@@ -331,13 +331,18 @@ class ShadingPipelineUnit(wiring.Component):
         connect(m, wiring.flipped(self.write), frame.write)
         # A constant has its value two cycles after its write.
         m.d.sync += written.eq(self.write.valid & self.write.ready)
+        # Without the spans of the last cycle, so that no path leads from the ports into the sum.
         inside = Signal(range(self.spans_inside + 1))
+        came, went = Signal(name="came"), Signal(name="went")
         finished = self.o.valid & self.o.ready & self.o.payload.last
+        is_one = Mux(came ^ went, inside == Mux(went, 2, 0), inside == 1)
         idle = Signal(init=1)
         m.d.comb += frame.hold.eq(~idle)
         m.d.sync += [
-            inside.eq(inside + admit - finished),
-            idle.eq(~admit & (idle | (finished & (inside == 1)))),
+            came.eq(admit),
+            went.eq(finished),
+            inside.eq(inside + came - went),
+            idle.eq(~admit & (idle | (finished & is_one))),
         ]
         if self.parameters.materials > 1:
             # Constants follow the index one cycle later, the slope of the exponent some more.

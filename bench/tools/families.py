@@ -71,6 +71,10 @@ class Family:
         Pattern of the cells that nextpnr does not time paths through: ``KIND``, or ``KIND.PARAMETER=VALUE``.
     registers : str
         A sentence on registers inside multipliers.
+    limit : float or None
+        Largest clock rate, MHz, that is quoted of a design in which `absorb_registers` gave a multiplier
+        registers on both sides, between which nextpnr does not time. ``None``: registers stay as Yosys leaves
+        them.
     """
 
     device: str
@@ -87,6 +91,7 @@ class Family:
     logic: str
     untimed: str
     registers: str
+    limit: float | None = None
 
     @property
     def cells(self) -> str:
@@ -116,7 +121,9 @@ synth_lattice -family ecp5 -top top -abc9""",
     distributed_ram="TRELLIS_DPR16X4",
     logic="LUT4|CCU2C|PFUMX|L6MUX21",
     untimed="ALU54B|MULT18X18D\\.REG_.*_CLK=(?!NONE).*",
-    registers="Multipliers are used without the registers inside them, through which the tool does not time.",
+    registers="Registers next to a multiplier are inside it and not counted. The tool does not time between "
+    "those on both sides of a multiplier: with one such, no clock rate above 250 MHz is quoted.",
+    limit=250.0,
 )
 
 ECP5_85F = replace(
@@ -168,13 +175,15 @@ class Place:
     seed : int
         Of the placement.
     fmax : float
-        Largest clock rate, MHz.
+        Largest clock rate, MHz; at most `Family.limit` where a multiplier is closed.
     start, end : str
         Registers, or memories, at the ends of the slowest path.
     logic, routing : float
         Nanoseconds of that path in cells and between them.
     kinds : dict of str to int
         How many cells of each kind it goes through.
+    closed : int
+        Multipliers with registers inside on both sides, between which nextpnr does not time.
     """
 
     seed: int
@@ -184,6 +193,7 @@ class Place:
     logic: float
     routing: float
     kinds: dict[str, int]
+    closed: int = 0
 
 
 def signal_name(cell: str, family: Family) -> str:

@@ -8,8 +8,10 @@ differs by a few per cent from one to the next. A `Family` holds what differs: L
 Every port has a register before or behind it, so that every path of the design lies between registers and
 counts; the parts counted leave those registers out. Reset comes as it is: its delay is not counted.
 
-Only paths that nextpnr times are quoted. On ECP5 it does not time those inside a multiplier with registers of
-its own: Yosys maps none there, and a netlist that has one is refused. On Nexus it times each stage of a
+On ECP5 `absorb_registers` moves registers next to a multiplier into it, which Yosys does not. nextpnr times a
+multiplier with registers on one side in full; between registers on both sides it does not time. A clock rate
+of a design with such a multiplier is quoted up to `Family.limit`, and the design is named below the table. On
+Nexus it times each stage of a
 multiplier, its registers' clock-to-output and setup times too, and Yosys moves registers next to a multiplier
 into it; only a multiplier with an adder of its own has no delay, and is refused.
 """
@@ -39,6 +41,7 @@ from blysk.sim.value_types import Choice, OutputFile, Whole
 __all__ = [
     "command",
     "table",
+    "untimed",
 ]
 
 
@@ -67,6 +70,17 @@ def table(layouts: Sequence[Layout], family: Family = ECP5) -> str:
         ).rstrip()
         for line in lines
     )
+
+
+def untimed(layouts: Sequence[Layout], family: Family = ECP5) -> Iterator[str]:
+    """A line for each design in which nextpnr leaves the interior of a multiplier untimed."""
+    for layout in layouts:
+        if layout.closed:
+            closed = f"{layout.closed} of {layout.parts.multipliers} multipliers"
+            yield (
+                f"{layout.name}: {closed} have registers inside on both sides, between which the tool does "
+                f"not time; no clock rate above {family.limit:g} MHz is quoted"
+            )
 
 
 def _units(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
@@ -124,16 +138,20 @@ def _pipelines(
     show_default="number of cores, 4 at most",
     help="Placements at once, of half a GB each.",
 )
+@click.option("--keep-registers", is_flag=True, help="ECP5: no registers inside multipliers.")
 @click.option("--json", "figures", type=OutputFile(), help="Every figure, and the slowest path of each seed.")
 @click.pass_context
-def command(context, family_name, lights, pipes, every_method, units, seeds, jobs, figures, **_):
+def command(
+    context, family_name, lights, pipes, every_method, units, seeds, jobs, keep_registers, figures, **_
+):
     """Place and route the pipeline on an FPGA, and print its parts and clock rate.
 
     LUT: look-up tables of four inputs, with those that serve as carries and memories; FF: flip-flops, without
     those inside multipliers; mult: multipliers of 18x18 bits; BRAM: block RAMs of 18 Kibit; LUTRAM: memories
     of 16x4 bits in look-up tables. The first line is what the FPGA has of them. Clock rates are in MHz, over
     the seeds. The slowest path is that of the slowest seed: in cells and between them, and the registers at
-    its ends. What was placed before comes from the cache.
+    its ends. What was placed before comes from the cache. On ECP5 registers beside a multiplier move into it;
+    between those on both sides of one the tool does not time, and says so below the table.
 
     \b
     Examples:
@@ -159,7 +177,7 @@ def command(context, family_name, lights, pipes, every_method, units, seeds, job
         for name, unit in designs:
             bar.set_description_str(name)
             try:
-                layouts.append(lay_out(name, unit(), seeds, jobs, bar.update, family))
+                layouts.append(lay_out(name, unit(), seeds, jobs, bar.update, family, not keep_registers))
             except TooLarge as error:
                 if len(designs) == 1:
                     raise
@@ -176,5 +194,7 @@ def command(context, family_name, lights, pipes, every_method, units, seeds, job
             },
         )
     click.echo(table(layouts, family))
+    for line in untimed(layouts, family):
+        click.echo(line)
     for name, reason in too_large.items():
         click.echo(f"{name}: {reason}")

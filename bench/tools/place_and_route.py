@@ -23,6 +23,8 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
 from blysk.bench.store import version_of
+from blysk.bench.tools import absorb_registers as absorbing
+from blysk.bench.tools.absorb_registers import Absorbed, absorb_registers
 from blysk.bench.tools.families import ECP5, Family, Parts, Place, kind_of_cell, signal_name
 from blysk.sim.engines.cache import cache_folder
 from blysk.sim.engines.engine import SimulationError
@@ -59,11 +61,8 @@ select -set registers t:$*dff* %co1:+[Q] w:* %i
 rename -hide w:* @registers %d
 """
 
-# With the ports, to be counted; without, to be placed: there are more of them than pins.
 _AFTER = """
-write_json netlist.json
-delete -port w:*
-write_json top.json"""
+write_json netlist.json"""
 
 _YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
 
@@ -106,6 +105,11 @@ class Layout:
         rates = [place.fmax for place in self.places]
         return min(rates), median(rates), max(rates)
 
+    @property
+    def closed(self) -> int:
+        """Multipliers with registers inside on both sides, between which nextpnr does not time."""
+        return max(place.closed for place in self.places)
+
     def as_dict(self) -> dict[str, Any]:
         """The figures under stable names."""
         low, middle, high = self.fmax
@@ -115,6 +119,7 @@ class Layout:
             "fmax_min_mhz": low,
             "fmax_median_mhz": middle,
             "fmax_max_mhz": high,
+            "closed_multipliers": self.closed,
             "seeds": [asdict(place) for place in self.places],
         }
 
@@ -280,7 +285,13 @@ def _refuse_too_large(kinds: Mapping[str, int], family: Family) -> None:
             raise TooLarge(f"does not fit: {count:,} {name}, ports too, on {most:,} of the {family.device}")
 
 
-def read_report(report: Mapping[str, Any], seed: int, family: Family = ECP5) -> Place:
+def _write_without_ports(path: Path, netlist: Mapping[str, Any]) -> None:
+    """Write a netlist for placement: it has more ports than the FPGA has pins."""
+    top = {**netlist["modules"]["top"], "ports": {}}
+    path.write_text(json.dumps({**netlist, "modules": {**netlist["modules"], "top": top}}), encoding="utf-8")
+
+
+def read_report(report: Mapping[str, Any], seed: int, family: Family = ECP5, closed: int = 0) -> Place:
     """What nextpnr's report says of the one clock.
 
     Parameters
@@ -291,6 +302,8 @@ def read_report(report: Mapping[str, Any], seed: int, family: Family = ECP5) -> 
         That it was made from.
     family : Family
         That it is of.
+    closed : int
+        Multipliers of the design with registers inside on both sides.
 
     Raises
     ------
@@ -309,14 +322,16 @@ def read_report(report: Mapping[str, Any], seed: int, family: Family = ECP5) -> 
         passed = dict.fromkeys(
             step["from"]["cell"].partition("/")[0] for step in path if step["type"] == "logic"
         )
+        fmax = float(rate["achieved"])
         return Place(
             seed=seed,
-            fmax=float(rate["achieved"]),
+            fmax=min(fmax, family.limit) if closed and family.limit else fmax,
             start=signal_name(path[0]["from"]["cell"], family),
             end=f"{signal_name(path[-1]['to']['cell'], family)}.{path[-1]['to']['port']}",
             logic=logic,
             routing=routing,
             kinds=dict(Counter(kind_of_cell(cell, family) for cell in passed)),
+            closed=closed,
         )
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise ToolError(f"nextpnr's report is not as expected: {error!r}") from error
@@ -349,6 +364,7 @@ def lay_out(
     jobs: int = 1,
     progress: Callable[[], object] = lambda: None,
     family: Family = ECP5,
+    absorb: bool = True,
 ) -> Layout:
     """Synthesise a component, then place and route it from seeds 1, 2, ....
 
@@ -369,6 +385,8 @@ def lay_out(
         Called after each seed.
     family : Family
         What of.
+    absorb : bool
+        Whether `absorb_registers` moves registers into multipliers, where the family has a `Family.limit`.
 
     Raises
     ------
@@ -381,7 +399,9 @@ def lay_out(
     """
     tools = versions_of(family)
     netlist = rtlil.convert(Registered(component), name="top", emit_src=False)
-    parts = (netlist, _BEFORE, _AFTER, _YOSYS, repr(family), repr(tools))
+    absorb = absorb and family.limit is not None
+    step = Path(absorbing.__file__).read_text(encoding="utf-8") if absorb else ""
+    parts = (netlist, _BEFORE, _AFTER, _YOSYS, step, repr(family), repr(tools))
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
     folder = cache_folder() / "fpga"
     folder.mkdir(mode=0o700, exist_ok=True)
@@ -393,7 +413,7 @@ def lay_out(
             progress()
     missing = [seed for seed in range(1, seeds + 1) if seed not in found]
     if missing:
-        with contextlib.closing(_run(netlist, missing, jobs, family)) as results:
+        with contextlib.closing(_run(netlist, missing, jobs, family, absorb)) as results:
             for seed, entry in results:
                 _store(folder / f"{key}-{seed}.json", *entry)
                 found[seed] = entry
@@ -402,7 +422,7 @@ def lay_out(
 
 
 def _run(
-    netlist: str, seeds: Sequence[int], jobs: int, family: Family
+    netlist: str, seeds: Sequence[int], jobs: int, family: Family, absorb: bool
 ) -> Iterator[tuple[int, tuple[Parts, Place]]]:
     """Run the tools; each seed as soon as it is done."""
     runner = _Runner()
@@ -416,6 +436,8 @@ def _run(
             pool.submit(runner.run, "Yosys", _YOSYS, [], folder, script).result()
             mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
             _refuse_untimed(mapped, family)
+            mapped, absorbed = absorb_registers(mapped) if absorb else (mapped, Absorbed())
+            _write_without_ports(folder / "top.json", mapped)
             kinds = Counter(cell["type"] for cell in mapped["modules"]["top"]["cells"].values())
             _refuse_too_large(kinds, family)
             options = (*family.options, *(family.large if kinds["LUT4"] >= _MANY else ()))
@@ -430,7 +452,10 @@ def _run(
                         raise TooLarge(f"does not fit: from seed {seed} {error}") from None
                     raise
                 report = json.loads(path.read_text(encoding="utf-8"))
-                return seed, (parts_of(mapped, report, family), read_report(report, seed, family))
+                return seed, (
+                    parts_of(mapped, report, family),
+                    read_report(report, seed, family, absorbed.closed),
+                )
 
             waiting = [pool.submit(route, seed) for seed in seeds]
             for done in as_completed(waiting):

@@ -426,7 +426,7 @@ class _Build:
         if key not in self._instances:
             when = None
             given = [
-                Signal(shape, name=f"{functional_unit.name}_{instance}_{k}")
+                Signal(shape, name=f"{functional_unit.name}_{instance}_{k}", reset_less=True)
                 for k, shape in enumerate(functional_unit.shapes)
             ]
 

@@ -169,8 +169,12 @@ class CompactIntensityUnit(wiring.Component):
         issued, multiplied, added, rounding = notes
         valid = Signal()
         last_channel = self.parameters.channels - 1
-        factors = [Signal(FixedShape(of), name=name) for of, name in ((_TERM, "term"), (_COLOR, "color"))]
-        product = Signal(FixedShape(_TERM * _COLOR))
+        # Without reset a multiplier's own registers can take their place.
+        factors = [
+            Signal(FixedShape(of), name=name, reset_less=True)
+            for of, name in ((_TERM, "term"), (_COLOR, "color"))
+        ]
+        product = Signal(FixedShape(_TERM * _COLOR), reset_less=True)
         total = Signal(FixedShape(UQ(11 + self._terms.bit_length(), 23)))
         start = FixedValue(_COLOR, _of_channel(self.constants.ambient, multiplied.channel))
         before = Mux(multiplied.first, Value.cast(start.extend(total.format)), Value.cast(total))

@@ -127,11 +127,11 @@ class LobeUnit(PipelinedUnit):
 
     Table, formats and error bounds are those of `Lobe`, the bit-accurate model.
 
-    With an initiation interval of 1 the latency is 7 cycles: one minus, saturation, leading one, shift, word,
-    product, sum. A longer interval takes 5 more: the input has a register, and the multiplier has registers
-    all around (`registered_product`). At every interval there is one multiplier of 18 by 18 bits. A beat that
-    is dark, or whose N·H is not positive, works as if its argument were 0: from one to the next nothing
-    toggles but the input and the first registers.
+    With an initiation interval of 1 the latency is 8 cycles: one minus, saturation, leading one, shift, word,
+    register, product, sum. A longer interval takes 4 more: the input has a register, and the multiplier has
+    registers all around (`registered_product`). At every interval there is one multiplier of 18 by 18 bits. A
+    beat that is dark, or whose N·H is not positive, works as if its argument were 0: from one to the next
+    nothing toggles but the input and the first registers.
 
     Parameters
     ----------
@@ -259,6 +259,9 @@ class LobeUnit(PipelinedUnit):
     def _interpolate(self, word: Word, lit: Word) -> Word:
         """Term of a word and its fraction: ``v + D f``."""
         p, g = self.parameters, self._graph
+        if g.interval == 1:
+            # A memory takes most of a clock's period, and so does a multiplier.
+            word = g.register("word_register", lambda code: code, word)
         formats = {"value": p.VALUE_FORMAT, "difference": p.DIFFERENCE_FORMAT, "fraction": p.fraction_format}
         parts, first = [], 0
         for name, format in formats.items():

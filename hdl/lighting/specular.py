@@ -81,17 +81,18 @@ class SlopeUnit(wiring.Component):
         else:
             exponent = FixedValue(UQ(p.EXPONENT_BITS, 0), self.exponent)
             a, b = (FixedValue.constant(term.format, term.values.item()) for term in p.slope_terms)
-            code = Signal(p.SLOPE_FORMAT.width, name="slope_word")
+            code = Signal(p.SLOPE_FORMAT.width, name="slope_word", reset_less=True)
             m.d.sync += code.eq(((a * exponent).truncate(18) + b).wrap(p.SLOPE_FORMAT).as_value())
-        scale = Signal(FixedShape(p.SCALE_FORMAT), name="scale")
-        shift = Signal(_SHIFT_BITS, name="shift")
+        # Without reset a multiplier's own register can take the place of the scale.
+        scale = Signal(FixedShape(p.SCALE_FORMAT), name="scale", reset_less=True)
+        shift = Signal(_SHIFT_BITS, name="shift", reset_less=True)
         for s in range(-1, 10):
             with m.If(code[s + 17] if s >= 0 else 1):
                 m.d.sync += [Value.cast(scale).eq((code << (9 - s))[10:27]), shift.eq(s + 1)]
         boundary = Const(p.SHIFTED_FORMAT.max_code, p.SHIFTED_FORMAT.width)
         if not p.as_published:
             word = self._look_up(m, "boundaries", p.boundaries.codes, p.SHIFTED_FORMAT)
-            boundary = Signal(p.SHIFTED_FORMAT.width)
+            boundary = Signal(p.SHIFTED_FORMAT.width, reset_less=True)
             m.d.sync += boundary.eq(word)
         m.d.comb += [
             self.slope.scale.eq(scale),

@@ -115,6 +115,8 @@ class ChordSpansUnit(wiring.Component):
     -------
     i : :py:`In(stream.Signature(StructLayout({"values": span_values_shape(...), "length": length_bits})))`
         Spans of one pixel, of which the first value counts, or of three and more.
+    long : :py:`In(1)`
+        Whether the span that is offered has more than one pixel: its source knows without the length.
     o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
         Operands of the pixels.
     out_of_range : :py:`Out(1)`
@@ -162,6 +164,7 @@ class ChordSpansUnit(wiring.Component):
                         )
                     )
                 ),
+                "long": In(1),
                 "o": Out(stream.Signature(output)),
                 "out_of_range": Out(1),
             }
@@ -191,7 +194,7 @@ class ChordSpansUnit(wiring.Component):
         given, taken = Signal(start_shape, name="given"), Signal(start_shape, name="taken")
         m.d.comb += [
             given.length.eq(span.length),
-            given.long.eq(span.length > 1),
+            given.long.eq(self.long),
             *(
                 given.start[i][name].eq(values[name][0])
                 for i, values in enumerate(span["values"])
@@ -220,7 +223,7 @@ class ChordSpansUnit(wiring.Component):
         m.submodules.value_gate = gate = self._gate
         lights = len(gate.o.payload)
         m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=lights, depth=starts.depth)
-        long = self.i.payload.length > 1
+        long = self.long
         for given, light in zip(gate.i.payload, self.i.payload["values"], strict=True):
             first, *others = (light.highlight[k].as_value() for k in range(3))
             m.d.comb += given[0].as_value().eq(first)
@@ -419,6 +422,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
             complete.eq(is_pixel | (is_middle & limited.valid)),
             spans.i.valid.eq(values.o.valid & tags.r_rdy & complete),
             spans.i.payload.length.eq(word.length),
+            spans.long.eq(is_middle),
             values.o.ready.eq(tags.r_rdy & Mux(is_pixel | is_middle, complete & spans.i.ready, 1)),
             tags.r_en.eq(values.o.valid & values.o.ready),
             limited.ready.eq(values.o.valid & tags.r_rdy & is_middle & spans.i.ready),

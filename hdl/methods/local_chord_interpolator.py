@@ -74,6 +74,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
             pair.eq(span.length == 2),
             spans.i.valid.eq(self.i.valid | second),
             spans.i.payload.eq(span),
+            spans.long.eq((span.length > 2) & ~second),
             self.i.ready.eq(spans.i.ready & ~second),
             self.out_of_range.eq(spans.out_of_range),
         ]

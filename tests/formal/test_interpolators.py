@@ -289,10 +289,21 @@ def in_step(harness: Harness) -> None:
         harness.claim(taken(last.o) == taken(unit.o))
 
 
+def tells_length(harness: Harness) -> None:
+    """Assume of what spans of values come with that it is as `chord_interpolator` claims."""
+    unit = harness.unit
+    if isinstance(unit, ChordSpansUnit):
+        harness.assume(unit.long == (unit.i.payload.length > 1))
+    if isinstance(unit, ChordInterpolatorUnit):
+        spans = unit._spans
+        harness.claim(~spans.i.valid | (spans.long == (spans.i.payload.length > 1)))
+
+
 def of_stretch(name: str, place: int) -> Harness:
     """One of the stretches of a unit, and that units side by side are in step."""
     make, stretches = UNITS[name]
     h = Harness(unit := make())
+    tells_length(h)
     in_step(h)
     list(stretches(unit))[place].follow(h)
     return h
@@ -303,6 +314,7 @@ def of_cycles(name: str, *, exact: bool = False) -> Harness:
     make, stretches = UNITS[name]
     h = Harness(unit := make())
     h.assume(unit.i.payload.length != 0)
+    tells_length(h)
     in_step(h)
     stays(h, unit.o)
     found = list(stretches(unit))

@@ -61,7 +61,7 @@ class OfUnit:
         """A value so many enabled cycles ago; it means something from that age on."""
         value = Value.cast(value)
         for _ in range(cycles):
-            past = Signal(value.shape(), name="past")
+            past = Signal(value.shape(), name="past", reset_less=True)
             with self.m.If(self.moves):
                 self.m.d.sync += past.eq(value)
             value = past
@@ -124,7 +124,7 @@ def of_term(parameters):
     are in range; of the product, which is cut, that f is from 0 to under 1.
     """
     h = OfUnit(parameters)
-    word, kept = h.unit.table.word, h.words["value_6"]
+    word, kept = h.before(h.unit.table.word), h.words["value_7"]
     h.harness.claim(kept == h.before(word[:17]))
     step = h.before(word[17:]).as_signed()
     h.harness.assume((kept + step >= 0) & (kept + step < 1 << 17))
@@ -135,7 +135,7 @@ def of_term(parameters):
     h.harness.claim((way >= Mux(step > 0, 0, step)) & (way <= Mux(step > 0, step, 0)))
     exact = kept + way
     h.harness.claim((exact >= 0) & (exact < 1 << 17))
-    h.harness.claim(h.words["term"] == h.before(Mux(h.words["lit_6"], exact[:17], 0)))
+    h.harness.claim(h.words["term"] == h.before(Mux(h.words["lit_7"], exact[:17], 0)))
     return h.harness
 
 

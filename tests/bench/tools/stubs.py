@@ -22,6 +22,32 @@ class Product(wiring.Component):
         return m
 
 
+class Stages(wiring.Component):
+    """A product of 18x18 bits with rows of registers for its operands, and rows for the product."""
+
+    a: In(signed(18))
+    b: In(signed(18))
+    o: Out(36)
+
+    def __init__(self, before, behind):
+        super().__init__()
+        self._before, self._behind = before, behind
+
+    def elaborate(self, platform):
+        m = Module()
+
+        def registered(value, count):
+            for _ in range(count):
+                register = Signal(signed(len(value)), reset_less=True)
+                m.d.sync += register.eq(value)
+                value = register
+            return value
+
+        a, b = (registered(value, self._before) for value in (self.a, self.b))
+        m.d.comb += self.o.eq(registered(a * b, self._behind))
+        return m
+
+
 class MultiplyAdd(wiring.Component):
     """A product and a sum between two registers."""
 

@@ -13,7 +13,7 @@ import pytest
 
 from blysk.bench.tools import fpga, place_and_route
 from blysk.bench.tools.families import ECP5, ECP5_85F, FAMILIES, NEXUS, Parts, Place
-from blysk.bench.tools.fpga import table
+from blysk.bench.tools.fpga import table, untimed
 from blysk.bench.tools.place_and_route import (
     Layout,
     TooLarge,
@@ -62,6 +62,23 @@ def test_table():
     figures = layouts[0].as_dict()
     assert [figures[f"fmax_{name}_mhz"] for name in ("min", "median", "max")] == [120.04, 125.0, 130.0]
     assert figures["seeds"][1]["end"] == "b.2"
+
+
+def test_designs_with_an_untimed_interior_are_named():
+    places = [Place(1, 250.0, "a", "b", 1.0, 1.0, {}, closed) for closed in (0, 3)]
+    layouts = [Layout(f"closed {place.closed}", Parts(1, 2, 4, 0, 0), (place,)) for place in places]
+    (line,) = untimed(layouts, ECP5)
+    assert line.startswith("closed 3: 3 of 4 multipliers have registers inside on both sides")
+    assert line.endswith("no clock rate above 250 MHz is quoted")
+    assert [layout.as_dict()["closed_multipliers"] for layout in layouts] == [0, 3]
+
+
+@pytest.mark.parametrize("options", [[], ["--keep-registers"]])
+def test_registers_stay_outside_where_asked_for(options, calls, cache, monkeypatch):
+    given = []
+    monkeypatch.setattr(fpga, "lay_out", lambda *a: given.append(a[-1]) or lay_out(*a))
+    assert main(["fpga", "--unit", "diffuse", "--seeds", "1", *options]) == 0
+    assert given == [not options]
 
 
 @pytest.mark.parametrize(("options", "family"), [([], ECP5), (["--family", "nexus"], NEXUS)])

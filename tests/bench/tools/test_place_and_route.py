@@ -23,7 +23,7 @@ from blysk.bench.tools.place_and_route import (
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 
-from .stubs import NEXUS_REPORT, REPORT, Counter, MultiplyAdd, Product, netlist
+from .stubs import NEXUS_REPORT, REPORT, Counter, MultiplyAdd, Product, Stages, netlist
 
 tools = pytest.mark.skipif(
     any(None in place_and_route.tool_versions(family).values() for family in FAMILIES.values()),
@@ -54,6 +54,14 @@ def test_stages_of_a_multiplier_are_one_cell():
         routing=2.0,
         kinds={"multiplier": 1, "carry": 1, "LUT": 1},
     )
+
+
+@pytest.mark.parametrize(
+    ("achieved", "closed", "quoted"), [(400.0, 0, 400.0), (400.0, 1, 250.0), (240.0, 2, 240.0)]
+)
+def test_limit_where_an_interior_is_not_timed(achieved, closed, quoted):
+    place = read_report({**REPORT, "fmax": {"clk": {"achieved": achieved}}}, 1, ECP5, closed)
+    assert (place.fmax, place.closed) == (quoted, closed)
 
 
 @pytest.mark.parametrize(
@@ -324,6 +332,28 @@ def test_parts_and_times_of_a_product(cache):
         assert period(place)
         # One 18x18 multiplier's ceiling, out of a placement of nothing else.
         assert 120 < place.fmax < 180
+
+
+@pytest.mark.long
+@tools
+def test_times_of_a_multiplier_with_absorbed_registers(cache):
+    """Registers on one side: the multiplier is timed in full. On both sides: its interior is not."""
+    for before, behind, lowest, highest in (
+        (0, 0, 120, 160),
+        (1, 0, 170, 220),
+        (0, 1, 165, 210),
+        (2, 2, 250, 250),
+    ):
+        layout, kept = (
+            lay_out("product", Stages(before, behind), 1, absorb=absorb) for absorb in (True, False)
+        )
+        (place,) = layout.places
+        assert place.closed == bool(before and behind)
+        assert lowest <= place.fmax <= highest
+        assert kept.parts.flip_flops == 36 * before + 36 * behind
+        absorbed = 36 * min(before, 1) + 36 * min(behind, 1)
+        assert layout.parts.flip_flops == kept.parts.flip_flops - absorbed
+        assert kept.places[0].closed == 0
 
 
 @pytest.mark.long

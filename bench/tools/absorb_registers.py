@@ -1,0 +1,281 @@
+"""Registers beside multipliers moved into them: a step on an ECP5 netlist between Yosys and nextpnr.
+
+An ECP5 multiplier, MULT18X18D, has registers of its own for either operand and for the product. Yosys uses
+none of them. `absorb_registers` takes Yosys's JSON netlist and moves flip-flops that stand directly before or
+behind a multiplier into it; nothing else of the netlist changes, and what it does stays the same on every
+cycle from power-up on.
+"""
+
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+__all__ = ["Absorbed", "absorb_registers"]
+
+_MULTIPLIER, _FLIP_FLOP = "MULT18X18D", "TRELLIS_FF"
+
+_OPERAND_BITS, _PRODUCT_BITS = 18, 36
+
+_OUTPUT = "OUTPUT"
+
+_INVERTER = f"{0x5555:016b}"
+"""Look-up table of the negated first input."""
+
+Pin = tuple[str, str, int]
+"""Of a cell: its name, that of the port, the bit."""
+
+
+@dataclass(frozen=True)
+class Absorbed:
+    """What `absorb_registers` moved.
+
+    Parameters
+    ----------
+    operands, products : int
+        Operands and products that have registers inside a multiplier.
+    removed : int
+        Flip-flops that are gone; one with another reader stays.
+    inverters : int
+        Look-up tables added, one for each enable that flip-flops used inverted, which multipliers cannot.
+    closed : int
+        Multipliers with registers for both operands and the product.
+    """
+
+    operands: int = 0
+    products: int = 0
+    removed: int = 0
+    inverters: int = 0
+    closed: int = 0
+
+    def as_dict(self) -> dict[str, int]:
+        """The figures under stable names."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class _Control:
+    """Clock and enable of a register; a constant enable is a string."""
+
+    clock: int
+    enable: int | str
+    inverted: bool
+
+
+class _Netlist:
+    """The cells of a flat module, by net."""
+
+    def __init__(self, module: Mapping[str, Any]):
+        self.cells = {
+            name: {**cell, **{key: dict(cell.get(key, {})) for key in ("parameters", "connections")}}
+            for name, cell in module["cells"].items()
+        }
+        self.ports = {bit for port in module["ports"].values() for bit in port["bits"]}
+        self.pins: defaultdict[Any, set[Pin]] = defaultdict(set)
+        self.by_output: dict[int, str] = {}
+        for name, cell in self.cells.items():
+            for port, bits in cell["connections"].items():
+                for k, bit in enumerate(bits):
+                    self.pins[bit].add((name, port, k))
+            if cell["type"] == _FLIP_FLOP:
+                self.by_output[cell["connections"]["Q"][0]] = name
+        bits = [bit for cell in self.cells.values() for nets in cell["connections"].values() for bit in nets]
+        self.fresh = max((bit for bit in (*bits, *self.ports) if isinstance(bit, int)), default=1) + 1
+        self.inverted: dict[int, int] = {}
+        self.removed = 0
+
+    def net(self, cell: str, port: str) -> Any:
+        """Net or constant at a port of one bit."""
+        (bit,) = self.cells[cell]["connections"].get(port, ["x"])
+        return bit
+
+    def connect(self, cell: str, port: str, bit: Any) -> None:
+        """Connect a port of one bit, which may have been connected."""
+        for old in self.cells[cell]["connections"].get(port, ()):
+            self.pins[old].discard((cell, port, 0))
+        self.cells[cell]["connections"][port] = [bit]
+        self.pins[bit].add((cell, port, 0))
+
+    def remove(self, cell: str) -> None:
+        """Remove a flip-flop."""
+        self.removed += 1
+        del self.by_output[self.net(cell, "Q")]
+        for port, (bit, *_) in self.cells.pop(cell)["connections"].items():
+            self.pins[bit].discard((cell, port, 0))
+
+    def control(self, cell: str) -> _Control | None:
+        """Control of a flip-flop that a multiplier's register can stand for; ``None`` if none can.
+
+        A multiplier's registers are 0 at power-up and are clocked by the rising edge. Whether reset or enable
+        comes first is not known, so that one with a reset stays. One at a port stands for another unit.
+        """
+        parameters = self.cells[cell]["parameters"]
+        mode = {key: str(value).strip() for key, value in parameters.items()}
+        clock, enable = self.net(cell, "CLK"), self.net(cell, "CE")
+        if (
+            not isinstance(clock, int)
+            or mode.get("CLKMUX", "CLK") != "CLK"
+            or mode.get("REGSET", "RESET") != "RESET"
+            or mode.get("LSRMODE", "LSR") != "LSR"
+            or mode.get("LSRMUX", "LSR") != "LSR"
+            or self.net(cell, "LSR") not in ("0", "x")
+            or self.ports & {self.net(cell, "DI"), self.net(cell, "Q")}
+        ):
+            return None
+        if mode.get("CEMUX", "1") == "1":
+            return _Control(clock, "1", False)
+        if mode["CEMUX"] not in ("CE", "INV") or not isinstance(enable, int):
+            return None
+        return _Control(clock, enable, mode["CEMUX"] == "INV")
+
+    def enable_of(self, control: _Control) -> Any:
+        """Net that is high while a register of this control is enabled; made by an inverter where needed."""
+        if not control.inverted:
+            return control.enable
+        if control.enable not in self.inverted:
+            self.inverted[control.enable] = self.fresh
+            name = f"enable_{control.enable}_LUT4_Z"
+            inputs = dict(zip("ABCD", (control.enable, "0", "0", "0"), strict=True))
+            self.cells[name] = {
+                "hide_name": 0,
+                "type": "LUT4",
+                "parameters": {"INIT": _INVERTER},
+                "attributes": {},
+                "port_directions": {**dict.fromkeys(inputs, "input"), "Z": "output"},
+                "connections": {},
+            }
+            for port, bit in (*inputs.items(), ("Z", self.fresh)):
+                self.connect(name, port, bit)
+            self.fresh += 1
+        return self.inverted[control.enable]
+
+    def use(self, cell: str, register: str, control: _Control) -> None:
+        """Switch a register of a multiplier on: the first clock, and an enable that it has, or the next."""
+        multiplier, enable = self.cells[cell], self.enable_of(control)
+        names = [f"CE{k}" for k in range(4)]
+        free = [name for name in names if multiplier["connections"].get(name, [enable]) == [enable]]
+        ports = {"CLK0": control.clock, "RST0": "0", free[0]: enable}
+        multiplier["port_directions"] = {
+            **multiplier.get("port_directions", {}),
+            **dict.fromkeys(ports, "input"),
+        }
+        for port, bit in ports.items():
+            self.connect(cell, port, bit)
+        multiplier["parameters"] |= {
+            "RESETMODE": "SYNC",
+            "GSR": "DISABLED",
+            f"REG_{register}_CLK": "CLK0",
+            f"REG_{register}_CE": free[0],
+            f"REG_{register}_RST": "RST0",
+        }
+
+    def fits(self, cell: str, controls: set[_Control | None]) -> _Control | None:
+        """The one control of a register's bits, of the clock that the multiplier has; else ``None``."""
+        if len(controls) != 1:
+            return None
+        (control,) = controls
+        clock = self.cells[cell]["connections"].get("CLK0")
+        return control if control is not None and clock in (None, ["0"], ["x"], [control.clock]) else None
+
+    def absorb_product(self, cell: str) -> bool:
+        """Move the flip-flops behind a multiplier into it, where nothing else reads the product."""
+        moved: dict[str, str] = {}
+        for k in range(_PRODUCT_BITS):
+            bit = self.net(cell, f"P{k}")
+            readers = self.pins[bit] - {(cell, f"P{k}", 0)} if isinstance(bit, int) else set()
+            if bit in self.ports or len(readers) > 1:
+                return False
+            for name, port, _ in readers:
+                if self.cells[name]["type"] != _FLIP_FLOP or port != "DI":
+                    return False
+                moved[f"P{k}"] = name
+        control = self.fits(cell, {self.control(name) for name in moved.values()})
+        if control is None:
+            return False
+        for port, name in moved.items():
+            bit = self.net(name, "Q")
+            self.remove(name)
+            self.connect(cell, port, bit)
+        self.use(cell, _OUTPUT, control)
+        return True
+
+    def beside_operand(self, cell: str, operand: str) -> tuple[_Control, dict[str, str]] | None:
+        """Control of the flip-flops before an operand, and these by port; ``None`` if they cannot move."""
+        found: dict[str, str] = {}
+        for k in range(_OPERAND_BITS):
+            bit = self.net(cell, f"{operand}{k}")
+            # A register of a constant 1 would not have it on the first cycle.
+            if bit in ("0", "x"):
+                continue
+            if bit not in self.by_output:
+                return None
+            found[f"{operand}{k}"] = self.by_output[bit]
+        control = self.fits(cell, {self.control(name) for name in found.values()})
+        return None if control is None else (control, found)
+
+    def absorb_operands(self, cell: str, closes: bool) -> int:
+        """Move the flip-flops before both operands in, or of one behind other flip-flops; how many operands.
+
+        nextpnr times a multiplier with a register for one operand alone as if it had none there. What is
+        before that register is then on a path through the multiplier: with a register of the product, and
+        nothing but flip-flops before, such a path is still short.
+        """
+        beside = {operand: self.beside_operand(cell, operand) for operand in "AB"}
+        if None in beside.values():
+            beside = {
+                operand: given
+                for operand, given in beside.items()
+                if closes
+                and given
+                and all(self.net(name, "DI") in self.by_output for name in given[1].values())
+            }
+        if len({control.clock for control, _ in beside.values()}) > 1:
+            return 0
+        for operand, (control, found) in beside.items():
+            for port, name in found.items():
+                self.connect(cell, port, self.net(name, "DI"))
+            self.use(cell, f"INPUT{operand}", control)
+        # One may be before both.
+        for name in {name for _, found in beside.values() for name in found.values()}:
+            if self.pins[self.net(name, "Q")] == {(name, "Q", 0)}:
+                self.remove(name)
+        return len(beside)
+
+
+def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict[str, Any], Absorbed]:
+    """Move flip-flops that stand directly beside a multiplier into its registers.
+
+    All bits of an operand, or of a product, must be flip-flops of one clock and one enable that have no
+    reset, are 0 at power-up, and are not at a port of the module. Bits of an operand may also be constant 0.
+    A product must have no reader but its flip-flops, one each. A flip-flop of an operand that has another
+    reader stays for that one. Of one operand alone they move only if flip-flops are before them and the
+    product has a register, too. An enable that flip-flops use inverted gets one look-up table, for all
+    multipliers.
+
+    Parameters
+    ----------
+    netlist : dict
+        Yosys's JSON of a flat module, mapped to ECP5; it is not changed. Multipliers have no registers yet.
+    top : str
+        The module.
+
+    Returns
+    -------
+    netlist : dict
+        With ``REG_INPUTA``, ``REG_INPUTB`` and ``REG_OUTPUT`` of its multipliers in use: clock ``CLK0``,
+        enables ``CE0`` to ``CE2``, reset ``RST0`` constant 0.
+    absorbed : Absorbed
+        What was moved.
+    """
+    module = netlist["modules"][top]
+    work = _Netlist(module)
+    operands = products = closed = 0
+    for name in sorted(name for name, cell in work.cells.items() if cell["type"] == _MULTIPLIER):
+        product = work.absorb_product(name)
+        inputs = work.absorb_operands(name, product)
+        products += product
+        operands += inputs
+        closed += product and inputs == 2
+    modules = {**netlist["modules"], top: {**module, "cells": work.cells}}
+    found = Absorbed(operands, products, work.removed, len(work.inverted), closed)
+    return {**netlist, "modules": modules}, found

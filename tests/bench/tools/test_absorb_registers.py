@@ -1,0 +1,282 @@
+"""Registers moved into multipliers: what moves, what stays, and that the netlist does the same."""
+
+import copy
+import json
+
+import pytest
+from amaranth.hdl import Cat, Module, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.bench.tools.absorb_registers import Absorbed, absorb_registers
+from blysk.bench.tools.place_and_route import tool_versions
+
+from ...simulators.mapped import map_component, same
+
+pytestmark = pytest.mark.skipif(tool_versions()["pyosys"] is None, reason="pyosys is not installed")
+
+
+class Beside(wiring.Component):
+    """Products of two operands, with registers as a function describes; and what that function gives out."""
+
+    a: In(signed(18))
+    b: In(signed(18))
+    enable: In(2)
+    o: Out(36)
+    other: Out(36)
+
+    def __init__(self, describe):
+        super().__init__()
+        self._describe = describe
+
+    def elaborate(self, platform):
+        m = Module()
+        given = [self.register(m, value, name) for value, name in ((self.a, "a_0"), (self.b, "b_0"))]
+        given.append(self.register(m, self.enable, "enables"))
+        product, *other = self._describe(lambda *args, **options: self.register(m, *args, **options), *given)
+        m.d.comb += self.o.eq(self.register(m, product, "last"))
+        m.d.comb += [self.other.eq(self.register(m, value, "other_last")) for value in other]
+        return m
+
+    @staticmethod
+    def register(m, value, name, when=None, reset_less=True, init=0):
+        register = Signal(signed(len(value)), name=name, reset_less=reset_less, init=init)
+        if when is None:
+            m.d.sync += register.eq(value)
+        else:
+            with m.If(when):
+                m.d.sync += register.eq(value)
+        return register
+
+
+def product(a_options=None, b_options=None, options=None, also=lambda a, b, p, register: ()):
+    """A product between registers with options."""
+
+    def describe(register, a, b, enable):
+        def chosen(given):
+            given = dict(given or {})
+            if "when" in given:
+                given["when"] = given["when"](enable)
+            return given
+
+        a, b = register(a, "a_1", **chosen(a_options)), register(b, "b_1", **chosen(b_options))
+        p = register(a * b, "p_0", **chosen(options))
+        return p, *also(a, b, p, register)
+
+    return describe
+
+
+def square(register, a, b, enable):
+    a = register(a, "a_1")
+    return (register(a * a, "p_0"),)
+
+
+def shared(register, a, b, enable):
+    """One register for two multipliers."""
+    a, b, c = register(a, "a_1"), register(b, "b_1"), register(~b, "c_1")
+    return register(a * b, "p_0"), register(a * c, "p_1")
+
+
+def half_enabled(register, a, b, enable):
+    """An operand of two halves, one of them enabled."""
+    low, high = register(a[:9], "low"), register(a[9:], "high", when=enable[0])
+    return (register(Cat(low, high).as_signed() * register(b, "b_1"), "p_0"),)
+
+
+def narrow(register, a, b, enable):
+    """Operands without sign, of fewer bits: 0 above."""
+    a, b = register(a[:9], "a_1").as_unsigned(), register(b[:12], "b_1").as_unsigned()
+    return (register(a * b, "p_0"),)
+
+
+def behind_logic(register, a, b, enable):
+    """One operand that may move, behind gates: as if it had no register, to nextpnr."""
+    return (register(register(a ^ b, "a_1") * register(b, "b_1", reset_less=False), "p_0"),)
+
+
+def chained(register, a, b, enable):
+    """One register between two multipliers: it goes into one of them."""
+    between = register((a * b)[18:].as_signed(), "between")
+    return (register(between * register(b, "b_1"), "p_0"),)
+
+
+FIRST, INVERTED = {"when": lambda enable: enable[0]}, {"when": lambda enable: ~enable[0]}
+SECOND = {"when": lambda enable: enable[1]}
+WITH_RESET = {"reset_less": False}
+
+CASES = {
+    "no enable": (product(), Absorbed(2, 1, 72, 0, 1)),
+    "an enable": (product(FIRST, FIRST, FIRST), Absorbed(2, 1, 72, 0, 1)),
+    "an inverted enable": (product(INVERTED, INVERTED, INVERTED), Absorbed(2, 1, 72, 1, 1)),
+    "three enables": (product(FIRST, SECOND, INVERTED), Absorbed(2, 1, 72, 1, 1)),
+    "enabled product": (product(options=SECOND), Absorbed(2, 1, 72, 0, 1)),
+    "a reset": (product(WITH_RESET), Absorbed(1, 1, 54, 0, 0)),
+    "a reset of the product": (product(options=WITH_RESET), Absorbed(2, 0, 36, 0, 0)),
+    "a value at power-up": (product({"init": 5}), Absorbed(1, 1, 54, 0, 0)),
+    "another reader of an operand": (product(also=lambda a, b, p, r: (a,)), Absorbed(2, 1, 54, 0, 1)),
+    "another reader of the product": (
+        product(also=lambda a, b, p, r: (r((a * b) ^ 1, "q"),)),
+        Absorbed(2, 0, 36, 0, 0),
+    ),
+    "a square": (square, Absorbed(2, 1, 54, 0, 1)),
+    "a shared operand": (shared, Absorbed(4, 2, 18 * 3 + 72, 0, 2)),
+    "halves of different enables": (half_enabled, Absorbed(1, 1, 54, 0, 0)),
+    "narrow operands": (narrow, Absorbed(2, 1, 9 + 12 + 21, 0, 1)),
+    "one operand, behind logic": (behind_logic, Absorbed(0, 1, 36, 0, 0)),
+    "no register at hand": (lambda register, a, b, enable: (a * b,), Absorbed()),
+}
+
+
+@pytest.fixture(scope="module")
+def mapped(tmp_path_factory):
+    """Netlist of a case, made once."""
+    made = {}
+
+    def mapped(name, describe):
+        if name not in made:
+            made[name] = map_component(Beside(describe), tmp_path_factory.mktemp("mapped"))
+        return copy.deepcopy(made[name])
+
+    return mapped
+
+
+def multipliers(netlist):
+    return [cell for cell in netlist["modules"]["top"]["cells"].values() if cell["type"] == "MULT18X18D"]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_moves_and_that_nothing_else_changes(name, mapped, tmp_path):
+    describe, expected = CASES[name]
+    before = mapped(name, describe)
+    text = json.dumps(before)
+    after, found = absorb_registers(before)
+    assert json.dumps(before) == text
+    assert found == expected
+    cells = [netlist["modules"]["top"]["cells"] for netlist in (before, after)]
+    assert len(cells[0]) - len(cells[1]) == found.removed - found.inverters
+    if found.products:
+        assert same(before, after, tmp_path) == ""
+    else:
+        assert found.operands == 0 or same(before, after, tmp_path) == ""
+
+
+def test_a_register_between_two_multipliers_goes_into_one(mapped, tmp_path):
+    before = mapped("chained", chained)
+    after, found = absorb_registers(before)
+    assert found.operands + found.products == 3
+    assert same(before, after, tmp_path) == ""
+
+
+def test_registers_at_ports_stay(mapped, tmp_path):
+    """They stand for those of other units."""
+
+    class AtPorts(wiring.Component):
+        a: In(signed(18))
+        b: In(signed(18))
+        o: Out(36)
+
+        def elaborate(self, platform):
+            m = Module()
+            a, b = (Beside.register(m, value, name) for value, name in ((self.a, "a_0"), (self.b, "b_0")))
+            m.d.comb += self.o.eq(Beside.register(m, a * b, "p_0"))
+            return m
+
+    before = map_component(AtPorts(), tmp_path)
+    after, found = absorb_registers(before)
+    assert found == Absorbed()
+    assert after == before
+
+
+def test_controls_of_a_multiplier(mapped):
+    """A clock, no reset, and an enable for each register; one without gets a constant."""
+    (cell,) = multipliers(absorb_registers(mapped("three enables", CASES["three enables"][0]))[0])
+    assert cell["parameters"]["RESETMODE"] == "SYNC"
+    assert cell["connections"]["RST0"] == ["0"]
+    enables = {cell["parameters"][f"REG_{name}_CE"] for name in ("INPUTA", "INPUTB", "OUTPUT")}
+    assert enables == {"CE0", "CE1", "CE2"}
+    assert len({cell["connections"][name][0] for name in enables}) == 3
+    (cell,) = multipliers(absorb_registers(mapped("enabled product", CASES["enabled product"][0]))[0])
+    assert {cell["connections"][cell["parameters"][f"REG_INPUT{x}_CE"]][0] for x in "AB"} == {"1"}
+    assert cell["connections"][cell["parameters"]["REG_OUTPUT_CE"]] != ["1"]
+
+
+def swapped_operand_bits(cell):
+    pins = cell["connections"]
+    pins["A3"], pins["A4"] = pins["A4"], pins["A3"]
+
+
+def swapped_product_bits(cell):
+    pins = cell["connections"]
+    pins["P7"], pins["P8"] = pins["P8"], pins["P7"]
+
+
+def always_enabled(cell):
+    cell["connections"][cell["parameters"]["REG_OUTPUT_CE"]] = ["1"]
+
+
+def enable_of_another(cell):
+    cell["parameters"]["REG_INPUTA_CE"] = cell["parameters"]["REG_INPUTB_CE"]
+
+
+def no_register(cell):
+    cell["parameters"]["REG_INPUTB_CLK"] = "NONE"
+
+
+def unsigned_operand(cell):
+    cell["connections"]["SIGNEDA"] = ["0"]
+
+
+def in_reset(cell):
+    cell["connections"]["RST0"] = ["1"]
+
+
+@pytest.mark.parametrize(
+    "inject",
+    [
+        swapped_operand_bits,
+        swapped_product_bits,
+        always_enabled,
+        enable_of_another,
+        no_register,
+        unsigned_operand,
+        in_reset,
+    ],
+)
+def test_injected_faults_are_found(inject, mapped, tmp_path):
+    before = mapped("three enables", CASES["three enables"][0])
+    after, _ = absorb_registers(before)
+    assert same(before, after, tmp_path) == ""
+    after = copy.deepcopy(after)
+    (cell,) = multipliers(after)
+    inject(cell)
+    assert "not shown to be equal" in same(before, after, tmp_path)
+
+
+def test_a_register_of_another_reader_that_is_removed_is_found(mapped, tmp_path):
+    name = "another reader of an operand"
+    before = mapped(name, CASES[name][0])
+    after = copy.deepcopy(absorb_registers(before)[0])
+    cells = after["modules"]["top"]["cells"]
+    kept = next(cell for cell in cells if cell.startswith("a_1_TRELLIS_FF"))
+    del cells[kept]
+    assert same(before, after, tmp_path) == "1 nets without a driver"
+
+
+def test_an_inverter_that_does_not_invert_is_found(mapped, tmp_path):
+    name = "an inverted enable"
+    before = mapped(name, CASES[name][0])
+    after = copy.deepcopy(absorb_registers(before)[0])
+    old, new = (netlist["modules"]["top"]["cells"] for netlist in (before, after))
+    (inverter,) = new.keys() - old.keys()
+    new[inverter]["parameters"]["INIT"] = f"{0xAAAA:016b}"
+    assert "not shown to be equal" in same(before, after, tmp_path)
+
+
+def test_a_power_up_value_that_is_lost_is_found(mapped, tmp_path):
+    """The same netlist but for a register that starts at 1: what is absorbed would start at 0."""
+    before = mapped("no enable", CASES["no enable"][0])
+    after, _ = absorb_registers(before)
+    for name, cell in before["modules"]["top"]["cells"].items():
+        if name.startswith("a_1_TRELLIS_FF"):
+            cell["parameters"]["REGSET"] = "SET"
+    assert "not shown to be equal" in same(before, after, tmp_path)

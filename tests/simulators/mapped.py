@@ -1,0 +1,155 @@
+"""Mapped ECP5 netlists of components, as Verilog that simulators run and Yosys proves things of."""
+
+import json
+import re
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from amaranth.back import rtlil
+from amaranth.hdl import Value
+from amaranth.lib.wiring import Component, Out
+
+from blysk.bench.quality.equivalence import yosys
+from blysk.bench.tools.families import ECP5
+from blysk.bench.tools.place_and_route import _AFTER, _BEFORE
+
+__all__ = ["cells", "core", "map_component", "same", "verilog_of"]
+
+_YOSYS_CELLS = ("LUT2", "LUT4", "PFUMX", "L6MUX21", "TRELLIS_FF", "TRELLIS_DPR16X4", "CCU2C")
+"""Cells that Yosys has models of."""
+
+
+def map_component(component: Component, folder: Path) -> dict[str, Any]:
+    """Yosys's JSON of a component by itself, mapped to ECP5 as `place_and_route` maps one."""
+    (folder / "top.il").write_text(rtlil.convert(component, name="top", emit_src=False))
+    yosys(_BEFORE + ECP5.synthesis + _AFTER, folder)
+    return json.loads((folder / "netlist.json").read_text())
+
+
+def verilog_of(netlist: dict[str, Any], folder: Path) -> str:
+    """Verilog of a netlist, cells as instances."""
+    modules = {"top": netlist["modules"]["top"]}
+    (folder / "mapped.json").write_text(json.dumps({**netlist, "modules": modules}))
+    yosys("read_json mapped.json\nwrite_verilog -noattr mapped.v\n", folder)
+    return (folder / "mapped.v").read_text()
+
+
+def cells_of(*names: str) -> str:
+    """Yosys's models of cells, without their delays."""
+    lattice = Path(find_spec("pyosys").origin).parent / "share" / "lattice"
+    library = "\n".join((lattice / file).read_text() for file in ("common_sim.vh", "ccu2c_sim.vh"))
+    text = ""
+    for name in names:
+        (model,) = re.findall(rf"^module {name} ?\(.*?^endmodule$", library, re.DOTALL | re.MULTILINE)
+        text += re.sub(r"^\s*specify$.*?^\s*endspecify$", "", model, flags=re.DOTALL | re.MULTILINE) + "\n"
+    return text
+
+
+def _ours() -> str:
+    text = (Path(__file__).parent / "ecp5_cells.v").read_text()
+    names = [f"INITVAL_{k:02X}" for k in range(64)]
+    values = "\n".join(f"  parameter [319:0] {name} = 320'b0;" for name in names)
+    return text.replace("@INITVALS@", values).replace("@INITIAL@", ", ".join(reversed(names)))
+
+
+def cells() -> str:
+    """Models of the cells: Yosys's, and ours where Yosys has black boxes."""
+    return cells_of(*_YOSYS_CELLS) + _ours()
+
+
+def core(component: Component, text: str) -> str:
+    """Verilog of a module ``core``, for the bench, about the module ``top`` of a component."""
+    ports = [("clk", 1, "input"), ("rst", 1, "input")]
+    inner = ["clk", "rst"]
+    for path, member, value in component.signature.flatten(component):
+        name = "_".join(str(part) for part in path if part != "payload")
+        ports.append((name, len(Value.cast(value)), "output" if member.flow is Out else "input"))
+        inner.append("__".join(map(str, path)))
+    listed = ", ".join(name for name, *_ in ports)
+    declared = "".join(
+        f"  {direction} {f'[{width - 1}:0] ' if width > 1 else ''}{name};\n"
+        for name, width, direction in ports
+        if width
+    )
+    joined = ", ".join(f".{port}({name})" for port, (name, *_) in zip(inner, ports, strict=True))
+    return f"module core ({listed});\n{declared}  top whole ({joined});\nendmodule\n{text}{cells()}"
+
+
+# Black boxes stand for what the step leaves alone.
+_PROOF = """\
+read_json both.json
+read_verilog models.v
+read_verilog -lib -nowb -ignore_redef +/lattice/cells_sim_ecp5.v
+setattr -unset keep */c:*
+hierarchy -top top
+proc
+flatten
+setattr -unset keep w:* c:*
+opt_expr
+opt_dff
+opt_clean
+simplemap t:$*dff*
+opt -full -share_all
+write_json proof.json
+"""
+
+
+def same(before: dict[str, Any], after: dict[str, Any], folder: Path) -> str:
+    """Whether two netlists do the same on every cycle; the reason why not, or nothing.
+
+    Those cells of the netlist ``after`` that are new or changed, multipliers and look-up tables, are put
+    beside the netlist ``before`` and read its nets. Yosys then merges equal cells of equal inputs and equal
+    state at power-up. If each product of ``after`` is merged with the net of ``before`` that it drives in
+    ``after``, then the nets of ``before`` satisfy every equation of ``after``, and there is one solution.
+    """
+    old, new = before["modules"]["top"], after["modules"]["top"]
+    if new["ports"] != old["ports"]:
+        return "other ports"
+    reads, drives = set(), []
+    for port in new["ports"].values():
+        (reads.update if port["direction"] == "output" else drives.extend)(port["bits"])
+    for cell in new["cells"].values():
+        for port, bits in cell["connections"].items():
+            (reads.update if cell["port_directions"][port] == "input" else drives.extend)(bits)
+    if len(drives) != len(set(drives)):
+        return "a net with two drivers"
+    if lacking := reads - set(drives) - {"0", "1", "x"}:
+        return f"{len(lacking)} nets without a driver"
+    fresh = 1 + max(bit for bit in (*reads, *drives, *_nets(old)) if isinstance(bit, int))
+    cells, left, right = dict(old["cells"]), [], []
+    for name, cell in new["cells"].items():
+        if cell == old["cells"].get(name):
+            continue
+        if cell["type"] == "LUT4":
+            if name in old["cells"]:
+                return f"{name} is changed"
+            cells[name] = cell
+            continue
+        if cell["type"] != "MULT18X18D":
+            return f"{name} is changed"
+        connections = dict(cell["connections"])
+        for port, (bit,) in cell["connections"].items():
+            if cell["port_directions"][port] == "output":
+                connections[port] = [fresh]
+                if bit in reads:
+                    left.append(bit)
+                    right.append(fresh)
+                fresh += 1
+        cells[f"{name}$after"] = {**cell, "connections": connections}
+    outputs = {
+        name: {"direction": "output", "bits": bits} for name, bits in (("left", left), ("right", right))
+    }
+    module = {**old, "cells": cells, "ports": {**old["ports"], **outputs}}
+    (folder / "both.json").write_text(json.dumps({"creator": "", "modules": {"top": module}}))
+    models = cells_of("LUT4", "TRELLIS_FF") + _ours().split("// A memory of 1024")[0]
+    (folder / "models.v").write_text(models)
+    yosys(_PROOF, folder)
+    ports = json.loads((folder / "proof.json").read_text())["modules"]["top"]["ports"]
+    left, right = (ports[name]["bits"] for name in ("left", "right"))
+    differ = sum(a != b for a, b in zip(left, right, strict=True))
+    return f"{differ} of {len(left)} nets are not shown to be equal" if differ or not left else ""
+
+
+def _nets(module: dict[str, Any]) -> set[Any]:
+    return {bit for cell in module["cells"].values() for bits in cell["connections"].values() for bit in bits}

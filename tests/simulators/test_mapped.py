@@ -1,0 +1,149 @@
+"""Mapped ECP5 netlists with registers inside multipliers, simulated against the bit-accurate models.
+
+Cells are Yosys's models and ours. Quick: a unit, and faults that are injected into its netlist. Long: more
+units, and a frame through pipelines, whose netlists are also proved to do what they did before the step.
+"""
+
+import copy
+
+import numpy as np
+import pytest
+
+from blysk.bench.tools.absorb_registers import absorb_registers
+from blysk.bench.tools.place_and_route import tool_versions
+from blysk.golden.frame_constants import writes_of
+from blysk.sim.frames.frame import beats_of
+from blysk.sim.frames.testbench import pixel_beats, teapot_frame
+from blysk.sim.units.record import length_of
+from blysk.sim.units.registry import RECORDS
+
+from .mapped import core, map_component, same, verilog_of
+from .verilog_bench import BenchError, VerilogBench, assert_beats, missing_tool
+
+pytestmark = pytest.mark.skipif(
+    tool_versions()["pyosys"] is None or bool(missing_tool("icarus")),
+    reason="pyosys or Icarus is not installed",
+)
+
+BEATS = 300
+
+UNITS = (
+    ("dot_product", ""),
+    ("chord_values", "interval 1"),
+    ("chord_values", "2 lights, interval 3"),
+    ("chord_setup", "interval 3"),
+    ("intensity", "3 lights, compact"),
+    ("quadratic_evaluator", "direct"),
+    ("half_chord", "interval 4"),
+)
+
+PIPELINES = ("chord, cosquad", "chord, blinn", "linear, cosquad")
+
+
+@pytest.fixture(scope="module")
+def mapped(tmp_path_factory):
+    """A unit's netlist before the step, made once."""
+    made = {}
+
+    def mapped(name, variant):
+        if (name, variant) not in made:
+            unit = RECORDS[name].variants[variant].unit()
+            made[name, variant] = map_component(unit, tmp_path_factory.mktemp("mapped"))
+        return copy.deepcopy(made[name, variant])
+
+    return mapped
+
+
+@pytest.fixture
+def check(tmp_path, mapped):
+    """Hold a unit's netlist after the step, and after a change of its cells, against the unit's model."""
+
+    def check(name, variant="", change=lambda cells: None, beats=BEATS):
+        record, rng = RECORDS[name], np.random.default_rng(2026)
+        unit = record.variants[variant].unit()
+        case = next(iter(record.stimuli_of(variant).values())).make(unit, rng, beats)
+        expected = record.expect(unit, case)
+        netlist, absorbed = absorb_registers(mapped(name, variant))
+        change(netlist["modules"]["top"]["cells"])
+        bench = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path)))
+        stalls = {"input_stalls": rng.random(997) < 0.3, "output_stalls": rng.random(1009) < 0.3}
+        sent = {"constants": case.constants, "write": case.write, **stalls}
+        found = bench.run("icarus", case.beats, length_of(expected), **sent)
+        assert_beats(found.beats, expected)
+        return absorbed
+
+    return check
+
+
+@pytest.mark.parametrize(
+    ("name", "variant"), [UNITS[0], *(pytest.param(*unit, marks=pytest.mark.long) for unit in UNITS[1:])]
+)
+def test_unit(check, name, variant):
+    assert check(name, variant).products
+
+
+def first(cells, kind):
+    return next(cell for cell in cells.values() if cell["type"] == kind)
+
+
+def wrong_enable(cells):
+    """A product is taken while the unit waits."""
+    multiplier = first(cells, "MULT18X18D")
+    multiplier["connections"][multiplier["parameters"]["REG_OUTPUT_CE"]] = ["1"]
+
+
+def not_inverted(cells):
+    """The enable's inverter hands on its input."""
+    inverter = next(cell for name, cell in cells.items() if name.startswith("enable_"))
+    inverter["parameters"]["INIT"] = f"{0xAAAA:016b}"
+
+
+def wrong_operand_bit(cells):
+    pins = first(cells, "MULT18X18D")["connections"]
+    pins["A3"], pins["A4"] = pins["A4"], pins["A3"]
+
+
+def wrong_product_bit(cells):
+    pins = first(cells, "MULT18X18D")["connections"]
+    pins["P20"], pins["P21"] = pins["P21"], pins["P20"]
+
+
+def no_register(cells):
+    """A product is not held while the unit waits, and comes a cycle early."""
+    first(cells, "MULT18X18D")["parameters"]["REG_OUTPUT_CLK"] = "NONE"
+
+
+def in_reset(cells):
+    first(cells, "MULT18X18D")["connections"]["RST0"] = ["1"]
+
+
+@pytest.mark.parametrize(
+    "inject", [wrong_enable, not_inverted, wrong_operand_bit, wrong_product_bit, no_register, in_reset]
+)
+def test_injected_faults_are_found(check, inject):
+    with pytest.raises((AssertionError, BenchError)):
+        check("dot_product", change=inject)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", PIPELINES)
+def test_a_frame_of_a_pipeline(name, tmp_path):
+    """Pixel by pixel under stalls; and the netlist before the step does the same, by proof."""
+    unit = RECORDS["pipeline"].variants[name].unit()
+    spans, constants, pixels = teapot_frame(unit.parameters)
+    before = map_component(unit, tmp_path)
+    netlist, absorbed = absorb_registers(before)
+    assert absorbed.closed
+    assert absorbed.removed
+    assert same(before, netlist, tmp_path) == ""
+    rng = np.random.default_rng(2026)
+    found = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path))).run(
+        "icarus",
+        beats_of(unit, spans),
+        len(pixels.x),
+        write=writes_of(constants),
+        input_stalls=rng.random(997) < 0.3,
+        output_stalls=rng.random(1009) < 0.3,
+    )
+    assert_beats(found.beats, pixel_beats(pixels))
+    assert len(np.unique(pixels.color)) > 10
