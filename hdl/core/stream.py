@@ -286,8 +286,8 @@ class PipelinedUnit(wiring.Component):
     def register(m: Module, value, name: str, *, when: Value | None = None):
         """A register that takes ``value`` on every enabled cycle, or only on those of ``when``.
 
-        It has no reset: it holds data, and `at` tells which data counts. A multiplier's own registers can take
-        its place.
+        It has no reset: it holds data, and `at` tells which data counts. A multiplier's own registers can
+        take its place.
         """
         register = Signal(value.shape(), name=name, reset_less=True)
         if when is None:
