@@ -333,10 +333,9 @@ class ShadingPipelineUnit(wiring.Component):
         m.d.sync += written.eq(self.write.valid & self.write.ready)
         # Without the spans of the last cycle, so that no path leads from the ports into the sum.
         inside = Signal(range(self.spans_inside + 1))
-        came, went = Signal(name="came"), Signal(name="went")
+        came, went, idle = Signal(name="came"), Signal(name="went"), Signal(name="idle", init=1)
         finished = self.o.valid & self.o.ready & self.o.payload.last
         is_one = Mux(came ^ went, inside == Mux(went, 2, 0), inside == 1)
-        idle = Signal(init=1)
         m.d.comb += frame.hold.eq(~idle)
         m.d.sync += [
             came.eq(admit),

@@ -244,6 +244,9 @@ def _comment(name: str, header: Sequence[str], rows: Sequence[tuple[str, ...]]) 
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [f"{name}: Verilog-2001, written by blysk", *header, ""]
     lines += ["  ".join(map(str.ljust, row, widths)) for row in rows]
+    ports = [row[0] for row in rows[1:]]
+    lines += ["", "Instantiation:", f"{name} {name}_0 ("]
+    lines += [f"  .{port}({port})," for port in ports[:-1]] + [f"  .{ports[-1]}({ports[-1]})", ");"]
     switches = [f"/* verilator lint_off {key} */ // {why}" for key, why in LINT_EXCEPTIONS.items()]
     comment = [f"// {line}".rstrip() for line in lines]
     return "\n".join([*comment, "", "/* verilator lint_save */", *switches, "", ""])

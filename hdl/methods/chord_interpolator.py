@@ -1,7 +1,9 @@
 """The chord method: forward differences of N·L and of half the squared chord from N to H."""
 
+import enum
+
 from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed, unsigned
-from amaranth.lib import data, enum, fifo, stream, wiring
+from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.cosines.span_limit import SpanLimit
@@ -243,7 +245,7 @@ class ChordSpansUnit(wiring.Component):
             m.d.comb += gate.constants.eq(self.constants)
 
 
-class _Place(enum.Enum, shape=2):
+class _Place(enum.IntEnum):
     """What a normal is to its span: the normal of a pixel, or one of the three of a longer span."""
 
     PIXEL = 0
@@ -346,7 +348,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         m.submodules.chord_values = values = self._values
         m.submodules.span_limit = limit = self._limit
         m.submodules.chord_spans = spans = self._spans
-        tag = data.StructLayout({"place": _Place, "length": unsigned(self.length_bits)})
+        tag = data.StructLayout({"place": unsigned(2), "length": unsigned(self.length_bits)})
         m.submodules.tags = tags = fifo.SyncFIFOBuffered(width=tag.size, depth=values.latency + FIFO_LATENCY)
         self._send(m, values, limit, tags, tag)
         self._collect(m, values, limit, tags, tag, spans)
@@ -364,7 +366,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         """Normals of a span: the first as the span is accepted, those that follow from registers."""
         span = self.i.payload
         right, middle = Signal.like(span.normal_right), Signal.like(span.normal_middle)
-        length, following = Signal.like(span.length), Signal(_Place)
+        length, following = Signal.like(span.length), Signal(2)
         word, long = Signal(tag, name="word"), Signal()
         idle = following == _Place.PIXEL
         takes, sends = Signal(), Signal()

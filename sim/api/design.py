@@ -24,6 +24,7 @@ from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
 from blysk.hdl.render import RenderUnit
 from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES, DesignOptions
 from blysk.sim.api.settings import Settings, checked, read_settings
+from blysk.sim.api.verilog_example import example_of
 from blysk.sim.errors import OptionError
 
 __all__ = [
@@ -277,7 +278,7 @@ def verilog_and_unit(
     loads = lobe is not None and lobe.fixed is None
     constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads)
     lines = _render_header(unit) if isinstance(unit, RenderUnit) else header_of(unit)
-    header = [*lines, "", "Frame constants, through the write port:", *constants]
+    header = [*lines, "", "Frame constants, through the write port:", *constants, *example_of(p)]
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
     texts = port_descriptions(pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
     descriptions = {port: text for port, text in texts.items() if not port.startswith("i_") or port in fields}

@@ -34,7 +34,7 @@ def test_exponents():
 def test_reference_is_the_renderer(model, exponent):
     """Worked out once a mesh, the exact frame is that which the golden renderer draws."""
     frame = Frame(teapot(1000), 96, 72)
-    image = render(frame.scene_of(exponent), model=REFLECTION_MODELS[model]).image.reshape(-1, 3)
+    image = render(frame.scene_of(exponent), model=MODELS[model].model).image.reshape(-1, 3)
     shown = frame.raster.pixel[frame.raster.visible]
     assert len(shown) == frame.pixels > 1500
     np.testing.assert_allclose(frame.golden(model, exponent), 255 * image[shown], rtol=0, atol=1e-9)

@@ -131,7 +131,7 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
         (["--json", "missing/folder.json"], "missing/folder.json: cannot be written"),
         (
             ["--methods", "chord", "--operands", "cosine"],
-            "the sweep: holds no possible design, 12 of chord: finds no normals",
+            "the sweep: holds no possible design, 16 of chord: finds no normals",
         ),
     ],
 )

@@ -112,7 +112,7 @@ def test_command(options, family, calls, cache, tmp_path, capsys):
 def test_device_by_the_number_of_pipelines(options, device, capsys, monkeypatch):
     """Several take the larger device, unless another is asked for."""
 
-    def lays_out(name, unit, seeds, jobs, progress, family):
+    def lays_out(name, unit, seeds, jobs, progress, family, absorb):
         return Layout(name, Parts(1, 2, 3, 4, 5), (Place(1, 130.0, "a", "b", 4.0, 3.0, {}),))
 
     monkeypatch.setattr(fpga, "lay_out", lays_out)
@@ -132,9 +132,9 @@ def test_designs():
     forms = names(fpga._units(["quadratic_evaluator"]))
     assert forms == [f"quadratic_evaluator {form}" for form in QUADRATIC_FORMS]
     full = {"method": "chord", "style": "compact", "setup_interval": 9, "gate": True}
-    whole = "pipeline chord, cosquad, 2 lights, compact, interval 9, gate"
+    whole = "pipeline chord, blinn, 2 lights, compact, interval 9, gate"
     assert names(fpga._pipelines(full, 2, False)) == [whole]
-    assert names(fpga._pipelines({}, 1, True)) == [f"pipeline {m}, cosquad, 1 light" for m in fpga.METHODS]
+    assert names(fpga._pipelines({}, 1, True)) == [f"pipeline {m}, blinn, 1 light" for m in fpga.METHODS]
 
 
 @pytest.mark.parametrize(

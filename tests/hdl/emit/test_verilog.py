@@ -184,7 +184,7 @@ def test_port_table():
     )
     head = text.partition("\n\n")[0].splitlines()
     assert head[1:4] == ["// A title.", "// exponent: 20", "//"]
-    rows = [re.split(r" {2,}", line.removeprefix("// ")) for line in head[4:]]
+    rows = [re.split(r" {2,}", line.removeprefix("// ")) for line in head[4 : head.index("//", 4)]]
     assert rows[0] == ["port", "direction", "width", "signed", "format", "description"]
     assert rows[1:] == [
         ["clk", "input", "1", "no", "unsigned(1)", "clock, rising edge"],

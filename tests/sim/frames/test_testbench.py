@@ -119,7 +119,7 @@ def test_what_is_in_the_folder(made):
     assert sorted(path.name for path in made.iterdir()) == FILES
     assert sorted(path.name for path in (made / "vectors").iterdir()) == TABLES
     readme = (made / "README.md").read_text()
-    assert "- method chord, model cosquad, lights 1, materials 1, throughput style\n" in readme
+    assert "- method chord, model blinn, lights 1, materials 1, throughput style\n" in readme
     assert "$" not in readme
     for table, counted in (
         ("spans", "spans of a teapot"),

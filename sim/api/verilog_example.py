@@ -1,0 +1,69 @@
+"""Worked example in the header of a Verilog file: every write of a frame, and the values of a table."""
+
+import numpy as np
+
+from blysk.golden.frame_constants import LOBE_ADDRESS
+from blysk.golden.frames.prepare import constants_of
+from blysk.golden.lighting.lobe import Lobe
+from blysk.golden.lighting.value_gate import ValueGate
+from blysk.golden.pipeline import Design
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.scene import Scene
+
+__all__ = ["example_of"]
+
+AMBIENT, DIFFUSE, SPECULAR, EXPONENT = 0.05, 0.4, 0.55, 50
+"""The surface of the example."""
+
+_PER_LINE = 8
+
+
+def example_of(design: Design) -> list[str]:
+    """Lines: all writes for a grey surface and white light along the viewer, in decimal.
+
+    Parameters
+    ----------
+    design : Design
+        The pipeline. A lobe that is fixed at build time, or whose model has a roughness, has that of its own.
+    """
+    colours = ((value,) * 3 for value in (AMBIENT, DIFFUSE, SPECULAR))
+    material = Material(*colours, design.build.exponent or EXPONENT)
+    triangle = Mesh(np.eye(3), np.array([[0, 1, 2]]), np.eye(3), material=np.zeros(1, np.int64))
+    lights = (Light((0, 0, 1)),) * design.lights
+    scene = Scene(triangle, Camera((0, 0, 5), (0, 0, 0)), 8, 8, (material,) * design.materials, lights)
+    try:
+        first, *more = constants_of(scene, design)
+    except ValueError:
+        # A table that is fixed is of its own parameter.
+        return []
+    writes = first.writes(0 if more else None)
+    pairs = list(zip(writes["address"].tolist(), writes["data"].tolist(), strict=True))
+    table = [data for address, data in pairs if address == LOBE_ADDRESS]
+    others = [f"{address}: {data}" for address, data in pairs if address != LOBE_ADDRESS]
+    lines = [
+        "",
+        f"Example: ambient {AMBIENT}, diffuse {DIFFUSE}, specular {SPECULAR}, exponent {material.exponent}, "
+        "L = H = (0, 0, 1), white light; address: data of each write of a material",
+        *("  " + ", ".join(others[k : k + _PER_LINE]) for k in range(0, len(others), _PER_LINE)),
+    ]
+    if isinstance(design.specular, Lobe) and table:
+        lines += _table_lines(design.specular, table)
+        if design.has_threshold and isinstance(design.highlight_gate, ValueGate):
+            lines.append(
+                "  threshold: 2^16 times the least u from which on all values are 0, rounded up, + 1"
+            )
+    return lines
+
+
+def _table_lines(lobe: Lobe, table: list[int]) -> list[str]:
+    steps, octaves = lobe.steps, lobe.octaves
+    return [
+        f"Table, {len(table)} writes to address {LOBE_ADDRESS} in this order: 2^17 + bank, then "
+        f"{lobe.entries + 1} values of the highlight S(u), u = 1 - N.H, times 2^17 (1 is 2^17 - 1):",
+        f"  row r = 0 to {octaves}, step k = 0 to {steps - 1}: u = k / {steps} 2^-{octaves} in row 0, "
+        f"(1 + k / {steps}) 2^(r - {octaves + 1}) from row 1 on; last u = 1",
+        f"  of the example: {', '.join(map(str, table[:6]))}, ..., {', '.join(map(str, table[-4:]))}; entry "
+        f"{lobe.entries // 2}: {table[1 + lobe.entries // 2]}",
+    ]
