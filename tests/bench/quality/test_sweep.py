@@ -16,7 +16,6 @@ from blysk.golden.number.unit_vector import quantise
 from blysk.golden.presets import MODELS, preset
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
-from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.teapot import teapot

@@ -114,7 +114,7 @@ def test_picture_waits_for_the_figures(tmp_path, monkeypatch, capsys):
     assert [path.name for path in tmp_path.iterdir() if path.is_file()] == []
 
 
-MEMORY = """
+MEMORY = r"""
 import re, sys
 from blysk.sim.cli.main import main
 status = main(sys.argv[1:])
