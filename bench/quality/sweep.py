@@ -45,9 +45,9 @@ FEW_EXPONENTS += (470, 500, 600, 700, 800, 900, 1000)
 LARGEST = 1.0
 """Target: the largest error of a channel, in LSB."""
 
-LARGEST_COSINE = 0.12 / 255 + ChordInterpolator().largest_deviation(1) + 2.0**-15
-"""How near to 0 an exact N·L must be for its sign to be open, 1.3e-3: the error of the chord method's fit
-(see `largest_span_angle`) and of the curvature of a part, and those of vectors and words."""
+LARGEST_COSINE = ChordInterpolator.DIFFUSE_BUDGET / 255 + 2.0**-15
+"""How near to 0 an exact N·L must be for its sign to be open, 5e-4: the error of the chord method's fit, and
+those of vectors and words."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.lighting import Material
+from blysk.golden.reference.lobes import curve_lines
 from blysk.golden.reference.reflection import ReflectionModel
 
 __all__ = ["HighlightLimits"]
@@ -26,10 +27,8 @@ class _Curve:
     @cached_property
     def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Arguments u in ascending order; the steepest ``|dS/du|`` and the largest S from each u on."""
-        u = np.r_[0, np.geomspace(1e-7, 1 - 1e-12, 4_000)]
-        value = self.model.reflect(1 - u, self.parameter)
-        slope = np.abs(np.diff(value)) / np.diff(u)
-        return u[:-1], *(np.maximum.accumulate(of[::-1])[::-1] for of in (slope, value[:-1]))
+        u, value, slope = curve_lines(self.model, self.parameter)
+        return u, *(np.maximum.accumulate(of[::-1])[::-1] for of in (slope, value))
 
     def _from(self, values: np.ndarray, u: np.ndarray) -> np.ndarray:
         return values[np.clip(np.searchsorted(self._points[0], u, "right") - 1, 0, None)]
@@ -118,7 +117,6 @@ class HighlightLimits:
         result = by_exponent(self.exponents[material][:, np.newaxis], u)
         for curve in dict.fromkeys(self.curves):
             if curve is not None:
-                which = np.flatnonzero([self.curves[index] is curve for index in range(len(self.curves))])
-                rows = np.isin(material, which)
+                rows = np.array([other is curve for other in self.curves])[material]
                 result[rows] = getattr(curve, name)(u[rows])
         return result

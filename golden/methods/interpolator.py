@@ -140,19 +140,6 @@ class Interpolator:
         """Largest angle of a span, in degrees, for good highlights at a specular exponent."""
         return self.MAX_ANGLE
 
-    def largest_deviation(self, exponent: int) -> float:
-        """Largest angle, in radians, between the middle normal of a span and the bisector of its ends.
-
-        The method assumes an angle of 0, so spans are cut until the angle is at most this. It costs 0.15 LSB:
-        the cosine-quadratic model changes by ``0.77 sqrt(n)`` a radian at most.
-
-        Parameters
-        ----------
-        exponent : int
-            Specular exponent n.
-        """
-        return 0.15 / (255 * 0.77 * exponent**0.5)
-
     def operand_error(self, length: int, degrees: float) -> float:
         """Bound of the error of N·L and of N·H against the method's own curve in float64.
 

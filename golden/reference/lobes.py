@@ -24,6 +24,7 @@ __all__ = [
     "TabulatedModel",
     "TrowbridgeReitz",
     "checked_roughness",
+    "curve_lines",
     "exponent_of_roughness",
     "roughness_of_exponent",
 ]
@@ -270,10 +271,28 @@ class TabulatedModel(ReflectionModel):
 
 
 def _steepness(model: ReflectionModel, parameter: float | None) -> float:
-    """Steepest of 4,000 lines between points of the curve, closer to each other towards the peak."""
+    """Steepest of the lines of `curve_lines`."""
+    return float(np.clip(curve_lines(model, parameter)[2].max(), 1.0, STEEPEST))
+
+
+def curve_lines(model: ReflectionModel, parameter: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A curve S(u), u = 1 - N·H, as 4,000 lines between its points, closer to each other towards the peak.
+
+    Parameters
+    ----------
+    model : ReflectionModel
+        Model of N·H.
+    parameter : float or None
+        Exponent or roughness, as `ReflectionModel.PARAMETER` says.
+
+    Returns
+    -------
+    u, value, slope : float64 arrays, shape (4000,)
+        Where each line begins, S there, and ``|dS/du|`` of the line.
+    """
     u = np.r_[0, np.geomspace(1e-7, 1 - 1e-12, 4_000)]
-    slopes = np.abs(np.diff(model.reflect(1 - u, parameter))) / np.diff(u)
-    return float(np.clip(slopes.max(), 1.0, STEEPEST))
+    value = model.reflect(1 - u, parameter)
+    return u[:-1], value[:-1], np.abs(np.diff(value)) / np.diff(u)
 
 
 def _is_number(text: str) -> bool:

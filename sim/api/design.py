@@ -72,10 +72,6 @@ def design(*, lights: int = 1, materials: int = 1, **options: Unpack[DesignOptio
     return design_of(settings, settings["lights"], settings["materials"])
 
 
-# `design` under a name that no parameter has.
-_default = design
-
-
 def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
     """The pipeline that the design options describe.
 
@@ -256,7 +252,7 @@ def verilog(
         If the name is none in Verilog, or the method takes values and geometry is hardware, or there
         cannot be so many pipelines.
     """
-    return verilog_and_unit(_default() if design is None else design, name, geometry, pipes, merged)[0]
+    return verilog_and_unit(Design() if design is None else design, name, geometry, pipes, merged)[0]
 
 
 def verilog_and_unit(
