@@ -133,11 +133,35 @@ def tidy_obj(data: bytes, found: Found) -> bytes:
         raise Refused(f"a face has the corners {shown(bad[1].decode().strip())!r}, not indices")
     if re.search(rb"^f .*(?<= )-?0+(?=[/\s]|\Z)", data, re.MULTILINE):
         raise Refused("a face has the vertex index 0; they count from 1")
-    # trimesh counts relative indices from the end of the file, not from the face.
-    relative = re.search(rb"^f .*[ /]-\d", data, re.MULTILINE)
-    if relative and re.search(rb"^vn? ", data[relative.end() :], re.MULTILINE):
-        raise Refused("relative face indices with vertices after them", "export it with absolute indices")
+    if re.search(rb"^f .*[ /]-\d", data, re.MULTILINE):
+        data = _absolute(data)
     return _triangular(data)
+
+
+def _absolute(data: bytes) -> bytes:
+    """The text with absolute indices: trimesh counts relative ones from the end of the file."""
+    counts = {b"v": 0, b"vt": 0, b"vn": 0}
+
+    def absolute(corner):
+        kinds = zip(counts, corner[0].split(b"/"), strict=False)
+        return b"/".join(counted(kind, index) for kind, index in kinds)
+
+    def counted(kind, index):
+        if not index.startswith(b"-"):
+            return index
+        if int(index) < -counts[kind]:
+            raise Refused(
+                f"a face has the index {index.decode()}, with {counts[kind]} {kind.decode()} before it"
+            )
+        return b"%d" % (counts[kind] + 1 + int(index))
+
+    def replaced(line):
+        if line[1] == b"f":
+            return b"f " + re.sub(rb"[^\s]+", absolute, line[2])
+        counts[line[1]] += 1
+        return line[0]
+
+    return re.sub(rb"^(vn|vt|v|f) ([^\n]*)", replaced, data, flags=re.MULTILINE)
 
 
 def _positions(data: bytes, found: Found) -> bytes:

@@ -150,7 +150,7 @@ SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
         (SQUARE + "f 1 2 3.5\n", "corners"),
         (SQUARE + "f 1/1/1/1 2 3\n", "corners"),
         (SQUARE + "f 1 2 3 9\n", "vertex 8 (from 0), there are 4"),
-        (SQUARE + "f 1 2 3 -9\n", "vertex -5"),
+        (SQUARE + "f 1 2 3 -9\n", "index -9"),
         (SQUARE.replace("v 1 0 0", "v 1_0 0 0") + "f 1 2 3\n", "'1_0 0 0', not 3 numbers"),
         (SQUARE + "vn 0 0 1_0\nf 1//1 2//1 3//1\n", "not 3 numbers"),
         (SQUARE.replace("v 1 0 0", "v 1 0 0 2") + "f 1 2 3\n", "weight w other than 1"),

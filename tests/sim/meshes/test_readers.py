@@ -61,14 +61,23 @@ def test_objects_and_materials_weld_to_one(tmp_path):
         (CORNERS + "v 9 9 9", "it has no faces"),
         (CORNERS + "f 0 1 2", "vertex index 0"),
         (CORNERS + "f 1 2 3\nf 1 2", "fewer than 3 corners"),
-        (CORNERS + "f 1 2 -9", "out of bounds"),
-        (CORNERS + "f -3 -2 -1\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf -3 -2 -1", "relative face indices"),
+        (CORNERS + "f 1 2 -9", "has the index -9, with 3 v before it"),
         (CORNERS + "f 1 2 3\nf 1 x 3", "not indices"),
         ("v 0 0\nv 1 0\nv 0 1\nf 1 2 3", "not 3 numbers"),
     ],
 )
 def test_bad_obj(tmp_path, text, reason):
     check_refused(tmp_path / "a.obj", reason, content=text)
+
+
+def test_relative_indices_count_from_their_face(tmp_path):
+    text = (
+        CORNERS
+        + "vn 0 0 1\nf -3//-1 -2//-1 -1//-1\nv 5 0 0\nv 6 0 0\nv 5 1 0\nvn 0 1 0\nf -3//-1 -2//-1 3//-2\n"
+    )
+    mesh = load(tmp_path / "a.obj", text).mesh
+    third = mesh.vertices[mesh.faces[0][2]]
+    assert sorted(mesh.vertices[mesh.faces[1]].tolist()) == sorted([[5, 0, 0], [6, 0, 0], third.tolist()])
 
 
 def test_what_trimesh_makes_of_bad_obj_files(tmp_path):
