@@ -12,7 +12,7 @@ from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.pipeline import Design
-from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
+from blysk.hdl.core.stream import FIFO_LATENCY, UNCOUNTED, connect, connect_fifo, connect_late_fifo
 from blysk.hdl.frame_constants import FrameConstantsUnit, write_shape
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
@@ -170,7 +170,7 @@ class ShadingPipelineUnit(wiring.Component):
         self._interpolator, self._gate, self._slope, self._lights = None, None, None, []
         self._tables = None
         self.setup_interval = self.cycles_per_pixel = 1
-        self.latency = FIFO_LATENCY + self._assembler.coordinates_latency
+        self.latency = 1 + FIFO_LATENCY + self._assembler.coordinates_latency
         if p.lights:
             self._make_units()
         elif p.build.setup_interval is not None:
@@ -256,7 +256,7 @@ class ShadingPipelineUnit(wiring.Component):
         17 are a memory of 16 words, and a register behind it.
         """
         interval = getattr(self._interpolator, "shortest_interval", None) or self.setup_interval
-        return max(-(-self.latency // interval), 17)
+        return max(-(-self.latency // interval) + UNCOUNTED, 17)
 
     @property
     def spans_inside(self) -> int:
@@ -289,18 +289,10 @@ class ShadingPipelineUnit(wiring.Component):
         """FIFO of the coordinates of spans, from the input to the assembler; valid and ready of its input."""
         p, assembler = self.parameters, self._assembler
         layout = coordinates_shape(p.x_bits, p.y_bits, p.length_bits)
-        m.submodules.coordinates = coordinates = fifo.SyncFIFOBuffered(
-            width=layout.size, depth=self._waiting_spans
-        )
-        word = Signal(layout, name="coordinates_word")
-        m.d.comb += [
-            *(word[name].eq(self.i.payload[name]) for name in ("x", "y", "length")),
-            coordinates.w_data.eq(word),
-            assembler.coordinates.payload.eq(coordinates.r_data),
-            assembler.coordinates.valid.eq(coordinates.r_rdy),
-            coordinates.r_en.eq(assembler.coordinates.ready),
-        ]
-        return coordinates.w_en, coordinates.w_rdy
+        source = stream.Signature(layout).create(path=("source",))
+        m.d.comb += [source.payload[name].eq(self.i.payload[name]) for name in layout.members]
+        connect_late_fifo(m, "coordinates", source, assembler.coordinates, self._waiting_spans)
+        return source.valid, source.ready
 
     def _admit(self, m: Module, frame: FrameConstantsUnit, sinks: list[tuple[Value, Value]]) -> Value:
         """Accept spans and writes; whether a span of a pixel or more is accepted on this cycle.

@@ -1,7 +1,7 @@
-"""Data-flow graphs: words of a unit, placed in time and on shared operators, then built as registers."""
+"""Data-flow graphs: words of a unit and how each is computed, then built as registers of their schedule."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from amaranth.hdl import Module, ShapeLike, Signal, Value, signed
@@ -9,6 +9,7 @@ from amaranth.lib.memory import Memory
 
 from blysk.golden.number.fixed import Format
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.schedule import Operation, Schedule, place
 from blysk.hdl.core.stream import PipelinedUnit
 
 __all__ = [
@@ -26,27 +27,36 @@ __all__ = [
 MULTIPLIER_BITS = 18
 """Bits of a multiplier's signed operands."""
 
-MULTIPLIER_LATENCY = 4
+MULTIPLIER_LATENCY = 2
 """Cycles of `registered_product`."""
 
 
-@dataclass(frozen=True, eq=False)
-class Word:
-    """A word of a data flow.
+@dataclass(eq=False)
+class Word(Operation):
+    """A word of a data flow, and the operation that makes it.
 
     Parameters
     ----------
-    name : str
-        Of its register.
-    stage : int
-        Enabled cycles from the input of a beat to the first on which the word can be read.
-    lifetime : int
-        Cycles on which it can be read, before the next beat's word replaces it.
+    name, operands, latency, lifetime, unit, since
+        As for `Operation`.
+    graph : Dataflow
+        That it is a word of.
+    make : callable
+        Makes its hardware.
     """
 
-    name: str
-    stage: int
-    lifetime: int
+    graph: "Dataflow | None" = None
+    make: "Callable[[_Build], Any] | None" = None
+
+    @property
+    def stage(self) -> int:
+        """Enabled cycles from the input of a beat to the first on which the word can be read."""
+        return self.graph.schedule.stage(self)
+
+    @property
+    def read(self) -> int:
+        """Enabled cycles from the input of a beat to that on which its operands are read."""
+        return self.graph.schedule.placements[self].read
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +65,8 @@ class FunctionalUnit:
 
     Parameters
     ----------
+    graph : Dataflow
+        Whose uses they serve.
     name : str
         Of its operand registers.
     shapes : sequence of ShapeLike
@@ -63,42 +75,31 @@ class FunctionalUnit:
         Registers from those of the operands to the result.
     make : callable
         Makes an instance: from a function that makes a register (value, name) and the operands, the result.
-    left : list of int
-        Uses that may still come.
-    taken : list of set of int
-        For each instance the stages at which it has a use.
     """
 
+    graph: "Dataflow"
     name: str
     shapes: Sequence[ShapeLike]
     latency: int
     make: Callable[..., Any]
-    left: list[int]
-    taken: list[set[int]] = field(default_factory=list)
 
     @property
     def count(self) -> int:
         """How many instances there are."""
-        return len(self.taken)
+        return self.graph.schedule.counts.get(self, 0)
 
 
 class Dataflow:
     """The words of a `PipelinedUnit` and how each is computed from others, before there is any hardware.
 
-    Every word gets the earliest stage at which its operands can be read. A shared functional unit, such as a
-    multiplier, is issued when a slot of it is free: beats come a whole multiple of the initiation interval
-    apart, so an instance has as many slots as the interval has cycles, and ``ceil(uses / interval)``
-    instances serve all. In a *spaced* graph beats come at any distance from the interval on: then the uses of
-    an instance lie within as many stages as the interval has cycles, and there are as many more instances as
-    that takes. Uses get slots in the order in which they are added. A word that is read after its lifetime is
-    copied by `build`.
+    Words are described first, each after those that it is made from. Then they are placed in time and on
+    shared functional units, such as multipliers, by `place`: when a word's stage, or the number of instances,
+    is asked for the first time. `build` makes the hardware; a word that is read after its lifetime is copied.
 
     Parameters
     ----------
     interval : int
         Initiation interval of the unit, at least 1.
-    multiplications : int
-        How many there will be.
     spaced : bool
         Whether beats come at any distance from the interval on; see `PipelinedUnit`.
     low_latency : bool
@@ -108,37 +109,51 @@ class Dataflow:
     ------
     ValueError
         If the interval is less than 1.
+
+    Source: docs/theory/scheduling.md.
     """
 
-    def __init__(
-        self, interval: int, multiplications: int = 0, *, spaced: bool = False, low_latency: bool = False
-    ):
+    def __init__(self, interval: int, *, spaced: bool = False, low_latency: bool = False):
         if interval < 1:
             raise ValueError(f"interval must be at least 1, not {interval}")
         self.interval = interval
         self.spaced = spaced
-        self._makers: list[tuple[Word, Callable[[_Build], Any]]] = []
+        self._words: list[Word] = []
+        self._schedule: Schedule | None = None
         latency, product = MULTIPLIER_LATENCY, registered_product
         if low_latency:
             latency, product = 1, lambda register, a, b: register(a * b, "product")
         operand = signed(MULTIPLIER_BITS)
-        self.multiplier = self.share("multiplier", multiplications, (operand, operand), latency, product)
+        self.multiplier = self.share("multiplier", (operand, operand), latency, product)
 
-    def _add(self, name: str, stage: int, lifetime: int, make: Callable[["_Build"], Any]) -> Word:
-        word = Word(name, stage, lifetime)
-        self._makers.append((word, make))
+    @property
+    def schedule(self) -> Schedule:
+        """The words in time and on instances; from now on no word can be added."""
+        if self._schedule is None:
+            self._schedule = place(self._words, self.interval, self.spaced)
+        return self._schedule
+
+    def _add(self, word: Word) -> Word:
+        if self._schedule is not None:
+            raise RuntimeError(f"{word.name} comes after the words were placed")
+        word.graph = self
+        self._words.append(word)
         return word
 
     def input(self, name: str, read: Callable[[Any], Any]) -> Word:
         """A word of the beat: ``read(operands)``."""
         first = 0 if self.interval == 1 else 1
-        return self._add(name, first, self.interval, lambda build: read(build.operands))
+        word = Word(name, (), 0, self.interval, since=first)
+        word.make = lambda build: read(build.operands)
+        return self._add(word)
 
     def wire(self, name: str, function: Callable[[Any], Any], word: Word) -> Word:
         """Wiring from a word's value; read after the word's lifetime, the wire is copied, not the word."""
-        return self._add(name, word.stage, word.lifetime, lambda build: function(build.at(word, word.stage)))
+        wire = Word(name, (word,), 0, word.lifetime)
+        wire.make = lambda build: function(build.at(word, wire.read))
+        return self._add(wire)
 
-    def register(self, name: str, function: Callable[..., Any], *words: Word, since: int = 0) -> Word:
+    def register(self, name: str, function: Callable[..., Any], *words: Word, since: int | Word = 0) -> Word:
         """A register of ``function`` of the words' values: one cycle.
 
         Parameters
@@ -149,39 +164,24 @@ class Dataflow:
             Of the values of `words`.
         *words : Word
             What it is made from.
-        since : int
-            Earliest stage of the word: a word that is read late needs no copies before.
+        since : int or Word
+            Earliest stage of the word, or the word that it comes with: a word that is read late needs no
+            copies before.
         """
-        stage = max(since - 1, *(word.stage for word in words))
+        register = Word(name, words, 1, self.interval, since=since)
 
         def make(build):
-            value = function(*(build.at(word, stage) for word in words))
-            return build.unit.register(build.m, value, name, when=build.when(stage))
+            value = function(*(build.at(word, register.read) for word in words))
+            return build.unit.register(build.m, value, name, when=build.when(register.read))
 
-        return self._add(name, stage + 1, self.interval, make)
+        register.make = make
+        return self._add(register)
 
     def share(
-        self, name: str, uses: int, shapes: Sequence[ShapeLike], latency: int, make: Callable[..., Any]
+        self, name: str, shapes: Sequence[ShapeLike], latency: int, make: Callable[..., Any]
     ) -> FunctionalUnit:
-        """A functional unit for so many uses; the parameters are those of `FunctionalUnit`."""
-        instances = -(-uses // self.interval)
-        return FunctionalUnit(name, shapes, latency, make, [uses], [set() for _ in range(instances)])
-
-    def _serves(self, taken: set[int], stage: int) -> bool:
-        """Whether an instance with uses at these stages serves one more, in any two beats."""
-        if self.spaced:
-            return stage not in taken and max(taken | {stage}) - min(taken | {stage}) < self.interval
-        return all((stage - other) % self.interval for other in taken)
-
-    def _place(self, functional_unit: FunctionalUnit, stage: int) -> tuple[int, int]:
-        """Instance and stage of a use, at the earliest from a stage on."""
-        for later in range(stage, stage + 2 * self.interval):
-            for instance, taken in enumerate(functional_unit.taken):
-                if self._serves(taken, later):
-                    taken.add(later)
-                    return instance, later
-        functional_unit.taken.append({stage})
-        return functional_unit.count - 1, stage
+        """A functional unit; the parameters are those of `FunctionalUnit`."""
+        return FunctionalUnit(self, name, shapes, latency, make)
 
     def use(
         self,
@@ -191,7 +191,7 @@ class Dataflow:
         operands: Callable[..., Sequence[Any]],
         result: Callable[[Any], Any] = lambda value: value,
         latency: int | None = None,
-        since: int = 0,
+        since: int | Word = 0,
     ) -> Word:
         """Result of a functional unit; its lifetime is one cycle.
 
@@ -209,26 +209,18 @@ class Dataflow:
             Wiring from the functional unit's result to the word's value.
         latency : int or None
             Registers from the operands to that value, where ``result`` takes one on the way; ``None``: all.
-        since : int
+        since : int or Word
             Earliest stage of the word, as for `register`.
-
-        Raises
-        ------
-        ValueError
-            If that is one use more than announced.
         """
-        if not functional_unit.left[0]:
-            raise ValueError(f"{name} is one use of the {functional_unit.name} more than announced")
-        functional_unit.left[0] -= 1
         latency = functional_unit.latency if latency is None else latency
-        stage = max(since - 1 - latency, *(word.stage for word in words))
-        instance, stage = self._place(functional_unit, stage)
+        use = Word(name, tuple(words), 1 + latency, 1, functional_unit, since)
 
         def make(build):
-            given = operands(*(build.at(word, stage) for word in words))
-            return result(build.issue(functional_unit, instance, stage, given))
+            given = operands(*(build.at(word, use.read) for word in words))
+            return result(build.issue(functional_unit, use, given))
 
-        return self._add(name, stage + 1 + latency, 1, make)
+        use.make = make
+        return self._add(use)
 
     def multiply(
         self,
@@ -237,11 +229,11 @@ class Dataflow:
         b: Word,
         left: Callable[[Any], FixedValue] = lambda value: value,
         right: Callable[[Any], FixedValue] = lambda value: value,
-        since: int = 0,
+        since: int | Word = 0,
     ) -> Word:
         """Exact product of two words on a shared multiplier.
 
-        Its stage is `MULTIPLIER_LATENCY` cycles after that of its operands; one in a graph of low latency.
+        It takes a cycle, and `MULTIPLIER_LATENCY` more; one more in a graph of low latency.
 
         Parameters
         ----------
@@ -257,7 +249,7 @@ class Dataflow:
         Raises
         ------
         ValueError
-            If an operand has too many bits, or there are more multiplications than announced.
+            If an operand has too many bits.
         """
         format: list[Format] = []
 
@@ -288,17 +280,18 @@ class Dataflow:
         address : Word
             As many bits as needed, unsigned.
         """
-        stage = address.stage
+        # The word that is read has the lifetime of the address.
+        word = Word(name, (address,), 1, address.lifetime)
 
         def make(build):
             memory = Memory(shape=width, depth=len(words), init=words)
             build.m.submodules[name] = memory
             port = memory.read_port()
-            build.m.d.comb += port.addr.eq(build.at(address, stage))
+            build.m.d.comb += port.addr.eq(build.at(address, word.read))
             return port.data
 
-        # The word that is read has the lifetime of the address.
-        return self._add(name, stage + 1, address.lifetime, make)
+        word.make = make
+        return self._add(word)
 
     def build(self, m: Module, unit: PipelinedUnit, operands: Any) -> Callable[[Word, int], Any]:
         """Make the hardware; the result gives a word's value at a stage.
@@ -312,18 +305,18 @@ class Dataflow:
         operands
             What the unit's `PipelinedUnit.datapath` is given.
         """
-        build = _Build(m, unit, operands)
-        for word, make in self._makers:
-            build.values[word] = {word.stage: make(build)}
+        build = _Build(self, m, unit, operands)
+        for word in self._words:
+            build.values[word] = {word.stage: word.make(build)}
         return build.at
 
 
 def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> Any:
-    """Exact product, `MULTIPLIER_LATENCY` cycles: two registers for each operand, two for the product.
+    """Exact product, `MULTIPLIER_LATENCY` cycles: a register for each operand, and one for the product.
 
     An FPGA's multipliers lie in few places, far from the multiplexers that operands come from and the adders
-    that products go to. Of registers in a row each wire is short wherever those are; and some go into the
-    multiplier block.
+    that products go to. These registers can go into the multiplier block, so that the wires to it and from it
+    have a cycle each.
 
     Parameters
     ----------
@@ -332,15 +325,14 @@ def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> A
     a, b
         Operands.
     """
-    for step in range(2):
-        a, b = register(a, f"a_{step}"), register(b, f"b_{step}")
-    return register(register(a * b, "product_0"), "product")
+    a, b = register(a, "a"), register(b, "b")
+    return register(a * b, "product")
 
 
-def shared_sums(graph: Dataflow, uses: int, product: Format) -> FunctionalUnit:
-    """What sums so many dot products, whose products have a format: two cycles; see `dot`."""
+def shared_sums(graph: Dataflow, product: Format) -> FunctionalUnit:
+    """What sums dot products, whose products have a format: two cycles; see `dot`."""
     shapes = FixedShape(product + product), FixedShape(product)
-    return graph.share("sum", uses, shapes, 1, lambda register, x, y: register(x + y, "total"))
+    return graph.share("sum", shapes, 1, lambda register, x, y: register(x + y, "total"))
 
 
 def dot(
@@ -367,11 +359,14 @@ def dot(
             return a, b, lambda v: v[c], lambda v: v[c]
         return a, a, lambda v: v[c], lambda v: b(v)[c]
 
-    products = [graph.multiply(f"{name}_{c}", *factors(c)) for c in range(3)]
+    products = [graph.multiply(f"{name}_{c}", *factors(c)) for c in range(2)]
     if sums is not None:
+        products.append(graph.multiply(f"{name}_2", *factors(2)))
         return graph.use(sums, f"{name}_total", products, lambda x, y, z: (x + y, z))
-    partial = graph.register(f"{name}_partial", lambda x, y: x + y, *products[:2])
-    return graph.register(f"{name}_total", lambda x, y: x + y, partial, products[2])
+    partial = graph.register(f"{name}_partial", lambda x, y: x + y, *products)
+    # An operand that waits takes fewer registers than a product.
+    last = graph.multiply(f"{name}_2", *factors(2), since=partial)
+    return graph.register(f"{name}_total", lambda x, y: x + y, partial, last)
 
 
 def checked_interval(interval: int | None, longest: int, default: int | None = None) -> int:
@@ -392,8 +387,8 @@ def checked_interval(interval: int | None, longest: int, default: int | None = N
 class _Build:
     """Hardware of a graph while it is being made."""
 
-    def __init__(self, m: Module, unit: PipelinedUnit, operands: Any):
-        self.m, self.unit, self.operands = m, unit, operands
+    def __init__(self, graph: Dataflow, m: Module, unit: PipelinedUnit, operands: Any):
+        self.graph, self.m, self.unit, self.operands = graph, m, unit, operands
         self.values: dict[Word, dict[int, Any]] = {}
         self._instances: dict[tuple[FunctionalUnit, int], tuple[list[Signal], Any]] = {}
 
@@ -415,14 +410,14 @@ class _Build:
             lifetime = self.unit.initiation_interval
         return copies[max(start for start in copies if start <= stage)]
 
-    def issue(
-        self, functional_unit: FunctionalUnit, instance: int, stage: int, operands: Sequence[Any]
-    ) -> Any:
-        """Issue operands to an instance of a functional unit at a stage; its result, for all uses.
+    def issue(self, functional_unit: FunctionalUnit, use: Word, operands: Sequence[Any]) -> Any:
+        """Issue operands of a use to an instance of a functional unit; its result, for all uses.
 
         Those of the first use are issued on every cycle of no other use, so that no register needs an enable.
         """
-        key, when = (functional_unit, instance), self.when(stage)
+        placement = self.graph.schedule.placements[use]
+        instance, when = placement.instance, self.when(placement.read)
+        key = functional_unit, instance
         if key not in self._instances:
             when = None
             given = [

@@ -65,8 +65,8 @@ def reciprocal_words(
         A table of `reciprocal_table`; ``None``: that in its own format.
     length_bits : int
         Bits of the length, 2 to 12.
-    since : int
-        First stage that may hold m - 1.
+    since : int or Word
+        First stage that may hold m - 1, or the word that it comes with.
 
     Returns
     -------

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from amaranth.hdl import Cat, EnableInserter, Module, Mux, Shape, ShapeLike, Signal, Value, ValueLike
 from amaranth.lib import data, fifo, stream, wiring
+from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Member, Out
 
 from blysk.hdl.core.fixed import FixedShape
@@ -11,11 +12,14 @@ from blysk.hdl.core.fixed import FixedShape
 __all__ = [
     "FIFO_LATENCY",
     "SLICE_LATENCY",
+    "UNCOUNTED",
     "PipelinedUnit",
     "connect",
     "connect_fifo",
+    "connect_late_fifo",
     "connect_slice",
     "count_down",
+    "pass_beside",
     "require_same_shape",
     "skid_buffer",
 ]
@@ -25,6 +29,9 @@ FIFO_LATENCY = 2
 
 SLICE_LATENCY = 1
 """Clocks that a payload takes through the register of `connect_slice`."""
+
+UNCOUNTED = 2
+"""Payloads that `connect_late_fifo` has taken and its level does not have yet."""
 
 
 def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> None:
@@ -110,6 +117,88 @@ def connect_fifo(m: Module, name: str, source: stream.Interface, sink: stream.In
         sink.valid.eq(buffer.r_rdy),
         buffer.r_en.eq(sink.ready),
     ]
+
+
+def connect_late_fifo(
+    m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int
+) -> None:
+    """Connect two streams through a FIFO behind a register, so that the source's handshake ends there.
+
+    Whether there is room follows from the FIFO's level alone, in a register; `UNCOUNTED` payloads of the
+    depth are for those that the level does not have yet. A payload takes a cycle more than `FIFO_LATENCY`.
+
+    Parameters
+    ----------
+    m, name, source, sink
+        As for `connect_fifo`.
+    depth : int
+        Payloads that the FIFO holds, at least 5.
+
+    Raises
+    ------
+    TypeError
+        If the payloads differ in a field or in a fixed-point format.
+    """
+    require_same_shape(source.payload.shape(), sink.payload.shape())
+    width = Shape.cast(source.payload.shape()).width
+    m.submodules[name] = buffer = fifo.SyncFIFOBuffered(width=width, depth=depth)
+    payload = Signal(width, name=f"{name}_payload", reset_less=True)
+    written, room = Signal(name=f"{name}_written"), Signal(name=f"{name}_room", init=1)
+    m.d.sync += [
+        payload.eq(source.payload),
+        written.eq(source.valid & room),
+        room.eq(buffer.level < depth - UNCOUNTED),
+    ]
+    m.d.comb += [
+        source.ready.eq(room),
+        buffer.w_data.eq(payload),
+        buffer.w_en.eq(written),
+        Value.cast(sink.payload).eq(buffer.r_data),
+        sink.valid.eq(buffer.r_rdy),
+        buffer.r_en.eq(sink.ready),
+    ]
+
+
+def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Signal:
+    """Words that pass beside a unit while its beats are inside, in their order, without handshakes.
+
+    A memory with an address for the words that come and one for those that go: there is no level to count,
+    as the unit's own handshakes tell when a word is there.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the memory as a submodule ``name``.
+    word : ValueLike
+        Word of the beat that comes.
+    written, taken : Value
+        Whether a beat enters the unit, and leaves it; it is inside for two cycles or more.
+    depth : int
+        Beats inside at most.
+
+    Returns
+    -------
+    Signal
+        Word of the beat that leaves next, while one is inside.
+    """
+    bits = (depth - 1).bit_length()
+    m.submodules[name] = words = Memory(shape=len(Value.cast(word)), depth=1 << bits, init=[])
+    write, first, second = words.write_port(), *(words.read_port(domain="comb") for _ in range(2))
+    address, following = Signal(bits, name=f"{name}_address"), Signal(bits, name=f"{name}_following", init=1)
+    leaves = Signal(len(Value.cast(word)), name=f"{name}_leaves", reset_less=True)
+    m.d.comb += [
+        write.data.eq(word),
+        write.en.eq(written),
+        first.addr.eq(address),
+        second.addr.eq(following),
+    ]
+    with m.If(written):
+        m.d.sync += write.addr.eq(write.addr + 1)
+    with m.If(taken):
+        m.d.sync += [address.eq(following), following.eq(following + 1)]
+    # Whether a beat leaves is known late: both words are read before.
+    m.d.sync += leaves.eq(Mux(taken, second.data, first.data))
+    return leaves
 
 
 def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:

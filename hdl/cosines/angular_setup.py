@@ -36,9 +36,9 @@ class AngularSetupUnit(PipelinedUnit):
     =================== == == == == == ==
     initiation interval 1  2  3  4  5  6
     =================== == == == == == ==
-    latency             59 60 62 67 71 64
+    latency             53 54 55 58 58 59
     multipliers         26 13 9  7  6  5
-    by arccos: latency  59 60 63 63 66 66
+    by arccos: latency  53 54 56 59 59 58
     multipliers         23 13 9  8  7  6
     =================== == == == == == ==
 
@@ -73,7 +73,7 @@ class AngularSetupUnit(PipelinedUnit):
         self.parameters = p = parameters or AngularSetup()
         products = 26 if p.angle == "half_chord" else 21
         interval = checked_interval(initiation_interval, products, 6)
-        self._graph = Dataflow(interval, products)
+        self._graph = Dataflow(interval)
         self._words = self._describe()
         super().__init__(
             data.StructLayout(
@@ -116,7 +116,7 @@ class AngularSetupUnit(PipelinedUnit):
             g.input(name, lambda operands, name=name: operands[name])
             for name in ("normal_left", "normal_right", "vector", "length")
         )
-        sums = shared_sums(g, 5, COMPONENT * COMPONENT)
+        sums = shared_sums(g, COMPONENT * COMPONENT)
         pairs = ((left, left), (right, right), (left, right), (left, vector), (right, vector))
         square_left, square_right, cross, dot_left, dot_right = (
             dot(g, f"dot_{k}", a, b, sums) for k, (a, b) in enumerate(pairs)
@@ -186,7 +186,7 @@ class AngularSetupUnit(PipelinedUnit):
 
         cosine = g.register("cosine_exact", exact, cross)
         cosine = g.register("cosine_rounded", lambda cosine: cosine.round_half_up(16), cosine)
-        functional_unit = g.share("arccos", 1, [FixedShape(Arccos.OPERAND_FORMAT)], unit.latency, arccos)
+        functional_unit = g.share("arccos", [FixedShape(Arccos.OPERAND_FORMAT)], unit.latency, arccos)
         radians = g.use(
             functional_unit,
             "radians_exact",
@@ -286,7 +286,7 @@ class AngularSetupUnit(PipelinedUnit):
             "psi_rounded", lambda psi: FixedValue(p.ANGLE_FORMAT, psi).round_half_up(18), leading
         )
         leading = g.register("psi_leading", lambda psi: psi.saturate(p.MANTISSA_FORMAT), leading)
-        reciprocal, step_shift = reciprocal_words(g, length, since=leading.stage - 4)
+        reciprocal, step_shift = reciprocal_words(g, length, since=angle)
         if p.angle == "half_chord":
             step_shift = g.register("step_shift", lambda a, b: (a + b)[:5], step_shift, shift)
         else:

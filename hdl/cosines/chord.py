@@ -53,7 +53,7 @@ def chord(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]
     else:
         difference = graph.register(f"{name}_difference", lambda a: subtract(a, b()), a)
     far = graph.register(f"{name}_far", is_far, difference)
-    operand = graph.register(f"{name}_operand", halved, difference)
+    operand = graph.wire(f"{name}_operand", halved, difference)
     square = dot(graph, f"{name}_square", operand, lambda v: v)
     square = graph.register(f"{name}_aligned", aligned, square, far)
     return graph.register(name, lambda square: square.scale(-1).saturate(Chord.FORMAT), square)
@@ -62,7 +62,7 @@ def chord(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]
 class ChordUnit(PipelinedUnit):
     """Half the squared chord ``u = |a - b|^2 / 2`` of two unit vectors; `Chord` is the bit-accurate model.
 
-    Latency 11 cycles (difference, halving, operand, four for the product, two sums, alignment, saturation),
+    Latency 8 cycles (difference, operand, two for the product, two sums, alignment, saturation),
     initiation interval 1. Three multipliers of 18x18 bits.
 
     Parameters
@@ -82,7 +82,7 @@ class ChordUnit(PipelinedUnit):
 
     def __init__(self, parameters: Chord | None = None):
         self.parameters = parameters or Chord()
-        self._graph = graph = Dataflow(1, 3)
+        self._graph = graph = Dataflow(1)
         a, b = (graph.input(name, lambda operands, name=name: operands[name]) for name in "ab")
         u = chord(graph, "u", a, b)
         self._result = u

@@ -42,7 +42,7 @@ class ChordSetupUnit(PipelinedUnit):
 
     `ChordSetup` is the bit-accurate model; it has formats and error bounds.
 
-    One product of a span, 3 of each u and 2 of each f share multipliers of 18x18 bits, 3 for one light and an
+    One product of a span, 3 of each u and 2 of each f share multipliers of 18x18 bits, 2 for one light and an
     initiation interval of 3; the attribute ``multipliers`` tells. Without highlights a light has 2 products.
     Beats come at any distance from the interval on. A table of ``2^(length_bits - 1)`` words of 17 bits holds
     the reciprocals. The attribute ``latency`` depends on how the products share the multipliers.
@@ -88,8 +88,8 @@ class ChordSetupUnit(PipelinedUnit):
         self.highlights = highlights
         self.lights = lights
         self.length_bits = checked_length_bits(length_bits)
-        self._graph = Dataflow(initiation_interval, 1 + (5 if highlights else 2) * lights, spaced=True)
-        self._shifters = shared_shifters(self._graph, (4 if highlights else 2) * lights, self.parameters)
+        self._graph = Dataflow(initiation_interval, spaced=True)
+        self._shifters = shared_shifters(self._graph, self.parameters)
         self._results = self._describe()
         self.multipliers = self._graph.multiplier.count
         values = span_values_shape(lights, highlights)
@@ -172,8 +172,8 @@ class ChordSetupUnit(PipelinedUnit):
         return result
 
 
-def shared_shifters(graph: Dataflow, uses: int, parameters: ChordSetup) -> FunctionalUnit:
-    """Shifters for so many differences, two of each quadratic; see `difference_words`."""
+def shared_shifters(graph: Dataflow, parameters: ChordSetup) -> FunctionalUnit:
+    """Shifters of the differences, two uses a quadratic; see `difference_words`."""
     format = parameters.shifted_format
 
     def shift(register, value, amount):
@@ -183,7 +183,7 @@ def shared_shifters(graph: Dataflow, uses: int, parameters: ChordSetup) -> Funct
         shifted = register(FixedValue(format, Value.cast(coarse) >> fine), "shifted")
         return register(shifted.round_half_up(parameters.fraction_bits).wrap(parameters.format), "rounded")
 
-    return graph.share("shifter", uses, (FixedShape(format), unsigned(5)), 3, shift)
+    return graph.share("shifter", (FixedShape(format), unsigned(5)), 3, shift)
 
 
 def step_words(

@@ -33,7 +33,7 @@ class ChordValuesUnit(PipelinedUnit):
     """``f = N·L`` and ``u = |N - H|^2 / 2`` of a unit normal; `ChordValues` is the bit-accurate model.
 
     Six products a light, three without highlights, share multipliers of 18x18 bits: ``ceil(6 lights / I)`` of
-    them, I the initiation interval, or one or two more. With I = 1 the latency is 12 cycles. Beats come at
+    them, I the initiation interval, or one or two more. With I = 1 the latency is 9 cycles. Beats come at
     any distance from I on.
 
     Parameters
@@ -70,7 +70,7 @@ class ChordValuesUnit(PipelinedUnit):
         self.parameters = p = parameters or ChordValues()
         self.lights = lights
         self.highlights = highlights
-        self._graph = g = Dataflow(initiation_interval, (6 if highlights else 3) * lights, spaced=True)
+        self._graph = g = Dataflow(initiation_interval, spaced=True)
         normal = g.input("normal", lambda operands: operands)
         self._words = []
         for i in range(lights):

@@ -26,7 +26,7 @@ class HalfChordUnit(PipelinedUnit):
     =================== == == == == == ==
     initiation interval 1  2  3  4  5  6
     =================== == == == == == ==
-    latency             35 38 37 36 36 40
+    latency             25 28 26 27 26 32
     multipliers         6  3  2  2  2  1
     =================== == == == == == ==
 
@@ -55,7 +55,7 @@ class HalfChordUnit(PipelinedUnit):
     def __init__(self, parameters: HalfChord | None = None, *, initiation_interval: int | None = None):
         self.parameters = parameters or HalfChord()
         interval = checked_interval(initiation_interval, 6)
-        self._graph = Dataflow(interval, 6)
+        self._graph = Dataflow(interval)
         self._angle = self._describe()
         super().__init__(
             data.StructLayout(

@@ -44,7 +44,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
     =================== === === === === ===
     initiation interval 1   2   4   8   46
     =================== === === === === ===
-    latency             141 144 156 172 282
+    latency             112 121 126 138 225
     multipliers         46  23  12  6   1
     shifters            18  9   5   3   1
     =================== === === === === ===
@@ -84,14 +84,12 @@ class RecurrenceSetupUnit(PipelinedUnit):
     ):
         self.parameters = p = parameters or RecurrenceSetup()
         self.lights = lights
-        self._graph = g = Dataflow(initiation_interval, 14 + 32 * lights)
-        self.multipliers = g.multiplier.count
+        self._graph = g = Dataflow(initiation_interval)
         self._shifted = p.steps.curvature_format
-        self._shifter = g.share(
-            "shifter", 18 * lights, (FixedShape(self._shifted), unsigned(_SHIFT_BITS)), 2, self._shift
-        )
-        self.shifters = self._shifter.count
+        shapes = FixedShape(self._shifted), unsigned(_SHIFT_BITS)
+        self._shifter = g.share("shifter", shapes, 2, self._shift)
         self._results = self._describe()
+        self.multipliers, self.shifters = g.multiplier.count, self._shifter.count
         super().__init__(
             span_normals_shape(),
             recurrence_starts_shape(p, lights),

@@ -64,7 +64,7 @@ class SpanLimitUnit(PipelinedUnit):
     def __init__(self, parameters: SpanLimit | None = None, *, highlights: bool = True):
         self.parameters = parameters or SpanLimit()
         self.highlights = highlights
-        self._graph = g = Dataflow(3, 3, spaced=True)
+        self._graph = g = Dataflow(3, spaced=True)
         left, right = (
             g.input(name, lambda operands, name=name: operands[name])
             for name in ("normal_left", "normal_right")

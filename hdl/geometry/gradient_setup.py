@@ -67,9 +67,9 @@ class GradientSetupUnit(PipelinedUnit):
     def __init__(self, initiation_interval: int = 4):
         if initiation_interval < 4:
             raise ValueError(f"initiation_interval must be at least 4, not {initiation_interval}")
-        self._graph = graph = Dataflow(initiation_interval, 12)
-        self.multipliers = graph.multiplier.count
+        self._graph = Dataflow(initiation_interval)
         self._results = self._describe()
+        self.multipliers = self._graph.multiplier.count
         super().__init__(
             attribute_shape(),
             gradient_shape(),
@@ -103,9 +103,7 @@ class GradientSetupUnit(PipelinedUnit):
         at_knee = wide_product(
             g, "at_knee", along, knee, p.PRODUCT_LOW, PlaneSetup.HEIGHT_LOW, point, lambda value: value
         )
-        rise = g.register(
-            "rise", lambda a, b: (b - a).extend(SQ(3, point)), first, middle, since=at_knee.stage
-        )
+        rise = g.register("rise", lambda a, b: (b - a).extend(SQ(3, point)), first, middle, since=at_knee)
         across = g.register("across", lambda a, b: (a - b).saturate(p.PRODUCT_FORMAT), rise, at_knee)
         inward = wide_product(
             g, "inward_word", across, width, p.PRODUCT_LOW, p.WIDTH_LOW, point, p.PRODUCT_FORMAT
@@ -118,7 +116,7 @@ class GradientSetupUnit(PipelinedUnit):
         shifter = self._shifter()
         part = g.use(shifter, "part_shifted", (part, column_shift), self._to_shift)
         row, step = (
-            g.use(shifter, name, (word, shift), self._to_shift, since=part.stage)
+            g.use(shifter, name, (word, shift), self._to_shift, since=part)
             for name, word, shift in (("row", along, row_shift), ("step", inward, column_shift))
         )
         short = g.register("short", lambda a, b, right: _either(right, a + b, a - b), row, part, right)
@@ -160,7 +158,7 @@ class GradientSetupUnit(PipelinedUnit):
             shifted = register((coarse >> fine)[:bits].as_signed(), "shifted")
             return register(FixedValue(format, ((shifted + 1) >> 1)[: format.width]), "rounded")
 
-        return self._graph.share("shifter", 3, (signed(bits), unsigned(PlaneSetup.SHIFT_BITS)), 3, shift)
+        return self._graph.share("shifter", (signed(bits), unsigned(PlaneSetup.SHIFT_BITS)), 3, shift)
 
     @staticmethod
     def _to_shift(value: FixedValue, amount: Value):
@@ -188,7 +186,7 @@ class GradientSetupUnit(PipelinedUnit):
             )
             return register(total, "digit")
 
-        digits = g.share("digit", 4, (wide, wide, unsigned(2), unsigned(2)), 1, digit)
+        digits = g.share("digit", (wide, wide, unsigned(2), unsigned(2)), 1, digit)
         total = None
         for k in range(4):
             low = slice(2 * k, 2 * k + 2)
@@ -205,7 +203,7 @@ class GradientSetupUnit(PipelinedUnit):
             lambda step, n: Array([Const(0, signed(1)), step, step << 1, -step])[n],
             g.wire("step_cut", cut, step),
             g.wire("n_above", lambda n: n[8:10], n),
-            since=total.stage,
+            since=total,
         )
         begin = g.register(
             "begin",

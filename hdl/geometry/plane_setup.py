@@ -58,9 +58,9 @@ class PlaneSetupUnit(PipelinedUnit):
 
     def __init__(self, grid: Grid = GRID, initiation_interval: int = 16):
         self.grid = grid
-        self._graph = graph = Dataflow(initiation_interval, 7)
-        self.multipliers = graph.multiplier.count
+        self._graph = Dataflow(initiation_interval)
         self._results = self._describe()
+        self.multipliers = self._graph.multiplier.count
         super().__init__(
             data.StructLayout(plane_corners_shape(grid) | {"right": unsigned(1)}),
             data.StructLayout(scales_shape() | {"sliver": unsigned(1)}),
@@ -95,7 +95,7 @@ class PlaneSetupUnit(PipelinedUnit):
             return data.View(shifted, register(Cat(word, *reversed(moved)), "shifted"))
 
         shifted = data.StructLayout({"word": unsigned(bits), "places": unsigned(6)})
-        shifter = g.share("shifter", 2, (unsigned(bits),), 2, normalise)
+        shifter = g.share("shifter", (unsigned(bits),), 2, normalise)
         top = g.use(shifter, "height_moved", (height,), lambda h: (Cat(Const(0, grid.bits), h),))
         wide = g.use(shifter, "area_moved", (area,), lambda a: (a,))
         # Both stand for one cycle, and are needed for longer.
@@ -115,7 +115,7 @@ class PlaneSetupUnit(PipelinedUnit):
             knee,
             top,
         )
-        table = shared_table(g, 2, lambda: self._module)
+        table = shared_table(g, lambda: self._module)
         of_height = reciprocal_word(g, table, "height_reciprocal", d)
         of_area = reciprocal_word(g, table, "area_reciprocal", g.wire("area_mantissa", mantissa, wide))
         short = g.wire("height_mantissa", lambda d: d.truncate(p.HEIGHT_FORMAT.fraction_bits), d)

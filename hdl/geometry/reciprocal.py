@@ -18,15 +18,13 @@ def _row_shape() -> data.StructLayout:
     return data.StructLayout({name: FixedShape(format) for name, format in formats.items()})
 
 
-def shared_table(graph: Dataflow, uses: int, module: Callable[[], Module]) -> FunctionalUnit:
-    """The table of `Reciprocal`, read so many times.
+def shared_table(graph: Dataflow, module: Callable[[], Module]) -> FunctionalUnit:
+    """The table of `Reciprocal`.
 
     Parameters
     ----------
     graph : Dataflow
         Graph that gets it.
-    uses : int
-        Reciprocals of a beat.
     module : callable
         The module that gets the table, when it is made.
     """
@@ -41,7 +39,7 @@ def shared_table(graph: Dataflow, uses: int, module: Callable[[], Module]) -> Fu
         m.d.comb += port.addr.eq(address)
         return register(port.data, "row")
 
-    return graph.share("table", uses, (unsigned(Reciprocal.SEGMENT_BITS),), 2, make)
+    return graph.share("table", (unsigned(Reciprocal.SEGMENT_BITS),), 2, make)
 
 
 def reciprocal_word(graph: Dataflow, table: FunctionalUnit, name: str, x: Word) -> Word:

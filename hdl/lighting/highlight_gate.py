@@ -27,7 +27,7 @@ class HighlightGateUnit(PipelinedUnit):
     =================== == == == == == == == == == == == == == == ==
     initiation interval 1  2  3  4  5  6  7  8  9  10 11 12 13 14 15
     =================== == == == == == == == == == == == == == == ==
-    latency             25 29 28 26 31 29 26 30 32 34 36 37 33 28 49
+    latency             19 23 23 24 20 21 23 28 30 31 27 24 25 25 47
     multipliers         15 8  5  4  3  3  3  2  2  2  2  2  2  2  1
     =================== == == == == == == == == == == == == == == ==
 
@@ -81,7 +81,7 @@ class HighlightGateUnit(PipelinedUnit):
         self.lights, self.exponent, self.takes_threshold = lights, exponent, takes_threshold
         count = 3 + 12 * lights
         interval = checked_interval(initiation_interval, count, 6)
-        self._graph = Dataflow(interval, count)
+        self._graph = Dataflow(interval)
         self._lit = self._describe()
         normal = data.ArrayLayout(FixedShape(p.component_format), 3)
         constants = {"halfway": data.ArrayLayout(normal, lights)}
@@ -122,7 +122,7 @@ class HighlightGateUnit(PipelinedUnit):
             for name in ("normal_left", "normal_right")
         )
 
-        sums = shared_sums(g, 1 + 2 * self.lights, p.component_format * p.component_format)
+        sums = shared_sums(g, p.component_format * p.component_format)
         one = FixedValue.constant(p.one_squared.format, p.one_squared.values.item())
         difference = g.register(
             "difference", lambda cosine: one - cosine, dot(g, "cosine", left, right, sums)
@@ -174,7 +174,7 @@ class HighlightGateUnit(PipelinedUnit):
             f"total_{index}",
             lambda partial, x: (partial - (Value.cast(x) << 2))[: 2 * f + 3].as_signed(),
             partial,
-            multiply("a_b", a, b, since=partial.stage),
+            multiply("a_b", a, b, since=partial),
         )
         exceeded = g.register(f"exceeded_{index}", lambda w: w[-1] | ~w[f + 2 :].any(), total)
         slack = g.register(f"slack_{index}", lambda w: w[f + 2 :][:f], total)
@@ -185,7 +185,7 @@ class HighlightGateUnit(PipelinedUnit):
             f"absolute_difference_{index}", lambda minus: Mux(minus[-1], -minus, minus)[:f], minus
         )
         product = multiply("u_slack", u, slack)
-        square = multiply("square", span, span, since=product.stage)
+        square = multiply("square", span, span, since=product)
         bright = g.register(
             f"bright_{index}",
             lambda x: Value.cast(x) >= (self._threshold << f),

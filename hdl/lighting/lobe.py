@@ -128,10 +128,10 @@ class LobeUnit(PipelinedUnit):
     Table, formats and error bounds are those of `Lobe`, the bit-accurate model.
 
     With an initiation interval of 1 the latency is 8 cycles: one minus, saturation, leading one, shift, word,
-    register, product, sum. A longer interval takes 4 more: the input has a register, and the multiplier has
-    registers all around (`registered_product`). At every interval there is one multiplier of 18 by 18 bits. A
-    beat that is dark, or whose N·H is not positive, works as if its argument were 0: from one to the next
-    nothing toggles but the input and the first registers.
+    register, product, sum. A longer interval takes 2 more: the input has a register, and the multiplier has
+    registers for its operands and its product (`registered_product`). At every interval there is one
+    multiplier of 18 by 18 bits. A beat that is dark, or whose N·H is not positive, works as if its argument
+    were 0: from one to the next nothing toggles but the input and the first registers.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ class LobeUnit(PipelinedUnit):
         if tables is not None and shares_memory:
             raise ValueError("a unit that shares a memory has no tables of its own")
         self.tables, self.shares_memory = _checked(p, tables), shares_memory
-        self._graph = Dataflow(initiation_interval, int(initiation_interval > 1))
+        self._graph = Dataflow(initiation_interval)
         self._read = lobe_read_signature(p).create(path=("table",))
         self._result = self._describe()
         ports = {}
@@ -248,7 +248,7 @@ class LobeUnit(PipelinedUnit):
         argument = g.register("argument", limited, argument, lit)
         zeros = g.register("zeros", lambda code: _leading_zeros(code[bits - p.octaves :]), argument)
         shapes = unsigned(len(self._read.address)), unsigned(p.fraction_format.width)
-        memory = g.share("memory", 1, shapes, 1, self._look_up)
+        memory = g.share("memory", shapes, 1, self._look_up)
         return self._interpolate(g.use(memory, "word", (argument, zeros), place), lit)
 
     def _look_up(self, register: Callable[[Any, str], Any], address: Value, fraction: Value) -> Value:

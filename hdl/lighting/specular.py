@@ -118,19 +118,19 @@ class SpecularUnit(PipelinedUnit):
     With an initiation interval I of 1 the latency is 7 cycles (difference from 1, saturation, shift,
     saturation, product, base, square), and each of M products has a multiplier: 17 by 17 bits, 17 by 11 and
     14 by 11 in the chords of ``coscos``, 13 by 11 in those of ``exp``. With a longer interval the products
-    share ``ceil(M / I)`` multipliers of 18 by 18 bits. A product then takes four cycles more, for its
+    share ``ceil(M / I)`` multipliers of 18 by 18 bits. A product then takes two cycles more, for its
     operands and the registers around the multiplier (`registered_product`), and the cycles until its slot.
 
     ============= = ===== == == == == =====================================================
     model         M I = 1 2  3  4  6  beside slope and square
     ============= = ===== == == == == =====================================================
-    line, squared 2 7     17 17 16 17
-    lyon2         3 8     21 24 21 24 a square
-    lyon3         4 9     27 26 27 31 two squares
-    exp           2 9     19 19 18 19 64 words of 32 bits and a shift, no square
-    coscos2       5 11    28 29 28 31 a product, 128 words of 36 bits, 64 of 33, and chords
-    coscos4       6 12    33 35 33 38 those and a square
-    as published  1 8     13 13 13 13 the slope's multiplier is of 18 by 17 bits, never shared
+    line, squared 2 7     13 12 13 12
+    lyon2         3 8     15 16 18 15 a square
+    lyon3         4 9     19 19 23 19 two squares
+    exp           2 9     15 14 15 14 64 words of 32 bits and a shift, no square
+    coscos2       5 11    20 21 21 21 a product, 128 words of 36 bits, 64 of 33, and chords
+    coscos4       6 12    23 24 25 24 those and a square
+    as published  1 8     11 11 11 11 the slope's multiplier is of 18 by 17 bits, never shared
     ============= = ===== == == == == =====================================================
 
     Slope and PROM cost the same as in a `SlopeUnit`.
@@ -181,8 +181,7 @@ class SpecularUnit(PipelinedUnit):
             raise ValueError("a unit with an exponent of its own shares no slope")
         self.exponent, self.shares_slope = exponent, shares_slope
         self._multiplies_slope = exponent is None and not p.as_published
-        count = self.multiplications(p, exponent)
-        self._graph = Dataflow(initiation_interval, count if initiation_interval > 1 else 0)
+        self._graph = Dataflow(initiation_interval)
         self._result = self._describe()
         constants = None
         if shares_slope:

@@ -1,6 +1,7 @@
 """The chord method: forward differences of N·L and of half the squared chord from N to H."""
 
 import enum
+from collections.abc import Iterable, Sequence
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, fifo, stream, wiring
@@ -10,9 +11,9 @@ from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
-from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
-from blysk.hdl.core.stream import FIFO_LATENCY, SLICE_LATENCY, connect, connect_slice
+from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_slice, pass_beside
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape, span_values_shape
 from blysk.hdl.cosines.chord_values import ChordValuesUnit, light_values_shape
 from blysk.hdl.cosines.span_limit import SpanLimitUnit, octave_limit
@@ -24,8 +25,8 @@ from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 __all__ = ["ChordAccumulatorUnit", "ChordInterpolatorUnit", "ChordSpansUnit"]
 
 
-def least_highlight(m: Module, name: str, values: data.View) -> Value:
-    """`SpanLimit.least` of three values of u, one clock after them.
+def least_highlight(m: Module, name: str, values: Sequence[FixedValue]) -> Value:
+    """`SpanLimit.least` of three values of u, two cycles after them.
 
     Parameters
     ----------
@@ -33,14 +34,17 @@ def least_highlight(m: Module, name: str, values: data.View) -> Value:
         Module that gets the registers.
     name : str
         Common part of their names.
-    values : data.View
+    values : sequence of FixedValue
         u at the first pixel, in the middle and at the last pixel.
     """
     left, middle, right = (value.as_value() for value in values)
     smaller = Signal.like(left, name=f"smaller_{name}", reset_less=True)
     bulge = Signal(signed(len(left) + 2), name=f"bulge_{name}", reset_less=True)
     m.d.sync += [smaller.eq(Mux(left < right, left, right)), bulge.eq(left + right - (middle << 1))]
-    return (smaller << 1) - Mux(bulge > 0, bulge, 0)
+    least = (smaller << 1) - Mux(bulge > 0, bulge, 0)
+    result = Signal.like(least, name=f"least_{name}", reset_less=True)
+    m.d.sync += result.eq(least)
+    return result
 
 
 class ChordAccumulatorUnit(AccumulatorUnit):
@@ -150,9 +154,9 @@ class ChordSpansUnit(wiring.Component):
         self.multipliers = self._setup.multipliers
         gated = gate is not None
         self._accumulator = ChordAccumulatorUnit(parameters, lights, highlights=highlights, gated=gated)
-        self.latency = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
+        self.latency = self._setup.latency + self._accumulator.latency
         waits = FIFO_LATENCY + (gate.latency if gate else 0)
-        self.short_latency = waits + SLICE_LATENCY + self._accumulator.latency
+        self.short_latency = waits + self._accumulator.latency
         output = operands_shape(parameters, lights, highlights=highlights, gated=gated)
         super().__init__(
             {
@@ -174,19 +178,19 @@ class ChordSpansUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """FIFO of starts beside the setup; a register slice before the accumulators."""
+        """FIFO of starts beside the setup, and the accumulators."""
         m = Module()
         m.submodules.chord_setup = setup = self._setup
         m.submodules.chord_accumulator = accumulator = self._accumulator
         span = self.i.payload
         functions = span["values"][0].shape().members
-        joined = stream.Signature(accumulator.i.payload.shape()).create(path=("joined",))
+        joined = accumulator.i
         start_shape = data.StructLayout(
             {"start": joined.payload.start.shape(), "length": span.length.shape(), "long": 1}
         )
         # As many starts as may follow a span that has just begun its setup, or come before it: its values may
         # take an interval, in which none comes.
-        depth = setup.latency + setup.initiation_interval + FIFO_LATENCY
+        depth = setup.latency + setup.initiation_interval + FIFO_LATENCY + 1
         m.submodules.starts = starts = fifo.SyncFIFOBuffered(width=start_shape.size, depth=depth)
         decided, gate_ready = Signal(init=1), Signal(init=1)
         if self._gate is not None:
@@ -194,6 +198,9 @@ class ChordSpansUnit(wiring.Component):
         else:
             m.d.comb += [decided.eq(1), gate_ready.eq(1)]
         given, taken = Signal(start_shape, name="given"), Signal(start_shape, name="taken")
+        # A register, so that no comparison of the level is between the handshakes.
+        room = Signal(name="room", init=1)
+        m.d.sync += room.eq(starts.level < depth - 1)
         m.d.comb += [
             given.length.eq(span.length),
             given.long.eq(self.long),
@@ -203,10 +210,10 @@ class ChordSpansUnit(wiring.Component):
                 for name in functions
             ),
             starts.w_data.eq(given),
-            starts.w_en.eq(self.i.valid & gate_ready & (setup.i.ready | ~given.long)),
+            starts.w_en.eq(self.i.valid & gate_ready & room & (setup.i.ready | ~given.long)),
             setup.i.payload.eq(span),
-            setup.i.valid.eq(self.i.valid & gate_ready & starts.w_rdy & given.long),
-            self.i.ready.eq(starts.w_rdy & gate_ready & (setup.i.ready | ~given.long)),
+            setup.i.valid.eq(self.i.valid & gate_ready & room & given.long),
+            self.i.ready.eq(room & gate_ready & (setup.i.ready | ~given.long)),
             taken.eq(starts.r_data),
             joined.payload.start.eq(taken.start),
             joined.payload.length.eq(taken.length),
@@ -216,7 +223,6 @@ class ChordSpansUnit(wiring.Component):
             setup.o.ready.eq(joined.ready & starts.r_rdy & decided & taken.long),
             self.out_of_range.eq(setup.o.valid & setup.o.ready & setup.o.payload.out_of_range),
         ]
-        connect_slice(m, joined, accumulator.i)
         connect(m, accumulator.o, wiring.flipped(self.o))
         return m
 
@@ -260,7 +266,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
     `ChordInterpolator` is the bit-accurate model. A span of k pixels takes ``min(k, 3)`` turns of the values,
     each ``setup_interval / 3`` cycles, and k cycles of the accumulators; both go on side by side, so that
     spans of any length leave a pixel in every cycle at a setup interval of 3. No multiplier a pixel; the
-    attribute ``multipliers`` tells how many there are: 10 for one light and an interval of 3.
+    attribute ``multipliers`` tells how many there are: 9 for one light and an interval of 3.
 
     The first pixel of a span of three or more comes `latency` cycles after the span, that of a shorter one
     earlier.
@@ -349,9 +355,12 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         m.submodules.span_limit = limit = self._limit
         m.submodules.chord_spans = spans = self._spans
         tag = data.StructLayout({"place": unsigned(2), "length": unsigned(self.length_bits)})
-        m.submodules.tags = tags = fifo.SyncFIFOBuffered(width=tag.size, depth=values.latency + FIFO_LATENCY)
-        self._send(m, values, limit, tags, tag)
-        self._collect(m, values, limit, tags, tag, spans)
+        sent, collected = Signal(tag, name="sent"), Signal(tag, name="collected")
+        accepted, taken = values.i.valid & values.i.ready, values.o.valid & values.o.ready
+        # One beat more may wait in the skid buffer.
+        m.d.comb += collected.eq(pass_beside(m, "tags", sent, accepted, taken, values.latency + 1))
+        self._send(m, values, limit, sent)
+        self._collect(m, values, limit, collected, spans)
         connect(m, spans.o, wiring.flipped(self.o))
         m.d.comb += [values.constants.eq(self.light_vectors), self.out_of_range.eq(spans.out_of_range)]
         if self.highlights:
@@ -362,25 +371,23 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
             )
         return m
 
-    def _send(self, m: Module, values, limit, tags, tag) -> None:
+    def _send(self, m: Module, values, limit, word) -> None:
         """Normals of a span: the first as the span is accepted, those that follow from registers."""
         span = self.i.payload
         right, middle = Signal.like(span.normal_right), Signal.like(span.normal_middle)
         length, following = Signal.like(span.length), Signal(2)
-        word, long = Signal(tag, name="word"), Signal()
+        long = Signal()
         idle = following == _Place.PIXEL
-        takes, sends = Signal(), Signal()
+        takes = Signal()
         m.d.comb += [
             long.eq(span.length > 2),
-            takes.eq(values.i.ready & tags.w_rdy & (limit.i.ready | ~long)),
+            # The limit is ready again before the last normal of a long span is sent.
+            takes.eq(values.i.ready & limit.i.ready),
             self.i.ready.eq(idle & takes),
-            limit.i.valid.eq(self.i.valid & idle & long & values.i.ready & tags.w_rdy),
+            limit.i.valid.eq(self.i.valid & idle & long & values.i.ready),
             limit.i.payload.normal_left.eq(span.normal_left),
             limit.i.payload.normal_right.eq(span.normal_right),
-            sends.eq(Mux(idle, self.i.valid & (limit.i.ready | ~long), 1)),
-            values.i.valid.eq(sends & tags.w_rdy),
-            tags.w_en.eq(sends & values.i.ready),
-            tags.w_data.eq(word),
+            values.i.valid.eq(Mux(idle, self.i.valid & limit.i.ready, 1)),
         ]
         with m.If(idle):
             m.d.comb += [
@@ -408,29 +415,26 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
             with m.Else():
                 m.d.sync += following.eq(_Place.PIXEL)
 
-    def _collect(self, m: Module, values, limit, tags, tag, spans) -> None:
+    def _collect(self, m: Module, values, limit, word, spans) -> None:
         """Values of a pixel, or of three places, as a span; and the flag of wide spans."""
         limited = limit.o
         if self.setup_interval > limit.initiation_interval:
             # Its result is there before the middle values, and must not keep the next span out.
             limited = limit.o.signature.create(path=("limited",))
             connect_slice(m, limit.o, limited)
-        word = Signal(tag, name="collected")
         left, right = (Signal.like(values.o.payload, name=f"values_{side}") for side in ("left", "right"))
         is_pixel, is_middle = word.place == _Place.PIXEL, word.place == _Place.MIDDLE
         complete = Signal()
         m.d.comb += [
-            word.eq(tags.r_data),
             complete.eq(is_pixel | (is_middle & limited.valid)),
-            spans.i.valid.eq(values.o.valid & tags.r_rdy & complete),
+            spans.i.valid.eq(values.o.valid & complete),
             spans.i.payload.length.eq(word.length),
             spans.long.eq(is_middle),
-            values.o.ready.eq(tags.r_rdy & Mux(is_pixel | is_middle, complete & spans.i.ready, 1)),
-            tags.r_en.eq(values.o.valid & values.o.ready),
-            limited.ready.eq(values.o.valid & tags.r_rdy & is_middle & spans.i.ready),
+            values.o.ready.eq(Mux(is_pixel | is_middle, complete & spans.i.ready, 1)),
+            limited.ready.eq(values.o.valid & is_middle & spans.i.ready),
         ]
         for place, side in ((_Place.LEFT, left), (_Place.RIGHT, right)):
-            with m.If(values.o.valid & tags.r_rdy & (word.place == place)):
+            with m.If(values.o.valid & (word.place == place)):
                 m.d.sync += side.eq(values.o.payload)
         given = spans.i.payload["values"]
         for i, light in enumerate(values.o.payload):
@@ -441,17 +445,30 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
                     given[i][name][1].eq(light[name]),
                     given[i][name][2].eq(right[i][name]),
                 ]
-        self._flag(m, spans.i, limited.payload)
+        # Of long spans, whose first value is in its register.
+        self._flag(m, spans.i, limited.payload, zip(left, values.o.payload, right, strict=True))
 
-    def _flag(self, m: Module, spans: stream.Interface, limited: data.View) -> None:
-        """Whether a span is wide, as it is complete: its angle, and where a highlight may be."""
-        p, given = self._limit.parameters, spans.payload["values"]
-        wide, wide_if_lit = Signal(), Signal()
+    def _flag(self, m: Module, spans: stream.Interface, limited: data.View, places: Iterable) -> None:
+        """Whether a span is wide, as it is complete: its angle, and where a highlight may be.
+
+        Parameters
+        ----------
+        m : Module
+            Module that gets the logic.
+        spans : stream.Interface
+            Complete spans.
+        limited : data.View
+            Output of the span limit.
+        places : iterable of tuple of data.View
+            Of each light the values at the first pixel, in the middle and at the last pixel.
+        """
+        p = self._limit.parameters
+        wide, wide_if_lit = Signal(2), Signal(2)
         long = spans.payload.length >= p.SHORTEST
         fires = spans.valid & spans.ready & long
         m.d.sync += [
-            wide.eq(fires & limited.wide),
-            wide_if_lit.eq(fires & limited.wide_if_lit),
+            wide.eq(Cat(fires & limited.wide, wide[0])),
+            wide_if_lit.eq(Cat(fires & limited.wide_if_lit, wide_if_lit[0])),
         ]
         lit = []
         if self.highlights:
@@ -460,11 +477,13 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
                 m.d.sync += level.eq(self.threshold)
             else:
                 level = octave_limit(m, "level", self.exponent, p.levels)
-            for i, light in enumerate(given):
-                front = Signal(name=f"front_{i}")
+            for i, light in enumerate(places):
+                front = Signal(2, name=f"front_{i}")
                 behind = p.BEHIND.codes.item()
-                m.d.sync += front.eq(Cat(f.as_value() >= behind for f in light.diffuse).any())
-                lit.append(front & (least_highlight(m, f"{i}", light.highlight) < level.as_value()))
+                now = Cat(at.diffuse.as_value() >= behind for at in light).any()
+                m.d.sync += front.eq(Cat(now, front[0]))
+                least = least_highlight(m, f"{i}", [at.highlight for at in light])
+                lit.append(front[1] & (least < level.as_value()))
         wide_now = Signal()
-        m.d.sync += wide_now.eq(wide | (wide_if_lit & Cat(lit).any()))
+        m.d.sync += wide_now.eq(wide[1] | (wide_if_lit[1] & Cat(lit).any()))
         m.d.comb += self.wide.eq(wide_now)

@@ -42,8 +42,8 @@ def operands_shape(
 class LightProductsUnit(PipelinedUnit):
     """``N . L``, and ``N . H`` or half the squared chord, of a normal with L and H of every light.
 
-    `NormalInterpolator.products` is the bit-accurate model. With an initiation interval of 1 the latency is 7
-    cycles (operands, four for the products, two sums), with the chord 11. Six products a light, three without
+    `NormalInterpolator.products` is the bit-accurate model. With an initiation interval of 1 the latency is 5
+    cycles (operands, two for the products, two sums), with the chord 8. Six products a light, three without
     highlights, share ``ceil(6 lights / initiation_interval)`` multipliers of 18 by 18 bits.
 
     Parameters
@@ -80,7 +80,7 @@ class LightProductsUnit(PipelinedUnit):
         self.parameters = parameters = parameters or LinearInterpolator()
         self.lights = lights
         self.highlights = highlights
-        self._graph = graph = Dataflow(initiation_interval, (6 if highlights else 3) * lights)
+        self._graph = graph = Dataflow(initiation_interval)
         normal = graph.input("normal", lambda operands: operands)
         self._words = []
         for i in range(lights):

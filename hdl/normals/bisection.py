@@ -51,8 +51,8 @@ class BisectionUnit(PipelinedUnit):
     ======================== == ===== ===== ===== ===== ===== ===== ===== ===== =====
     variant                  s  1     2     3     4     5     6     7     8     9
     ======================== == ===== ===== ===== ===== ===== ===== ===== ===== =====
-    90 degrees               3  23, 9 25, 5 26, 3 28, 3 29, 2 27, 2 25, 2 25, 2 38, 1
-    45 degrees, degree 2     2  20, 8 21, 4 23, 3 25, 2 24, 2 23, 2 23, 2 29, 1
+    90 degrees               3  23, 9 25, 5 26, 3 24, 3 29, 2 27, 2 25, 2 25, 2 38, 1
+    45 degrees, degree 2     2  20, 8 22, 4 23, 3 25, 2 24, 2 23, 2 23, 2 29, 1
     45 degrees, degree 1     1  17, 7 19, 4 20, 3 21, 2 19, 2 20, 2 25, 1
     ======================== == ===== ===== ===== ===== ===== ===== ===== ===== =====
 
@@ -84,7 +84,7 @@ class BisectionUnit(PipelinedUnit):
         self.parameters = parameters or Bisection()
         steps = self.parameters.steps
         interval = checked_interval(initiation_interval, steps + 6, steps + 3)
-        self._graph = Dataflow(interval, steps + 6, low_latency=True)
+        self._graph = Dataflow(interval, low_latency=True)
         self._words = self._describe()
         super().__init__(
             data.StructLayout({"normal_a": normal_shape(), "normal_b": normal_shape()}),

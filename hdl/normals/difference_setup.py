@@ -42,7 +42,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     =========== == == == == == == ==
     interval    1  2  3  4  5  6  7
     =========== == == == == == == ==
-    latency     21 22 23 25 23 24 28
+    latency     17 18 18 20 21 21 24
     multipliers 7  4  3  2  2  2  1
     =========== == == == == == == ==
 
@@ -51,7 +51,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     =========== == == == == == == ==
     interval    1  2  3  4  5  6  7
     =========== == == == == == == ==
-    latency     13 15 16 16 16 16 16
+    latency     11 13 14 14 14 14 14
     multipliers 3  2  1  1  1  1  1
     =========== == == == == == == ==
 
@@ -60,7 +60,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     =========== == == == == == == == == ==
     interval    1  2  3  4  5  6  7  8  9
     =========== == == == == == == == == ==
-    latency     24 25 25 25 28 29 26 26 28
+    latency     20 21 23 22 25 23 22 22 29
     multipliers 9  5  3  3  2  2  2  2  1
     =========== == == == == == == == == ==
 
@@ -110,7 +110,7 @@ class DifferenceSetupUnit(PipelinedUnit):
         interval = checked_interval(initiation_interval, longest, uses)
         self._graph = Dataflow(interval)
         shapes = FixedShape(RECIPROCAL_FORMAT), FixedShape(COMPONENT), unsigned(5)
-        self._multiplier = self._graph.share("multiplier", uses, shapes, MULTIPLIER_LATENCY + 3, _multiply)
+        self._multiplier = self._graph.share("multiplier", shapes, MULTIPLIER_LATENCY + 3, _multiply)
         self._words = self._describe()
         coefficients = curve_shapes()
         if order == 1:

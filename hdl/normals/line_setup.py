@@ -64,7 +64,7 @@ class LineSetupUnit(PipelinedUnit):
     ):
         self.parameters = parameters or LineSetup()
         self.length_bits = checked_length_bits(length_bits)
-        self._graph = Dataflow(initiation_interval, 9)
+        self._graph = Dataflow(initiation_interval)
         self._words = self._describe()
         self.multipliers = self._graph.multiplier.count
         ends = dict.fromkeys(("normal_left", "normal_right"), vector_shape())
@@ -86,7 +86,7 @@ class LineSetupUnit(PipelinedUnit):
             g, length, reciprocal_table(p.RECIPROCAL_FORMAT), length_bits=self.length_bits
         )
         shapes = FixedShape(_SHIFTED), unsigned(4)
-        shifters = g.share("shifter", 3, shapes, 3, self._shift)
+        shifters = g.share("shifter", shapes, 3, self._shift)
         bits, words = p.LOW_FORMAT.width, {"start": left, "length": length}
 
         def half(format, which):

@@ -29,7 +29,7 @@ class MiddleNormalUnit(PipelinedUnit):
     =========== == == == == == == == == ==
     interval    1  2  3  4  5  6  7  8  9
     =========== == == == == == == == == ==
-    latency     36 37 40 39 40 40 40 44 52
+    latency     26 28 29 28 30 34 30 28 39
     multipliers 9  5  3  3  2  2  2  2  1
     =========== == == == == == == == == ==
 
@@ -59,7 +59,7 @@ class MiddleNormalUnit(PipelinedUnit):
     def __init__(self, parameters: MiddleNormal | None = None, *, initiation_interval: int | None = None):
         self.parameters = parameters or MiddleNormal()
         interval = checked_interval(initiation_interval, _MULTIPLICATIONS, 6)
-        self._graph = Dataflow(interval, _MULTIPLICATIONS)
+        self._graph = Dataflow(interval)
         self._words = self._describe()
         ends = {"normal_left": normal_shape(), "normal_right": normal_shape()}
         super().__init__(
@@ -119,7 +119,7 @@ class MiddleNormalUnit(PipelinedUnit):
         words = {"normal_left": left, "normal_right": right, "out_of_range": out_of_range}
         for c in range(3):
             half_sum = g.register(
-                f"half_sum_{c}", lambda a, b, c=c: (a[c] + b[c]).scale(-1), left, right, since=e.stage
+                f"half_sum_{c}", lambda a, b, c=c: (a[c] + b[c]).scale(-1), left, right, since=e
             )
             product = g.multiply(f"scaled_{c}", e, half_sum, right=_cut)
             middle = g.register(f"middle_sum_{c}", _corrected, half_sum, product)

@@ -119,7 +119,7 @@ def test_one_multiplier_a_light():
             "blinn_product": plain + 18 * lights,
         }
         if lights == 1:
-            assert multipliers["blinn"] == 17
+            assert multipliers["blinn"] == 16
 
 
 def test_rate_is_that_of_cosquad():

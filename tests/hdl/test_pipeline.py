@@ -105,9 +105,9 @@ def test_cycles(method, interval):
 @pytest.mark.parametrize(
     ("method", "latency", "interval"),
     [
-        pytest.param("quadratic", 94, 4, marks=pytest.mark.long),
-        pytest.param("renormalise", 66, 4, marks=pytest.mark.long),
-        ("chord", 58, 3),
+        pytest.param("quadratic", 72, 4, marks=pytest.mark.long),
+        pytest.param("renormalise", 57, 4, marks=pytest.mark.long),
+        ("chord", 47, 3),
     ],
 )
 def test_cycles_of_long_spans(method, latency, interval, lights):

@@ -1,8 +1,7 @@
 # amaranth: UnusedElaboratable=no
-"""Data-flow graphs: stages and slots by hand, and small units against NumPy, cycle by cycle."""
+"""Data-flow graphs: small units against NumPy, cycle by cycle."""
 
 import re
-from collections import Counter
 
 import numpy as np
 import pytest
@@ -25,8 +24,8 @@ INTERVALS = [1, 3, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 4, 5, 
 class GraphUnit(PipelinedUnit):
     """A unit that is a graph: ``describe`` gives its results, by name, each with its shape."""
 
-    def __init__(self, interval, describe, multiplications=0, spaced=False):
-        self.graph = Dataflow(interval, multiplications, spaced=spaced)
+    def __init__(self, interval, describe, spaced=False):
+        self.graph = Dataflow(interval, spaced=spaced)
         inputs = {
             name: self.graph.input(name, lambda operands, name=name: operands[name])
             for name in INPUTS.members
@@ -49,97 +48,6 @@ def beats_of(rng, count=200):
     ends = [-(2**17), 2**17 - 1]
     a[:4], b[:4] = np.repeat(ends, 2), np.tile(ends, 2)
     return {"a": a, "b": b, "n": rng.integers(0, 32, count)}
-
-
-# Ages by hand.
-
-
-@pytest.mark.parametrize(("interval", "first"), [(1, 0), (2, 1), (7, 1)])
-def test_earliest_ages(interval, first):
-    """An input is read from its register, or at once; a register takes one cycle, a multiplication five."""
-    g = Dataflow(interval, 1)
-    a, b = (g.input(name, lambda operands: operands) for name in "ab")
-    assert (a.stage, b.stage) == (first, first)
-    assert a.lifetime == interval
-    late = g.register("late", lambda a: a, g.register("once", lambda a: a, a))
-    assert late.stage == first + 2
-    both = g.register("both", lambda a, b: a + b, b, late)
-    assert both.stage == first + 3
-    product = g.multiply("product", late, both)
-    assert (product.stage, product.lifetime) == (first + 8, 1)
-    quick = Dataflow(interval, 1, low_latency=True)
-    a = quick.input("a", lambda operands: operands)
-    assert quick.multiply("product", a, a).stage == first + 2
-    table = g.look_up("table", [0] * 4, 3, late)
-    assert (table.stage, table.lifetime) == (first + 3, late.lifetime)
-
-
-def test_turns_by_hand():
-    """Three multiplications on one multiplier: the second and the third wait for a slot."""
-    g = Dataflow(3, 3)
-    assert g.multiplier.count == 1
-    a = g.input("a", lambda operands: operands)
-    stages = [g.multiply(f"product_{k}", a, a).stage for k in range(3)]
-    assert stages == [6, 7, 8]
-    # With two cycles there are two multipliers, and the third multiplication takes the first's next slot.
-    g = Dataflow(2, 3)
-    assert g.multiplier.count == 2
-    a = g.input("a", lambda operands: operands)
-    assert [g.multiply(f"product_{k}", a, a).stage for k in range(3)] == [6, 6, 7]
-
-
-@pytest.mark.parametrize("interval", [1, 2, 3, 4, 5, 6, 7, 11])
-@pytest.mark.parametrize("latency", [1, 3])
-def test_turns_never_collide(interval, latency):
-    """Random graphs: no instance has two uses in a slot, and no use waits a whole interval."""
-    rng = np.random.default_rng(interval)
-    for _ in range(50):
-        uses = int(rng.integers(1, 40))
-        g = Dataflow(interval)
-        functional_unit = g.share("functional_unit", uses, (unsigned(1),), latency, lambda register, a: a)
-        assert functional_unit.count == -(-uses // interval)
-        words = [g.input("a", lambda operands: operands)]
-        slots = Counter()
-        for k in range(uses):
-            operand = words[rng.integers(len(words))]
-            if rng.random() < 0.3:
-                operand = g.register(f"wait_{k}", lambda a: a, operand)
-            word = g.use(functional_unit, f"use_{k}", (operand,), lambda a: (a,))
-            issued = word.stage - 1 - latency
-            assert operand.stage <= issued < operand.stage + interval
-            slots[issued % interval] += 1
-            words.append(word)
-        assert max(slots.values()) <= functional_unit.count
-        assert sum(map(len, functional_unit.taken)) == uses
-
-
-@pytest.mark.parametrize("interval", [1, 2, 3, 5, 8])
-@pytest.mark.parametrize("latency", [1, 3])
-def test_slots_of_spaced_beats_never_collide(interval, latency):
-    """Random graphs: no piece serves two beats at once, whatever their distance from the interval on."""
-    rng, more = np.random.default_rng(interval), 0
-    for _ in range(50):
-        uses = int(rng.integers(1, 30))
-        g = Dataflow(interval, spaced=True)
-        functional_unit = g.share("functional_unit", uses, (unsigned(1),), latency, lambda register, a: a)
-        words = [g.input("a", lambda operands: operands)]
-        for k in range(uses):
-            operand = words[rng.integers(len(words))]
-            word = g.use(functional_unit, f"use_{k}", (operand,), lambda a: (a,))
-            assert word.stage - 1 - latency >= operand.stage
-            words.append(word)
-        assert sum(map(len, functional_unit.taken)) == uses
-        for taken in functional_unit.taken:
-            busy = {
-                (stage, other + distance)
-                for stage in taken
-                for other in taken
-                for distance in range(interval, 8 * interval + 99)
-            }
-            assert all(stage != other for stage, other in busy)
-        more += functional_unit.count - -(-uses // interval)
-    # That takes more pieces than beats at multiples of the interval do.
-    assert (more > 0) == (interval > 1)
 
 
 # Hardware.
@@ -186,10 +94,10 @@ def test_products(verify, interval):
     ab, bb = a * b, b * b
     fourth = ab.truncate(15).saturate(SQ(1, 15)) * bb.truncate(15).saturate(SQ(1, 15))
     mixed = fourth.truncate(10).saturate(SQ(1, 10)) * a
-    unit = GraphUnit(interval, products, 4)
+    unit = GraphUnit(interval, products)
     expected = {"ab": ab.codes, "fourth": fourth.codes, "mixed": mixed.codes}
     verify(unit, beats, expected)
-    assert cost_of(GraphUnit(interval, products, 4)).multiplier_count == -(-4 // interval)
+    assert cost_of(GraphUnit(interval, products)).multiplier_count == -(-4 // interval)
 
 
 def table(g, a, b, n):
@@ -222,7 +130,7 @@ def shifts(g, a, b, n):
         shifted = register(coarse >> fine, "shifted")
         return register(Mux(shifted[-1], -1, shifted)[:18].as_signed(), "result")
 
-    functional_unit = g.share("shifter", 4, (signed(18), unsigned(4)), 3, make)
+    functional_unit = g.share("shifter", (signed(18), unsigned(4)), 3, make)
 
     def use(name, value):
         return g.use(functional_unit, name, (value, n), lambda value, n: (Value.cast(value), n[:4]))
@@ -265,8 +173,6 @@ class RandomGraph:
             (str(rng.choice(["sum", "product", "register"])), *rng.integers(0, 3 + k, 2).tolist())
             for k in range(int(rng.integers(8, 16)))
         ]
-        self.sums = sum(kind == "sum" for kind, *_ in self.steps)
-        self.products = sum(kind == "product" for kind, *_ in self.steps)
 
     def describe(self, g, a, b, n):
         """Words of the graph; its last five are results."""
@@ -274,7 +180,7 @@ class RandomGraph:
         def add(register, x, y):
             return register((register(x, "x") + register(y, "y"))[:WORD].as_signed(), "total")
 
-        adders = g.share("adder", self.sums, (signed(WORD), signed(WORD)), 2, add)
+        adders = g.share("adder", (signed(WORD), signed(WORD)), 2, add)
         words = [g.wire(name, lambda v: Value.cast(v).as_signed(), w) for name, w in (("a", a), ("b", b))]
         words.append(g.register("n", lambda n: Cat(n, Const(0, WORD - 5)).as_signed(), n))
         for k, (kind, first, second) in enumerate(self.steps):
@@ -306,7 +212,7 @@ class RandomGraph:
 def test_spaced_graphs_at_any_distance(verify, interval, seed):
     """A random graph equals its function, at the interval, and at every distance from there on."""
     graph, rng = RandomGraph([interval, seed]), np.random.default_rng(seed)
-    unit = GraphUnit(interval, graph.describe, graph.products, spaced=True)
+    unit = GraphUnit(interval, graph.describe, spaced=True)
     beats = beats_of(rng)
     expected = graph.compute(beats)
     verify(unit, beats, expected)
@@ -330,15 +236,12 @@ def test_refuses_an_interval(interval):
         Dataflow(interval)
 
 
-@pytest.mark.parametrize("interval", [1, 4])
-def test_refuses_more_uses_than_announced(interval):
-    g = Dataflow(interval, 1)
+def test_refuses_words_after_they_were_placed():
+    g = Dataflow(3)
     a = g.input("a", lambda operands: operands)
-    g.multiply("first", a, a)
-    with pytest.raises(ValueError, match=r"^second is one use of the multiplier more than announced$"):
-        g.multiply("second", a, a)
-    with pytest.raises(ValueError, match=r"^third is one use of the shifter more than announced$"):
-        g.use(g.share("shifter", 0, (signed(4),), 1, None), "third", (a,), lambda a: (a,))
+    assert g.register("once", lambda a: a, a).stage == 2
+    with pytest.raises(RuntimeError, match=r"^late comes after the words were placed$"):
+        g.register("late", lambda a: a, a)
 
 
 @pytest.mark.parametrize(
@@ -352,7 +255,7 @@ def test_refuses_an_operand_that_is_too_wide(format, accepted):
         word = g.multiply("product", b, operand)
         return {"product": word}, {"product": FixedShape(OPERAND * format)}
 
-    unit = GraphUnit(1, describe, 1)
+    unit = GraphUnit(1, describe)
     if accepted:
         unit.datapath(Module(), unit.i.payload)
         return
@@ -367,22 +270,6 @@ def test_multiplier_bits():
 # Words that come later than they could, wiring, and dot products.
 
 
-@pytest.mark.parametrize("interval", [1, 3])
-def test_words_stand_no_earlier_than_asked(interval):
-    g = Dataflow(interval, 2 * interval)
-    a = g.input("a", lambda operands: operands)
-    assert g.register("late", lambda a: a, a, since=9).stage == 9
-    assert g.register("soon", lambda a: a, a, since=1).stage == a.stage + 1
-    assert g.multiply("late", a, a, since=9).stage == 9
-    assert g.multiply("soon", a, a, since=1).stage == a.stage + 5
-    # A stage whose slot is taken is passed over.
-    functional_unit = g.share("functional_unit", 2, (unsigned(1),), 3, lambda register, a: a)
-    first, second = (g.use(functional_unit, "use", (a,), lambda a: (a,), since=12).stage for _ in range(2))
-    assert (first, second) == ((12, 12) if functional_unit.count == 2 else (12, 13))
-    wire = g.wire("wire", lambda a: a, a)
-    assert (wire.stage, wire.lifetime) == (a.stage, a.lifetime)
-
-
 def late_and_early(g, a, b, n):
     """A piece read after one register and after both; a wire that is copied in place of its word."""
 
@@ -390,10 +277,10 @@ def late_and_early(g, a, b, n):
         first = register(x + y, "first")
         return first, register((first + x).wrap(SQ(3, 17)), "second")
 
-    functional_unit = g.share("adder", 3, (FixedShape(OPERAND), FixedShape(OPERAND)), 2, make)
+    functional_unit = g.share("adder", (FixedShape(OPERAND), FixedShape(OPERAND)), 2, make)
     early = g.use(functional_unit, "early", (a, b), lambda *ab: ab, lambda results: results[0], latency=1)
     low = g.wire("low", lambda a: Value.cast(a)[:5], a)
-    late = g.register("late", lambda low, n: low ^ n, low, n, since=early.stage + 6)
+    late = g.register("late", lambda low, n: low ^ n, low, n, since=12)
     again = g.use(
         functional_unit, "again", (a, b), lambda *ab: ab, lambda results: results[0], latency=1, since=11
     )
@@ -425,7 +312,7 @@ def test_dot_products(verify, interval, shared):
 
         vector = g.wire("vector", lambda a: vector_of(a, half, a), a)
         other = g.register("other", lambda b: vector_of(b, b, half), b)
-        sums = shared_sums(g, 3, OPERAND * OPERAND) if shared else None
+        sums = shared_sums(g, OPERAND * OPERAND) if shared else None
         words = {
             "two": dot(g, "two", vector, other, sums),
             "own": dot(g, "own", vector, vector, sums),
@@ -437,7 +324,7 @@ def test_dot_products(verify, interval, shared):
 
     beats = beats_of(np.random.default_rng(interval))
     a, b, half = beats["a"], beats["b"], 1 << 16
-    unit = GraphUnit(interval, describe, 9)
+    unit = GraphUnit(interval, describe)
     assert cost_of(unit).multiplier_count == -(-9 // interval)
     verify(unit, beats, {"two": a * b + half * (b + a), "own": 2 * a * a + half * half, "made": 3 * half * a})
 

@@ -22,8 +22,8 @@ from blysk.sim.units.registry import RECORDS
 @pytest.mark.parametrize(
     ("angle", "latencies", "counts", "longest"),
     [
-        ("half_chord", [59, 60, 62, 67, 71, 64], [26, 13, 9, 7, 6, 5], 26),
-        ("arccos", [59, 60, 63, 63, 66, 66], [23, 13, 9, 8, 7, 6], 21),
+        ("half_chord", [53, 54, 55, 58, 58, 59], [26, 13, 9, 7, 6, 5], 26),
+        ("arccos", [53, 54, 56, 59, 59, 58], [23, 13, 9, 8, 7, 6], 21),
     ],
 )
 def test_times_and_parts(angle, latencies, counts, longest):

@@ -6,5 +6,5 @@ from blysk.hdl.emit.cost import cost_of
 
 def test_times_and_parts():
     unit = ChordUnit()
-    assert (unit.latency, unit.initiation_interval) == (11, 1)
+    assert (unit.latency, unit.initiation_interval) == (8, 1)
     assert cost_of(unit).multipliers == {(18, 18): 3}

@@ -13,7 +13,7 @@ from blysk.sim.units.cosines.chord_setup import RECORD
 from ..variants import mostly_long
 
 MULTIPLIERS = {
-    **{(1, 1): 6, (1, 2): 4, (1, 3): 3, (1, 4): 3, (1, 6): 3, (1, 9): 1, (1, 18): 1},
+    **{(1, 1): 6, (1, 2): 3, (1, 3): 2, (1, 4): 2, (1, 6): 2, (1, 9): 1, (1, 18): 1},
     **{(2, 3): 5, (2, 9): 2, (3, 18): 1},
 }
 """Of numbers of lights and intervals: not always as few as ``ceil((1 + 5 lights) / interval)``.
@@ -35,7 +35,7 @@ def test_multipliers(lights, interval):
 
 def test_options():
     unit = ChordSetupUnit()
-    assert (unit.lights, unit.initiation_interval, unit.multipliers, unit.latency) == (1, 3, 3, 24)
+    assert (unit.lights, unit.initiation_interval, unit.multipliers, unit.latency) == (1, 3, 2, 21)
     assert cost_of(ChordSetupUnit(length_bits=9)).rom_bits == 17 << 8
     assert ChordSetupUnit(None, 2, initiation_interval=1, highlights=False).multipliers == 5
 

@@ -7,12 +7,12 @@ from blysk.hdl.cosines.chord_values import ChordValuesUnit
 from blysk.hdl.emit.cost import cost_of
 
 FIGURES = {
-    (1, 1): (6, 12),
-    (1, 3): (3, 13),
-    (1, 6): (1, 15),
-    (2, 1): (12, 12),
-    (2, 3): (5, 13),
-    (3, 6): (3, 16),
+    (1, 1): (6, 9),
+    (1, 3): (2, 11),
+    (1, 6): (1, 13),
+    (2, 1): (12, 9),
+    (2, 3): (4, 11),
+    (3, 6): (4, 14),
 }
 """Multipliers and latency, of numbers of lights and intervals."""
 

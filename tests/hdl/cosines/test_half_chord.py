@@ -9,7 +9,7 @@ from blysk.hdl.emit.cost import cost_of
 from ..variants import mostly_long
 
 # Latency and multipliers for the initiation intervals 1 to 6, as the unit's text states them.
-STATED = [(1, 35, 6), (2, 38, 3), (3, 37, 2), (4, 36, 2), (5, 36, 2), (6, 40, 1)]
+STATED = [(1, 25, 6), (2, 28, 3), (3, 26, 2), (4, 27, 2), (5, 26, 2), (6, 32, 1)]
 
 
 @pytest.mark.parametrize(("interval", "latency", "multipliers"), mostly_long(STATED, STATED[-1]))

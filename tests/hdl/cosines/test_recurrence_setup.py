@@ -9,12 +9,12 @@ from blysk.hdl.emit.cost import cost_of
 from ..variants import mostly_long
 
 STATED = [
-    (1, 1, 46, 18, 141),
-    (1, 2, 23, 9, 144),
-    (1, 4, 12, 5, 156),
-    (1, 8, 6, 3, 172),
-    (1, 46, 1, 1, 282),
-    (2, 4, 20, 9, 156),
+    (1, 1, 46, 18, 112),
+    (1, 2, 23, 9, 121),
+    (1, 4, 12, 5, 126),
+    (1, 8, 6, 3, 138),
+    (1, 46, 1, 1, 225),
+    (2, 4, 20, 9, 130),
 ]
 """Lights, interval, multipliers, shifters and latency, as the unit's text states them."""
 

@@ -21,7 +21,7 @@ def test_spans_of_the_record_are_decided_both_ways(variant):
 @pytest.mark.long
 def test_times_and_multipliers_as_stated():
     units = [HighlightGateUnit(initiation_interval=interval) for interval in range(1, 16)]
-    assert [unit.latency for unit in units] == [25, 29, 28, 26, 31, 29, 26, 30, 32, 34, 36, 37, 33, 28, 49]
+    assert [unit.latency for unit in units] == [19, 23, 23, 24, 20, 21, 23, 28, 30, 31, 27, 24, 25, 25, 47]
     counts = [cost_of(unit).multiplier_count for unit in units]
     assert counts == [15, 8, 5, 4, 3, 3, 3, *[2] * 7, 1]
 

@@ -53,7 +53,7 @@ def test_compact_costs_one_multiplier(lights):
     cost = cost_of(CompactIntensityUnit(Intensity(lights)))
     assert cost.multipliers == {(17, 17): 1}
     # As the docstring states.
-    stated = {1: (230, 1335), 16: (808, 18769)}
+    stated = {1: (230, 651), 16: (808, 9007)}
     if lights in stated:
         assert (cost.register_bits, cost_of(IntensityUnit(Intensity(lights))).register_bits) == stated[lights]
     # Terms and which are left and used; operands, product, rounded sum; sum; channels, twice, as one waits;

@@ -47,13 +47,13 @@ def case_of(make, unit, length, seed=1):
 # Multipliers, latency and cycles.
 
 FIGURES = {
-    (chord, 1, 3): (10, 41),
-    (chord, 1, 9): (5, None),
+    (chord, 1, 3): (9, 34),
+    (chord, 1, 9): (4, None),
     (chord, 1, 18): (3, None),
     (chord, 2, 3): (18, None),
     (local, 1, 1): (6, None),
-    (local, 1, 3): (3, 27),
-    (local, 1, 6): (3, None),
+    (local, 1, 3): (2, 23),
+    (local, 1, 6): (2, None),
     (local, 2, 3): (5, None),
 }
 """Multipliers and latency, of numbers of lights and setup intervals."""
@@ -74,8 +74,8 @@ def test_multipliers_and_latency(make, lights, interval):
 
 def test_highlights_and_gates_cost_no_multiplier_a_pixel():
     assert cost_of(chord(highlights=False)).multiplier_count == 6
-    assert cost_of(chord(gate=gated(1))).multiplier_count == 10
-    assert cost_of(local(gate=gated(1))).multiplier_count == 3
+    assert cost_of(chord(gate=gated(1))).multiplier_count == 9
+    assert cost_of(local(gate=gated(1))).multiplier_count == 2
 
 
 def runs_of(lengths):

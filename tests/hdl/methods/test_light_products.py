@@ -11,7 +11,7 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.methods.light_products import LightProductsUnit
 from blysk.sim.units.methods.light_products import RECORD
 
-TIMES = {"cosine": 7, "one_minus_cosine": 11}
+TIMES = {"cosine": 5, "one_minus_cosine": 8}
 
 
 @pytest.mark.parametrize("operand", TIMES)

@@ -9,8 +9,8 @@ from blysk.hdl.normals.bisection import BisectionUnit
 
 # Latency and multipliers for the initiation intervals 1, 2, ..., as the unit's text states them.
 STATED = {
-    Bisection(): [(23, 9), (25, 5), (26, 3), (28, 3), (29, 2), (27, 2), (25, 2), (25, 2), (38, 1)],
-    Bisection(2, 45): [(20, 8), (21, 4), (23, 3), (25, 2), (24, 2), (23, 2), (23, 2), (29, 1)],
+    Bisection(): [(23, 9), (25, 5), (26, 3), (24, 3), (29, 2), (27, 2), (25, 2), (25, 2), (38, 1)],
+    Bisection(2, 45): [(20, 8), (22, 4), (23, 3), (25, 2), (24, 2), (23, 2), (23, 2), (29, 1)],
     Bisection(1, 45): [(17, 7), (19, 4), (20, 3), (21, 2), (19, 2), (20, 2), (25, 1)],
 }
 

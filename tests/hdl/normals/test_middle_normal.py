@@ -9,7 +9,7 @@ from blysk.hdl.normals.middle_normal import MiddleNormalUnit
 from ..variants import mostly_long
 
 # Latency and multipliers for the initiation intervals 1 to 9, as the unit's text states them.
-STATED = [(36, 9), (37, 5), (40, 3), (39, 3), (40, 2), (40, 2), (40, 2), (44, 2), (52, 1)]
+STATED = [(26, 9), (28, 5), (29, 3), (28, 3), (30, 2), (34, 2), (30, 2), (28, 2), (39, 1)]
 
 
 @pytest.mark.parametrize("interval", mostly_long(range(1, 10), 6))

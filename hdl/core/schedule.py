@@ -1,0 +1,285 @@
+"""The scheduler: operations of a unit placed in time and on shared functional units, before any hardware.
+
+It knows neither words' widths nor Amaranth: operations, what each takes its operands from, and how long it
+takes. `blysk.hdl.core.dataflow` describes the operations and makes registers of the schedule.
+
+What it guarantees, for every schedule that it returns:
+
+- an operation reads its operands when all of them are there, and not before its ``since``;
+- two uses of an instance of a functional unit never meet, in any two beats that the interval allows;
+- a functional unit has as few instances as the interval allows, ``ceil(uses / interval)``, unless beats come
+  at any distance and operations depend on each other: then as few as the search finds;
+- the same operations in the same order give the same schedule.
+
+Source: docs/theory/scheduling.md.
+"""
+
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice, product
+from math import prod
+
+__all__ = ["Operation", "Placement", "Schedule", "place"]
+
+_MOST_SEARCHED = 500
+"""Ways to share instances that are tried, for beats at any distance."""
+
+
+@dataclass(eq=False)
+class Operation:
+    """An operation, and its result.
+
+    Parameters
+    ----------
+    name : str
+        Of the result.
+    operands : tuple of Operation
+        Whose results it takes, all on the same cycle.
+    latency : int
+        Cycles from there to the first on which its result can be read: 0 for wiring.
+    lifetime : int or None
+        Cycles on which the result can be read, before the next beat's replaces it; ``None`` for wiring: that
+        of its operand.
+    unit : hashable or None
+        Functional unit that serves it: equal instances of hardware, shared by its uses. ``None``: hardware of
+        its own.
+    since : int or Operation
+        Earliest stage of the result: a number, or the stage of another's. What is read late needs no copies
+        before.
+    """
+
+    name: str
+    operands: tuple["Operation", ...]
+    latency: int
+    lifetime: int | None
+    unit: Hashable | None = None
+    since: "int | Operation" = 0
+
+
+@dataclass(frozen=True)
+class Placement:
+    """When an operation reads its operands, and on which instance.
+
+    Parameters
+    ----------
+    read : int
+        Enabled cycles from the input of a beat to that on which the operands are read.
+    instance : int
+        Of the functional unit; 0 where there is none.
+    """
+
+    read: int
+    instance: int = 0
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Operations in time and on instances.
+
+    Parameters
+    ----------
+    placements : dict of Operation to Placement
+        Of every operation.
+    counts : dict
+        Instances of each functional unit.
+    """
+
+    placements: Mapping[Operation, Placement]
+    counts: Mapping[Hashable, int]
+
+    def stage(self, operation: Operation) -> int:
+        """First stage at which the result can be read."""
+        return self.placements[operation].read + operation.latency
+
+    @property
+    def length(self) -> int:
+        """First stage at which all results can be read."""
+        return max(map(self.stage, self.placements))
+
+
+def place(operations: Sequence[Operation], interval: int, spaced: bool = False) -> Schedule:
+    """Place operations: each at the earliest stage at which its operands and a slot are free.
+
+    Beats come a whole multiple of the interval apart, so an instance has as many slots as the interval has
+    cycles. In a *spaced* schedule beats come at any distance from the interval on: then the uses of an
+    instance lie within as many stages as the interval has cycles.
+
+    Then operations with hardware of their own move to as late a stage as costs no copy of their operands:
+    where these are read later by others all the same.
+
+    Parameters
+    ----------
+    operations : sequence of Operation
+        Each after those whose results it takes.
+    interval : int
+        Initiation interval, at least 1.
+    spaced : bool
+        Whether beats come at any distance from the interval on.
+
+    Returns
+    -------
+    schedule : Schedule
+        Of all operations.
+    """
+    units = list(dict.fromkeys(o.unit for o in operations if o.unit is not None))
+    found = _greedy(operations, interval, spaced)
+    if spaced and interval > 1:
+        found = min((found, *_shared(operations, interval, units)), key=_size)
+    return Schedule(_delayed(operations, found.placements), found.counts)
+
+
+def _earliest(operation: Operation, placements: dict) -> int:
+    """First stage at which an operation may read its operands."""
+    since = operation.since
+    if isinstance(since, Operation):
+        since = placements[since].read + since.latency
+    stages = [placements[o].read + o.latency for o in operation.operands]
+    if not operation.latency:
+        return max(stages, default=since)
+    return max([since - operation.latency, *stages])
+
+
+def _greedy(operations: Sequence[Operation], interval: int, spaced: bool) -> Schedule:
+    """Each use at the first free slot; more instances where that takes too long."""
+    placements: dict[Operation, Placement] = {}
+    instances: dict[Hashable, list[set[int]]] = {}
+    for unit in (o.unit for o in operations if o.unit is not None):
+        instances.setdefault(unit, [])
+    for unit, taken in instances.items():
+        uses = sum(o.unit == unit for o in operations)
+        taken += [set() for _ in range(-(-uses // interval))]
+
+    def serves(taken: set[int], stage: int) -> bool:
+        if spaced:
+            return stage not in taken and max(taken | {stage}) - min(taken | {stage}) < interval
+        return all((stage - other) % interval for other in taken)
+
+    for operation in operations:
+        read, instance = _earliest(operation, placements), 0
+        if operation.unit is not None:
+            sets = instances[operation.unit]
+            slots = (
+                (stage, k)
+                for stage in range(read, read + 2 * interval)
+                for k, taken in enumerate(sets)
+                if serves(taken, stage)
+            )
+            slot = next(slots, None)
+            if slot is None:
+                sets.append(set())
+                slot = read, len(sets) - 1
+            read, instance = slot
+            sets[instance].add(read)
+        placements[operation] = Placement(read, instance)
+    return Schedule(placements, {unit: len(taken) for unit, taken in instances.items()})
+
+
+def _size(schedule: Schedule) -> tuple[int, int]:
+    """Instances first, then cycles."""
+    return sum(schedule.counts.values()), schedule.length
+
+
+def _shared(operations: Sequence[Operation], interval: int, units: Sequence[Hashable]) -> Iterator[Schedule]:
+    """Schedules for beats at any distance with few instances; none if there are too many ways.
+
+    Uses of a unit, in the order in which they could come first, are shared out in runs of neighbours; each
+    run has an instance, whose first use waits until the last comes within the interval.
+    """
+    alone: dict[Operation, Placement] = {}
+    for operation in operations:
+        alone[operation] = Placement(_earliest(operation, alone))
+    uses = {
+        unit: sorted((o for o in operations if o.unit == unit), key=lambda o: alone[o].read) for unit in units
+    }
+    choices = [list(islice(_runs(len(uses[unit]), interval), _MOST_SEARCHED)) for unit in units]
+    if prod(map(len, choices)) >= _MOST_SEARCHED:
+        return
+    fewest = None
+    for chosen in product(*choices):
+        instances = sum(map(len, chosen))
+        if fewest is not None and instances > fewest:
+            continue
+        run_of = {}
+        for unit, sizes in zip(units, chosen, strict=True):
+            of_unit = iter(uses[unit])
+            for k, size in enumerate(sizes):
+                run_of.update({next(of_unit): (unit, k) for _ in range(size)})
+        placements = _windows(operations, interval, run_of)
+        if placements is None:
+            continue
+        counts = {unit: len(sizes) for unit, sizes in zip(units, chosen, strict=True)}
+        fewest = instances
+        yield Schedule(placements, counts)
+
+
+def _runs(uses: int, interval: int) -> Iterator[tuple[int, ...]]:
+    """Sizes of the runs of neighbours: as few runs as there can be, then one or two more."""
+
+    def parts(left: int, count: int) -> Iterator[tuple[int, ...]]:
+        if count == 0:
+            if left == 0:
+                yield ()
+            return
+        # The others take one each at least, an interval at most.
+        for size in range(min(interval, left - count + 1), max(1, left - interval * (count - 1)) - 1, -1):
+            for rest in parts(left - size, count - 1):
+                yield size, *rest
+
+    fewest = -(-uses // interval)
+    for count in range(fewest, min(uses, fewest + 2) + 1):
+        yield from parts(uses, count)
+
+
+def _windows(
+    operations: Sequence[Operation], interval: int, run_of: dict[Operation, tuple]
+) -> dict[Operation, Placement] | None:
+    """Placements in which the uses of each run lie within an interval; ``None`` if there are none."""
+    starts: dict[tuple, int] = dict.fromkeys(run_of.values(), 0)
+    for _ in range(2 * len(operations)):
+        placements: dict[Operation, Placement] = {}
+        taken: dict[tuple, set[int]] = {run: set() for run in starts}
+        for operation in operations:
+            read, run = _earliest(operation, placements), run_of.get(operation)
+            if run is None:
+                placements[operation] = Placement(read)
+                continue
+            read = max(read, starts[run])
+            while read in taken[run]:
+                read += 1
+            taken[run].add(read)
+            placements[operation] = Placement(read, run[1])
+        late = {run: max(stages) - interval + 1 for run, stages in taken.items()}
+        if all(min(taken[run]) >= least for run, least in late.items()):
+            return placements
+        if max(late.values()) > 40 * interval + 400:
+            return None
+        starts = {run: max(starts[run], least) for run, least in late.items()}
+    return None
+
+
+def _delayed(
+    operations: Sequence[Operation], placements: dict[Operation, Placement]
+) -> dict[Operation, Placement]:
+    """Operations with hardware of their own moved to as late as costs no copies of their operands."""
+    placements = dict(placements)
+    readers: dict[Operation, list[Operation]] = {o: [] for o in operations}
+    for operation in operations:
+        for operand in dict.fromkeys(operation.operands):
+            readers[operand].append(operation)
+    bound = {o.since for o in operations if isinstance(o.since, Operation)}
+    for operation in reversed(operations):
+        placement = placements[operation]
+        fixed = operation.unit is not None or not operation.latency or operation in bound
+        if fixed or not readers[operation] or not operation.operands:
+            continue
+        # Wiring is where its operand is.
+        if any(not o.latency and o.operands for o in (*readers[operation], *operation.operands)):
+            continue
+        latest = min(placements[o].read for o in readers[operation]) - operation.latency
+        for operand in operation.operands:
+            others = (placements[o].read for o in readers[operand] if o is not operation)
+            there = placements[operand].read + operand.latency
+            latest = min(latest, max([there + (operand.lifetime or 1) - 1, *others]))
+        if latest > placement.read:
+            placements[operation] = Placement(latest, placement.instance)
+    return placements
