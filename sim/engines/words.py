@@ -44,6 +44,10 @@ _SHIFTS = {
 }
 
 
+LONG = 4096
+"""Characters of an expression whose operands get names."""
+
+
 class _Left(Exception):
     """Something that stays as it is."""
 
@@ -97,12 +101,18 @@ def _literal(parts: str) -> int:
 
 
 class _Parser:
-    """Recursive descent over one expression."""
+    """Recursive descent over one expression.
+
+    Of a long one, operands that come again get a name: ``names`` by their code. CXXRTL writes them out each
+    time, the steps of a divider as often as there are steps behind them.
+    """
 
     def __init__(self, text: str, variables: dict[str, tuple[str, int]]):
         self.tokens = _TOKEN.findall(text)
         self.at = 0
         self.variables = variables
+        self.named = len(text) > LONG
+        self.names: dict[str, str] = {}
 
     def next(self) -> str:
         if self.at == len(self.tokens):
@@ -168,6 +178,8 @@ class _Parser:
         while self.peek() == ".":
             self.take(".")
             result = self.method(result)
+        if self.named and len(result.code) > 64 and not result.variable and 0 < result.width <= 64:
+            result = _Expression(self.names.setdefault(result.code, f"n_{len(self.names)}"), result.width)
         return result
 
     def choice(self) -> _Expression:
@@ -305,10 +317,14 @@ def _store(target: str, width: int, last: int, first: int, code: str) -> str:
 
 def _statement(line: str, variables: dict[str, tuple[str, int]]) -> str:
     if match := _CONDITION.match(line):
+        if len(match[4]) > LONG:
+            raise _Left
         (question,) = _Parser(match[4][1:-1] if match[3] else match[4], variables).expressions()
         code = question.word if question.width <= 64 else f"bool({question.value})"
         return f"{match[1]}{match[2]}({code}){match[5]}"
     if match := _INDEX.match(line) or _UPDATE.match(line):
+        if len(match[2]) > LONG:
+            raise _Left
         values = ", ".join(value.value for value in _Parser(match[2], variables).expressions())
         return f"{match[1]}{values}{match[3]}"
     match = _ASSIGNMENT.match(line)
@@ -321,13 +337,19 @@ def _statement(line: str, variables: dict[str, tuple[str, int]]) -> str:
         raise _Left
     stop = width - 1 if last is None else int(last)
     start = 0 if last is None else int(first or last)
-    (value,) = _Parser(text, variables).expressions()
+    parser = _Parser(text, variables)
+    (value,) = parser.expressions()
     if value.width != stop - start + 1 or stop >= width:
         raise _Left
     if value.width <= 64:
-        return indent + _store(target, width, stop, start, value.word)
-    place = "" if last is None else f".slice<{stop},{start}>()"
-    return f"{indent}{target}{place} = {value.value};"
+        stored = _store(target, width, stop, start, value.word)
+    else:
+        place = "" if last is None else f".slice<{stop},{start}>()"
+        stored = f"{target}{place} = {value.value};"
+    if not parser.names:
+        return indent + stored
+    names = "".join(f"const word {name} = {code}; " for code, name in parser.names.items())
+    return f"{indent}{{ {names}{stored} }}"
 
 
 def _table(match: re.Match) -> str:

@@ -8,6 +8,7 @@ from amaranth.hdl import Cat, Module, Mux, Signal, signed
 from amaranth.lib import data, stream
 from amaranth.lib.wiring import Component, In, Out
 
+from blysk.sim.engines import words
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.engines.words import plain_words
 
@@ -67,14 +68,15 @@ class Operations(Component):
         return m
 
 
-@pytest.mark.parametrize("width", [1, 33, 64])
-def test_as_in_pysim(width):
-    """Small numbers, those with all bits, and any, under stalls."""
+@pytest.mark.parametrize(("width", "long"), [(1, words.LONG), (33, 64), (64, words.LONG)])
+def test_as_in_pysim(monkeypatch, width, long):
+    """Small numbers, those with all bits, and any, under stalls; operands of long expressions have names."""
+    monkeypatch.setattr(words, "LONG", long)
     rng = np.random.default_rng(width)
-    words = rng.integers(0, 1 << 64, (2, 200), dtype=np.uint64)
-    words[:, :60] = rng.choice(np.array([0, 1, 3, (1 << 64) - 1, 1 << 63, 1 << 31], np.uint64), (2, 60))
-    words[1, 40:80] = words[0, 40:80]
-    beats = {"a": words[0], "b": words[1], "c": rng.integers(0, 128, 200)}
+    numbers = rng.integers(0, 1 << 64, (2, 200), dtype=np.uint64)
+    numbers[:, :60] = rng.choice(np.array([0, 1, 3, (1 << 64) - 1, 1 << 63, 1 << 31], np.uint64), (2, 60))
+    numbers[1, 40:80] = numbers[0, 40:80]
+    beats = {"a": numbers[0], "b": numbers[1], "c": rng.integers(0, 128, 200)}
     component, stalls = Operations(width), {"output_stalls": rng.random(97) < 0.3}
     fast, slow = (
         simulate(component, beats, count=200, engine=name, **stalls) for name in ("cxxrtl", "pysim")
