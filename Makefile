@@ -16,11 +16,11 @@ demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
 
 test: $(VENV)/.installed-test lint
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadgroup --no-loadscope-reorder
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder
 
 # What `make test` leaves out: sweeps, proofs, browsers.
 test-long: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadgroup --no-loadscope-reorder -m "long or prove"
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m "long or prove"
 
 test-all:
 	$(MAKE) test
@@ -36,7 +36,7 @@ soak: $(VENV)/.installed-bench
 	$(BIN)/python -m blysk.bench.quality.soak
 
 coverage: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadgroup --no-loadscope-reorder --cov
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder --cov
 	@for package in golden hdl sim; do \
 		printf '%s: %% ' $$package; \
 		$(BIN)/coverage report --include="$$package/*" --format=total || exit 1; \

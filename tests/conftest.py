@@ -1,5 +1,6 @@
 """What the tests of every hardware unit share: one way to hold RTL against its bit-accurate model."""
 
+import re
 import signal
 import threading
 from collections.abc import Mapping
@@ -9,22 +10,31 @@ import numpy as np
 import pytest
 from amaranth.hdl import ResetInserter, Signal, Value
 from amaranth.sim import Simulator
+from xdist.scheduler import LoadScopeScheduling
 
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED, quantise
 from blysk.sim.engines.beats import dtype_of, pack
 from blysk.sim.engines.simulate import simulate
 
 
-def pytest_collection_modifyitems(items):
-    """Groups of ``--dist loadgroup``: a file, or of the tests of every unit a unit, which come first.
+class Groups(LoadScopeScheduling):
+    """What one worker runs: the tests of a file, or of the tests of every unit those of a unit.
 
-    A worker compiles a unit once, and the longest tests do not come last.
+    A worker compiles a unit once.
     """
-    for item in items:
-        group = item.nodeid.partition("::")[0]
-        if group == "tests/test_units.py":
-            group += item.callspec.params["name"]
-        item.add_marker(pytest.mark.xdist_group(group))
+
+    def _split_scope(self, nodeid):
+        group, _, test = nodeid.partition("::")
+        return group + re.sub(r"^\w+(\[\w+)?.*", r"\1", test) if group == "tests/test_units.py" else group
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    return Groups(config, log)
+
+
+def pytest_collection_modifyitems(items):
+    """The tests of every unit first: the longest tests do not come last."""
     items.sort(key=lambda item: not item.nodeid.startswith("tests/test_units.py"))
 
 

@@ -6,7 +6,6 @@ Source: docs/theory/interpolation.md#bisection.
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from scipy.optimize import linprog
 
 from blysk.golden.number.fixed import Format
 
@@ -77,6 +76,9 @@ def minimax(
     basis, triangle = np.linalg.qr(powers[:, free])
     matrix = basis * np.sqrt(GRID)
     ones = np.ones((len(x), 1))
+    # Its import takes half a second, and most programs need no fit.
+    from scipy.optimize import linprog
+
     tighter = 1.0
     for _ in range(2):
         fit = linprog(

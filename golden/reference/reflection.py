@@ -7,7 +7,6 @@ from functools import cache
 from typing import ClassVar
 
 import numpy as np
-from scipy.optimize import brentq
 
 __all__ = [
     "BLINN",
@@ -281,6 +280,9 @@ def coscos_scale(exponent: float, power: int, rule: str = "taylor") -> float:
         angle = (nodes + 1) * half
         lobe = np.cos(scale * angle) ** power * np.sin(angle)
         return float(half * (weights @ lobe)) - 1 / (exponent + 1)
+
+    # Its import takes half a second, and only one model needs a root.
+    from scipy.optimize import brentq
 
     # At a = 1/2 the lobe covers the sphere; far out it falls like 0.6/a^2 at most.
     return float(brentq(excess, 0.5, 1 + math.sqrt(exponent + 1), xtol=1e-15, rtol=1e-14))

@@ -7,9 +7,9 @@ import warnings
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.reference.geometry import Mesh
@@ -23,6 +23,9 @@ from blysk.sim.meshes.ply import read_ply
 from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, REEXPORT, Refused
 from blysk.sim.meshes.stl import tidy_stl
 from blysk.sim.meshes.teapot import teapot
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = ["DEFAULT_CREASE", "DEFAULT_TRIANGLES", "SUFFIXES", "LoadedMesh", "load_mesh"]
 
@@ -199,8 +202,11 @@ def _read(path: Path) -> bytes:
     return data
 
 
-def _load_scene(path: Path, data: bytes, materials: bool) -> tuple[trimesh.Scene, Found]:
+def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scene, Found]":
     """Check what trimesh does not, and load without touching any file that was not checked."""
+    # Its import takes longer than to draw a small picture; only a file needs it.
+    import trimesh
+
     suffix = path.suffix.lower()
     references, options, found = {}, {"skip_materials": True}, Found()
     if suffix == ".obj":
@@ -230,8 +236,12 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> tuple[trimesh.Scene
     return scene, found
 
 
-def _assemble(scene: trimesh.Scene, found: Found, path: Path, data: bytes, crease_angle: float) -> LoadedMesh:
+def _assemble(
+    scene: "trimesh.Scene", found: Found, path: Path, data: bytes, crease_angle: float
+) -> LoadedMesh:
     """All triangles of a scene in world coordinates, as one mesh."""
+    import trimesh
+
     nodes = _placed(scene)
     numbers = {name: _number(name, scene.geometry[name], path) for _, name in nodes}
     nodes = [(matrix, scene.geometry[name], numbers[name]) for matrix, name in nodes]
@@ -283,7 +293,7 @@ def _assemble(scene: trimesh.Scene, found: Found, path: Path, data: bytes, creas
     return _with_materials(loaded, found)
 
 
-def _placed(scene: trimesh.Scene) -> list[tuple[np.ndarray, str]]:
+def _placed(scene: "trimesh.Scene") -> list[tuple[np.ndarray, str]]:
     """Matrix into the world, and name, of the geometry of every node that has one.
 
     trimesh's own way takes time by the cube of a node's level.

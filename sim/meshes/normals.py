@@ -1,8 +1,6 @@
 """Vertex normals of meshes: computed, cut at creases, mended, transformed."""
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from blysk.golden.reference.geometry import normalise
 
@@ -88,6 +86,10 @@ def crease_normals(
     cosine = np.einsum("ei,ei->e", face_normals[first // 3], face_normals[second // 3])
     smooth = cosine >= np.cos(np.radians(crease_angle)) - _COSINE_SLACK
     first, second = first[smooth], second[smooth]
+
+    # Their import takes longer than to draw a small picture.
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
 
     rows = np.concatenate([low_corner[first], high_corner[first]])
     columns = np.concatenate([low_corner[second], high_corner[second]])

@@ -78,6 +78,7 @@ def generated(component, monkeypatch):
     """CXXRTL's own text."""
     with monkeypatch.context() as patch:
         patch.setattr(cxxrtl, "group_registers", lambda text: text)
+        patch.setattr(cxxrtl, "plain_words", lambda text: text)
         return cxxrtl._generate(rtlil.convert(component, name="top", emit_src=False))
 
 

@@ -113,7 +113,7 @@ def test_trimesh_log_stays_off_the_terminal(tmp_path, monkeypatch, capfd):
         logging.getLogger("trimesh").warning("noise")
         return original(*args, **kwargs)
 
-    monkeypatch.setattr(blysk.sim.meshes.mesh.trimesh, "load_scene", noisy)
+    monkeypatch.setattr(trimesh, "load_scene", noisy)
     level = logging.getLogger("trimesh").level
     load(tmp_path / "a.stl", trimesh.creation.box())
     assert capfd.readouterr() == ("", "")

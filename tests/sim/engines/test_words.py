@@ -1,0 +1,101 @@
+"""Expressions as machine words: every operation at the widths where a word begins or ends, against pysim."""
+
+import re
+
+import numpy as np
+import pytest
+from amaranth.hdl import Cat, Module, Mux, Signal, signed
+from amaranth.lib import data, stream
+from amaranth.lib.wiring import Component, In, Out
+
+from blysk.sim.engines import words
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.engines.words import plain_words
+
+from .test_guards import Few, generated
+
+
+class Operations(Component):
+    """What Amaranth has, of a and b of a width and an amount c, signed and not; fields lie across words."""
+
+    i: In(stream.Signature(data.StructLayout({"a": 64, "b": 64, "c": 7})))
+    o: Out(stream.Signature(data.ArrayLayout(64, 24)))
+
+    def __init__(self, width):
+        self.width = width
+        super().__init__()
+
+    def elaborate(self, platform):
+        m = Module()
+        width, given = self.width, self.i.payload
+        a, b = given.a[:width], given.b[:width]
+        s, t = a.as_signed(), b.as_signed()
+        c, k = given.c, Signal(signed(width), init=-1 << width - 1)
+        results = [
+            a + b,
+            s - t,
+            (a * b)[:64],
+            (s * t)[:64],
+            Cat(a & b, a | t, ~s),
+            Cat(a ^ b, -s, -a),
+            Cat(a == b, a != t, a < b, a <= b, s > t, s >= t, s < b),
+            Cat(a.any(), a.all(), a.bool(), ~a[0], s != k, s == -1, (a & b).any()),
+            (a << c[:5])[:64],
+            (s << c[:6])[:64],
+            a >> c,
+            s >> c,
+            Mux(c[0], a, t),
+            Mux(a > b, Cat(a, b), Cat(b, a)),
+            Cat(b[: width // 2], a[width // 2 :], c).rotate_left(3),
+            a[-1].replicate(width) ^ b,
+            Cat(a, b)[width // 2 : width // 2 + width],
+            a.word_select(c[:1], max(1, width // 2)),
+            a.bit_select(c[:6], width),
+            s + k,
+        ]
+        wide = Signal(150, init=5)
+        m.d.comb += self.i.ready.eq(~self.o.valid | self.o.ready)
+        with m.If(self.i.ready):
+            m.d.sync += self.o.valid.eq(self.i.valid)
+            m.d.sync += wide[60 - width // 2 :][:width].eq(a)
+            m.d.sync += [place.eq(result) for place, result in zip(self.o.payload, results, strict=False)]
+            m.d.sync += self.o.payload[20].eq(wide[50:114])
+            m.d.sync += self.o.payload[21].eq(wide[60 - width // 2 :][:width])
+            with m.If(wide[:100].any() & (wide[1:101] != wide[:100])):
+                m.d.sync += self.o.payload[22].eq((wide ^ Cat(given.a, given.b))[40:104])
+            with m.Else():
+                m.d.sync += self.o.payload[23].eq((~wide)[37:101])
+        return m
+
+
+@pytest.mark.parametrize(("width", "long"), [(1, words.LONG), (33, 64), (64, words.LONG)])
+def test_as_in_pysim(monkeypatch, width, long):
+    """Small numbers, those with all bits, and any, under stalls; operands of long expressions have names."""
+    monkeypatch.setattr(words, "LONG", long)
+    rng = np.random.default_rng(width)
+    numbers = rng.integers(0, 1 << 64, (2, 200), dtype=np.uint64)
+    numbers[:, :60] = rng.choice(np.array([0, 1, 3, (1 << 64) - 1, 1 << 63, 1 << 31], np.uint64), (2, 60))
+    numbers[1, 40:80] = numbers[0, 40:80]
+    beats = {"a": numbers[0], "b": numbers[1], "c": rng.integers(0, 128, 200)}
+    component, stalls = Operations(width), {"output_stalls": rng.random(97) < 0.3}
+    fast, slow = (
+        simulate(component, beats, count=200, engine=name, **stalls) for name in ("cxxrtl", "pysim")
+    )
+    assert np.array_equal(fast.beats, slow.beats)
+    assert np.array_equal(fast.cycles, slow.cycles)
+
+
+def test_templates_are_gone(monkeypatch):
+    """But for operations of more than 64 bits, which are CXXRTL's; then the text keeps its header."""
+    operation, header = re.compile(r"\b\w+_[us]+<\d+>\(|reduce_|logic_"), "#include <cxxrtl/cxxrtl.h>"
+    wide = plain_words(generated(Operations(24), monkeypatch))
+    assert set(operation.findall(wide)) == {"xor_uu<150>("}
+    assert header in wide
+    narrow = plain_words(generated(Few(), monkeypatch))
+    assert not operation.search(narrow)
+    assert header not in narrow
+
+
+def test_text_that_is_not_understood_stays():
+    for text in ("", "struct p_top {};", "bool p_top::eval(performer *performer) {\n\tp_x = odd(p_y);\n}"):
+        assert plain_words(text) == text
