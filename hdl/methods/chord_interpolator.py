@@ -380,7 +380,8 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         idle = following == _Place.PIXEL
         takes = Signal()
         m.d.comb += [
-            long.eq(span.length > 2),
+            # By bits: a comparison is a chain of carries.
+            long.eq(span.length[2:].any() | span.length[:2].all()),
             # The limit is ready again before the last normal of a long span is sent.
             takes.eq(values.i.ready & limit.i.ready),
             self.i.ready.eq(idle & takes),
@@ -408,7 +409,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
                     Value.cast(right).eq(Value.cast(span.normal_right)),
                     Value.cast(middle).eq(Value.cast(span.normal_middle)),
                     length.eq(span.length),
-                    following.eq(Mux(span.length > 1, _Place.RIGHT, _Place.PIXEL)),
+                    following.eq(Mux(span.length[1:].any(), _Place.RIGHT, _Place.PIXEL)),
                 ]
             with m.Elif((following == _Place.RIGHT) & (length > 2)):
                 m.d.sync += following.eq(_Place.MIDDLE)
