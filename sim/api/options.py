@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple, TypedDict, get_args
 
+from blysk.golden.bus.framing import PACKETS
+from blysk.golden.bus.registers import BUSES
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -30,6 +32,7 @@ __all__ = [
     "GEOMETRIES",
     "GEOMETRY",
     "PIPES",
+    "PORTS",
     "RENDERING",
     "SCENE",
     "SLOW_SIZE",
@@ -350,6 +353,22 @@ PIPES: dict[str, Option] = {
     ),
 }
 """Option of a rendering, of Verilog and of place and route."""
+
+PORTS: dict[str, Option] = {
+    "top": Option(
+        Choice("core", PACKETS),
+        None,
+        "What the core does: spans to pixels, triangles to spans, triangles to pixels.  [default: shader; with "
+        "--geometry hardware: render]",
+    ),
+    "bus": Option(
+        Choice("bus", ("native", *BUSES)),
+        "native",
+        "Ports of the core: its own streams, or AXI4-Stream with registers on AXI4-Lite or Wishbone; -o X.v "
+        "then writes X.md, X.h and X.svd, too.",
+    ),
+}
+"""Options of Verilog alone."""
 
 RENDERING: dict[str, Option] = {
     **GEOMETRY,
