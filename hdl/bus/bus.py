@@ -24,7 +24,6 @@ PORT_DESCRIPTIONS = {
     "m_axis_tkeep": "all ones",
     "m_axis_tlast": "the last one of a packet, see above",
     "m_axis_tuser": "bit 0: the first one of the frame; bit 1: the last one",
-    "tvalid": "the beat is there",
 }
 """Ports of the streams, for the table in Verilog."""
 

@@ -21,7 +21,24 @@ from blysk.hdl.geometry.span_clip import SpanClipUnit
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
 
-__all__ = ["GeometryUnit"]
+__all__ = ["PORT_DESCRIPTIONS", "GeometryUnit"]
+
+PORT_DESCRIPTIONS = {
+    "normal_left": "unit normal at the first pixel; of a true line its end, N/W",
+    "normal_middle": "unit normal in the middle",
+    "normal_right": "unit normal at the last pixel; of a true line its end, N/W",
+    "line_left": "N/W at the first pixel",
+    "line_right": "N/W at the last pixel",
+    "x": "column of the first pixel",
+    "y": "row",
+    "length": "pixels of the span",
+    "depth": "depth at the first pixel",
+    "depth_last": "depth at the last pixel",
+    "depth_step": "step of the depth from a pixel to the next",
+    "flip": "the normals have been negated: a back face",
+    "material": "index of the triangle's material",
+}
+"""Fields of a span, for the table in Verilog."""
 
 _SORTED = 17
 """Triangles that wait for the edge setup, while others are dropped by the sort."""

@@ -7,7 +7,10 @@ from blysk.golden.bus.byte_layout import ByteLayout
 from blysk.golden.bus.registers import ADDRESS_BITS, ERRORS, WORD_BITS, Register
 from blysk.hdl.bus.bus import BusUnit
 
-__all__ = ["documents_of", "layout_lines"]
+__all__ = ["DOCUMENTS", "documents_of", "layout_lines"]
+
+DOCUMENTS = (".md", ".h", ".svd")
+"""Suffixes of what is written beside the Verilog."""
 
 _SPACE = 1 << ADDRESS_BITS
 _IN_SVD = {
@@ -29,7 +32,8 @@ def documents_of(unit: BusUnit, name: str) -> dict[str, str]:
     name : str
         Name of its Verilog module.
     """
-    return {".md": _markdown(unit, name), ".h": _header(unit, name), ".svd": _svd(unit, name)}
+    texts = _markdown(unit, name), _header(unit, name), _svd(unit, name)
+    return dict(zip(DOCUMENTS, texts, strict=True))
 
 
 def layout_lines(layout: ByteLayout) -> list[str]:
@@ -52,9 +56,9 @@ def _markdown(unit: BusUnit, name: str) -> str:
     lines = [
         f"# Registers of {name}",
         "",
-        f"{unit.map.core[0].upper()}{unit.map.core[1:]}. Words of {WORD_BITS} bits, little endian, addresses of "
-        f"bytes in {_SPACE} bytes. A signed value is extended by its sign. An access that is refused (SLVERR, ERR) "
-        "changes nothing but `errors` and `refused`.",
+        f"{unit.map.core.capitalize()}. Words of {WORD_BITS} bits, little endian, in {_SPACE} bytes. A signed "
+        "value is extended by its sign. An access that is refused (SLVERR, ERR) changes nothing but `errors` "
+        "and `refused`.",
         "",
         "| address | register | access | bits | what it is |",
         "| --- | --- | --- | ---: | --- |",

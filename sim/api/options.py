@@ -358,8 +358,8 @@ PORTS: dict[str, Option] = {
     "top": Option(
         Choice("core", PACKETS),
         None,
-        "What the core does: spans to pixels, triangles to spans, triangles to pixels.  [default: shader; with "
-        "--geometry hardware: render]",
+        "What the core does: spans to pixels, triangles to spans, or triangles to pixels.  [default: shader; "
+        "with --geometry hardware: render]",
     ),
     "bus": Option(
         Choice("bus", ("native", *BUSES)),
