@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from blysk.golden.bus.registers import CONSTANTS
-from blysk.golden.render import Renderer
 from blysk.hdl.bus.bus import PORT_DESCRIPTIONS, BusUnit
 from blysk.hdl.bus.tops import TOPS
 from blysk.hdl.geometry.geometry import PORT_DESCRIPTIONS as GEOMETRY_PORT_DESCRIPTIONS
@@ -75,7 +74,7 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
         Frame constants by the addresses of its write port, and their example.
     """
     framing, map = unit.framing, unit.map
-    packets = framing.packets
+    packets, layouts = framing.packets, framing.parameters
     # Words are told by the layouts and the map.
     kept = [line for line in of_core if not line.startswith(("status_", "constants_", "before the first"))]
     registers = [
@@ -89,19 +88,18 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
         f"Streams: AXI4-Stream. Registers: {_PATHS[bus]}; words of 32 bits, little endian.",
         "rst is synchronous and active high: of an active-low aresetn its inverse.",
         "",
-        f"s_axis_tdata, {framing.parameters.given.size} bytes: byte, C declaration, format; extended by sign or 0:",
-        *layout_lines(framing.parameters.given),
-        f"m_axis_tdata, {framing.parameters.made.size} bytes, likewise:",
-        *layout_lines(framing.parameters.made),
-        "s_axis_tlast ends a frame: needed, or the last beat is never given. m_axis_tlast: "
-        + _MARKS[packets]
-        + ".",
-        "m_axis_tuser: bit 0 the first one of the frame, bit 1 the last one. All bytes count; tkeep is all ones.",
+        f"s_axis_tdata, {layouts.given.size} bytes: byte, C declaration, format; extended by sign or 0:",
+        *layout_lines(layouts.given),
+        f"m_axis_tdata, {layouts.made.size} bytes, likewise:",
+        *layout_lines(layouts.made),
+        "s_axis_tlast ends a frame: needed, or the last beat is never given.",
+        f"m_axis_tlast: {_MARKS[packets]}.",
+        "m_axis_tuser: bit 0 the first one of the frame, bit 1 the last one; tkeep is all ones.",
         "",
-        "Order: rst for a cycle; write every frame register and constant in any order; send the beats of a frame, "
-        "tlast with the last; wait until state is 0; then write again or send the next frame.",
-        "A refused access (SLVERR, err) changes nothing but errors and refused: an address without a register, the "
-        "wrong direction, a value that does not fit, part of a word, a write while a frame is inside.",
+        "Order: rst for a cycle; write every frame register and constant in any order; send the beats of a",
+        "frame, tlast with the last; wait until state is 0; then write again or send the next frame.",
+        "A refused access (SLVERR, err) changes nothing but errors and refused: no register at the address,",
+        "the wrong direction, a value that does not fit, part of a word, a write while a frame is inside.",
         "",
         "Registers, by address of a byte:",
         *registers,

@@ -115,8 +115,15 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
     return replace(made, materials=materials)
 
 
-def renderer_of(design: Design) -> Renderer:
+def renderer_of(design: Design, option: str = "geometry", value: str = "hardware") -> Renderer:
     """Triangles to pixels with a shading pipeline.
+
+    Parameters
+    ----------
+    design : Design
+        The pipeline.
+    option, value : str
+        What asks for it.
 
     Raises
     ------
@@ -127,7 +134,7 @@ def renderer_of(design: Design) -> Renderer:
         return Renderer(design)
     except ValueError:
         reason = f"triangles give normals, and {design.method} takes values"
-        raise OptionError("geometry", "hardware", reason, "use another method, or software") from None
+        raise OptionError(option, value, reason, "use another method, or spans from software") from None
 
 
 def pixel_pipelines(design: Design, pipes: int, merged: bool = False) -> ShadingUnit:
@@ -329,7 +336,8 @@ def verilog_and_unit(
         raise OptionError("merged", "", "one pipeline has one stream", "give pipes, too")
     if pipes > 1 and bus != "native":
         raise OptionError("pipes", str(pipes), f"a core on {bus} has one pipeline", "leave it out, or bus")
-    parameters = renderer_of(design) if hardware else design
+    asked = ("geometry", chosen) if chosen == "hardware" else ("top", top)
+    parameters = renderer_of(design, *asked) if hardware else design
     if hardware or bus != "native":
         unit = unit_of_top(top, bus, parameters)
     else:
