@@ -57,8 +57,8 @@ def _markdown(unit: BusUnit, name: str) -> str:
         f"# Registers of {name}",
         "",
         f"{unit.map.core.capitalize()}. Words of {WORD_BITS} bits, little endian, in {_SPACE} bytes. Signed "
-        "values are extended by their sign. An access that is refused (SLVERR, ERR) changes nothing but `errors` "
-        "and `refused`.",
+        "values are extended by their sign. An access that is refused (SLVERR, ERR) changes nothing but "
+        "`errors` and `refused`.",
         "",
         "| address | register | access | bits | what it is |",
         "| --- | --- | --- | ---: | --- |",
