@@ -27,7 +27,7 @@ from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, p
 from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
 from blysk.hdl.render import RenderUnit
 from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, geometry_descriptions, unit_of_top
-from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, DesignOptions
+from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS, DesignOptions
 from blysk.sim.api.settings import Settings, checked, read_settings
 from blysk.sim.api.verilog_example import example_of
 from blysk.sim.errors import OptionError
@@ -284,6 +284,7 @@ def verilog(
     merged: bool = False,
     top: str | None = None,
     bus: str = "native",
+    setups: int = 1,
 ) -> str:
     """Verilog-2001 of a pipeline for synthesis, with a table of its ports and frame constants.
 
@@ -303,6 +304,8 @@ def verilog(
         ``"shader"``, ``"geometry"`` or ``"render"``: what the core does; by default as geometry says.
     bus : {"native", "axi", "wishbone"}
         Its own ports, or AXI4-Stream with registers on AXI4-Lite or Wishbone.
+    setups : int
+        Lanes of triangle setup, 1 or 2, of what takes triangles.
 
     Raises
     ------
@@ -311,7 +314,7 @@ def verilog(
         cannot be so many pipelines, or not this core on this bus.
     """
     design = Design() if design is None else design
-    return verilog_and_unit(design, name, geometry, pipes, merged, top, bus)[0]
+    return verilog_and_unit(design, name, geometry, pipes, merged, top, bus, setups)[0]
 
 
 def verilog_and_unit(
@@ -322,6 +325,7 @@ def verilog_and_unit(
     merged: bool = False,
     top: str | None = None,
     bus: str = "native",
+    setups: int = 1,
 ) -> tuple[str, ShadingUnit | RenderUnit | GeometryUnit | BusUnit]:
     """The same, and the hardware that it is of."""
     (chosen,) = checked({"geometry": geometry}, GEOMETRY).values()
@@ -329,7 +333,9 @@ def verilog_and_unit(
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise OptionError("name", name, "no Verilog name", "use letters, digits and underscores")
     hardware = TOPS[top].takes_triangles
-    checked({"pipes": pipes}, PIPES)
+    checked({"pipes": pipes, "setups": setups}, PIPES | SETUPS)
+    if setups > 1 and not hardware:
+        raise OptionError("setups", str(setups), "spans need no triangle setup", "give top or geometry, too")
     if hardware and pipes > 1:
         raise OptionError("pipes", str(pipes), "triangles go to one pipeline", "leave it out, or use spans")
     if merged and pipes == 1:
@@ -339,7 +345,8 @@ def verilog_and_unit(
     asked = ("geometry", chosen) if chosen == "hardware" else ("top", top)
     parameters = renderer_of(design, *asked) if hardware else design
     if hardware or bus != "native":
-        unit = unit_of_top(top, bus, parameters)
+        lanes = {"setups": setups} if hardware else {}
+        unit = unit_of_top(top, bus, parameters, **lanes)
     else:
         unit = pixel_pipelines(design, pipes, merged)
     p = design

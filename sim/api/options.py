@@ -35,6 +35,7 @@ __all__ = [
     "PORTS",
     "RENDERING",
     "SCENE",
+    "SETUPS",
     "SLOW_SIZE",
     "VIEW_WORDS",
     "ColorLike",
@@ -370,8 +371,19 @@ PORTS: dict[str, Option] = {
 }
 """Options of Verilog alone."""
 
+SETUPS: dict[str, Option] = {
+    "setups": Option(
+        Few(1, 2),
+        1,
+        "With --geometry hardware: lanes of triangle setup; two take twice as many small triangles.",
+        "pipeline.setups",
+    ),
+}
+"""Option of a rendering and of Verilog, of what takes triangles."""
+
 RENDERING: dict[str, Option] = {
     **GEOMETRY,
+    **SETUPS,
     **PIPES,
     "specialise": Option(
         Truth(),
@@ -429,6 +441,7 @@ class RenderOptions(SceneOptions, DesignOptions, total=False):
     """Options of a rendering, by their names in Python."""
 
     geometry: Literal["software", "hardware"]
+    setups: Literal[1, 2]
     pipes: Literal[1, 2, 4, 8]
     specialise: bool
     short_words: bool

