@@ -122,6 +122,24 @@ class ByteLayout:
         return words.view(np.uint8).reshape(len(words), self.size)
 
     def unpack(self, data: np.ndarray) -> dict[str, np.ndarray]:
-        """Codes of each field, int64 of shape (N, *shape), of uint8 of shape (N, size)."""
+        """Codes of each field, int64 of shape (N, *shape), of uint8 of shape (N, size): their low bits."""
+        found = {}
+        for name, (field, codes) in self._numbers(data).items():
+            low = codes & ((1 << field.width) - 1)
+            sign = low >> (field.width - 1) & int(field.signed)
+            found[name] = low - (sign << field.width)
+        return found
+
+    def fits(self, data: np.ndarray) -> np.ndarray:
+        """Whether every number of a payload fits its field, shape (N,)."""
+        held = self.unpack(data)
+        fit = [
+            (held[name] == codes).reshape(len(codes), -1).all(axis=1)
+            for name, (_, codes) in self._numbers(data).items()
+        ]
+        return np.logical_and.reduce(fit)
+
+    def _numbers(self, data: np.ndarray) -> dict[str, tuple[Field, np.ndarray]]:
+        """Each field, and its numbers as they stand on the bus."""
         words = np.ascontiguousarray(data, dtype=np.uint8).view(self.dtype)[:, 0]
-        return {field.name: words[field.name].astype(np.int64) for field in self.fields}
+        return {field.name: (field, words[field.name].astype(np.int64)) for field in self.fields}

@@ -67,7 +67,8 @@ def _expect(unit, case):
 def _status(unit, case):
     record = _RECORDS[unit.packets]
     ended = int(np.count_nonzero(case.beats["last"]))
-    mine = {"frames": ended, "misfits": 0, "busy": int(not case.beats["last"][-1])}
+    misfits = int(np.count_nonzero(~unit.parameters.given.fits(np.asarray(case.beats["data"], np.uint8))))
+    mine = {"frames": ended, "misfits": misfits, "busy": int(not case.beats["last"][-1])}
     return dict(record.status(unit.core, _core_case(unit, case))) | mine
 
 
@@ -94,6 +95,18 @@ def _short(unit, rng, count):
     return _case(unit, rng, count, 2)
 
 
+def _misfits(unit, rng, count):
+    """Frames with beats in which bits of any byte are turned round."""
+    case = _frames(unit, rng, count)
+    # Not of the last ones, so that every run ends with a beat.
+    data = case.beats["data"]
+    chosen = rng.random(len(data)) < 0.3
+    chosen[[-1, min(PAUSED, len(data)) - 1]] = False
+    byte, bit = rng.integers(0, data.shape[1], len(data)), rng.integers(0, 8, len(data))
+    data[chosen, byte[chosen]] ^= (1 << bit[chosen]).astype(np.uint8)
+    return case
+
+
 def _variants():
     yield "shader", Variant(partial(FramingUnit, "shader", preset(lights=0)))
     design = preset("chord", x_bits=5, y_bits=5)
@@ -108,7 +121,7 @@ RECORD = Record(
     variants=dict(_variants()),
     expect=_expect,
     status=_status,
-    stimuli={"frames": Stimulus(_frames, 200), "short": Stimulus(_short, 60)},
+    stimuli={"frames": Stimulus(_frames, 200), "short": Stimulus(_short, 60), "misfits": Stimulus(_misfits, 100)},
     axis="",
     remembers=True,
 )
