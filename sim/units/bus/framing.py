@@ -121,7 +121,20 @@ RECORD = Record(
     variants=dict(_variants()),
     expect=_expect,
     status=_status,
-    stimuli={"frames": Stimulus(_frames, 200), "short": Stimulus(_short, 60), "misfits": Stimulus(_misfits, 100)},
+    stimuli={
+        "frames": Stimulus(_frames, 200),
+        "short": Stimulus(_short, 60),
+        "misfits": Stimulus(_misfits, 100),
+    },
     axis="",
     remembers=True,
+    still={
+        "bytes hold 12 bits of a coordinate, and no more than colours": (
+            "top.{spare,word}[12-15] top.{spare,word}[28-31] top.{spare,word}[56-63]"
+        ),
+        "without lights a colour is a constant of the run, written once": (
+            "top.{spare,word}[32-55] held_back[24-47] pixel_assembler.spare[24-47] "
+            "pixel_assembler.$signal[24-47] frame_constants.word_{1,2,3}[0-16]"
+        ),
+    },
 )

@@ -80,6 +80,16 @@ def _borders(unit, rng, count):
     return Case(beats, {"busy": 0} | counters)
 
 
+def _decoding(unit, rng, count):
+    """Reads and writes at addresses a bit off those of registers."""
+    address = np.array([register.address for register in unit.parameters.registers])
+    address = (address[:, np.newaxis] ^ 1 << np.arange(12)).ravel()
+    both = np.tile(address, 2)
+    beats = {"address": both, "write": np.arange(len(both)) // len(address), "data": np.zeros_like(both)}
+    counters = {name: (1 << width) - 1 for name, width, _ in _COUNTERS}
+    return Case(beats | {"strobe": np.full(len(both), 15)}, {"busy": 0} | counters)
+
+
 def _map(lights):
     return RegisterMap("core", _COUNTERS, frame_registers(), constant_registers(preset(lights=lights)))
 
@@ -97,6 +107,8 @@ RECORD = Record(
         "accesses": Stimulus(_accesses, 2000),
         "busy": Stimulus(_busy, 500),
         "borders": Stimulus(_borders, stalled=False),
+        "decoding": Stimulus(_decoding, stalled=False),
     },
     axis="",
+    waivers={"load": "No stream: the test of the unit and those of the buses watch it."},
 )
