@@ -124,6 +124,16 @@ class RenderUnit(wiring.Component):
         if size is None:
             members["memory"] = Out(DepthMemory(design.x_bits, design.y_bits))
         super().__init__(members)
+        self.busy: Signal | None = None
+
+    def watch(self) -> Signal:
+        """Ask, before it is elaborated, for a signal that tells whether anything is inside.
+
+        From the cycle after a triangle was taken in, until the cycle after its last pixel has left.
+        """
+        self.geometry.watch()
+        self.busy = Signal(name="render_busy")
+        return self.busy
 
     def elaborate(self, platform):
         """The three units; a span goes to the pipeline, and its depth to a FIFO, on the same cycle."""
@@ -174,4 +184,9 @@ class RenderUnit(wiring.Component):
             *(self.status[name].eq(depth.status[name]) for name in ("pixels", "hidden")),
             *(self.status[name].eq(pipeline.status[name]) for name in _SHADING),
         ]
+        if self.busy is not None:
+            shaded = Signal(COUNTER_BITS, name="shaded_spans")
+            with m.If(depths.r_en):
+                m.d.sync += shaded.eq(shaded + 1)
+            m.d.comb += self.busy.eq(geometry.busy | (count != shaded) | depth.busy)
         return m

@@ -46,6 +46,7 @@ _TITLES = {
     "cosines": "Cosines without normals",
     "methods": "Whole methods",
     "lighting": "Light",
+    "bus": "In somebody else's design",
     "": "All of it",
 }
 """What a room holds."""

@@ -97,6 +97,8 @@ class DepthTestUnit(wiring.Component):
             members["memory"] = Out(port)
         super().__init__(members)
         self._port = port.create(path=("port",)) if size else self.memory
+        self.busy = Signal(name="depth_busy")
+        """Whether a pixel is inside."""
 
     def elaborate(self, platform):
         """Depth of the pixel; the memory's word; their comparison; the write."""
@@ -108,6 +110,7 @@ class DepthTestUnit(wiring.Component):
         stages = [Signal(self.o.payload.shape(), name=f"pixel_{k}") for k in range(3)]
         valid = [Signal(name=f"valid_{k}") for k in range(3)]
         m.d.comb += [
+            self.busy.eq(Cat(valid).any() | self.o.valid),
             advance.eq(skid_buffer(m, self.o, valid[2], stages[2])),
             self.i.ready.eq(advance),
             accept.eq(self.i.valid & advance),

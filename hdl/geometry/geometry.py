@@ -21,10 +21,30 @@ from blysk.hdl.geometry.span_clip import SpanClipUnit
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
 
-__all__ = ["GeometryUnit"]
+__all__ = ["PORT_DESCRIPTIONS", "GeometryUnit"]
+
+PORT_DESCRIPTIONS = {
+    "normal_left": "unit normal at the first pixel; of a true line its end, N/W",
+    "normal_middle": "unit normal in the middle",
+    "normal_right": "unit normal at the last pixel; of a true line its end, N/W",
+    "line_left": "N/W at the first pixel",
+    "line_right": "N/W at the last pixel",
+    "x": "column of the first pixel",
+    "y": "row",
+    "length": "pixels of the span",
+    "depth": "depth at the first pixel",
+    "depth_last": "depth at the last pixel",
+    "depth_step": "step of the depth from a pixel to the next",
+    "flip": "the normals have been negated: a back face",
+    "material": "index of the triangle's material",
+}
+"""Fields of a span, for the table in Verilog."""
 
 _SORTED = 17
 """Triangles that wait for the edge setup, while others are dropped by the sort."""
+
+_INSIDE_BITS = 10
+"""Of counters that are compared: fewer triangles, and fewer spans, are inside."""
 
 _SCALES = 4
 """Triangles whose scales wait for their attributes."""
@@ -171,6 +191,15 @@ class GeometryUnit(wiring.Component):
                 "status": Out(counters_shape(*COUNTERS)),
             }
         )
+        self.busy: Signal | None = None
+
+    def watch(self) -> Signal:
+        """Ask, before it is elaborated, for a signal that tells whether anything is inside.
+
+        A triangle counts from the cycle after it was taken in, until the cycle after its last span has left.
+        """
+        self.busy = Signal(name="geometry_busy")
+        return self.busy
 
     def elaborate(self, platform):
         """The units, what waits between them, and the counters."""
@@ -189,7 +218,29 @@ class GeometryUnit(wiring.Component):
         connect(m, self._attributes.o, self._normals.i)
         connect(m, self._normals.o, wiring.flipped(self.o))
         self._count(m)
+        if self.busy is not None:
+            self._watch(m)
         return m
+
+    def _watch(self, m: Module) -> None:
+        """Triangles that came and are gone, by the units that end them; pieces between the last two units.
+
+        Counters are compared modulo a number that is larger than what fits inside.
+        """
+        sort, rows, pieces = self._sort, self._clip.o, self._attributes.o
+        came, walked, cut, left = (
+            Signal(_INSIDE_BITS, name=name) for name in ("came", "walked", "cut", "left")
+        )
+        for count, event in (
+            (came, self.i.valid & self.i.ready),
+            (walked, rows.valid & rows.ready & rows.payload.last),
+            (cut, pieces.valid & pieces.ready),
+            (left, self.o.valid & self.o.ready),
+        ):
+            with m.If(event):
+                m.d.sync += count.eq(count + 1)
+        gone = walked + sum(sort.status[name] for name in ("empty", "zero_area", "culled"))
+        m.d.comb += self.busy.eq((came != gone[:_INSIDE_BITS]) | self._attributes.busy | (cut != left))
 
     def _set_up(self, m: Module) -> tuple[stream.Interface, stream.Interface]:
         """From the sort, through the lanes in turns, to what is walked and to planes."""

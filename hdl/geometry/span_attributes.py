@@ -69,6 +69,8 @@ class SpanAttributesUnit(wiring.Component):
                 "status": Out(counters_shape("empty", "cut")),
             }
         )
+        self.busy = Signal(name="attributes_busy")
+        """Whether a scanline or a piece is inside."""
 
     def elaborate(self, platform):
         """The long edge's values; the walk along a scanline; the pieces' words."""
@@ -111,6 +113,7 @@ class SpanAttributesUnit(wiring.Component):
             Signal(name="result_valid"),
         )
         m.d.comb += along.advance.eq(skid_buffer(m, self.o, result_valid, result))
+        m.d.comb += self.busy.eq(busy | valid | self.o.valid)
         with m.If(along.advance):
             m.d.sync += [
                 valid.eq(along.emits),

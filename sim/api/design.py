@@ -1,6 +1,7 @@
 """Designs by the words of the command line, and their Verilog."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib.metadata import version
 from typing import Any, Literal, Unpack
@@ -15,14 +16,18 @@ from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.scene import BACK_FACES
 from blysk.golden.render import Renderer
+from blysk.hdl.bus.bus import BusUnit
+from blysk.hdl.bus.tops import TOPS
 from blysk.hdl.emit.verilog import emit
+from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.methods.interpolator import spelled
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, port_descriptions
 from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
 from blysk.hdl.render import RenderUnit
-from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES, DesignOptions
+from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, geometry_descriptions, unit_of_top
+from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS, DesignOptions
 from blysk.sim.api.settings import Settings, checked, read_settings
 from blysk.sim.api.verilog_example import example_of
 from blysk.sim.errors import OptionError
@@ -37,6 +42,8 @@ __all__ = [
     "verilog",
     "verilog_and_unit",
 ]
+
+_FORMATS = "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign"
 
 ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
 """Hardware from spans to pixels."""
@@ -108,8 +115,15 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
     return replace(made, materials=materials)
 
 
-def renderer_of(design: Design) -> Renderer:
+def renderer_of(design: Design, option: str = "geometry", value: str = "hardware") -> Renderer:
     """Triangles to pixels with a shading pipeline.
+
+    Parameters
+    ----------
+    design : Design
+        The pipeline.
+    option, value : str
+        What asks for it.
 
     Raises
     ------
@@ -120,7 +134,7 @@ def renderer_of(design: Design) -> Renderer:
         return Renderer(design)
     except ValueError:
         reason = f"triangles give normals, and {design.method} takes values"
-        raise OptionError("geometry", "hardware", reason, "use another method, or software") from None
+        raise OptionError(option, value, reason, "use another method, or spans from software") from None
 
 
 def pixel_pipelines(design: Design, pipes: int, merged: bool = False) -> ShadingUnit:
@@ -163,7 +177,7 @@ def header_of(unit: ShadingUnit) -> list[str]:
         f"latency {unit.latency} cycles, {unit.cycles_per_pixel} a pixel",
         f"a span takes at most max({unit.cycles_per_pixel} length, {unit.setup_interval}) cycles",
         *_several_lines(several, unit),
-        "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign",
+        _FORMATS,
     ]
     if made.takes_values:
         formats = ChordSetup.DIFFUSE_FORMAT, ChordSetup.HIGHLIGHT_FORMAT
@@ -204,18 +218,25 @@ def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[st
 def _render_header(unit: RenderUnit) -> list[str]:
     """What triangles to pixels are, in lines: those of the pipeline inside without its input's, and more."""
     first, *lines = (line for line in header_of(unit.pipeline) if not line.startswith("i_"))
-    geometry, grid = unit.geometry, unit.parameters.geometry.grid
-    spans = "their true lines, uncut" if geometry.lines else "three unit normals, wide ones cut"
     return [
         first.replace("shading pipeline", "triangles to pixels"),
         *lines,
+        *_geometry_lines(unit.geometry),
+        "memory_*: a depth for each pixel; read data a clock after the place; all ones before a frame",
+    ]
+
+
+def _geometry_lines(geometry: GeometryUnit) -> list[str]:
+    """What goes into triangles to spans."""
+    grid = geometry.grid
+    spans = "their true lines, uncut" if geometry.lines else "three unit normals, wide ones cut"
+    return [
         f"geometry: at most a triangle in {geometry.interval} cycles; spans with {spans}; {grid.coordinate} "
         "coordinates",
         "i_normal_*: vertex normal times 1/W over the largest 1/W of the triangle, "
         f"{ATTRIBUTE}; i_depth: linear on the screen",
         f"constants_*: the picture's borders in pixels; back faces {', '.join(map(_numbered, BACK_FACES))}; "
         "largest chord of a span in 1/1024",
-        "memory_*: a depth for each pixel; read data a clock after the place; all ones before a frame",
         "status_*: counters since reset",
     ]
 
@@ -224,12 +245,46 @@ def _numbered(name: str) -> str:
     return f"{BACK_FACES.index(name)}: {name}"
 
 
+def _geometry_header(unit: GeometryUnit) -> list[str]:
+    """What triangles to spans are, in lines."""
+    return [f"blysk {version('blysk')} triangles to spans, MIT licence", _FORMATS, *_geometry_lines(unit)]
+
+
+def _descriptions(unit: ShadingUnit | RenderUnit, pipes: int) -> Mapping[str, str]:
+    """Descriptions of the ports of a core that gives pixels."""
+    if isinstance(unit, RenderUnit):
+        return RENDER_PORT_DESCRIPTIONS
+    fields = {f"i_{field}" for field in unit.i.payload.shape().members}
+    texts = port_descriptions(pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
+    return {port: text for port, text in texts.items() if not port.startswith("i_") or port in fields}
+
+
+def _top_and_bus(geometry: str, top: str | None, bus: str) -> tuple[str, str]:
+    """The core and the bus, checked.
+
+    Raises
+    ------
+    OptionError
+        If there is no such core or bus, or the core is another than hardware geometry makes.
+    """
+    checked({"bus": bus} | ({} if top is None else {"top": top}), PORTS)
+    hardware = geometry == "hardware"
+    top = top or ("render" if hardware else "shader")
+    if hardware and not TOPS[top].takes_triangles:
+        remedy = "leave one of them out"
+        raise OptionError("top", top, "it takes spans, and hardware geometry triangles", remedy)
+    return top, bus
+
+
 def verilog(
     design: Design | None = None,
     name: str = "blysk",
     geometry: Literal["software", "hardware"] = "software",
     pipes: int = 1,
     merged: bool = False,
+    top: str | None = None,
+    bus: str = "native",
+    setups: int = 1,
 ) -> str:
     """Verilog-2001 of a pipeline for synthesis, with a table of its ports and frame constants.
 
@@ -245,41 +300,72 @@ def verilog(
         Number of pipelines, 1, 2, 4 or 8, that take spans of different scanlines.
     merged : bool
         Whether several give one stream of pixels in place of one each.
+    top : str, optional
+        ``"shader"``, ``"geometry"`` or ``"render"``: what the core does; by default as geometry says.
+    bus : {"native", "axi", "wishbone"}
+        Its own ports, or AXI4-Stream with registers on AXI4-Lite or Wishbone.
+    setups : int
+        Lanes of triangle setup, 1 or 2, of what takes triangles.
 
     Raises
     ------
     InputError
         If the name is none in Verilog, or the method takes values and geometry is hardware, or there
-        cannot be so many pipelines.
+        cannot be so many pipelines, or not this core on this bus.
     """
-    return verilog_and_unit(Design() if design is None else design, name, geometry, pipes, merged)[0]
+    design = Design() if design is None else design
+    return verilog_and_unit(design, name, geometry, pipes, merged, top, bus, setups)[0]
 
 
 def verilog_and_unit(
-    design: Design, name: str, geometry: str = "software", pipes: int = 1, merged: bool = False
-) -> tuple[str, ShadingUnit | RenderUnit]:
+    design: Design,
+    name: str,
+    geometry: str = "software",
+    pipes: int = 1,
+    merged: bool = False,
+    top: str | None = None,
+    bus: str = "native",
+    setups: int = 1,
+) -> tuple[str, ShadingUnit | RenderUnit | GeometryUnit | BusUnit]:
     """The same, and the hardware that it is of."""
     (chosen,) = checked({"geometry": geometry}, GEOMETRY).values()
+    top, bus = _top_and_bus(chosen, top, bus)
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise OptionError("name", name, "no Verilog name", "use letters, digits and underscores")
-    hardware = chosen == "hardware"
-    shading = pixel_pipelines(design, pipes, merged)
+    hardware = TOPS[top].takes_triangles
+    checked({"pipes": pipes, "setups": setups}, PIPES | SETUPS)
+    if setups > 1 and not hardware:
+        raise OptionError("setups", str(setups), "spans need no triangle setup", "give top or geometry, too")
     if hardware and pipes > 1:
         raise OptionError("pipes", str(pipes), "triangles go to one pipeline", "leave it out, or use spans")
     if merged and pipes == 1:
         raise OptionError("merged", "", "one pipeline has one stream", "give pipes, too")
-    unit = RenderUnit(renderer_of(design)) if hardware else shading
+    if pipes > 1 and bus != "native":
+        raise OptionError("pipes", str(pipes), f"a core on {bus} has one pipeline", "leave it out, or bus")
+    asked = ("geometry", chosen) if chosen == "hardware" else ("top", top)
+    parameters = renderer_of(design, *asked) if hardware else design
+    if hardware or bus != "native":
+        lanes = {"setups": setups} if hardware else {}
+        unit = unit_of_top(top, bus, parameters, **lanes)
+    else:
+        unit = pixel_pipelines(design, pipes, merged)
     p = design
     lobe = p.specular if isinstance(p.specular, Lobe) else None
     loads = lobe is not None and lobe.fixed is None
     constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads)
-    lines = _render_header(unit) if isinstance(unit, RenderUnit) else header_of(unit)
-    header = [*lines, "", "Frame constants, through the write port:", *constants, *example_of(p)]
-    fields = {f"i_{field}" for field in unit.i.payload.shape().members}
-    texts = port_descriptions(pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
-    descriptions = {port: text for port, text in texts.items() if not port.startswith("i_") or port in fields}
-    if isinstance(unit, RenderUnit):
-        descriptions = RENDER_PORT_DESCRIPTIONS
+    core = unit.framing.core if isinstance(unit, BusUnit) else unit
+    if isinstance(core, GeometryUnit):
+        lines = _geometry_header(core)
+    else:
+        lines = _render_header(core) if isinstance(core, RenderUnit) else header_of(core)
+    words = [*constants, *example_of(p)]
+    if isinstance(unit, BusUnit):
+        header, descriptions = bus_header(unit, bus, lines, words), bus_descriptions(unit)
+    elif isinstance(unit, GeometryUnit):
+        header, descriptions = lines, geometry_descriptions(unit)
+    else:
+        header = [*lines, "", "Frame constants, through the write port:", *words]
+        descriptions = _descriptions(unit, pipes)
     try:
         return emit(unit, name, header=header, descriptions=descriptions), unit
     except ValueError as error:

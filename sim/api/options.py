@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple, TypedDict, get_args
 
+from blysk.golden.bus.framing import PACKETS
+from blysk.golden.bus.registers import BUSES
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -30,8 +32,10 @@ __all__ = [
     "GEOMETRIES",
     "GEOMETRY",
     "PIPES",
+    "PORTS",
     "RENDERING",
     "SCENE",
+    "SETUPS",
     "SLOW_SIZE",
     "VIEW_WORDS",
     "ColorLike",
@@ -351,8 +355,35 @@ PIPES: dict[str, Option] = {
 }
 """Option of a rendering, of Verilog and of place and route."""
 
+PORTS: dict[str, Option] = {
+    "top": Option(
+        Choice("core", PACKETS),
+        None,
+        "What the core does: spans to pixels, triangles to spans, or triangles to pixels.  [default: shader; "
+        "with --geometry hardware: render]",
+    ),
+    "bus": Option(
+        Choice("bus", ("native", *BUSES)),
+        "native",
+        "Ports of the core: its own streams, or AXI4-Stream with registers on AXI4-Lite or Wishbone; -o X.v "
+        "then writes X.md, X.h and X.svd, too.",
+    ),
+}
+"""Options of Verilog alone."""
+
+SETUPS: dict[str, Option] = {
+    "setups": Option(
+        Few(1, 2),
+        1,
+        "With --geometry hardware: lanes of triangle setup; two take twice as many small triangles.",
+        "pipeline.setups",
+    ),
+}
+"""Option of a rendering and of Verilog, of what takes triangles."""
+
 RENDERING: dict[str, Option] = {
     **GEOMETRY,
+    **SETUPS,
     **PIPES,
     "specialise": Option(
         Truth(),
@@ -410,6 +441,7 @@ class RenderOptions(SceneOptions, DesignOptions, total=False):
     """Options of a rendering, by their names in Python."""
 
     geometry: Literal["software", "hardware"]
+    setups: Literal[1, 2]
     pipes: Literal[1, 2, 4, 8]
     specialise: bool
     short_words: bool

@@ -209,6 +209,8 @@ class Rendering:
         Of loading and building.
     pipes : int
         Number of pipelines.
+    setups : int
+        Lanes of triangle setup, of hardware that takes triangles; 0: it takes spans.
     """
 
     loaded: LoadedMesh
@@ -219,6 +221,7 @@ class Rendering:
     simulator: FrameSimulator | TriangleSimulator | None
     seconds: dict[str, float]
     pipes: int = 1
+    setups: int = 0
 
     @property
     def design(self) -> Design:
@@ -295,7 +298,7 @@ def prepare_rendering(
     start = perf_counter()
     with settings.located():
         made = design or _design(settings)
-        _check_geometry(settings, made, frames)
+        _check_geometry(settings, made)
         stage("loading the mesh")
         loaded = load(settings)
         seconds = {"load": perf_counter() - start}
@@ -322,9 +325,9 @@ def prepare_rendering(
                 _shrink(settings, error)
     seconds["build"] = perf_counter() - start - seconds["load"]
     used = "pysim" if engine == "pysim" else "cxxrtl"
-    return Rendering(
-        loaded, scenes, smallest, settings["specialise"], used, simulator, seconds, settings["pipes"]
-    )
+    setups = settings["setups"] if settings["geometry"] == "hardware" else 0
+    counts = settings["pipes"], setups
+    return Rendering(loaded, scenes, smallest, settings["specialise"], used, simulator, seconds, *counts)
 
 
 def _large(design: Design) -> str:
@@ -344,12 +347,15 @@ def _simulator(
         raise settings.refuse("pipes", reason, "give at most one for each row")
     if settings["geometry"] == "software":
         return FrameSimulator(design, engine, pipes)
-    return TriangleSimulator(Renderer(design), (scene.width, scene.height), engine)
+    size = scene.width, scene.height
+    return TriangleSimulator(Renderer(design), size, engine, setups=settings["setups"])
 
 
-def _check_geometry(settings: Settings, design: Design, frames: int) -> None:
-    """Refuse what triangles cannot be drawn with."""
+def _check_geometry(settings: Settings, design: Design) -> None:
+    """Refuse what triangles cannot be drawn with, and what only they can."""
     if settings["geometry"] == "software":
+        if settings["setups"] > 1:
+            raise settings.refuse("setups", "spans need no triangle setup", "give geometry hardware, too")
         return
     reason = None
     if design.takes_values:
@@ -358,8 +364,6 @@ def _check_geometry(settings: Settings, design: Design, frames: int) -> None:
         reason, remedy = "a specialised pipeline takes spans", "leave out specialise"
     elif settings["pipes"] > 1:
         reason, remedy = "triangles go to one pipeline", "leave out pipes"
-    elif frames:
-        reason, remedy = "draws one picture", "leave out frames"
     if reason is not None:
         raise settings.refuse("geometry", reason, f"{remedy}, or use software")
 
@@ -436,7 +440,8 @@ def render(
         Called now and then with the number of pixels so far and in all.
     **options
         Those of `scene` and of `design`, by the names of the command line; ``geometry``: ``"hardware"``
-        simulates triangles to pixels, ``"software"`` spans to pixels; ``specialise``: whether to build only
+        simulates triangles to pixels, ``"software"`` spans to pixels; ``setups``: 1 or 2 lanes of triangle
+        setup of the first; ``specialise``: whether to build only
         what the scene needs; ``short_words``: with words as short as the error bound allows; ``pipes``: 1,
         2, 4 or 8 pipelines for different scanlines.
 

@@ -164,7 +164,9 @@ def _animation(
     """Render and write the frames of a turntable; the figures of all."""
     start = perf_counter()
     smallest = ready.specialisation
-    animation = Animation(smallest.scenes[0], smallest.design, ready.engine, ready.design, ready.pipes)
+    animation = Animation(
+        smallest.scenes[0], smallest.design, ready.engine, ready.design, ready.pipes, ready.setups
+    )
     cameras = [scene.camera for scene in ready.scenes]
     if address:
         workers = dask_executor(animation, address)

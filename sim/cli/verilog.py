@@ -2,13 +2,14 @@
 
 import click
 
+from blysk.sim.api.bus_documents import DOCUMENTS, documents_of
 from blysk.sim.api.design import design, header_of, verilog_and_unit
-from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES
+from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.cli.outputs import check_outputs
 from blysk.sim.errors import InputError
 from blysk.sim.frames.testbench import check_folder, write_testbench
-from blysk.sim.output import write_text
+from blysk.sim.output import all_or_none, write_text
 from blysk.sim.value_types import OutputFile
 
 __all__ = ["command"]
@@ -20,6 +21,8 @@ __all__ = ["command"]
 @options_of(GEOMETRY)
 @options_of(PIPES)
 @click.option("--merged", is_flag=True, help="With --pipes: one stream of pixels, in the order of the spans.")
+@options_of(PORTS)
+@options_of(SETUPS)
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
 @click.option(
     "-o", "--output", type=OutputFile(), help="Verilog file.  [default: standard output; --testbench: none]"
@@ -31,7 +34,7 @@ __all__ = ["command"]
     help="New or empty folder for the Verilog with a cocotb test bench, which needs nothing of blysk.",
 )
 @click.pass_context
-def command(context, name, output, testbench, geometry, pipes, merged, **_):
+def command(context, name, output, testbench, geometry, pipes, merged, top, bus, setups, **_):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
     A test bench holds it against the pixels of a small frame, in Icarus Verilog or Verilator: pip install
@@ -43,22 +46,34 @@ def command(context, name, output, testbench, geometry, pipes, merged, **_):
         blysk verilog --method chord --testbench bench
         blysk verilog --geometry hardware -o render.v
         blysk verilog --pipes 4 -o four.v
+        blysk verilog --top render --bus axi -o core.v
     """
     geometry = geometry or GEOMETRY["geometry"].default
     pipes = pipes or PIPES["pipes"].default
     if testbench is not None and pipes > 1 and not merged:
         raise InputError("--testbench", "its bench takes one stream of pixels", "give --merged, too")
+    bus, setups = bus or PORTS["bus"].default, setups or SETUPS["setups"].default
+    if testbench is not None and (bus != "native" or top not in (None, "shader")):
+        wrong = f"--bus {bus}" if bus != "native" else f"--top {top}"
+        raise InputError("--testbench", f"its bench drives the native shader, not {wrong}", "leave one out")
+    if output and bus != "native" and not output.endswith(".v"):
+        raise InputError(f"-o {output}", "X.md, X.h and X.svd go beside X.v", "let the name end in .v")
     if testbench is not None and geometry == "hardware":
         raise InputError(
             "--testbench", "its bench sends spans, and hardware geometry takes triangles", "leave one out"
         )
     made = design(**given_options(context, [*DESIGN, *COUNTS]))
-    check_outputs([testbench] if testbench else [], pictures=[], others=[output])
+    beside = [f"{output[:-2]}{suffix}" for suffix in DOCUMENTS] if output and bus != "native" else []
+    check_outputs([testbench] if testbench else [], pictures=[], others=[output, *beside])
     if testbench is not None:
         check_folder(testbench)
-    text, unit = verilog_and_unit(made, name, geometry, pipes, merged)
-    if output:
-        write_text(output, text)
+    text, unit = verilog_and_unit(made, name, geometry, pipes, merged, top, bus, setups)
+    with all_or_none():
+        if output:
+            write_text(output, text)
+        if beside:
+            for path, document in zip(beside, documents_of(unit, name).values(), strict=True):
+                write_text(path, document)
     if testbench is not None:
         write_testbench(testbench, unit, name, text, header_of(unit))
     elif not output:

@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from blysk.golden.frames.compare import compare
+from blysk.golden.frames.compare import compare, compare_image
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.scene import Scene
-from blysk.sim.frames.figures import frame_figures
+from blysk.golden.render import Renderer
+from blysk.sim.frames.figures import frame_figures, triangle_figures
 from blysk.sim.frames.frame import FrameSimulator
+from blysk.sim.frames.triangles import TriangleSimulator
 from blysk.sim.frames.workers import cluster_client, local_executor
 from blysk.sim.output import atomic_writer
 
@@ -124,6 +126,8 @@ class Animation:
         the pipeline itself.
     pipes : int
         Number of pipelines.
+    setups : int
+        Lanes of triangle setup, of hardware that takes triangles; 0: it takes spans.
     """
 
     scene: Scene
@@ -131,6 +135,7 @@ class Animation:
     engine: str = "cxxrtl"
     full: Design | None = None
     pipes: int = 1
+    setups: int = 0
 
 
 @dataclass(frozen=True)
@@ -158,6 +163,11 @@ def _simulator(design: Design, engine: str, pipes: int = 1) -> FrameSimulator:
     return FrameSimulator(design, engine, pipes)
 
 
+@functools.lru_cache(maxsize=1)
+def _triangle_simulator(design: Design, engine: str, size: tuple[int, int], setups: int) -> TriangleSimulator:
+    return TriangleSimulator(Renderer(design), size, engine, setups=setups)
+
+
 def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
     """Render one frame, and compare it with the golden renderer's.
 
@@ -165,6 +175,11 @@ def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
     """
     with _ONE_AT_A_TIME:
         scene = replace(animation.scene, camera=camera)
+        if animation.setups:
+            design, size = animation.design, (scene.width, scene.height)
+            drawn = _triangle_simulator(design, animation.engine, size, animation.setups).render(scene)
+            comparison = compare_image(scene, design, drawn.image)
+            return AnimationFrame(drawn.image, triangle_figures(scene, design, drawn, comparison))
         frame = _simulator(animation.design, animation.engine, animation.pipes).render(scene)
         full = animation.full or animation.design
         return AnimationFrame(frame.image, frame_figures(scene, full, frame, compare(scene, full, frame)))

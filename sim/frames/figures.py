@@ -90,6 +90,7 @@ def triangle_figures(
     return {
         **_figures(scene, design, frame, len(sent.triangles), frame.visible),
         "geometry": "hardware",
+        "setups": frame.setups,
         "triangle_cycles": frame.input_cycles,
         **_errors(comparison, [name for name in ERRORS if name != "arithmetic"]),
         "counts": {
@@ -147,13 +148,15 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     Parameters
     ----------
     frames : sequence of dict
-        Of `frame_figures`, of one scene and pipeline.
+        Of `frame_figures` or `triangle_figures`, of one scene and pipeline. ``triangles`` are the most that
+        a frame has.
     """
-    same = ("method", "model", "exponent", "lights", "materials", "engine", "width", "height", "triangles")
-    same += ("pipes",)
+    same = ("method", "model", "exponent", "lights", "materials", "engine", "width", "height")
+    same += tuple(key for key in ("pipes", "geometry", "setups") if key in frames[0])
     pixels, cycles = (sum(frame[key] for frame in frames) for key in ("pixels", "cycles"))
     return {
         **{key: frames[0][key] for key in same},
+        "triangles": max(frame["triangles"] for frame in frames),
         "frame_count": len(frames),
         "visible_pixels": sum(frame["visible_pixels"] for frame in frames),
         "pixels": pixels,
@@ -176,7 +179,7 @@ def worst_errors(figures: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, fl
         Of `frame_figures`.
     """
     worst = {}
-    for name in ERRORS:
+    for name in (name for name in ERRORS if f"{name}_error" in figures[0]):
         errors = [frame[f"{name}_error"] for frame in figures if frame["visible_pixels"]]
         worst[f"{name}_error"] = {
             key: (min if key == "psnr_db" else max)((error[key] for error in errors), default=math.nan)

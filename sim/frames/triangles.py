@@ -45,6 +45,8 @@ class SimulatedTriangleFrame:
         The simulator.
     seconds : dict
         Of ``triangles`` (transformed and clipped) and of ``simulate``.
+    setups : int
+        Lanes of triangle setup.
     """
 
     image: np.ndarray
@@ -56,6 +58,7 @@ class SimulatedTriangleFrame:
     input_cycles: int
     engine: str
     seconds: dict[str, float]
+    setups: int = 1
 
     @property
     def spans(self) -> int:
@@ -101,6 +104,7 @@ class TriangleSimulator:
         setups: int = 1,
     ):
         self.renderer, self.size, self.engine, self.angle = renderer, size, engine, angle
+        self.setups = setups
         self._unit = RenderUnit(renderer, size, setups)
         self._check()
 
@@ -171,7 +175,7 @@ class TriangleSimulator:
             image = frame_of_pixels(scene, *np.zeros((2, 0), dtype=int), np.zeros((0, 3), dtype=np.uint8))
             seconds = {"triangles": ready - start, "simulate": 0.0}
             return SimulatedTriangleFrame(
-                image, sent, dict.fromkeys(STATUS, 0), 0, 0, 0, 0, self.engine, seconds
+                image, sent, dict.fromkeys(STATUS, 0), 0, 0, 0, 0, self.engine, seconds, setups=self.setups
             )
         run = simulate(
             self._unit,
@@ -199,6 +203,7 @@ class TriangleSimulator:
             input_cycles=int(run.input_cycles[-1] - run.input_cycles[0] + 1),
             engine=run.engine,
             seconds={"triangles": ready - start, "simulate": perf_counter() - ready},
+            setups=self.setups,
         )
 
     def _longest_silence(self, sent: SceneTriangles, inside: int = 24) -> int:

@@ -37,6 +37,19 @@ def _below(unit, rng, count):
     return _walked(unit, rng, count, Frame(-2048, 8, 2047, 2047))
 
 
+def _flat(unit, rng, count):
+    """Triangles with a flat top, nearly as high as the grid: the lower short edge is all of a side."""
+    triangles, grid = random_triangles(rng, count, unit.grid, 500.0), unit.grid
+    ends = grid.coordinate.min_code, grid.coordinate.max_code
+    triangles.x[:] = rng.integers(ends[0], ends[1], triangles.x.shape)
+    triangles.y[:, :2] = ends[0] + rng.integers(0, 8 * grid.steps, (count, 1))
+    triangles.y[:, 2] = ends[1] - rng.integers(0, 1 << rng.integers(1, grid.bits - 1), count)
+    stages = Stages(triangles, Frame(-2048, -2048, 2047, -2036), grid)
+    beats = stages.drawn.beats | stages.edges.beats
+    beats = {name: beats[name] for name in walk_shape(grid).members}
+    return Case(beats, Frame(-2048, -2048, 2047, -2036).codes)
+
+
 RECORD = Record(
     name="edge_walk",
     title="First and last covered pixel of each scanline of a triangle",
@@ -50,6 +63,7 @@ RECORD = Record(
         "small": Stimulus(_small, 300),
         "tall": Stimulus(_tall, 300),
         "below": Stimulus(_below, 300),
+        "flat": Stimulus(_flat, 120),
     },
     axis="",
 )

@@ -46,13 +46,50 @@ def test_picture_and_figures(capsys):
     ("options", "says"),
     [
         (["--specialise"], "a specialised pipeline takes spans; leave out specialise"),
-        (["--frames", "2"], "draws one picture; leave out frames"),
         (["--method", "chord-local"], "triangles give normals, and chord-local takes values"),
     ],
 )
 def test_what_triangles_cannot_be_drawn_with(refused, options, says):
     """One line of reason and remedy."""
     refused("render", *SMALL, *HARDWARE, *options, thing="--geometry hardware", says=says)
+
+
+@pytest.mark.long
+def test_two_setups():
+    """The same picture, in fewer cycles; spans are refused."""
+    found = {}
+    for setups in ("1", "2"):
+        options = [*SMALL, *HARDWARE, "--setups", setups, "-o", f"{setups}.png", "--json", f"{setups}.json"]
+        assert main(["render", *options]) == 0
+        found[setups] = json.loads(Path(f"{setups}.json").read_text())
+        assert found[setups]["setups"] == int(setups)
+    np.testing.assert_array_equal(picture("1.png"), picture("2.png"))
+    assert found["2"]["cycles"] < found["1"]["cycles"]
+
+
+def test_setups_need_triangles(refused):
+    """Of both commands, and of a scene file."""
+    needs = "spans need no triangle setup; give "
+    refused("render", *SMALL, "--setups", "2", thing="--setups 2", says=needs + "geometry hardware, too")
+    refused("verilog", "--setups", "2", thing="--setups 2", says=needs + "top or geometry, too")
+    refused("verilog", "--setups", "3", thing="--setups 3", says="give one of 1, 2")
+    Path("a.toml").write_text('[mesh]\nfile = "teapot"\n[pipeline]\nsetups = 2\n')
+    refused("render", "a.toml", thing="a.toml, pipeline.setups", says=needs)
+
+
+def test_turntable():
+    """Each frame is the model's; errors, cycles and counters are those of all."""
+    options = [*SMALL, *HARDWARE, "--frames", "2", "--jobs", "1", "-o", "a.gif", "--json", "a.json"]
+    assert main(["render", *options]) == 0
+    figures = json.loads(Path("a.json").read_text())
+    assert figures["geometry"] == "hardware"
+    assert "arithmetic_error" not in figures
+    assert figures["cycles"] == sum(frame["cycles"] for frame in figures["frames"])
+    drawn = blysk.scene("teapot", triangles=500, size=(64, 48))
+    model = triangle_frame(drawn, Renderer(blysk.design()))
+    assert figures["frames"][0]["pixels"] > 0
+    assert picture(figures["frames"][0]["picture"]).shape == model.image.shape
+    assert figures["frames"][0]["method_error"]["max_lsb"] < 0.6
 
 
 def test_scene_file_names_the_key(refused):

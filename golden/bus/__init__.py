@@ -1,0 +1,1 @@
+"""Buses: layouts of bytes, frames of streams, and the map of the registers."""

@@ -1,0 +1,145 @@
+"""Layout of a payload in the bytes of a bus: the one that a C compiler gives a structure."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import prod
+
+import numpy as np
+
+__all__ = ["ByteLayout", "Field"]
+
+
+@dataclass(frozen=True)
+class Field:
+    """A number, or an array of numbers, in the payload of a stream.
+
+    Parameters
+    ----------
+    name : str
+        A C identifier.
+    width : int
+        Bits of a number, 1 to 64.
+    signed : bool
+        Whether it is in two's complement.
+    shape : tuple of int
+        Sizes of the array, the outer one first; empty for a single number.
+    format : str
+        Number format, for people.
+
+    Raises
+    ------
+    ValueError
+        If the width is out of range.
+    """
+
+    name: str
+    width: int
+    signed: bool = False
+    shape: tuple[int, ...] = ()
+    format: str = ""
+
+    def __post_init__(self):
+        if not 1 <= self.width <= 64:
+            raise ValueError(f"a field of a layout must have 1 to 64 bits, not {self.width}")
+
+    @property
+    def size(self) -> int:
+        """Bytes of a number: 1, 2, 4 or 8."""
+        return next(size for size in (1, 2, 4, 8) if self.width <= 8 * size)
+
+    @property
+    def count(self) -> int:
+        """Numbers of the array."""
+        return prod(self.shape)
+
+    @property
+    def c_type(self) -> str:
+        """Type of a number in C."""
+        return f"{'' if self.signed else 'u'}int{8 * self.size}_t"
+
+
+@dataclass(frozen=True)
+class ByteLayout:
+    """Bytes of a payload, little endian: each number in 1, 2, 4 or 8 bytes at a multiple of its size.
+
+    A number is extended to its bytes, by its sign if it has one. Fields follow in the order of the payload;
+    the whole is a multiple of the largest number's size. Bytes between are 0. So the layout is that of a C
+    structure of ``c_type`` members on every processor whose integers are aligned to their size, and a DMA
+    controller can send an array of such structures as it is.
+
+    Parameters
+    ----------
+    fields : tuple of Field
+        At least one, their names different.
+
+    Source: docs/theory/bus.md#streams.
+    """
+
+    fields: tuple[Field, ...]
+
+    @property
+    def dtype(self) -> np.dtype:
+        """NumPy type of a payload."""
+        kinds = [
+            (field.name, f"<{'i' if field.signed else 'u'}{field.size}", field.shape) for field in self.fields
+        ]
+        return np.dtype(kinds, align=True)
+
+    @property
+    def size(self) -> int:
+        """Bytes of a payload."""
+        return self.dtype.itemsize
+
+    @property
+    def offsets(self) -> tuple[int, ...]:
+        """First byte of each field."""
+        return tuple(self.dtype.fields[field.name][1] for field in self.fields)
+
+    def pack(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Bytes of payloads, uint8 of shape (N, size).
+
+        Parameters
+        ----------
+        columns : mapping of str to int array
+            Codes of each field, of shape (N, *shape).
+
+        Raises
+        ------
+        ValueError
+            If a code does not fit its field.
+        """
+        words = np.zeros(len(columns[self.fields[0].name]), dtype=self.dtype)
+        for field in self.fields:
+            codes = np.asarray(columns[field.name])
+            low, high = (
+                (-(1 << field.width - 1), (1 << field.width - 1) - 1)
+                if field.signed
+                else (0, (1 << field.width) - 1)
+            )
+            if codes.size and not low <= codes.min() <= codes.max() <= high:
+                raise ValueError(f"field {field.name} holds {low} to {high}")
+            words[field.name] = codes
+        return words.view(np.uint8).reshape(len(words), self.size)
+
+    def unpack(self, data: np.ndarray) -> dict[str, np.ndarray]:
+        """Codes of each field, int64 of shape (N, *shape), of uint8 of shape (N, size): their low bits."""
+        found = {}
+        for name, (field, codes) in self._numbers(data).items():
+            low = codes & ((1 << field.width) - 1)
+            sign = low >> (field.width - 1) & int(field.signed)
+            found[name] = low - (sign << field.width)
+        return found
+
+    def fits(self, data: np.ndarray) -> np.ndarray:
+        """Whether every number of a payload fits its field, shape (N,)."""
+        held = self.unpack(data)
+        fit = [
+            (held[name] == codes).reshape(len(codes), -1).all(axis=1)
+            for name, (_, codes) in self._numbers(data).items()
+        ]
+        return np.logical_and.reduce(fit)
+
+    def _numbers(self, data: np.ndarray) -> dict[str, tuple[Field, np.ndarray]]:
+        """Each field, and its numbers as they stand on the bus."""
+        words = np.ascontiguousarray(data, dtype=np.uint8).view(self.dtype)[:, 0]
+        return {field.name: (field, words[field.name].astype(np.int64)) for field in self.fields}

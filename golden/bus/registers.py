@@ -1,0 +1,310 @@
+"""The map of a core's registers on a bus, from one table, and the bit-accurate model of their file."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from blysk.golden.frame_constants import (
+    BANK_ADDRESS,
+    FIELDS_OF_A_FRAME,
+    FIELDS_OF_A_LIGHT,
+    LIGHT_STRIDE,
+    LOBE_ADDRESS,
+    MATERIAL_ADDRESS,
+    THRESHOLD_ADDRESS,
+)
+from blysk.golden.geometry.edge_setup import X_BITS
+from blysk.golden.geometry.triangles import LIMIT_BITS
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.number.unit_vector import COMPONENT
+from blysk.golden.pipeline import Design
+from blysk.golden.reference.scene import BACK_FACES
+
+__all__ = [
+    "ADDRESS_BITS",
+    "BUSES",
+    "CONSTANTS",
+    "ERRORS",
+    "IDENTITY",
+    "VERSION",
+    "WORD_BITS",
+    "Register",
+    "RegisterFile",
+    "RegisterMap",
+    "constant_registers",
+    "frame_registers",
+]
+
+BUSES = ("axi", "wishbone")
+"""Buses in front of the registers."""
+
+ADDRESS_BITS = 12
+"""Bits of an address of a byte."""
+
+WORD_BITS = 32
+"""Bits of a register."""
+
+IDENTITY = int.from_bytes(b"BLSK", "big")
+"""What the first register reads."""
+
+VERSION = 1
+"""Version of the map."""
+
+FRAME, COUNTERS, CONSTANTS = 0x040, 0x080, 0x800
+"""First address of the registers of the picture, of the counters, and of the frame constants."""
+
+ERRORS = {
+    "unmapped": "no register at the address, or it is no multiple of 4",
+    "read_only": "a write to a register that is read-only",
+    "write_only": "a read of a register that is write-only",
+    "value": "a value that its register does not hold",
+    "strobe": "a write of some bytes of a word",
+    "busy": "a write of a frame register or constant while a frame is inside",
+}
+"""Why an access is refused; bits of the register ``errors``, the first one bit 0."""
+
+
+@dataclass(frozen=True)
+class Register:
+    """A register.
+
+    Parameters
+    ----------
+    name : str
+        A C identifier in lower case.
+    address : int
+        Of its first byte, a multiple of 4.
+    access : str
+        ``"read-only"``, ``"read-write"`` (reset to 0), ``"write-only"``, or ``"clear"``: a 1 written clears
+        the bit.
+    width : int
+        Bits of its value.
+    signed : bool
+        Whether it is in two's complement, and extended by its sign to 32 bits.
+    text : str
+        What it is.
+    format : str
+        Number format.
+    bits : tuple of (str, int, int, str)
+        Parts: name, first bit, bits, what it is.
+    """
+
+    name: str
+    address: int
+    access: str
+    width: int
+    signed: bool = False
+    text: str = ""
+    format: str = ""
+    bits: tuple[tuple[str, int, int, str], ...] = ()
+
+    def holds(self, data: int) -> bool:
+        """Whether the register takes a word of 32 bits that is written."""
+        return data == self.extended(data)
+
+    def extended(self, code: int) -> int:
+        """The word of 32 bits of a code."""
+        code &= (1 << self.width) - 1
+        negative = self.signed and code >> (self.width - 1)
+        return code | ((1 << WORD_BITS) - (1 << self.width) if negative else 0)
+
+
+def frame_registers() -> list[Register]:
+    """Registers of the picture, of a core that takes triangles; see `Frame`."""
+    borders = {
+        "left": "first column of the picture on the grid",
+        "top": "first row",
+        "right": "the column after the last",
+        "bottom": "the row after the last",
+    }
+    kinds = ", ".join(f"{k}: {name}" for k, name in enumerate(BACK_FACES))
+    rows = [(name, X_BITS, True, f"{text}; pixels, -2048 to 2048") for name, text in borders.items()]
+    rows += [
+        ("back_faces", 2, False, f"back faces, {kinds}"),
+        ("limit", LIMIT_BITS, False, "largest chord between the unit normals of a span's ends, in 1/1024"),
+    ]
+    return [
+        Register(name, FRAME + 4 * k, "read-write", width, signed, text)
+        for k, (name, width, signed, text) in enumerate(rows)
+    ]
+
+
+_OF_A_FRAME = {
+    "exponent": "specular exponent, 1 to 1000",
+    "ambient": "ambient colour, 255 times its value",
+}
+_OF_A_LIGHT = {
+    "direction": "unit vector to the light, component times 2^17 - 1",
+    "halfway": "unit half-way vector, component times 2^17 - 1",
+    "diffuse": "diffuse colour, 255 times coefficient times light",
+    "specular": "specular colour, 255 times coefficient times light",
+}
+
+
+def constant_registers(design: Design) -> list[Register]:
+    """Registers of the frame constants: those of the write port, four bytes each from `CONSTANTS` on.
+
+    Parameters
+    ----------
+    design : Design
+        The shading pipeline.
+    """
+    color, component = Intensity.COLOR_FORMAT, COMPONENT
+    formats = {"exponent": (Specular.EXPONENT_BITS, False, "")} | dict.fromkeys(
+        ("ambient", "diffuse", "specular"), (color.width, False, str(color))
+    )
+    formats |= dict.fromkeys(("direction", "halfway"), (component.width, True, str(component)))
+    rows = []
+
+    def add(prefix: str, base: int, fields: Mapping, texts: Mapping) -> None:
+        for name, (first, count) in fields.items():
+            for k in range(count):
+                part = "" if count == 1 else f"_{('xyz' if formats[name][1] else 'rgb')[k]}"
+                rows.append((f"{prefix}{name}{part}", base + first + k, *formats[name], texts[name]))
+
+    add("", 0, FIELDS_OF_A_FRAME, _OF_A_FRAME)
+    if design.materials > 1:
+        text = "index of the material that exponent and colours written next belong to"
+        rows.append(("material", MATERIAL_ADDRESS, (design.materials - 1).bit_length(), False, "", text))
+    if design.loads_tables:
+        text = "the next value of a table, UQ(0, 17); with bit 17 the bank whose table begins"
+        rows.append(("lobe", LOBE_ADDRESS, 18, False, "", text))
+    if design.threshold_format is not None:
+        form = design.threshold_format
+        text = "threshold of a material's table, where its highlight ends"
+        rows.append(("threshold", THRESHOLD_ADDRESS, form.width, False, str(form), text))
+    if design.banks > 1:
+        width = (design.banks - 1).bit_length()
+        rows.append(("bank", BANK_ADDRESS, width, False, "", "bank of a material's table"))
+    for light in range(design.lights):
+        add(f"light{light}_", (light + 1) * LIGHT_STRIDE, FIELDS_OF_A_LIGHT, _OF_A_LIGHT)
+    return [
+        Register(name, CONSTANTS + 4 * address, "write-only", width, signed, text, form)
+        for name, address, width, signed, form, text in sorted(rows, key=lambda row: row[1])
+    ]
+
+
+@dataclass(frozen=True)
+class RegisterMap:
+    """Every register of a core.
+
+    Parameters
+    ----------
+    core : str
+        Word for the core, for people.
+    counters : sequence of (str, int, str)
+        Counters since the reset: name, bits, what is counted.
+    picture : sequence of Register
+        Those of the picture, if it has some.
+    constants : sequence of Register
+        Frame constants, if it has some.
+
+    Source: docs/theory/bus.md#registers.
+    """
+
+    core: str
+    counters: Sequence[tuple[str, int, str]] = ()
+    picture: Sequence[Register] = ()
+    constants: Sequence[Register] = ()
+
+    @cached_property
+    def registers(self) -> tuple[Register, ...]:
+        """All of them, by rising address."""
+        causes = tuple((name, k, 1, text) for k, (name, text) in enumerate(ERRORS.items()))
+        state = (("busy", 0, 1, "a frame is inside, from its first beat in to its last beat out"),)
+        control = [
+            Register("identity", 0x000, "read-only", 32, text=f'"BLSK", 0x{IDENTITY:08X}'),
+            Register("version", 0x004, "read-only", 16, text=f"version of this map, {VERSION}"),
+            Register("state", 0x008, "read-only", 1, text="what the core does", bits=state),
+            Register(
+                "errors",
+                0x00C,
+                "clear",
+                len(ERRORS),
+                text="why accesses were refused; a 1 clears",
+                bits=causes,
+            ),
+            Register("refused", 0x010, "read-only", ADDRESS_BITS, text="address of the access refused last"),
+        ]
+        counters = [
+            Register(name, COUNTERS + 4 * k, "read-only", width, text=f"{text}; since the reset")
+            for k, (name, width, text) in enumerate(self.counters)
+        ]
+        return (*control, *self.picture, *counters, *self.constants)
+
+    def __getitem__(self, name: str) -> Register:
+        """The register of a name."""
+        return self.by_name[name]
+
+    @cached_property
+    def by_name(self) -> dict[str, Register]:
+        """Registers by name."""
+        return {register.name: register for register in self.registers}
+
+    @cached_property
+    def by_address(self) -> dict[int, Register]:
+        """Registers by address."""
+        return {register.address: register for register in self.registers}
+
+
+@dataclass
+class RegisterFile:
+    """Bit-accurate model of the registers: an answer for each access, one after the other.
+
+    Parameters
+    ----------
+    map : RegisterMap
+        The registers.
+    values : dict of str to int
+        What registers hold, and what the core says in those that are read-only; 0 where none is given.
+    """
+
+    map: RegisterMap
+    values: dict[str, int] = field(default_factory=dict)
+
+    def access(
+        self, address: int, data: int | None = None, strobe: int = 15, busy: bool = False
+    ) -> tuple[int, str]:
+        """The word read, 0 of a write, and why the access is refused, if it is.
+
+        Parameters
+        ----------
+        address : int
+            Of a byte, 12 bits.
+        data : int, optional
+            The word to write; ``None`` reads.
+        strobe : int
+            A bit for each byte that is written.
+        busy : bool
+            Whether a frame is inside.
+        """
+        register = self.map.by_address.get(address)
+        cause = self._refusal(register, data, strobe, busy)
+        if cause:
+            self.values["errors"] = self.values.get("errors", 0) | 1 << list(ERRORS).index(cause)
+            self.values["refused"] = address
+            return 0, cause
+        if data is None:
+            fixed = {"identity": IDENTITY, "version": VERSION, "state": int(busy)}
+            return register.extended(fixed.get(register.name, self.values.get(register.name, 0))), ""
+        if register.access == "clear":
+            self.values[register.name] = self.values.get(register.name, 0) & ~data
+        else:
+            self.values[register.name] = data & (1 << register.width) - 1
+        return 0, ""
+
+    @staticmethod
+    def _refusal(register: Register | None, data: int | None, strobe: int, busy: bool) -> str:
+        """The first cause in the order of `ERRORS` that fits."""
+        if register is None:
+            return "unmapped"
+        if data is None:
+            return "write_only" if register.access == "write-only" else ""
+        if register.access == "read-only":
+            return "read_only"
+        if not register.holds(data):
+            return "value"
+        if strobe != 15:
+            return "strobe"
+        return "busy" if busy and register.access != "clear" else ""

@@ -1,0 +1,171 @@
+"""A core on a bus: AXI4-Stream for what it draws, AXI4-Lite or Wishbone for its registers."""
+
+from amaranth.hdl import Cat, Module, Value
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.bus.registers import RegisterMap, constant_registers, frame_registers
+from blysk.golden.pipeline import Design
+from blysk.golden.render import Renderer
+from blysk.hdl.bus.axi_lite import AxiLite, AxiLiteUnit
+from blysk.hdl.bus.framing import FramingUnit
+from blysk.hdl.bus.registers import RegistersUnit
+from blysk.hdl.bus.wishbone import Wishbone, WishboneUnit
+
+__all__ = ["BUSES", "PORT_DESCRIPTIONS", "AxiStream", "BusUnit"]
+
+BUSES = {"axi": ("s_axil", AxiLite, AxiLiteUnit), "wishbone": ("wb", Wishbone, WishboneUnit)}
+"""Buses by name: the member for registers, its signature, and what is behind it."""
+
+PORT_DESCRIPTIONS = {
+    "s_axis_tdata": "one triangle or span, see above",
+    "s_axis_tlast": "the last one of the frame",
+    "m_axis_tdata": "one pixel or span, see above",
+    "m_axis_tkeep": "all ones",
+    "m_axis_tlast": "the last one of a packet, see above",
+    "m_axis_tuser": "bit 0: the first one of the frame; bit 1: the last one",
+}
+"""Ports of the streams, for the table in Verilog."""
+
+
+class AxiStream(wiring.Signature):
+    """Signals of AXI4-Stream, seen from the transmitter.
+
+    Parameters
+    ----------
+    size : int
+        Bytes of TDATA.
+    user : int
+        Bits of TUSER; with any, there is TKEEP, too.
+    """
+
+    def __init__(self, size: int, user: int = 0):
+        members = {"tdata": Out(8 * size), "tvalid": Out(1), "tready": In(1), "tlast": Out(1)}
+        if user:
+            members |= {"tkeep": Out(size), "tuser": Out(user)}
+        super().__init__(members)
+
+
+class BusUnit(wiring.Component):
+    """A core with bytes in and out, and registers: those of `FramingUnit` and `RegistersUnit`, connected.
+
+    Registers are written while no frame is inside, so that constants never change under one. No path leads
+    from a ready to a valid; s_axis_tready may follow from s_axis_tvalid and the index of a material.
+
+    Parameters
+    ----------
+    bus : str
+        One of `BUSES`.
+    top : str
+        One of `TOPS`.
+    parameters : Design or Renderer
+        Of the core.
+    **options
+        To its constructor.
+
+    Members
+    -------
+    s_axis : :py:`In(AxiStream(...))`
+        Triangles or spans; TLAST ends a frame.
+    m_axis : :py:`Out(AxiStream(..., user=2))`
+        Pixels or spans.
+    s_axil : :py:`In(AxiLite())`
+        Registers; or ``wb``, :py:`In(Wishbone())`.
+    memory
+        That of the core, where it has one.
+
+    Attributes
+    ----------
+    map : RegisterMap
+        The registers.
+
+    Source: docs/theory/bus.md#streams.
+    """
+
+    def __init__(self, bus: str, top: str, parameters: Design | Renderer, **options):
+        self.framing = FramingUnit(top, parameters, **options)
+        member, signature, front = BUSES[bus]
+        self._member, self._front = member, front()
+        counters = [
+            (name, field.shape.width, _TEXTS.get(name, name.replace("_", " ")))
+            for name, field in self.framing.status.shape()
+            if name != "busy"
+        ]
+        of_core = self.framing.core.signature.members
+        design = parameters.design if isinstance(parameters, Renderer) else parameters
+        self.map = RegisterMap(
+            self.framing.top.title,
+            counters,
+            frame_registers() if "constants" in of_core else (),
+            constant_registers(design) if "write" in of_core else (),
+        )
+        self._registers = RegistersUnit(self.map)
+        layouts = self.framing.parameters
+        members = {
+            "s_axis": In(AxiStream(layouts.given.size)),
+            "m_axis": Out(AxiStream(layouts.made.size, 2)),
+            member: In(signature()),
+        }
+        if "memory" in of_core:
+            members["memory"] = of_core["memory"]
+        super().__init__(members)
+
+    def elaborate(self, platform):
+        """The front of the bus, the registers, the framed core."""
+        m = Module()
+        m.submodules.framing = framing = self.framing
+        m.submodules.registers = registers = self._registers
+        m.submodules.front = front = self._front
+        given, made = self.s_axis, self.m_axis
+        m.d.comb += [
+            Value.cast(framing.i.payload.data).eq(given.tdata),
+            framing.i.payload.last.eq(given.tlast),
+            framing.i.valid.eq(given.tvalid),
+            given.tready.eq(framing.i.ready),
+            made.tdata.eq(Value.cast(framing.o.payload.data)),
+            made.tkeep.eq(~0),
+            made.tlast.eq(framing.o.payload.last),
+            made.tuser.eq(Cat(framing.o.payload.first, framing.o.payload.end)),
+            made.tvalid.eq(framing.o.valid),
+            framing.o.ready.eq(made.tready),
+        ]
+        wiring.connect(m, front.i, registers.i)
+        wiring.connect(m, registers.o, front.o)
+        wiring.connect(m, wiring.flipped(getattr(self, self._member)), front.bus)
+        m.d.comb += [
+            registers.constants[name].eq(framing.status[name]) for name in registers.constants.shape().members
+        ]
+        if self.map.picture:
+            m.d.comb += [
+                framing.constants[name].eq(registers.picture[name])
+                for name in framing.constants.shape().members
+            ]
+        if self.map.constants:
+            # No frame is inside, so that a write is accepted at once.
+            m.d.comb += [
+                framing.write.valid.eq(registers.load.valid),
+                framing.write.payload.address.eq(registers.load.address),
+                framing.write.payload.data.eq(registers.load.data),
+            ]
+        if "memory" in self.signature.members:
+            wiring.connect(m, framing.memory, wiring.flipped(self.memory))
+        return m
+
+
+_TEXTS = {
+    "empty": "triangles that cover no pixel",
+    "zero_area": "triangles without area",
+    "culled": "back faces left out",
+    "sliver": "triangles at most 1/256 pixel wide",
+    "cut": "spans that were cut",
+    "repaired": "normals of length 0 in whose place the one before stands",
+    "spans": "spans shaded",
+    "pixels": "pixels shaded",
+    "hidden": "of them those behind others",
+    "out_of_range_spans": "spans of an angle that the method does not serve",
+    "wide_spans": "spans wider than the error bound of the exponent allows",
+    "empty_spans": "spans of length 0",
+    "overrun": "whether a span went past the largest column",
+    "frames": "frames that have ended",
+    "misfits": "beats of which a number did not fit its field; its low bits were taken",
+}

@@ -1,0 +1,154 @@
+"""Framing: a core between streams of bytes, which tell where packets and frames begin and end."""
+
+from amaranth.hdl import Module, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.bus.byte_layout import ByteLayout
+from blysk.golden.bus.framing import PACKETS, Framing
+from blysk.golden.pipeline import Design
+from blysk.golden.render import Renderer
+from blysk.hdl.bus.byte_layout import bytes_of, fields_of, layout_of, misfits
+from blysk.hdl.bus.tops import TOPS
+from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.geometry.triangles import COUNTER_BITS, count_events
+
+__all__ = ["FramingUnit", "given_shape", "made_shape"]
+
+_SETTLES = 3
+"""Cycles after which whatever watches the core has seen a beat."""
+
+
+def given_shape(layout: ByteLayout) -> data.StructLayout:
+    """Shape of what goes in: bytes, and whether it is the last of its frame."""
+    return data.StructLayout({"data": data.ArrayLayout(8, layout.size), "last": 1})
+
+
+def made_shape(layout: ByteLayout) -> data.StructLayout:
+    """Shape of what comes out: bytes, end of a packet, first and last of a frame."""
+    return data.StructLayout({"data": data.ArrayLayout(8, layout.size), "last": 1, "first": 1, "end": 1})
+
+
+class FramingUnit(wiring.Component):
+    """A core between streams of bytes with the borders of frames: `Framing` is the bit-accurate model.
+
+    A frame is what comes up to a beat with ``last``. No beat is accepted after it until the core is empty and
+    the frame's last beat has been accepted at the output, so that nothing of two frames is ever inside, and
+    constants can change in between. One beat is held back until the next one comes or the frame ends: only
+    then is it known whether it is the last. That takes 2 cycles, and no throughput. A frame that gives
+    nothing ends without a beat; ``frames`` counts it.
+
+    Parameters
+    ----------
+    top : str
+        One of `TOPS`.
+    parameters : Design or Renderer
+        Of the core.
+    **options
+        To its constructor.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(given_shape(layout)))`
+        Spans or triangles.
+    o : :py:`Out(stream.Signature(made_shape(layout)))`
+        Pixels or spans.
+    write, constants, memory
+        Those of the core, where it has them.
+    status : :py:`Out(...)`
+        Counters of the core; ``frames`` that have ended, ``misfits``, beats of which a number did not fit its
+        field (whose low bits were taken), and ``busy``.
+
+    Source: docs/theory/bus.md#streams; not in the documents.
+    """
+
+    def __init__(self, top: str = "shader", parameters: Design | Renderer | None = None, **options):
+        self.top, self.packets = TOPS[top], PACKETS[top]
+        self.core = self.top.unit(parameters, **options)
+        payloads = self.core.i.payload.shape(), self.core.o.payload.shape()
+        self._without = ("last",) if self.packets == "span" else ()
+        given, made = layout_of(payloads[0]), layout_of(payloads[1], self._without)
+        self.parameters = Framing(given, made, self.packets)
+        counters = {"frames": unsigned(COUNTER_BITS), "misfits": unsigned(COUNTER_BITS), "busy": unsigned(1)}
+        members = {
+            "i": In(stream.Signature(given_shape(given))),
+            "o": Out(stream.Signature(made_shape(made))),
+            "status": Out(data.StructLayout(self.core.status.shape().members | counters)),
+        }
+        of_core = self.core.signature.members
+        members |= {name: of_core[name] for name in ("write", "constants", "memory") if name in of_core}
+        super().__init__(members)
+
+    def elaborate(self, platform):
+        """The core; what may come in; the beat held back and its flags."""
+        m = Module()
+        m.submodules.core = core = self.core
+        inside = self.top.watch(core)
+        for name in ("write", "memory"):
+            if name in self.signature.members:
+                wiring.connect(m, wiring.flipped(getattr(self, name)), getattr(core, name))
+        if "constants" in self.signature.members:
+            m.d.comb += core.constants.eq(self.constants)
+
+        active, ending, accept = Signal(name="active"), Signal(name="ending"), Signal(name="accept")
+        settles = Signal(range(_SETTLES + 1), name="settles")
+        shape, word = core.i.payload.shape(), Value.cast(self.i.payload.data)
+        m.d.comb += [
+            Value.cast(core.i.payload).eq(fields_of(shape, word)),
+            core.i.valid.eq(self.i.valid & ~ending),
+            self.i.ready.eq(core.i.ready & ~ending),
+            accept.eq(self.i.valid & self.i.ready),
+        ]
+        with m.If(accept):
+            m.d.sync += [active.eq(1), ending.eq(self.i.payload.last), settles.eq(_SETTLES)]
+        with m.Elif(settles != 0):
+            m.d.sync += settles.eq(settles - 1)
+        empty, done = Signal(name="empty"), Signal(name="done")
+        m.d.comb += empty.eq(ending & (settles == 0) & ~inside & ~core.o.valid)
+        done_when = self._give(m, empty)
+        m.d.comb += done.eq(done_when)
+        with m.If(done):
+            m.d.sync += [active.eq(0), ending.eq(0)]
+
+        misfit = Signal(name="misfit")
+        m.d.sync += misfit.eq(accept & misfits(shape, word))
+        count_events(m, self.status, frames=done, misfits=misfit)
+        m.d.comb += [
+            *(self.status[name].eq(core.status[name]) for name in core.status.shape().members),
+            self.status.busy.eq(active),
+        ]
+        return m
+
+    def _give(self, m: Module, empty: Value) -> Value:
+        """The beat held back and the one at the output; whether the frame has left."""
+        made, shape = self.core.o, self.core.o.payload.shape()
+        held, waiting = Signal(shape, name="held_back", reset_less=True), Signal(name="waiting")
+        word, valid = Signal(self.o.payload.shape(), name="word", reset_less=True), Signal(name="valid")
+        begun, leaves = Signal(name="begun"), Signal(name="leaves")
+        if self.packets == "span":
+            last = held.last
+        elif self.packets == "run":
+            place = made.payload
+            last = empty | (place.x != held.x + 1) | (place.y != held.y)
+        else:
+            last = empty
+        advance = skid_buffer(m, self.o, valid, word)
+        done = empty & ~waiting & ~self.o.valid
+        m.d.comb += [made.ready.eq(advance), leaves.eq(advance & waiting & (made.valid | empty))]
+        with m.If(advance):
+            m.d.sync += valid.eq(leaves)
+            with m.If(made.valid):
+                m.d.sync += [held.eq(made.payload), waiting.eq(1)]
+            with m.Elif(empty):
+                m.d.sync += waiting.eq(0)
+        with m.If(leaves):
+            m.d.sync += [
+                Value.cast(word.data).eq(bytes_of(shape, Value.cast(held), self._without)),
+                word.last.eq(last),
+                word.first.eq(~begun),
+                word.end.eq(empty),
+                begun.eq(1),
+            ]
+        with m.If(done):
+            m.d.sync += begun.eq(0)
+        return done

@@ -1,0 +1,159 @@
+"""The registers of a core: an answer for each access of a bus."""
+
+from amaranth.hdl import Const, Module, Signal, Value, signed, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.bus.registers import (
+    ADDRESS_BITS,
+    CONSTANTS,
+    ERRORS,
+    IDENTITY,
+    VERSION,
+    WORD_BITS,
+    Register,
+    RegisterMap,
+)
+from blysk.hdl.frame_constants import write_shape
+
+__all__ = ["RegistersUnit", "access_shape", "answer_shape"]
+
+
+def access_shape() -> data.StructLayout:
+    """Shape of an access: address of a byte, whether it is a write, the word, the bytes that count."""
+    return data.StructLayout(
+        {"address": ADDRESS_BITS, "write": 1, "data": WORD_BITS, "strobe": WORD_BITS // 8}
+    )
+
+
+def answer_shape() -> data.StructLayout:
+    """Shape of an answer: the word read, 0 of a write, and whether the access was refused."""
+    return data.StructLayout({"data": WORD_BITS, "error": 1})
+
+
+class RegistersUnit(wiring.Component):
+    """Registers behind a bus: `RegisterFile` is the bit-accurate model.
+
+    An access is answered 2 cycles after it was accepted, and the next is accepted when the answer has been
+    taken. A refused access changes nothing but the registers ``errors`` and ``refused``. Registers of the
+    picture and frame constants are written while ``busy`` is low.
+
+    Parameters
+    ----------
+    parameters : RegisterMap
+        The registers.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(access_shape()))`
+        Accesses.
+    o : :py:`Out(stream.Signature(answer_shape()))`
+        Their answers.
+    constants : :py:`In(...)`
+        What the core says: ``busy``, and its counters by name.
+    picture : :py:`Out(...)`
+        Registers of the picture by name; only where there are some.
+    load : :py:`Out(...)`
+        A frame constant, written on the cycle on which ``valid`` is high.
+
+    Source: docs/theory/bus.md#registers.
+    """
+
+    def __init__(self, parameters: RegisterMap):
+        self.parameters = parameters
+        said = {"busy": unsigned(1)} | {name: unsigned(width) for name, width, _ in parameters.counters}
+        load = {"valid": unsigned(1)} | dict(write_shape().members)
+        members = {
+            "i": In(stream.Signature(access_shape())),
+            "o": Out(stream.Signature(answer_shape())),
+            "constants": In(data.StructLayout(said)),
+            "load": Out(data.StructLayout(load)),
+        }
+        if parameters.picture:
+            shape = {register.name: _shape(register) for register in parameters.picture}
+            members["picture"] = Out(data.StructLayout(shape))
+        super().__init__(members)
+
+    def elaborate(self, platform):
+        """The access in a register; where it goes; its answer in another."""
+        m = Module()
+        access, full = Signal(self.i.payload.shape(), name="access"), Signal(name="full")
+        answer, answered = Signal(self.o.payload.shape(), name="answer"), Signal(name="answered")
+        m.d.comb += [
+            self.i.ready.eq(~full & ~answered),
+            self.o.valid.eq(answered),
+            self.o.payload.eq(answer),
+        ]
+        with m.If(self.i.valid & self.i.ready):
+            m.d.sync += [access.eq(self.i.payload), full.eq(1)]
+        with m.If(self.o.ready):
+            m.d.sync += answered.eq(0)
+        refused, errors = Signal(ADDRESS_BITS, name="refused"), Signal(len(ERRORS), name="errors")
+        cause, word = self._decide(m, access, {"errors": errors, "refused": refused})
+        with m.If(full):
+            m.d.sync += [full.eq(0), answered.eq(1), answer.error.eq(cause.any()), answer.data.eq(word)]
+            with m.If(cause.any()):
+                m.d.sync += [refused.eq(access.address), errors.eq(errors | cause)]
+        accepted = full & access.write & ~cause.any()
+        with m.If(accepted & (access.address == self.parameters["errors"].address)):
+            m.d.sync += errors.eq(errors & ~access.data[: len(ERRORS)])
+        for register in self.parameters.picture:
+            value = Signal(_shape(register), name=f"picture_{register.name}")
+            m.d.comb += self.picture[register.name].eq(value)
+            with m.If(accepted & (access.address == register.address)):
+                m.d.sync += value.eq(access.data)
+        m.d.comb += [
+            self.load.valid.eq(accepted & (access.address >= CONSTANTS)),
+            self.load.address.eq((access.address - CONSTANTS) >> 2),
+            self.load.data.eq(access.data),
+        ]
+        return m
+
+    def _decide(self, m: Module, access, held) -> tuple[Signal, Signal]:
+        """Why the access in the register is refused, a bit for each cause; and the word that it reads."""
+        cause, word = Signal(len(ERRORS), name="cause"), Signal(WORD_BITS, name="word")
+        found, fits = Signal(name="found"), Signal(name="fits")
+        readable, writable, locked = (Signal(name=name) for name in ("readable", "writable", "locked"))
+        said = {"identity": IDENTITY, "version": VERSION, "state": self.constants.busy} | held
+        said |= {name: self.constants[name] for name, *_ in self.parameters.counters}
+        with m.Switch(access.address):
+            for register in self.parameters.registers:
+                with m.Case(register.address):
+                    reads, writes = register.access != "write-only", register.access != "read-only"
+                    m.d.comb += [found.eq(1), readable.eq(reads), writable.eq(writes)]
+                    if writes:
+                        m.d.comb += [
+                            fits.eq(_fits(register, access.data)),
+                            locked.eq(register.access != "clear"),
+                        ]
+                    if reads:
+                        value = said[register.name] if register.name in said else self.picture[register.name]
+                        read = Value.cast(value) if isinstance(value, Value) else Const(value, register.width)
+                        with m.If(~access.write):
+                            m.d.comb += word.eq(read.as_signed() if register.signed else read)
+        names = ("unmapped", "read_only", "write_only", "value", "strobe", "busy")
+        wrong = (
+            ~found,
+            access.write & ~writable,
+            ~access.write & ~readable,
+            access.write & ~fits,
+            access.write & ~access.strobe.all(),
+            access.write & locked & self.constants.busy,
+        )
+        before = Const(0)
+        for name, one in zip(names, wrong, strict=True):
+            m.d.comb += cause[list(ERRORS).index(name)].eq(one & ~before)
+            before = before | one
+        return cause, word
+
+
+def _shape(register: Register):
+    return signed(register.width) if register.signed else unsigned(register.width)
+
+
+def _fits(register: Register, word: Value) -> Value:
+    """Whether a word of 32 bits is the extension of the register's value."""
+    above = word[register.width :]
+    if not len(above):
+        return Const(1)
+    return above == (word[register.width - 1].replicate(len(above)) if register.signed else 0)

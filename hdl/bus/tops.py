@@ -1,0 +1,56 @@
+"""Cores that a bus can be put round."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from amaranth.hdl import Value
+from amaranth.lib import wiring
+
+from blysk.golden.geometry.geometry import Geometry
+from blysk.golden.pipeline import Design
+from blysk.golden.render import Renderer
+from blysk.hdl.geometry.geometry import GeometryUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.hdl.render import RenderUnit
+
+__all__ = ["TOPS", "Top"]
+
+
+@dataclass(frozen=True)
+class Top:
+    """A core with streams ``i`` and ``o``.
+
+    Parameters
+    ----------
+    title : str
+        What it makes of what.
+    unit : callable
+        Makes it of a `Design` or a `Renderer`; keywords go to its constructor.
+    takes_triangles : bool
+        Whether triangles go in, else spans; the unit is then made of a `Renderer`.
+    watch : callable
+        Gives, of the core before it is elaborated, whether anything is inside but for what waits at ``o``.
+    """
+
+    title: str
+    unit: Callable[..., wiring.Component]
+    takes_triangles: bool
+    watch: Callable[[wiring.Component], Value]
+
+
+def _geometry(parameters: Renderer, **options) -> GeometryUnit:
+    geometry: Geometry = parameters.geometry
+    return GeometryUnit(geometry.grid, parameters.design.build.style == "compact", geometry.lines, **options)
+
+
+def _shader(parameters: Design) -> ShadingPipelineUnit:
+    return ShadingPipelineUnit(parameters)
+
+
+TOPS = {
+    # A write is accepted while no span is inside.
+    "shader": Top("spans to pixels", _shader, False, lambda core: ~core.write.ready),
+    "geometry": Top("triangles to spans", _geometry, True, GeometryUnit.watch),
+    "render": Top("triangles to pixels", RenderUnit, True, RenderUnit.watch),
+}
+"""Cores by name; those of `PACKETS`."""

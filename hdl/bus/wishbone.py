@@ -1,0 +1,97 @@
+"""Wishbone B4, classic and pipelined: a peripheral in front of registers."""
+
+from amaranth.hdl import Cat, Const, Module, Signal
+from amaranth.lib import stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.bus.registers import ADDRESS_BITS, WORD_BITS
+from blysk.hdl.bus.registers import access_shape, answer_shape
+
+__all__ = ["Wishbone", "WishboneUnit"]
+
+_WORD_ADDRESS_BITS = ADDRESS_BITS - 2
+
+
+class Wishbone(wiring.Signature):
+    """Signals of Wishbone B4 with words of 32 bits, seen from the initiator; addresses are those of words."""
+
+    def __init__(self):
+        super().__init__(
+            {
+                "cyc": Out(1),
+                "stb": Out(1),
+                "we": Out(1),
+                "adr": Out(_WORD_ADDRESS_BITS),
+                "sel": Out(WORD_BITS // 8),
+                "dat_w": Out(WORD_BITS),
+                "dat_r": In(WORD_BITS),
+                "ack": In(1),
+                "err": In(1),
+                "stall": In(1),
+            }
+        )
+
+
+class WishboneUnit(wiring.Component):
+    """Wishbone to accesses, one at a time.
+
+    A request is taken on a cycle on which ``stall`` is low. From the next one on, up to and with the cycle of
+    ``ack`` or ``err``, ``stall`` is high: so a classic initiator, which keeps ``stb`` until it is answered,
+    asks once, and a pipelined one waits. Both need no other wiring; a classic one leaves ``stall`` open. An
+    initiator that ends the cycle before it is answered gets no answer, and a write may have been made.
+    ``ack``, ``err`` and ``stall`` are registers.
+
+    Members
+    -------
+    bus : :py:`In(Wishbone())`
+        The bus.
+    i : :py:`Out(stream.Signature(access_shape()))`
+        Accesses.
+    o : :py:`In(stream.Signature(answer_shape()))`
+        Their answers.
+
+    Source: docs/theory/bus.md#registers.
+    """
+
+    def __init__(self):
+        super().__init__(
+            {
+                "bus": In(Wishbone()),
+                "i": Out(stream.Signature(access_shape())),
+                "o": In(stream.Signature(answer_shape())),
+            }
+        )
+
+    def elaborate(self, platform):
+        """The request in a register; its answer in another."""
+        m = Module()
+        bus, access, answer = self.bus, self.i, self.o
+        busy, dropped = Signal(name="request_busy"), Signal(name="dropped")
+        m.d.comb += [bus.stall.eq(busy), answer.ready.eq(1)]
+        with m.If(access.ready):
+            m.d.sync += access.valid.eq(0)
+        with m.If(bus.cyc & bus.stb & ~busy):
+            m.d.sync += [
+                busy.eq(1),
+                dropped.eq(0),
+                access.valid.eq(1),
+                access.payload.address.eq(Cat(Const(0, 2), bus.adr)),
+                access.payload.write.eq(bus.we),
+                access.payload.data.eq(bus.dat_w),
+                access.payload.strobe.eq(bus.sel),
+            ]
+        with m.Elif(busy & ~bus.cyc):
+            m.d.sync += dropped.eq(1)
+        m.d.sync += [bus.ack.eq(0), bus.err.eq(0)]
+        with m.If(busy & answer.valid):
+            given = bus.cyc & ~dropped
+            m.d.sync += [
+                bus.ack.eq(given & ~answer.payload.error),
+                bus.err.eq(given & answer.payload.error),
+                bus.dat_r.eq(answer.payload.data),
+            ]
+        ends = Signal(name="ends")
+        m.d.sync += ends.eq(busy & answer.valid)
+        with m.If(ends):
+            m.d.sync += busy.eq(0)
+        return m

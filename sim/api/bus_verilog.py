@@ -1,0 +1,113 @@
+"""Headers and port descriptions of cores on a bus, and of geometry alone."""
+
+from collections.abc import Sequence
+
+from blysk.golden.bus.registers import CONSTANTS
+from blysk.hdl.bus.bus import PORT_DESCRIPTIONS, BusUnit
+from blysk.hdl.bus.tops import TOPS
+from blysk.hdl.geometry.geometry import PORT_DESCRIPTIONS as GEOMETRY_PORT_DESCRIPTIONS
+from blysk.hdl.geometry.geometry import GeometryUnit
+from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
+from blysk.sim.api.bus_documents import layout_lines
+
+__all__ = ["bus_descriptions", "bus_header", "geometry_descriptions", "unit_of_top"]
+
+_MARKS = {
+    "span": "the last pixel of its span",
+    "run": "a pixel that the next one does not follow on its right, or the last of the frame",
+    "frame": "the last one of the frame",
+}
+_PATHS = {
+    "axi": "AXI4-Lite, s_axil_*",
+    "wishbone": "Wishbone B4, wb_*, classic or pipelined; wb_adr counts words",
+}
+
+
+def unit_of_top(top: str, bus: str, parameters, **options):
+    """A core, on a bus or with its own ports.
+
+    Parameters
+    ----------
+    top, bus : str
+        Their names; the bus may be ``"native"``.
+    parameters : Design or Renderer
+        As the core takes them.
+    **options
+        To its constructor.
+    """
+    return (
+        TOPS[top].unit(parameters, **options) if bus == "native" else BusUnit(bus, top, parameters, **options)
+    )
+
+
+def geometry_descriptions(unit: GeometryUnit) -> dict[str, str]:
+    """Descriptions of the ports of geometry alone."""
+    made = set(unit.o.payload.shape().members)
+    counted = {f"status_{name}" for name in unit.status.shape().members}
+    shared = {
+        port: text
+        for port, text in RENDER_PORT_DESCRIPTIONS.items()
+        if port in counted or port.startswith(("i_", "constants_"))
+    }
+    return shared | {f"o_{name}": text for name, text in GEOMETRY_PORT_DESCRIPTIONS.items() if name in made}
+
+
+def bus_descriptions(unit: BusUnit) -> dict[str, str]:
+    """Descriptions of the ports of a core on a bus."""
+    of_memory = {port: text for port, text in RENDER_PORT_DESCRIPTIONS.items() if port.startswith("memory_")}
+    memory = of_memory if "memory" in unit.signature.members else {}
+    return PORT_DESCRIPTIONS | memory
+
+
+def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Sequence[str]) -> list[str]:
+    """How a core on a bus is driven, in lines.
+
+    Parameters
+    ----------
+    unit : BusUnit
+        The core.
+    bus : str
+        Name of the bus.
+    of_core : sequence of str
+        What the core is.
+    constants : sequence of str
+        Frame constants by the addresses of its write port, and their example.
+    """
+    framing, map = unit.framing, unit.map
+    packets, layouts = framing.packets, framing.parameters
+    # Words are told by the layouts and the map.
+    kept = [line for line in of_core if not line.startswith(("status_", "constants_", "before the first"))]
+    registers = [
+        f"  0x{register.address:03X}  {register.name:<12} {register.text}"
+        for register in map.registers
+        if register.address < CONSTANTS
+    ]
+    lines = [
+        *kept,
+        "",
+        f"Streams: AXI4-Stream. Registers: {_PATHS[bus]}; words of 32 bits, little endian.",
+        "rst is synchronous and active high: of an active-low aresetn its inverse.",
+        "",
+        f"s_axis_tdata, {layouts.given.size} bytes: byte, C declaration, format; extended by sign or 0:",
+        *layout_lines(layouts.given),
+        f"m_axis_tdata, {layouts.made.size} bytes, likewise:",
+        *layout_lines(layouts.made),
+        "s_axis_tlast ends a frame: needed, or the last beat is never given.",
+        f"m_axis_tlast: {_MARKS[packets]}.",
+        "m_axis_tuser: bit 0 the first one of the frame, bit 1 the last one; tkeep is all ones.",
+        "",
+        "Order: rst for a cycle; write every frame register and constant in any order; send the beats of a",
+        "frame, tlast with the last; wait until state is 0; then write again or send the next frame.",
+        "A refused access (SLVERR, err) changes nothing but errors and refused: no register at the address,",
+        "the wrong direction, a value that does not fit, part of a word, a write while a frame is inside.",
+        "",
+        "Registers, by address of a byte:",
+        *registers,
+    ]
+    if map.constants:
+        lines += [
+            "",
+            f"Frame constants: register 0x{CONSTANTS:03X} + 4 address, signed ones extended by sign:",
+        ]
+        lines += constants
+    return lines

@@ -1,0 +1,140 @@
+"""Record of the framing of streams."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.golden.bus.byte_layout import ByteLayout
+from blysk.golden.presets import preset
+from blysk.golden.render import Renderer
+from blysk.hdl.bus.framing import FramingUnit
+from blysk.sim.units.geometry.geometry import RECORD as GEOMETRY
+from blysk.sim.units.pipeline import RECORD as SHADER
+from blysk.sim.units.record import PAUSED, Case, Record, Stimulus, Variant, first, length_of
+from blysk.sim.units.render import RECORD as RENDER
+
+__all__ = ["RECORD"]
+
+_RECORDS = {"span": SHADER, "frame": GEOMETRY, "run": RENDER}
+
+
+def _columns(layout: ByteLayout, beats) -> dict:
+    """Beats of a core, with the names of a layout: members of structures, and structures in arrays."""
+    found = {}
+
+    def add(name, value):
+        if getattr(value, "dtype", None) is not None and value.dtype.names:
+            for key in value.dtype.names:
+                part = value[key]
+                for k in range(value.shape[1]) if value.ndim > 1 else [None]:
+                    add(
+                        f"{name}_{key}" if k is None else f"{name}_{k}_{key}",
+                        part if k is None else part[:, k],
+                    )
+        else:
+            found[name] = value
+
+    for name, value in beats.items():
+        add(name, value)
+    return {field.name: found[field.name] for field in layout.fields}
+
+
+def _core_case(unit, case) -> Case:
+    """The case of the core in a unit."""
+    data = np.asarray(case.beats["data"], dtype=np.uint8)
+    return Case(unit.parameters.given.unpack(data), case.constants, case.write)
+
+
+def _frame_of(unit, case) -> np.ndarray:
+    """Frame of each output beat: how many beats come of each input beat, by cases that are one longer."""
+    record, inner = _RECORDS[unit.packets], _core_case(unit, case)
+    begins = np.flatnonzero(np.r_[True, case.beats["last"][:-1]])
+    counts = [
+        length_of(record.expect(unit.core, Case(first(inner.beats, end), inner.constants, inner.write)))
+        for end in [*begins[1:], len(case.beats["last"])]
+    ]
+    return np.repeat(np.arange(len(begins)), np.diff([0, *counts]))
+
+
+def _expect(unit, case):
+    record, frame = _RECORDS[unit.packets], _frame_of(unit, case)
+    made = unit.parameters.compute(record.expect(unit.core, _core_case(unit, case)), frame)
+    # The last beat of a frame that has not ended is held back.
+    begun = np.count_nonzero(case.beats["last"]) if not case.beats["last"][-1] else -1
+    return first(made, len(frame) - int(len(frame) > 0 and frame[-1] == begun))
+
+
+def _status(unit, case):
+    record = _RECORDS[unit.packets]
+    ended = int(np.count_nonzero(case.beats["last"]))
+    misfits = int(np.count_nonzero(~unit.parameters.given.fits(np.asarray(case.beats["data"], np.uint8))))
+    mine = {"frames": ended, "misfits": misfits, "busy": int(not case.beats["last"][-1])}
+    return dict(record.status(unit.core, _core_case(unit, case))) | mine
+
+
+def _case(unit, rng, count, length):
+    record = _RECORDS[unit.packets]
+    # Of spans the count is that of pixels.
+    count *= 10 if unit.packets == "span" else 1
+    inner = next(iter(record.stimuli.values())).make(unit.core, rng, count)
+    data = unit.parameters.given.pack(_columns(unit.parameters.given, inner.beats))
+    ends = np.cumsum(rng.integers(1, 2 * length, len(data) + 1)) - 1
+    last = np.isin(np.arange(len(data)), ends)
+    # Also those with which the run, and the one with pauses, ends.
+    last[[-1, min(PAUSED, len(last)) - 1]] = True
+    return Case({"data": data, "last": last.astype(int)}, inner.constants, inner.write)
+
+
+def _frames(unit, rng, count):
+    """Frames of some beats each, some of which give nothing."""
+    return _case(unit, rng, count, 24)
+
+
+def _short(unit, rng, count):
+    """Frames of a beat or two."""
+    return _case(unit, rng, count, 2)
+
+
+def _misfits(unit, rng, count):
+    """Frames with beats in which bits of any byte are turned round."""
+    case = _frames(unit, rng, count)
+    # Not of the last ones, so that every run ends with a beat.
+    data = case.beats["data"]
+    chosen = rng.random(len(data)) < 0.3
+    chosen[[-1, min(PAUSED, len(data)) - 1]] = False
+    byte, bit = rng.integers(0, data.shape[1], len(data)), rng.integers(0, 8, len(data))
+    data[chosen, byte[chosen]] ^= (1 << bit[chosen]).astype(np.uint8)
+    return case
+
+
+def _variants():
+    yield "shader", Variant(partial(FramingUnit, "shader", preset(lights=0)))
+    design = preset("chord", x_bits=5, y_bits=5)
+    yield "render", Variant(partial(FramingUnit, "render", Renderer(design), size=(32, 24)), long=True)
+    yield "geometry", Variant(partial(FramingUnit, "geometry", Renderer(design)), long=True)
+
+
+RECORD = Record(
+    name="framing",
+    title="A core between streams of bytes, with the borders of frames",
+    source="docs/theory/bus.md#streams",
+    variants=dict(_variants()),
+    expect=_expect,
+    status=_status,
+    stimuli={
+        "frames": Stimulus(_frames, 200),
+        "short": Stimulus(_short, 60),
+        "misfits": Stimulus(_misfits, 100),
+    },
+    axis="",
+    remembers=True,
+    still={
+        "bytes hold 12 bits of a coordinate, and no more than colours": (
+            "top.{spare,word}[12-15] top.{spare,word}[28-31] top.{spare,word}[56-63]"
+        ),
+        "without lights a colour is a constant of the run, written once": (
+            "top.{spare,word}[32-55] held_back[24-47] pixel_assembler.spare[24-47] "
+            "pixel_assembler.$signal[24-47] frame_constants.word_{1,2,3}[0-16]"
+        ),
+    },
+)

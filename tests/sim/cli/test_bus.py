@@ -1,0 +1,45 @@
+"""``--top`` and ``--bus``: Verilog of every core, what is written beside it, and what is refused."""
+
+from pathlib import Path
+
+import pytest
+
+from blysk.sim.cli.main import main
+
+pytestmark = pytest.mark.usefixtures("folder")
+
+SMALL = "--method", "linear", "--model", "cosquad"
+
+
+def test_files_of_a_core_on_a_bus():
+    """The header tells how to drive it; the map stands beside it in three forms."""
+    assert main(["verilog", *SMALL, "--bus", "wishbone", "-o", "core.v"]) == 0
+    text = Path("core.v").read_text()
+    for told in (
+        "Registers: Wishbone B4, wb_*",
+        "s_axis_tdata, 32 bytes",
+        "   8  int32_t normal_left[3]",
+        "s_axis_tlast ends a frame",
+        "  0x00C  errors",
+        "Frame constants: register 0x800 + 4 address",
+        "  .wb_stall(wb_stall)",
+    ):
+        assert told in text
+    assert sorted(path.name for path in Path().iterdir()) == ["core.h", "core.md", "core.svd", "core.v"]
+
+
+@pytest.mark.parametrize(
+    ("options", "thing", "says"),
+    [
+        (["--bus", "ahb"], "--bus ahb", "unknown bus; use one of native, axi, wishbone"),
+        (["--top", "cpu"], "--top cpu", "unknown core; use one of shader, geometry, render"),
+        (["--top", "shader", "--geometry", "hardware"], "--top shader", "it takes spans"),
+        (["--bus", "axi", "--pipes", "2"], "--pipes 2", "a core on axi has one pipeline"),
+        (["--bus", "axi", "-o", "core.txt"], "-o core.txt", "let the name end in .v"),
+        (["--bus", "axi", "--testbench", "bench"], "--testbench", "not --bus axi"),
+        (["--top", "render", "--method", "chord-local"], "--top render", "chord-local takes values"),
+    ],
+)
+def test_refused(refused, options, thing, says):
+    refused("verilog", *options, thing=thing, says=says)
+    assert list(Path().iterdir()) == []
