@@ -47,7 +47,7 @@ __all__ = [
 SLOW_SIZE = (160, 120)
 """Largest picture of the slow engine where it stands in for the compiled one, and its default size."""
 
-COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent", "roughness")
+COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent", "roughness", "fresnel")
 """Options of a material."""
 
 ColorLike = str | float | Triple
@@ -285,6 +285,12 @@ SCENE: dict[str, Option] = {
         "Of models that have one in place of an exponent, as in glTF.  [default: by the exponent]",
         "material.roughness",
     ),
+    "fresnel": Option(
+        Color(),
+        None,
+        "Reflection F_0 along the normal: k_s times Schlick's F_0 + (1 - F_0)(1 - V.H)^5.  [default: none]",
+        "material.fresnel",
+    ),
 }
 """Options of a scene."""
 
@@ -393,6 +399,7 @@ class SceneOptions(TypedDict, total=False):
     specular: ColorLike
     exponent: int
     roughness: float
+    fresnel: ColorLike
 
 
 class DesignOptions(TypedDict, total=False):
