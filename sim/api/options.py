@@ -95,8 +95,8 @@ class Model(Choice):
 
     def __init__(self):
         super().__init__("reflection model", REFLECTION_MODELS | LOBES | MODELS)
-        points = "give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1"
-        self.remedy = f"{points}, or {self.remedy}"
+        self.points = "give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1"
+        self.remedy = f"{self.points}, or {self.remedy}"
 
     def get_metavar(self, param, ctx=None):
         """The names, or a file."""
@@ -111,7 +111,9 @@ class Model(Choice):
         try:
             return TabulatedModel.of_csv(value)
         except OSError as error:
-            raise ValueError(f"cannot be opened ({error.strerror})") from None
+            raise PartError("", f"{shown(value)} cannot be opened ({error.strerror})", self.points) from None
+        except ValueError as error:
+            raise PartError("", str(error), self.points) from None
 
 
 class Roughness(Number):
