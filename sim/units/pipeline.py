@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.frame_constants import BANK_ADDRESS, LOBE_ADDRESS, FrameConstants, writes_of
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -43,6 +43,7 @@ from blysk.sim.units.pipeline_spans import (
     spans_at_rounding,
     spans_in_highlight,
     spans_near_terminator,
+    tabled,
 )
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
@@ -82,6 +83,7 @@ def _measure(rng, count, design):
             left, right, light, halfway = (quantise(v) for v in (left, right, light, halfway))
             colors = (grey[name][np.newaxis] for name in ("diffuse", "specular"))
             constants = FrameConstants(exponent, grey["ambient"], light, halfway, *colors)
+            constants = tabled(design, constants)
             zero = np.zeros_like(length)
             spans = ends_for(design, Spans(zero, zero, length, left, right))
             found = design.compute(spans, constants).color[:, 0]
@@ -141,7 +143,9 @@ def _status(unit, case):
 def case_of(unit, spans: Spans, constants, *before: int) -> Case:
     """Spans under the constants of each material, which are written over others of these codes."""
     write = writes_of(constants if isinstance(constants, list) else [constants])
-    parts = [{"address": write["address"], "data": np.full_like(write["data"], code)} for code in before]
+    # Tables have an order of their own.
+    kept = np.isin(write["address"], (LOBE_ADDRESS, BANK_ADDRESS))
+    parts = [{"address": write["address"], "data": np.where(kept, write["data"], code)} for code in before]
     write = {name: np.concatenate([part[name] for part in (*parts, write)]) for name in write}
     return Case(beats_of(unit, ends_for(unit.parameters, spans)), write=write)
 
@@ -165,7 +169,8 @@ def _border(design, rng):
     """Constants of eight times the full light, steep at the terminator; and the light's vector."""
     light, peak = (quantise(v)[np.newaxis] for v in sphere(rng, 2))
     colors = (Intensity.color(np.array([color])) for color in ((8, 7, 6), (0.03, 0.5, 0.1)))
-    return FrameConstants(1, np.zeros(3, dtype=int), light, peak, *colors), light[0]
+    constants = FrameConstants(1, np.zeros(3, dtype=int), light, peak, *colors)
+    return tabled(design, constants), light[0]
 
 
 def _terminator(unit, rng, count):
@@ -201,7 +206,7 @@ def _highlights(unit, rng, count, *, exponent, invert):
     peak, direction = (quantise(v) ^ -invert for v in (peak, direction))
     colors = (Intensity.color(np.array([color])) for color in ((0, 0.01, 0), (8, 7, 6)))
     vectors = direction[np.newaxis], peak[np.newaxis]
-    constants = FrameConstants(exponent, np.zeros(3, dtype=int), *vectors, *colors)
+    constants = tabled(unit.parameters, FrameConstants(exponent, np.zeros(3, dtype=int), *vectors, *colors))
     largest = unit.parameters.interpolator.MAX_ANGLE - 0.01
     spans = spans_in_highlight(rng, largest, normalise(peak), exponent)
     return case_of(unit, spans, constants, 0x3FFFF)
@@ -219,11 +224,12 @@ def _halves(unit, rng, count):
         exponent=int(1000 ** rng.uniform()),
         direction=quantise(normalise(halfway + 0.2 * rng.normal(size=3)))[np.newaxis],
     )
+    constants = tabled(design, constants)
     away = rng.normal(size=(candidates, 3)) / np.sqrt(constants.exponent)
     flat = flat_spans(quantise(normalise(halfway + away)))
     cosine, highlight, dark = operands_of(design, flat, constants)
     d = Diffuse(cosine.format).compute(cosine).codes
-    s = design.specular.compute(highlight, dark, constants.exponent).codes
+    s = design.specular.compute(highlight, dark, constants.highlight).codes
     # The inverse of an odd number: each step doubles its bits, of which three are right at the start.
     inverse = s
     for _ in range(3):
@@ -308,7 +314,8 @@ LONG_DESIGNS: dict[str, Design] = {
 
 
 def _variants():
-    designs = [("quadratic", model) for model in ("cosquad", "cosquad7", "cosquad_lin")]
+    designs = [("chord", "blinn")]
+    designs += [("quadratic", model) for model in ("cosquad", "cosquad7", "cosquad_lin")]
     designs += [(method, "cosquad") for method in METHODS if method not in ("quadratic", "chord-local")]
     designs += [("chord", "exp"), ("chord", "blinn_product")]
     for method, model in designs:
@@ -324,7 +331,7 @@ def _variants():
                 "LSB",
                 beat=SPAN,
                 note=f"one light, against normalised Phong interpolation with Blinn's power{note}",
-                long=model != "cosquad",
+                long=model not in ("blinn", "cosquad"),
             ),
         )
     yield "chord-local", Variant(partial(ShadingPipelineUnit, preset("chord-local")))
