@@ -395,7 +395,8 @@ RECORD = Record(
             "shift[4] square_shift[5] shifter_0_1[4]"
         ),
         "twice a number is even": (
-            "{highlight,diffuse}_0_second[0] *_second_difference[0] chord_setup.spare[47] chord_setup.spare[141] "
+            "{highlight,diffuse}_0_second[0] *_second_difference[0] "
+            "chord_setup.spare[47] chord_setup.spare[141] "
             "chord_spans.{spare,payload}[100] chord_spans.{spare,payload}[194]"
         ),
     },
