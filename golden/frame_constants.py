@@ -9,7 +9,7 @@ from blysk.golden.lighting.intensity import MAX_INTENSITY, MAX_LIGHTS, Intensity
 from blysk.golden.lighting.lobe import LobeTable
 from blysk.golden.number.fixed import Format
 from blysk.golden.number.unit_vector import quantise
-from blysk.golden.reference.lighting import halfway_vector
+from blysk.golden.reference.lighting import distant_cosine, halfway_vector
 from blysk.golden.reference.reflection import ReflectionModel
 from blysk.golden.reference.scene import Scene
 
@@ -101,7 +101,9 @@ class FrameConstants:
 
         Lights that the scene does not have are black. A light straight behind the surface that faces the
         viewer (``L = -V``) has no half-way vector, and no specular light. With point lights or a near viewer
-        there are no vectors of a frame: they are 0.
+        there are no vectors of a frame: they are 0. So they are for a light that is off, whose colour is 0:
+        its terms are 0, and the compact style spends no cycle on them. Fresnel's reflection of a distant
+        light and viewer is a constant, and part of the specular colour.
 
         With ``energy`` the highlight is that of the energy-normalised form: the factor of
         `ReflectionModel.energy_factor` multiplies k_s here, once a frame, and the specular unit stays as it
@@ -138,6 +140,8 @@ class FrameConstants:
         direction = np.zeros((count, 3), dtype=np.int64)
         halfway, diffuse, specular = np.zeros((3, count, 3), dtype=np.int64)
         for index, light in enumerate(scene.lights):
+            if not light.is_on:
+                continue
             diffuse[index] = Intensity.color(np.multiply(material.diffuse, light.color))
             between = np.zeros(3)
             if not scene.local:
@@ -147,7 +151,8 @@ class FrameConstants:
             if has_halfway:
                 halfway[index] = quantise(between)
             if scene.local or has_halfway:
-                highlight = factor * np.multiply(material.specular, light.color)
+                reflection = material.reflection(distant_cosine(light, scene.distant_viewer))
+                highlight = factor * reflection * light.color
                 if energy is not None and highlight.max() > MAX_INTENSITY:
                     raise ValueError(
                         f"the energy factor {factor:.4g} of {energy.name} with {energy.PARAMETER} "

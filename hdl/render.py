@@ -24,6 +24,7 @@ PORT_DESCRIPTIONS = {
     "i_depth": "their depths, less is nearer",
     "i_normal": "component (second index) of a corner's (first index) N/W",
     "i_material": "index of the triangle's material",
+    "i_two_sided": "with back_faces 2: 1 turns the normals of the triangle's back in place of culling it",
     "o_x": "column of the pixel",
     "o_y": "row",
     "o_r": "red",

@@ -55,7 +55,8 @@ class Value(click.ParamType):
         except ValueError as error:
             option = param.opts[0] if param else self.name
             reason = f"unknown {self.name}" if str(error) == "unknown" else str(error)
-            raise InputError(f"{option} {value}", reason, self.remedy) from None
+            remedy = getattr(error, "remedy", self.remedy)
+            raise InputError(f"{option} {value}", reason, remedy) from None
 
 
 def shown(value: Any) -> str:

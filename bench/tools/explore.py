@@ -63,8 +63,8 @@ _WORDS = range(36, 47, 2)
 
 _MARKERS = dict(zip(STYLES, ("o", "^"), strict=True))
 
-SERVED = {"blinn": LOBES["blinn"]} | MODELS
-"""Specular units by reflection models that have an exponent."""
+SERVED = LOBES | MODELS
+"""Specular units by reflection models; those of a roughness take the one of the exponent."""
 
 EXPONENT = 50
 """Of the default sweep."""

@@ -41,7 +41,7 @@ from blysk.bench.tools.web_data import (
     tables,
 )
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.presets import MODELS
+from blysk.golden.presets import LOBES, MODELS
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import processors
 from blysk.sim.output import atomic_writer, files_within, write_json, write_text
@@ -55,6 +55,9 @@ __all__ = [
     "write_site",
 ]
 
+
+TABLES = {name: LOBES[name] for name in ("blinn", "ggx")}
+"""Models by a table that the page's script knows."""
 
 _MARK = "site.json"
 
@@ -190,7 +193,7 @@ def write_site(
         .get_template("web/index.html")
         .render(
             site=_site(designs, meshes),
-            models=[model for model in MODELS if any(d["model"] == model for d in designs.values())],
+            models=[model for model in LOBES | MODELS if any(d["model"] == model for d in designs.values())],
             version=version_of("blysk"),
             documents={name: DOCUMENTS[name] for name in folders or {}},
             has_report=report is not None,
@@ -246,6 +249,7 @@ def _site(designs: Mapping[str, Mapping[str, Any]], meshes: Mapping[str, Any]) -
         "methods": {name: method(name) for name in dict.fromkeys(d["method"] for d in designs.values())},
         "errorMap": {"limits": STEPS, "colors": map_colors()},
         "mostExponent": MAX_EXPONENT,
+        "rough": ["ggx"],
     }
 
 
@@ -304,8 +308,8 @@ class _Design(click.ParamType):
         method, _, model = value.partition("/")
         if method not in SERVED:
             raise InputError(f"--design {value}", "unknown method", f"use one of {', '.join(SERVED)}")
-        if model not in MODELS:
-            raise InputError(f"--design {value}", "unknown model", f"use one of {', '.join(MODELS)}")
+        if model not in MODELS | TABLES:
+            raise InputError(f"--design {value}", "unknown model", f"use one of {', '.join(MODELS | TABLES)}")
         return method, model
 
 

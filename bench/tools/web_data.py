@@ -4,7 +4,7 @@ import base64
 import inspect
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -12,10 +12,18 @@ import numpy as np
 
 from blysk.bench import accuracy
 from blysk.bench.report.cosine_quadratic_figures import sphere
-from blysk.golden.frame_constants import FIELDS_OF_A_FRAME, FIELDS_OF_A_LIGHT, LIGHT_STRIDE
+from blysk.golden.frame_constants import (
+    FIELDS_OF_A_FRAME,
+    FIELDS_OF_A_LIGHT,
+    LIGHT_STRIDE,
+    LOBE_ADDRESS,
+    THRESHOLD_ADDRESS,
+    FrameConstants,
+)
 from blysk.golden.frames.cut import cut_by_angle, cut_spans
-from blysk.golden.frames.prepare import spans_for
+from blysk.golden.frames.prepare import spans_for, with_tables
 from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.pipeline import Design, Spans
@@ -23,6 +31,7 @@ from blysk.golden.presets import LOBES, METHODS, MODELS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.lobes import GGX
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import (
     AngleCosine,
@@ -44,12 +53,14 @@ __all__ = [
     "HEIGHT",
     "MESHES",
     "REFERENCES",
+    "ROUGHNESSES",
     "SERVED",
     "START",
     "WIDTH",
     "Body",
     "design_of",
     "encode",
+    "lobe_of",
     "method",
     "model_table",
     "module_of",
@@ -70,8 +81,11 @@ SERVED = tuple(name for name, method in METHODS.items() if method.serves_gate an
 """Methods of modules, which have a gate. Where spans carry values of the light, it cannot be moved without
 them."""
 
-DESIGNS = tuple(pair for pair in accuracy.DESIGNS if pair[0] in SERVED)
+DESIGNS = (*(pair for pair in accuracy.DESIGNS if pair[0] in SERVED), ("chord", "ggx"))
 """Method and model of each module."""
+
+ROUGHNESSES = tuple(round(step / 100, 2) for step in range(10, 101))
+"""Those that a model with a roughness may have."""
 
 BACKGROUND = "#1a1c20"
 
@@ -79,10 +93,11 @@ START = {
     "mesh": "teapot",
     "view": 0,
     "method": "chord",
-    "model": "cosquad",
+    "model": "blinn",
     "reference": "method",
     "direction": [-0.5, 0.8, 0.7],
     "exponent": 50,
+    "roughness": 0.3,
     "ambient": 0.08,
     "diffuse": 0.75,
     "specular": 0.6,
@@ -192,6 +207,7 @@ def scene_of(settings: Mapping[str, Any]) -> Scene:
             tuple(settings["diffuse"] * color),
             (settings["specular"],) * 3,
             settings["exponent"],
+            settings["roughness"],
         ),
         lights=[Light(tuple(settings["direction"]), _channels(settings["light"]))],
         background=_channels(BACKGROUND),
@@ -322,9 +338,10 @@ def module_of(method: str, model: str) -> dict[str, Any]:
     dict
         ``wasm``, compressed by zlib, in base 64, and its ``bytes``; ``ports``: see `ports_of`;
         ``probes``: those of `probes_of`; ``stages``: names, titles and ages at which a pixel comes
-        and goes.
+        and goes; ``lobe``: see `lobe_of`.
     """
-    component = ObservedPipeline(design_of(method, model))
+    design = design_of(method, model)
+    component = ObservedPipeline(design)
     binary, ports, probes = build(component), ports_of(component), probes_of(component.unit)
     ages = {probe.name: probe.age for probe in probes}
     first, lit, done = min(0, *ages.values()), ages["diffuse"], ages["r"]
@@ -343,6 +360,36 @@ def module_of(method: str, model: str) -> dict[str, Any]:
             for probe in probes
         ],
         "stages": [dict(zip(("name", "title", "from", "to"), stage, strict=True)) for stage in stages],
+        "lobe": lobe_of(design),
+    }
+
+
+def lobe_of(design: Design) -> dict[str, Any] | None:
+    """What frame constants with a table need, which the page makes itself; ``None`` without tables.
+
+    Returns
+    -------
+    dict
+        ``model``: see `model_table`; ``knots``: arguments of the entries; ``parameter``: its name, and
+        ``parameters`` that it may have; for each ``exponents`` and ``thresholds``, of `FrameConstants`.
+    """
+    if not design.loads_tables:
+        return None
+    lobe = design.specular
+    assert isinstance(lobe, Lobe)
+    name = lobe.model.PARAMETER or "exponent"
+    parameters = ROUGHNESSES if name == "roughness" else range(1, MAX_EXPONENT + 1)
+    scene = scene_of(START)
+    (material,) = scene.materials
+    plain = FrameConstants.of(scene)
+    found = [with_tables([plain], [replace(material, **{name: of})], design)[0] for of in parameters]
+    return {
+        "model": model_table(design.model or ""),
+        "knots": np.minimum(lobe.knots, 1 - 2.0**-40).tolist(),
+        "parameter": name,
+        "parameters": list(parameters),
+        "exponents": [of.exponent for of in found],
+        "thresholds": [of.threshold for of in found],
     }
 
 
@@ -354,6 +401,8 @@ def model_table(model: str) -> dict[str, Any]:
     reflection = unit.model
     if isinstance(reflection, PowerModel):
         return {"kind": "power"}
+    if reflection is GGX:
+        return {"kind": "ggx", "parameter": "roughness"}
     if isinstance(reflection, PolynomialModel):
         slopes = [reflection.slope(exponent) for exponent in exponents]
         return {"kind": "line", "power": 1 << unit.squarings, "slopes": slopes}
@@ -373,6 +422,8 @@ def tables() -> dict[str, Any]:
         "frame": FIELDS_OF_A_FRAME,
         "light": FIELDS_OF_A_LIGHT,
         "stride": LIGHT_STRIDE,
+        "lobe": LOBE_ADDRESS,
+        "threshold": THRESHOLD_ADDRESS,
         "done": int(StopReason.DONE),
     }
 

@@ -152,7 +152,7 @@ def cut_by_error(
     - a light's N·L changes its sign, or nearly, where its highlight shows, and the pixels might not have the
       sign of the exact value at every one of them, unless that is within 2^-25 of 0.
 
-    Of lights that are behind the surface along all of a span only the turn counts.
+    Of lights that are behind the surface along all of a span only the turn counts; those that are off do not.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def cut_by_error(
     raster, cut
         As of `cut_spans`.
     """
-    limits = limits or HighlightLimits.of(scene.materials)
+    limits, scene = limits or HighlightLimits.of(scene.materials), scene.lit
     cosines = np.cos(np.radians([interpolator.widest_span(exponent) for exponent in limits.exponents]))
 
     def is_wide(origin, first, last):
@@ -195,7 +195,7 @@ def missed_spans(
     scene, raster, interpolator, limits
         As for `cut_by_error`.
     """
-    limits = limits or HighlightLimits.of(scene.materials)
+    limits, scene = limits or HighlightLimits.of(scene.materials), scene.lit
     spans = np.flatnonzero(raster.length > 2)
     missed = 0
     for part in chunks(len(spans)):

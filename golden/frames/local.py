@@ -114,9 +114,10 @@ def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> Spa
         Spans from `cut_spans`, in any order.
     lights : int, optional
         Lights of the pipeline, by default those of the scene. Lights that the scene does not have have an
-        N·L of 0, and are dark.
+        N·L of 0, and are dark; so have those that are off.
     """
     count = len(scene.lights) if lights is None else lights
+    on = np.array([light.is_on for light in scene.lights], dtype=bool)
     spans = np.arange(len(raster.length))
     diffuse, highlight = np.zeros((2, len(spans), count, 3))
     # Of a span of one pixel the first value is all three; of two, there is none in the middle.
@@ -129,6 +130,6 @@ def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> Spa
             )
         for part in chunks(len(has)):
             exact = SurfacePoints.at(scene, raster, has[part], np.full(len(has[part]), t))
-            diffuse[has[part], : len(scene.lights), place] = exact.diffuse
+            diffuse[has[part], : len(scene.lights), place] = exact.diffuse * on
             highlight[has[part], : len(scene.lights), place] = exact.highlight
     return SpanValues.quantise(diffuse, highlight)

@@ -137,9 +137,12 @@ def with_tables(
             fixed = ", ".join(f"{value:g}" for value in banks)
             raise ValueError(f"the {lobe.model.PARAMETER} is fixed at {fixed}, not {parameter:g}")
     if len(banks) > lobe.banks:
+        most = f"build it with more banks, up to {lobe.MAX_BANKS}"
+        if lobe.banks == lobe.MAX_BANKS:
+            most = "take a model without a table, such as exp"
         raise ValueError(
             f"the materials have {len(banks)} lobes, the pipeline has banks for {lobe.banks}; give materials "
-            f"an equal {lobe.model.PARAMETER}, or build it with more banks, up to {lobe.MAX_BANKS}"
+            f"an equal {lobe.model.PARAMETER}, or {most}"
         )
     tables = [lobe.table(parameter) for parameter in banks]
     thresholds = [

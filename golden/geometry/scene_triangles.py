@@ -105,6 +105,7 @@ def scene_triangles(scene: Scene, grid: Grid = GRID, limit: int = Frame.limit) -
         depth=np.rint(depth).astype(np.int64),
         normal=np.clip(np.rint(normal * 2.0**ATTRIBUTE.fraction_bits), -_LARGEST, _LARGEST).astype(np.int64),
         material=mesh.material[source].astype(np.int64),
+        two_sided=scene.two_sided[source],
     )
     return SceneTriangles(triangles, frame, source, int((cut & present).sum()), int((~present).sum()))
 

@@ -170,6 +170,8 @@ class Triangles:
         Components of N/W over the largest 1/W of the triangle, `ATTRIBUTE`; the last axis is x, y, z.
     material : int64 array, shape (T,)
         Index of the material.
+    two_sided : bool array, shape (T,)
+        Whether a frame that leaves out back faces negates the normals of this one instead.
     """
 
     x: np.ndarray
@@ -177,13 +179,14 @@ class Triangles:
     depth: np.ndarray
     normal: np.ndarray
     material: np.ndarray
+    two_sided: np.ndarray
 
     def __len__(self) -> int:
         return len(self.x)
 
     def __getitem__(self, key) -> "Triangles":
         """Triangles picked by a NumPy index."""
-        return Triangles(self.x[key], self.y[key], self.depth[key], self.normal[key], self.material[key])
+        return Triangles(**{name: values[key] for name, values in self.beats.items()})
 
     @property
     def attributes(self) -> np.ndarray:
@@ -194,5 +197,5 @@ class Triangles:
     @property
     def beats(self) -> dict:
         """What is sent to the hardware."""
-        names = ("x", "y", "depth", "normal", "material")
+        names = ("x", "y", "depth", "normal", "material", "two_sided")
         return {name: getattr(self, name) for name in names}

@@ -39,7 +39,8 @@ class SortedTriangles:
     @property
     def beats(self) -> dict:
         """What the hardware gives."""
-        return self.triangles.beats | {"area": self.area, "right": self.right, "flip": self.flip}
+        beats = self.triangles.beats | {"area": self.area, "right": self.right, "flip": self.flip}
+        return {name: values for name, values in beats.items() if name != "two_sided"}
 
 
 @dataclass(frozen=True)
@@ -53,8 +54,8 @@ class VertexSort:
        is lost;
     2. counted as ``zero_area`` and dropped where twice its area,
        ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)``, is 0;
-    3. counted as ``culled`` and dropped where it is seen from behind and the frame asks for that. Corners
-       that are counterclockwise as seen, y up, face the viewer.
+    3. counted as ``culled`` and dropped where it is seen from behind, not two-sided, and the frame asks for
+       that. Corners that are counterclockwise as seen, y up, face the viewer.
 
     A sorted triangle has its long edge on the right where a of the sorted corners is negative. All is exact.
 
@@ -119,7 +120,8 @@ class VertexSort:
         odd = (order == np.arange(3)).sum(axis=1) == 1
         back = (area > 0) ^ odd
         solid = area != 0
-        drawn = solid & ~back if frame.back_faces == "cull" else solid
+        culls = frame.back_faces == "cull"
+        drawn = solid & ~(back & culls & (kept.two_sided == 0))
         counts = {
             "empty": len(triangles) - len(kept),
             "zero_area": int((~solid).sum()),
@@ -129,7 +131,7 @@ class VertexSort:
             triangles=kept[drawn],
             area=np.abs(area[drawn]),
             right=area[drawn] < 0,
-            flip=back[drawn] & (frame.back_faces == "flip"),
+            flip=back[drawn] & ((frame.back_faces == "flip") | culls),
             source=source[drawn],
         )
         return result, counts

@@ -9,17 +9,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.lobes import checked_roughness, exponent_of_roughness, roughness_of_exponent
+from blysk.golden.reference.lobes import (
+    LEAST_ROUGHNESS,
+    checked_roughness,
+    exponent_of_roughness,
+    roughness_of_exponent,
+)
 from blysk.golden.reference.reflection import ReflectionModel
 
 __all__ = [
     "Light",
     "Material",
+    "distant_cosine",
     "gram_determinant",
     "halfway_vector",
     "intensity",
     "intensity_of_cosines",
     "saturate",
+    "schlick",
 ]
 
 Triple = tuple[float, float, float]
@@ -87,6 +94,11 @@ class Light:
             object.__setattr__(self, "direction", tuple(normalise(direction).tolist()))
         object.__setattr__(self, "color", triple("a light's color", self.color, least=0))
 
+    @property
+    def is_on(self) -> bool:
+        """Whether its colour is not 0."""
+        return any(self.color)
+
     def towards(self, points: np.ndarray | None = None) -> np.ndarray:
         """Unit vectors L from points of the surface to the light; 0 where a point light is at the point.
 
@@ -112,6 +124,29 @@ class Light:
         return normalise(np.asarray(self.position) - points)
 
 
+def schlick(f0: ArrayLike, cosine: ArrayLike) -> np.ndarray:
+    """Schlick's form of Fresnel's reflection: ``F = F_0 + (1 - F_0)(1 - V·H)^5``.
+
+    Parameters
+    ----------
+    f0 : array
+        F_0, the reflection along the normal, 0 to 1.
+    cosine : array
+        V·H, 0 to 1.
+
+    Returns
+    -------
+    float64 array
+        Shape of both, broadcast.
+
+    Notes
+    -----
+    Source: docs/theory/models.md#reflection-models; [Schlick94b] 24.
+    """
+    f0 = np.asarray(f0, dtype=np.float64)
+    return f0 + (1 - f0) * (1 - np.asarray(cosine, dtype=np.float64)) ** 5
+
+
 @dataclass(frozen=True)
 class Material:
     """Reflection coefficients of a surface.
@@ -125,6 +160,10 @@ class Material:
     roughness : float, optional
         Roughness r of microfacets, greater than 0 and at most 1. By default that of the exponent, see
         `lobes.roughness_of_exponent`.
+    fresnel : three floats, optional
+        F_0 a channel, 0 to 1: k_s counts times `schlick`, see `reflection`. ``None``: k_s as it is.
+    two_sided : bool
+        Whether a scene that leaves out back faces draws those of this material, with their normals turned.
 
     Raises
     ------
@@ -139,6 +178,8 @@ class Material:
     specular: Triple
     exponent: int
     roughness: float | None = None
+    fresnel: Triple | None = None
+    two_sided: bool = False
 
     def __post_init__(self):
         for name in ("ambient", "diffuse", "specular"):
@@ -148,6 +189,8 @@ class Material:
             raise ValueError(f"a material's exponent must be in 1 to 1000, not {self.exponent}")
         if self.roughness is not None:
             object.__setattr__(self, "roughness", checked_roughness(self.roughness))
+        if self.fresnel is not None:
+            object.__setattr__(self, "fresnel", triple("a material's fresnel", self.fresnel, 0, 1))
 
     @classmethod
     def of_metallic_roughness(
@@ -155,9 +198,14 @@ class Material:
     ) -> "Material":
         """Material of glTF's base colour, metallic and roughness factors.
 
-        ``k_d = (1 - metallic) base``; ``k_s = F_0 = 0.04 (1 - metallic) + metallic base``, the reflection
-        that Schlick's formula has along the normal; the exponent is that of the roughness, rounded, in 1 to
-        1000. A roughness under 1/1000 counts as that.
+        ``k_d = (1 - metallic) base``; ``F_0 = 0.04 (1 - metallic) + metallic base``, of `schlick`; the
+        exponent is that of the roughness, rounded, in 1 to 1000. A roughness under `LEAST_ROUGHNESS`, of
+        which the table of a lobe keeps its error, counts as that.
+
+        With ``alpha = roughness^2``, k_s is ``1/(4 alpha^2)``: what the peak of glTF's specular term,
+        ``F D / 4`` with ``D = 1/(pi alpha^2)``, is over its diffuse term, ``k_d / pi``. A highlight that is
+        brighter than the picture's white only grows wider, and its errors with it: k_s is at most 1 over the
+        largest channel of F_0, and at most 4.
 
         Parameters
         ----------
@@ -181,11 +229,26 @@ class Material:
         for name, value in (("metallic", metallic), ("roughness", roughness)):
             if not 0 <= value <= 1:
                 raise ValueError(f"{name} must be 0 to 1, not {value}")
-        roughness = max(float(roughness), 1e-3)
+        roughness = max(float(roughness), LEAST_ROUGHNESS)
         exponent = round(min(max(exponent_of_roughness(roughness), 1), 1000))
         dielectric = 1 - metallic
-        specular = 0.04 * dielectric + metallic * color
-        return cls(tuple(ambient * color), tuple(dielectric * color), tuple(specular), exponent, roughness)
+        f0 = 0.04 * dielectric + metallic * color
+        peak = min(1 / (4 * roughness**4), 1 / max(f0.max(), 0.25))
+        diffuse = tuple(dielectric * color)
+        return cls(tuple(ambient * color), diffuse, (peak,) * 3, exponent, roughness, tuple(f0))
+
+    def reflection(self, cosine: float | None = None) -> np.ndarray:
+        """k_s with Fresnel's reflection: ``k_s F``, or k_s where there is no ``fresnel``; shape (3,).
+
+        Parameters
+        ----------
+        cosine : float, optional
+            V·H of a light: a constant of the frame, where light and viewer are distant. ``None``: it changes
+            from point to point, and F_0 stands for F, which it is at V·H = 1.
+        """
+        if self.fresnel is None:
+            return np.array(self.specular)
+        return self.specular * schlick(self.fresnel, 1.0 if cosine is None else cosine)
 
     def parameter(self, model: ReflectionModel) -> float | None:
         """Exponent or roughness, as `ReflectionModel.PARAMETER` of a model says, or ``None``."""
@@ -209,6 +272,21 @@ def halfway_vector(light_direction: ArrayLike, viewer: ArrayLike) -> np.ndarray:
     """
     total = np.asarray(light_direction, dtype=np.float64) + np.asarray(viewer, dtype=np.float64)
     return np.where(np.linalg.norm(total, axis=-1, keepdims=True) > 1e-9, normalise(total), 0.0)
+
+
+def distant_cosine(light: Light, viewer: ArrayLike | None) -> float | None:
+    """V·H of a distant light and viewer, 0 where ``L = -V``; ``None`` where one of them is near.
+
+    Parameters
+    ----------
+    light : Light
+        Directional, or a point light.
+    viewer : array, shape (3,), or None
+        Unit vector V to a distant viewer.
+    """
+    if light.position is not None or viewer is None:
+        return None
+    return float(np.clip(halfway_vector(light.direction, viewer) @ np.asarray(viewer), 0, 1))
 
 
 def gram_determinant(normal: np.ndarray, light_direction: np.ndarray, viewer: np.ndarray) -> np.ndarray:
@@ -247,7 +325,8 @@ def intensity(
     ``I = k_a I_a + sum_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6). The cosine of a
     mirror model, such as Phong's, is R·V with ``R = 2 (N·L) N - L``, that of the others N·H. A light with
     ``N·L <= 0`` gives neither diffuse nor specular; one with ``L = -V`` has no half-way vector and gives no
-    specular. A point light gives nothing to the point where it is.
+    specular. A point light gives nothing to the point where it is. k_s is that of `Material.reflection` at
+    the V·H of a distant light and viewer.
 
     Parameters
     ----------
@@ -294,7 +373,9 @@ def intensity(
             highlight_cosine = 1 - np.square(normals - halfway).sum(axis=-1) / 2
         else:
             highlight_cosine = _dot(normals, halfway)
-        _add_light(total, material, light, cosine, highlight_cosine, halfway.any(axis=-1), model)
+        constant = distant_cosine(light, viewer if viewer.ndim == 1 else None)
+        specular = light.color * material.reflection(constant)
+        _add_light(total, material, light, specular, cosine, highlight_cosine, halfway.any(axis=-1), model)
     return total
 
 
@@ -305,15 +386,18 @@ def intensity_of_cosines(
     cosine: np.ndarray,
     highlight_cosine: np.ndarray,
     model: ReflectionModel,
+    viewer: ArrayLike | None = None,
 ) -> np.ndarray:
     """The same, from what a method gives instead of a normal.
 
     Parameters
     ----------
     material, lights, ambient_light, model
-        As for `intensity`; of the lights only the colours are read.
+        As for `intensity`; of the lights only the colours are read, and for Fresnel's reflection directions.
     cosine, highlight_cosine : arrays, shape (..., lights)
         N·L and N·H.
+    viewer : array, shape (3,), optional
+        Unit vector V to a distant viewer, for Fresnel's reflection.
 
     Returns
     -------
@@ -323,7 +407,8 @@ def intensity_of_cosines(
     total[...] = np.multiply(material.ambient, ambient_light)
     for index, light in enumerate(lights):
         given = cosine[..., index], highlight_cosine[..., index]
-        _add_light(total, material, light, *given, np.True_, model)
+        specular = light.color * material.reflection(distant_cosine(light, viewer))
+        _add_light(total, material, light, specular, *given, np.True_, model)
     return total
 
 
@@ -331,14 +416,14 @@ def _dot(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
     return vectors @ others if others.ndim == 1 else np.einsum("...i,...i->...", vectors, others)
 
 
-def _add_light(total, material, light, cosine, highlight_cosine, has_halfway, model) -> None:
+def _add_light(total, material, light, specular, cosine, highlight_cosine, has_halfway, model) -> None:
     """Both terms of a light, added in place; without a cosine of the highlight, the diffuse one alone."""
     color = np.asarray(light.color)
     total += np.maximum(cosine, 0.0)[..., np.newaxis] * (color * material.diffuse)
     if highlight_cosine is not None:
         highlight = model.reflect(highlight_cosine, material.parameter(model))
         highlight = np.where((cosine > 0) & has_halfway, highlight, 0.0)
-        total += highlight[..., np.newaxis] * (color * material.specular)
+        total += highlight[..., np.newaxis] * specular
 
 
 def saturate(values: np.ndarray) -> np.ndarray:

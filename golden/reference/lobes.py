@@ -15,6 +15,7 @@ __all__ = [
     "BECKMANN",
     "COPLANAR_PHONG",
     "GGX",
+    "LEAST_ROUGHNESS",
     "MAX_POINTS",
     "STEEPEST",
     "TABLE_MODELS",
@@ -32,6 +33,9 @@ __all__ = [
 
 MAX_POINTS = 100_000
 """Most points of a curve in a file."""
+
+LEAST_ROUGHNESS = 0.05
+"""Least roughness that a mesh file's material gets: for less, errors of u by a step of its word show."""
 
 STEEPEST = 10_000.0
 """Largest steepness of a curve: one that jumps has no larger one."""

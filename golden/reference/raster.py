@@ -289,7 +289,7 @@ def rasterise(scene: Scene) -> Raster:
         back = (plane * towards).sum(axis=1) < 0
     else:
         back = plane @ scene.camera.viewer < 0
-    culled = back & ~degenerate if scene.back_faces == "cull" else np.zeros(len(faces), dtype=bool)
+    culled = back & ~degenerate & scene.culls
 
     x, y, w, depth = homogeneous.T
     outside = np.zeros(len(faces), dtype=bool)
@@ -342,7 +342,7 @@ def rasterise(scene: Scene) -> Raster:
 
     triangle = pieces.triangle[piece].astype(np.int32)
     span_back = back[triangle]
-    turn = np.where(span_back, -1.0, 1.0) if scene.back_faces == "flip" else np.ones(len(triangle))
+    turn = np.where(span_back & scene.flips[triangle], -1.0, 1.0)
     fallback = plane[triangle] * turn[:, np.newaxis]
     corners = mesh.normals[faces[triangle]] * turn[:, np.newaxis, np.newaxis]
     ends = [
@@ -467,8 +467,9 @@ def fragment_normals(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndar
     weight += t * raster.weights_right[span].sum(axis=1, keepdims=True)
     lost = np.flatnonzero((length <= 1e-12 * weight)[:, 0])
     if len(lost):
-        face = face_normals(scene.mesh)[raster.triangle[span[lost]]]
-        flip = raster.back[span[lost]] & (scene.back_faces == "flip")
+        triangle = raster.triangle[span[lost]]
+        face = face_normals(scene.mesh)[triangle]
+        flip = raster.back[span[lost]] & scene.flips[triangle]
         normal[lost] = np.where(flip[:, np.newaxis], -face, face)
         length[lost] = 1.0
     return normal / length

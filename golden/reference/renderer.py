@@ -246,10 +246,10 @@ class _NodeColors:
                 middles = np.where(lost, face, normalise(total))
                 normals = np.concatenate((normals, middles), axis=1)
                 points = np.concatenate((points, (points[:, [1, 2, 0]] + points[:, [2, 0, 1]]) / 2), axis=1)
-        if scene.back_faces == "flip":
-            back = np.zeros(len(shown), dtype=bool)
-            back[self.place] = raster.back
-            normals = np.where(back[:, np.newaxis, np.newaxis], -normals, normals)
+        back = np.zeros(len(shown), dtype=bool)
+        back[self.place] = raster.back
+        back &= scene.flips[shown]
+        normals = np.where(back[:, np.newaxis, np.newaxis], -normals, normals)
         self.colors = saturate(_shade(scene, normals, model, shown, slice(None), points=points))
 
     def interpolate(self, which: np.ndarray) -> np.ndarray:
@@ -346,6 +346,7 @@ def shade_operands(
                 cosine[chosen],
                 highlight_cosine[chosen],
                 model,
+                scene.distant_viewer,
             )
             colors[raster.pixel[chosen]] = saturate(shaded)
     return image

@@ -1,7 +1,7 @@
 """Everything that a picture depends on: mesh, camera, size, material and lights."""
 
 import operator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,7 +43,8 @@ class Scene:
         Color of the pixels that show no surface, in [0, 1].
     back_faces : {"flip", "show", "cull"}
         A triangle seen from behind (its corners clockwise) is drawn with its normals negated, so that those
-        of an outer surface turn to the viewer's side, or with its normals as they are, or is left out.
+        of an outer surface turn to the viewer's side, or with its normals as they are, or is left out. Where
+        its material is two-sided, ``"cull"`` negates the normals, too.
     viewer : {"distant", "near"}
         The V of the lighting: `Camera.viewer` everywhere, or from each point of the surface to a perspective
         camera.
@@ -99,6 +100,32 @@ class Scene:
     def local(self) -> bool:
         """Whether L or H differ from point to point: there is a point light, or a near viewer."""
         return self.viewer == "near" or any(light.position is not None for light in self.lights)
+
+    @property
+    def lit(self) -> "Scene":
+        """The scene with the lights that are on."""
+        on = tuple(light for light in self.lights if light.is_on)
+        return self if len(on) == len(self.lights) else replace(self, lights=on)
+
+    @property
+    def culls(self) -> np.ndarray:
+        """Whether each triangle is left out where it is seen from behind: bool array, shape (faces,)."""
+        return (self.back_faces == "cull") & ~self.two_sided
+
+    @property
+    def flips(self) -> np.ndarray:
+        """Whether each triangle has its normals turned where it is seen from behind: bool array."""
+        return (self.back_faces == "flip") | (self.back_faces == "cull") & self.two_sided
+
+    @property
+    def two_sided(self) -> np.ndarray:
+        """Whether each triangle's material is two-sided: bool array, shape (faces,)."""
+        return np.array([material.two_sided for material in self.materials])[self.mesh.material]
+
+    @property
+    def distant_viewer(self) -> np.ndarray | None:
+        """Unit vector V to a distant viewer; ``None`` if the viewer is near."""
+        return self.camera.viewer if self.viewer == "distant" else None
 
     def view_vectors(self, points: np.ndarray | None = None) -> np.ndarray:
         """Unit vectors V from points of the surface to the viewer.

@@ -41,8 +41,10 @@ def corners_shape(grid: Grid = GRID) -> dict:
 
 
 def triangle_shape(grid: Grid = GRID) -> data.StructLayout:
-    """Shape of a triangle: corners in any order, and the index of its material."""
-    return data.StructLayout(corners_shape(grid) | {"material": unsigned(MATERIAL_BITS)})
+    """Shape of a triangle: corners in any order, the index of its material, whether it is two-sided."""
+    return data.StructLayout(
+        corners_shape(grid) | {"material": unsigned(MATERIAL_BITS), "two_sided": unsigned(1)}
+    )
 
 
 def tag_shape() -> dict:

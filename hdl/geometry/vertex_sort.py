@@ -76,6 +76,7 @@ class VertexSortUnit(wiring.Component):
         m = Module()
         corners = [Signal(_corner_shape(self.grid), name=f"corner_{k}") for k in range(3)]
         material, odd = Signal.like(self.i.payload.material), Signal(name="odd")
+        two_sided = Signal(name="two_sided")
         covered, leaves, digits = Signal(name="covered"), Signal(name="leaves"), Signal(3, name="digits")
         free = Signal(name="area_free")
 
@@ -83,6 +84,7 @@ class VertexSortUnit(wiring.Component):
         with m.Switch(step):
             with m.Case(0):
                 m.d.sync += [step.eq(self.i.valid), material.eq(self.i.payload.material), odd.eq(0)]
+                m.d.sync += two_sided.eq(self.i.payload.two_sided)
                 for k, corner in enumerate(corners):
                     m.d.sync += [corner[name].eq(self.i.payload[name][k]) for name in corner.shape().members]
             with m.Case(4):
@@ -94,7 +96,7 @@ class VertexSortUnit(wiring.Component):
         m.d.comb += self.i.ready.eq(step == 0)
         self._exchange(m, corners, odd, step)
         self._box(m, corners, step, covered, digits)
-        zero, culled = self._area(m, corners, material, odd, digits, leaves, free)
+        zero, culled = self._area(m, corners, (material, two_sided), odd, digits, leaves, free)
         count_events(m, self.status, empty=(step == 4) & ~covered, zero_area=zero, culled=culled)
         return m
 
@@ -135,8 +137,12 @@ class VertexSortUnit(wiring.Component):
                 with m.If(rows < _rows_of(count, self.grid)):
                     m.d.sync += digits.eq(count)
 
-    def _area(self, m, corners, material, odd, digits, leaves, free) -> tuple[Value, Value]:
-        """The second stage; whether a triangle has no area, or is culled, on this cycle."""
+    def _area(self, m, corners, tag, odd, digits, leaves, free) -> tuple[Value, Value]:
+        """The second stage; whether a triangle has no area, or is culled, on this cycle.
+
+        The tag is the index of the material, and whether it is two-sided.
+        """
+        (material, is_two_sided), two_sided = tag, Signal(name="two_sided_area")
         grid, result = self.grid, Signal(self.o.payload.shape(), name="result")
         total_bits, most = 2 * grid.bits + 1, _largest_digits(grid)
         total = Signal(signed(total_bits), name="total")
@@ -165,6 +171,7 @@ class VertexSortUnit(wiring.Component):
         with m.If(leaves):
             m.d.sync += [busy.eq(1), left.eq(digits - 1), total.eq(0), odd_area.eq(odd)]
             m.d.sync += [result.material.eq(material), *(self._sorted(result, corners))]
+            m.d.sync += two_sided.eq(is_two_sided)
         with m.Elif(busy):
             m.d.sync += [left.eq(left - 1), busy.eq(left != 0)]
         with m.If(sums):
@@ -173,7 +180,8 @@ class VertexSortUnit(wiring.Component):
 
         back = (total > 0) ^ odd_area
         zero = total == 0
-        culled = back & (self.constants.back_faces == BACK_FACES.index("cull"))
+        culls, flips = (self.constants.back_faces == BACK_FACES.index(name) for name in ("cull", "flip"))
+        culled = back & culls & ~two_sided
         valid = Signal(name="valid")
         m.d.comb += [drops.eq(zero | culled), free.eq(~(busy | sums | done | valid))]
         with m.If(done):
@@ -181,7 +189,7 @@ class VertexSortUnit(wiring.Component):
                 valid.eq(~drops),
                 result.area.eq(Mux(total < 0, -total, total)),
                 result.right.eq(total < 0),
-                result.flip.eq(back & (self.constants.back_faces == BACK_FACES.index("flip"))),
+                result.flip.eq(back & (flips | culls)),
             ]
         with m.Elif(self.o.ready):
             m.d.sync += valid.eq(0)

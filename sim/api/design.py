@@ -59,7 +59,7 @@ def design(*, lights: int = 1, materials: int = 1, **options: Unpack[DesignOptio
     method : str
         Interpolation along a span: one of `METHODS`, by default ``"chord"``.
     model : str
-        Reflection model: one of `MODELS` or `LOBES`, by default ``"cosquad"``; or the curve of a file.
+        Reflection model: one of `MODELS` or `LOBES`, by default ``"blinn"``; or the curve of a file.
     operand : {"cosine", "one_minus_cosine"}
         Operand of the specular unit, of methods that find normals.
     gate : bool

@@ -51,7 +51,7 @@ __all__ = [
 SLOW_SIZE = (160, 120)
 """Largest picture of the slow engine where it stands in for the compiled one, and its default size."""
 
-COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent", "roughness")
+COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent", "roughness", "fresnel")
 """Options of a material."""
 
 ColorLike = str | float | Triple
@@ -99,8 +99,8 @@ class Model(Choice):
 
     def __init__(self):
         super().__init__("reflection model", REFLECTION_MODELS | LOBES | MODELS)
-        points = "give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1"
-        self.remedy = f"{points}, or {self.remedy}"
+        self.points = "give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1"
+        self.remedy = f"{self.points}, or {self.remedy}"
 
     def get_metavar(self, param, ctx=None):
         """The names, or a file."""
@@ -115,7 +115,9 @@ class Model(Choice):
         try:
             return TabulatedModel.of_csv(value)
         except OSError as error:
-            raise ValueError(f"cannot be opened ({error.strerror})") from None
+            raise PartError("", f"{shown(value)} cannot be opened ({error.strerror})", self.points) from None
+        except ValueError as error:
+            raise PartError("", str(error), self.points) from None
 
 
 class Roughness(Number):
@@ -289,6 +291,12 @@ SCENE: dict[str, Option] = {
         "Of models that have one in place of an exponent, as in glTF.  [default: by the exponent]",
         "material.roughness",
     ),
+    "fresnel": Option(
+        Color(),
+        None,
+        "Reflection F_0 along the normal: k_s times Schlick's F_0 + (1 - F_0)(1 - V.H)^5.  [default: none]",
+        "material.fresnel",
+    ),
 }
 """Options of a scene."""
 
@@ -424,6 +432,7 @@ class SceneOptions(TypedDict, total=False):
     specular: ColorLike
     exponent: int
     roughness: float
+    fresnel: ColorLike
 
 
 class DesignOptions(TypedDict, total=False):

@@ -381,8 +381,7 @@ def _check_lobes(scene: Scene, design: Design, settings: Settings) -> None:
 
 def _design(settings: Settings) -> Design:
     """The design of the settings, for the scene's lights and one material."""
-    source = settings.source
-    lights = source.lights if isinstance(source, Scene) else settings["lights"]
+    source, lights = settings.source, settings.lights
     viewer = source.viewer if isinstance(source, Scene) else settings["viewer"]
     made = design_of(settings, max(1, len(lights)))
     local = viewer == "near" or any(light.position is not None for light in lights)

@@ -60,9 +60,10 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
         See `Scene`; ``"near"`` needs the method ``chord-local``.
     lights : sequence of Light
         At most 16; by default one from (-0.5, 0.8, 0.7). Those with a position need the method
-        ``chord-local``.
-    ambient, diffuse, specular, exponent
-        See `Material`; by default those of the mesh file's materials, else copper and 50.
+        ``chord-local``. Those whose colour is 0 are off, and left out.
+    ambient, diffuse, specular, exponent, roughness, fresnel
+        See `Material`; by default those of the mesh file's materials, else copper and 50. An exponent that is
+        given counts before a file's roughness, too.
 
     Raises
     ------
@@ -144,7 +145,7 @@ def _made(loaded: LoadedMesh, settings: Settings, count: int) -> tuple[Scene, li
         width=width,
         height=height,
         material=_materials(loaded, settings),
-        lights=tuple(_scaled(light, shift) for light in settings["lights"]),
+        lights=tuple(_scaled(light, shift) for light in settings.lights),
         **{name: settings[name] for name in ("viewer", "back_faces", "ambient_light", "background")},
     )
     return made, cameras

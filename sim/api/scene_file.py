@@ -75,6 +75,8 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         diffuse = [0.75, 0.42, 0.2]
         specular = 0.6
         exponent = 50
+        # roughness, 0 to 1                 # of ggx and beckmann; by default by the exponent
+        # fresnel                           # F_0 of Schlick's reflection, a colour; by default none
 
         [pipeline]
         method = "chord"

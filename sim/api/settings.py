@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from blysk.golden.reference.geometry import Mesh, normalise
-from blysk.golden.reference.lighting import Triple
+from blysk.golden.reference.lighting import Light, Triple
 from blysk.golden.reference.scene import Scene
 from blysk.sim.api.options import SCENE, Option, PartError, Source
 from blysk.sim.api.scene_file import read_scene_file
@@ -46,6 +46,13 @@ class Settings:
     def refuse(self, name: str, reason: str, remedy: str, value: object = None) -> OptionError:
         """The error of a value; without a ``value``, the option's own is shown."""
         return OptionError(name, self.values[name] if value is None else value, reason, remedy)
+
+    @property
+    def lights(self) -> tuple[Light, ...]:
+        """Those of the scene; of the options those that are on: one that is off takes no hardware."""
+        if isinstance(self.source, Scene):
+            return self.source.lights
+        return tuple(light for light in self["lights"] if light.is_on)
 
     @contextmanager
     def located(self) -> Iterator[None]:

@@ -128,8 +128,10 @@ def _without_dark_lights(
 ) -> tuple[tuple[Scene, ...], list[Reduction]]:
     constants = _constants(scenes[0], full.lights)
     bright = np.any([of.diffuse | of.specular for of in constants], axis=(0, 2))
-    # Spans are cut by every light's, dark or not.
-    if bright.all() or (full.interpolator.CUT_BY_ERROR and bright.any()):
+    if full.interpolator.CUT_BY_ERROR and bright.any():
+        # Spans are cut by those of every light that is on, whether it shows or not.
+        bright[: len(scenes[0].lights)] |= [light.is_on for light in scenes[0].lights]
+    if bright.all():
         return scenes, []
     count = int(np.count_nonzero(bright))
     kept = tuple(light for light, lit in zip(scenes[0].lights, bright, strict=False) if lit)
@@ -145,7 +147,7 @@ def _without_equal_materials(
     scenes: tuple[Scene, ...], full: Design
 ) -> tuple[tuple[Scene, ...], list[Reduction]]:
     keys = [
-        (*of.writes()["data"].tolist(), full.highlight_parameter(material))
+        (*of.writes()["data"].tolist(), full.highlight_parameter(material), material.two_sided)
         for of, material in zip(_constants(scenes[0], None), scenes[0].materials, strict=True)
     ]
     first: dict[tuple, int] = {}

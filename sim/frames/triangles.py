@@ -122,6 +122,7 @@ class TriangleSimulator:
             depth=rng.integers(0, DEPTH.max_code, (count, 3)),
             normal=most // 2 + rng.integers(-most // 4, most // 4, (count, 3, 3)),
             material=np.arange(count) * self.renderer.design.materials // count,
+            two_sided=np.arange(count) % 2,
         )
         constants = sample_constants(self.renderer.design)
         expected = self.renderer.compute(triangles, frame, constants)

@@ -131,14 +131,31 @@ def find_gltf_materials(document: dict, materials: bool, found: Found) -> None:
 
 
 def _gltf_material(text: dict, name: str, given_name: str) -> tuple[FileMaterial, int]:
-    """A material of a glTF document, and how many textures it has."""
+    """A material of a glTF document, and how many textures it has.
+
+    Factors that are missing are 1, as glTF has it. Those of a texture, which is not read, say nothing.
+    """
     look = text.get("pbrMetallicRoughness", {})
     factor = look.get("baseColorFactor", [1, 1, 1, 1]) if isinstance(look, dict) else look
     numbers = factor if isinstance(factor, list) and len(factor) == 4 else []
     usable = all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers)
     color = color_of(numbers[:3] if usable else [], "baseColorFactor", name, str(factor))
     textures = sum(key.endswith("Texture") for part in (look, text) for key in part)
-    return FileMaterial(given_name, color), textures
+    two_sided = text.get("doubleSided") is True
+    if "metallicRoughnessTexture" in look:
+        return FileMaterial(given_name, color, two_sided=two_sided), textures
+    factors = [_factor(look, key, name) for key in ("metallicFactor", "roughnessFactor")]
+    return FileMaterial.of_metallic_roughness(given_name, color, *factors, two_sided), textures
+
+
+def _factor(look: dict, key: str, name: str) -> float:
+    """A factor of a material; `Refused` if it is no number from 0 to 1."""
+    value = look.get(key, 1)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
+        raise Refused(
+            f"material {name!r} has {key} {shown(str(value))!r}, not a number from 0 to 1", ONE_MATERIAL
+        )
+    return float(value)
 
 
 def plain_gltf(document: dict, found: Found) -> bytes:

@@ -12,6 +12,11 @@ __all__ = ["FileMaterial", "Found", "color_of", "surfaces"]
 _AMBIENT_SHARE = 0.1
 
 
+_SAID = ("ambient", "diffuse", "specular", "exponent", "roughness", "fresnel")
+# What a file says of the second does not count where the first is given.
+_INSTEAD = (("diffuse", "ambient"), ("exponent", "roughness"), ("specular", "fresnel"))
+
+
 @dataclass(frozen=True)
 class FileMaterial:
     """What a file says of a material; ``None`` where it says nothing.
@@ -24,12 +29,31 @@ class FileMaterial:
         Colours, each channel 0 to 1: factors of k_d and k_s, as they stand.
     exponent : int or None
         Exponent of the highlight, 1 to 1000.
+    roughness : float or None
+        Of models that have one in place of an exponent.
+    fresnel, ambient : three floats or None
+        F_0 of `Material`; and k_a, where it is not a share of the diffuse colour.
+    two_sided : bool
+        Whether its faces are seen from behind, too.
     """
 
     name: str = ""
     diffuse: Triple | None = None
     specular: Triple | None = None
     exponent: int | None = None
+    roughness: float | None = None
+    fresnel: Triple | None = None
+    ambient: Triple | None = None
+    two_sided: bool = False
+
+    @classmethod
+    def of_metallic_roughness(
+        cls, name: str, base: Triple, metallic: float, roughness: float, two_sided: bool = False
+    ) -> "FileMaterial":
+        """Of glTF's factors, 0 to 1 each: see `Material.of_metallic_roughness`."""
+        made = Material.of_metallic_roughness(base, metallic, roughness, _AMBIENT_SHARE)
+        names = ("diffuse", "specular", "exponent", "roughness", "fresnel", "ambient")
+        return cls(name, **{field: getattr(made, field) for field in names}, two_sided=two_sided)
 
 
 @dataclass
@@ -70,7 +94,9 @@ def surfaces(
 ) -> tuple[Material, ...]:
     """Reflection coefficients of a mesh's materials: what the file says, before a default.
 
-    The file's diffuse colour is k_d, and a tenth of it k_a; its specular colour is k_s.
+    The file's diffuse colour is k_d, and a tenth of it, or of the base colour, k_a; its specular colour is
+    k_s. An exponent that is given counts before the file's roughness, and a specular colour that is given
+    before the file's F_0.
 
     Parameters
     ----------
@@ -83,13 +109,10 @@ def surfaces(
     """
     result = []
     for material in materials:
-        color = None if "diffuse" in fixed else material.diffuse
-        said = {
-            "ambient": color and tuple(_AMBIENT_SHARE * channel for channel in color),
-            "diffuse": color,
-            "specular": material.specular,
-            "exponent": material.exponent,
-        }
-        said = {name: value for name, value in said.items() if value is not None and name not in fixed}
-        result.append(replace(default, **said))
+        said = {name: getattr(material, name) for name in _SAID}
+        if material.diffuse is not None and material.ambient is None:
+            said["ambient"] = tuple(_AMBIENT_SHARE * channel for channel in material.diffuse)
+        hidden = {*fixed, *(other for name, other in _INSTEAD if name in fixed)}
+        said = {name: value for name, value in said.items() if value is not None and name not in hidden}
+        result.append(replace(default, **said, two_sided=material.two_sided))
     return tuple(result)

@@ -73,13 +73,17 @@ def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> None
 
 
 def _mtl_material(text: str, name: str) -> tuple[FileMaterial, int]:
-    """A material of a material file, and how many textures it has."""
+    """A material of a material file, and how many textures it has.
+
+    Where it has Pr or Pm, roughness and metallic factor, these take the place of Ks and Ns; of the two a
+    missing one is 1 and 0, and a missing Kd white.
+    """
     values, textures = {}, 0
     for line in text.splitlines():
         keyword, *words = line.partition("#")[0].split() or [""]
         if re.match("map_|norm$|bump$|disp$|decal$|refl$", keyword.lower()):
             textures += 1
-        elif keyword in ("Kd", "Ks", "Ns"):
+        elif keyword in ("Kd", "Ks", "Ns", "Pr", "Pm"):
             values[keyword] = words
     colors = {}
     for keyword in ("Kd", "Ks"):
@@ -87,6 +91,17 @@ def _mtl_material(text: str, name: str) -> tuple[FileMaterial, int]:
             # One number is for all channels.
             given = values[keyword] * 3 if len(values[keyword]) == 1 else values[keyword]
             colors[keyword] = color_of([_float(word) for word in given], keyword, name, " ".join(given))
+    factors = {"Pm": 0.0, "Pr": 1.0}
+    for keyword in factors.keys() & values.keys():
+        given = " ".join(values[keyword])
+        if not 0 <= (number := _float(given)) <= 1:
+            raise Refused(
+                f"material {name!r} has {keyword} {shown(given)!r}, not a number from 0 to 1", ONE_MATERIAL
+            )
+        factors[keyword] = number
+    if factors.keys() & values.keys():
+        base = colors.get("Kd", (1.0, 1.0, 1.0))
+        return FileMaterial.of_metallic_roughness(name, base, *factors.values()), textures
     exponent = None
     if "Ns" in values:
         number = _float(" ".join(values["Ns"]))

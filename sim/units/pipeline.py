@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.frame_constants import BANK_ADDRESS, LOBE_ADDRESS, FrameConstants, writes_of
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -21,7 +21,6 @@ from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.units.cosines.chord_setup import values_of
 from blysk.sim.units.methods.interpolator import SPAN
-from blysk.sim.units.methods.quadratic_interpolator import STILL
 from blysk.sim.units.operands import (
     degrees_between,
     short_lengths,
@@ -43,6 +42,7 @@ from blysk.sim.units.pipeline_spans import (
     spans_at_rounding,
     spans_in_highlight,
     spans_near_terminator,
+    tabled,
 )
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
@@ -82,6 +82,7 @@ def _measure(rng, count, design):
             left, right, light, halfway = (quantise(v) for v in (left, right, light, halfway))
             colors = (grey[name][np.newaxis] for name in ("diffuse", "specular"))
             constants = FrameConstants(exponent, grey["ambient"], light, halfway, *colors)
+            constants = tabled(design, constants)
             zero = np.zeros_like(length)
             spans = ends_for(design, Spans(zero, zero, length, left, right))
             found = design.compute(spans, constants).color[:, 0]
@@ -141,7 +142,9 @@ def _status(unit, case):
 def case_of(unit, spans: Spans, constants, *before: int) -> Case:
     """Spans under the constants of each material, which are written over others of these codes."""
     write = writes_of(constants if isinstance(constants, list) else [constants])
-    parts = [{"address": write["address"], "data": np.full_like(write["data"], code)} for code in before]
+    # Tables have an order of their own.
+    kept = np.isin(write["address"], (LOBE_ADDRESS, BANK_ADDRESS))
+    parts = [{"address": write["address"], "data": np.where(kept, write["data"], code)} for code in before]
     write = {name: np.concatenate([part[name] for part in (*parts, write)]) for name in write}
     return Case(beats_of(unit, ends_for(unit.parameters, spans)), write=write)
 
@@ -165,7 +168,8 @@ def _border(design, rng):
     """Constants of eight times the full light, steep at the terminator; and the light's vector."""
     light, peak = (quantise(v)[np.newaxis] for v in sphere(rng, 2))
     colors = (Intensity.color(np.array([color])) for color in ((8, 7, 6), (0.03, 0.5, 0.1)))
-    return FrameConstants(1, np.zeros(3, dtype=int), light, peak, *colors), light[0]
+    constants = FrameConstants(1, np.zeros(3, dtype=int), light, peak, *colors)
+    return tabled(design, constants), light[0]
 
 
 def _terminator(unit, rng, count):
@@ -201,7 +205,7 @@ def _highlights(unit, rng, count, *, exponent, invert):
     peak, direction = (quantise(v) ^ -invert for v in (peak, direction))
     colors = (Intensity.color(np.array([color])) for color in ((0, 0.01, 0), (8, 7, 6)))
     vectors = direction[np.newaxis], peak[np.newaxis]
-    constants = FrameConstants(exponent, np.zeros(3, dtype=int), *vectors, *colors)
+    constants = tabled(unit.parameters, FrameConstants(exponent, np.zeros(3, dtype=int), *vectors, *colors))
     largest = unit.parameters.interpolator.MAX_ANGLE - 0.01
     spans = spans_in_highlight(rng, largest, normalise(peak), exponent)
     return case_of(unit, spans, constants, 0x3FFFF)
@@ -219,11 +223,12 @@ def _halves(unit, rng, count):
         exponent=int(1000 ** rng.uniform()),
         direction=quantise(normalise(halfway + 0.2 * rng.normal(size=3)))[np.newaxis],
     )
+    constants = tabled(design, constants)
     away = rng.normal(size=(candidates, 3)) / np.sqrt(constants.exponent)
     flat = flat_spans(quantise(normalise(halfway + away)))
     cosine, highlight, dark = operands_of(design, flat, constants)
     d = Diffuse(cosine.format).compute(cosine).codes
-    s = design.specular.compute(highlight, dark, constants.exponent).codes
+    s = design.specular.compute(highlight, dark, constants.highlight).codes
     # The inverse of an odd number: each step doubles its bits, of which three are right at the start.
     inverse = s
     for _ in range(3):
@@ -249,9 +254,9 @@ def _brightest(unit, rng, count):
 
 
 def _counters(unit, rng, count):
-    """More spans that are out of range, and more empty ones, than the counters hold; one past the last x."""
+    """More spans that are out of range, wide, and empty, than the counters hold; one past the last x."""
     design = unit.parameters
-    kinds = any_spans(rng, design, np.array([1, 0, 2]))
+    kinds = any_spans(rng, design, np.array([4, 0, 2]))
     kinds.normal_right[:] = -kinds.normal_left
     kinds.x[2] = (1 << design.x_bits) - 1
     spans = kinds[np.r_[np.repeat([0, 1], _COUNTED), 2]]
@@ -263,6 +268,8 @@ def _counters(unit, rng, count):
 
 _CHORD = preset("chord")
 _FULL = preset("chord", lights=2, gate=True)
+_BOTH = ("chord, blinn", "quadratic, cosquad")
+"""Variants that get every stimulus: the default one and the documents' own."""
 _LESS = {"x_bits": 9, "y_bits": 8, "length_bits": 5}
 
 DESIGNS: dict[str, Design] = {
@@ -308,7 +315,8 @@ LONG_DESIGNS: dict[str, Design] = {
 
 
 def _variants():
-    designs = [("quadratic", model) for model in ("cosquad", "cosquad7", "cosquad_lin")]
+    designs = [("chord", "blinn")]
+    designs += [("quadratic", model) for model in ("cosquad", "cosquad7", "cosquad_lin")]
     designs += [(method, "cosquad") for method in METHODS if method not in ("quadratic", "chord-local")]
     designs += [("chord", "exp"), ("chord", "blinn_product")]
     for method, model in designs:
@@ -324,7 +332,7 @@ def _variants():
                 "LSB",
                 beat=SPAN,
                 note=f"one light, against normalised Phong interpolation with Blinn's power{note}",
-                long=model != "cosquad",
+                long=model not in ("blinn", "cosquad"),
             ),
         )
     yield "chord-local", Variant(partial(ShadingPipelineUnit, preset("chord-local")))
@@ -343,31 +351,53 @@ RECORD = Record(
     status=_status,
     stimuli={
         "spans": Stimulus(_spans, 3000, repeats=3),
-        "setups": Stimulus(_every_setup, 60, stalled=False),
-        "terminator": Stimulus(_terminator),
-        "roundings": Stimulus(_roundings),
-        "long spans": Stimulus(_long_spans, stalled=False),
-        "highlights": Stimulus(partial(_highlights, exponent=997, invert=0)),
-        "highlights, inverted": Stimulus(partial(_highlights, exponent=30, invert=1)),
-        "halves": Stimulus(_halves, 30, repeats=12),
-        "brightest": Stimulus(_brightest, 800, stalled=False),
-        "counters": Stimulus(_counters, stalled=False),
+        "setups": Stimulus(_every_setup, 60, stalled=False, variants=_BOTH),
+        "terminator": Stimulus(_terminator, variants=_BOTH),
+        "roundings": Stimulus(_roundings, variants=_BOTH),
+        "long spans": Stimulus(_long_spans, stalled=False, variants=_BOTH),
+        "highlights": Stimulus(partial(_highlights, exponent=997, invert=0), variants=_BOTH),
+        "highlights, inverted": Stimulus(partial(_highlights, exponent=30, invert=1), variants=_BOTH),
+        "halves": Stimulus(_halves, 30, repeats=12, variants=_BOTH),
+        "brightest": Stimulus(_brightest, 800, stalled=False, variants=_BOTH),
+        "counters": Stimulus(_counters, stalled=False, variants=_BOTH),
     },
-    waivers={
-        "multiplier_1_0": "While the output is stalled, the register holds no factor that is still read.",
-        "g_1": "It is for the saturation of G, which between unit normals is less than 0.45.",
-        "constants": "A slope, n of 10 bits normalised to 17, ends in seven zeros: the bit is 0.",
-        "cosine_2": "2^-34 of the cosine of a span's ends counts only within that of a border of 18 bits.",
-    },
-    still=STILL
-    | {
+    still={
         "a counter stops at its largest value, and a flag that is set stays": (
-            "top.status[15] top.status[31-32]"
+            "top.status[15] top.status[31] top.status[47-48]"
         ),
         "three terms of 8 times the full channel are 6120, less than 2^13": "rounded_{r,g,b}[13]",
-        "a slope is n / 2, and n of 10 bits, normalised to 17, ends in seven zeros": (
-            "slope_word[0-16] slope.scale[0-6] light_0.specular.datapath.product[0-6]"
+        "under 64 spans are inside": "top.inside[6]",
+        "a table of the only bank ends at one address": "tables.last[0-8]",
+        "a threshold has 15 of the level's 26 fraction bits, and is at most 4": (
+            "interpolator.level[0-10] interpolator.level[29]"
         ),
-        "the second bit of a square is 0": "light_0.specular.datapath.square[1]",
+        "what the limits of the ten octaves of exponents have in common": (
+            "span_limit.datapath.limit[7] span_limit.datapath.limit[28] span_limit.datapath.limit[31-36]"
+        ),
+        "the second bit of a square is 0; one of 18 bits is 2^34 at one code, and no larger": (
+            "chord_values.datapath.multiplier_{3-5}_product[1] "
+            "chord_values.datapath.multiplier_{3-5}_product[34-35] "
+            "span_limit.datapath.multiplier_0_product[1] span_limit.datapath.multiplier_0_product[34-35] "
+            "u_0_exact_square_2[1] u_0_exact_square_2[34-35] chord_square_0[1] chord_square_0[34-35]"
+        ),
+        "half the squared chord of unit vectors is at most 2": (
+            "u_0_exact_square_partial[35-36] u_0_exact_square_total[36-37] u_0_exact_aligned[36-39] "
+            "u_0_exact[36] chord_square_partial[35-36] chord_square_total[36-37] chord_aligned[36-39] "
+            "span_limit.datapath.chord[36]"
+        ),
+        "a reciprocal is normalised, and so is its square: 17 bits without a sign, the first of them 1": (
+            "chord_setup.datapath.multiplier_{0-2}_b[16-17] chord_setup.datapath.multiplier_{0-2}[16-17] "
+            "reciprocal[16] reciprocals.port__data[16] square[16] square_rounded[16]"
+        ),
+        "the largest square in the table is under 1 by 62 steps": "square_rounded[17]",
+        "products have fewer fraction bits than what is shifted": "shifter_0_0[0-4] shifter_1_0[0-11]",
+        "a length of 12 bits takes shifts up to 12, and its square up to 25": (
+            "shift[4] square_shift[5] shifter_0_1[4]"
+        ),
+        "twice a number is even": (
+            "{highlight,diffuse}_0_second[0] *_second_difference[0] "
+            "chord_setup.spare[47] chord_setup.spare[141] "
+            "chord_spans.{spare,payload}[100] chord_spans.{spare,payload}[194]"
+        ),
     },
 )

@@ -5,14 +5,18 @@ from dataclasses import replace
 import numpy as np
 
 from blysk.golden.frame_constants import (
+    BANK_ADDRESS,
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
     LIGHT_STRIDE,
+    LOBE_ADDRESS,
     MATERIAL_ADDRESS,
+    THRESHOLD_ADDRESS,
     FrameConstants,
 )
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.lighting.lobe import LobeTable
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, quantise
@@ -34,6 +38,7 @@ __all__ = [
     "spans_at_rounding",
     "spans_in_highlight",
     "spans_near_terminator",
+    "tabled",
 ]
 
 _LONG_AND_SHORT = ((200, 4095), (3000, 12))
@@ -62,7 +67,38 @@ def any_constants(
             colors[1][:] = 0
         ambient = Intensity.color(rng.uniform(0, 0.2, 3))
         found.append(FrameConstants(exponent, ambient, direction, halfway, *colors))
+    if design.loads_tables:
+        lobe = design.specular
+        rough = lobe.model.PARAMETER == "roughness"
+        any_of = rng.uniform(0.05, 1, lobe.banks) if rough else rng.integers(1, 1001, lobe.banks)
+        of_bank = lobe.fixed or any_of.tolist()
+        banks = rng.integers(0, lobe.banks, design.materials).tolist()
+        found = [tabled(design, of, of_bank[bank], bank) for of, bank in zip(found, banks, strict=True)]
     return found
+
+
+def tabled(
+    design: Design, constants: FrameConstants, parameter: float | None = None, bank: int = 0
+) -> FrameConstants:
+    """Constants with the table of a parameter, by default of the exponent, where the pipeline has tables."""
+    if not design.loads_tables:
+        return constants
+    table = design.specular.table(constants.exponent if parameter is None else parameter)
+    threshold = design.threshold_of(table).codes.item() if design.has_threshold else None
+    return replace(constants, lobe=table, bank=bank, threshold=threshold)
+
+
+def _tables_written(design: Design, write: dict[str, np.ndarray]) -> list[LobeTable]:
+    """Table of each bank after so many writes."""
+    lobe = design.specular
+    if lobe.fixed is not None:
+        return lobe.fixed_tables
+    values = np.zeros((lobe.banks, lobe.entries + 1), dtype=np.int64)
+    data = write["data"][write["address"] == LOBE_ADDRESS]
+    starts = np.flatnonzero(data >> 17)
+    for start, end in zip(starts, [*starts[1:], len(data)], strict=True):
+        values[data[start] - (1 << 17), : end - start - 1] = data[start + 1 : end]
+    return [LobeTable(lobe, Fixed(lobe.VALUE_FORMAT, row)) for row in values]
 
 
 def constants_written(design: Design, write: dict[str, np.ndarray]) -> list[FrameConstants]:
@@ -87,7 +123,16 @@ def constants_written(design: Design, write: dict[str, np.ndarray]) -> list[Fram
         first, count = FIELDS_OF_A_FRAME["ambient"]
         ambient = material[first : first + count] & Intensity.COLOR_FORMAT.max_code
         found.append(FrameConstants(int(material[0]) & 0x3FF, ambient, **fields))
-    return found
+    if not design.loads_tables:
+        return found
+    tables, banks = _tables_written(design, write), words[:, BANK_ADDRESS].tolist()
+    thresholds: list[int | None] = [None] * len(found)
+    if design.has_threshold:
+        thresholds = (words[:, THRESHOLD_ADDRESS] & design.threshold_format.max_code).tolist()
+    return [
+        replace(of, lobe=tables[bank], bank=bank, threshold=threshold)
+        for of, bank, threshold in zip(found, banks, thresholds, strict=True)
+    ]
 
 
 # Spans.

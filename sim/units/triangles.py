@@ -49,7 +49,7 @@ def frame_of(constants: Mapping) -> Frame:
 def triangles_with(**members: np.ndarray) -> Triangles:
     """Triangles of some members, the others 0."""
     count = len(next(iter(members.values())))
-    shapes = {"x": (3,), "y": (3,), "depth": (3,), "normal": (3, 3), "material": ()}
+    shapes = {"x": (3,), "y": (3,), "depth": (3,), "normal": (3, 3), "material": (), "two_sided": ()}
     zeros = {name: np.zeros((count, *shape), dtype=np.int64) for name, shape in shapes.items()}
     return Triangles(**zeros | members)
 
@@ -241,6 +241,7 @@ def random_triangles(
         depth=depth,
         normal=np.clip(np.rint(normal * 2**23), -most, most).astype(np.int64),
         material=rng.integers(0, 1024, count),
+        two_sided=rng.random(count) < 0.5,
     )
 
 

@@ -115,6 +115,20 @@ def test_energy_factor_multiplies_the_specular_colour(energy):
             np.testing.assert_array_equal(getattr(normalised, name), getattr(plain, name))
 
 
+def test_fresnel_is_in_the_specular_colour():
+    """Of each light its own, k_s F, with V·H = cos 60 degrees and 1; of a point light k_s F_0."""
+    material = Material((0.1, 0.2, 0.3), (0.6, 0.5, 0.4), (0.5, 1, 1), 9, fresnel=(0.04, 0.5, 1))
+    lights = [Light((3**0.5, 0, -1)), Light((0, 0, 5)), Light((1, 1, 1), (0, 0, 0))]
+    found = FrameConstants.of(scene(lights, material))
+    expected = [[0.5 * (0.04 + 0.96 / 32), 0.5 + 0.5 / 32, 1], [0.02, 0.5, 1], [0, 0, 0]]
+    assert np.abs(found.specular / (255 * 64) - expected).max() <= 2.0**-7 / 255
+    # A light that is off has no vectors, either: its terms are 0.
+    assert not any(getattr(found, name)[2].any() for name in ("direction", "halfway", "diffuse"))
+    assert found.direction[0].any()
+    near = FrameConstants.of(scene([Light(position=(1e9, 0, -1e9)), *lights], material))
+    assert np.abs(near.specular[0] / (255 * 64) - (0.02, 0.5, 1)).max() <= 2.0**-7 / 255
+
+
 @pytest.mark.parametrize(("energy", "largest"), [("phong", 48), ("blinn", 195), ("cosquad_lin", 36)])
 def test_exponents_whose_energy_factor_fits(energy, largest):
     def of(exponent, coefficient):

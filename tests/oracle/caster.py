@@ -88,16 +88,19 @@ class Picture:
     """The lesser of the least barycentric coordinate and the relative distance to the next surface behind."""
 
 
-def cast(vertices, faces, normals, view, light, coefficients, exponent, model, steps=None):
+def cast(
+    vertices, faces, normals, view, light, coefficients, exponent, model, steps=None, f0=None, one_sided=()
+):
     """Colours 0 to 255, not rounded, of one directional white light.
 
     ``coefficients`` are k_a, k_d and k_s, each of three channels; with ``steps``, corners stand on a grid of
-    so many places a pixel. Normals are turned where the triangle is seen from behind.
+    so many places a pixel. Normals are turned where the triangle is seen from behind; triangles of the
+    indices ``one_sided`` are then not seen. With ``f0``, k_s is of Fresnel's reflection, by Schlick.
     """
     shape = (view.height, view.width)
     depth, second = np.full(shape, np.inf), np.full(shape, np.inf)
     normal, inside = np.zeros((*shape, 3)), np.zeros(shape)
-    for face in np.asarray(faces):
+    for index, face in enumerate(np.asarray(faces)):
         corners = np.asarray(vertices, dtype=np.float64)[face]
         x, y, far = view.places(corners)
         first, last = np.zeros(2, dtype=int), np.array(shape)
@@ -120,6 +123,8 @@ def cast(vertices, faces, normals, view, light, coefficients, exponent, model, s
         u, v, t = (s * p).sum(axis=-1) / volume, (ray * q).sum(axis=-1) / volume, q @ ac / volume
         least = np.minimum(np.minimum(u, v), 1 - u - v)
         hit = (least >= 0) & (t > view.near)
+        if index in one_sided:
+            hit &= ray @ np.cross(ab, ac) < 0
         nearer = hit & (t < depth[place])
         second[place] = np.where(
             nearer, depth[place], np.where(hit, np.minimum(second[place], t), second[place])
@@ -133,8 +138,11 @@ def cast(vertices, faces, normals, view, light, coefficients, exponent, model, s
     hit = np.isfinite(depth)
     to_light, to_viewer = unit(light), -view.forward
     cosine = normal @ to_light
-    highlight = normal @ unit(to_light + to_viewer)
+    halfway = unit(to_light + to_viewer)
+    highlight = normal @ halfway
     k_a, k_d, k_s = (np.asarray(k, dtype=np.float64) for k in coefficients)
+    if f0 is not None:
+        k_s = k_s * (f0 + (1 - np.asarray(f0)) * (1 - to_viewer @ halfway) ** 5)
     term = MODELS[model](highlight, exponent) * (cosine > 0)
     color = k_a + k_d * np.maximum(cosine, 0)[..., None] + k_s * term[..., None]
     behind = np.where(np.isfinite(second), second, 2 * np.where(hit, depth, 1))

@@ -1,5 +1,7 @@
 """Frames of the pipelines against the ray caster: coarse and fine meshes, both projections, camera inside."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -66,7 +68,7 @@ def camera_of(name: str, projection: str) -> Camera:
     return Camera((0.1, 0.2, 2.2), (0.0, 0.0, 0.0), projection=projection, height=2.4, field_of_view=70.0)
 
 
-def held(scene: Scene, design) -> tuple[np.ndarray, float]:
+def held(scene: Scene, design, light=LIGHT, **options) -> tuple[np.ndarray, float]:
     """Errors at the pixels that are not in doubt, in LSB; and the project's own method error."""
     camera, (width, height) = scene.camera, SIZE
     view = View(
@@ -85,11 +87,12 @@ def held(scene: Scene, design) -> tuple[np.ndarray, float]:
         mesh.faces,
         mesh.normals,
         view,
-        LIGHT,
+        light,
         COEFFICIENTS,
         scene.materials[0].exponent,
         design.specular.model.name,
         steps=256,
+        **options,
     )
     frame = model_frame(scene, design)
     shown = np.any(frame.image != 0, axis=-1)
@@ -153,6 +156,41 @@ def test_camera_inside(exponent):
     camera = Camera((1.0, 0.0, 0.05), (0.4, 0.1, 1.0), projection="perspective", field_of_view=80.0)
     errors, _ = held(scene_of(MESHES["coarse torus"], camera, exponent), preset("chord"))
     assert errors.max() <= 1.0
+
+
+def test_fresnel():
+    """A light from behind, at V·H = 0.3: there the reflection is over four times that along the normal."""
+    mesh, f0 = MESHES["coarse torus"], (0.04, 0.2, 0.7)
+    camera = camera_of("coarse torus", "orthographic")
+    side = unit(np.cross(camera.viewer, (0.0, 1.0, 0.0)))
+    # L·V = 2 (V·H)^2 - 1.
+    light = tuple(-0.82 * camera.viewer + (1 - 0.82**2) ** 0.5 * side)
+    scene = scene_of(mesh, camera, 10)
+    material = replace(scene.material, fresnel=f0)
+    scene = replace(scene, material=material, lights=(Light(light),))
+    errors, _ = held(scene, preset("chord"), light, f0=f0)
+    assert errors.max() <= 1.0
+    without, _ = held(scene, preset("chord"), light)
+    assert without.max() > 20
+
+
+def test_two_sided():
+    """Half a torus, its back faces left out, but for those of one of two materials, which are turned."""
+    mesh = MESHES["coarse torus"]
+    middle = mesh.vertices[mesh.faces].mean(axis=1)
+    faces = mesh.faces[middle[:, 2] < 0.1]
+    mesh = replace(mesh, faces=faces, material=np.arange(len(faces)) // 4 % 2)
+    material = Material(*COEFFICIENTS, 50)
+    both = replace(material, two_sided=True), material
+    camera = camera_of("coarse torus", "perspective")
+    scene = Scene(mesh, camera, *SIZE, both, (Light(LIGHT),), back_faces="cull")
+    one_sided = set(np.flatnonzero(mesh.material).tolist())
+    errors, _ = held(scene, preset("chord", materials=2), one_sided=one_sided)
+    assert errors.max() <= 1.0
+    flipped = model_frame(replace(scene, back_faces="flip"), preset("chord", materials=2))
+    assert (
+        np.any(flipped.image != model_frame(scene, preset("chord", materials=2)).image, axis=-1).sum() > 500
+    )
 
 
 def test_caster_finds_a_wrong_curve():

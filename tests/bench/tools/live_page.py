@@ -7,9 +7,9 @@ import hashlib
 import numpy as np
 
 from blysk.bench.tools import web_data
-from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.frame import frame_buffer
-from blysk.golden.frames.prepare import PreparedFrame
+from blysk.golden.frames.prepare import PreparedFrame, constants_of
 from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.probes import ObservedPipeline
 from blysk.sim.engines.simulate import simulate
@@ -22,7 +22,7 @@ def has_compiler():
 
 WIDTHS = {"desktop": (1280, 800), "phone": (375, 740)}
 
-DESIGNS = [("chord", "cosquad"), ("chord", "exp"), ("linear", "cosquad")]
+DESIGNS = [("chord", "cosquad"), ("chord", "exp"), ("linear", "cosquad"), ("chord", "ggx")]
 
 VIEWS = {"teapot": 2, "square": 1}
 
@@ -74,7 +74,8 @@ def digest(image):
 def prepared(state):
     """Scene, design and spans of the page's settings."""
     design = web_data.design_of(state["method"], state["model"])
-    band = next(most for most in web_data.BANDS if state["exponent"] <= most)
+    exponent = web_data.BANDS[-1] if state["model"] == "ggx" else state["exponent"]
+    band = next(most for most in web_data.BANDS if exponent <= most)
     cut, spans = web_data.spans_of(state["mesh"], state["view"], band, design)
     return web_data.scene_of(state), design, PreparedFrame(cut, cut, 0, spans)
 
@@ -90,7 +91,7 @@ def natively(state):
         unit,
         beats_of(unit.unit, frame.spans),
         count=len(frame.cut_raster.span),
-        write=writes_of([FrameConstants.of(scene, 1)]),
+        write=writes_of(constants_of(scene, design)),
         engine="auto",
     )
     colors = np.stack([run.beats[name] for name in "rgb"], axis=-1)
@@ -99,7 +100,7 @@ def natively(state):
 
 def by_model(state):
     scene, design, frame = prepared(state)
-    pixels = design.compute(frame.spans, FrameConstants.of(scene, 1))
+    pixels = design.compute(frame.spans, constants_of(scene, design))
     return frame_buffer(scene, frame.cut_raster, pixels.color)
 
 

@@ -77,6 +77,7 @@ STATED = {
 }
 WHOLE = {
     ("pipeline", "quadratic, cosquad"): (94 + 2, 1, {"18x18": 11, "17x17": 8}, 34816 + 17408),
+    ("pipeline", "chord, blinn"): (61, 1, {"18x18": 11, "17x17": 6}, 34816),
     ("pipeline", "chord, cosquad"): (60, 1, {"18x18": 10, "17x17": 8}, 34816 + 17408),
 }
 # Units with every kind of cell that are quickly measured.

@@ -108,7 +108,8 @@ def test_every_control_changes_the_frame(open_page):
     for control, value in [
         *(("exponent", 100), ("ambient", 0.3), ("diffuse", 0.5), ("specular", 0.9)),
         *(("color", "#3366cc"), ("light", "#ffddaa"), ("model", "exp"), ("view-number", 1)),
-        *(("exponent", 700), ("mesh", "square"), ("method", "linear")),
+        *(("exponent", 700), ("model", "ggx"), ("roughness", 0.55), ("roughness", 0.12)),
+        *(("mesh", "square"), ("method", "linear")),
     ]:
         change(page, control, value)
         image = picture_of(page)

@@ -1,5 +1,7 @@
 """Frames by the models of geometry, shading and depth test, against exact normals of every pixel."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from blysk.golden.frames.triangle_frame import span_angle, triangle_frame
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.presets import preset
 from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
 from blysk.golden.render import Renderer
 from blysk.sim.api.scene import scene
@@ -41,6 +44,24 @@ def test_true_lines_are_not_cut():
     assert counts["renormalise"]["spans"] == len(raster.length) + raster.hidden_spans
     assert counts["renormalise"]["spans"] < counts["chord"]["spans"]
     assert counts["renormalise"]["pixels"] == counts["chord"]["pixels"]
+
+
+def test_two_sided_materials():
+    """Holes in a teapot, through which back faces of two materials would be seen: those of one are."""
+    drawn = scene("teapot", size=(160, 120), triangles=1000, back_faces="cull")
+    faces = drawn.mesh.faces[np.arange(len(drawn.mesh.faces)) % 8 > 3]
+    mesh = replace(drawn.mesh, faces=faces, material=np.arange(len(faces)) // 16 % 2)
+    both = replace(drawn.material[0], two_sided=True), drawn.material[0]
+    drawn = replace(drawn, mesh=mesh, material=both)
+    renderer, masks = Renderer(preset("chord", materials=2)), []
+    for back_faces in ("cull", "flip"):
+        given = replace(drawn, back_faces=back_faces)
+        frame, exact = triangle_frame(given, renderer), render(given, "phong", REFLECTION_MODELS["cosquad"])
+        np.testing.assert_array_equal(frame.owner >= 0, exact.mask)
+        assert np.abs(frame.image - exact.image * 255)[exact.mask].max() < 0.6
+        masks.append(exact.mask.sum())
+    single = render(replace(drawn, material=(both[1],) * 2), "phong", REFLECTION_MODELS["cosquad"])
+    assert single.mask.sum() + 100 < masks[0] < masks[1] - 100
 
 
 def test_widest_span():

@@ -18,7 +18,7 @@ def triangles_of(points):
     shape = points.shape[:2]
     zeros = np.zeros(shape, dtype=np.int64)
     return Triangles(
-        points[..., 0], points[..., 1], zeros, np.zeros((*shape, 3), dtype=np.int64), zeros[:, 0]
+        points[..., 0], points[..., 1], zeros, np.zeros((*shape, 3), dtype=np.int64), zeros[:, 0], zeros[:, 0]
     )
 
 

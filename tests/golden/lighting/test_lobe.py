@@ -405,3 +405,20 @@ def test_bad_arguments_are_refused():
         ValueError, match=r"^a table has 337 values of UQ\(0, 17\), not \(336,\) of UQ\(0, 17\)$"
     ):
         LobeTable(LOBE, table.values[1:])
+
+
+def test_octaves_keep_narrow_lobes_that_equal_steps_lose():
+    """The figures of docs/guide/pica200.md: 256 values of 12 bits in equal steps of N·H, and the table."""
+    lobe = Lobe(BLINN, operand="one_minus_cosine")
+    code = np.unique(np.r_[np.arange(1 << 14), 2 ** np.linspace(0, 25, 50_000)].astype(np.int64))[:-1]
+    operand = Fixed(lobe.operand_format, code)
+    cosine, knots, found = 1 - operand.values, np.arange(257) / 256, []
+    for exponent in (10, 50, 100, 1000):
+        exact, values = cosine**exponent, np.round(knots**exponent * 4096) / 4096
+        values[:256] = np.minimum(values[:256], 4095 / 4096)
+        ours = lobe.compute(operand, np.zeros(len(code), dtype=bool), lobe.table(exponent)).values
+        errors = np.abs([np.interp(cosine, knots, values) - exact, ours - exact]).max(axis=1)
+        found.append((255 * errors).tolist())
+    equal, octaves = np.transpose(found)
+    assert equal == pytest.approx([0.06, 1.1, 4.0, 103], rel=0.1)
+    assert octaves.max() < 0.04

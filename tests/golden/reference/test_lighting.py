@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from blysk.golden.reference.lighting import (
     intensity,
     intensity_of_cosines,
     saturate,
+    schlick,
 )
 from blysk.golden.reference.lobes import GGX, TabulatedModel
 from blysk.golden.reference.reflection import BLINN, REFLECTION_MODELS
@@ -267,12 +269,33 @@ def test_intensity_of_cosines(model):
     """The same sum from N·L and N·H."""
     normals = random_units(300, 14)
     lights = [Light((1, 2, 3), (0.5, 0.6, 0.7)), Light((-3, 2, 1))]
-    material = Material((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), 9)
+    material = Material((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), 9, fresnel=(0.04, 0.3, 1))
     cosine = np.stack([normals @ light.direction for light in lights], axis=-1)
     highlight = np.stack([normals @ halfway_vector(light.direction, V) for light in lights], axis=-1)
-    found = intensity_of_cosines(material, lights, grey(0.5), cosine, highlight, REFLECTION_MODELS[model])
+    found = intensity_of_cosines(material, lights, grey(0.5), cosine, highlight, REFLECTION_MODELS[model], V)
     expected = intensity(normals, material, lights, grey(0.5), V, REFLECTION_MODELS[model])
     assert found == pytest.approx(expected, abs=1e-14)
+
+
+def test_fresnel():
+    """k_s times F_0 + (1 - F_0)(1 - V·H)^5, of a distant light and viewer; else times F_0."""
+    assert schlick(0.04, np.array([1.0, 0.5, 0.0])) == pytest.approx([0.04, 0.04 + 0.96 / 32, 1])
+    f0 = np.array([0.04, 0.5, 1.0])
+    given = Material(grey(0), grey(0), (0.5, 0.25, 2), 9, fresnel=tuple(f0))
+    normals, points = random_units(50, 3), random_units(50, 4)
+    # 120 degrees from the viewer, so that V·H is 1/2; and far away in the same direction.
+    direction = (math.sqrt(3) / 2, 0, -0.5)
+    expected = intensity(normals, replace(given, fresnel=None), [Light(direction)], grey(0), V, BLINN)
+    assert expected.max() > 0.5
+    found = intensity(normals, given, [Light(direction)], grey(0), V, BLINN)
+    assert found == pytest.approx(expected * (f0 + (1 - f0) / 32), abs=1e-14)
+    far = Light(position=tuple(1e12 * np.array(direction)))
+    found = intensity(normals, given, [far], grey(0), V, BLINN, points=points)
+    assert found == pytest.approx(expected * f0, abs=1e-9)
+    near = np.tile(V, (50, 1))
+    assert intensity(normals, given, [Light(direction)], grey(0), near, BLINN) == pytest.approx(expected * f0)
+    with pytest.raises(ValueError, match=r"^a material's fresnel must be in 0 to 1"):
+        replace(given, fresnel=(0, 0, 1.5))
 
 
 def test_gram_identity():
@@ -338,13 +361,21 @@ def test_roughness_of_a_material():
 
 
 def test_material_of_metallic_roughness():
-    """A dielectric reflects 4% and its base colour; a metal its base colour, and nothing diffuse."""
+    """A dielectric reflects 4% and its base colour; a metal its base colour, and nothing diffuse.
+
+    k_s makes the highlight's peak what D / 4 over 1 / pi is, with D of the model itself.
+    """
     base = (0.8, 0.5, 0.2)
     dielectric, metal = (Material.of_metallic_roughness(base, metallic, 0.4) for metallic in (0, 1))
     assert dielectric.diffuse == base
-    assert dielectric.specular == (0.04,) * 3
+    assert dielectric.fresnel == (0.04,) * 3
     assert metal.diffuse == (0,) * 3
-    assert metal.specular == base
+    assert metal.fresnel == base
+    assert dielectric.specular == (4,) * 3
+    assert metal.specular == pytest.approx((1 / 0.8,) * 3)
+    rough = Material.of_metallic_roughness(base, 0, 0.7)
+    assert rough.specular == pytest.approx((math.pi * GGX.peak(0.7) / 4,) * 3)
+    assert Material.of_metallic_roughness(base, 0, 0.01).roughness == 0.05
     assert (metal.roughness, metal.exponent) == (0.4, round(2 / 0.4**4 - 2))
     assert [Material.of_metallic_roughness(base, 0, r).exponent for r in (0, 1)] == [1000, 1]
     for values, name in (((-0.1, 0.5), "metallic"), ((0.5, 1.1), "roughness")):

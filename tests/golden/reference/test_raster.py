@@ -307,6 +307,20 @@ def test_back_faces():
     raster = rasterise(replace(scene, back_faces="cull"))
     assert raster.culled == 1
     assert set(raster.triangle.tolist()) == {0}
+    # A material that is two-sided is not culled, but turned.
+    both = replace(scene.material, two_sided=True)
+    for material, triangles in (
+        (both, {0, 1}),
+        ((both, scene.material), {0}),
+        ((scene.material, both), {0, 1}),
+    ):
+        mesh = replace(scene.mesh, material=np.array([0, 1]) if isinstance(material, tuple) else None)
+        given = replace(scene, mesh=mesh, back_faces="cull", material=material)
+        raster = rasterise(given)
+        assert (raster.culled, set(raster.triangle.tolist())) == (2 - len(triangles), triangles)
+        turned = rasterise(replace(given, back_faces="flip"))
+        chosen = np.isin(turned.triangle, list(triangles))
+        assert np.array_equal(raster.normal_left, turned.normal_left[chosen])
 
 
 def test_cancelled_normals_become_the_normal_of_the_face():

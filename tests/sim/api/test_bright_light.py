@@ -6,6 +6,7 @@ import blysk
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.reference.lighting import Light
+from blysk.sim.api.render import prepare_rendering, rendering_settings
 
 LIGHTS = ((-0.5, 0.8, 0.7), (0.9, 0.2, 0.5))
 
@@ -35,3 +36,13 @@ def test_errors_are_in_proportion(method, color):
         errors = compare(scene, design, model_frame(scene, design))
         assert 0.4 < errors.arithmetic_error.max_lsb <= 0.5 + color / 16
         assert errors.method_error.max_lsb <= 0.5 + color / 16 + color / 4
+
+
+def test_a_light_that_is_off_is_not_built():
+    """It takes no hardware and asks for no method, wherever it is."""
+    key = Light((-0.5, 0.8, 0.7))
+    off = [Light((0, 0, 1), (0, 0, 0)), Light(position=(1, 2, 3), color=(0, 0, 0))]
+    settings = rendering_settings("teapot", {"lights": [key, *off], "size": (16, 12), "triangles": 220})
+    ready = prepare_rendering(settings, engine="pysim")
+    assert ready.scenes[0].lights == (key,)
+    assert (ready.design.lights, ready.design.method) == (1, "chord")

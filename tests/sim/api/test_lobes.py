@@ -1,6 +1,7 @@
 """Lobes through the Python interface: roughness, curves of files, banks of materials, bad input."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -70,6 +71,32 @@ def test_bad_input(options, message):
     with pytest.raises(InputError) as caught:
         read_settings("teapot", options, {**SCENE, **DESIGN})
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("0,0\n0.5\n1,1", "line 2 of a.csv must have two numbers, not '0.5'"),
+        ("0,0\n,0.5\n1,1", "line 2 of a.csv must have two numbers, not ',0.5'"),
+        ("0,0\n0.5,nan\n1,1", "point 2 of a must have two finite numbers, not cosine 0.5, value nan"),
+        ("0,0\n1,1.5", "point 2 of a must have a value from 0 to 1, not cosine 1, value 1.5"),
+        ("0,0\n0.6,0\n0.5,0\n1,1", "point 3 of a must have a larger cosine than the point before it"),
+        ("0,0\n0.5,0\n0.5,0\n1,1", "point 3 of a must have a larger cosine than the point before it"),
+        ("0,0", "a must have at least 2 points, not 1"),
+        ("cosine,value", "a must have at least 2 points, not 0"),
+        ("0.1,0\n1,1", "the cosines of a must go from 0 to 1, not from 0.1 to 1"),
+    ],
+)
+def test_bad_csv(tmp_path, monkeypatch, text, reason):
+    """One line with the reason, and what to give: nothing of other models."""
+    monkeypatch.chdir(tmp_path)
+    Path("a.csv").write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_settings("teapot", {"model": "a.csv"}, {**SCENE, **DESIGN})
+    message = str(caught.value)
+    assert reason in message
+    assert message.endswith("; give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1")
+    assert "\n" not in message
 
 
 def test_verilog_tells_the_addresses_of_tables():

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.prepare import constants_of, prepare
+from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
@@ -138,21 +139,40 @@ def test_equal_materials():
 
 
 def test_black_lights():
-    """Of methods whose spans are not cut by what the lights show."""
+    """No span is cut for a light that is off; one that is on counts, even where nothing shows it."""
     scene = scene_of(lights=(KEY, BLACK, FILL))
-    assert "lights" not in reasons(specialise(scene, full_of(scene)))
-    special = specialise(scene, preset("linear", lights=3))
+    special = specialise(scene, full_of(scene))
     assert reasons(special)["lights"] == "1 of 3 lights: they light nothing"
     assert special.scenes[0].lights == (KEY, FILL)
     assert_same_frame(scene, special)
+    faint = scene_of(lights=(KEY, Light((0, 0, 1), (1e-9,) * 3), FILL))
+    assert "lights" not in reasons(specialise(faint, full_of(faint)))
+    assert "lights" in reasons(specialise(faint, preset("linear", lights=3)))
+
+
+def test_a_light_that_is_off_costs_nothing():
+    """No span more, and in the compact style no cycle, in a pipeline that has it: its terms are 0."""
+    design, found = preset("chord", "blinn", lights=2, style="compact"), []
+    for lights in ((KEY,), (KEY, BLACK), (KEY, FILL)):
+        scene = scene_of(lights=lights, size=(60, 50))
+        spans, (constants,) = prepare(scene, design).spans, constants_of(scene, design)
+        operands = design.operands(spans, constants)
+        diffuse = Diffuse(operands.cosine.format)
+        terms = (
+            diffuse.compute(operands.cosine),
+            design.specular.compute(operands.highlight, diffuse.dark(operands.cosine), constants.highlight),
+        )
+        found.append((len(spans), design.intensity.cycles(*terms).sum()))
+    assert found[0] == found[1]
+    assert found[2][1] > 1.3 * found[1][1]
 
 
 def test_methods_that_no_gate_serves():
-    """Spans that are cut by their error are cut by all lights, the dark one too."""
+    """Spans that are cut by their error are not cut by a light that is off."""
     scene = scene_of(replace(CLAY, exponent=400), (KEY, BLACK, FILL))
     for method in ("chord-local", "quadratic-published", "renormalise"):
         special = specialise(scene, preset(method, lights=3))
-        assert ("lights" in reasons(special)) == (not preset(method).interpolator.CUT_BY_ERROR)
+        assert "lights" in reasons(special)
         assert reasons(special)["exponent"] == "exponent fixed at 400: PROM folded"
         assert_same_frame(scene, special)
     dark = scene_of(lights=(BLACK,))

@@ -1,5 +1,7 @@
 """Frames by simulated geometry, shading and depth test, against their bit-accurate models."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,17 @@ def test_frame_is_the_model_s(simulator, triangles, back_faces):
     spans, _ = simulator.renderer.geometry.compute(sent, frame.sent.frame)
     pixels = np.bincount(spans.triangle, spans.length, len(sent))
     assert frame.cycles < np.maximum(16, pixels).sum() + 600
+
+
+def test_two_sided(simulator):
+    """Back faces of a two-sided material are turned where others are left out."""
+    drawn = scene("teapot", size=SIZE, triangles=200, back_faces="cull")
+    mesh = replace(drawn.mesh, faces=drawn.mesh.faces[::2], material=None)
+    drawn = replace(drawn, mesh=mesh, material=replace(drawn.materials[0], two_sided=True))
+    frame, flipped = simulator.render(drawn), simulator.render(replace(drawn, back_faces="flip"))
+    np.testing.assert_array_equal(frame.image, triangle_frame(drawn, simulator.renderer).image)
+    np.testing.assert_array_equal(frame.image, flipped.image)
+    assert frame.counts["culled"] == 0
 
 
 def test_an_empty_picture(simulator):

@@ -2,6 +2,7 @@
 
 import os
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -126,16 +127,20 @@ def test_gltf_materials(tmp_path, normals):
         base(0, 0, 1, 0.5, name="blue"),
         base(9, 9, 9, 9, name="unused"),
         {"name": "white"},
-        {"pbrMetallicRoughness": {"metallicFactor": 0.5}},
+        {"pbrMetallicRoughness": {"metallicFactor": 0.5, "roughnessFactor": 0.3}, "doubleSided": True},
         base(0, 0, 1, 1, name="blue too"),
         base(1, 0.25, 0, 1),
     ]
+    # What a texture says of the factors is not known.
+    materials[5]["pbrMetallicRoughness"] |= {"metallicRoughnessTexture": {"index": 0}}
     loaded = check(
         load(tmp_path / "a.glb", material_gltf(materials, [5, None, 0, 2, 3, 4, 0], None, normals))
     )
-    blue, white = FileMaterial("blue", BLUE), FileMaterial("white", (1.0, 1.0, 1.0))
-    orange = FileMaterial("", (1.0, 0.25, 0.0))
-    assert by_position(loaded) == [orange, FileMaterial(), blue, white, white, blue, blue]
+    of_factors, all_white = FileMaterial.of_metallic_roughness, (1.0, 1.0, 1.0)
+    blue, white = of_factors("blue", BLUE, 0, 1), of_factors("white", all_white, 1, 1)
+    half, orange = of_factors("", all_white, 0.5, 0.3, True), FileMaterial("", (1.0, 0.25, 0.0))
+    assert by_position(loaded) == [orange, FileMaterial(), blue, white, half, blue, blue]
+    assert loaded.ignored == ("1 texture",)
     one = load_mesh(str(tmp_path / "a.glb"), materials=False)
     assert one.materials == (FileMaterial(),)
     assert np.array_equal(one.mesh.vertices, loaded.mesh.vertices)
@@ -254,6 +259,8 @@ def test_most_materials(tmp_path, suffix):
     ("line", "reason"),
     [
         ("Kd nan 0 0", "material 'a' has Kd 'nan 0 0', not three numbers from 0 to 1"),
+        ("Pr 1.5", "material 'a' has Pr '1.5', not a number from 0 to 1"),
+        ("Pm", "material 'a' has Pm '', not a number from 0 to 1"),
         ("Kd 0 inf 0", "material 'a' has Kd"),
         ("Kd 0 0 1.001", "material 'a' has Kd"),
         ("Kd 0 0 -1e-9", "material 'a' has Kd"),
@@ -335,6 +342,10 @@ RANGE = "not three numbers from 0 to 1"
         ([{"pbrMetallicRoughness": {"baseColorFactor": {"r": 1}}}], 0, RANGE),
         ([{"pbrMetallicRoughness": [1]}], 0, RANGE),
         *(
+            ([{"pbrMetallicRoughness": {key: value}}], 0, f"has {key} '{value}', not a number from 0 to 1")
+            for key, value in (("metallicFactor", 2), ("roughnessFactor", -0.5), ("roughnessFactor", True))
+        ),
+        *(
             (value, 0, "its materials are no list of objects")
             for value in ([7], {"0": base(1, 0, 0, 1)}, "red")
         ),
@@ -414,12 +425,44 @@ def test_surfaces():
     assert surfaces([FileMaterial()], default) == (default,)
 
 
+def test_surfaces_of_factors():
+    """By the formulas of glTF's appendix B; options go before the file, the exponent before a roughness."""
+    default = Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0.6, 0.6, 0.6), 50)
+    said = FileMaterial.of_metallic_roughness("a", (0.5, 0.0, 1.0), 0.25, 0.8, two_sided=True)
+    (made,) = surfaces([said], default)
+    assert made.diffuse == pytest.approx((0.375, 0, 0.75))
+    assert made.ambient == pytest.approx((0.05, 0, 0.1))
+    assert made.fresnel == pytest.approx((0.03 + 0.125, 0.03, 0.03 + 0.25))
+    assert made.specular == pytest.approx((1 / (4 * 0.64**2),) * 3)
+    assert (made.roughness, made.exponent, made.two_sided) == (0.8, round(2 / 0.64**2 - 2), True)
+    (shiny,) = surfaces([said], default, {"exponent"})
+    assert (shiny.exponent, shiny.roughness) == (50, None)
+    (painted,) = surfaces([said], default, {"diffuse", "specular"})
+    assert (painted.ambient, painted.diffuse) == (default.ambient, default.diffuse)
+    assert (painted.specular, painted.fresnel, painted.roughness) == (default.specular, None, 0.8)
+    (rough,) = surfaces([said], replace(default, roughness=0.2, fresnel=(1, 1, 1)), {"roughness", "fresnel"})
+    assert (rough.roughness, rough.fresnel, rough.exponent) == (0.2, (1, 1, 1), made.exponent)
+
+
+def test_factors_of_obj(tmp_path):
+    """Pr and Pm in place of Ks and Ns."""
+    put(
+        tmp_path / "a.mtl",
+        "newmtl a\nKd 1 0 0\nKs 1 1 1\nNs 9\nPr 0.25\nnewmtl b\nPm 1 # metal\nPr 0.5\nnewmtl c\nPm 0.5\n",
+    )
+    made = by_position(load(tmp_path / "a.obj", material_obj(["a", "b", "c"], "a.mtl")))
+    factors = (RED, 0, 0.25), ((1.0,) * 3, 1, 0.5), ((1.0,) * 3, 0.5, 1)
+    expected = zip("abc", factors, strict=True)
+    assert made == [FileMaterial.of_metallic_roughness(name, *of) for name, of in expected]
+
+
 def test_a_scene_of_a_file(tmp_path):
     """From a file to the constants of the pipeline: the surfaces fit the mesh."""
     loaded = load(tmp_path / "a.glb", material_gltf([base(1, 0, 0, 1), base(0, 0, 1, 1)], [1, None, 0]))
     default = Material((0, 0, 0), (0.5, 0.5, 0.5), (0, 0, 0), 1)
     camera = Camera.framing(loaded.mesh.vertices, (0, 0, 1), "orthographic", 3)
-    scene = Scene(loaded.mesh, camera, 90, 30, surfaces(loaded.materials, default), (Light((0, 0, 1)),))
+    given = surfaces(loaded.materials, default, {"specular"})
+    scene = Scene(loaded.mesh, camera, 90, 30, given, (Light((0, 0, 1)),))
     image = render(scene).image
     colors = [[0.0, 0.0, 1.0], [0.5, 0.5, 0.5], [1.0, 0.0, 0.0]]
     assert np.unique(image[image.any(axis=-1)].round(9), axis=0).tolist() == colors

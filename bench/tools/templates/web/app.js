@@ -117,10 +117,12 @@ const blysk = (() => {
   function settingsNow() {
     const reference = site.references[state.reference];
     const method = site.methods[state.method];
-    const band = site.bands.findIndex((most) => state.exponent <= most);
-    const { direction, exponent, ambient, diffuse, specular } = state;
+    // A model with a roughness may have lobes as narrow as any.
+    const rough = site.rough.includes(state.model);
+    const band = site.bands.findIndex((most) => (rough ? site.mostExponent : state.exponent) <= most);
+    const { direction, exponent, roughness, ambient, diffuse, specular } = state;
     return {
-      ...{ direction, exponent, ambient, diffuse, specular },
+      ...{ direction, exponent, roughness, ambient, diffuse, specular },
       design: `${state.method}-${state.model}`,
       spans: view().streams[state.method][band],
       viewer: view().axes[2],
@@ -129,7 +131,7 @@ const blysk = (() => {
       reference: {
         curve: reference.curve ?? method.curve,
         chord: reference.curve ? false : method.chord,
-        model: reference.model ?? state.model,
+        model: (!rough && reference.model) || state.model,
       },
     };
   }
@@ -349,7 +351,10 @@ const blysk = (() => {
   const controls = ["method", "model", "reference", "mesh", "color", "light", "ambient", "diffuse", "specular"];
 
   function showControls() {
-    for (const id of [...controls, "exponent"]) byId(id).value = state[id];
+    for (const id of [...controls, "exponent", "roughness"]) byId(id).value = state[id];
+    const rough = site.rough.includes(state.model);
+    byId("exponent").parentNode.hidden = rough;
+    byId("roughness").parentNode.hidden = !rough;
     byId("view-number").value = state.view;
     const views = site.meshes[state.mesh].views.length;
     byId("view-number").max = views - 1;

@@ -106,20 +106,37 @@ const blyskCore = () => {
     };
   }
 
-  function constantsOf(settings, viewer, tables) {
+  function constantsOf(settings, viewer, tables, lobe = null) {
     const terms = termsOf(settings);
     const code = (intensities) => intensities.map((part) => colorCode(part, tables.color));
     const direction = normalised(settings.direction);
     const halfway = halfwayVector(direction, viewer);
     const lit = halfway.some((part) => part);
+    const row = lobe ? lobe.parameters.indexOf(settings[lobe.parameter]) : -1;
     return {
-      exponent: [settings.exponent],
+      exponent: [lobe ? lobe.exponents[row] : settings.exponent],
       ambient: code(terms.ambient),
       direction: quantised(direction, tables.one),
       halfway: lit ? quantised(halfway, tables.one) : [0, 0, 0],
       diffuse: code(terms.diffuse),
       specular: lit ? code(terms.specular) : [0, 0, 0],
+      ...(lobe && { threshold: lobe.thresholds[row], lobe: tableOf(lobe, lobe.parameters[row]) }),
     };
+  }
+
+  // Entries of a lobe's table, as `blysk.golden.lighting.lobe` makes them of a curve that falls.
+  function tableOf({ model, knots }, parameter) {
+    const reflect = reflection(model, parameter);
+    const value = knots.map((u) => reflect(1 - u));
+    const high = value.slice(1).map((next, k) => (next + value[k]) / 2 - reflect(1 - (knots[k + 1] + knots[k]) / 2));
+    let least = Infinity;
+    return value.map((own, k) => {
+      const [before, after] = [high[Math.max(k - 1, 0)], high[Math.min(k, high.length - 1)]];
+      const [smaller, larger] = [Math.abs(before), Math.abs(after)].sort((a, b) => a - b);
+      const move = before * after > 0 ? Math.sign(before) * Math.min(larger / 2, 2 * smaller) : 0;
+      const limited = Math.min(Math.max(own - move, 0), 1 - 2 ** -17);
+      return (least = Math.min(least, Math.floor(limited * 2 ** 17 + 0.5)));
+    });
   }
 
   // Beats of the write port.
@@ -131,6 +148,10 @@ const blyskCore = () => {
     ])
       for (const [name, [first, count]] of Object.entries(fields))
         for (let k = 0; k < count; k++) beats.push([base + first + k, constants[name][k]]);
+    if (constants.lobe) {
+      beats.push([tables.threshold, constants.threshold], [tables.lobe, 1 << 17]);
+      for (const value of constants.lobe) beats.push([tables.lobe, value]);
+    }
     const words = new Uint32Array(beats.length * port.words);
     beats.forEach(([address, data], k) => {
       put(words, k * port.words, port.fields.address, address);
@@ -141,7 +162,13 @@ const blyskCore = () => {
 
   // The reference in float64.
 
+  // By the exponent, or by the roughness of a model that has one.
   function reflection(model, exponent) {
+    if (model.kind === "ggx") {
+      const alpha = exponent ** 2;
+      const width = ((1 - alpha) * (1 + alpha)) / alpha ** 2;
+      return (cosine) => (cosine > 0 ? (1 + Math.max((1 - cosine) * (1 + cosine) * width, 0)) ** -2 : 0);
+    }
     if (model.kind === "power") return (cosine) => Math.max(cosine, 0) ** exponent;
     if (model.kind === "exp") return (cosine) => Math.exp(exponent * (cosine - 1));
     if (model.kind === "coscos") {
@@ -216,7 +243,7 @@ const blyskCore = () => {
     const halfway = halfwayVector(direction, viewer);
     const lit = halfway.some((part) => part) && settings.specular > 0;
     const { ambient, diffuse, specular } = termsOf(settings);
-    const reflect = reflection(model, settings.exponent);
+    const reflect = reflection(model, settings[model.parameter ?? "exponent"]);
     const found = { cosine: 0, highlight: 0, diffuse: 0, specular: 0, color: [0, 0, 0] };
     return (normal) => {
       found.cosine = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
@@ -307,7 +334,8 @@ const blyskCore = () => {
     }
 
     prepare(settings, viewer) {
-      const { words, count } = writesOf(constantsOf(settings, viewer, this.tables), this.tables, this.design.ports.write);
+      const constants = constantsOf(settings, viewer, this.tables, this.design.lobe);
+      const { words, count } = writesOf(constants, this.tables, this.design.ports.write);
       this.words(this.writes, words.length).set(words);
       this.exports.prepare(
         ...[this.writes, count, this.input, this.count, this.output, this.fragments, this.cycles, this.inputClocks],
@@ -354,6 +382,6 @@ const blyskCore = () => {
 
   return {
     ...{ put, get, decoded, unpacked, spansOf, normalised, halfwayVector, quantised, termsOf, constantsOf, writesOf },
-    ...{ reflection, curveOf, shader, reference, errorFigures, Simulation },
+    ...{ reflection, tableOf, curveOf, shader, reference, errorFigures, Simulation },
   };
 };
