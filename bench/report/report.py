@@ -21,6 +21,7 @@ import click
 from blysk.bench.command import resumable
 from blysk.bench.report import (
     cosine_quadratic,
+    criteria,
     energy,
     errata,
     lobe,
@@ -32,6 +33,7 @@ from blysk.bench.report import (
     stability,
     thesis,
     units,
+    world,
 )
 from blysk.bench.report.page import environment, page, without_pictures
 from blysk.bench.report.section import Section, Table
@@ -56,18 +58,20 @@ __all__ = [
 
 SECTIONS: dict[str, ModuleType] = {
     "points": points,
-    "units": units,
+    "stability": stability,
+    "needs": needs,
+    "criteria": criteria,
+    "world": world,
     "place-and-route": place_and_route,
     "several-pipelines": several_pipelines,
+    "energy": energy,
     "explore": explore,
+    "units": units,
+    "lobe": lobe,
     "thesis": thesis,
     "cosine-quadratic": cosine_quadratic,
     "phong-blinn": phong_blinn,
-    "lobe": lobe,
     "errata": errata,
-    "stability": stability,
-    "needs": needs,
-    "energy": energy,
 }
 """Modules of the sections by name, in the order of the page."""
 

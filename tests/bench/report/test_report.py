@@ -91,7 +91,7 @@ def test_page_has_everything(points_section, plain_section):
     assert len(reader.ids) == len(set(reader.ids))
     # Everything is in it but the files beside it.
     outside = {address for address in reader.addresses if not address.startswith(("data:", "#"))}
-    assert outside == {"report.json", "points.csv", "fronts.csv", "graded.csv", "long.csv"}
+    assert outside == {"report.json", "points.csv", "front.csv", "fronts.csv", "graded.csv", "long.csv"}
     assert all(address[1:] in reader.ids for address in reader.addresses if address.startswith("#"))
     for section in (points_section, plain_section):
         for part in section.parts:
@@ -133,7 +133,7 @@ def test_every_axis_is_explained():
 def test_files(tmp_path, points_section, plain_section):
     folder = tmp_path / "report"
     write_report(folder, [points_section, plain_section], ABOUT)
-    names = {"index.html", "report.json", "points.csv", "fronts.csv", "graded.csv", "long.csv"}
+    names = {"index.html", "report.json", "points.csv", "front.csv", "fronts.csv", "graded.csv", "long.csv"}
     assert {path.name for path in folder.iterdir()} == names
     with (folder / "graded.csv").open(newline="") as file:
         assert list(csv.reader(file)) == [
