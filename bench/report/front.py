@@ -1,95 +1,18 @@
 """Error against run time over several meshes, sizes and exponents: the front, as sentence, drawing, table."""
 
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Container, Iterable, Mapping, Sequence
 from statistics import median
 from typing import Any
 
 import numpy as np
 
-from blysk.bench.accuracy import scene_for
 from blysk.bench.colors import style_of
 from blysk.bench.labels import Label, place_labels
-from blysk.bench.report.needs import ring
-from blysk.bench.report.points_text import front
 from blysk.bench.report.section import Conclusion, Drawing, Table
-from blysk.bench.speed.cycle_model import frame_cycles, unit_of
 from blysk.bench.svg import panels, svg
-from blysk.golden.frames.compare import compare_image
-from blysk.golden.frames.frame import model_frame
-from blysk.golden.frames.prepare import constants_of
-from blysk.golden.methods.interpolator import Operand
-from blysk.golden.presets import preset
-from blysk.golden.reference.geometry import Mesh
-from blysk.sim.meshes.teapot import teapot
+from blysk.golden.presets import METHODS
 
-__all__ = ["FULL_SCENES", "QUICK_SCENES", "conclusion", "measure", "spread_table", "summaries"]
-
-QUICK_SCENES = (
-    ("teapot", 1000, (160, 120), (20, 200)),
-    ("ring", 1296, (160, 120), (20, 200)),
-    ("teapot", 10_000, (320, 240), (100,)),
-)
-"""Mesh, triangles, size and exponents of the quick report's scenes."""
-
-FULL_SCENES = (
-    ("teapot", 1000, (640, 480), (1, 10, 100, 1000)),
-    ("ring", 1296, (640, 480), (1, 10, 100, 1000)),
-    ("teapot", 10_000, (640, 480), (1, 10, 100, 1000)),
-    ("teapot", 10_000, (1920, 1080), (100,)),
-    ("teapot", 100_000, (1920, 1080), (100,)),
-)
-
-
-@lru_cache(maxsize=4)
-def _mesh(name: str, triangles: int) -> Mesh:
-    return ring() if name == "ring" else teapot(triangles)
-
-
-def measure(
-    method: str, model: str, scenes: Sequence[Sequence[Any]], operand: Operand | None = None
-) -> list[dict[str, Any]]:
-    """Errors and cycles of a design over several scenes: by the bit-accurate model and the cycle model.
-
-    Parameters
-    ----------
-    method, model, operand
-        Of `preset`.
-    scenes : sequence
-        As `QUICK_SCENES`.
-
-    Returns
-    -------
-    list of dict
-        A scene and exponent each: ``mesh``, ``triangles``, ``width``, ``height``, ``exponent``,
-        ``method_max_lsb``, ``total_max_lsb``, ``spans`` after cutting, ``uncut_spans``, ``pixels``,
-        ``cycles``.
-    """
-    design = preset(method, model, operand=operand)
-    unit = unit_of(design)
-    found = []
-    for mesh, triangles, size, exponents in scenes:
-        for exponent in exponents:
-            scene = scene_for(_mesh(mesh, triangles), exponent, *size)
-            frame = model_frame(scene, design)
-            errors = compare_image(scene, design, frame.image)
-            writes = sum(len(of.writes()["data"]) for of in constants_of(scene, design))
-            found.append(
-                {
-                    "mesh": mesh,
-                    "triangles": len(scene.mesh.faces),
-                    "width": size[0],
-                    "height": size[1],
-                    "exponent": exponent,
-                    "method_max_lsb": errors.method_error.max_lsb,
-                    "total_max_lsb": errors.total_error.max_lsb,
-                    "spans": frame.spans,
-                    "uncut_spans": len(frame.raster.length),
-                    "pixels": frame.pixels,
-                    "cycles": frame_cycles(unit, frame.prepared.spans, writes),
-                }
-            )
-    return found
+__all__ = ["conclusion", "spread_table", "summaries"]
 
 
 def summaries(
@@ -102,7 +25,7 @@ def summaries(
     points : sequence of dict
         Those of the report.
     spread : mapping
-        Results of `measure` by method, model and perhaps operand.
+        Results of `front_scenes.measure` by method, model and perhaps operand.
 
     Returns
     -------
@@ -139,10 +62,12 @@ def _summary(label: str, point: Mapping[str, Any], samples: Sequence[tuple]) -> 
     if cycles and rates:
         middle = median(cycles) * 1e3 / median(rates)
         ns = min(cycles) * 1e3 / max(rates), middle, max(cycles) * 1e3 / min(rates)
+    method_name = point["settings"]["method"]
     return {
         "label": label,
-        "method": point["settings"]["method"],
+        "method": method_name,
         "group": point["group"],
+        "is_prepared": METHODS.get(method_name) is not None and METHODS[method_name].TAKES_VALUES,
         "samples": len(samples),
         "method_error": (min(method), max(method)),
         "total_error": (min(total), max(total)),
@@ -155,58 +80,90 @@ def _summary(label: str, point: Mapping[str, Any], samples: Sequence[tuple]) -> 
     }
 
 
+_ALIKE_LSB, _ALIKE_CYCLES = 0.15, 1.05
+"""Errors, and cycles as a factor, that are not told apart."""
+
+
 def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
-    """Which designs are on the front of the largest total error, over all scenes, against cycles a pixel."""
+    """The front of the largest total error, over all scenes, against cycles a pixel, in a few sentences."""
     timed = [of for of in found if of["cycles"]]
     if not timed:
         return None
     on_front = _front(timed, "total_error")
-    exact = [of for of in on_front if of["total_error"][1] <= 1] or on_front[-1:]
-    best = exact[0]
+    best = next((of for of in on_front if of["total_error"][1] <= 1), on_front[-1])
+    scenes = max(of["samples"] for of in timed)
     sentence = (
-        f"Of {len(timed)} designs {len(on_front)} {'is' if len(on_front) == 1 else 'are'} on the front: "
-        f"none has both "
-        f"a smaller worst error and fewer cycles. "
-        + (
-            "Of those within 1 LSB of exact Blinn shading everywhere "
-            if best["total_error"][1] <= 1
-            else "There "
-        )
-        + f"**`{best['label']}`** is the fastest: {_costs(best)}."
+        f"**`{best['label']}`** shades a pixel in {best['cycles'][1]:.2f} cycles and is never more than "
+        f"{best['total_error'][1]:.2f} LSB from exact Blinn shading, over {scenes} scenes, with "
+        f"{_costs(best)}. "
+        f"None of the "
+        f"other {len(timed) - 1} designs is both as fast and as exact"
     )
-    others = [of for of in on_front if of is not best]
+    others = [f"`{of['label']}` ({_says(of)})" for of in on_front if of is not best]
     if others:
-        said = "; ".join(f"`{of['label']}`, {_costs(of)}" for of in others[:3])
-        more = f"; and {len(others) - 3} more" if len(others) > 3 else ""
-        sentence += f" Also on it: {said}{more}."
-    rivals = [of for of in timed if of["method"] == "renormalise" and of["total_error"][1] <= 1]
+        more = f" and {len(others) - 3} more" if len(others) > 3 else ""
+        sentence += f"; also on the front {'is' if len(others) == 1 else 'are'} {', '.join(others[:3])}{more}"
+    rivals = _cheapest_first(
+        of for of in timed if of["method"] == "renormalise" and of["total_error"][1] <= 1
+    )
     if rivals and best["method"] != "renormalise":
-        rival = min(rivals, key=lambda of: of["cycles"][1])
+        rival = rivals[0]
+        times = rival["cycles"][1] / best["cycles"][1]
         sentence += (
-            f" The best form of normalising at every pixel, `{rival['label']}`, takes "
-            f"{rival['cycles'][1] / best['cycles'][1]:.2f} times the cycles ({_costs(rival)})."
+            f". Normalising at every pixel in its best form, `{rival['label']}`, errs by "
+            f"{rival['total_error'][1]:.2f} LSB and takes {times:.2f} times the cycles, with {_costs(rival)}"
         )
-    return Conclusion("What does a pixel cost, and how exact is it?", sentence, _drawing(timed))
+    prepared = _cheapest_first(of for of in timed if of["is_prepared"] and of["total_error"][1] <= 1)
+    if prepared:
+        sentence += (
+            f". `{prepared[0]['label']}` takes {_costs(prepared[0])}, but the dot products at three points "
+            f"of every "
+            "span are made before it and not counted"
+        )
+    return Conclusion("What does a pixel cost, and how exact is it?", f"{sentence}.", _drawing(timed))
+
+
+def _cheapest_first(found: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    return sorted(found, key=lambda of: of["multipliers"] or np.inf)
 
 
 def _front(found: Sequence[Mapping[str, Any]], kind: str) -> list[Mapping[str, Any]]:
-    """Those that no other beats, fastest first."""
-    error, cycles = [of[kind][1] for of in found], [of["cycles"][1] for of in found]
-    on = [of for of, is_on in zip(found, front(error, cycles), strict=True) if is_on]
-    return sorted(on, key=lambda of: of["cycles"][1])
+    """Those that no other beats, fastest first, but for those whose dot products come from outside.
+
+    One beats another when it is no worse in error (by `_ALIKE_LSB`) and cycles (by `_ALIKE_CYCLES`), and either
+    better than that in one of them or has fewer multipliers.
+    """
+    found = [of for of in found if not of["is_prepared"]]
+    error, cycles = np.array([(of[kind][1], of["cycles"][1]) for of in found]).T
+    multipliers = np.array([of["multipliers"] or np.inf for of in found])
+    # [i, j]: whether j is better than i.
+    less_error = error < error[:, np.newaxis] - _ALIKE_LSB
+    less_cycles = cycles * _ALIKE_CYCLES < cycles[:, np.newaxis]
+    fewer = multipliers < multipliers[:, np.newaxis]
+    no_worse = ~(less_error | less_cycles).T
+    beaten = (no_worse & (less_error | less_cycles | fewer)).any(axis=1)
+    return sorted(
+        (of for of, is_beaten in zip(found, beaten, strict=True) if not is_beaten),
+        key=lambda of: of["cycles"][1],
+    )
+
+
+def _says(of: Mapping[str, Any]) -> str:
+    return f"{of['cycles'][1]:.2f} cycles, {of['total_error'][1]:.2f} LSB"
 
 
 def _costs(of: Mapping[str, Any]) -> str:
-    parts = [f"{of['cycles'][1]:.2f} cycles a pixel", f"worst error {of['total_error'][1]:.2f} LSB"]
-    if of["multipliers"] is not None:
-        parts.append(f"{of['multipliers']} multipliers")
+    parts = [] if of["multipliers"] is None else [f"{of['multipliers']} multipliers"]
     if of["luts"] is not None:
         parts.append(f"{of['luts']:,} LUT at {of['fmax_mhz']:.0f} MHz")
-    return ", ".join(parts)
+    return ", ".join(parts) or "not counted"
 
 
 def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
     """Both errors side by side, against nanoseconds where most designs have been placed, else cycles."""
+    # Where there are several scenes, a design of one is not comparable.
+    several = [of for of in found if of["samples"] > 1]
+    found = several if len(several) > 2 else found
     placed = [of for of in found if of["ns"]]
     in_ns = 2 * len(placed) > len(found)
     key, drawn = ("ns", placed) if in_ns else ("cycles", found)
@@ -216,7 +173,8 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
         ("total_error", "total error: exact Blinn"),
     )
     for panel, (kind, title) in zip(axes, kinds, strict=True):
-        panel.set(xscale="log", yscale="log", title=title)
+        panel.set(xscale="log", yscale="log")
+        panel.set_title(title, fontsize=9, loc="left")
         for of in drawn:
             style, published = style_of(of["method"]), of["group"] == "published"
             x, (low, high) = of[key], of[kind]
@@ -231,28 +189,26 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
                 linewidth=0.6,
                 alpha=0.9,
             )
-        on = {of["label"] for of in _front(drawn, kind)} if not in_ns else set()
+        on = {of["label"] for of in _front(drawn, kind)}
         corners = sorted((of[key][1], of[kind][1]) for of in drawn if of["label"] in on)
-        if corners:
+        if corners and not in_ns:
             xs = [corners[0][0], *(x for x, _ in corners), max(of[key][1] for of in drawn)]
             ys = [max(of[kind][1] for of in drawn), *(y for _, y in corners), corners[-1][1]]
             panel.step(xs, ys, where="post", color="#1c2126", linewidth=1.2, zorder=0)
         _ticks(panel, in_ns)
     axes[0].set_ylabel("largest error over all scenes, LSB of 8 bits")
     for panel, (kind, _) in zip(axes, kinds, strict=True):
-        front_labels = {of["label"] for of in _front(drawn, kind)}
-        order = sorted(
-            drawn, key=lambda of: (of["label"] not in front_labels, of["group"] == "published", of[kind][1])
-        )
         labels = [
             Label(
-                of[key][1],
-                of[kind][1],
-                of["label"].replace(", 1 - N.H", ""),
-                style_of(of["method"]).color,
-                "bold" if of["label"] in front_labels else "normal",
+                *(
+                    of[key][1],
+                    of[kind][1],
+                    _short(of),
+                    style_of(of["method"]).color,
+                ),
+                "bold" if of["label"] in on else "normal",
             )
-            for of in _distinct(order, key, kind)
+            for of in _named(drawn, on, kind)
         ]
         place_labels(panel, labels, [(of[key][1], of[kind][1]) for of in drawn])
     scenes = max(of["samples"] for of in drawn)
@@ -261,7 +217,10 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
         f"(meshes, sizes, "
         "exponents); bars go to the smallest error, and over the run times of all scenes"
         + (" and seeds of placement" if in_ns else "")
-        + ". Open: as published. The line is the front. Of designs in the same place one is named."
+        + ". Open: as published. Asterisk: its dot products at three points of every span are made before "
+        "the pipeline, so that it is not on the front. The line is the front. Named are the front, and the "
+        "best and the worst of "
+        "each method."
         " Not counted: spans are cut from triangles, and their normals prepared, before the pipeline (by "
         "the host, or by "
         "the hardware of `blysk verilog --geometry`); each part of a cut span counts with its cycles."
@@ -290,13 +249,19 @@ def _ticks(panel: Any, in_ns: bool) -> None:
     panel.set_xlabel("ns a pixel, after place and route" if in_ns else "cycles a pixel")
 
 
-def _distinct(found: Sequence[Mapping[str, Any]], key: str, kind: str) -> list[Mapping[str, Any]]:
-    """One of those that lie in the same place, to a hundredth of a decade, the first."""
-    kept: dict[tuple, Mapping[str, Any]] = {}
-    for of in found:
-        place = np.rint(np.log10([of[key][1], of[kind][1]]) * (60, 25))
-        kept.setdefault((*place, of["method"]), of)
-    return list(kept.values())
+def _short(of: Mapping[str, Any]) -> str:
+    return of["label"].replace(", 1 - N.H", "") + "*" * of["is_prepared"]
+
+
+def _named(found: Sequence[Mapping[str, Any]], on: Container[str], kind: str) -> list[Mapping[str, Any]]:
+    """Which get a label, the more important first: the front, then the best and the worst of each method."""
+    chosen = sorted((of for of in found if of["label"] in on), key=lambda of: of[kind][1])
+    for method in dict.fromkeys(of["method"] for of in found):
+        own = sorted((of for of in found if of["method"] == method), key=lambda of: of[kind][1])
+        named = any(of["method"] == method for of in chosen)
+        chosen += [of for of in ([] if named else own[:1]) if of not in chosen]
+        chosen += [of for of in own[-1:] if of not in chosen]
+    return chosen
 
 
 def spread_table(found: Sequence[Mapping[str, Any]]) -> Table:

@@ -10,12 +10,13 @@ from matplotlib.ticker import PercentFormatter
 
 from blysk.bench.labels import Label, place_labels
 from blysk.bench.report.section import Cell, Conclusion, Drawing, Grade, Section, Table
+from blysk.bench.ring import ring
 from blysk.bench.store import Task
 from blysk.bench.svg import panels, svg
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.sim.frames.figures import difference_figures, saving_figures
@@ -23,35 +24,12 @@ from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.frames.specialise import Reduction, Specialisation, specialise
 from blysk.sim.meshes.teapot import teapot
 
-__all__ = ["QUICK_SCENES", "SCENES", "measure", "ring", "section", "simulate_both", "tasks"]
+__all__ = ["QUICK_SCENES", "SCENES", "measure", "section", "simulate_both", "tasks"]
 
 _KEY = Light((-0.5, 0.8, 0.7))
 _COPPER = Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.20), (0.6,) * 3, 50)
 _FULL, _QUICK = (480, 360, 10_000), (160, 120, 1000)
 _RESOURCES = ("cells", "multipliers", "register_bits", "memory_bits")
-
-
-def ring(around: int = 36, across: int = 18) -> Mesh:
-    """A ring with exact normals: radii 1 and 0.42, axis y; that of the project's examples.
-
-    Parameters
-    ----------
-    around, across : int
-        Points along each of its circles.
-    """
-    a, b = np.meshgrid(
-        np.linspace(0, 2 * np.pi, around, endpoint=False),
-        np.linspace(0, 2 * np.pi, across, endpoint=False),
-        indexing="ij",
-    )
-    outwards = np.stack([np.cos(a), np.zeros_like(a), np.sin(a)], axis=-1)
-    normals = np.cos(b)[..., np.newaxis] * outwards + np.sin(b)[..., np.newaxis] * (0.0, 1.0, 0.0)
-    index = np.arange(around * across).reshape(around, across)
-    right, up = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1)
-    corner = np.roll(right, -1, axis=1)
-    faces = np.stack([index, up, corner, index, corner, right], axis=-1).reshape(-1, 3)
-    normals = normalise(normals.reshape(-1, 3))
-    return Mesh(outwards.reshape(-1, 3) + 0.42 * normals, faces, normals)
 
 
 def _teapot(width, height, triangles, material=_COPPER, lights=(_KEY,), **options) -> Scene:
@@ -268,8 +246,12 @@ def _saved_drawing(found: dict[str, dict]) -> Drawing:
         for y, value in zip(place + (column - 0.5) * 0.36, left[:, column], strict=True):
             axes[0].text(value + 0.01, y, f"{value:.0%} {name}", va="center", fontsize=6.5, color=color)
     axes[0].set(
-        yticks=place, yticklabels=list(found), xlim=(0, 1.22), title="everything that is not needed, by scene"
+        yticks=place,
+        yticklabels=list(found),
+        xlim=(0, 1.22),
     )
+    axes[0].set_title("everything that is not needed, by scene", fontsize=9, loc="left")
+    axes[1].set_title("each omission alone, at its best", fontsize=9, loc="left")
     axes[0].invert_yaxis()
     labels = []
     for kind, each in _shares_alone(found).items():
@@ -277,13 +259,14 @@ def _saved_drawing(found: dict[str, dict]) -> Drawing:
         labels.append(Label(x, y, kind.replace(" n ", " ")))
     labels.sort(key=lambda label: -label.x - label.y)
     axes[1].scatter([of.x for of in labels], [of.y for of in labels], s=16, color="#1c2126")
-    axes[1].set(title="each omission alone, at its best", ylabel="multipliers saved, share")
+    axes[1].set(ylabel="multipliers saved, share")
     for panel in axes:
         panel.xaxis.set_major_formatter(PercentFormatter(1))
     axes[1].yaxis.set_major_formatter(PercentFormatter(1))
     axes[0].set_xlabel("saved, share of the full pipeline")
     axes[1].set_xlabel("cells saved, share of the full pipeline")
-    axes[1].margins(0.12)
+    axes[0].set_xticks(np.arange(0, 1.01, 0.25))
+    axes[1].set(xlim=(-0.04, 1.12), ylim=(-0.06, 1.12))
     place_labels(axes[1], labels, [(of.x, of.y) for of in labels])
     note = "Counted in the netlist before technology mapping; the pixels are those of the full pipeline."
     return Drawing("needs-saved", "What leaving out saves", svg(figure), note)

@@ -15,7 +15,7 @@ import click
 
 from blysk.bench.colors import style_of
 from blysk.bench.command import run
-from blysk.bench.report import front, place_and_route
+from blysk.bench.report import front, front_scenes, place_and_route
 from blysk.bench.report.frames import (
     ERRORS,
     EXPONENTS,
@@ -94,7 +94,7 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
         A teapot of 992 triangles at 160x120 and exponent 100, `QUICK_SIMULATED` designs through the
         simulation, the others through the model, and committed clock rates (`placed`). Else one of 10,712
         triangles at 640x480, all `EXPONENTS`, every design simulated, and placed and routed where the tools
-        are installed. Without a C++ compiler nothing is simulated. Further scenes: see `front`.
+        are installed. Without a C++ compiler nothing is simulated. Further scenes: see `front_scenes`.
     meshes : sequence of str
         Files of further meshes.
 
@@ -122,8 +122,8 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
         pair = design["method"], design["model"]
         found.append(Task(hardware, design))
         if design["model"] in _SPREAD_MODELS:
-            scenes = front.QUICK_SCENES if quick else front.FULL_SCENES
-            found.append(Task(front.measure, {**design, "scenes": json.loads(json.dumps(scenes))}))
+            scenes = front_scenes.QUICK_SCENES if quick else front_scenes.FULL_SCENES
+            found.append(Task(front_scenes.measure, {**design, "scenes": json.loads(json.dumps(scenes))}))
         if not quick and "operand" not in design and all(tool_versions().values()):
             found.append(place_and_route.task(*pair))
     return found
@@ -329,7 +329,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     spread = {
         _design_of(task.settings): result
         for task, result in zip(tasks, results, strict=True)
-        if task.function is front.measure
+        if task.function is front_scenes.measure
     }
     found = front.summaries(points, spread)
     return Section(

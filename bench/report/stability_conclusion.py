@@ -10,7 +10,10 @@ from blysk.bench.report.section import Conclusion, Drawing
 from blysk.bench.report.stability_errors import GOOD, RANGE_EXPONENTS
 from blysk.bench.svg import panels, svg
 
-__all__ = ["conclusion"]
+__all__ = ["TERMINATOR", "conclusion"]
+
+TERMINATOR = "5"
+"""Group of the cases in which N.L changes its sign."""
 
 
 def _cases(groups: Mapping[str, Sequence[dict]]) -> Iterator[dict]:
@@ -19,12 +22,17 @@ def _cases(groups: Mapping[str, Sequence[dict]]) -> Iterator[dict]:
 
 
 def _worst(groups: Mapping[str, Sequence[dict]]) -> tuple[float, str]:
-    """Largest error in spans inside the range, cut or served whole, and the name of its case."""
+    """Largest error in a span inside the range, cut or served whole, without a flag; and its case."""
     errors = [
-        *((of["prepared"]["error"], of["case"]) for of in _cases(groups) if of["prepared"]),
+        *((of["prepared"]["silent"], of["case"]) for of in _cases(groups) if of["prepared"]),
         *((of["given"]["safe"], of["case"]) for of in _cases(groups) if of["inside"]),
     ]
     return max(errors, default=(0.0, ""))
+
+
+def _lit(groups: Mapping[str, Sequence[dict]]) -> Mapping[str, Sequence[dict]]:
+    """Without the group in which light goes out, where a bright highlight ends within a pixel."""
+    return {group: found for group, found in groups.items() if group != TERMINATOR}
 
 
 def _outside(groups: Mapping[str, Sequence[dict]]) -> float:
@@ -41,29 +49,37 @@ def conclusion(cases: Mapping[str, Any], ranges: Mapping[str, Any]) -> Conclusio
         Results of `measure` and `measure_ranges` by method.
     """
     worst = {method: _worst(groups) for method, groups in cases.items()}
+    lit = {method: _worst(_lit(groups)) for method, groups in cases.items()}
     silent = [
         method
         for method, groups in cases.items()
         if any(of["prepared"] and of["prepared"]["grade"] == "bad" for of in _cases(groups))
         or any(of["inside"] and of["given"]["safe_grade"] == "bad" for of in _cases(groups))
     ]
-    within = sorted(
-        (method for method in worst if worst[method][0] <= GOOD), key=lambda method: worst[method][0]
+    within, elsewhere = (
+        sorted((method for method in of if of[method][0] <= GOOD), key=lambda method: of[method][0])
+        for of in (worst, lit)
     )
+    elsewhere = [method for method in elsewhere if method not in within]
     count = sum(1 for _ in _cases(next(iter(cases.values()))))
     least, most = (of(worst, key=lambda method: worst[method][0]) for of in (min, max))
-    sentence = (
-        f"Inside its range {'no method is' if not silent else 'methods are (' + ', '.join(silent) + ')'} "
-        f"silently wrong in "
-        f"{count} stiff and extreme cases. "
-        + (
-            f"Within {GOOD:g} LSB in all of them: {_listed(within)}. "
-            if within
-            else f"None stays within {GOOD:g} LSB in all of them. "
+    which = "no method is" if not silent else f"{_listed(silent)} {'is' if len(silent) == 1 else 'are'}"
+    sentence = f"Inside its range {which} silently wrong in {count} stiff and extreme cases. "
+    if within:
+        said = ", ".join(f"**`{method}`** ({worst[method][0]:.2f})" for method in within)
+        sentence += f"Within {GOOD:g} LSB in all of them: {said}"
+    else:
+        sentence += (
+            f"None stays within {GOOD:g} LSB in all of them; the nearest is `{least}`, "
+            f"{worst[least][0]:.2f} LSB"
         )
-        + f"The smallest worst case is that of **`{least}`**, {worst[least][0]:.2f} LSB "
-        f"({worst[least][1]}), the largest "
-        f"that of `{most}`, {worst[most][0]:.0f} LSB ({worst[most][1]}), which its documentation states."
+    if elsewhere:
+        said = ", ".join(f"`{method}` ({lit[method][0]:.2f})" for method in elsewhere)
+        sentence += f"; but for pixels where the light sets, also {said}"
+    sentence += (
+        f". The largest error inside a range is {worst[most][0]:.0f} LSB (`{most}`, {worst[most][1]}), as "
+        f"its "
+        "documentation states."
     )
     if "chord" in ranges:
         first, last = (
@@ -72,25 +88,32 @@ def conclusion(cases: Mapping[str, Any], ranges: Mapping[str, Any]) -> Conclusio
         sentence += (
             f" The range of `chord` ends at spans that turn by {first:.3g} degrees at exponent "
             f"{RANGE_EXPONENTS[0]} and "
-            f"{last:.2g} at {RANGE_EXPONENTS[-1]}; wider ones are cut before the pipeline, or flagged by it."
+            f"{last:.3g} at {RANGE_EXPONENTS[-1]}; wider ones are cut before the pipeline, or flagged by it."
         )
-    return Conclusion("Where is it exact, and where does that end?", sentence, _drawing(cases, ranges, worst))
+    return Conclusion(
+        "Where is it exact, and where does that end?", sentence, _drawing(cases, ranges, worst, lit)
+    )
 
 
 def _listed(methods: Sequence[str]) -> str:
     return ", ".join(f"`{method}`" for method in methods)
 
 
-def _drawing(cases: Mapping[str, Any], ranges: Mapping[str, Any], worst: Mapping[str, tuple]) -> Drawing:
-    methods = sorted(cases, key=lambda method: -worst[method][0])
+def _drawing(
+    cases: Mapping[str, Any], ranges: Mapping[str, Any], worst: Mapping[str, tuple], lit: Mapping[str, tuple]
+) -> Drawing:
+    methods = sorted(cases, key=lambda method: (-worst[method][0], -lit[method][0]))
     figure, (left, right) = panels(9.2, 0.3 * len(methods) + 1.3, 2)
     place = np.arange(len(methods))
     for y, method in zip(place, methods, strict=True):
         style, error, outside = style_of(method), worst[method][0], _outside(cases[method])
         left.plot([error, max(outside, error)], [y, y], color=style.color, linewidth=0.8, linestyle=":")
         left.plot(outside, y, marker="o", markersize=5, markerfacecolor="white", color=style.color)
-        left.plot(error, y, marker=style.marker, markersize=6, color=style.color)
-        left.text(error, y - 0.42, f"{error:.2g}", fontsize=6.5, ha="center", va="center", color=style.color)
+        left.plot(error, y, marker="|", markersize=8, color=style.color)
+        left.plot(lit[method][0], y, marker=style.marker, markersize=6, color=style.color)
+        for value in {error, lit[method][0] if lit[method][0] < error / 1.4 else error}:
+            text = f"{value:.0f}" if value >= 9.95 else f"{value:.2g}"
+            left.text(value, y - 0.42, text, fontsize=6.5, ha="center", va="center", color=style.color)
         widest = (
             [ranges[method]["widest"][str(exponent)] for exponent in RANGE_EXPONENTS]
             if method in ranges
@@ -101,13 +124,13 @@ def _drawing(cases: Mapping[str, Any], ranges: Mapping[str, Any], worst: Mapping
             ends = (widest[0], RANGE_EXPONENTS[0]), (widest[-1], RANGE_EXPONENTS[-1])
             same = max(widest) < 1.05 * min(widest)
             for angle, exponent in ends[:1] if same else ends:
-                text = f"{angle:.2g}°, any n" if same else f"{angle:.2g}°, n = {exponent}"
+                text = f"{angle:.3g}°, any n" if same else f"{angle:.3g}°, n = {exponent}"
                 right.text(angle, y - 0.42, text, fontsize=6.5, ha="center", va="center", color=style.color)
     left.axvline(GOOD, color="#59626c", linewidth=0.8, linestyle="--")
-    left.set(
-        xscale="log", xlabel="largest error, LSB of 8 bits", title="worst case, filled: inside the range"
-    )
-    right.set(xscale="log", xlabel="widest span that is served whole, degrees", title="where the range ends")
+    left.set(xscale="log", xlabel="largest error, LSB of 8 bits")
+    left.set_title("worst case", fontsize=9, loc="left")
+    right.set(xscale="log", xlabel="widest span that is served whole, degrees")
+    right.set_title("where the range ends", fontsize=9, loc="left")
     for panel, ticks in ((left, (0.5, 1, 2, 5, 10, 50, 200)), (right, (0.5, 1, 2, 5, 10, 20, 45, 90, 180))):
         panel.margins(x=0.12)
         low, high = panel.get_xlim()
@@ -118,10 +141,13 @@ def _drawing(cases: Mapping[str, Any], ranges: Mapping[str, Any], worst: Mapping
     left.set_yticklabels(methods)
     right.set_yticklabels([""] * len(methods))
     note = (
-        "Left, filled: the worst of all cases, spans cut where need be or served whole; open: spans as they "
-        "come, outside "
-        f"the range, of which no flag tells. Dashed: {GOOD:g} LSB. Right: from the smallest exponent to the "
-        f"largest."
+        "Left, filled: the worst of all cases inside the range, spans cut where need be or served whole, "
+        "but for those "
+        "where the light sets; bar: with those, in which a bright highlight of a small exponent ends within "
+        "a pixel; "
+        f"open: spans as they come, outside the range, of which no flag tells. Dashed: {GOOD:g} LSB. Right: "
+        f"from the "
+        "smallest exponent to the largest."
     )
     return Drawing(
         "stability-worst", "Worst case of each method, and where its range ends", svg(figure), note

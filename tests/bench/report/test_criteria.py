@@ -3,7 +3,8 @@
 import json
 
 from blysk.bench.report import energy
-from blysk.bench.report.criteria import BAD_INPUT, frame, refused, resources, section, simulated, tasks
+from blysk.bench.report.criteria import section, tasks
+from blysk.bench.report.criteria_figures import BAD_INPUT, frame, refused, resources, simulated
 from blysk.bench.store import Task
 from blysk.golden.presets import METHODS
 

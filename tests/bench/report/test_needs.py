@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from blysk.bench.report import needs
-from blysk.bench.report.needs import QUICK_SCENES, SCENES, measure, ring, section, simulate_both, tasks
+from blysk.bench.report.needs import QUICK_SCENES, SCENES, measure, section, simulate_both, tasks
 from blysk.bench.report.section import Drawing, Table
+from blysk.bench.ring import ring
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.raster import face_normals
