@@ -130,8 +130,8 @@ def _cheapest_first(found: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any
 def _front(found: Sequence[Mapping[str, Any]], kind: str) -> list[Mapping[str, Any]]:
     """Those that no other beats, fastest first, but for those whose dot products come from outside.
 
-    One beats another when it is no worse in error (by `_ALIKE_LSB`) and cycles (by `_ALIKE_CYCLES`), and either
-    better than that in one of them or has fewer multipliers.
+    One beats another when it is no worse in error (by `_ALIKE_LSB`) and cycles (by `_ALIKE_CYCLES`), and is
+    better than that in one of them, or has fewer multipliers.
     """
     found = [of for of in found if not of["is_prepared"]]
     error, cycles = np.array([(of[kind][1], of["cycles"][1]) for of in found]).T

@@ -17,7 +17,7 @@ from typing import Any
 import click
 
 from blysk.bench.command import resumable
-from blysk.bench.report.frames import STEPS, map_colors
+from blysk.bench.report.frames import map_colors
 from blysk.bench.report.page import embedded, environment
 from blysk.bench.report.report import SECTIONS, about, chosen_tasks, measure_all, measured, write_report
 from blysk.bench.store import Task, version_of
@@ -31,6 +31,7 @@ from blysk.bench.tools.web_data import (
     HEIGHT,
     MESHES,
     REFERENCES,
+    RIVAL,
     SERVED,
     START,
     WIDTH,
@@ -227,6 +228,7 @@ def _scripts(tasks: Sequence[Task], results: Sequence[Any]) -> tuple[dict[str, s
 def _site(designs: Mapping[str, Mapping[str, Any]], meshes: Mapping[str, Any]) -> dict[str, Any]:
     """What the page reads as it starts."""
     first = next(iter(designs.values()))
+    rivals = [design["model"] for design in designs.values() if design["method"] == RIVAL]
     start = START | {"mesh": next(iter(meshes)), "method": first["method"], "model": first["model"]}
     if any(START["method"] == d["method"] and START["model"] == d["model"] for d in designs.values()):
         start |= {"method": START["method"], "model": START["model"]}
@@ -244,7 +246,9 @@ def _site(designs: Mapping[str, Mapping[str, Any]], meshes: Mapping[str, Any]) -
         "designs": designs,
         "meshes": meshes,
         "methods": {name: method(name) for name in dict.fromkeys(d["method"] for d in designs.values())},
-        "errorMap": {"limits": STEPS, "colors": map_colors()},
+        "errorMap": {"colors": map_colors()},
+        "rival": RIVAL if rivals else None,
+        "rivalModel": rivals[0] if rivals else None,
         "mostExponent": MAX_EXPONENT,
     }
 
