@@ -193,6 +193,8 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
         section.name: {
             "title": section.title,
             "text": list(section.text),
+            "conclusion": section.conclusion
+            and {"title": section.conclusion.title, "sentence": section.conclusion.sentence},
             "tables": {
                 table.name: {"title": table.title, "note": table.note, "rows": table.records()}
                 for table in _tables([section])

@@ -131,6 +131,12 @@ def _report_files(folder: Path) -> list[Path]:
     return files
 
 
+def _answers(report: Path) -> list[dict[str, str]]:
+    """Conclusions of a report: title and sentence."""
+    sections = json.loads((report / "report.json").read_text(encoding="utf-8")).get("sections", {})
+    return [section["conclusion"] for section in sections.values() if section.get("conclusion")]
+
+
 def tasks(designs: Sequence[tuple[str, str]], views: Mapping[str, int]) -> list[Task]:
     """What has to be made for a site: modules, then spans.
 
@@ -195,6 +201,7 @@ def write_site(
             version=version_of("blysk"),
             documents={name: DOCUMENTS[name] for name in folders or {}},
             has_report=report is not None,
+            answers=_answers(report) if report else [],
             modules=len(designs),
         )
     )

@@ -295,7 +295,9 @@ const blyskCore = () => {
     let above = count;
     let bucket = buckets.length;
     while (above > Math.floor(rank)) above -= buckets[--bucket];
-    const top = errors.filter((error) => error * scale >= bucket).sort();
+    const top = new Float64Array(count - above);
+    for (let k = 0, n = 0; k < count; k++) if (errors[k] * scale >= bucket) top[n++] = errors[k];
+    top.sort();
     const at = Math.floor(rank) - above;
     const low = top[at];
     const high = top[Math.min(at + 1, top.length - 1)];
