@@ -72,6 +72,7 @@ def panels(
     **options
         Of `matplotlib.figure.Figure.subplots`.
     """
-    with rc_context({"font.size": 8, "axes.grid": True, "grid.color": "#dddddd", "grid.linewidth": 0.5}):
+    style = {"font.size": 8, "axes.axisbelow": True, "axes.grid": True}
+    with rc_context(style | {"grid.color": "#dddddd", "grid.linewidth": 0.5}):
         figure = Figure(figsize=(width, height), layout="constrained")
         return figure, figure.subplots(1, columns, squeeze=False, **options)[0]

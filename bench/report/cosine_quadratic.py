@@ -105,7 +105,9 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         pictures_drawing(bodies),
         _pictures_table(bodies),
     ]
-    return Section("cosine-quadratic", "Figures of [C]: the cosine-quadratic model", text, parts)
+    return Section(
+        "cosine-quadratic", "Figures of [C]: the cosine-quadratic model", text, parts, appendix=True
+    )
 
 
 def _published_table(found: dict[str, Any]) -> Table:

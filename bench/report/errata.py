@@ -380,4 +380,4 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "again: from what is published, and from what it should be. The units keep the published constants "
         "as named variants, so that their effect shows in the other sections.",
     ]
-    return Section("errata", "Errata of the documents", text, [errata, figures])
+    return Section("errata", "Errata of the documents", text, [errata, figures], appendix=True)

@@ -96,11 +96,13 @@ TIMES = [
     for key, title, unit, better in (
         ("cycles_per_pixel", "hardware, cycles", "cycles a pixel", "less"),
         ("ns_per_pixel", "hardware, at the clock rate after place and route", "ns a pixel", "less"),
+        ("multipliers", "multipliers of 18x18 bits", "", "less"),
+        ("luts", "look-up tables after place and route", "LUT", "less"),
         ("simulated_pixels_per_second", "simulation of the hardware", "pixels a second", "more"),
         ("golden_ns_per_pixel", "the same in float64 NumPy", "ns a pixel", "less"),
     )
 ]
-"""Measures of run time, in the same form."""
+"""Measures of run time and cost, in the same form."""
 
 _REPEATS = 3
 
@@ -278,14 +280,15 @@ def _judged(
 
 
 def hardware(method: str, model: str, operand: Operand | None = None) -> dict[str, int]:
-    """What the pipeline of a design takes before technology mapping, see `Cost`.
+    """What the pipeline of a design takes before technology mapping, and its ``latency`` in cycles.
 
     Returns
     -------
     dict
         See `Cost.totals`.
     """
-    return cost_of(ShadingPipelineUnit(preset(method, model, operand=operand))).totals
+    unit = ShadingPipelineUnit(preset(method, model, operand=operand))
+    return cost_of(unit).totals | {"latency": unit.latency}
 
 
 def speeds(

@@ -1,18 +1,22 @@
 """What sample scenes do not need: what their pipelines go without, and what that saves, as a section."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from matplotlib.ticker import PercentFormatter
 
-from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
+from blysk.bench.labels import Label, place_labels
+from blysk.bench.report.section import Cell, Conclusion, Drawing, Grade, Section, Table
+from blysk.bench.ring import ring
 from blysk.bench.store import Task
-from blysk.bench.svg import svg
+from blysk.bench.svg import panels, svg
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.sim.frames.figures import difference_figures, saving_figures
@@ -20,35 +24,12 @@ from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.frames.specialise import Reduction, Specialisation, specialise
 from blysk.sim.meshes.teapot import teapot
 
-__all__ = ["QUICK_SCENES", "SCENES", "measure", "ring", "section", "simulate_both", "tasks"]
+__all__ = ["QUICK_SCENES", "SCENES", "measure", "section", "simulate_both", "tasks"]
 
 _KEY = Light((-0.5, 0.8, 0.7))
 _COPPER = Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.20), (0.6,) * 3, 50)
 _FULL, _QUICK = (480, 360, 10_000), (160, 120, 1000)
 _RESOURCES = ("cells", "multipliers", "register_bits", "memory_bits")
-
-
-def ring(around: int = 36, across: int = 18) -> Mesh:
-    """A ring with exact normals: radii 1 and 0.42, axis y; that of the project's examples.
-
-    Parameters
-    ----------
-    around, across : int
-        Points along each of its circles.
-    """
-    a, b = np.meshgrid(
-        np.linspace(0, 2 * np.pi, around, endpoint=False),
-        np.linspace(0, 2 * np.pi, across, endpoint=False),
-        indexing="ij",
-    )
-    outwards = np.stack([np.cos(a), np.zeros_like(a), np.sin(a)], axis=-1)
-    normals = np.cos(b)[..., np.newaxis] * outwards + np.sin(b)[..., np.newaxis] * (0.0, 1.0, 0.0)
-    index = np.arange(around * across).reshape(around, across)
-    right, up = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1)
-    corner = np.roll(right, -1, axis=1)
-    faces = np.stack([index, up, corner, index, corner, right], axis=-1).reshape(-1, 3)
-    normals = normalise(normals.reshape(-1, 3))
-    return Mesh(outwards.reshape(-1, 3) + 0.42 * normals, faces, normals)
 
 
 def _teapot(width, height, triangles, material=_COPPER, lights=(_KEY,), **options) -> Scene:
@@ -114,7 +95,14 @@ SCENES: dict[str, tuple[Callable[[int, int, int], Scene], dict[str, Any] | None]
 method with the model cosquad and a highlight gate.
 """
 
-QUICK_SCENES = ("copper teapot", "matt teapot, k_s = 0")
+QUICK_SCENES = (
+    "copper teapot",
+    "matt teapot, k_s = 0",
+    "teapot in ambient light",
+    "grey teapot",
+    "three materials alike",
+    "floor lit from behind, exponent 500",
+)
 """Scenes of the quick report."""
 
 
@@ -125,7 +113,7 @@ def _specialised(name: str, size: Sequence[int]) -> tuple[Scene, Specialisation]
 
 
 def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
-    """Reductions of a scene's pipeline, and its frame against the full one's, by bit-accurate models.
+    """Reductions of a scene's pipeline, each alone and all, and its frame against the full one's, by models.
 
     Parameters
     ----------
@@ -140,7 +128,7 @@ def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
     -------
     dict
         Those of `saving_figures` and `difference_figures`, and ``reasons``, what is left out and why,
-        ``method``, ``model`` and ``pixels``.
+        ``alone``, what each saves by itself, in the netlist, ``method``, ``model`` and ``pixels``.
     """
     scene, found = _specialised(name, size)
     full, smaller = model_frame(scene, found.full), model_frame(found.scenes[0], found.design)
@@ -148,9 +136,11 @@ def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
     if not steps:
         together = {key: value for reduction in found.reductions for key, value in reduction.changes.items()}
         counted = replace(found, reductions=(Reduction("all of it", together),))
+    alone = [saving_figures(replace(found, reductions=(each,)))["reductions"][0] for each in found.reductions]
     return {
         **saving_figures(counted),
         **difference_figures(smaller, full),
+        "alone": [each["saves"] for each in alone],
         "reasons": [reduction.reason for reduction in found.reductions],
         "method": found.full.method,
         "model": found.full.model,
@@ -202,9 +192,99 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         f"{_left(found[most], 'cells'):.0%} ({most}). Cells are operators, multiplexers, registers and "
         "memories of any width, before technology mapping.",
     ]
-    return Section(
-        "needs", "What a scene does not need", text, [_totals(found), _drawing(found), _reductions(found)]
+    parts = [_totals(found), _drawing(found), _alone(found), _reductions(found)]
+    return Section("needs", "What a scene does not need", text, parts, conclusion=_conclusion(found))
+
+
+def _shares_alone(found: dict[str, dict]) -> dict[str, list[tuple[str, dict[str, float]]]]:
+    """By kind of omission: scene, and share of each resource that it saves alone."""
+    shares: dict[str, list[tuple[str, dict[str, float]]]] = {}
+    for name, of in found.items():
+        for reason, saves in zip(of["reasons"], of["alone"], strict=True):
+            kind = re.sub(r"\d+", "n", reason.partition(":")[0])
+            share = {resource: saves[resource] / max(of["full"][resource], 1) for resource in _RESOURCES}
+            shares.setdefault(kind, []).append((name, share))
+    return shares
+
+
+def _conclusion(found: dict[str, dict]) -> Conclusion:
+    """What leaving out saves, by scene, and the single omission that saves most."""
+    least, most = (of(found, key=lambda name: _left(found[name], "cells")) for of in (min, max))
+
+    def says(name):
+        parts = [
+            f"{1 - _left(found[name], resource):.0%} of the {resource.replace('_', ' ')}"
+            for resource in _RESOURCES
+        ]
+        return f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+    same = sum(of["different_pixels"] == 0 for of in found.values())
+    sentence = (
+        f"Leaving out what a scene does not need saves from {says(most)} (*{most}*) to **{says(least)}** "
+        f"(*{least}*), and "
+        f"changes no pixel in {same} of {len(found)} scenes."
     )
+    shares = _shares_alone(found)
+    if shares:
+        kind = max(shares, key=lambda kind: max(share["cells"] for _, share in shares[kind]))
+        name, share = max(shares[kind], key=lambda one: one[1]["cells"])
+        sentence += (
+            f" The single omission that saves most: {kind}, {share['cells']:.0%} of the cells and "
+            f"{share['multipliers']:.0%} of the multipliers (*{name}*)."
+        )
+    return Conclusion("What does a scene not need?", sentence, _saved_drawing(found))
+
+
+def _saved_drawing(found: dict[str, dict]) -> Drawing:
+    figure, axes = panels(9.2, 0.36 * max(len(found), 5) + 1.3, 2)
+    place = np.arange(len(found))
+    left = np.array(
+        [[1 - _left(of, resource) for resource in ("cells", "multipliers")] for of in found.values()]
+    )
+    for column, (color, name) in enumerate((("#0072b2", "cells"), ("#d55e00", "multipliers"))):
+        axes[0].barh(place + (column - 0.5) * 0.36, left[:, column], 0.34, color=color, label=name)
+        for y, value in zip(place + (column - 0.5) * 0.36, left[:, column], strict=True):
+            axes[0].text(value + 0.01, y, f"{value:.0%} {name}", va="center", fontsize=6.5, color=color)
+    axes[0].set(
+        yticks=place,
+        yticklabels=list(found),
+        xlim=(0, 1.22),
+    )
+    axes[0].set_title("everything that is not needed, by scene", fontsize=9, loc="left")
+    axes[1].set_title("each omission alone, at its best", fontsize=9, loc="left")
+    axes[0].invert_yaxis()
+    labels = []
+    for kind, each in _shares_alone(found).items():
+        x, y = (max(share[resource] for _, share in each) for resource in ("cells", "multipliers"))
+        labels.append(Label(x, y, kind.replace(" n ", " ")))
+    labels.sort(key=lambda label: -label.x - label.y)
+    axes[1].scatter([of.x for of in labels], [of.y for of in labels], s=16, color="#1c2126")
+    axes[1].set(ylabel="multipliers saved, share")
+    for panel in axes:
+        panel.xaxis.set_major_formatter(PercentFormatter(1))
+    axes[1].yaxis.set_major_formatter(PercentFormatter(1))
+    axes[0].set_xlabel("saved, share of the full pipeline")
+    axes[1].set_xlabel("cells saved, share of the full pipeline")
+    axes[0].set_xticks(np.arange(0, 1.01, 0.25))
+    axes[1].set(xlim=(-0.04, 1.12), ylim=(-0.06, 1.12))
+    place_labels(axes[1], labels, [(of.x, of.y) for of in labels])
+    note = "Counted in the netlist before technology mapping; the pixels are those of the full pipeline."
+    return Drawing("needs-saved", "What leaving out saves", svg(figure), note)
+
+
+def _alone(found: dict[str, dict]) -> Table:
+    columns = ["scene", "left out, and why", *(f"saves {name.replace('_', ' ')}" for name in _RESOURCES)]
+    columns += ["cells, share of the full", "multipliers, share of the full"]
+    rows: list[list[Cell]] = [
+        [
+            *(name, reason, *(saves[resource] for resource in _RESOURCES)),
+            *(saves[resource] / max(of["full"][resource], 1) for resource in ("cells", "multipliers")),
+        ]
+        for name, of in found.items()
+        for reason, saves in zip(of["reasons"], of["alone"], strict=True)
+    ]
+    note = "Each by itself, from the full pipeline, counted in the netlist."
+    return Table("needs-alone", "What each omission saves alone", columns, rows, note)
 
 
 def _left(figures: dict, resource: str) -> float:
@@ -253,12 +333,11 @@ def _reductions(found: dict[str, dict]) -> Table:
 
 def _drawing(found: dict[str, dict]) -> Drawing:
     from matplotlib.figure import Figure
-    from matplotlib.ticker import PercentFormatter
 
     figure = Figure(figsize=(7.6, 0.62 * len(found) + 1.1), layout="constrained")
     axes = figure.subplots()
     place = np.arange(len(found))
-    colors = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd")
+    colors = ("#0072b2", "#d55e00", "#00805c", "#b0508a")
     for index, (resource, color) in enumerate(zip(_RESOURCES, colors, strict=True)):
         left = [_left(of, resource) for of in found.values()]
         axes.barh(place + (index - 1.5) * 0.2, left, 0.2, color=color, label=resource.replace("_", " "))

@@ -39,6 +39,8 @@ AXES = {
     "cycles_per_pixel": "Cycles of the simulated pipeline from the first write of a constant to the last "
     "pixel, over its pixels.",
     "ns_per_pixel": "Cycles a pixel at the clock rate that place and route achieves.",
+    "multipliers": "Multipliers of 18x18 bits in the netlist, none of them shared with anything else.",
+    "luts": "Look-up tables of four inputs after place and route, one light, three channels.",
     "simulated_pixels_per_second": "How fast this machine simulates the hardware: more is better, so the "
     "axis runs the other way.",
     "golden_ns_per_pixel": "Time of the same method and model in float64 NumPy on this machine, over the "
@@ -170,8 +172,8 @@ def page(sections: Sequence[Section], about: Mapping[str, Any]) -> str:
     Parameters
     ----------
     sections : sequence of Section
-        In their order. One with ``points`` among its figures (see `section`) has the drawing of
-        error against run time.
+        In their order, appendices last. One with ``points`` among its figures (see `section`) has the
+        drawing of error against run time. Conclusions stand at the top.
     about : dict
         See `about`.
 
@@ -187,6 +189,15 @@ def page(sections: Sequence[Section], about: Mapping[str, Any]) -> str:
     (explored,) = [section for section in sections if "points" in section.figures] or (None,)
     figures = without_pictures(explored.figures) if explored else None
     template = environment().get_template("report.html")
+    ordered = [section for section in sections if not section.appendix]
+    ordered += [section for section in sections if section.appendix]
+    conclusions = [section for section in ordered if section.conclusion]
     return template.render(
-        sections=sections, about=about, explored=explored, figures=figures, axes=AXES, **texts
+        sections=ordered,
+        conclusions=conclusions,
+        about=about,
+        explored=explored,
+        figures=figures,
+        axes=AXES,
+        **texts,
     )

@@ -271,7 +271,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         + f" at {largest['triangles']:,} triangles.",
     ]
     parts = [_exponent_drawing(ratio), ways, frames, _frames_drawing(frames, size)]
-    return Section("phong-blinn", "Experiments of [P]: Phong and Blinn", text, parts)
+    return Section("phong-blinn", "Experiments of [P]: Phong and Blinn", text, parts, appendix=True)
 
 
 def _fewer(share: float) -> str:

@@ -1,8 +1,10 @@
 """The report's section on place and route: parts and clock rate of the pipeline, a table a family."""
 
 from collections.abc import Sequence
+from statistics import median
 from typing import Any
 
+from blysk.bench.report.placed import read_store
 from blysk.bench.report.section import Cell, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.tools.families import ECP5, FAMILIES
@@ -98,7 +100,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     """
     name, title = "place-and-route", "Place and route"
     if not tasks:
-        return Section(name, title, ["Left out of a quick report; `blysk fpga` does it alone."], [])
+        return Section(name, title, *_committed())
     text = [
         f"The pipeline, {MODEL}, one light, three channels, out of context. Placement starts from a seed; "
         "clock rates are over some of them. At one pixel a cycle, 1920x1080 pixels 60 times a second ask for "
@@ -115,6 +117,40 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         text.append(said)
         tables += [table] if table else []
     return Section(name, title, text, tables)
+
+
+def _committed() -> tuple[list[str], list[Table]]:
+    """What a quick report says: the figures of the store, each with its date and command."""
+    rows: list[list[Cell]] = [
+        [
+            *(
+                entry[name]
+                for name in ("design", "device", "luts", "flip_flops", "multipliers", "block_rams")
+            ),
+            *(
+                min(entry["fmax_mhz"]),
+                median(entry["fmax_mhz"]),
+                max(entry["fmax_mhz"]),
+                len(entry["fmax_mhz"]),
+            ),
+            *(entry["date"], entry["command"]),
+        ]
+        for entry in read_store()
+    ]
+    columns = ["design", "device", "look-up tables", "flip-flops", "multipliers", "block RAMs"]
+    columns += [f"clock rate, {which}, MHz" for which in ("smallest", "median", "largest")]
+    columns += ["seeds", "date", "command"]
+    text = (
+        "Placing a design takes minutes, so a quick report measures none: these are the committed figures, "
+        "each with its "
+        "date and command. `blysk fpga --json FILE` measures more, and `python -m blysk.bench.report.placed "
+        "FILE` adds "
+        "them; a full report measures all of them anew."
+    )
+    table = Table(
+        "place-and-route-committed", "Committed figures", columns, rows, "Out of context, one light."
+    )
+    return [text], [table]
 
 
 def _table(family: str, results: Sequence[tuple[dict[str, Any], Any]]) -> tuple[str, Table | None]:

@@ -13,8 +13,9 @@ from typing import Any
 
 import click
 
+from blysk.bench.colors import style_of
 from blysk.bench.command import run
-from blysk.bench.report import place_and_route
+from blysk.bench.report import front, front_scenes, place_and_route
 from blysk.bench.report.frames import (
     ERRORS,
     EXPONENTS,
@@ -28,9 +29,11 @@ from blysk.bench.report.frames import (
     speeds,
     view_of,
 )
+from blysk.bench.report.placed import placed
 from blysk.bench.report.points_text import front_table, fronts_of, readme_table, table, text
 from blysk.bench.report.section import Section
 from blysk.bench.store import Task
+from blysk.bench.tools.families import DEVICE
 from blysk.bench.tools.place_and_route import tool_versions
 from blysk.golden.presets import METHODS, MODELS, PUBLISHED
 from blysk.golden.reference.renderer import SHADINGS
@@ -71,15 +74,15 @@ both, so that each method is compared in its best form too. Those as published a
 
 _BEST_OPERAND = {"operand": "one_minus_cosine"}
 
-QUICK_SIMULATED = [
-    ("linear", "cosquad"),
-    ("quadratic", "cosquad"),
-    ("renormalise", "cosquad"),
-    ("renormalise", "exp"),
-    ("chord-local", "cosquad"),
-    ("chord", "cosquad"),
-]
-"""Those that the quick report simulates; of the others it has the model's frames, and no cycles."""
+_BEST_MODEL = "blinn"
+"""The exact lobe table, with which each method in its best form has points, too."""
+
+QUICK_SIMULATED = [(method, "cosquad") for method in (*METHODS, *PUBLISHED)]
+"""Those that the quick report simulates: a pipeline of every method. Of the others it has the model's
+frames, and the cycles of the same method, whose spans are the same, with the difference of latency."""
+
+_SPREAD_MODELS = ("cosquad", "exp", "blinn", "blinn_product")
+"""Models of the designs that are measured over several scenes."""
 
 
 def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
@@ -89,9 +92,9 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
     ----------
     quick : bool
         A teapot of 992 triangles at 160x120 and exponent 100, `QUICK_SIMULATED` designs through the
-        simulation, the others through the model, no clock rates. Else one of 10,712 triangles at 640x480, all
-        `EXPONENTS`, every design simulated, and placed and routed where the tools are installed. Without
-        a C++ compiler nothing is simulated.
+        simulation, the others through the model, and committed clock rates (`placed`). Else one of 10,712
+        triangles at 640x480, all `EXPONENTS`, every design simulated, and placed and routed where the tools
+        are installed. Without a C++ compiler nothing is simulated. Further scenes: see `front_scenes`.
     meshes : sequence of str
         Files of further meshes.
 
@@ -117,8 +120,10 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
             found += [Task(software_frames, settings), Task(software_speeds, settings, timed=True)]
     for design in _designs():
         pair = design["method"], design["model"]
-        if not quick or pair in QUICK_SIMULATED:
-            found.append(Task(hardware, design))
+        found.append(Task(hardware, design))
+        if design["model"] in _SPREAD_MODELS:
+            scenes = front_scenes.QUICK_SCENES if quick else front_scenes.FULL_SCENES
+            found.append(Task(front_scenes.measure, {**design, "scenes": json.loads(json.dumps(scenes))}))
         if not quick and "operand" not in design and all(tool_versions().values()):
             found.append(place_and_route.task(*pair))
     return found
@@ -127,7 +132,11 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
 def _designs() -> list[dict[str, str]]:
     """Options of the hardware's points."""
     designs = [{"method": method, "model": model} for method, model in DESIGNS]
-    return designs + [{"method": method, "model": "cosquad"} | _BEST_OPERAND for method in BEST]
+    designs += [{"method": method, "model": "cosquad"} | _BEST_OPERAND for method in BEST]
+    best = [
+        {"method": method, "model": _BEST_MODEL} for method in METHODS if (method, _BEST_MODEL) not in DESIGNS
+    ]
+    return designs + [of | (_BEST_OPERAND if of["method"] in BEST else {}) for of in best]
 
 
 def _design_of(settings: Mapping[str, Any]) -> tuple[str, ...]:
@@ -167,15 +176,13 @@ def _command(settings: Mapping[str, Any]) -> str:
 
 def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any]]:
     """The points, by mesh in the order of the tasks, exponent and design."""
-    of_design: dict[tuple, dict] = {}
+    of_design = _of_designs(tasks, results)
     of_frame: dict[tuple, dict] = {}
     for task, result in zip(tasks, results, strict=True):
-        if task.function in (hardware, place_and_route.measure):
-            taken = result if task.function is hardware else {"fmax_mhz": result.get("fmax_median_mhz")}
-            of_design.setdefault(_design_of(task.settings), {}).update(taken)
-        elif task.function in (speeds, software_speeds):
+        if task.function in (speeds, software_speeds):
             for key, speed in zip(_keys(task), result, strict=True):
                 of_frame[key] = speed
+    cycles_of = _Cycles(tasks, results, of_design)
     points = []
     for task, result in zip(tasks, results, strict=True):
         if task.function not in (frames, software_frames):
@@ -186,12 +193,13 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
             software = task.function is software_frames
             taken = {} if software else of_design.get(_design_of(settings), {})
             fmax = taken.get("fmax_mhz")
-            cycles = None if found["cycles"] is None else found["cycles"] / found["pixels"]
+            cycles = None if software else cycles_of(key, found)
             points.append(
                 {
                     "id": "/".join(map(str, key)),
                     "label": f"{method}, software" if software else _label(settings),
                     "group": "software" if software else _group(method),
+                    "colors": list(style_of("" if software else method)[:2]),
                     "settings": settings,
                     "command": _command(settings),
                     "errors": found["errors"],
@@ -199,12 +207,11 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
                     "times": {
                         "cycles_per_pixel": cycles,
                         "ns_per_pixel": None if None in (cycles, fmax) else cycles * 1e3 / fmax,
+                        "multipliers": taken.get("multipliers"),
+                        "luts": taken.get("luts"),
                         **of_frame[key],
                     },
-                    "hardware": {
-                        name: taken.get(name)
-                        for name in ("multipliers", "cells", "register_bits", "memory_bits", "fmax_mhz")
-                    },
+                    "hardware": {name: taken.get(name) for name in _HARDWARE},
                     "counts": {
                         name: found[name]
                         for name in ("pixels", "shown", "spans", "out_of_range_spans", "cycles")
@@ -217,6 +224,58 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
         points,
         key=lambda point: (sources.index(point["settings"]["source"]), point["settings"]["exponent"]),
     )
+
+
+_HARDWARE = (
+    "multipliers",
+    "cells",
+    "register_bits",
+    "memory_bits",
+    "luts",
+    "fmax_mhz",
+    "seeds_mhz",
+    "placed",
+)
+
+
+def _of_designs(tasks: Sequence[Task], results: Sequence[Any]) -> dict[tuple, dict[str, Any]]:
+    """Hardware of designs: the netlist, and place and route, measured now or committed."""
+    found: dict[tuple, dict[str, Any]] = {}
+    for design, entry in placed(DEVICE).items():
+        rates = {"fmax_mhz": entry["fmax_median_mhz"], "seeds_mhz": entry["fmax_mhz"]}
+        found[design] = {"luts": entry["luts"], **rates, "placed": f"{entry['date']}, {entry['device']}"}
+    for task, result in zip(tasks, results, strict=True):
+        of = found.setdefault(_design_of(task.settings), {}) if "method" in task.settings else {}
+        if task.function is hardware:
+            of |= result
+        elif task.function is place_and_route.measure and "fmax_median_mhz" in result:
+            rates = [seed["fmax"] for seed in result.get("seeds", ())]
+            of |= {"fmax_mhz": result["fmax_median_mhz"], "seeds_mhz": rates or [result["fmax_median_mhz"]]}
+            of |= {"luts": result.get("luts"), "placed": "this report"}
+    return found
+
+
+class _Cycles:
+    """Cycles a pixel of frames: their own, or those of the same method and spans with another model."""
+
+    def __init__(self, tasks: Sequence[Task], results: Sequence[Any], of_design: Mapping[tuple, dict]):
+        self._of_design = of_design
+        self._simulated: dict[tuple, tuple[tuple, dict]] = {}
+        for task, result in zip(tasks, results, strict=True):
+            if task.function is frames:
+                for key, found in zip(_keys(task), result, strict=True):
+                    if found["cycles"] is not None:
+                        self._simulated.setdefault((*key[:2], key[-1]), (_design_of(task.settings), found))
+
+    def __call__(self, key: tuple, found: Mapping[str, Any]) -> float | None:
+        if found["cycles"] is not None:
+            return found["cycles"] / found["pixels"]
+        other, simulated = self._simulated.get((*key[:2], key[-1]), (None, None))
+        latency, others = (self._of_design.get(of, {}).get("latency") for of in (key[1:-1], other))
+        same = simulated and all(simulated[name] == found[name] for name in ("spans", "pixels"))
+        if None in (latency, others) or not same:
+            return None
+        return (simulated["cycles"] + latency - others) / found["pixels"]
 
 
 def _label(settings: Mapping[str, Any]) -> str:
@@ -247,8 +306,9 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
       - ``errors``: value or ``None`` by key of ``errors``; ``times``: by key of ``times``;
       - ``verdicts``: whether both frames look identical, by kind of error: ``total``, ``method``,
         ``arithmetic``, ``model``;
-      - ``hardware``: ``multipliers``, ``cells``, ``register_bits``, ``memory_bits``, ``fmax_mhz``, or
-        ``None``;
+      - ``colors``: of its method, on light and on dark paper;
+      - ``hardware``: ``multipliers``, ``cells``, ``register_bits``, ``memory_bits``; after place and route
+        ``luts``, ``fmax_mhz``, the median, ``seeds_mhz``, and ``placed``, when; or ``None``;
       - ``counts``: ``pixels``, ``shown``, ``spans``, ``out_of_range_spans``, ``cycles``;
       - ``pictures``: ``frame``, ``error`` (map of the method error) and ``total`` (of the total error), data
         URIs of PNGs of one size, the maps transparent where no surface is;
@@ -266,11 +326,18 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     """
     points = _points(tasks, results)
     fronts = fronts_of(points)
+    spread = {
+        _design_of(task.settings): result
+        for task, result in zip(tasks, results, strict=True)
+        if task.function is front_scenes.measure
+    }
+    found = front.summaries(points, spread)
     return Section(
         name="points",
         title="Error against run time",
         text=text(points),
-        parts=[table(points), front_table(points, fronts)],
+        parts=[front.spread_table(found), table(points), front_table(points, fronts)],
+        conclusion=front.conclusion(found),
         figures={
             "points": points,
             "groups": [{"key": key, "title": title} for key, title in GROUPS.items()],

@@ -102,14 +102,16 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
         f"of {LARGEST_LSB:g} LSB, or FLIP to {FLIP_P99:g} in 99 % of the pixels and {FLIP_MAX:g} in all, and "
         f"CIEDE2000 to {CIEDE2000_P99:g} and {CIEDE2000_MAX:g}."
     )
-    placed = any(point["hardware"]["fmax_mhz"] for point in points)
+    dates = {point["hardware"]["placed"] for point in points if point["hardware"].get("placed")}
+    placed = "this report" in dates
     of_time = (
         "Run times: cycles a pixel from the simulation, first write of a constant to last pixel; nanoseconds "
         + (
             f"at the clock rate after place and route on an {DEVICE}, the median of some seeds, of one for "
             f"published methods and other models than `{place_and_route.MODEL}`; "
             if placed
-            else "in a full report; "
+            else "at committed clock rates after place and route "
+            f"({'; '.join(sorted(dates))}), where there are any; "
         )
         + "pixels that the simulation of the hardware does in a second; and nanoseconds a shown pixel of the "
         "same method and model in float64 NumPy, spans at hand, vectorised over the pixels. White light on a "
@@ -120,7 +122,11 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
     modelled = [point for point in points if point["settings"]["engine"] == "model"]
     engines = f"{len(simulated):,} frames went through the simulated RTL"
     if modelled:
-        engines += f", {len(modelled):,} through its bit-accurate model, which has no cycles"
+        engines += (
+            f", {len(modelled):,} through its bit-accurate model; these have the cycles of the simulated "
+            f"pipeline of the "
+            "same method, whose spans are the same, with the difference of latency"
+        )
     return [*map(_glance, _by_scene(points).values()), of_error, of_time, f"{engines}."]
 
 
@@ -163,6 +169,7 @@ def table(points: Sequence[Mapping[str, Any]]) -> Table:
         "cells": "cells",
         "register_bits": "register bits",
         "memory_bits": "memory bits",
+        "luts": "look-up tables",
         "fmax_mhz": "clock rate, MHz",
     }
     columns: dict[str, Callable[[Mapping[str, Any]], Cell]] = {
@@ -172,7 +179,11 @@ def table(points: Sequence[Mapping[str, Any]]) -> Table:
         "exponent": lambda point: point["settings"]["exponent"],
         "identical to the eye": lambda point: point["verdicts"]["total"],
         **{_heading(axis): _getter("errors", axis["key"]) for axis in largest},
-        **{_heading(axis): _getter("times", axis["key"]) for axis in TIMES},
+        **{
+            _heading(axis): _getter("times", axis["key"])
+            for axis in TIMES
+            if axis["key"] not in ("multipliers", "luts")
+        },
         **{title: _getter("hardware", key) for key, title in hardware.items()},
         **{_heading(axis): _getter("errors", axis["key"]) for axis in others},
         "identical to exact interpolation": lambda point: point["verdicts"]["method"],
@@ -196,7 +207,7 @@ def table(points: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _getter(kind: str, key: str) -> Callable[[Mapping[str, Any]], Cell]:
-    return lambda point: point[kind][key]
+    return lambda point: point[kind].get(key)
 
 
 def front_table(points: Sequence[Mapping[str, Any]], fronts: Mapping[str, Sequence[str]]) -> Table:

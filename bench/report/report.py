@@ -21,6 +21,7 @@ import click
 from blysk.bench.command import resumable
 from blysk.bench.report import (
     cosine_quadratic,
+    criteria,
     energy,
     errata,
     lobe,
@@ -32,13 +33,14 @@ from blysk.bench.report import (
     stability,
     thesis,
     units,
+    world,
 )
 from blysk.bench.report.page import environment, page, without_pictures
 from blysk.bench.report.section import Section, Table
 from blysk.bench.store import Task, results_of, version_of
 from blysk.bench.tools import explore
 from blysk.sim.errors import InputError
-from blysk.sim.frames.workers import local_executor, processors
+from blysk.sim.frames.workers import check_address, cluster_executor, local_executor, processors
 from blysk.sim.output import files_within, write_json, write_text
 from blysk.sim.value_types import Whole
 
@@ -56,18 +58,20 @@ __all__ = [
 
 SECTIONS: dict[str, ModuleType] = {
     "points": points,
-    "units": units,
+    "stability": stability,
+    "needs": needs,
+    "criteria": criteria,
+    "world": world,
     "place-and-route": place_and_route,
     "several-pipelines": several_pipelines,
+    "energy": energy,
     "explore": explore,
+    "units": units,
+    "lobe": lobe,
     "thesis": thesis,
     "cosine-quadratic": cosine_quadratic,
     "phong-blinn": phong_blinn,
-    "lobe": lobe,
     "errata": errata,
-    "stability": stability,
-    "needs": needs,
-    "energy": energy,
 }
 """Modules of the sections by name, in the order of the page."""
 
@@ -111,6 +115,7 @@ def about(quick: bool, meshes: Sequence[str], names: Sequence[str]) -> dict[str,
         "meshes": list(meshes),
         "chosen": list(names),
         "whole": list(names) == list(SECTIONS),
+        "cluster": None,
         "machine": {
             "processor": _processor(),
             "cores": processors(),
@@ -188,6 +193,8 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
         section.name: {
             "title": section.title,
             "text": list(section.text),
+            "conclusion": section.conclusion
+            and {"title": section.conclusion.title, "sentence": section.conclusion.sentence},
             "tables": {
                 table.name: {"title": table.title, "note": table.note, "rows": table.records()}
                 for table in _tables([section])
@@ -218,10 +225,13 @@ def _begin(folder: str) -> None:
         signal.signal(signal.SIGTERM, lambda *_: os.killpg(0, signal.SIGKILL))
 
 
-def measure_all(tasks: Sequence[Task], jobs: int, progress: Callable[[], object]) -> list[Any]:
+def measure_all(
+    tasks: Sequence[Task], jobs: int, progress: Callable[[], object], address: str | None = None
+) -> list[Any]:
     """Results of tasks in their order; times are measured at the end, alone, with all models built.
 
-    Processes that an interrupt ends take with them what they began, and their files.
+    Processes that an interrupt ends take with them what they began, and their files. A cluster measures what
+    is the same on every machine; times are always those of this one.
 
     Parameters
     ----------
@@ -231,6 +241,8 @@ def measure_all(tasks: Sequence[Task], jobs: int, progress: Callable[[], object]
         Processes.
     progress : callable
         Called after each.
+    address : str, optional
+        Dask scheduler, whose workers take the place of the processes.
 
     Returns
     -------
@@ -241,7 +253,7 @@ def measure_all(tasks: Sequence[Task], jobs: int, progress: Callable[[], object]
     others = [task for task in tasks if not task.timed]
     with (
         tempfile.TemporaryDirectory(prefix="blysk-") as folder,
-        local_executor(jobs, _begin, (folder,)) as executor,
+        cluster_executor(address) if address else local_executor(jobs, _begin, (folder,)) as executor,
     ):
         found = iter(results_of(others, executor, progress))
     of_times = iter(results_of(timed, None, progress))
@@ -271,7 +283,10 @@ def chosen_tasks(
 
 
 def measured(
-    chosen: Sequence[tuple[ModuleType, list[Task]]], jobs: int, progress: Callable[[], object]
+    chosen: Sequence[tuple[ModuleType, list[Task]]],
+    jobs: int,
+    progress: Callable[[], object],
+    address: str | None = None,
 ) -> list[Section]:
     """The sections of `chosen_tasks`; what was measured before comes from the cache.
 
@@ -283,8 +298,10 @@ def measured(
         Processes.
     progress : callable
         Called after each task.
+    address : str, optional
+        As for `measure_all`.
     """
-    results = iter(measure_all([task for _, own in chosen for task in own], jobs, progress))
+    results = iter(measure_all([task for _, own in chosen for task in own], jobs, progress, address))
     return [module.section(own, [next(results) for _ in own]) for module, own in chosen]
 
 
@@ -302,7 +319,7 @@ class _Name(click.ParamType):
 
 @click.command(short_help="Report: error against run time, all measured.")
 @click.argument("folder", type=click.Path(path_type=Path), default="report")
-@click.option("--quick", is_flag=True, help="Small pictures, few samples: two minutes.")
+@click.option("--quick", is_flag=True, help="Small pictures, few samples: minutes.")
 @click.option(
     "--mesh",
     "meshes",
@@ -322,11 +339,15 @@ class _Name(click.ParamType):
 @click.option(
     "--jobs",
     type=Whole(1, 64),
-    default=processors,
-    show_default="number of cores",
-    help="Processes, of up to a GB each; what measures a time runs alone.",
+    help="Processes, of up to a GB each; what measures a time runs alone.  [default: number of cores]",
 )
-def command(folder, quick, meshes, names, jobs):
+@click.option(
+    "--cluster",
+    "address",
+    metavar="ADDRESS",
+    help="Dask scheduler, tcp://host:8786, whose workers measure what is no time; times are this machine's.",
+)
+def command(folder, quick, meshes, names, jobs, address):
     """Measure error against run time, and all else there is to say, and write a report into FOLDER.
 
     FOLDER is report if left out; it is made, or an earlier report in it replaced. The page index.html is one
@@ -339,10 +360,17 @@ def command(folder, quick, meshes, names, jobs):
         blysk bench --quick
         blysk bench report --mesh model.obj
     """
+    if address is not None:
+        check_address(address)
+        if jobs:
+            raise InputError("--jobs", "a cluster has its own workers", "leave out --jobs or --cluster")
+        if meshes:
+            raise InputError("--mesh", "the workers of a cluster have not the file", "leave out --cluster")
     check_folder(folder)
     environment()
     names = [name for name in SECTIONS if name in names or not names]
     chosen = chosen_tasks(quick, meshes, names)
     with resumable(sum(len(own) for _, own in chosen), "measurements") as count:
-        write_report(folder, measured(chosen, jobs, count), about(quick, meshes, names))
+        sections = measured(chosen, jobs or processors(), count, address)
+        write_report(folder, sections, about(quick, meshes, names) | {"cluster": address})
     click.echo(f"{'report':<12}{folder / _PAGE}")

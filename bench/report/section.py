@@ -4,13 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-__all__ = ["Cell", "Drawing", "Grade", "Section", "Table"]
+__all__ = ["Cell", "Conclusion", "Drawing", "Grade", "Mark", "Section", "Table"]
 
 Cell = str | int | float | bool | None
 """Of a table. ``None``: there is no such figure."""
 
-Grade = Literal["", "good", "fair", "bad"]
+Grade = Literal["", "good", "fair", "poor", "bad"]
 """How the cell of a table is coloured; what each means stands in the table's note."""
+
+Mark = Literal["", "stated", "silent"]
+"""What else is to say of an error: it is stated in the documentation or flagged; or nothing tells of it."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,8 @@ class Table:
         What was measured, and how: a sentence or some.
     grades : sequence of sequences of grades, optional
         One a cell.
+    marks : sequence of sequences of marks, optional
+        One a cell.
     """
 
     name: str
@@ -39,9 +44,11 @@ class Table:
     rows: Sequence[Sequence[Cell]]
     note: str = ""
     grades: Sequence[Sequence[Grade]] | None = None
+    marks: Sequence[Sequence[Mark]] | None = None
 
     def __post_init__(self):
         widths = {len(row) for row in self.rows} | {len(row) for row in self.grades or ()}
+        widths |= {len(row) for row in self.marks or ()}
         if widths - {len(self.columns)}:
             raise ValueError(f"a row of table {self.name} has not {len(self.columns)} cells")
         if self.grades is not None and len(self.grades) != len(self.rows):
@@ -75,6 +82,25 @@ class Drawing:
 
 
 @dataclass(frozen=True)
+class Conclusion:
+    """What a section comes to, at the top of the report: a sentence with its figures, and a drawing.
+
+    Parameters
+    ----------
+    title : str
+        The question, in a few words.
+    sentence : str
+        The answer, as Markdown, made from the measurements.
+    drawing : Drawing
+        Which shows it.
+    """
+
+    title: str
+    sentence: str
+    drawing: Drawing
+
+
+@dataclass(frozen=True)
 class Section:
     """A section of the report.
 
@@ -90,6 +116,10 @@ class Section:
         In the order of the page.
     figures : dict
         What the page's script or other programs read besides the tables; plain values for JSON.
+    conclusion : Conclusion, optional
+        What it comes to, if that stands at the top.
+    appendix : bool
+        Whether it is for those who check the documents, and so comes last.
     """
 
     name: str
@@ -97,3 +127,5 @@ class Section:
     text: Sequence[str]
     parts: Sequence[Table | Drawing]
     figures: dict[str, Any] = field(default_factory=dict)
+    conclusion: Conclusion | None = None
+    appendix: bool = False

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from blysk.bench.report.section import Drawing, Grade, Section, Table
+from blysk.bench.colors import style_of
+from blysk.bench.report.section import Drawing, Grade, Mark, Section, Table
 from blysk.bench.report.stability_cases import GROUPS, STREAM_GROUP
+from blysk.bench.report.stability_conclusion import conclusion
 from blysk.bench.report.stability_errors import (
     FACTORS,
     GOOD,
@@ -31,35 +33,25 @@ from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.presets import METHODS
 
 __all__ = [
-    "QUICK_METHODS",
+    "QUICK_SIMULATED",
     "section",
     "tasks",
 ]
 
 
-QUICK_METHODS = ("linear", "quadratic", "chord")
-"""Methods of the quick report, and the last of them in simulation."""
+QUICK_SIMULATED = ("renormalise", "chord")
+"""Methods that the quick report simulates."""
 
-_STYLES = {
-    "linear": ("#777777", "-"),
-    "bisection": ("#8c564b", "-"),
-    "quadratic": ("#1f77b4", "-"),
-    "quadratic-eval": ("#17a2c8", "--"),
-    "quadratic-horner": ("#0b3d91", ":"),
-    "angular": ("#2ca02c", "-"),
-    "recurrence": ("#7fb800", "--"),
-    "renormalise": ("#9467bd", "-"),
-    "chord": ("#d62728", "-"),
-    "chord-local": ("#ff7f0e", "--"),
-}
-"""Colour and dashes of a method's line; others are black."""
+_LIMITS: dict[Grade, float] = {"good": GOOD, "fair": 4.0, "poor": 16.0}
+"""Largest error in LSB of each colour; larger ones are bad."""
+
+_MARKS: dict[Grade, Mark] = {"fair": "stated", "bad": "silent"}
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Every method in every case; a few methods, and one in simulation, if it is to be quick."""
-    methods = QUICK_METHODS if quick else METHODS
-    simulated = QUICK_METHODS[-1:] if quick else METHODS
-    settings = [{"method": method} for method in methods]
+    """Every method in every case, and in simulation; if it is to be quick, `QUICK_SIMULATED` there."""
+    simulated = QUICK_SIMULATED if quick else METHODS
+    settings = [{"method": method} for method in METHODS]
     result = [Task(function, each) for function in (measure, measure_ranges) for each in settings]
     return result + [Task(measure_stream, {"method": method, "quick": quick}) for method in simulated]
 
@@ -98,7 +90,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             "Largest error of a pixel in spans without a flag, LSB: every span as it comes",
             methods,
             worst["given"],
-            "What somebody gets who sends spans to the pipeline without cutting them. Bad cells are outside "
+            "What somebody gets who sends spans to the pipeline without cutting them. Cells with ! are "
+            "outside "
             "of the ranges below.",
         ),
     ]
@@ -114,24 +107,30 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         f"equals to the bit, with the model `{MODEL}`; group {STREAM_GROUP} is simulated hardware. Each is "
         "held against exact normals of every pixel in float64 with the same model; 0.5 LSB is a "
         "correctly rounded pixel. Where N.L is 0 but for the arithmetic, lit and dark are both right.",
-        f"*Good* is an error to {GOOD:g} LSB. *Fair* is a larger one of which the user is told: the pipeline "
-        "flags the span, or the method serves it and its documentation states such an error (its own curve "
-        "in float64 is as far from exact normals, and its units' error bounds, times the exponent in a "
-        "highlight, come to the rest). *Bad* is any other: silently wrong.",
+        f"Colours follow the error: to {GOOD:g} LSB, to {_LIMITS['fair']:g}, to {_LIMITS['poor']:g}, and "
+        f"above. A larger "
+        f"error than {GOOD:g} LSB is marked § where the user is told of it: the pipeline flags the span, or "
+        f"the method "
+        "serves it and its documentation states such an error (its own curve in float64 is as far from exact "
+        "normals, and its units' error bounds, times the exponent in a highlight, come to the rest); and ! "
+        "where "
+        "nothing tells: silently wrong.",
         "Where N.L changes its sign a highlight goes out at once, however bright it is. At exponent 1 it is "
         "bright there, and a method whose N.L is off by a part of an LSB puts it out a pixel early or late: "
         "the error of group 5 can be as large as the highlight.",
-        f"Bad cells with spans cut: {len(bad)} of {len(worst['prepared'])}. With spans as they come: "
+        f"Silently wrong cells with spans cut: {len(bad)} of {len(worst['prepared'])}. With spans as they "
+        f"come: "
         f"{len(silent)}"
         + (f", of {_listed(sorted(set(silent), key=methods.index))}" if silent else "")
-        + f"; of the {len(safe)} cases with spans that the method serves, {unsafe} are bad there.",
+        + f"; of the {len(safe)} cases with spans that the method serves, {unsafe} are silently wrong there.",
         f"In simulation {sum(case['runs'] for case in runs)} runs with stalls, empty spans and resets gave "
         f"{sum(case['runs'] * case['pixels'] for case in runs):,} pixels, "
         f"{sum(case['wrong'] or 0 for case in runs):,} of them wrong"
         + (f"; {halted} came to a halt." if (halted := sum(case["wrong"] is None for case in runs)) else "."),
     ]
     parts = [*tables, _range_table(ranges), _drawing(ranges), _case_table(cases), _stream_table(streams)]
-    return Section("stability", "Numerical stability on stiff and extreme cases", text, parts)
+    title = "Numerical stability on stiff and extreme cases"
+    return Section("stability", title, text, parts, conclusion=conclusion(cases, ranges))
 
 
 def _listed(methods: Sequence[str]) -> str:
@@ -154,15 +153,42 @@ def _stream_cell(cases: Sequence[dict] | None) -> tuple[float | None, Grade]:
 
 
 def _matrix(name, title, methods, worst, note) -> Table:
+    def colored(group, method) -> Grade:
+        error, grade = worst[group, method]
+        # Pixels that differ are no small error.
+        return grade if group == STREAM_GROUP else _magnitude(error)
+
+    def marked(group, method) -> Mark:
+        return "" if group == STREAM_GROUP else _MARKS.get(worst[group, method][1], "")
+
     return Table(
         name,
         title,
         ["group", "what is extreme", *methods],
         [[group, text, *(worst[group, method][0] for method in methods)] for group, text in GROUPS.items()],
-        f"Worst case of each group; green is good, yellow fair, red bad. Group {STREAM_GROUP}: simulated "
-        f"pixels that are not the model's; none where it was not simulated. {note}",
-        [["", "", *(worst[group, method][1] for method in methods)] for group in GROUPS],
+        f"Worst case of each group; colours follow the error; §: stated or flagged, !: nothing tells. Group "
+        f"{STREAM_GROUP}: simulated pixels that are not the model's; none where it was not simulated. {note}",
+        [["", "", *(colored(group, method) for method in methods)] for group in GROUPS],
+        [["", "", *(marked(group, method) for method in methods)] for group in GROUPS],
     )
+
+
+def _magnitude(error: float | None) -> Grade:
+    """Colour of an error in LSB."""
+    if error is None:
+        return ""
+    return next((grade for grade, limit in _LIMITS.items() if error <= limit), "bad")
+
+
+def _shown(rows: Sequence[Sequence], grades: Sequence[Sequence[Grade]]) -> dict[str, Any]:
+    """Colours by the error of each graded cell, and marks by its grade."""
+    return {
+        "grades": [
+            [_magnitude(cell) if grade else "" for cell, grade in zip(row, of, strict=True)]
+            for row, of in zip(rows, grades, strict=True)
+        ],
+        "marks": [[_MARKS.get(grade, "") for grade in of] for of in grades],
+    }
 
 
 def _range_table(ranges: dict[str, dict]) -> Table:
@@ -204,7 +230,8 @@ def _range_table(ranges: dict[str, dict]) -> Table:
         "the light: that of which none of a sample is cut."
     )
     title = "Range of each method: served whole, exact to a step, flagged; and what it does outside"
-    return Table("safe-ranges", title, [*columns, "pixels of a span", "exponents"], rows, note, grades)
+    columns += ["pixels of a span", "exponents"]
+    return Table("safe-ranges", title, columns, rows, note, **_shown(rows, grades))
 
 
 def _case_table(cases: dict[str, dict]) -> Table:
@@ -228,7 +255,7 @@ def _case_table(cases: dict[str, dict]) -> Table:
                 shown = [given["grade"], given["safe_grade"], prepared.get("grade", ""), ""]
                 grades.append([""] * 8 + shown)
     note = "A case without figures for cut spans is refused when they are prepared."
-    return Table("stability-cases", "Every case", columns, rows, note, grades)
+    return Table("stability-cases", "Every case", columns, rows, note, **_shown(rows, grades))
 
 
 def _stream_table(streams: dict[str, list]) -> Table:
@@ -257,8 +284,8 @@ def _drawing(ranges: dict[str, dict]) -> Drawing:
             errors = [
                 of[way][key] if show else np.nan for of, show in zip(found["sweep"], shown, strict=True)
             ]
-            color, dash = _STYLES.get(method, ("#000000", "-."))
-            panel.plot(SWEEP, errors, color=color, linestyle=dash, linewidth=1.4, label=method)
+            style = style_of(method)
+            panel.plot(SWEEP, errors, color=style.color, linestyle=style.dash, linewidth=1.4, label=method)
         panel.axhline(0.5, color="#888888", linewidth=0.8, linestyle=":")
         panel.set(xscale="log", yscale="log", title=title, xlabel="angle of the span, degrees")
         panel.grid(True, color="#dddddd", linewidth=0.5)

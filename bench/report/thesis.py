@@ -132,7 +132,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         _shares_table(by[shading_share]),
         squares,
     ]
-    return Section("thesis", "Claims of [T]: speed, table 1.1, MNSE", text, parts)
+    return Section("thesis", "Claims of [T]: speed, table 1.1, MNSE", text, parts, appendix=True)
 
 
 _CLAIM_OF = {(way, baseline): claim for claim in CLAIMS for way in claim.ways for baseline in claim.baselines}

@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.report.needs import ring
+from blysk.bench.ring import ring
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.pixel_pipelines import PIPES
 from blysk.golden.presets import preset

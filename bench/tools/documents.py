@@ -17,6 +17,7 @@ DOCUMENTS = {
 """Folders that a site may have: title, and what is there."""
 
 _LINK = re.compile(r'<a href="([^"#:]*)(#[^"]*)?"([^>]*)>(.*?)</a>', re.DOTALL)
+_IMAGE = re.compile(r'<img src="(\.\./[^":]*)"')
 _HEADING = re.compile(r"<(h[1-6])>(.*?)</\1>", re.DOTALL)
 
 
@@ -59,6 +60,7 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
             title = re.search(r"^# (.+)$", text, re.MULTILINE)
             body = _LINK.sub(lambda match, name=name: _link(match, name, folders), markdown.render(text))
             body = _HEADING.sub(lambda m: f'<{m[1]} id="{slug(m[2])}">{m[2]}</{m[1]}>', body)
+            body = _IMAGE.sub(lambda match, at=(name, folder): _image(match, *at, pictures), body)
             body = body.replace("<img ", '<img loading="lazy" ')
             body = body.replace("<table>", '<div class="scroll"><table>').replace(
                 "</table>", "</table></div>"
@@ -70,6 +72,15 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
             if path.stem == first != "README":
                 pages[f"{name}/index.html"] = page
     return pages, pictures
+
+
+def _image(match: re.Match, name: str, folder: Path, pictures: dict[str, Path]) -> str:
+    """A picture from outside of its folder, which comes with the folder's own."""
+    path = (folder / match[1]).resolve()
+    if path.is_file() and path.suffix in (".svg", ".png"):
+        pictures[f"{name}/{path.name}"] = path
+        return f'<img src="{path.name}"'
+    return match[0]
 
 
 def _link(match: re.Match, name: str, folders: Mapping[str, Path]) -> str:

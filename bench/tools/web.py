@@ -17,7 +17,7 @@ from typing import Any
 import click
 
 from blysk.bench.command import resumable
-from blysk.bench.report.frames import STEPS, map_colors
+from blysk.bench.report.frames import map_colors
 from blysk.bench.report.page import embedded, environment
 from blysk.bench.report.report import SECTIONS, about, chosen_tasks, measure_all, measured, write_report
 from blysk.bench.store import Task, version_of
@@ -31,6 +31,7 @@ from blysk.bench.tools.web_data import (
     HEIGHT,
     MESHES,
     REFERENCES,
+    RIVAL,
     SERVED,
     START,
     WIDTH,
@@ -133,6 +134,12 @@ def _report_files(folder: Path) -> list[Path]:
     return files
 
 
+def _answers(report: Path) -> list[dict[str, str]]:
+    """Conclusions of a report: title and sentence."""
+    sections = json.loads((report / "report.json").read_text(encoding="utf-8")).get("sections", {})
+    return [section["conclusion"] for section in sections.values() if section.get("conclusion")]
+
+
 def tasks(designs: Sequence[tuple[str, str]], views: Mapping[str, int]) -> list[Task]:
     """What has to be made for a site: modules, then spans.
 
@@ -197,6 +204,7 @@ def write_site(
             version=version_of("blysk"),
             documents={name: DOCUMENTS[name] for name in folders or {}},
             has_report=report is not None,
+            answers=_answers(report) if report else [],
             modules=len(designs),
         )
     )
@@ -230,6 +238,7 @@ def _scripts(tasks: Sequence[Task], results: Sequence[Any]) -> tuple[dict[str, s
 def _site(designs: Mapping[str, Mapping[str, Any]], meshes: Mapping[str, Any]) -> dict[str, Any]:
     """What the page reads as it starts."""
     first = next(iter(designs.values()))
+    rivals = [design["model"] for design in designs.values() if design["method"] == RIVAL]
     start = START | {"mesh": next(iter(meshes)), "method": first["method"], "model": first["model"]}
     if any(START["method"] == d["method"] and START["model"] == d["model"] for d in designs.values()):
         start |= {"method": START["method"], "model": START["model"]}
@@ -247,7 +256,9 @@ def _site(designs: Mapping[str, Mapping[str, Any]], meshes: Mapping[str, Any]) -
         "designs": designs,
         "meshes": meshes,
         "methods": {name: method(name) for name in dict.fromkeys(d["method"] for d in designs.values())},
-        "errorMap": {"limits": STEPS, "colors": map_colors()},
+        "errorMap": {"colors": map_colors()},
+        "rival": RIVAL if rivals else None,
+        "rivalModel": rivals[0] if rivals else None,
         "mostExponent": MAX_EXPONENT,
         "rough": ["ggx"],
     }

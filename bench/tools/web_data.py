@@ -53,6 +53,7 @@ __all__ = [
     "HEIGHT",
     "MESHES",
     "REFERENCES",
+    "RIVAL",
     "ROUGHNESSES",
     "SERVED",
     "START",
@@ -77,9 +78,8 @@ WIDTH, HEIGHT = 320, 240
 BANDS = (100, MAX_EXPONENT)
 """Spans are cut for these exponents; a frame has those of the smallest that is not under its own."""
 
-SERVED = tuple(name for name, method in METHODS.items() if method.serves_gate and not method.TAKES_VALUES)
-"""Methods of modules, which have a gate. Where spans carry values of the light, it cannot be moved without
-them."""
+SERVED = tuple(name for name, method in METHODS.items() if not method.TAKES_VALUES)
+"""Methods of modules. Where spans carry values of the light, it cannot be moved without them."""
 
 DESIGNS = (*(pair for pair in accuracy.DESIGNS if pair[0] in SERVED), ("chord", "ggx"))
 """Method and model of each module."""
@@ -95,6 +95,7 @@ START = {
     "method": "chord",
     "model": "blinn",
     "reference": "method",
+    "compare": "exact",
     "direction": [-0.5, 0.8, 0.7],
     "exponent": 50,
     "roughness": 0.3,
@@ -105,6 +106,9 @@ START = {
     "light": "#ffffff",
 }
 """What the page shows first."""
+
+RIVAL = "linear"
+"""Method that a frame may be compared with, in hardware too."""
 
 REFERENCES = {
     "method": {
@@ -171,8 +175,8 @@ MESHES = {
 
 
 def design_of(method: str, model: str) -> Design:
-    """The pipeline of a module: one light, and a highlight gate."""
-    return preset(method, model, gate=True)
+    """The pipeline of a module: one light, and a highlight gate, where the method can have one."""
+    return preset(method, model, gate=METHODS[method].serves_gate)
 
 
 @cache
@@ -219,9 +223,9 @@ def scene_of(settings: Mapping[str, Any]) -> Scene:
 COLUMNS = (
     *({"name": name, "bytes": 2, "bias": 1 << 15, "running": True} for name in ("x", "y")),
     {"name": "length", "bytes": 2, "bias": 0},
-    *({"name": f"normal_left.{c}", "bytes": 3, "bias": 1 << 17} for c in range(3)),
+    *({"name": f"normal_left.{c}", "bytes": 3, "bias": 1 << 23} for c in range(3)),
     *(
-        {"name": f"normal_{place}.{c}", "bytes": 3, "bias": 1 << 18, "from": f"normal_left.{c}"}
+        {"name": f"normal_{place}.{c}", "bytes": 3, "bias": 1 << 23, "from": f"normal_left.{c}"}
         for place in ("right", "middle")
         for c in range(3)
     ),
@@ -230,7 +234,8 @@ COLUMNS = (
 """Codes of the spans in a file, a column a field: as they are, or the change from the span before
 (``running``) or from another column (``from``); plus ``bias``, so that none is negative; in so many
 ``bytes``. The middle normal is the left one where the method takes none. The ratio is that of the lengths
-that the interpolated normals have at the ends, ``round(2^19 log2(m_r / m_l))``."""
+that the interpolated normals have at the ends, ``round(2^19 log2(m_r / m_l))``; of a method that takes these
+themselves it is 0."""
 
 
 def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -> bytes:
@@ -315,6 +320,8 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
         streams[method] = []
         for exponent in BANDS:
             cut, spans = spans_of(mesh, view, exponent, design)
+            if design.interpolator.takes_line:
+                cut = replace(cut, magnitude_left=cut.magnitude_right)
             ratio = cut.magnitude_right / np.where(cut.magnitude_left, cut.magnitude_left, 1.0)
             data = encode(spans, cut.visible, np.where(ratio, ratio, 1.0))
             text = base64.b64encode(data).decode()

@@ -37,7 +37,18 @@ from blysk.sim.frames.triangles import SimulatedTriangleFrame, TriangleSimulator
 from blysk.sim.meshes.mesh import LoadedMesh
 from blysk.sim.output import atomic_writer
 
-__all__ = ["Engine", "RenderedFrame", "Rendering", "prepare_rendering", "render", "rendering_settings"]
+__all__ = [
+    "SPECIALISING",
+    "Engine",
+    "RenderedFrame",
+    "Rendering",
+    "prepare_rendering",
+    "render",
+    "rendering_settings",
+]
+
+SPECIALISING = "finding out what the scene needs"
+"""Stage of `prepare_rendering` in which a specialisation is found."""
 
 Engine = Literal["auto", "cxxrtl", "pysim"]
 """``"auto"``: compiled, or Amaranth's simulator where no C++ compiler works."""
@@ -309,7 +320,7 @@ def prepare_rendering(
                 made = made.for_materials(scenes[0].materials)
             _check_lobes(scenes[0], made, settings)
             constants_of(scenes[0], made)
-            stage("finding out what the scene needs" if settings["specialise"] else "")
+            stage(SPECIALISING if settings["specialise"] else "")
             smallest = _specialised(scenes, made, settings)
             stage(f"building the model{_large(smallest.design)}")
             try:

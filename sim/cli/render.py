@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, get_args
@@ -9,8 +10,16 @@ from typing import Any, get_args
 import click
 from tqdm import tqdm
 
+from blysk.sim.api.descriptions import METHOD_LINES, MODEL_LINES, described
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE
-from blysk.sim.api.render import Engine, RenderedFrame, Rendering, prepare_rendering, rendering_settings
+from blysk.sim.api.render import (
+    SPECIALISING,
+    Engine,
+    RenderedFrame,
+    Rendering,
+    prepare_rendering,
+    rendering_settings,
+)
 from blysk.sim.api.scene_file import key_lines
 from blysk.sim.cli.options import given_options, lights_of, options_of
 from blysk.sim.cli.outputs import animation_paths, check_outputs
@@ -18,7 +27,7 @@ from blysk.sim.errors import InputError
 from blysk.sim.frames.animation import Animation, dask_executor, process_executor, render_frames, write_gif
 from blysk.sim.frames.figures import animation_figures
 from blysk.sim.frames.picture import write_image
-from blysk.sim.frames.summary import animation_lines
+from blysk.sim.frames.summary import animation_lines, short_lines, specialisation_lines
 from blysk.sim.frames.workers import check_address, processors
 from blysk.sim.output import all_or_none, atomic_writer, write_json
 from blysk.sim.value_types import Choice, OutputFile, Whole
@@ -27,6 +36,11 @@ __all__ = ["command"]
 
 MAX_FRAMES = 9999
 """Most frames of a turntable: four digits in their names."""
+
+_SPECIALISE = (
+    f"{'specialise':<12}builds the full pipeline and the smaller one and counts what each part takes: "
+    "about half a minute the first time"
+)
 
 _KEYS = "\n".join(f"    {line}" for line in key_lines())
 _HELP = f"""Render MESH through the simulated pipeline.
@@ -42,6 +56,14 @@ Examples:
     blysk render scene.toml --gate --specialise
     blysk render teapot --method chord-local --point-light 3,4,5 --viewer near
     blysk render scene.toml --frames 36 -o turntable.gif
+
+\b
+Methods:
+{described(METHOD_LINES)}
+
+\b
+Models:
+{described(MODEL_LINES)}
 
 \b
 Keys of a scene file, all but mesh.file optional:
@@ -79,8 +101,11 @@ Keys of a scene file, all but mesh.file optional:
 @click.option(
     "--cluster", "address", metavar="ADDRESS", help="Dask scheduler whose workers draw them: tcp://host:8786."
 )
+@click.option("-v", "--verbose", is_flag=True, help="Every figure, not the few that most need.")
 @click.pass_context
-def command(context, mesh, engine, output, comparison, figures, vcd, frames, jobs, address, **options):
+def command(
+    context, mesh, engine, output, comparison, figures, vcd, frames, jobs, address, verbose, **options
+):
     """Render a mesh or a scene file; `_HELP` is the text that users see."""
     start = perf_counter()
     if not Path(mesh).stem:
@@ -115,7 +140,7 @@ def command(context, mesh, engine, output, comparison, figures, vcd, frames, job
             engine="pysim" if vcd else engine,
             frames=frames or 0,
             remote=bool(address),
-            stage=stage.set_description_str,
+            stage=partial(_told, stage),
         )
         stage.set_description_str("rasterising and simulating")
         if frames:
@@ -135,13 +160,27 @@ def command(context, mesh, engine, output, comparison, figures, vcd, frames, job
         report["seconds"]["total"] = perf_counter() - start
         if figures:
             write_json(figures, report)
-    lines = animation_lines(report) if frames else frame.lines()
+    if frames:
+        lines = animation_lines(report)
+    elif verbose:
+        lines = frame.lines()
+    else:
+        lines = short_lines(report)
+        if "specialisation" in report:
+            lines = [*lines, *specialisation_lines(report["specialisation"])]
     ignored = () if frames else ready.loaded.ignored
     for line in (*lines, *(f"{'ignored':<12}{text}" for text in ignored)):
         print(line)
     for name, path in {**written, "figures": figures, "waves": vcd}.items():
         if path:
             print(f"{name:<12}{path}")
+
+
+def _told(bar: tqdm, text: str) -> None:
+    """Show a stage of the work; of the longest say how long it takes."""
+    bar.set_description_str(text)
+    if text == SPECIALISING:
+        print(_SPECIALISE, flush=True)
 
 
 def _frame(ready: Rendering, vcd: str | None) -> RenderedFrame:

@@ -61,36 +61,36 @@ class Probe:
 
 
 class ObservedPipeline(Component):
-    """A pipeline of one light with a highlight gate, whose status tells more; its beats are those without.
+    """A pipeline of one light, whose status tells more; its beats are those without.
 
     Parameters
     ----------
     design : Design
-        What is observed; one light, and a gate.
+        What is observed; one light, with a gate or without.
 
     Members
     -------
     i, o, write
         Those of `ShadingPipelineUnit`.
-    status : :py:`Out(StructLayout({..., "gated_spans": 32}))`
-        Its status; the number of spans that the gate has found to be without a highlight; ``waits``, whether
-        the interpolator's pixel waits, and ``taken``, whether the lights take one; and each word by the name
-        of its probe.
+    status : :py:`Out(StructLayout({..., "gated_pixels": 32}))`
+        Its status; the number of pixels, of spans that the gate has found to be without a highlight, that the
+        lights have taken; ``waits``, whether the interpolator's pixel waits, and ``taken``, whether the
+        lights take one; and each word by the name of its probe.
 
     Raises
     ------
     ValueError
-        If the design has another number of lights, or no gate.
+        If the design has another number of lights.
     """
 
     def __init__(self, design: Design):
-        if design.lights != 1 or not design.gate:
-            raise ValueError("a pipeline with one light and a gate is observed")
+        if design.lights != 1:
+            raise ValueError("a pipeline with one light is observed")
         self.design = design
         self.unit = ShadingPipelineUnit(design)
         members = dict(self.unit.signature.members)
         status = members.pop("status").shape.members
-        status |= {"gated_spans": unsigned(_GATED_BITS), "waits": unsigned(1), "taken": unsigned(1)}
+        status |= {"gated_pixels": unsigned(_GATED_BITS), "waits": unsigned(1), "taken": unsigned(1)}
         status |= {probe.name: probe.shape for probe in probes_of(self.unit)}
         super().__init__(members | {"status": Out(data.StructLayout(status))})
 
@@ -111,15 +111,14 @@ class ObservedPipeline(Component):
                 source.ready.eq(sink.ready),
             ]
         gated = Signal(_GATED_BITS)
-        gate = _unit(fragment, "highlight_gate") or _unit(fragment, f"{_CHORD_SPANS}.value_gate")
-        decision = gate.o
-        m.d.sync += gated.eq(gated + (decision.valid & decision.ready & ~decision.payload[0]))
         operands, taken = _unit(fragment, "interpolator").o, _unit(fragment, "light_0").i
         m.d.comb += [
-            self.status.gated_spans.eq(gated),
+            self.status.gated_pixels.eq(gated),
             self.status.waits.eq(operands.valid & ~operands.ready),
             self.status.taken.eq(taken.valid & taken.ready),
         ]
+        if self.design.gate:
+            m.d.sync += gated.eq(gated + (taken.valid & taken.ready & taken.payload.gated))
         for probe, value in _words(self.unit, fragment):
             m.d.comb += Value.cast(self.status[probe.name]).eq(Value.cast(value))
         return m
@@ -209,8 +208,9 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
     is_cosine = design.interpolator.operand == "cosine"
     title, exact = ("N·H", "highlight_cosine") if is_cosine else ("1 − N·H", "one_minus_cosine")
     yield number("highlight", title, "interpolator", operands.highlight, 0, exact, one_squared)
-    gated = light.i.payload.gated
-    yield Probe("gated", "gate: no highlight", "gate", Shape.cast(gated.shape()), 0, ""), gated
+    if design.gate:
+        gated = light.i.payload.gated
+        yield Probe("gated", "gate: no highlight", "gate", Shape.cast(gated.shape()), 0, ""), gated
 
     datapath = _part(fragment, "light_0.specular.datapath")
     words = _registers(datapath)

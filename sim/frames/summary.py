@@ -5,7 +5,7 @@ from typing import Any
 
 from blysk.sim.frames.figures import ERRORS
 
-__all__ = ["animation_lines", "frame_lines", "specialisation_lines"]
+__all__ = ["animation_lines", "frame_lines", "short_lines", "specialisation_lines"]
 
 _COUNTS = {
     "repaired_normals": "stored normals repaired",
@@ -24,6 +24,10 @@ _COUNTS = {
     "wide_spans": "spans wider than the error bound of the exponent allows",
     "out_of_range_spans": "spans out of range in the pipeline",
 }
+
+
+_WARNINGS = ("repaired_normals", "dropped_faces", "missed_spans", "wide_spans", "out_of_range_spans")
+"""Counts that may be faults."""
 
 
 def _line(name: str, text: str) -> str:
@@ -55,6 +59,30 @@ def frame_lines(figures: Mapping[str, Any]) -> Iterator[str]:
         yield _line("NMSE", f"{figures['nmse']:.3g} ({published}, {share})")
     yield from _count_lines(figures["counts"])
     yield _second_line(figures["seconds"])
+
+
+def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
+    """What a person needs of a frame's figures, in at most seven lines; `frame_lines` has the rest."""
+    yield _line(
+        "mesh",
+        f"{figures['mesh']}, {figures['triangles']:,} triangles, {figures['width']}x{figures['height']}",
+    )
+    lights = f"{figures['lights']} light{'s' * (figures['lights'] != 1)}"
+    pipes = f", {figures['pipes']} pipelines" if figures.get("pipes", 1) > 1 else ""
+    model = f"{figures['method']}, {figures['model']}, exponent {figures['exponent']}, {lights}{pipes}"
+    yield _line("hardware", f"{model}; {figures['engine']}")
+    rate = f", {figures['cycles_per_pixel']:.3f} a pixel" if figures["pixels"] else ""
+    yield _line("cycles", f"{figures['cycles']:,} for {figures['pixels']:,} pixels{rate}")
+    if figures["visible_pixels"]:
+        total, method = (figures[f"{name}_error"]["max_lsb"] for name in ("total", "method"))
+        exact = f"at most {total:.2f} LSB of 8 bits from exact Blinn shading"
+        yield _line("error", f"{exact}, {method:.2f} from exact normals with this model")
+    else:
+        yield _line("error", "none, no pixel shows the surface")
+    counted = [text for key, text in _COUNTS.items() if figures["counts"].get(key) and key in _WARNINGS]
+    if counted:
+        yield _line("noticed", f"{counted[0]}{f' and {len(counted) - 1} more' * (len(counted) > 1)}; see -v")
+    yield _line("seconds", f"{figures['seconds'].get('total', sum(figures['seconds'].values())):.1f}")
 
 
 def animation_lines(figures: Mapping[str, Any]) -> Iterator[str]:

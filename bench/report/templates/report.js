@@ -101,6 +101,23 @@
     }
   }
 
+  // A link to something in a fold opens it; so does printing.
+  const openTo = () => {
+    const target = location.hash && byId(decodeURIComponent(location.hash.slice(1)));
+    if (!target) return;
+    for (let fold = target.querySelector(":scope > .fold") ?? target; fold; fold = fold.parentElement?.closest("details"))
+      if (fold.tagName === "DETAILS") fold.open = true;
+    target.scrollIntoView();
+  };
+  addEventListener("hashchange", openTo);
+  document.addEventListener("click", ({ target }) => {
+    if (target.closest(`a[href="${location.hash || "#"}"]`)) openTo();
+  });
+  openTo();
+  addEventListener("beforeprint", () => {
+    for (const fold of document.querySelectorAll(".fold")) fold.open = true;
+  });
+
   // The contents are open where there is room beside the text.
   if (matchMedia("(max-width: 62rem)").matches) document.querySelector("nav details").open = false;
 
@@ -318,8 +335,7 @@
     for (const place of places) {
       const { point } = place,
         onFront = front.has(point.id);
-      const dot = shape(point.group, onFront ? 6 : 5);
-      dot.classList.add("dot");
+      const dot = drawn("g", { class: "dot", style: `--light:${point.colors[0]};--dark:${point.colors[1]}` }, shape(point.group, onFront ? 6 : 5));
       dot.dataset.point = point.id;
       dot.setAttribute("transform", `translate(${place.x} ${place.y})`);
       dot.setAttribute("role", "button");
@@ -677,7 +693,7 @@
   byId("groups").addEventListener("change", update);
   let drawnWidth = 0;
   new ResizeObserver(() => {
-    if (plot.clientWidth !== drawnWidth) {
+    if (plot.clientWidth && plot.clientWidth !== drawnWidth) {
       drawnWidth = plot.clientWidth;
       draw();
     }

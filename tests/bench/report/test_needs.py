@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from blysk.bench.report import needs
-from blysk.bench.report.needs import QUICK_SCENES, SCENES, measure, ring, section, simulate_both, tasks
+from blysk.bench.report.needs import QUICK_SCENES, SCENES, measure, section, simulate_both, tasks
 from blysk.bench.report.section import Drawing, Table
+from blysk.bench.ring import ring
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.raster import face_normals
@@ -141,18 +142,22 @@ def test_section():
         "largest_difference": 0,
         "different_pixels": 0,
         "reasons": ["this"],
+        "alone": [half],
         "method": "chord",
         "model": "cosquad",
         "pixels": 7,
     }
-    full = [task for task in tasks(quick=False) if task.settings["name"] in QUICK_SCENES]
+    names = QUICK_SCENES[:2]
+    full = [task for task in tasks(quick=False) if task.settings["name"] in names]
     simulated = {"cycles": 9, "full_cycles": 12, "different_pixels": 0}
     results = [counted, counted | {"specialised": figures}, simulated, simulated | {"different_pixels": 3}]
     assert [task.function for task in full] == [measure, measure, simulate_both, simulate_both]
     made = section(full, results)
     assert made.name == "needs"
-    totals, reductions = (part for part in made.parts if isinstance(part, Table))
+    totals, alone, reductions = (part for part in made.parts if isinstance(part, Table))
+    assert [row["cells, share of the full"] for row in alone.records()] == [0.5] * len(alone.rows)
     assert [part.name for part in made.parts if isinstance(part, Drawing)] == ["needs-shares"]
+    assert "50% of the cells" in made.conclusion.sentence
     first, second = totals.records()
     assert (first["cells, full"], first["cells, specialised"], first["cycles, specialised"]) == (100, 50, 9)
     assert (first["pixels of another colour"], second["pixels of another colour"]) == (0, 3)
@@ -161,7 +166,7 @@ def test_section():
 
     quick = tasks(quick=True)
     assert [task.settings["name"] for task in quick] == list(QUICK_SCENES)
-    several = counted | {"reasons": ["this", "that"]}
-    totals, _, reductions = section(quick, [several, several]).parts
+    several = counted | {"reasons": ["this", "that"], "alone": [half, half]}
+    totals, _, _, reductions = section(quick[:2], [several, several]).parts
     assert totals.records()[0]["cycles, full"] is None
     assert [row["saves cells"] for row in reductions.records()] == [None, None, 50] * 2

@@ -4,6 +4,7 @@ import pytest
 
 from blysk.bench.report import place_and_route
 from blysk.bench.report.place_and_route import OTHERS, OTHERS_SEEDS, measure, section, tasks
+from blysk.bench.report.placed import read_store
 from blysk.bench.tools.families import FAMILIES, Parts, Place
 from blysk.bench.tools.place_and_route import Layout, TooLarge, ToolError
 from blysk.golden.presets import METHODS
@@ -80,6 +81,10 @@ def test_missing_tools_are_named(found_tools, monkeypatch):
     assert todo[-1].key != with_tools[-1].key
 
 
-def test_quick_report_leaves_it_out():
+def test_quick_report_has_the_committed_figures():
     assert tasks(True) == []
-    assert "Left out" in section([], []).text[0]
+    made = section([], [])
+    assert "committed figures" in made.text[0]
+    rows = made.parts[0].records()
+    assert [row["design"] for row in rows] == [entry["design"] for entry in read_store()]
+    assert all(row["date"] and row["command"].startswith("blysk fpga") for row in rows)

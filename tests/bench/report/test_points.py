@@ -92,9 +92,12 @@ def of_frames(chosen):
 def test_quick_tasks():
     chosen = tasks(quick=True)
     own = [s for s in of_frames(chosen) if "operand" not in s]
-    assert [(s["method"], s["model"]) for s in own] == DESIGNS
-    # Each method in its best form too.
-    assert [s["method"] for s in of_frames(chosen) if s not in own] == BEST
+    assert [(s["method"], s["model"]) for s in own][: len(DESIGNS)] == DESIGNS
+    # Each method in its best form too, with its own model and with the exact table.
+    best = [(s["method"], s["model"]) for s in of_frames(chosen) if s not in own]
+    assert best == [(method, model) for model in ("cosquad", "blinn") for method in BEST]
+    exact = {s["method"] for s in of_frames(chosen) if s["model"] == "blinn"}
+    assert exact == set(METHODS)
     operands = {
         (s["method"], s.get("operand", METHODS.get(s["method"], s).operand))
         for s in own
@@ -103,6 +106,7 @@ def test_quick_tasks():
     operands |= {(s["method"], s["operand"]) for s in of_frames(chosen) if s not in own}
     assert {(method, "one_minus_cosine") for method in METHODS} <= operands
     assert {(s["method"], s["model"]) for s in of_frames(chosen) if s["simulated"]} == set(QUICK_SIMULATED)
+    assert {method for method, _ in QUICK_SIMULATED} == {*METHODS, *PUBLISHED}
     assert [one.settings["shading"] for one in chosen if one.function is software_frames] == [*SHADINGS]
     assert all(one.timed == (one.function in (speeds, software_speeds)) for one in chosen)
     assert place_and_route.measure not in {one.function for one in chosen}
@@ -205,6 +209,8 @@ def test_errors_of_software(found):
     assert found["teapot/phong/100"]["times"] == {
         "cycles_per_pixel": None,
         "ns_per_pixel": None,
+        "multipliers": None,
+        "luts": None,
         "simulated_pixels_per_second": None,
         "golden_ns_per_pixel": pytest.approx(1e5, rel=1),
     }
@@ -285,7 +291,10 @@ def test_clock_rate(measured):
 def test_section(measured):
     made = section(*measured)
     assert (made.name, made.title) == ("points", "Error against run time")
-    every, on_front = made.parts
+    over_scenes, every, on_front = made.parts
+    assert {row["design"] for row in over_scenes.records()} == {
+        point["label"] for point in made.figures["points"] if point["group"] != "software"
+    }
     assert len(every.rows) == len(made.figures["points"]) == 2 * 7
     assert {len(row) for row in every.grades} == {len(every.columns)}
     for record, point in zip(every.records(), made.figures["points"], strict=True):

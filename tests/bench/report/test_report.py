@@ -1,11 +1,13 @@
 """The report: its page, its files, its command."""
 
+import contextlib
 import csv
 import importlib.util
 import json
 import os
 import re
 import sys
+from concurrent.futures import Executor, Future
 from html.parser import HTMLParser
 
 import pytest
@@ -91,7 +93,7 @@ def test_page_has_everything(points_section, plain_section):
     assert len(reader.ids) == len(set(reader.ids))
     # Everything is in it but the files beside it.
     outside = {address for address in reader.addresses if not address.startswith(("data:", "#"))}
-    assert outside == {"report.json", "points.csv", "fronts.csv", "graded.csv", "long.csv"}
+    assert outside == {"report.json", "points.csv", "front.csv", "fronts.csv", "graded.csv", "long.csv"}
     assert all(address[1:] in reader.ids for address in reader.addresses if address.startswith("#"))
     for section in (points_section, plain_section):
         for part in section.parts:
@@ -133,7 +135,7 @@ def test_every_axis_is_explained():
 def test_files(tmp_path, points_section, plain_section):
     folder = tmp_path / "report"
     write_report(folder, [points_section, plain_section], ABOUT)
-    names = {"index.html", "report.json", "points.csv", "fronts.csv", "graded.csv", "long.csv"}
+    names = {"index.html", "report.json", "points.csv", "front.csv", "fronts.csv", "graded.csv", "long.csv"}
     assert {path.name for path in folder.iterdir()} == names
     with (folder / "graded.csv").open(newline="") as file:
         assert list(csv.reader(file)) == [
@@ -230,6 +232,33 @@ def test_command(run, tmp_path):
     assert {path.name for path in folder.iterdir()} == {"index.html", "report.json", "other.csv"}
 
 
+def test_a_cluster_measures_what_is_no_time(run, tmp_path, monkeypatch):
+    asked = []
+
+    class Here(Executor):
+        def submit(self, function, /, *arguments, **named):
+            asked.append(function.__self__.timed)
+            future = Future()
+            future.set_result(function(*arguments, **named))
+            return future
+
+    @contextlib.contextmanager
+    def workers(address):
+        assert address == "tcp://a:1"
+        yield Here()
+
+    monkeypatch.setattr(report, "check_address", lambda address: None)
+    monkeypatch.setattr(report, "cluster_executor", workers)
+    monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
+    folder = tmp_path / "report"
+    result = run(folder, "--cluster", "tcp://a:1")
+    assert result.exit_code == 0, result.output
+    assert asked
+    assert not any(asked)
+    assert json.loads((folder / "report.json").read_text())["cluster"] == "tcp://a:1"
+    assert "by the workers of tcp://a:1" in (folder / "index.html").read_text()
+
+
 def test_meshes_go_to_the_points(monkeypatch, tmp_path, plain_section):
     monkeypatch.setattr(report, "SECTIONS", {"points": Fake(plain_section), "other": Fake(plain_section)})
     folder = tmp_path / "report"
@@ -245,6 +274,9 @@ def test_meshes_go_to_the_points(monkeypatch, tmp_path, plain_section):
     [
         (["--only", "nothing"], "--only nothing: unknown section; use one of plain, other"),
         (["--jobs", "0"], "--jobs 0: out of range"),
+        (["--cluster", "nowhere"], "--cluster nowhere: not the address of a Dask scheduler"),
+        (["--cluster", "tcp://a:1", "--jobs", "2"], "--jobs: a cluster has its own workers"),
+        (["--cluster", "tcp://a:1", "--mesh", "a.obj"], "--mesh: the workers of a cluster have not the file"),
     ],
 )
 def test_bad_options(run, tmp_path, arguments, message):

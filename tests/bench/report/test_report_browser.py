@@ -32,10 +32,13 @@ def open_page(watching, report):
     pages = []
     with watching() as (new_page, errors, requests):
 
-        def open_page(width="desktop", folder=report, **options):
+        def open_page(width="desktop", folder=report, unfold=True, **options):
             page = new_page(WIDTHS[width], 10, **options)
             pages.append((folder / "index.html").as_uri())
             page.goto(pages[-1])
+            if options.get("java_script_enabled", True) and unfold:
+                page.locator(".fold").evaluate_all("folds => folds.forEach(fold => (fold.open = true))")
+                page.locator("#plot").scroll_into_view_if_needed()
             return page
 
         yield open_page
@@ -215,7 +218,7 @@ def test_table_of_points_has_all_columns(open_page, points_section):
     visible = page.locator("#part-points thead th:visible")
     assert visible.count() < 10
     page.get_by_label("all columns").check()
-    assert visible.count() == len(points_section.parts[0].columns)
+    assert visible.count() == len(points_section.parts[1].columns)
 
 
 @pytest.mark.long
@@ -285,11 +288,27 @@ def test_print(open_page):
     assert page.pdf(prefer_css_page_size=True).startswith(b"%PDF-")
 
 
+def test_answers_first_and_the_rest_folded(open_page, points_section):
+    page = open_page(unfold=False)
+    answer = page.locator("#answer-points")
+    assert answer.locator("strong").is_visible()
+    assert answer.locator("img").evaluate("image => image.naturalWidth") > 0
+    assert page.locator("#plot").is_hidden()
+    assert page.locator("#section-plain h2").is_visible()
+    # A link opens what it leads to.
+    answer.locator(".more a").click()
+    page.locator("#plot .dot").first.wait_for()
+    assert page.locator("#section-points .fold").get_attribute("open") is not None
+    assert page.locator("#section-plain .fold").get_attribute("open") is None
+
+
 def test_page_without_scripts(open_page, points_section):
     page = open_page(java_script_enabled=False)
+    for name in ("points", "plain"):
+        page.locator(f"#section-{name} summary").first.click()
     assert page.locator("#explorer").is_hidden()
     assert page.get_by_text("needs JavaScript").is_visible()
-    assert page.locator("#part-points tbody tr").count() == len(points_section.parts[0].rows)
+    assert page.locator("#part-points tbody tr").count() == len(points_section.parts[1].rows)
     assert page.locator("#part-points thead th").first.is_visible()
     assert page.locator(".shot img").first.is_visible()
 

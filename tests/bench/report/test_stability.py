@@ -10,7 +10,7 @@ import pytest
 
 from blysk.bench.report import stability_streams
 from blysk.bench.report.section import Drawing, Table
-from blysk.bench.report.stability import QUICK_METHODS, section, tasks
+from blysk.bench.report.stability import QUICK_SIMULATED, section, tasks
 from blysk.bench.report.stability_cases import (
     ANGLES,
     EXPONENTS,
@@ -206,7 +206,7 @@ def test_worst_grade(grades, worst):
 
 @pytest.mark.parametrize(
     "method",
-    [name if name in QUICK_METHODS else pytest.param(name, marks=pytest.mark.long) for name in METHODS],
+    [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in METHODS],
 )
 def test_ranges(method):
     """Where the docstrings say that spans are flagged, and every range is good or fair to its end."""
@@ -257,6 +257,17 @@ def test_section():
         if row["group"] not in (5, STREAM_GROUP):
             assert row["chord"] <= GOOD
             assert grades[-1] == "good"
+    # Colours follow the error, marks tell what is stated and what is silent.
+    cases_of_method = tables["stability-cases"]
+    column = list(cases_of_method.columns).index("error cut, LSB")
+    for row, grades, marks in zip(
+        cases_of_method.rows, cases_of_method.grades, cases_of_method.marks, strict=True
+    ):
+        if row[column] is not None:
+            assert (grades[column] == "good") == (row[column] <= GOOD)
+            assert (marks[column] == "") == (row[column] <= GOOD)
+    assert "`chord`" in made.conclusion.sentence
+    assert "silently wrong in" in made.conclusion.sentence
     assert len(tables["stability-cases"].rows) == sum(len(cases(group)) for group in FROM_SPANS)
     [row] = tables["safe-ranges"].records()
     assert row["method"] == "chord"
@@ -271,4 +282,8 @@ def test_tasks():
     full = tasks(quick=False)
     assert all(isinstance(task, Task) and not task.timed for task in full)
     assert {task.settings["method"] for task in full} == set(METHODS)
-    assert {task.settings["method"] for task in tasks(quick=True)} == set(QUICK_METHODS)
+    quick = tasks(quick=True)
+    assert {task.settings["method"] for task in quick} == set(METHODS)
+    assert {task.settings["method"] for task in quick if task.function is measure_stream} == set(
+        QUICK_SIMULATED
+    )

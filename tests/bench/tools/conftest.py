@@ -57,7 +57,8 @@ def open_page(watching, live_site):
     with watching() as (new_page, errors, requests):
 
         def open_page(width="desktop", script=None, waits=True, folder=live_site, **options):
-            page = new_page(WIDTHS[width], 30, **options)
+            # Else the light turns.
+            page = new_page(WIDTHS[width], 30, **{"reduced_motion": "reduce"} | options)
             if script:
                 page.add_init_script(script)
             folders.append(folder.as_uri())

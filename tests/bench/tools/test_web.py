@@ -334,6 +334,32 @@ def test_documents_in_the_site(tmp_path, work, results):
     assert {"guide/index.html", "blocks/index.html"} <= set(links)
 
 
+def test_every_link_of_the_site_leads_somewhere(tmp_path, work, results):
+    """Files, and anchors in them; the answers of a report stand on the front page."""
+    report = tmp_path / "report"
+    report.mkdir()
+    conclusion = {"title": "What?", "sentence": "**This** much."}
+    sections = {"points": {"conclusion": conclusion}, "units": {"conclusion": None}}
+    figures = {"program": "blysk", "files": ["index.html", "report.json"], "sections": sections}
+    (report / "report.json").write_text(json.dumps(figures))
+    (report / "index.html").write_text("<p>report</p>")
+    folders = {name: path for name, path in web.folders_of(None).items() if name != "blocks"}
+    site = tmp_path / "site"
+    web.write_site(site, work, results, report, folders)
+    assert "<strong>This</strong> much." in (site / "index.html").read_text()
+    pages = {path: path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
+    assert len(pages) > 15
+    for path, text in pages.items():
+        for address in Addresses(text).found:
+            if re.match(r"[a-z]+:", address):
+                continue
+            file, _, anchor = address.partition("#")
+            target = (path.parent / file).resolve() if file else path
+            assert target.is_file(), (path, address)
+            if anchor and target.suffix == ".html":
+                assert f'id="{anchor}"' in pages.get(target, target.read_text()), (path, address)
+
+
 def test_folders_of_documents(tmp_path):
     with pytest.raises(InputError, match="holds no pages of units; make them with `blysk pages FOLDER`"):
         web.folders_of(tmp_path)

@@ -185,7 +185,9 @@ def test_keyboard(open_page):
     page.keyboard.press("Enter")
     page.wait_for_selector("body[data-inside]")
     assert page.locator("#inside").is_visible()
-    # All that can be done is reached by the Tab key.
+    # All that can be done is reached by the Tab key, once it is unfolded.
+    page.locator(".further summary").click()
+    page.locator("#frame").focus()
     reached = set()
     for _ in range(40):
         page.keyboard.press("Tab")
@@ -329,7 +331,7 @@ def test_from_a_web_server(browser, live_site):
 
     with ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=live_site)) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        context = browser.new_context()
+        context = browser.new_context(reduced_motion="reduce")
         page = context.new_page()
         errors = []
         page.on("pageerror", lambda error: errors.append(str(error)))

@@ -70,6 +70,11 @@ def test_frame_in_a_notebook(frame):
 def test_command_line_prints_and_writes_the_same(frame, tmp_path, capsys):
     options = ["--method", "chord", "--exponent", "200", "--triangles", "500", "--size", "64x48"]
     assert main(["render", "teapot", *options, "-o", str(tmp_path / "a.png")]) == 0
+    short = capsys.readouterr().out.splitlines()
+    assert len(short) <= 8
+    assert any(f"{frame.cycles:,}" in line for line in short)
+    assert any(f"{frame.error.max_lsb:.2f}" in line for line in short)
+    assert main(["render", "teapot", *options, "-v", "-o", str(tmp_path / "a.png")]) == 0
     frame.save(tmp_path / "b.png")
     frame.save_comparison(tmp_path / "c.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()

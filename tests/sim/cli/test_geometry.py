@@ -20,7 +20,7 @@ HARDWARE = "--geometry", "hardware"
 
 def test_picture_and_figures(capsys):
     """The model's picture; errors against exact normals of every pixel; counters and cycles."""
-    assert main(["render", *SMALL, *HARDWARE, "-o", "a.png", "--json", "a.json"]) == 0
+    assert main(["render", *SMALL, *HARDWARE, "-v", "-o", "a.png", "--json", "a.json"]) == 0
     figures = json.loads(Path("a.json").read_text())
     drawn = blysk.scene("teapot", triangles=500, size=(64, 48))
     model = triangle_frame(drawn, Renderer(blysk.design()))

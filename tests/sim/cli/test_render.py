@@ -51,7 +51,7 @@ def rendered(tmp_path_factory):
     names = [folder / name for name in ("a.png", "both.png", "a.json")]
     with contextlib.redirect_stdout(io.StringIO()) as output:
         status = main(
-            ["render", *SMALL, "-o", str(names[0]), "--compare", str(names[1]), "--json", str(names[2])]
+            ["render", *SMALL, "-v", "-o", str(names[0]), "--compare", str(names[1]), "--json", str(names[2])]
         )
     assert status == 0
     return folder, output.getvalue()
@@ -141,7 +141,7 @@ def test_repairs_are_counted(capsys):
     header += [f"property float {name}" for name in names]
     header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
     Path("a.ply").write_text("\n".join(header + rows + faces) + "\n")
-    assert main(["render", "a.ply", "--size", "16x12", "--json", "a.json"]) == 0
+    assert main(["render", "a.ply", "--size", "16x12", "-v", "--json", "a.json"]) == 0
     output, _ = capsys.readouterr()
     counts = json.loads(Path("a.json").read_text())["counts"]
     assert (counts["repaired_normals"], counts["dropped_faces"]) == (2, 1)
@@ -226,4 +226,4 @@ def test_fallback_without_compiler(capsys, monkeypatch):
     figures = json.loads(Path("a.json").read_text())
     assert (figures["engine"], figures["width"], figures["height"]) == ("pysim", 24, 9)
     assert picture("teapot-blysk.png").shape == (9, 24, 3)
-    assert "teapot, 24x9" in output
+    assert re.search(r"^mesh +teapot, \d+ triangles, 24x9$", output, re.MULTILINE)

@@ -114,26 +114,33 @@ const blysk = (() => {
 
   const view = () => site.meshes[state.mesh].views[state.view];
 
-  function settingsNow() {
+  function settingsNow(name = state.method, reflection = state.model) {
     const reference = site.references[state.reference];
-    const method = site.methods[state.method];
+    const method = site.methods[name];
     // A model with a roughness may have lobes as narrow as any.
-    const rough = site.rough.includes(state.model);
+    const rough = site.rough.includes(reflection);
     const band = site.bands.findIndex((most) => (rough ? site.mostExponent : state.exponent) <= most);
     const { direction, exponent, roughness, ambient, diffuse, specular } = state;
     return {
       ...{ direction, exponent, roughness, ambient, diffuse, specular },
-      design: `${state.method}-${state.model}`,
-      spans: view().streams[state.method][band],
+      design: `${name}-${reflection}`,
+      spans: view().streams[name][band],
       viewer: view().axes[2],
       color: hexChannels(state.color),
       light: hexChannels(state.light),
       reference: {
         curve: reference.curve ?? method.curve,
         chord: reference.curve ? false : method.chord,
-        model: (!rough && reference.model) || state.model,
+        model: (!rough && reference.model) || reflection,
       },
     };
+  }
+
+  // What stands right of the divider, if that is hardware, too: the method that shows at once why.
+  function rivalNow() {
+    if (state.compare !== "rival" || !site.rival || state.method === site.rival) return null;
+    const model = `${site.rival}-${state.model}` in site.designs ? state.model : site.rivalModel;
+    return settingsNow(site.rival, model);
   }
 
   let busy = false;
@@ -149,13 +156,13 @@ const blysk = (() => {
       while (again) {
         again = false;
         const settings = settingsNow();
+        const rival = rivalNow();
         const [model] = await Promise.all([
           modelOf(settings.reference.model),
-          designOf(settings.design),
-          spansOf(settings.spans),
+          ...[settings, rival].filter(Boolean).flatMap((of) => [designOf(of.design), spansOf(of.spans)]),
         ]);
         if (again) continue;
-        const result = await ask("frame", { settings, model });
+        const result = await ask("frame", { settings, model, rival });
         paint(settings, result);
         if (orbiting) turnLight();
       }
@@ -183,7 +190,7 @@ const blysk = (() => {
     pageState.frames++;
     stopSlow();
     draw("frame", result.frame);
-    draw("golden", result.golden);
+    draw("golden", result.rival ? result.rival.frame : result.golden);
     draw("errors", result.map);
     const now = performance.now();
     const between = now - painted;
@@ -194,21 +201,34 @@ const blysk = (() => {
     if (orbiting && now - told < 200) return;
     told = now;
     showLight();
-    const { figures } = result;
+    showFigures();
+  }
+
+  const lsb = (value) => `${shown(value, 3)} LSB`;
+
+  // Figures of the frame; while it is watched, those of the pixels that have come.
+  function showFigures(so = null) {
+    const { figures, rival, settings } = pageState.latest;
+    const cycles = so ? so.cycles : figures.cycles;
+    const each = so ? so.cycles / Math.max(so.pixels, 1) : figures.cycles / figures.pixels;
     const texts = {
-      largest: `${shown(figures.largest, 3)} LSB`,
-      p999: `${shown(figures.p999, 3)} LSB`,
-      cycles: shown(figures.cycles),
-      each: shown(figures.cycles / figures.pixels, 3),
-      gated: `≥ ${shown((100 * figures.gated) / figures.spans, 3)} %`,
+      largest: lsb(figures.largest),
+      p999: lsb(figures.p999),
+      cycles: shown(cycles),
+      each: so && !so.pixels ? "–" : shown(each, 3),
+      gated: figures.gated === null ? "no gate" : `${shown((100 * figures.gated) / figures.pixels, 3)} %`,
       speed: shown(Math.round(figures.pixels / figures.seconds / 1000) * 1000),
       rate: shown(1000 / pause, 2),
     };
     for (const [name, text] of Object.entries(texts)) {
       const cell = document.querySelector(`[data-figure=${name}]`);
       cell.textContent = text;
-      cell.dataset.value = { ...figures, each: figures.cycles / figures.pixels }[name] ?? "";
+      cell.dataset.value = { ...figures, cycles, each }[name] ?? "";
     }
+    byId("ramp-high").textContent = shown(figures.largest, 3);
+    const [method] = settings.design.split("-" + state.model);
+    byId("own-text").textContent = `${method}: ${lsb(figures.largest)}`;
+    byId("other-text").textContent = rival ? `${site.rival}: ${lsb(rival.largest)}` : "exact, float64";
   }
 
   // The light: a place in the picture is an angle from the viewer.
@@ -275,6 +295,7 @@ const blysk = (() => {
     down = null;
     if (!clicked) return;
     const [x, y] = pointed(event);
+    setOrbit(false);
     look(Math.floor(x * site.width), Math.floor(y * site.height));
   });
   canvas.addEventListener("pointercancel", () => (down = null));
@@ -306,7 +327,20 @@ const blysk = (() => {
     const distance = Math.max(Math.hypot(x, y), 0.1) / (Math.hypot(x, y) || 1);
     placeLight(distance * (x * cosine - y * sine), distance * (x * sine + (y || 0.001) * cosine));
   }
-  byId("orbit").addEventListener("click", () => setOrbit(!orbiting));
+  byId("orbit").addEventListener("click", () => {
+    leave();
+    setOrbit(!orbiting);
+  });
+
+  // The divider.
+
+  function showSplit() {
+    const stage = byId("frame").parentNode;
+    stage.style.setProperty("--split", `${byId("split").value}%`);
+    byId("own-text").hidden = Number(byId("split").value) < 8;
+    byId("other-text").hidden = Number(byId("split").value) > 92;
+  }
+  byId("split").addEventListener("input", showSplit);
 
   // The same frame as its pixels came, cycle by cycle.
 
@@ -318,6 +352,7 @@ const blysk = (() => {
     slow = 0;
     byId("slow").setAttribute("aria-pressed", false);
     draw("frame", pageState.latest.frame);
+    showFigures();
   }
 
   function watch() {
@@ -335,20 +370,27 @@ const blysk = (() => {
       for (; at < cycles.length && cycles[at] <= clock; at++)
         for (let c = 0; order[at] >= 0 && c < 3; c++) pixels[order[at] + c] = frame[order[at] + c];
       draw("frame", pixels);
-      byId("light-text").textContent = `clock ${shown(Math.min(Math.floor(clock), figures.cycles))}`;
+      showFigures({ cycles: Math.min(Math.floor(clock), figures.cycles), pixels: at });
       if (at < cycles.length) slow = requestAnimationFrame(show);
       else {
         stopSlow();
         showLight();
       }
     };
+    byId("split").value = 100;
+    showSplit();
     slow = requestAnimationFrame(show);
   }
   byId("slow").addEventListener("click", watch);
 
   // Controls.
 
-  const controls = ["method", "model", "reference", "mesh", "color", "light", "ambient", "diffuse", "specular"];
+  const controls = ["compare", "method", "model", "reference", "mesh", "color", "light", "ambient", "diffuse", "specular"];
+
+  const COMPARED = {
+    exact: "normals of unit length at every pixel, in 53-bit arithmetic",
+    rival: "normals on a straight line between the ends of a span: too short in the middle, so highlights go dull",
+  };
 
   function showControls() {
     for (const id of [...controls, "exponent", "roughness"]) byId(id).value = state[id];
@@ -365,6 +407,8 @@ const blysk = (() => {
       output.textContent = output.htmlFor.value === "view-number" ? `${Number(value) + 1} of ${views}` : value;
     }
     const { text } = site.references[state.reference];
+    byId("method-text").textContent = site.methods[state.method].text.replaceAll("`", "");
+    byId("compare-text").textContent = COMPARED[rivalNow() ? "rival" : "exact"];
     byId("explained").replaceChildren(
       make("p", {}, make("strong", {}, state.method), ` ${site.methods[state.method].text.replaceAll("`", "")}`),
       make("p", {}, make("strong", {}, site.references[state.reference].title), ` ${text}`),
@@ -396,9 +440,12 @@ const blysk = (() => {
     changed();
   });
   byId("controls").addEventListener("submit", (event) => event.preventDefault());
+  byId("close").addEventListener("click", leave);
   byId("again").addEventListener("click", () => {
     setOrbit(false);
     Object.assign(state, site.start);
+    byId("split").value = 50;
+    showSplit();
     changed();
   });
 
@@ -421,6 +468,8 @@ const blysk = (() => {
     byId("inside").hidden = false;
     byId("pixel-x").value = x;
     byId("pixel-y").value = y;
+    // Where it does not stand beside the picture, it comes into sight.
+    if (matchMedia("(max-width: 69.99rem)").matches) byId("inside").scrollIntoView({ block: "start" });
     if (span < 0) {
       byId("inside-title").textContent = `There is no surface at column ${x}, row ${y}.`;
       byId("pipeline").replaceChildren();
@@ -443,7 +492,8 @@ const blysk = (() => {
     pageState.inside = inside;
     const codesOf = [0, 1, 2].map((c) => [codes[`normal_left.${c}`][span], codes[`normal_right.${c}`][span]]);
     const { one } = site.tables;
-    const cosine = codesOf.reduce((sum, [a, b]) => sum + (a / one) * (b / one), 0);
+    const product = (k, n) => codesOf.reduce((sum, of) => sum + (of[k] / one) * (of[n] / one), 0);
+    const cosine = product(0, 1) / Math.sqrt(product(0, 0) * product(1, 1) || 1);
     byId("inside-title").textContent =
       `Column ${x}, row ${y}: pixel ${x - codes.x[span] + 1} of a span of ${inside.length}, columns ${codes.x[span]} to ` +
       `${codes.x[span] + inside.length - 1}, whose normal turns by ${shown((Math.acos(Math.min(cosine, 1)) * 180) / Math.PI, 3)}°. ` +
@@ -515,6 +565,7 @@ const blysk = (() => {
   }
 
   function gatedAt(inside, pixel) {
+    if (!("gated" in inside.design.ports.status.fields)) return 0;
     for (const [clock, n] of inside.taken) if (n === pixel) return inside.code("gated", clock);
     return 0;
   }
@@ -717,11 +768,13 @@ const blysk = (() => {
     showControls();
     // The other scripts call `blysk`, which is there when this one has ended. The first frames are slow: the browser
     // compiles anew what is used much.
+    showSplit();
     setTimeout(async () => {
       for (let k = 0; k < 4; k++) await refresh();
       document.body.dataset.frame = "ready";
+      if (!matchMedia("(prefers-reduced-motion: reduce)").matches) setOrbit(true);
     });
   }
 
-  return Object.assign(pageState, { given, refresh, look, setClock, setOrbit, settingsNow, wordAt, ask });
+  return Object.assign(pageState, { given, refresh, look, setClock, setOrbit, settingsNow, rivalNow, wordAt, ask });
 })();

@@ -260,11 +260,10 @@ const blyskCore = () => {
     };
   }
 
-  // Channels in LSB of the fragments that show, in the order of the spans; not rounded.
-  function reference(spans, settings, viewer, curve, model, chord, one) {
+  // Normals of the fragments that show, in the order of the spans: they do not depend on the light.
+  function normalsOf(spans, curve, one) {
     const values = new Float64Array(3 * spans.shown);
     const normal = [0, 0, 0];
-    const shade = shader(settings, viewer, model, chord);
     let at = 0;
     for (let span = 0; span < spans.count; span++) {
       const length = spans.codes.length[span];
@@ -274,8 +273,39 @@ const blyskCore = () => {
         if (!spans.visible[first + k]) continue;
         along ??= curveOf(curve, spans, span, one, normal);
         along(k / Math.max(length - 1, 1));
-        const { color } = shade(normal);
-        for (let c = 0; c < 3; c++) values[at++] = Math.min(Math.max(color[c], 0), 1) * 255;
+        values[at++] = normal[0];
+        values[at++] = normal[1];
+        values[at++] = normal[2];
+      }
+    }
+    return values;
+  }
+
+  // Channels in LSB of the fragments that show, in the order of the spans; not rounded. What `shader` does, for all.
+  function reference(normals, settings, viewer, model, chord) {
+    const values = new Float64Array(normals.length);
+    const [lx, ly, lz] = normalised(settings.direction);
+    const halfway = halfwayVector([lx, ly, lz], viewer);
+    const [hx, hy, hz] = halfway;
+    const lit = halfway.some((part) => part) && settings.specular > 0;
+    const { ambient, diffuse, specular } = termsOf(settings);
+    const reflect = reflection(model, settings.exponent);
+    for (let at = 0; at < normals.length; at += 3) {
+      const x = normals[at];
+      const y = normals[at + 1];
+      const z = normals[at + 2];
+      const cosine = x * lx + y * ly + z * lz;
+      let shine = 0;
+      if (lit && cosine > 0) {
+        const highlight = chord
+          ? 1 - ((x - hx) * (x - hx) + (y - hy) * (y - hy) + (z - hz) * (z - hz)) / 2
+          : x * hx + y * hy + z * hz;
+        shine = reflect(highlight < 1 ? highlight : 1);
+      }
+      const front = cosine > 0 ? cosine : 0;
+      for (let c = 0; c < 3; c++) {
+        const color = ambient[c] + front * diffuse[c] + shine * specular[c];
+        values[at + c] = color < 0 ? 0 : color > 1 ? 255 : color * 255;
       }
     }
     return values;
@@ -292,7 +322,9 @@ const blyskCore = () => {
     let above = count;
     let bucket = buckets.length;
     while (above > Math.floor(rank)) above -= buckets[--bucket];
-    const top = errors.filter((error) => error * scale >= bucket).sort();
+    const top = new Float64Array(count - above);
+    for (let k = 0, n = 0; k < count; k++) if (errors[k] * scale >= bucket) top[n++] = errors[k];
+    top.sort();
     const at = Math.floor(rank) - above;
     const low = top[at];
     const high = top[Math.min(at + 1, top.length - 1)];
@@ -353,7 +385,7 @@ const blyskCore = () => {
       return {
         words,
         cycles: this.exports.cycles(),
-        gated: figure("gated_spans"),
+        gated: "gated" in this.design.ports.status.fields ? figure("gated_pixels") : null,
         wide: figure("out_of_range_spans"),
         each: this.words(this.cycles, 2 * this.fragments),
       };
@@ -382,6 +414,6 @@ const blyskCore = () => {
 
   return {
     ...{ put, get, decoded, unpacked, spansOf, normalised, halfwayVector, quantised, termsOf, constantsOf, writesOf },
-    ...{ reflection, tableOf, curveOf, shader, reference, errorFigures, Simulation },
+    ...{ reflection, tableOf, curveOf, normalsOf, shader, reference, errorFigures, Simulation },
   };
 };

@@ -2,70 +2,117 @@
 const blyskWorker = (core) => {
   const designs = new Map();
   const views = new Map();
-  let simulation = null;
-  let loaded = "";
+  const simulations = new Map();
+  const normals = new Map();
   let settingsOfPage = null;
 
-  const errorsOf = (words, settings, entry, model) => {
-    const { width, height, tables, errorMap } = settingsOfPage;
-    const { spans, design } = entry;
-    const port = design.ports.o;
-    const at = (name) => {
-      const field = port.fields[name];
-      const [word, shift, mask] = [field.offset >>> 5, field.offset & 31, 2 ** field.width - 1];
-      return (base) => (words[base + word] >>> shift) & mask;
-    };
-    const [x, y, red, green, blue] = ["x", "y", "r", "g", "b"].map(at);
-    const { reference, viewer } = settings;
-    const exact = core.reference(spans, settings, viewer, reference.curve, model, reference.chord, tables.one);
-    const [background] = new Uint32Array(Uint8Array.from(settingsOfPage.backgroundCodes).buffer);
-    const [frame, golden, map] = [background, background, 0].map((color) => {
-      const pixels = new Uint32Array(width * height).fill(color);
-      return new Uint8ClampedArray(pixels.buffer);
-    });
-    const order = new Int32Array(spans.fragments);
-    const errors = new Float64Array(3 * spans.shown);
-    let shown = 0;
-    for (let span = 0; span < spans.count; span++) {
-      const left = spans.codes.x[span];
-      const row = spans.codes.y[span];
-      for (let n = spans.first[span]; n < spans.first[span + 1]; n++) {
-        const base = n * port.words;
-        const column = left + n - spans.first[span];
-        if (x(base) !== column || y(base) !== row) throw new Error("another pixel came than was asked for");
-        const place = 4 * (row * width + column);
-        order[n] = spans.visible[n] ? place : -1;
-        if (!spans.visible[n]) continue;
-        frame[place] = red(base);
-        frame[place + 1] = green(base);
-        frame[place + 2] = blue(base);
-        let worst = 0;
-        for (let c = 0; c < 3; c++) {
-          const value = exact[3 * shown + c];
-          golden[place + c] = Math.round(value);
-          const error = Math.abs(frame[place + c] - value);
-          errors[3 * shown + c] = error;
-          if (error > worst) worst = error;
-        }
-        let step = 0;
-        while (step < errorMap.limits.length - 1 && errorMap.limits[step] < worst) step++;
-        for (let c = 0; c < 3; c++) map[place + c] = errorMap.colors[step][c];
-        map[place + 3] = 255;
-        shown++;
-      }
+  // Normals by spans and curve: a view's, as long as it is drawn.
+  const normalsOf = (name, spans, curve) => {
+    const key = `${name} ${curve}`;
+    if (!normals.has(key)) {
+      if (normals.size > 3) normals.clear();
+      normals.set(key, core.normalsOf(spans, curve, settingsOfPage.tables.one));
     }
-    return { frame, golden, map, order, shown, figures: core.errorFigures(errors) };
+    return normals.get(key);
   };
 
+  const empty = (color) => {
+    const pixels = new Uint32Array(settingsOfPage.width * settingsOfPage.height).fill(color);
+    return new Uint8ClampedArray(pixels.buffer);
+  };
+
+  const backgroundOf = () => new Uint32Array(Uint8Array.from(settingsOfPage.backgroundCodes).buffer)[0];
+
+  const fieldsOf = (port) =>
+    ["x", "y", "r", "g", "b"].map((name) => {
+      const { offset, width } = port.fields[name];
+      return [offset >>> 5, offset & 31, 2 ** width - 1];
+    });
+
+  // The frame of a run, and where its pixels are: a place each, or -1 for one that is hidden.
+  const frameOf = (words, { spans, design }) => {
+    const { width } = settingsOfPage;
+    const size = design.ports.o.words;
+    const [[xw, xs, xm], [yw, ys, ym], [rw, rs, rm], [gw, gs, gm], [bw, bs, bm]] = fieldsOf(design.ports.o);
+    const frame = empty(backgroundOf());
+    const order = new Int32Array(spans.fragments);
+    for (let span = 0; span < spans.count; span++) {
+      const first = spans.first[span];
+      const left = spans.codes.x[span] - first;
+      const row = spans.codes.y[span];
+      for (let n = first; n < spans.first[span + 1]; n++) {
+        const base = n * size;
+        if (((words[base + xw] >>> xs) & xm) !== left + n || ((words[base + yw] >>> ys) & ym) !== row)
+          throw new Error("another pixel came than was asked for");
+        if (!spans.visible[n]) {
+          order[n] = -1;
+          continue;
+        }
+        const place = 4 * (row * width + left + n);
+        order[n] = place;
+        frame[place] = (words[base + rw] >>> rs) & rm;
+        frame[place + 1] = (words[base + gw] >>> gs) & gm;
+        frame[place + 2] = (words[base + bw] >>> bs) & bm;
+      }
+    }
+    return { frame, order };
+  };
+
+  // Largest error of each pixel that shows; all errors.
+  const errorsOf = (frame, order, exact, golden) => {
+    const errors = new Float64Array(exact.length);
+    const worst = new Float64Array(exact.length / 3);
+    let shown = 0;
+    for (let n = 0; n < order.length; n++) {
+      const place = order[n];
+      if (place < 0) continue;
+      for (let c = 0; c < 3; c++) {
+        const value = exact[3 * shown + c];
+        if (golden) golden[place + c] = (value + 0.5) | 0;
+        const error = Math.abs(frame[place + c] - value);
+        errors[3 * shown + c] = error;
+        if (error > worst[shown]) worst[shown] = error;
+      }
+      shown++;
+    }
+    return { errors, worst };
+  };
+
+  // Colours in equal steps from 0 to the largest error of the frame.
+  const mapOf = (worst, largest, order) => {
+    const { colors } = settingsOfPage.errorMap;
+    const map = empty(0);
+    const scale = colors.length / (largest || 1);
+    let shown = 0;
+    for (let n = 0; n < order.length; n++) {
+      const place = order[n];
+      if (place < 0) continue;
+      const color = colors[Math.min(Math.max(Math.ceil(worst[shown++] * scale) - 1, 0), colors.length - 1)];
+      map[place] = color[0];
+      map[place + 1] = color[1];
+      map[place + 2] = color[2];
+      map[place + 3] = 255;
+    }
+    return map;
+  };
+
+  // Simulations of the two designs that are compared, each with its spans.
   const load = (settings) => {
     const key = `${settings.design} ${settings.spans}`;
     const { module, design } = designs.get(settings.design);
-    if (loaded !== key) {
-      simulation = new core.Simulation(module, design, settingsOfPage.tables);
+    if (!simulations.has(key)) {
+      if (simulations.size > 1) simulations.delete(simulations.keys().next().value);
+      const simulation = new core.Simulation(module, design, settingsOfPage.tables);
       simulation.load(views.get(settings.spans));
-      loaded = key;
+      simulations.set(key, simulation);
     }
-    return { spans: views.get(settings.spans), design };
+    return { spans: views.get(settings.spans), design, simulation: simulations.get(key) };
+  };
+
+  const exactOf = (settings, entry, model) => {
+    const { reference, viewer } = settings;
+    const found = normalsOf(settings.spans, entry.spans, reference.curve);
+    return core.reference(found, settings, viewer, model, reference.chord);
   };
 
   const answer = {
@@ -78,23 +125,37 @@ const blyskWorker = (core) => {
     spans: ({ name, bytes }) => {
       views.set(name, core.spansOf(bytes, settingsOfPage.columns));
     },
-    frame: ({ settings, model }) => {
+    frame: ({ settings, model, rival }) => {
       const entry = load(settings);
       const before = performance.now();
-      const run = simulation.run(settings, settings.viewer);
+      const run = entry.simulation.run(settings, settings.viewer);
       const seconds = (performance.now() - before) / 1000;
-      const { frame, golden, map, order, shown, figures } = errorsOf(run.words, settings, entry, model);
+      const { frame, order } = frameOf(run.words, entry);
+      const golden = empty(backgroundOf());
+      const exact = exactOf(settings, entry, model);
+      const { errors, worst } = errorsOf(frame, order, exact, golden);
+      const figures = core.errorFigures(errors);
+      const map = mapOf(worst, figures.largest, order);
       const cycles = new Int32Array(order.length);
       for (let k = 0; k < cycles.length; k++) cycles[k] = run.each[2 * k];
       const result = {
         ...{ frame, golden, map, order, cycles },
         figures: {
           ...figures,
-          ...{ shown, seconds, cycles: run.cycles, pixels: entry.spans.fragments, spans: entry.spans.count },
-          ...{ gated: run.gated, wide: run.wide, milliseconds: performance.now() - before },
+          ...{ shown: entry.spans.shown, seconds, cycles: run.cycles },
+          ...{ pixels: entry.spans.fragments, spans: entry.spans.count, gated: run.gated, wide: run.wide },
         },
       };
-      return [result, [frame.buffer, golden.buffer, map.buffer, order.buffer, cycles.buffer]];
+      const moved = [frame.buffer, golden.buffer, map.buffer, order.buffer, cycles.buffer];
+      if (rival) {
+        const other = load(rival);
+        const drawn = frameOf(other.simulation.run(rival, rival.viewer).words, other);
+        const found = errorsOf(drawn.frame, drawn.order, exactOf(rival, other, model));
+        result.rival = { frame: drawn.frame, largest: core.errorFigures(found.errors).largest };
+        moved.push(drawn.frame.buffer);
+      }
+      result.figures.milliseconds = performance.now() - before;
+      return [result, moved];
     },
     trace: ({ settings, from, to }) => {
       const { spans, design } = load(settings);

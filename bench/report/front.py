@@ -1,0 +1,297 @@
+"""Error against run time over several meshes, sizes and exponents: the front, as sentence, drawing, table."""
+
+from collections.abc import Container, Iterable, Mapping, Sequence
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from blysk.bench.colors import style_of
+from blysk.bench.labels import Label, place_labels
+from blysk.bench.report.section import Conclusion, Drawing, Table
+from blysk.bench.svg import panels, svg
+from blysk.golden.presets import METHODS
+
+__all__ = ["conclusion", "spread_table", "summaries"]
+
+
+def summaries(
+    points: Sequence[Mapping[str, Any]], spread: Mapping[tuple, Sequence[dict]]
+) -> list[dict[str, Any]]:
+    """A dictionary a hardware design, over all scenes in which it was measured.
+
+    Parameters
+    ----------
+    points : sequence of dict
+        Those of the report.
+    spread : mapping
+        Results of `front_scenes.measure` by method, model and perhaps operand.
+
+    Returns
+    -------
+    list of dict
+        ``label``, ``method``, ``group``, ``samples`` (their number); ``method_error`` and ``total_error``,
+        each largest and smallest over the scenes; ``cycles``, smallest, median and largest cycles a pixel;
+        ``ns``, the same in nanoseconds over scenes and seeds, or ``None``; ``multipliers``, ``luts``,
+        ``fmax_mhz``, ``parts``, spans after cutting over spans before.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for point in points:
+        if point["group"] == "software":
+            continue
+        of = found.setdefault(point["label"], {"point": point, "samples": []})
+        cycles = point["times"]["cycles_per_pixel"]
+        errors = [point["errors"][f"{kind}_max_lsb"] for kind in ("method", "total")]
+        of["samples"].append((*errors, cycles, None))
+    for of in found.values():
+        settings = of["point"]["settings"]
+        key = tuple(settings[name] for name in ("method", "model", "operand") if name in settings)
+        for sample in spread.get(key, ()):
+            cycles = sample["cycles"] / sample["pixels"]
+            errors = [sample["method_max_lsb"], sample["total_max_lsb"]]
+            of["samples"].append((*errors, cycles, sample["spans"] / max(sample["uncut_spans"], 1)))
+    return [_summary(label, **of) for label, of in found.items()]
+
+
+def _summary(label: str, point: Mapping[str, Any], samples: Sequence[tuple]) -> dict[str, Any]:
+    method, total, cycles, parts = (
+        [value for value in of if value is not None] for of in zip(*samples, strict=True)
+    )
+    rates = point["hardware"].get("seeds_mhz") or []
+    ns = None
+    if cycles and rates:
+        middle = median(cycles) * 1e3 / median(rates)
+        ns = min(cycles) * 1e3 / max(rates), middle, max(cycles) * 1e3 / min(rates)
+    method_name = point["settings"]["method"]
+    return {
+        "label": label,
+        "method": method_name,
+        "group": point["group"],
+        "is_prepared": METHODS.get(method_name) is not None and METHODS[method_name].TAKES_VALUES,
+        "samples": len(samples),
+        "method_error": (min(method), max(method)),
+        "total_error": (min(total), max(total)),
+        "cycles": (min(cycles), median(cycles), max(cycles)) if cycles else None,
+        "ns": ns,
+        "multipliers": point["hardware"].get("multipliers"),
+        "luts": point["hardware"].get("luts"),
+        "fmax_mhz": median(rates) if rates else None,
+        "parts": median(parts) if parts else None,
+    }
+
+
+_ALIKE_LSB, _ALIKE_CYCLES = 0.15, 1.05
+"""Errors, and cycles as a factor, that are not told apart."""
+
+
+def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
+    """The front of the largest total error, over all scenes, against cycles a pixel, in a few sentences."""
+    timed = [of for of in found if of["cycles"]]
+    if not timed:
+        return None
+    on_front = _front(timed, "total_error")
+    best = next((of for of in on_front if of["total_error"][1] <= 1), on_front[-1])
+    scenes = max(of["samples"] for of in timed)
+    sentence = (
+        f"**`{best['label']}`** shades a pixel in {best['cycles'][1]:.2f} cycles and is never more than "
+        f"{best['total_error'][1]:.2f} LSB from exact Blinn shading, over {scenes} scenes, with "
+        f"{_costs(best)}. "
+        f"None of the "
+        f"other {len(timed) - 1} designs is both as fast and as exact"
+    )
+    others = [f"`{of['label']}` ({_says(of)})" for of in on_front if of is not best]
+    if others:
+        more = f" and {len(others) - 3} more" if len(others) > 3 else ""
+        sentence += f"; also on the front {'is' if len(others) == 1 else 'are'} {', '.join(others[:3])}{more}"
+    rivals = _cheapest_first(
+        of for of in timed if of["method"] == "renormalise" and of["total_error"][1] <= 1
+    )
+    if rivals and best["method"] != "renormalise":
+        rival = rivals[0]
+        times = rival["cycles"][1] / best["cycles"][1]
+        sentence += (
+            f". Normalising at every pixel in its best form, `{rival['label']}`, errs by "
+            f"{rival['total_error'][1]:.2f} LSB and takes {times:.2f} times the cycles, with {_costs(rival)}"
+        )
+    prepared = _cheapest_first(of for of in timed if of["is_prepared"] and of["total_error"][1] <= 1)
+    if prepared:
+        sentence += (
+            f". `{prepared[0]['label']}` takes {_costs(prepared[0])}, but the dot products at three points "
+            f"of every "
+            "span are made before it and not counted"
+        )
+    return Conclusion("What does a pixel cost, and how exact is it?", f"{sentence}.", _drawing(timed))
+
+
+def _cheapest_first(found: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    return sorted(found, key=lambda of: of["multipliers"] or np.inf)
+
+
+def _front(found: Sequence[Mapping[str, Any]], kind: str) -> list[Mapping[str, Any]]:
+    """Those that no other beats, fastest first, but for those whose dot products come from outside.
+
+    One beats another when it is no worse in error (by `_ALIKE_LSB`) and cycles (by `_ALIKE_CYCLES`), and is
+    better than that in one of them, or has fewer multipliers.
+    """
+    found = [of for of in found if not of["is_prepared"]]
+    error, cycles = np.array([(of[kind][1], of["cycles"][1]) for of in found]).T
+    multipliers = np.array([of["multipliers"] or np.inf for of in found])
+    # [i, j]: whether j is better than i.
+    less_error = error < error[:, np.newaxis] - _ALIKE_LSB
+    less_cycles = cycles * _ALIKE_CYCLES < cycles[:, np.newaxis]
+    fewer = multipliers < multipliers[:, np.newaxis]
+    no_worse = ~(less_error | less_cycles).T
+    beaten = (no_worse & (less_error | less_cycles | fewer)).any(axis=1)
+    return sorted(
+        (of for of, is_beaten in zip(found, beaten, strict=True) if not is_beaten),
+        key=lambda of: of["cycles"][1],
+    )
+
+
+def _says(of: Mapping[str, Any]) -> str:
+    return f"{of['cycles'][1]:.2f} cycles, {of['total_error'][1]:.2f} LSB"
+
+
+def _costs(of: Mapping[str, Any]) -> str:
+    parts = [] if of["multipliers"] is None else [f"{of['multipliers']} multipliers"]
+    if of["luts"] is not None:
+        parts.append(f"{of['luts']:,} LUT at {of['fmax_mhz']:.0f} MHz")
+    return ", ".join(parts) or "not counted"
+
+
+def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
+    """Both errors side by side, against nanoseconds where most designs have been placed, else cycles."""
+    # Where there are several scenes, a design of one is not comparable.
+    several = [of for of in found if of["samples"] > 1]
+    found = several if len(several) > 2 else found
+    placed = [of for of in found if of["ns"]]
+    in_ns = 2 * len(placed) > len(found)
+    key, drawn = ("ns", placed) if in_ns else ("cycles", found)
+    figure, axes = panels(9.2, 4.4, 2, sharex=True, sharey=True)
+    kinds = (
+        ("method_error", "method error: the same model, exact normals"),
+        ("total_error", "total error: exact Blinn"),
+    )
+    for panel, (kind, title) in zip(axes, kinds, strict=True):
+        panel.set(xscale="log", yscale="log")
+        panel.set_title(title, fontsize=9, loc="left")
+        for of in drawn:
+            style, published = style_of(of["method"]), of["group"] == "published"
+            x, (low, high) = of[key], of[kind]
+            panel.errorbar(
+                *(x[1], high),
+                xerr=[[x[1] - x[0]], [x[2] - x[1]]],
+                yerr=[[high - max(low, 1e-2)], [0]],
+                color=style.color,
+                marker=style.marker,
+                markersize=5.5,
+                markerfacecolor="white" if published else style.color,
+                linewidth=0.6,
+                alpha=0.9,
+            )
+        on = {of["label"] for of in _front(drawn, kind)}
+        corners = sorted((of[key][1], of[kind][1]) for of in drawn if of["label"] in on)
+        if corners and not in_ns:
+            xs = [corners[0][0], *(x for x, _ in corners), max(of[key][1] for of in drawn)]
+            ys = [max(of[kind][1] for of in drawn), *(y for _, y in corners), corners[-1][1]]
+            panel.step(xs, ys, where="post", color="#1c2126", linewidth=1.2, zorder=0)
+        _ticks(panel, in_ns)
+    axes[0].set_ylabel("largest error over all scenes, LSB of 8 bits")
+    for panel, (kind, _) in zip(axes, kinds, strict=True):
+        labels = [
+            Label(
+                *(
+                    of[key][1],
+                    of[kind][1],
+                    _short(of),
+                    style_of(of["method"]).color,
+                ),
+                "bold" if of["label"] in on else "normal",
+            )
+            for of in _named(drawn, on, kind)
+        ]
+        place_labels(panel, labels, [(of[key][1], of[kind][1]) for of in drawn])
+    scenes = max(of["samples"] for of in drawn)
+    note = (
+        f"A point is a design: its largest error and its median run time over up to {scenes} scenes "
+        f"(meshes, sizes, "
+        "exponents); bars go to the smallest error, and over the run times of all scenes"
+        + (" and seeds of placement" if in_ns else "")
+        + ". Open: as published. Asterisk: its dot products at three points of every span are made before "
+        "the pipeline, so that it is not on the front. The line is the front. Named are the front, and the "
+        "best and the worst of "
+        "each method."
+        " Not counted: spans are cut from triangles, and their normals prepared, before the pipeline (by "
+        "the host, or by "
+        "the hardware of `blysk verilog --geometry`); each part of a cut span counts with its cycles."
+    )
+    if not in_ns:
+        note += (
+            f" {len(placed)} of {len(found)} designs have committed clock rates; "
+            "the others await `blysk fpga`."
+        )
+    return Drawing(
+        "front", f"Error against {'nanoseconds' if in_ns else 'cycles'} a pixel", svg(figure), note
+    )
+
+
+def _ticks(panel: Any, in_ns: bool) -> None:
+    ticks = (10, 12, 15, 20, 30, 50, 100, 200, 500) if in_ns else (1, 1.5, 2, 3, 5, 10, 20, 50, 100)
+    low, high = panel.get_xlim()
+    kept = [tick for tick in ticks if low <= tick <= high]
+    panel.set_xticks(kept, [f"{tick:g}" for tick in kept], minor=False)
+    panel.set_xticks((), minor=True)
+    errors = [0.5, 1, 2, 5, 10, 20, 50, 100, 200]
+    low, high = panel.get_ylim()
+    kept = [tick for tick in errors if low <= tick <= high]
+    panel.set_yticks(kept, [f"{tick:g}" for tick in kept], minor=False)
+    panel.set_yticks((), minor=True)
+    panel.set_xlabel("ns a pixel, after place and route" if in_ns else "cycles a pixel")
+
+
+def _short(of: Mapping[str, Any]) -> str:
+    return of["label"].replace(", 1 - N.H", "") + "*" * of["is_prepared"]
+
+
+def _named(found: Sequence[Mapping[str, Any]], on: Container[str], kind: str) -> list[Mapping[str, Any]]:
+    """Which get a label, the more important first: the front, then the best and the worst of each method."""
+    chosen = sorted((of for of in found if of["label"] in on), key=lambda of: of[kind][1])
+    for method in dict.fromkeys(of["method"] for of in found):
+        own = sorted((of for of in found if of["method"] == method), key=lambda of: of[kind][1])
+        named = any(of["method"] == method for of in chosen)
+        chosen += [of for of in ([] if named else own[:1]) if of not in chosen]
+        chosen += [of for of in own[-1:] if of not in chosen]
+    return chosen
+
+
+def spread_table(found: Sequence[Mapping[str, Any]]) -> Table:
+    """What `summaries` gives, a row a design."""
+    on_front = {of["label"] for of in _front([of for of in found if of["cycles"]], "total_error")}
+    columns = ["design", "group", "on the front", "scenes"]
+    columns += ["method error, smallest, LSB", "method error, largest, LSB"]
+    columns += ["total error, smallest, LSB", "total error, largest, LSB"]
+    columns += [
+        "cycles a pixel, smallest",
+        "cycles a pixel, median",
+        "cycles a pixel, largest",
+        "ns a pixel, median",
+    ]
+    columns += ["multipliers", "look-up tables", "clock rate, MHz", "parts a span"]
+    rows = [
+        [
+            *(of["label"], of["group"], of["label"] in on_front, of["samples"]),
+            *of["method_error"],
+            *of["total_error"],
+            *(of["cycles"] or [None] * 3),
+            *(of["ns"][1] if of["ns"] else None, of["multipliers"], of["luts"], of["fmax_mhz"], of["parts"]),
+        ]
+        for of in found
+    ]
+    note = (
+        "Over all meshes, sizes and exponents. Cycles of the further scenes are those of the cycle model. "
+        "Parts a span: "
+        "spans after cutting over spans before, the cost of cutting. Multipliers are those of the netlist; "
+        "look-up tables "
+        "and clock rates those after place and route, where a design has been placed."
+    )
+    return Table("front", "Every design over all scenes", columns, rows, note)

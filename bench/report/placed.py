@@ -1,0 +1,115 @@
+"""Place and route that was measured before: parts and clock rates of pipelines, each with its date.
+
+A quick report reads them here, as placing a design takes minutes. ``blysk fpga --json FILE`` measures more,
+and ``python -m blysk.bench.report.placed FILE [FILE ...]`` merges the files into the store.
+"""
+
+import json
+import re
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import click
+
+from blysk.bench.command import run
+from blysk.sim.errors import InputError
+from blysk.sim.output import write_json
+
+__all__ = ["STORE", "design_of", "merged", "placed", "read_store"]
+
+STORE = Path(__file__).with_name("placed.json")
+"""The committed store: a list of entries of `merged`."""
+
+_NAME = re.compile(r"pipeline ([\w-]+), ([\w-]+), 1 light(?:, (cosine|one_minus_cosine))?")
+
+_PARTS = ("luts", "flip_flops", "multipliers", "block_rams", "distributed_rams")
+
+
+def design_of(name: str) -> tuple[str, ...] | None:
+    """Method, model and perhaps operand, of a name that ``blysk fpga`` gives a pipeline.
+
+    ``None`` of another number of lights, another style and what is no pipeline.
+    """
+    found = _NAME.fullmatch(name)
+    return tuple(word for word in found.groups() if word) if found else None
+
+
+def merged(
+    entries: Iterable[Mapping[str, Any]], measured: Mapping[str, Any], date: str, command: str
+) -> list[dict[str, Any]]:
+    """Entries with what ``blysk fpga --json`` measured, in place of older figures of the same designs.
+
+    Parameters
+    ----------
+    entries : iterable of dict
+        So far.
+    measured : dict
+        Of ``blysk fpga --json``.
+    date : str
+        Of the measurement, as 2026-11-23.
+    command : str
+        That made it.
+
+    Returns
+    -------
+    list of dict
+        By device and name: ``design``, ``device``, the parts, ``fmax_mhz`` of each seed, ``tools``, ``date``
+        and ``command``.
+    """
+    found = {(entry["device"], entry["design"]): dict(entry) for entry in entries}
+    for design in measured["designs"]:
+        found[measured["device"], design["design"]] = {
+            "design": design["design"],
+            "device": measured["device"],
+            **{part: design[part] for part in _PARTS},
+            "fmax_mhz": [seed["fmax"] for seed in design["seeds"]],
+            "tools": measured["tools"],
+            "date": date,
+            "command": command,
+        }
+    return [found[key] for key in sorted(found)]
+
+
+def read_store(path: Path = STORE) -> list[dict[str, Any]]:
+    """Entries of the store."""
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def placed(device: str, path: Path = STORE) -> dict[tuple[str, ...], dict[str, Any]]:
+    """Committed figures of pipelines of one light on a device, by `design_of`, with ``fmax_median_mhz``."""
+    found = {}
+    for entry in read_store(path):
+        design = design_of(entry["design"])
+        if design and entry["device"] == device:
+            found[design] = entry | {"fmax_median_mhz": median(entry["fmax_mhz"])}
+    return found
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, type=click.Path())
+@click.option("--date", default=lambda: datetime.now(UTC).date().isoformat(), show_default="today")
+@click.option("--command", "by", default="blysk fpga", show_default=True, help="What made the files.")
+@click.option(
+    "--store", type=click.Path(path_type=Path), default=STORE, help="In place of the committed one."
+)
+def _merge(files: Sequence[str], date: str, by: str, store: Path) -> int:
+    """Merge files of `blysk fpga --json` into the store of place and route."""
+    entries = read_store(store) if store.exists() else []
+    for file in files:
+        try:
+            entries = merged(entries, json.loads(Path(file).read_text(encoding="utf-8")), date, by)
+        except (OSError, ValueError, KeyError, TypeError):
+            raise InputError(
+                file, "has no figures of place and route", "write it by blysk fpga --json"
+            ) from None
+    write_json(store, entries)
+    click.echo(f"{'placed':<12}{len(entries)} designs in {store}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run(_merge, "blysk.bench.report.placed", None))

@@ -1,0 +1,63 @@
+"""The store of place and route: names, merging, what the report takes from it."""
+
+import json
+
+from click.testing import CliRunner
+
+from blysk.bench.report import placed as module
+from blysk.bench.report.placed import STORE, design_of, merged, placed, read_store
+from blysk.bench.tools.families import DEVICE
+from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
+
+
+def measured(name, *rates):
+    parts = dict.fromkeys(("luts", "flip_flops", "multipliers", "block_rams", "distributed_rams"), 7)
+    seeds = [{"seed": k, "fmax": rate} for k, rate in enumerate(rates, 1)]
+    return {
+        "device": DEVICE,
+        "tools": {"pyosys": "1"},
+        "designs": [{"design": name, **parts, "seeds": seeds}],
+    }
+
+
+def test_names():
+    assert design_of("pipeline chord, cosquad, 1 light") == ("chord", "cosquad")
+    best = "pipeline quadratic, blinn, 1 light, one_minus_cosine"
+    assert design_of(best) == ("quadratic", "blinn", "one_minus_cosine")
+    for other in (
+        "specular",
+        "pipeline chord, cosquad, 2 lights",
+        "pipeline chord, cosquad, 1 light, compact",
+    ):
+        assert design_of(other) is None
+
+
+def test_committed_store():
+    found = placed(DEVICE)
+    assert ("chord", "blinn") in found
+    for method, model, *_ in found:
+        assert method in METHODS | PUBLISHED
+        assert model in MODELS | LOBES
+    assert read_store() == sorted(read_store(), key=lambda entry: (entry["device"], entry["design"]))
+    assert STORE.is_file()
+
+
+def test_newer_figures_replace_older_ones(tmp_path):
+    name = "pipeline linear, blinn, 1 light, one_minus_cosine"
+    first = merged([], measured(name, 90.0, 110.0), "2026-01-01", "by hand")
+    again = merged(first, measured(name, 100.0), "2026-02-01", "blysk fpga")
+    assert [entry["fmax_mhz"] for entry in again] == [[100.0]]
+    file, store = tmp_path / "a.json", tmp_path / "store.json"
+    file.write_text(json.dumps(measured(name, 90.0, 110.0)))
+    result = CliRunner().invoke(module._merge, [str(file), "--date", "2026-01-01", "--store", str(store)])
+    assert result.exit_code == 0, result.output
+    (entry,) = placed(DEVICE, store).values()
+    assert (entry["fmax_median_mhz"], entry["date"], entry["luts"]) == (100.0, "2026-01-01", 7)
+
+
+def test_other_files_are_refused(tmp_path):
+    file = tmp_path / "a.json"
+    file.write_text("{}")
+    found = CliRunner().invoke(module._merge, [str(file), "--store", str(tmp_path / "store.json")])
+    assert "has no figures of place and route" in str(found.exception)
+    assert not (tmp_path / "store.json").exists()

@@ -1,0 +1,35 @@
+"""The cycle model: its recurrence pair by pair against a loop, and its frames against simulation."""
+
+import numpy as np
+import pytest
+
+from blysk.bench.speed.cycle_model import WAITING, compare, span_cycles
+from blysk.golden.presets import preset
+
+
+def looped(length, interval, waiting):
+    """The recurrence, span by span."""
+    starts, ready, end = [], None, 0
+    for k, (own, least) in enumerate(zip(length, interval, strict=True)):
+        free = starts[k - 2] + waiting if k >= 2 else 0
+        ready = 0 if ready is None else max(ready + least, free)
+        starts.append(max(end, ready))
+        end = starts[-1] + own
+    return end
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 7, 300])
+@pytest.mark.parametrize("waiting", [0, WAITING])
+def test_recurrence(count, waiting):
+    rng = np.random.default_rng(count)
+    length, interval = rng.integers(1, 12, count), rng.integers(1, 7, count)
+    assert span_cycles(length, interval, waiting) == looped(length.tolist(), interval.tolist(), waiting)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("method", "share"), [("linear", 0), ("renormalise", 0), ("quadratic", 0), ("chord", 0.03)]
+)
+def test_frames(method, share):
+    simulated, modelled = compare(preset(method), 400, (64, 48))
+    assert abs(modelled - simulated) <= share * simulated
