@@ -289,7 +289,7 @@ const blyskCore = () => {
     const [hx, hy, hz] = halfway;
     const lit = halfway.some((part) => part) && settings.specular > 0;
     const { ambient, diffuse, specular } = termsOf(settings);
-    const reflect = reflection(model, settings.exponent);
+    const reflect = reflection(model, settings[model.parameter ?? "exponent"]);
     for (let at = 0; at < normals.length; at += 3) {
       const x = normals[at];
       const y = normals[at + 1];
