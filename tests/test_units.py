@@ -6,7 +6,7 @@ in Amaranth's simulator; the long run all variants, compiled.
 """
 
 import inspect
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -22,10 +22,19 @@ FEW = 24
 """Beats in Amaranth's simulator; spans are as short as for 200 pixels."""
 
 
-@cache
-def unit_of(name, variant):
-    """A component, the same for all its stimuli: it is translated once."""
+@lru_cache(maxsize=1)
+def default_of(name):
+    return RECORDS[name].variants[RECORDS[name].default].unit()
+
+
+@lru_cache(maxsize=1)
+def other_of(name, variant):
     return RECORDS[name].variants[variant].unit()
+
+
+def unit_of(name, variant):
+    """A component, the same for all its stimuli: it is translated once. Models of no others take memory."""
+    return default_of(name) if variant == RECORDS[name].default else other_of(name, variant)
 
 
 def _runs():

@@ -33,11 +33,16 @@ DESIGNS = {
 }
 
 
+QUICK = "chord", "materials, lights, gate", "values"
+
+
 def colors(beats):
     return np.stack([beats[channel] for channel in "rgb"], axis=-1)
 
 
-@pytest.mark.parametrize("design", DESIGNS)
+@pytest.mark.parametrize(
+    "design", [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in DESIGNS]
+)
 def test_equals_model(design):
     design = DESIGNS[design]
     unit = ShadingPipelineUnit(design)
@@ -104,22 +109,21 @@ def test_gate_by_threshold():
         HighlightGateUnit(p, exponent=20, takes_threshold=True)
 
 
-def test_one_multiplier_a_light():
+@pytest.mark.parametrize("lights", [1, pytest.param(2, marks=pytest.mark.long)])
+def test_one_multiplier_a_light(lights):
     """One fewer than cosine-quadratic light has, which multiplies by its slope; 17 fewer than by products."""
-    for lights in (1, 2):
-        multipliers = {
-            model: cost_of(ShadingPipelineUnit(preset("chord", model, lights))).totals["multipliers"]
-            for model in (None, "blinn", "cosquad", "blinn_product")
-        }
-        plain = multipliers["blinn"] - lights
-        assert multipliers == {
-            None: multipliers[None],
-            "blinn": plain + lights,
-            "cosquad": plain + 2 * lights,
-            "blinn_product": plain + 18 * lights,
-        }
-        if lights == 1:
-            assert multipliers["blinn"] == 16
+    multipliers = {
+        model: cost_of(ShadingPipelineUnit(preset("chord", model, lights))).totals["multipliers"]
+        for model in ("blinn", "cosquad", "blinn_product")
+    }
+    plain = multipliers["blinn"] - lights
+    assert multipliers == {
+        "blinn": plain + lights,
+        "cosquad": plain + 2 * lights,
+        "blinn_product": plain + 18 * lights,
+    }
+    if lights == 1:
+        assert multipliers["blinn"] == 16
 
 
 def test_rate_is_that_of_cosquad():
@@ -130,12 +134,14 @@ def test_rate_is_that_of_cosquad():
     assert units[0].cycles_per_pixel == 1
 
 
-def test_one_memory_for_all_lights():
+@pytest.mark.parametrize(
+    ("lights", "materials"), [(2, 4), *(pytest.param(n, 1, marks=pytest.mark.long) for n in (1, 3))]
+)
+def test_one_memory_for_all_lights(lights, materials):
     """One of 336 words of 35 bits a bank, in one place, whatever the lights."""
-    for lights, materials in ((1, 1), (3, 1), (2, 4)):
-        with_table, without = (
-            cost_of(ShadingPipelineUnit(preset("chord", model, lights, materials=materials)))
-            for model in ("blinn", None)
-        )
-        assert with_table.ram_bits - without.ram_bits >= materials * 336 * 35
-        assert with_table.rom_bits == without.rom_bits
+    with_table, without = (
+        cost_of(ShadingPipelineUnit(preset("chord", model, lights, materials=materials)))
+        for model in ("blinn", None)
+    )
+    assert with_table.ram_bits - without.ram_bits >= materials * 336 * 35
+    assert with_table.rom_bits == without.rom_bits

@@ -40,8 +40,8 @@ RECORD = Record(
     source="[T] figure 4.10",
     variants={
         "": Variant(GeometryUnit),
-        "compact": Variant(partial(GeometryUnit, compact=True)),
-        "true lines": Variant(partial(GeometryUnit, lines=True)),
+        "compact": Variant(partial(GeometryUnit, compact=True), long=True),
+        "true lines": Variant(partial(GeometryUnit, lines=True), long=True),
         "two lanes": Variant(partial(GeometryUnit, setups=2), long=True),
         "4 fraction bits": Variant(partial(GeometryUnit, Grid(4)), long=True),
     },

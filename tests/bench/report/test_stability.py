@@ -3,7 +3,7 @@
 
 import dataclasses
 import json
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -46,13 +46,13 @@ NAMES = [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) f
 FROM_SPANS = [group for group in GROUPS if group != STREAM_GROUP]
 
 
-@cache
+@lru_cache(maxsize=1)
 def cases(group: int) -> list[Case]:
     return list(cases_of(group))
 
 
-@pytest.mark.parametrize("group", FROM_SPANS)
 @pytest.mark.parametrize("method", NAMES)
+@pytest.mark.parametrize("group", FROM_SPANS)
 def test_keeps_what_is_promised(group, method):
     """Nothing silently wrong: not of spans that are cut, nor in the safe range of spans as they come."""
     for case in cases(group):

@@ -160,7 +160,11 @@ def test_without_a_compiler(monkeypatch):
 
 @pytest.mark.parametrize(
     "options",
-    [{"method": "linear", "specialise": True}, pytest.param({}, marks=pytest.mark.long)],
+    [
+        {"method": "linear"},
+        pytest.param({"method": "linear", "specialise": True}, marks=pytest.mark.long),
+        pytest.param({}, marks=pytest.mark.long),
+    ],
     ids=str,
 )
 def test_several_pipelines_give_the_same_picture(options):

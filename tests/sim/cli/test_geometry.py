@@ -37,9 +37,6 @@ def test_picture_and_figures(capsys):
     printed = capsys.readouterr().out
     assert f"hardware, the last triangle taken in after {figures['triangle_cycles']:,} cycles" in printed
     assert "the same method and model in float64" not in printed
-    frame = blysk.render(drawn, geometry="hardware")
-    np.testing.assert_array_equal(frame.image, model.image)
-    assert frame.cycles == figures["cycles"]
 
 
 @pytest.mark.parametrize(
@@ -106,8 +103,8 @@ def test_unknown(refused):
         refused(*command, "--geometry", "x", thing="--geometry x", says="use one of software, hardware")
 
 
-def test_verilog(capsys):
-    """Triangles in, pixels and a memory of depths out; of lines without a normaliser."""
+def test_verilog():
+    """Triangles in, pixels and a memory of depths out."""
     assert main(["verilog", *HARDWARE, "-o", "a.v"]) == 0
     text = Path("a.v").read_text()
     header, body = text.split("module blysk (", 1)
@@ -116,7 +113,19 @@ def test_verilog(capsys):
     for port in ("i_normal_2_2", "memory_read_data", "status_hidden", "constants_limit", "o_depth"):
         assert f"// {port} " in header
     assert "_geometry_normals_normaliser" in body
-    assert blysk.verilog(blysk.design(), geometry="hardware") == text
+
+
+@pytest.mark.long
+def test_same_from_python(capsys):
+    """Frame and Verilog by the functions of the package; of lines without a normaliser."""
+    assert main(["render", *SMALL, *HARDWARE, "-o", "a.png", "--json", "a.json"]) == 0
+    drawn = blysk.scene("teapot", triangles=500, size=(64, 48))
+    frame = blysk.render(drawn, geometry="hardware")
+    np.testing.assert_array_equal(frame.image, picture("a.png"))
+    assert frame.cycles == json.loads(Path("a.json").read_text())["cycles"]
+    assert main(["verilog", *HARDWARE, "-o", "a.v"]) == 0
+    assert blysk.verilog(blysk.design(), geometry="hardware") == Path("a.v").read_text()
+    capsys.readouterr()
     assert main(["verilog", *HARDWARE, "--method", "renormalise"]) == 0
     text = capsys.readouterr().out
     assert "true lines, uncut" in text

@@ -42,6 +42,7 @@ def test_no_cache(tmp_path, places):
     assert os.listdir(tmp_path) == ["a.png"]
 
 
+@pytest.mark.long
 def test_compiled_engine_without_a_cache(tmp_path):
     """Yosys' WebAssembly, the compiler and the model, in a folder that is gone afterwards."""
     temporary = tmp_path / "temporary"
@@ -85,16 +86,16 @@ def test_folder_that_is_gone(tmp_path):
     assert (status, errors) == (2, [f"blysk: the current folder: {reason}"])
 
 
-@pytest.mark.parametrize("option", ["--json", "--compare"])
-@pytest.mark.parametrize("old", [True, False])
-def test_failed_output_leaves_no_picture(tmp_path, option, old):
+@pytest.mark.parametrize(("option", "old"), [("--json", True), ("--compare", True), ("--json", False)])
+def test_failed_output_leaves_no_picture(tmp_path, monkeypatch, capsys, option, old):
+    monkeypatch.chdir(tmp_path)
     suffix = ".json" if option == "--json" else ".png"
     picture = tmp_path / "a.png"
     if old:
         picture.write_text("old")
     for bad in (f"/proc/b{suffix}", tmp_path / "none" / f"b{suffix}", tmp_path / ("b" * 300 + suffix)):
-        status, _, errors = blysk(*RENDER, "-o", picture, option, bad, folder=tmp_path, HOME=str(tmp_path))
-        assert (status, len(errors)) == (2, 1)
+        assert main([*RENDER, "-o", str(picture), option, str(bad)]) == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
     left = [path.name for path in tmp_path.iterdir() if path.name != ".cache"]
     assert left == ["a.png"] * old
     assert not old or picture.read_text() == "old"

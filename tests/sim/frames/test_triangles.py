@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from blysk.golden.frames.triangle_frame import triangle_frame
-from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
+from blysk.sim.api.design import design
 from blysk.sim.api.scene import scene
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.frames.triangles import TriangleSimulator
@@ -17,7 +17,7 @@ SIZE = 64, 48
 
 @pytest.fixture(scope="module")
 def simulator():
-    return TriangleSimulator(Renderer(preset("chord")), SIZE)
+    return TriangleSimulator(Renderer(design()), SIZE)
 
 
 @pytest.mark.parametrize(("triangles", "back_faces"), [(200, "flip"), (1000, "cull")])
@@ -63,7 +63,7 @@ def test_another_size_is_refused(simulator):
 
 def test_a_wrong_model_is_found(monkeypatch):
     """A simulator checks some triangles of its own before a scene's."""
-    renderer = Renderer(preset("chord"))
+    renderer = Renderer(design())
     compute = Renderer.compute
 
     def wrong(self, *operands):
