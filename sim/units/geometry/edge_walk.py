@@ -38,11 +38,12 @@ def _below(unit, rng, count):
 
 
 def _flat(unit, rng, count):
-    """Triangles with a flat top, nearly as high as the grid: the lower short edge is all of a side."""
+    """Triangles with a flat top, or nearly so, as high as the grid: the lower short edge is a whole side."""
     triangles, grid = random_triangles(rng, count, unit.grid, 500.0), unit.grid
     ends = grid.coordinate.min_code, grid.coordinate.max_code
     triangles.x[:] = rng.integers(ends[0], ends[1], triangles.x.shape)
-    triangles.y[:, :2] = ends[0] + rng.integers(0, 8 * grid.steps, (count, 1))
+    triangles.y[:, :2] = ends[0] + rng.integers(0, 4 * grid.steps, (count, 1))
+    triangles.y[::2, 1] += rng.integers(0, 4 * grid.steps, len(triangles.y[::2]))
     triangles.y[:, 2] = ends[1] - rng.integers(0, 1 << rng.integers(1, grid.bits - 1), count)
     stages = Stages(triangles, Frame(-2048, -2048, 2047, -2036), grid)
     beats = stages.drawn.beats | stages.edges.beats
