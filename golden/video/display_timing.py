@@ -88,7 +88,8 @@ class DisplayTiming:
     """Position, whether it is in the picture, and both sync signals, a cycle of the pixel clock each.
 
     Cycle 0 is the first pixel below the picture, so that the blank lines come before the first frame. The
-    position counts through the porches: x below the line's total, y below the frame's. Exact.
+    position counts through the porches: x below the line's total, y below the frame's. The vertical signal
+    changes where the horizontal pulse begins, so that its porches count from the last pixel's end. Exact.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ class DisplayTiming:
             "y": y,
             "active": (x < line.visible) & (y < frame.visible),
             "hsync": self._sync(x, line),
-            "vsync": self._sync(y, frame),
+            "vsync": self._sync(y + (x >= line.pulse[0]), frame),
         }
 
     @staticmethod

@@ -12,8 +12,8 @@ BITS = 10
 CONTROL_WORDS = (0b1101010100, 0b0010101011, 0b0101010100, 0b1010101011)
 """Words outside the picture, by ``c1 c0``: seven transitions or more, which no word of colour has."""
 
-CLOCK_WORD = 0b0000011111
-"""What the clock's lane repeats: high for the first half of a pixel."""
+CLOCK_WORD = 0b1111100000
+"""What the clock's lane repeats: a word begins with its falling edge. Displays find words by control words."""
 
 MAX_DISPARITY = 8
 """Largest running disparity after a word: ones less zeros sent since the last control word."""

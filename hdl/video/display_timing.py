@@ -1,6 +1,6 @@
 """Display timing: which pixel a display shows on each cycle of the pixel clock, and its sync pulses."""
 
-from amaranth.hdl import Module, Signal, Value, unsigned
+from amaranth.hdl import Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import Out
 
@@ -61,14 +61,14 @@ class DisplayTimingUnit(wiring.Component):
             self.o.y.eq(y),
             self.o.active.eq((x < line.visible) & (y < frame.visible)),
             self.o.hsync.eq(_sync(x, line)),
-            self.o.vsync.eq(_sync(y, frame)),
+            self.o.vsync.eq(Mux(x >= line.pulse[0], _sync(y, frame, 1), _sync(y, frame))),
         ]
         return m
 
 
-def _sync(position: Value, axis: Axis) -> Value:
+def _sync(position: Value, axis: Axis, early: int = 0) -> Value:
     begin, end = axis.pulse
-    pulse = (position >= begin) & (position < end)
+    pulse = (position >= begin - early) & (position < end - early)
     return pulse if axis.positive else ~pulse
 
 

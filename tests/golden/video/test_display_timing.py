@@ -13,7 +13,7 @@ def runs(values):
 
 
 def test_vga():
-    """800x525, 25.2 MHz; both pulses low, 96 pixels and two lines; 16 and 10 in front of them."""
+    """800x525, 25.2 MHz; both pulses low, 96 pixels and two lines; 16 and 10 lines in front of them."""
     assert (VGA.cycles, VGA.pixel_rate, VGA.size) == (800 * 525, 25.2e6, (640, 480))
     frame = DisplayTiming().compute(VGA.cycles, first=45 * 800)
     assert frame["active"].sum() == 640 * 480
@@ -21,7 +21,7 @@ def test_vga():
     assert runs(line["active"]) == [(1, 640), (0, 160)]
     assert runs(line["hsync"]) == [(1, 640 + 16), (0, 96), (1, 48)]
     assert line["vsync"].all()
-    assert runs(frame["vsync"]) == [(1, 490 * 800), (0, 2 * 800), (1, 33 * 800)]
+    assert runs(frame["vsync"]) == [(1, 489 * 800 + 656), (0, 2 * 800), (1, 33 * 800 + 144)]
     assert len(set(zip(frame["x"].tolist(), frame["y"].tolist(), strict=True))) == VGA.cycles
 
 

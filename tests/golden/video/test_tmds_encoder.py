@@ -71,7 +71,7 @@ def test_words(every):
     assert transitions.max() == 5
     assert np.abs(np.diff(bits_of(np.array(CONTROL_WORDS)))).sum(-1).min() == 7
     assert not set(words.ravel().tolist()) & set(CONTROL_WORDS)
-    assert bits_of(CLOCK_WORD).tolist() == [1] * 5 + [0] * 5
+    assert bits_of(CLOCK_WORD).tolist() == [0] * 5 + [1] * 5
 
 
 def test_stream_is_the_flow_chart_in_turn():

@@ -12,10 +12,13 @@ __all__ = ["PatternTop", "picture"]
 
 
 class PatternTop(wiring.Component):
-    """A display whose bands hold ``(x, y, x ^ y ^ frame)`` in every pixel but those of every eighth column."""
+    """A display whose bands hold ``(x, y, x ^ y ^ frame)`` in every pixel but those of every eighth column.
 
-    def __init__(self, parameters, pause=0):
-        self.display, self.pause = DisplayUnit(parameters), pause
+    Without ``moves`` every frame is the first.
+    """
+
+    def __init__(self, parameters, pause=0, moves=True):
+        self.display, self.pause, self.moves = DisplayUnit(parameters), pause, moves
         members = self.display.signature.members
         super().__init__({name: Out(members[name].shape) for name in ("pairs", "status")})
 
@@ -34,7 +37,7 @@ class PatternTop(wiring.Component):
             pixel.y.eq(y),
             pixel.r.eq(x),
             pixel.g.eq(line),
-            pixel.b.eq(x ^ line ^ frame),
+            pixel.b.eq(x ^ line ^ (frame if self.moves else 0)),
             done.payload.eq(band),
         ]
         with m.FSM():
