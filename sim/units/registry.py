@@ -13,7 +13,7 @@ from blysk.sim.units.record import Record
 
 __all__ = ["RECORDS", "ROOMS"]
 
-ROOMS = ("geometry", "normals", "cosines", "methods", "lighting", "")
+ROOMS = ("geometry", "normals", "cosines", "methods", "lighting", "video", "")
 """Rooms on the data's way; last those that stand in none."""
 
 HELPERS = ("operands", "record", "registry", "triangles")
