@@ -8,7 +8,7 @@ from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.render import Renderer
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import connect, connect_fifo
+from blysk.hdl.core.stream import connect, connect_fifo, moving
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.depth_test import DepthMemory, DepthTestUnit, drawn_pixel_shape
 from blysk.hdl.geometry.geometry import GeometryUnit
@@ -102,6 +102,11 @@ class RenderUnit(wiring.Component):
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
         Depths so far; only without a ``size``.
 
+    Attributes
+    ----------
+    idle : Signal
+        No triangle, span or pixel is inside. A cycle after the last left.
+
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
@@ -124,6 +129,7 @@ class RenderUnit(wiring.Component):
         if size is None:
             members["memory"] = Out(DepthMemory(design.x_bits, design.y_bits))
         super().__init__(members)
+        self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
         """The three units; a span goes to the pipeline, and its depth to a FIFO, on the same cycle."""
@@ -151,6 +157,11 @@ class RenderUnit(wiring.Component):
         with m.If(made.valid & made.ready):
             m.d.sync += count.eq(count + 1)
         shape = data.StructLayout(deep)
+        spans = moving(m, "spans", made, depth.i, pixel_last := Signal(name="pixel_last"))
+        m.d.comb += [
+            pixel_last.eq(pipeline.o.payload.last),
+            self.idle.eq(geometry.idle & depth.idle & ~spans),
+        ]
         m.submodules.depths = depths = fifo.SyncFIFOBuffered(
             width=Shape.cast(shape).width, depth=pipeline.spans_inside + 1
         )

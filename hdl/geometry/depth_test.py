@@ -80,6 +80,11 @@ class DepthTestUnit(wiring.Component):
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
         Depths so far.
 
+    Attributes
+    ----------
+    idle : Signal
+        No pixel is inside.
+
     Source: docs/theory/geometry.md#depth; not in the documents.
     """
 
@@ -97,6 +102,7 @@ class DepthTestUnit(wiring.Component):
             members["memory"] = Out(port)
         super().__init__(members)
         self._port = port.create(path=("port",)) if size else self.memory
+        self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
         """Depth of the pixel; the memory's word; their comparison; the write."""
@@ -112,6 +118,7 @@ class DepthTestUnit(wiring.Component):
             self.i.ready.eq(advance),
             accept.eq(self.i.valid & advance),
         ]
+        m.d.comb += self.idle.eq(~(Cat(valid).any() | self.o.valid))
 
         # The sum has a sign, and a bit more than any step of a span can add.
         first, total = Signal(name="first", init=1), Signal(37, name="total")
