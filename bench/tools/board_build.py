@@ -1,4 +1,4 @@
-"""Bitstreams: a board's top through Yosys, nextpnr and ecppack, with its pins, clocks, and what was reached."""
+"""Bitstreams: a board's top through Yosys, nextpnr and ecppack, with its pins, and the clocks reached."""
 
 import contextlib
 import importlib
@@ -16,7 +16,15 @@ from amaranth.hdl import Elaboratable
 from blysk.bench.store import version_of
 from blysk.bench.tools.absorb_registers import absorb_registers
 from blysk.bench.tools.families import ECP5, signal_name
-from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE, MOUNT, YOSYS, TooLarge, ToolError, ToolRunner
+from blysk.bench.tools.place_and_route import (
+    MAP_AFTER,
+    MAP_BEFORE,
+    MOUNT,
+    YOSYS,
+    TooLarge,
+    ToolError,
+    ToolRunner,
+)
 from blysk.sim.errors import InputError
 
 __all__ = ["BOARDS", "Board", "Built", "Clock", "board_named", "build", "packages_missing"]
@@ -59,6 +67,10 @@ class Board:
         Resources, up to six: what the top does with each is the top's.
     block_rams, multipliers : int
         Of its device.
+    lines : int
+        Of a band: the device has the memory.
+    loader : str
+        What openFPGALoader calls it.
     """
 
     name: str
@@ -69,6 +81,8 @@ class Board:
     buttons: tuple[tuple[str, int], ...]
     block_rams: int
     multipliers: int
+    lines: int
+    loader: str
 
     def make(self) -> Any:
         """The platform of amaranth-boards.
@@ -100,6 +114,8 @@ BOARDS = {
             buttons=_ULX3S_BUTTONS,
             block_rams=56,
             multipliers=28,
+            lines=8,
+            loader="ulx3s",
         ),
         Board(
             *("ulx3s-85f", "ulx3s", "ULX3S_85F_Platform"),
@@ -108,6 +124,8 @@ BOARDS = {
             buttons=_ULX3S_BUTTONS,
             block_rams=208,
             multipliers=156,
+            lines=16,
+            loader="ulx3s",
         ),
         Board(
             *("icepi-zero", "icepi_zero", "IcepiZero1_3Platform"),
@@ -116,6 +134,8 @@ BOARDS = {
             buttons=(("button", 0), ("button", 1)),
             block_rams=56,
             multipliers=28,
+            lines=8,
+            loader="icepi-zero",
         ),
     )
 }
@@ -319,9 +339,13 @@ def _clocks(report: Mapping[str, Any], rates: Mapping[str, float]) -> tuple[Cloc
     """Clocks of nextpnr's report, with the path that limits each; then paths between clocks."""
     names, result = {}, []
     for net, rate in report["fmax"].items():
-        name = next((name for name, asked in rates.items() if abs(rate["constraint"] / asked - 1) < 1e-3), None)
+        name = next(
+            (name for name, asked in rates.items() if abs(rate["constraint"] / asked - 1) < 1e-3), None
+        )
         if name is None or name in names.values():
-            raise ToolError(f"nextpnr constrains {net} to {rate['constraint']:.2f} MHz, which no clock asks for")
+            raise ToolError(
+                f"nextpnr constrains {net} to {rate['constraint']:.2f} MHz, which no clock asks for"
+            )
         names[net] = name
     for path in report["critical_paths"]:
         edges = [path[side].removeprefix("posedge ") for side in ("from", "to")]

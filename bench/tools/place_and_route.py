@@ -32,12 +32,12 @@ from blysk.sim.errors import InputError
 from blysk.sim.output import write_json
 
 __all__ = [
-    "SEEDS",
-    "Layout",
     "MAP_AFTER",
     "MAP_BEFORE",
     "MOUNT",
+    "SEEDS",
     "YOSYS",
+    "Layout",
     "Registered",
     "TooLarge",
     "ToolError",

@@ -54,7 +54,9 @@ class BandBuffer:
     def __post_init__(self):
         height = self.mode.vertical.visible
         if self.lines < 2 or self.lines & (self.lines - 1) or height % self.lines or height < 4 * self.lines:
-            raise ValueError(f"a band has 2, 4, 8, ... lines, and {height} lines are four bands or more of them")
+            raise ValueError(
+                f"a band has 2, 4, 8, ... lines, and {height} lines are four bands or more of them"
+            )
         if not all(4 <= bits <= 8 for bits in self.colour_bits):
             raise ValueError("a channel is kept by 4 to 8 bits")
         if not all(0 <= channel <= 255 for channel in self.background):

@@ -69,7 +69,7 @@ class ClockPlan:
 
 
 def clock_plan(reference: int, pixel_rate: float, draw_rate: float) -> ClockPlan:
-    """The plan whose pixel clock is nearest to what is asked for; of equal ones that with the fastest drawing.
+    """The plan whose pixel clock is nearest to what is asked for; of equal ones the fastest drawing clock.
 
     Parameters
     ----------
@@ -105,13 +105,11 @@ def clock_plan(reference: int, pixel_rate: float, draw_rate: float) -> ClockPlan
             ]
             if error <= TOLERANCE and draw <= DIVIDERS and loops:
                 loop = loops[0]
-                plan = ClockPlan(
-                    reference, input_divider, steps // loop, loop, serial, SERIAL * serial, draw
-                )
+                plan = ClockPlan(reference, input_divider, steps // loop, loop, serial, SERIAL * serial, draw)
                 plans.append((error, -vco / draw, input_divider, serial, plan))
     if not plans:
         raise NoClockPlan(
-            f"no dividers make {pixel_rate / 1e6:g} MHz for pixels, and {draw_rate / 1e6:g} MHz or a little less "
-            f"for drawing, of {reference / 1e6:g} MHz"
+            f"no dividers make {pixel_rate / 1e6:g} MHz for pixels, and {draw_rate / 1e6:g} MHz or a little "
+            f"less for drawing, of {reference / 1e6:g} MHz"
         )
     return min(plans, key=lambda entry: entry[:-1])[-1]

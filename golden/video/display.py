@@ -1,6 +1,7 @@
 """Display: frames to the words of four lanes, and back to frames, with every rule of the lanes checked."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -115,7 +116,9 @@ class Display:
         weights = 1 << np.arange(BITS)
         counts = []
         for offset in range(BITS):
-            whole = bits[offset : offset + (len(bits) - offset) // BITS * BITS].reshape(-1, BITS, bits.shape[1])
+            whole = bits[offset : offset + (len(bits) - offset) // BITS * BITS].reshape(
+                -1, BITS, bits.shape[1]
+            )
             words = np.einsum("nbl,b->nl", whole, weights)
             is_control = np.isin(words[:, :3], CONTROL_WORDS).all(1)
             # Two in a row: no run of colour looks like that at any cut.
@@ -132,7 +135,7 @@ class Display:
 
     def _check_sync(self, control: np.ndarray, active: np.ndarray, tops: np.ndarray) -> None:
         """Both sync signals in the blank parts of lines, from the first frame's top to the last one's."""
-        for top, following in zip(tops[:-1], tops[1:], strict=True):
+        for top, following in pairwise(tops):
             if following - top != self.mode.cycles:
                 raise LaneError(f"a frame lasts {following - top} pixels, not {self.mode.cycles}")
         end = tops[-1] + (self.mode.vertical.visible - 1) * self.mode.horizontal.total

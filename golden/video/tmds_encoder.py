@@ -13,7 +13,7 @@ CONTROL_WORDS = (0b1101010100, 0b0010101011, 0b0101010100, 0b1010101011)
 """Words outside the picture, by ``c1 c0``: seven transitions or more, which no word of colour has."""
 
 CLOCK_WORD = 0b1111100000
-"""What the clock's lane repeats: a word begins with its falling edge. Displays find words by control words."""
+"""What the clock's lane repeats: a word begins with its falling edge."""
 
 MAX_DISPARITY = 8
 """Largest running disparity after a word: ones less zeros sent since the last control word."""
@@ -33,8 +33,8 @@ class TmdsEncoder:
     Then the eight bits are sent as they are or inverted, as bit 9 tells, so that the running disparity comes
     nearer to 0. In a control period one of `CONTROL_WORDS` is sent, and the disparity becomes 0.
 
-    Exact: every word decodes to its byte. The running disparity stays even and within `MAX_DISPARITY`, whatever is
-    sent.
+    Exact: every word decodes to its byte. The running disparity stays even and within `MAX_DISPARITY`,
+    whatever is sent.
 
     Source: docs/theory/video.md#tmds.
     """

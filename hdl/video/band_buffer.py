@@ -126,9 +126,7 @@ class BandBufferUnit(wiring.Component):
         worth = (coming == after_slot) | (coming == self._plus_one(after_slot))
         pixel = self.pixels.payload
         place = Signal(range(2 * given.pixels), name="place")
-        word = Cat(
-            pixel[channel][8 - bits :] for channel, bits in zip("rgb", given.colour_bits, strict=True)
-        )
+        word = Cat(pixel[channel][8 - bits :] for channel, bits in zip("rgb", given.colour_bits, strict=True))
         m.d.comb += self.request.payload.eq(last)
         with m.FSM(name="draw"):
             with m.State("wait"), m.If(~Array(busy)[which]):

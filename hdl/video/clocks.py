@@ -11,7 +11,7 @@ __all__ = ["ClockUnit"]
 
 
 class ClockUnit(wiring.Component):
-    """ECP5's PLL, ``EHXPLLL``, and the domains ``sync``, ``pixel`` and ``serial``, in reset until it is locked.
+    """ECP5's PLL, ``EHXPLLL``, and the domains ``sync``, ``pixel``, ``serial``, in reset until it is locked.
 
     Parameters
     ----------

@@ -79,5 +79,3 @@ class DisplayUnit(wiring.Component):
             self.pairs.eq(serialiser.o.payload),
         ]
         return m
-
-

@@ -70,5 +70,3 @@ def _sync(position: Value, axis: Axis, early: int = 0) -> Value:
     begin, end = axis.pulse
     pulse = (position >= begin - early) & (position < end - early)
     return pulse if axis.positive else ~pulse
-
-

@@ -38,7 +38,9 @@ class OutputCells(wiring.Component):
             raise ValueError(f"{lanes} lanes need {lanes} ports, not {len(ports)}")
         self._ports = ports
         members = {"pairs": In(data.ArrayLayout(2, lanes))}
-        super().__init__(members if ports is not None else members | {"bits": Out(data.ArrayLayout(2, lanes))})
+        super().__init__(
+            members if ports is not None else members | {"bits": Out(data.ArrayLayout(2, lanes))}
+        )
 
     def elaborate(self, platform):
         """Buffers, or two registers in their place."""

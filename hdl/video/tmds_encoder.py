@@ -1,6 +1,6 @@
 """TMDS encoder: a byte of colour as ten bits with few transitions and no direct current."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed, unsigned
+from amaranth.hdl import Cat, Const, Mux, Signal, signed, unsigned
 from amaranth.lib import data
 
 from blysk.golden.video.tmds_encoder import BITS, CONTROL_WORDS, TmdsEncoder
@@ -44,7 +44,7 @@ class TmdsEncoderUnit(PipelinedUnit):
         super().__init__(SYMBOL, unsigned(BITS), latency=self.parameters.latency)
 
     def datapath(self, m, operands):
-        """XOR or XNOR by the ones of the byte, then both of it; excess of the chain; inversion and disparity."""
+        """XOR or XNOR by the ones of the byte; the chain's excess of ones; inversion and disparity."""
         byte = operands.data
         ones = Signal(range(9), name="ones")
         use_xor, chain = Signal(name="use_xor"), Signal(8, name="chain")

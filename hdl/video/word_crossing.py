@@ -13,8 +13,8 @@ class WordCrossing(wiring.Component):
 
     A bit that toggles with each word goes through two flip-flops; its first edge sets a counter of five
     cycles. Later edges may come a cycle early or late, where the edges of both clocks lie close together,
-    without moving it: a word is taken at the same distance from its edge, two or three cycles, for ever. Constraint:
-    the words' paths take less than two periods of the serial clock; they stay for five.
+    without moving it: every word is taken at the same distance from its edge, two or three cycles.
+    Constraint: the words' paths take less than two periods of the serial clock; they stay for five.
 
     Both clocks come from one source, at 1 : 5. The phase does not matter.
 

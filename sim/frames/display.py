@@ -41,8 +41,8 @@ class OneClock(wiring.Component):
     i : :py:`In(stream.Signature(buttons))`
         The buttons from now on.
     o : :py:`Out(stream.Signature(32))`
-        Bits of the lanes, those of four cycles at a time: of each cycle two bits of lane 0, of lane 1, ...; the
-        sink must be ready.
+        Bits of the lanes, those of four cycles at a time: of each cycle two bits of lane 0, of lane 1, ...;
+        the sink must be ready.
     status : :py:`Out(...)`
         That of the top.
 

@@ -44,7 +44,8 @@ def test_a_smaller_bound_is_refuted(refute):
 
 
 @pytest.mark.parametrize(
-    ("text", "bug"), [("xor + invert - 1", "xor - 1"), ("Mux(active, after, 0)", "after"), ("~xor, ", "xor, ")]
+    ("text", "bug"),
+    [("xor + invert - 1", "xor - 1"), ("Mux(active, after, 0)", "after"), ("~xor, ", "xor, ")],
 )
 def test_bugs_are_found(refute, inject, text, bug):
     """Injected in the unit, each refutes the claims."""

@@ -9,7 +9,9 @@ from blysk.golden.video.display_timing import VGA, Axis, DisplayMode, DisplayTim
 def runs(values):
     """Lengths of runs of equal values, with the values."""
     edges = np.r_[0, np.flatnonzero(np.diff(values)) + 1, len(values)]
-    return list(zip(np.asarray(values)[edges[:-1]].astype(int).tolist(), np.diff(edges).tolist(), strict=True))
+    return list(
+        zip(np.asarray(values)[edges[:-1]].astype(int).tolist(), np.diff(edges).tolist(), strict=True)
+    )
 
 
 def test_vga():

@@ -10,7 +10,6 @@ from blysk.hdl.video.display import DisplayUnit
 __all__ = ["PatternTop", "picture"]
 
 
-
 class PatternTop(wiring.Component):
     """A display whose bands hold ``(x, y, x ^ y ^ frame)`` in every pixel but those of every eighth column.
 

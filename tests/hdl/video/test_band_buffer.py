@@ -83,7 +83,7 @@ def show(parameters, wait, periods=(1.0, 1.37), frames=FRAMES):
     simulator.add_testbench(draw)
     simulator.add_testbench(watch)
     simulator.run()
-    found = {name: np.array(values) for name, values in zip(unit.shown.shape().members, zip(*found), strict=True)}
+    found = dict(zip(unit.shown.shape().members, np.array(found).T, strict=True))
     for name, values in cycles.items():
         np.testing.assert_array_equal(found[name], values)
     colours = np.stack([found[channel] for channel in "rgb"], axis=-1)[cycles["active"]]
