@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from amaranth.hdl import Cat, Elaboratable, Module
+from amaranth.hdl import Cat, ClockDomain, Elaboratable, Module
 from amaranth.lib import io
 from amaranth.lib.wiring import Component
 
@@ -154,6 +154,7 @@ class BoardTop(Elaboratable):
         clock = platform.request(platform.default_clk, dir="-")
         m.submodules.clock = buffer = io.Buffer("i", clock)
         m.submodules.clocks = clocks = ClockUnit(self.plan)
+        m.domains += [ClockDomain(name) for name in clocks.clocks]
         m.d.comb += clocks.reference.eq(buffer.i)
         names = [pin.name for pin in platform.lookup("hdmi", 0).ios if hasattr(pin, "ios")]
         connector = platform.request("hdmi", 0, dir=dict.fromkeys(names, "-"))

@@ -1,6 +1,6 @@
 """Clocks: a PLL that makes the clocks of a display and of what draws for it, of a board's clock."""
 
-from amaranth.hdl import ClockDomain, ClockSignal, Const, Instance, Module, Signal
+from amaranth.hdl import ClockSignal, Const, Instance, Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.cdc import ResetSynchronizer
 from amaranth.lib.wiring import In
@@ -11,7 +11,9 @@ __all__ = ["ClockUnit"]
 
 
 class ClockUnit(wiring.Component):
-    """ECP5's PLL, ``EHXPLLL``, and the domains ``sync``, ``pixel``, ``serial``, in reset until it is locked.
+    """ECP5's PLL, ``EHXPLLL``, which drives the domains ``sync``, ``pixel``, ``serial``.
+
+    They are in reset until it is locked. Who uses it defines them.
 
     Parameters
     ----------
@@ -79,7 +81,6 @@ class ClockUnit(wiring.Component):
             **{f"i_{name}": Const(0) for name in ("ENCLKOP", "ENCLKOS", "ENCLKOS2", "ENCLKOS3")},
         )
         for name, clock in self.clocks.items():
-            m.domains += ClockDomain(name)
             m.d.comb += ClockSignal(name).eq(clock)
             m.submodules[f"reset_{name}"] = ResetSynchronizer(~locked, domain=name)
         return m
