@@ -1,8 +1,9 @@
 """The compiled engine: a component through CXXRTL to C++, compiled, cached, and driven by compiled code.
 
-Amaranth gives RTLIL, Yosys' CXXRTL a C++ class that `guards` rewrites, and `cxxrtl_driver.cc` the loop over
-the cycles; Python is called once in a million cycles. The first run of a newly built model is compared with
-pysim over its first cycles, and the first and last 1024 writes, before the model goes into the cache.
+Amaranth gives RTLIL, Yosys' CXXRTL a C++ class that `guards` and `words` rewrite, and `cxxrtl_driver.cc`
+the loop over the cycles; Python is called once in a million cycles. The first run of a newly built model is
+compared with pysim over its first cycles, and the first and last 1024 writes, before the model
+goes into the cache.
 """
 
 import contextlib
@@ -34,6 +35,7 @@ from blysk.sim.engines.compilers import Compiler, compiler_missing, find_compile
 from blysk.sim.engines.engine import Ports, SimulationError, Stimulus, StopReason, Trace
 from blysk.sim.engines.guards import group_registers
 from blysk.sim.engines.pysim import Model as Interpreted
+from blysk.sim.engines.words import plain_words
 from blysk.sim.errors import InputError
 
 __all__ = ["Model", "runtime_folder", "sources_of"]
@@ -157,7 +159,7 @@ def _generate(netlist: str) -> str:
                 f"Yosys: {str(warning.message).strip()} A combinational signal depends on itself, "
                 "or one field of a structure on another: give each its own signal, or use the engine pysim"
             )
-    return group_registers(text)
+    return plain_words(group_registers(text))
 
 
 def _netlist_of(component: Component) -> str:
@@ -175,13 +177,18 @@ def sources_of(component: Component) -> tuple[str, str]:
     component : Component
         As for `Model`, with whose errors it is refused.
     """
-    driver = _members(Ports(component)) + _source("cxxrtl_driver.cc")
-    return _generate(_netlist_of(component)), driver
+    text = _generate(_netlist_of(component))
+    return text, _header(text) + _members(Ports(component)) + _source("cxxrtl_driver.cc")
 
 
 def runtime_folder() -> Path:
     """Folder of the headers that this C++ includes."""
     return Path(_Yosys.data_dir()) / "include" / "backends" / "cxxrtl" / "runtime"
+
+
+def _header(text: str) -> str:
+    """Definition for the driver of a model that needs none of CXXRTL's operations."""
+    return "" if "#include <cxxrtl/cxxrtl.h>" in text else "#define BLYSK_WORDS\n"
 
 
 def _members(ports: Ports) -> str:
@@ -208,8 +215,9 @@ def _workshop() -> Iterator[Path]:
 def _build(netlist: str, driver: str, compiler: Compiler, key: str, folder: Path) -> str | None:
     """Make the shared library ``model`` in a folder; what the compiler complains of if it fails."""
     names = f'#define BLYSK_MODEL "model.cc"\n#define BLYSK_KEY "{key}"\n'
-    (folder / "model.cc").write_text(_generate(netlist))
-    (folder / "driver.cc").write_text(names + driver)
+    text = _generate(netlist)
+    (folder / "model.cc").write_text(text)
+    (folder / "driver.cc").write_text(names + _header(text) + driver)
     commands = [[*compiler.compile, "-I", str(runtime_folder()), "driver.cc", "-o", "model"]]
     if compiler.link:
         commands[0][-1] = "driver.o"
@@ -255,9 +263,9 @@ class Model:
     """A component compiled to machine code.
 
     The library comes from the cache, or is built; a built one is compared with pysim on its first run and
-    only then put into the cache. Entries are named by the hash of netlist, Yosys script, `guards`, driver,
-    compiler and flags and by that of their own content, and appear whole (written aside, then renamed). A
-    cache without room costs a warning, and the next process a build.
+    only then put into the cache. Entries are named by the hash of netlist, Yosys script, `guards`, `words`,
+    driver, compiler and flags and by that of their own content, and appear whole (written aside, then
+    renamed). A cache without room costs a warning, and the next process a build.
 
     Parameters
     ----------
@@ -289,6 +297,7 @@ class Model:
                 netlist,
                 _SCRIPT,
                 _source("guards.py"),
+                _source("words.py"),
                 driver,
                 compiler.identity,
                 repr(compiler.compile[1:] + compiler.link[1:]),

@@ -9,7 +9,35 @@
 //
 // The model lives on the heap: g++ 12 -O2 miscompiles it as a local object.
 
+#ifndef BLYSK_WORDS
 #include <cxxrtl/cxxrtl.h>
+#else
+// All of it that a model of words needs, without the headers that take a compiler half a second.
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#define CXXRTL_ALWAYS_INLINE inline __attribute__((__always_inline__))
+#define CXXRTL_ASSERT(condition) ((void)(condition))
+
+namespace cxxrtl {
+
+struct interior {};
+struct observer {};
+struct performer {};
+
+struct module {
+	module() = default;
+	virtual ~module() = default;
+	module(const module &) = delete;
+	virtual void reset() = 0;
+	virtual bool eval(performer *performer = nullptr) = 0;
+	virtual bool commit() = 0;
+};
+
+} // namespace cxxrtl
+#endif
 
 // CXXRTL's own values are arrays of 32-bit chunks, which compilers are slow at and make slow code of. These are machine
 // words; one is enough for most of a datapath, and makes the shading pipeline 2.5 times as fast. They offer what generated
@@ -73,6 +101,7 @@ struct value : expression<value<Bits>> {
 		for (size_t n = 0; n <= sizeof...(init); n++) data[n / 2] |= word(chunks[n]) << n % 2 * 32;
 	}
 
+#ifndef BLYSK_WORDS
 	CXXRTL_ALWAYS_INLINE value(const cxxrtl::value<Bits> &from) {
 		for (size_t n = 0; n < from.chunks; n++) data[n / 2] |= word(from.data[n]) << n % 2 * 32;
 	}
@@ -83,6 +112,9 @@ struct value : expression<value<Bits>> {
 		return result;
 	}
 
+	CXXRTL_ALWAYS_INLINE cxxrtl::value<Bits> library() const { return *this; }
+#endif
+
 	CXXRTL_ALWAYS_INLINE static value cut(word from) {
 		static_assert(words == 1, "one word");
 		value result;
@@ -91,7 +123,6 @@ struct value : expression<value<Bits>> {
 	}
 
 	CXXRTL_ALWAYS_INLINE const value &val() const { return *this; }
-	CXXRTL_ALWAYS_INLINE cxxrtl::value<Bits> library() const { return *this; }
 
 	template<class Integer>
 	void set(Integer from) { data[0] = from; }
@@ -219,10 +250,10 @@ struct memory {
 		int priority;
 	};
 
-	std::unique_ptr<value<Width>[]> data;
+	std::vector<value<Width>> data;
 	std::vector<write> writes;
 
-	explicit memory(size_t depth) : data(new value<Width>[depth]) {}
+	explicit memory(size_t depth) : data(depth) {}
 	memory &operator=(memory &&) = default;
 
 	const value<Width> &operator[](size_t index) const { return data[index]; }
@@ -259,6 +290,12 @@ struct memory_index {
 		valid(address.data[0] - offset < depth), index(address.data[0] - offset) {}
 };
 
+// What `words.py` writes shifts with.
+CXXRTL_ALWAYS_INLINE word shifted_left(word a, word b) { return b < 64 ? a << b : 0; }
+CXXRTL_ALWAYS_INLINE word shifted_right(word a, word b) { return b < 64 ? a >> b : 0; }
+CXXRTL_ALWAYS_INLINE word shifted_signed(word a, word b) { return int64_t(a) >> (b < 63 ? b : 63); }
+
+#ifndef BLYSK_WORDS
 #define UNARY(name, condition, result) \
 	template<size_t BitsY, size_t BitsA> \
 	CXXRTL_ALWAYS_INLINE value<BitsY> name(const value<BitsA> &a) { \
@@ -336,6 +373,7 @@ LIBRARY(div)
 LIBRARY(mod)
 LIBRARY(divfloor)
 LIBRARY(modfloor)
+#endif
 
 } // namespace native
 

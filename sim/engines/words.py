@@ -1,0 +1,398 @@
+"""CXXRTL's C++ with expressions of at most 64 bits as expressions of one machine word.
+
+CXXRTL writes every expression with templates over the widths: ``add_uu<5>(a.curr, b.slice<7,4>().val())``.
+A compiler takes longer to instantiate and inline them than for all the rest. `plain_words` writes such an
+expression as ``((a.curr.data[0] + ((b.data[0] >> 4) & 0xf)) & 0x1f)``: the same machine, compiled in two
+fifths of the time.
+"""
+
+import re
+from collections.abc import Callable
+from typing import NamedTuple
+
+__all__ = ["plain_words"]
+
+_TOKEN = re.compile(r"0x[0-9a-f]+u|\d+u?|\w+|\S")
+_DECLARED = re.compile(r"^\t+(?:/\*\w+\*/ )?(value|wire)<(\d+)> (\w+)(?=;| \{| =)", re.MULTILINE)
+_ASSIGNMENT = re.compile(r"^(\t+)([pi]_\w+(?:\.next)?)(?:\.slice<(\d+)(?:,(\d+))?>\(\))? = (.*);$")
+_CONDITION = re.compile(r"^(\t+if \()(!?)(bool)?(\(.*\)|\w+<.*)(\) \{)$")
+_INDEX = re.compile(r"^(\t+auto \w+ = memory_index\()(.*)(, \d+, \d+\);)$")
+_UPDATE = re.compile(r"^(\t+\w+\.update\(\w+\.index, )(.*)(, \d+\);)$")
+_COMMIT = re.compile(r"^(\t+)if \(([pi]_\w+)\.commit\(observer\)\) changed = true;$", re.MULTILINE)
+_RESET = re.compile(r"^(\t)([pi]_\w+) = (?:wire|value)<(\d+)>\{(.*)\};$")
+_TABLE = re.compile(
+    r"^\tstatic const value<(\d+)> (mem_init_\d+)\[(\d+)\] \{\n(.*?)\};\n"
+    r"\tstd::copy\(std::begin\(\2\), std::end\(\2\), &(\w+)\.data\[(\d+)\]\);$",
+    re.MULTILINE | re.DOTALL,
+)
+_LIBRARY = re.compile(r"\b(?:[a-z]+_(?:u|s|uu|ss|su|us)|reduce_\w+|logic_\w+)<\d+>\(|std::copy")
+_HEADER = "#include <cxxrtl/cxxrtl.h>\n"
+
+_ARITHMETIC = {"add": "+", "sub": "-", "mul": "*", "and": "&", "or": "|", "xor": "^"}
+_ORDER = {"lt": "<", "le": "<=", "gt": ">", "ge": ">="}
+_EQUALITY = {"eq": "==", "ne": "!=", "eqx": "==", "nex": "!="}
+_SHIFTS = {
+    "shl_uu": "shifted_left",
+    "shl_su": "shifted_left",
+    "sshl_uu": "shifted_left",
+    "sshl_su": "shifted_left",
+    "shr_uu": "shifted_right",
+    "sshr_uu": "shifted_right",
+    "shift_uu": "shifted_right",
+    "shiftx_uu": "shifted_right",
+    "sshr_su": "shifted_signed",
+}
+
+
+class _Left(Exception):
+    """Something that stays as it is."""
+
+
+class _Expression(NamedTuple):
+    """C++ of an expression: up to 64 bits a word below 2^width, above a ``value``; or any variable.
+
+    ``low`` is a word with the lowest 64 bits, where it is simpler.
+    """
+
+    code: str
+    width: int
+    variable: bool = False
+    low: str = ""
+
+    @property
+    def word(self) -> str:
+        if self.width > 64:
+            raise _Left
+        if not self.width:
+            return "0x0ull"
+        return f"{self.code}.data[0]" if self.variable else self.code
+
+    @property
+    def signed(self) -> str:
+        spare = 64 - self.width
+        return f"word(int64_t({self.word} << {spare}) >> {spare})" if 0 < spare < 64 else self.word
+
+    @property
+    def value(self) -> str:
+        if self.variable or self.width > 64:
+            return self.code
+        return f"value<{self.width}>::cut({self.word})" if self.width else "value<0>{}"
+
+
+def _of_value(code: str, width: int) -> _Expression:
+    return _Expression(code if width > 64 else f"{code}.data[0]", width)
+
+
+def _mask(width: int) -> str:
+    return f"{(1 << width) - 1:#x}ull"
+
+
+def _cut(code: str, width: int) -> str:
+    return f"({code})" if width == 64 else f"(({code}) & {_mask(width)})"
+
+
+def _literal(parts: str) -> int:
+    chunks = [int(part.rstrip("u"), 0) for part in re.findall(r"\w+", parts)]
+    return sum(chunk << 32 * n for n, chunk in enumerate(chunks))
+
+
+class _Parser:
+    """Recursive descent over one expression."""
+
+    def __init__(self, text: str, variables: dict[str, tuple[str, int]]):
+        self.tokens = _TOKEN.findall(text)
+        self.at = 0
+        self.variables = variables
+
+    def next(self) -> str:
+        if self.at == len(self.tokens):
+            raise _Left
+        self.at += 1
+        return self.tokens[self.at - 1]
+
+    def take(self, *tokens: str) -> None:
+        for token in tokens:
+            if self.next() != token:
+                raise _Left
+
+    def peek(self) -> str:
+        return self.tokens[self.at] if self.at < len(self.tokens) else ""
+
+    def number(self) -> int:
+        token = self.next()
+        if not token.isdigit():
+            raise _Left
+        return int(token)
+
+    def numbers(self) -> list[int]:
+        """Template arguments."""
+        self.take("<")
+        found = [self.number()]
+        while self.peek() == ",":
+            self.take(",")
+            found.append(self.number())
+        self.take(">")
+        return found
+
+    def expressions(self, end: str = "") -> list[_Expression]:
+        """Expressions with commas between them, up to a token or the end of the text."""
+        found = [self.expression()]
+        while self.peek() == ",":
+            self.take(",")
+            found.append(self.expression())
+        if self.peek() != end:
+            raise _Left
+        if end:
+            self.take(end)
+        return found
+
+    def expression(self) -> _Expression:
+        token = self.next()
+        if token == "(":
+            result = self.choice()
+        elif token == "value":
+            result = self.constant()
+        elif token in self.variables:
+            kind, width = self.variables[token]
+            if kind == "wire":
+                self.take(".")
+                if (part := self.next()) not in ("curr", "next"):
+                    raise _Left
+                token = f"{token}.{part}"
+            result = _Expression(token, width, True)
+        else:
+            (width,) = self.numbers()
+            self.take("(")
+            arguments = self.expressions(")")
+            result = (_unary if len(arguments) == 1 else _binary)(token, width, *arguments)
+        while self.peek() == ".":
+            self.take(".")
+            result = self.method(result)
+        return result
+
+    def choice(self) -> _Expression:
+        question = self.expression()
+        self.take("?")
+        yes = self.expression()
+        self.take(":")
+        no = self.expression()
+        self.take(")")
+        if yes.width != no.width:
+            raise _Left
+        parts = (yes.word, no.word) if yes.width <= 64 else (yes.value, no.value)
+        return _Expression(f"({question.word} ? {parts[0]} : {parts[1]})", yes.width)
+
+    def constant(self) -> _Expression:
+        (width,) = self.numbers()
+        start = self.at
+        opening = self.next()
+        while self.next() != {"(": ")", "{": "}"}.get(opening):
+            pass
+        parts = self.tokens[start + 1 : self.at - 1]
+        if width > 64:
+            return _Expression(f"value<{width}>{{{''.join(parts)}}}", width)
+        return _Expression(f"{_literal(' '.join(parts)):#x}ull", width)
+
+    def method(self, of: _Expression) -> _Expression:
+        method = self.next()
+        if method == "val":
+            self.take("(", ")")
+            return of
+        if method == "slice":
+            last, *first = self.numbers()
+            self.take("(", ")")
+            return _slice(of, last, *first or [last])
+        if method == "concat":
+            self.take("(")
+            (low,) = self.expressions(")")
+            width = of.width + low.width
+            if width > 64:
+                return _Expression(f"{of.value}.concat({low.value}).val()", width)
+            return _Expression(f"({of.word} << {low.width} | {low.word})", width)
+        if method == "repeat" and of.width == 1:
+            (width,) = self.numbers()
+            self.take("(", ")")
+            if width > 64:
+                return _Expression(f"{of.value}.repeat<{width}>()", width)
+            return _Expression(_cut(f"-{of.word}", width), width)
+        raise _Left
+
+
+def _slice(of: _Expression, last: int, first: int) -> _Expression:
+    width = last - first + 1
+    if last >= of.width or width <= 0:
+        raise _Left
+    if of.low and last < 64:
+        return _Expression(_cut(f"{of.low} >> {first}", width), width)
+    if width > 64 or not (of.variable or of.width <= 64):
+        return _of_value(f"{of.value}.slice<{last},{first}>().val()", width)
+    if not of.variable:
+        return _Expression(_cut(f"{of.word} >> {first}", width), width)
+    start, shift = divmod(first, 64)
+    code = f"{of.code}.data[{start}]"
+    if shift:
+        code = f"{code} >> {shift}"
+    if last // 64 != start:
+        code = f"{code} | {of.code}.data[{start + 1}] << {64 - shift}"
+    elif last == of.width - 1:
+        return _Expression(f"({code})", width)
+    return _Expression(_cut(code, width), width)
+
+
+def _unary(name: str, width: int, a: _Expression) -> _Expression:
+    code = None
+    if name == "logic_not" and width <= 64:
+        code = f"word({a.word} == 0)" if a.width <= 64 else f"word(!bool({a.value}))"
+    elif name in ("reduce_or", "reduce_bool") and width <= 64:
+        code = f"word({a.word} != 0)" if a.width <= 64 else f"word(bool({a.value}))"
+    elif name == "reduce_and" and max(width, a.width) <= 64:
+        code = f"word({a.word} == {_mask(a.width)})"
+    elif name == "not_u" and a.width == width > 64:
+        code = f"{a.value}.bit_not()"
+    elif name in ("not_u", "not_s", "pos_u", "pos_s", "neg_u", "neg_s") and max(width, a.width) <= 64:
+        operand = a.word if name.endswith("_u") else a.signed
+        code = _cut({"not": "~", "pos": "", "neg": "-"}[name[:3]] + operand, width)
+    return _of_value(f"{name}<{width}>({a.value})", width) if code is None else _Expression(code, width)
+
+
+def _binary(name: str, width: int, a: _Expression, b: _Expression) -> _Expression:
+    code = None
+    operation, _, signs = name.rpartition("_")
+    if max(width, a.width, b.width) <= 64:
+        left, right = (a.signed, b.signed) if signs == "ss" else (a.word, b.word)
+        if name in ("logic_and", "logic_or"):
+            code = f"word({a.word} {'&&' if name == 'logic_and' else '||'} {b.word})"
+        elif name in _SHIFTS:
+            code = _cut(f"{_SHIFTS[name]}({a.signed if signs == 'su' else a.word}, {b.word})", width)
+        elif signs in ("uu", "ss") and operation in _ARITHMETIC:
+            code = f"{left} {_ARITHMETIC[operation]} {right}"
+            # Nothing to cut off: bit by bit, of operands no wider than the result.
+            fits = signs == "uu" and operation in ("and", "or", "xor") and max(a.width, b.width) <= width
+            code = f"({code})" if fits else _cut(code, width)
+        elif signs in ("uu", "ss") and operation in _EQUALITY:
+            code = f"word({left} {_EQUALITY[operation]} {right})"
+        elif signs in ("uu", "ss") and operation in _ORDER:
+            if signs == "ss":
+                left, right = f"int64_t({left})", f"int64_t({right})"
+            code = f"word({left} {_ORDER[operation]} {right})"
+    elif width <= 64 and a.width == b.width and operation in _EQUALITY:
+        code = f"word({a.value} {_EQUALITY[operation]} {b.value})"
+    elif operation in ("shl", "sshl") and max(a.width, b.width) <= 64:
+        low = f"{_SHIFTS[name]}({a.signed if signs == 'su' else a.word}, {b.word})"
+        return _Expression(f"{name}<{width}>({a.value}, {b.value})", width, low=low)
+    if code is None:
+        return _of_value(f"{name}<{width}>({a.value}, {b.value})", width)
+    return _Expression(code, width)
+
+
+def _store(target: str, width: int, last: int, first: int, code: str) -> str:
+    """Put a word into bits of a variable."""
+    if (first, last) == (0, width - 1) and width <= 64:
+        return f"{target}.data[0] = {code};"
+    word, shift = divmod(first, 64)
+    mask = (1 << (last - first + 1)) - 1
+    low = mask << shift & (1 << 64) - 1
+    kept = f"{target}.data[{word}] & {~low & (1 << 64) - 1:#x}ull"
+    if last // 64 == word:
+        return f"{target}.data[{word}] = ({kept}) | {code} << {shift};"
+    high = mask >> (64 - shift)
+    kept_high = f"{target}.data[{word + 1}] & {~high & (1 << 64) - 1:#x}ull"
+    return (
+        f"{{ const word part = {code}; {target}.data[{word}] = ({kept}) | part << {shift}; "
+        f"{target}.data[{word + 1}] = ({kept_high}) | part >> {64 - shift}; }}"
+    )
+
+
+def _statement(line: str, variables: dict[str, tuple[str, int]]) -> str:
+    if match := _CONDITION.match(line):
+        (question,) = _Parser(match[4][1:-1] if match[3] else match[4], variables).expressions()
+        code = question.word if question.width <= 64 else f"bool({question.value})"
+        return f"{match[1]}{match[2]}({code}){match[5]}"
+    if match := _INDEX.match(line) or _UPDATE.match(line):
+        values = ", ".join(value.value for value in _Parser(match[2], variables).expressions())
+        return f"{match[1]}{values}{match[3]}"
+    match = _ASSIGNMENT.match(line)
+    if not match:
+        raise _Left
+    indent, target, last, first, text = match.groups()
+    name, _, following = target.partition(".")
+    kind, width = variables.get(name, ("", 0))
+    if (kind == "wire") != (following == "next"):
+        raise _Left
+    stop = width - 1 if last is None else int(last)
+    start = 0 if last is None else int(first or last)
+    (value,) = _Parser(text, variables).expressions()
+    if value.width != stop - start + 1 or stop >= width:
+        raise _Left
+    if value.width <= 64:
+        return indent + _store(target, width, stop, start, value.word)
+    place = "" if last is None else f".slice<{stop},{start}>()"
+    return f"{indent}{target}{place} = {value.value};"
+
+
+def _table(match: re.Match) -> str:
+    """A memory's initial words, copied one by one."""
+    width, name, depth, memory, start = int(match[1]), match[2], match[3], match[5], match[6]
+    words = -(-width // 64)
+    entries = []
+    for literal in re.findall(r"\{(.*?)\}", match[4]):
+        value = _literal(literal)
+        entries += [f"{value >> 64 * n & (1 << 64) - 1:#x}ull" for n in range(words)]
+    lines = "".join(f"\t\t{', '.join(entries[n : n + 8])},\n" for n in range(0, len(entries), 8))
+    return (
+        f"\tstatic const word {name}[{depth} * {words}] {{\n{lines}\t}};\n"
+        f"\tfor (size_t k = 0; k < {depth} * {words}; k++)\n"
+        f"\t\t{memory}.data[{start} + k / {words}].data[k % {words}] = {name}[k];"
+    )
+
+
+def _reset(line: str) -> str:
+    match = _RESET.match(line)
+    if not match:
+        raise _Left
+    # `reset` is called by the constructor alone, when everything is 0.
+    indent, name, width, value = match[1], match[2], int(match[3]), _literal(match[4])
+    if not value:
+        return ""
+    if width > 64 or "wire" not in line:
+        raise _Left
+    return f"{indent}{name}.curr.data[0] = {name}.next.data[0] = {value:#x}ull;"
+
+
+def plain_words(text: str) -> str:
+    """Rewrite the C++ of `write_cxxrtl`, statement by statement; one that is not understood stays as it is.
+
+    The driver's ``value`` and ``wire`` keep their bits in ``data``, words of 64 bits with 0 above the width.
+    The text names CXXRTL's header only where it still needs CXXRTL's operations, those of wide operands.
+
+    Parameters
+    ----------
+    text : str
+        C++ of one module, without debug information, whose ``reset`` only the constructor calls.
+
+    Returns
+    -------
+    str
+        C++ with the same class.
+    """
+    reset, evaluate = text.find("void p_top::reset("), text.find("bool p_top::eval(")
+    if reset < 0 or evaluate < reset:
+        return text
+    variables: dict[str, tuple[str, int]] = {}
+    twice = set()
+    for kind, width, name in _DECLARED.findall(text):
+        if variables.setdefault(name, (kind, int(width))) != (kind, int(width)):
+            twice.add(name)
+    for name in twice:
+        del variables[name]
+
+    def rewritten(line: str, rewrite: Callable[..., str], *arguments: object) -> str:
+        try:
+            return rewrite(line, *arguments)
+        except _Left:
+            return line
+
+    lines = [rewritten(line, _reset) for line in _TABLE.sub(_table, text[reset:evaluate]).split("\n")]
+    lines += [rewritten(line, _statement, variables) for line in text[evaluate:].split("\n")]
+    text = _COMMIT.sub(r"\1\2.curr = \2.next;", text[:reset]) + "\n".join(lines)
+    return text if _LIBRARY.search(text) else text.replace(_HEADER, "")
