@@ -10,6 +10,7 @@ from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.triangle_frame import span_angle
 from blysk.golden.geometry.triangles import Frame, Triangles
 from blysk.golden.pipeline import Design
+from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import DrawnPixels, Renderer
@@ -20,7 +21,7 @@ from blysk.golden.video.motion import Motion, rotation
 from blysk.golden.video.triangle_assembly import TriangleAssembly
 from blysk.golden.video.vertex_unit import ScreenVertices, VertexTransform
 
-__all__ = ["BandPixels", "Drawing", "turned"]
+__all__ = ["BandPixels", "Drawing", "board_design", "turned"]
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,7 @@ class Drawing:
     def of(
         cls,
         scenes: Sequence[Scene],
-        design: Design,
+        design: Design | None = None,
         *,
         lines: int = 16,
         axis: Sequence[float] = (0.0, 1.0, 0.0),
@@ -132,8 +133,9 @@ class Drawing:
         ----------
         scenes : sequence of Scene
             Of one mesh, camera and size; they differ in materials and lights, and are the presets.
-        design : Design
-            Shading; its ``x_bits`` and ``y_bits`` are replaced.
+        design : Design, optional
+            Shading; its ``x_bits`` and ``y_bits`` are replaced. By default `board_design` for the lights and
+            materials of the scenes.
         lines : int
             Of a band.
         axis : three floats
@@ -151,6 +153,7 @@ class Drawing:
             If a scene does not fit the design, the mesh the memory, or the camera the matrix.
         """
         scene, transform = scenes[0], transform or VertexTransform()
+        design = design or board_design(max(len(each.lights) for each in scenes), len(scene.materials))
         size = scene.width, scene.height
         x_bits, y_bits = cls.place_bits(size, lines)
         design = replace(design, x_bits=x_bits, y_bits=y_bits)
@@ -239,6 +242,20 @@ class Drawing:
             pixels = self.band(index, angle, preset)
             image[index * self.lines + pixels.y, pixels.x] = pixels.color
         return image
+
+
+def board_design(lights: int = 1, materials: int = 1) -> Design:
+    """The shading that a small device shows a picture with: chord, cosquad, a span each 9 cycles.
+
+    13 multipliers with one light, where a span each 3 cycles takes 18; with the geometry's 10, and one each
+    for vertices and motion, 25 of the 28 of an ECP5-25F.
+
+    Parameters
+    ----------
+    lights, materials : int
+        As `Design` has them.
+    """
+    return preset("chord", "cosquad", lights, materials=materials, setup_interval=9)
 
 
 def turned(scene: Scene, angle: int, axis: Sequence[float] = (0.0, 1.0, 0.0)) -> Scene:

@@ -27,7 +27,7 @@ def band_rows_shape() -> data.StructLayout:
 
 
 class TriangleAssemblyUnit(wiring.Component):
-    """Keeps the vertices of a frame and makes triangles of them: `TriangleAssembly` is the bit-accurate model.
+    """Keeps vertices of a frame, makes triangles of them: `TriangleAssembly` is the bit-accurate model.
 
     A triangle takes three cycles, one for each corner that is read, whether it is sent or not; it is offered
     `latency` cycles after its first corner's address. A range is accepted while none is read, and costs two

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from amaranth.hdl import Module, Signal, unsigned
+from amaranth.hdl import Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -54,7 +54,8 @@ class MergedDrawUnit(wiring.Component):
             unit.request.valid.eq(self.i.valid),
             self.i.ready.eq(unit.request.ready),
             unit.buttons.eq(buttons),
-            self.o.payload.pixel.eq(unit.pixels.payload),
+            # A beat that waits must not change, where there is no pixel either.
+            Value.cast(self.o.payload.pixel).eq(Mux(unit.pixels.valid, Value.cast(unit.pixels.payload), 0)),
             self.o.payload.band.eq(unit.done.payload),
             self.o.payload.done.eq(~unit.pixels.valid),
             self.o.valid.eq(unit.pixels.valid | unit.done.valid),

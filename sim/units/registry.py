@@ -3,7 +3,8 @@
 A file without a record holds parts that records share. Components without a record: the frame constants, the
 pixel assembler and the pixel merger, whose ports are not a stream ``i`` to a stream ``o``, and the
 accumulator of the chord method. The records of the pipelines and of the chord interpolators, of which they
-are parts, cover them. Beats of the pixel lanes depend on the cycles: they have tests of their own.
+are parts, cover them. Beats of the pixel lanes depend on the cycles: they have tests of their own; so have
+band depths, controls and the draw unit, whose ports are others.
 """
 
 import pkgutil
