@@ -41,6 +41,9 @@ OPTIONS = {name: option for name, option in {**SCENE, **DESIGN}.items() if name 
 
 _DEFAULTS = {"triangles": 1000, "style": "compact", "back_faces": "cull"}
 
+MAX_LIGHTS = 4
+"""Lights of a board's scene."""
+
 _SHINIER = 4
 """How many times the exponent of the second material."""
 
@@ -78,6 +81,8 @@ def gpu_of(
     loaded = load(settings)
     (scene,) = scenes_of(loaded, settings)
     scenes = _presets(scene, settings["up"])
+    if len(scene.lights) > MAX_LIGHTS:
+        raise settings.refuse("lights", f"{len(scene.lights)} lights", f"give at most {MAX_LIGHTS}", "")
     design = design_of(settings, len(scene.lights), len(scene.materials))
     background = tuple(round(255 * channel) for channel in scene.background)
     buffer = BandBuffer(VGA, board.lines, colour_bits=COLOURS[colours], background=background)
