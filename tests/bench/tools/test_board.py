@@ -42,8 +42,8 @@ def pattern_on(board):
         ),
         (
             ["ulx3s-85f", "--triangles", "3000", "--clock", "5", "--simulate", "1", "-o", "x"],
-            "--mesh: a frame of 3,080 triangles takes 325,140 cycles or more, and 60 Hz leaves 83,333: too heavy "
-            "by a factor of 3.90; use fewer triangles, or a faster --clock",
+            "--mesh: a frame of 3,080 triangles takes 325,140 cycles or more, and 60 Hz leaves 83,333: too "
+            "heavy by a factor of 3.90; use fewer triangles, or a faster --clock",
         ),
         (
             ["ulx3s-25f", "--projection", "orthographic", "-o", "x"],

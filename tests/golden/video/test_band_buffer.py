@@ -54,5 +54,5 @@ def test_following():
     ],
 )
 def test_bad_parameters_are_refused(options):
-    with pytest.raises(ValueError, match="band|channel"):
+    with pytest.raises(ValueError, match=r"band|channel"):
         BandBuffer(MODE, **options)
