@@ -27,8 +27,8 @@ class GpuUnit(wiring.Component):
     ----------
     parameters : Gpu
         Bit-accurate model, with all contents of memories.
-    setups : int
-        As `RenderUnit` has it.
+    setups, compact
+        As `RenderUnit` has them.
 
     Members
     -------
@@ -42,9 +42,9 @@ class GpuUnit(wiring.Component):
     Source: docs/theory/video.md#bands.
     """
 
-    def __init__(self, parameters: Gpu, setups: int = 1):
+    def __init__(self, parameters: Gpu, setups: int = 1, compact: bool | None = None):
         self.parameters = parameters
-        self.draw = DrawUnit(parameters.drawing, setups)
+        self.draw = DrawUnit(parameters.drawing, setups, compact)
         self.display = DisplayUnit(parameters.buffer)
         super().__init__(
             {

@@ -73,7 +73,7 @@ class RenderUnit(wiring.Component):
     `GeometryUnit`, `ShadingPipelineUnit` and `DepthTestUnit` in a row; spans wait between the first two in a
     FIFO, and their depths pass the pipeline in another. Each takes as long as it would alone, at the same
     time as the others: a frame as many cycles as the slowest, if none of them waits for long. The compact
-    style is that of the design's build, of shading and of geometry.
+    style is that of the design's build, of shading and, unless told otherwise, of geometry.
 
     Frame constants are written while no span is inside; spans of another material than the one before wait
     for the pipeline to be empty, see `ShadingPipelineUnit`.
@@ -86,6 +86,8 @@ class RenderUnit(wiring.Component):
         As `DepthTestUnit` has it.
     setups : int
         As `GeometryUnit` has it.
+    compact : bool or None
+        Style of the geometry; ``None``: that of the design's build.
 
     Members
     -------
@@ -111,11 +113,15 @@ class RenderUnit(wiring.Component):
     """
 
     def __init__(
-        self, parameters: Renderer | None = None, size: tuple[int, int] | None = None, setups: int = 1
+        self,
+        parameters: Renderer | None = None,
+        size: tuple[int, int] | None = None,
+        setups: int = 1,
+        compact: bool | None = None,
     ):
         self.parameters = parameters or Renderer()
         design, grid = self.parameters.design, self.parameters.geometry.grid
-        compact = design.build.style == "compact"
+        compact = design.build.style == "compact" if compact is None else compact
         self.geometry = GeometryUnit(grid, compact, self.parameters.geometry.lines, setups)
         self.pipeline = ShadingPipelineUnit(design)
         self.depth = DepthTestUnit(design.x_bits, design.y_bits, size)

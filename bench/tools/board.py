@@ -101,11 +101,17 @@ def command(context, board_name, mesh, output, simulate, colours, clock, seeds, 
     _check_load(gpu, plan)
     click.echo("\n".join(_design_lines(board, mesh, gpu, plan)))
     if simulate:
-        _simulate(gpu, scenes, plan, simulate, Path(output))
+        _simulate(board, gpu, scenes, plan, simulate, Path(output))
         return
     with tqdm(bar_format="{desc}", leave=False, disable=None) as bar:
         rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
-        built = build(board, BoardTop(board, GpuUnit(gpu), plan), rates, seeds, bar.set_description_str)
+        built = build(
+            board,
+            BoardTop(board, GpuUnit(gpu, compact=board.compact), plan),
+            rates,
+            seeds,
+            bar.set_description_str,
+        )
     click.echo("\n".join(built_lines(built)))
     if missed(built):
         raise ToolError(missed(built))
@@ -124,8 +130,9 @@ def _design_lines(board: Board, mesh: str, gpu: Gpu, plan: ClockPlan) -> Iterato
         f"{len(drawing.presets)} presets"
     )
     design = drawing.renderer.design
+    style = "compact" if board.compact else "fast"
     lights = "1 light" if design.lights == 1 else f"{design.lights} lights"
-    yield f"{'shading':<12}{design.method}, {design.model}, {lights}, {design.build.style} style"
+    yield f"{'shading':<12}{design.method}, {design.model}, {lights}, {style} geometry"
     bits = "".join(map(str, buffer.colour_bits))
     yield f"{'display':<12}640x480 at 60 Hz, bands of {buffer.lines} lines, RGB{bits}"
     rates = ", ".join(f"{name} {float(rate) / 1e6:.6g} MHz" for name, rate in plan.rates.items())
@@ -149,7 +156,9 @@ def _check_load(gpu: Gpu, plan: ClockPlan) -> None:
         )
 
 
-def _simulate(gpu: Gpu, scenes: Sequence[Scene], plan: ClockPlan, count: int, folder: Path) -> None:
+def _simulate(
+    board: Board, gpu: Gpu, scenes: Sequence[Scene], plan: ClockPlan, count: int, folder: Path
+) -> None:
     """Frames through the lanes, written, and held against the model and the exact frame."""
     paths = [folder / f"frame-{number:04}.png" for number in range(1, count + 1)]
     made = not folder.exists()
@@ -164,7 +173,7 @@ def _simulate(gpu: Gpu, scenes: Sequence[Scene], plan: ClockPlan, count: int, fo
         rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
         mode = gpu.buffer.mode
         with tqdm(total=count, unit=" frames", leave=False, disable=None) as bar:
-            top = OneClock(GpuUnit(gpu), rate)
+            top = OneClock(GpuUnit(gpu, compact=board.compact), rate)
             shown = show(top, mode, count, progress=lambda pixels: bar.update(pixels / mode.cycles - bar.n))
         seconds = perf_counter() - start
         for path, frame in zip(paths, shown.frames, strict=True):

@@ -71,6 +71,8 @@ class Board:
         Of a band: the device has the memory.
     loader : str
         What openFPGALoader calls it.
+    compact : bool
+        Whether the device is small: compact geometry, shading that takes a span each 9 cycles.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Board:
     multipliers: int
     lines: int
     loader: str
+    compact: bool
 
     def make(self) -> Any:
         """The platform of amaranth-boards.
@@ -116,6 +119,7 @@ BOARDS = {
             multipliers=28,
             lines=8,
             loader="ulx3s",
+            compact=True,
         ),
         Board(
             *("ulx3s-85f", "ulx3s", "ULX3S_85F_Platform"),
@@ -126,6 +130,7 @@ BOARDS = {
             multipliers=156,
             lines=16,
             loader="ulx3s",
+            compact=False,
         ),
         Board(
             *("icepi-zero", "icepi_zero", "IcepiZero1_3Platform"),
@@ -136,6 +141,7 @@ BOARDS = {
             multipliers=28,
             lines=8,
             loader="icepi-zero",
+            compact=True,
         ),
     )
 }

@@ -34,12 +34,15 @@ __all__ = ["COLOURS", "OPTIONS", "BoardTop", "gpu_of", "least_cycles"]
 COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
 """Bits of a pixel in the band buffer."""
 
-_LEFT_OUT = ("size", "projection", "viewer", "target", "method", "operand", "gate", "setup_interval")
+_LEFT_OUT = ("size", "projection", "viewer", "target", "method", "operand", "gate", "setup_interval", "style")
 
 OPTIONS = {name: option for name, option in {**SCENE, **DESIGN}.items() if name not in _LEFT_OUT}
 """Options of the command: the picture's size is the display's, the camera a perspective one."""
 
-_DEFAULTS = {"triangles": 1000, "style": "compact", "back_faces": "cull"}
+_DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
+
+COMPACT_INTERVAL = 9
+"""Cycles from a span to the next on a small device."""
 
 MAX_LIGHTS = 4
 """Lights of a board's scene."""
@@ -75,7 +78,8 @@ def gpu_of(
     InputError
         If the mesh cannot be read, or does not fit, or an option is not accepted.
     """
-    settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **_DEFAULTS)
+    interval = {"setup_interval": COMPACT_INTERVAL} if board.compact else {}
+    settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **_DEFAULTS, **interval)
     if settings["size"] != VGA.size:
         raise settings.refuse("size", "the display has 640x480 pixels", "leave it out", "")
     loaded = load(settings)

@@ -54,8 +54,8 @@ class DrawUnit(wiring.Component):
     ----------
     parameters : Drawing
         Bit-accurate model, with all contents of memories.
-    setups : int
-        As `RenderUnit` has it.
+    setups, compact
+        As `RenderUnit` has them.
 
     Members
     -------
@@ -73,10 +73,10 @@ class DrawUnit(wiring.Component):
     Source: docs/theory/video.md#bands; [T] figure 4.10.
     """
 
-    def __init__(self, parameters: Drawing, setups: int = 1):
+    def __init__(self, parameters: Drawing, setups: int = 1, compact: bool | None = None):
         self.parameters = given = parameters
         design = given.renderer.design
-        self.render = RenderUnit(given.renderer, None, setups)
+        self.render = RenderUnit(given.renderer, None, setups, compact)
         self.depth = BandDepthUnit(BandDepth((given.size[0], given.lines)), design.x_bits, design.y_bits)
         self.mesh, self.commands = MeshMemoryUnit(given.mesh), DrawCommandsUnit(given.commands)
         self.vertex = VertexUnit(given.transform, given.mesh.index_bits)
