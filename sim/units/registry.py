@@ -4,7 +4,8 @@ A file without a record holds parts that records share. Components without a rec
 pixel assembler and the pixel merger, whose ports are not a stream ``i`` to a stream ``o``, and the
 accumulator of the chord method. The records of the pipelines and of the chord interpolators, of which they
 are parts, cover them. Beats of the pixel lanes depend on the cycles: they have tests of their own; so have
-band depths, controls and the draw unit, whose ports are others.
+band depths, controls and the draw unit, and the units of the display with two clocks or none that waits,
+whose ports are others.
 """
 
 import pkgutil

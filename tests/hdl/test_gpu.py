@@ -46,12 +46,12 @@ def test_frames_equal_the_models():
     assert (found.frames[0] != found.frames[1]).any()
     state = made.drawing.controls.advance(made.drawing.controls.start)
     figures = compare_image(turned(given, state.angle), made.drawing.renderer.design, found.frames[0])
-    # Corners move by up to a hundredth of a pixel: at silhouettes a pixel is the surface or the background.
+    # Corners move by up to a hundredth of a pixel, across which a pixel is surface or background.
     assert figures.total_error.psnr_db > 30
 
 
 def test_heavy_frames_lose_bands_only():
-    """Every band is that of some angle of the motion, or background; as many are background as are counted."""
+    """Every band is that of some angle of the motion, or background; what is background was counted."""
     made, _ = gpu(30, RGB565)
     frames = 6
     found = shown(made, frames)
