@@ -8,7 +8,7 @@ from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.render import Renderer
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import connect, connect_fifo
+from blysk.hdl.core.stream import connect, connect_fifo, moving
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.depth_test import DepthMemory, DepthTestUnit, drawn_pixel_shape
 from blysk.hdl.geometry.geometry import GeometryUnit
@@ -74,7 +74,7 @@ class RenderUnit(wiring.Component):
     `GeometryUnit`, `ShadingPipelineUnit` and `DepthTestUnit` in a row; spans wait between the first two in a
     FIFO, and their depths pass the pipeline in another. Each takes as long as it would alone, at the same
     time as the others: a frame as many cycles as the slowest, if none of them waits for long. The compact
-    style is that of the design's build, of shading and of geometry.
+    style is that of the design's build, of shading and, unless told otherwise, of geometry.
 
     Frame constants are written while no span is inside; spans of another material than the one before wait
     for the pipeline to be empty, see `ShadingPipelineUnit`.
@@ -87,6 +87,8 @@ class RenderUnit(wiring.Component):
         As `DepthTestUnit` has it.
     setups : int
         As `GeometryUnit` has it.
+    compact : bool or None
+        Style of the geometry; ``None``: that of the design's build.
 
     Members
     -------
@@ -103,15 +105,24 @@ class RenderUnit(wiring.Component):
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
         Depths so far; only without a ``size``.
 
+    Attributes
+    ----------
+    idle : Signal
+        No triangle, span or pixel is inside. A cycle after the last left.
+
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
     def __init__(
-        self, parameters: Renderer | None = None, size: tuple[int, int] | None = None, setups: int = 1
+        self,
+        parameters: Renderer | None = None,
+        size: tuple[int, int] | None = None,
+        setups: int = 1,
+        compact: bool | None = None,
     ):
         self.parameters = parameters or Renderer()
         design, grid = self.parameters.design, self.parameters.geometry.grid
-        compact = design.build.style == "compact"
+        compact = design.build.style == "compact" if compact is None else compact
         self.geometry = GeometryUnit(grid, compact, self.parameters.geometry.lines, setups)
         self.pipeline = ShadingPipelineUnit(design)
         self.depth = DepthTestUnit(design.x_bits, design.y_bits, size)
@@ -125,16 +136,7 @@ class RenderUnit(wiring.Component):
         if size is None:
             members["memory"] = Out(DepthMemory(design.x_bits, design.y_bits))
         super().__init__(members)
-        self.busy: Signal | None = None
-
-    def watch(self) -> Signal:
-        """Ask, before it is elaborated, for a signal that tells whether anything is inside.
-
-        From the cycle after a triangle was taken in, until the cycle after its last pixel has left.
-        """
-        self.geometry.watch()
-        self.busy = Signal(name="render_busy")
-        return self.busy
+        self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
         """The three units; a span goes to the pipeline, and its depth to a FIFO, on the same cycle."""
@@ -162,6 +164,11 @@ class RenderUnit(wiring.Component):
         with m.If(made.valid & made.ready):
             m.d.sync += count.eq(count + 1)
         shape = data.StructLayout(deep)
+        spans = moving(m, "spans", made, depth.i, pixel_last := Signal(name="pixel_last"))
+        m.d.comb += [
+            pixel_last.eq(pipeline.o.payload.last),
+            self.idle.eq(geometry.idle & depth.idle & ~spans),
+        ]
         m.submodules.depths = depths = fifo.SyncFIFOBuffered(
             width=Shape.cast(shape).width, depth=pipeline.spans_inside + 1
         )
@@ -185,9 +192,4 @@ class RenderUnit(wiring.Component):
             *(self.status[name].eq(depth.status[name]) for name in ("pixels", "hidden")),
             *(self.status[name].eq(pipeline.status[name]) for name in _SHADING),
         ]
-        if self.busy is not None:
-            shaded = Signal(COUNTER_BITS, name="shaded_spans")
-            with m.If(depths.r_en):
-                m.d.sync += shaded.eq(shaded + 1)
-            m.d.comb += self.busy.eq(geometry.busy | (count != shaded) | depth.busy)
         return m

@@ -26,6 +26,7 @@ ANCHORS = {
     "forward-differences angular-method arccos half-chord recurrence renormaliser true-spans",
     "chord.md": "the-chord differences error-bound where-spans-are-cut local-lights",
     "bus.md": "streams registers",
+    "video.md": "vertices bands display tmds",
     "units.md": "specular-unit exact-power highlight-gate intensity pipeline frame-constants lobe",
 }
 """Sections that docstrings may cite, whether one does or not."""

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Set
 from importlib.util import find_spec
 from pathlib import Path
 
-from blysk.bench.tools.place_and_route import _YOSYS, ToolError
+from blysk.bench.tools.place_and_route import YOSYS, ToolError
 
 __all__ = ["Miter", "yosys"]
 
@@ -26,7 +26,7 @@ def yosys(script: str, folder: Path) -> None:
         If it fails.
     """
     done = subprocess.run(
-        [sys.executable, "-c", _YOSYS], input=script, capture_output=True, encoding="utf-8", cwd=folder
+        [sys.executable, "-c", YOSYS], input=script, capture_output=True, encoding="utf-8", cwd=folder
     )
     if done.returncode:
         raise ToolError(f"Yosys failed: {(done.stderr or done.stdout).strip().splitlines()[-1]}")

@@ -32,11 +32,16 @@ from blysk.sim.errors import InputError
 from blysk.sim.output import write_json
 
 __all__ = [
+    "MAP_AFTER",
+    "MAP_BEFORE",
+    "MOUNT",
     "SEEDS",
+    "YOSYS",
     "Layout",
     "Registered",
     "TooLarge",
     "ToolError",
+    "ToolRunner",
     "lay_out",
     "parts_of",
     "read_report",
@@ -51,7 +56,7 @@ _REMEDY = "pip install 'blysk[fpga]'"
 
 # Names of registers stay: cells are named by them. Amaranth's other names are aliases, of which abc9 makes
 # two cells of one name.
-_BEFORE = """\
+MAP_BEFORE = """\
 read_rtlil top.il
 hierarchy -top top
 proc
@@ -61,12 +66,12 @@ select -set registers t:$*dff* %co1:+[Q] w:* %i
 rename -hide w:* @registers %d
 """
 
-_AFTER = """
+MAP_AFTER = """
 write_json netlist.json"""
 
-_YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
+YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
 
-_MOUNT = "/job"
+MOUNT = "/job"
 """What the tool in its sandbox calls the folder it runs in, the only one it sees."""
 
 _MANY = 1000
@@ -182,7 +187,7 @@ def versions_of(family: Family) -> dict[str, str]:
     return versions
 
 
-class _Runner:
+class ToolRunner:
     """Runs the tools, several at once, and ends them all when told."""
 
     def __init__(self) -> None:
@@ -201,7 +206,7 @@ class _Runner:
                 process = subprocess.Popen(
                     command,
                     cwd=folder,
-                    env={**os.environ, "YOWASP_MOUNT": f"{_MOUNT}=."},
+                    env={**os.environ, "YOWASP_MOUNT": f"{MOUNT}=."},
                     stdin=subprocess.PIPE,
                     stdout=log,
                     stderr=subprocess.STDOUT,
@@ -401,7 +406,7 @@ def lay_out(
     netlist = rtlil.convert(Registered(component), name="top", emit_src=False)
     absorb = absorb and family.limit is not None
     step = Path(absorbing.__file__).read_text(encoding="utf-8") if absorb else ""
-    parts = (netlist, _BEFORE, _AFTER, _YOSYS, step, repr(family), repr(tools))
+    parts = (netlist, MAP_BEFORE, MAP_AFTER, YOSYS, step, repr(family), repr(tools))
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
     folder = cache_folder() / "fpga"
     folder.mkdir(mode=0o700, exist_ok=True)
@@ -425,15 +430,15 @@ def _run(
     netlist: str, seeds: Sequence[int], jobs: int, family: Family, absorb: bool
 ) -> Iterator[tuple[int, tuple[Parts, Place]]]:
     """Run the tools; each seed as soon as it is done."""
-    runner = _Runner()
+    runner = ToolRunner()
     module = family.package.replace("-", "_")
     nextpnr = f"import sys, {module} as n; sys.exit(n.{module.replace('yowasp', 'run')}(sys.argv[1:]))"
     with tempfile.TemporaryDirectory(prefix="blysk-") as name, ThreadPoolExecutor(jobs) as pool:
         folder = Path(name)
         try:
             (folder / "top.il").write_text(netlist, encoding="utf-8")
-            script = _BEFORE + family.synthesis + _AFTER
-            pool.submit(runner.run, "Yosys", _YOSYS, [], folder, script).result()
+            script = MAP_BEFORE + family.synthesis + MAP_AFTER
+            pool.submit(runner.run, "Yosys", YOSYS, [], folder, script).result()
             mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
             _refuse_untimed(mapped, family)
             mapped, absorbed = absorb_registers(mapped) if absorb else (mapped, Absorbed())
@@ -444,7 +449,7 @@ def _run(
 
             def route(seed: int) -> tuple[int, tuple[Parts, Place]]:
                 path = folder / f"{seed}.json"
-                files = ["--json", f"{_MOUNT}/top.json", "--report", f"{_MOUNT}/{path.name}"]
+                files = ["--json", f"{MOUNT}/top.json", "--report", f"{MOUNT}/{path.name}"]
                 try:
                     runner.run("nextpnr", nextpnr, [*options, *files, "--seed", str(seed)], folder)
                 except ToolError as error:

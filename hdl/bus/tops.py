@@ -50,7 +50,7 @@ def _shader(parameters: Design) -> ShadingPipelineUnit:
 TOPS = {
     # A write is accepted while no span is inside.
     "shader": Top("spans to pixels", _shader, False, lambda core: ~core.write.ready),
-    "geometry": Top("triangles to spans", _geometry, True, GeometryUnit.watch),
-    "render": Top("triangles to pixels", RenderUnit, True, RenderUnit.watch),
+    "geometry": Top("triangles to spans", _geometry, True, lambda core: ~core.idle),
+    "render": Top("triangles to pixels", RenderUnit, True, lambda core: ~core.idle),
 }
 """Cores by name; those of `PACKETS`."""

@@ -20,6 +20,7 @@ __all__ = [
     "connect_slice",
     "count_down",
     "pass_beside",
+    "moving",
     "require_same_shape",
     "skid_buffer",
 ]
@@ -264,6 +265,28 @@ def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -
     m.d.comb += source.ready.eq(accepts)
     with m.If(accepts):
         m.d.sync += [valid.eq(source.valid), payload.eq(source.payload)]
+
+
+def moving(
+    m: Module, name: str, source: stream.Interface, sink: stream.Interface, last: ValueLike = 1
+) -> Value:
+    """Whether payloads are between two streams: more went in than came out.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the counter, of at most 1023.
+    name : str
+        Of the counter.
+    source, sink : stream.Interface
+        Where payloads go in and come out.
+    last : ValueLike
+        Whether what comes out is the last, or only, part of a payload.
+    """
+    inside = Signal(10, name=f"{name}_inside")
+    enters, leaves = source.valid & source.ready, sink.valid & sink.ready & last
+    m.d.sync += inside.eq(inside + enters - leaves)
+    return inside.any()
 
 
 def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[Signal, Signal]:

@@ -80,6 +80,11 @@ class DepthTestUnit(wiring.Component):
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
         Depths so far.
 
+    Attributes
+    ----------
+    idle : Signal
+        No pixel is inside.
+
     Source: docs/theory/geometry.md#depth; not in the documents.
     """
 
@@ -97,8 +102,7 @@ class DepthTestUnit(wiring.Component):
             members["memory"] = Out(port)
         super().__init__(members)
         self._port = port.create(path=("port",)) if size else self.memory
-        self.busy = Signal(name="depth_busy")
-        """Whether a pixel is inside."""
+        self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
         """Depth of the pixel; the memory's word; their comparison; the write."""
@@ -110,11 +114,11 @@ class DepthTestUnit(wiring.Component):
         stages = [Signal(self.o.payload.shape(), name=f"pixel_{k}") for k in range(3)]
         valid = [Signal(name=f"valid_{k}") for k in range(3)]
         m.d.comb += [
-            self.busy.eq(Cat(valid).any() | self.o.valid),
             advance.eq(skid_buffer(m, self.o, valid[2], stages[2])),
             self.i.ready.eq(advance),
             accept.eq(self.i.valid & advance),
         ]
+        m.d.comb += self.idle.eq(~(Cat(valid).any() | self.o.valid))
 
         # The sum has a sign, and a bit more than any step of a span can add.
         first, total = Signal(name="first", init=1), Signal(37, name="total")

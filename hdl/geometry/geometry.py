@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.triangles import ATTRIBUTES, GRID, Grid
-from blysk.hdl.core.stream import connect, connect_fifo
+from blysk.hdl.core.stream import connect, connect_fifo, moving
 from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit, serial_attribute_shape
 from blysk.hdl.geometry.edge_normals import EdgeNormalsUnit, true_spans_shape
 from blysk.hdl.geometry.edge_setup import EdgeSetupUnit
@@ -43,11 +43,11 @@ PORT_DESCRIPTIONS = {
 _SORTED = 17
 """Triangles that wait for the edge setup, while others are dropped by the sort."""
 
-_INSIDE_BITS = 10
-"""Of counters that are compared: fewer triangles, and fewer spans, are inside."""
-
 _SCALES = 4
 """Triangles whose scales wait for their attributes."""
+
+_INSIDE_BITS = 10
+"""Bits of the difference of two counters: more than triangles are inside at most."""
 
 
 class _TriangleSetup(wiring.Component):
@@ -169,6 +169,11 @@ class GeometryUnit(wiring.Component):
     status : :py:`Out(counters_shape(*COUNTERS))`
         What was counted since the reset.
 
+    Attributes
+    ----------
+    idle : Signal
+        No triangle is inside, nor any of its spans. Rises a cycle after the last left.
+
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
@@ -191,15 +196,7 @@ class GeometryUnit(wiring.Component):
                 "status": Out(counters_shape(*COUNTERS)),
             }
         )
-        self.busy: Signal | None = None
-
-    def watch(self) -> Signal:
-        """Ask, before it is elaborated, for a signal that tells whether anything is inside.
-
-        A triangle counts from the cycle after it was taken in, until the cycle after its last span has left.
-        """
-        self.busy = Signal(name="geometry_busy")
-        return self.busy
+        self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
         """The units, what waits between them, and the counters."""
@@ -218,29 +215,8 @@ class GeometryUnit(wiring.Component):
         connect(m, self._attributes.o, self._normals.i)
         connect(m, self._normals.o, wiring.flipped(self.o))
         self._count(m)
-        if self.busy is not None:
-            self._watch(m)
+        self._watch(m)
         return m
-
-    def _watch(self, m: Module) -> None:
-        """Triangles that came and are gone, by the units that end them; pieces between the last two units.
-
-        Counters are compared modulo a number that is larger than what fits inside.
-        """
-        sort, rows, pieces = self._sort, self._clip.o, self._attributes.o
-        came, walked, cut, left = (
-            Signal(_INSIDE_BITS, name=name) for name in ("came", "walked", "cut", "left")
-        )
-        for count, event in (
-            (came, self.i.valid & self.i.ready),
-            (walked, rows.valid & rows.ready & rows.payload.last),
-            (cut, pieces.valid & pieces.ready),
-            (left, self.o.valid & self.o.ready),
-        ):
-            with m.If(event):
-                m.d.sync += count.eq(count + 1)
-        gone = walked + sum(sort.status[name] for name in ("empty", "zero_area", "culled"))
-        m.d.comb += self.busy.eq((came != gone[:_INSIDE_BITS]) | self._attributes.busy | (cut != left))
 
     def _set_up(self, m: Module) -> tuple[stream.Interface, stream.Interface]:
         """From the sort, through the lanes in turns, to what is walked and to planes."""
@@ -280,6 +256,20 @@ class GeometryUnit(wiring.Component):
             rows.ready.eq(to.ready & (planes.valid | ~first)),
             planes.ready.eq(to.ready & rows.valid & first),
         ]
+
+    def _watch(self, m: Module) -> None:
+        """Whether anything is inside: triangles up to their last scanline, and pieces of their spans."""
+        rows, sort = self._clip.o, self._sort
+        dropped = sum(sort.status[name] for name in ("empty", "zero_area", "culled"))[:_INSIDE_BITS]
+        taken, walked = (Signal(_INSIDE_BITS, name=name) for name in ("taken", "walked"))
+        with m.If(self.i.valid & self.i.ready):
+            m.d.sync += taken.eq(taken + 1)
+        with m.If(rows.valid & rows.ready & rows.payload.last):
+            m.d.sync += walked.eq(walked + 1)
+        spans = moving(m, "pieces", self._attributes.o, self.o)
+        m.d.comb += self.idle.eq(
+            ((taken - walked)[:_INSIDE_BITS] == dropped) & self._attributes.idle & ~spans
+        )
 
     def _count(self, m: Module) -> None:
         """Counters of the units; those that two have are added."""

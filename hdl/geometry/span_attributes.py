@@ -56,6 +56,11 @@ class SpanAttributesUnit(wiring.Component):
     status : :py:`Out(counters_shape("empty", "cut"))`
         Triangles without a span, and spans of more than one piece, since the reset.
 
+    Attributes
+    ----------
+    idle : Signal
+        No scanline is walked and no piece waits.
+
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
 
@@ -69,8 +74,7 @@ class SpanAttributesUnit(wiring.Component):
                 "status": Out(counters_shape("empty", "cut")),
             }
         )
-        self.busy = Signal(name="attributes_busy")
-        """Whether a scanline or a piece is inside."""
+        self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
         """The long edge's values; the walk along a scanline; the pieces' words."""
@@ -113,7 +117,7 @@ class SpanAttributesUnit(wiring.Component):
             Signal(name="result_valid"),
         )
         m.d.comb += along.advance.eq(skid_buffer(m, self.o, result_valid, result))
-        m.d.comb += self.busy.eq(busy | valid | self.o.valid)
+        m.d.comb += self.idle.eq(~(busy | valid | self.o.valid))
         with m.If(along.advance):
             m.d.sync += [
                 valid.eq(along.emits),

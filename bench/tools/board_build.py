@@ -1,0 +1,408 @@
+"""Bitstreams: a board's top through Yosys, nextpnr and ecppack, with its pins, and the clocks reached."""
+
+import contextlib
+import importlib
+import json
+import re
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from amaranth.hdl import Elaboratable
+
+from blysk.bench.store import version_of
+from blysk.bench.tools.absorb_registers import absorb_registers
+from blysk.bench.tools.families import ECP5, signal_name
+from blysk.bench.tools.place_and_route import (
+    MAP_AFTER,
+    MAP_BEFORE,
+    MOUNT,
+    YOSYS,
+    TooLarge,
+    ToolError,
+    ToolRunner,
+)
+from blysk.sim.errors import InputError
+
+__all__ = ["BOARDS", "Board", "Built", "Clock", "board_named", "build", "packages_missing"]
+
+_REMEDY = "pip install 'blysk[board]'"
+
+PERIODS = 1
+"""Periods of the reader's clock that a path between two clocks may take: what crosses stays for longer."""
+
+_LIBRARY = """\
+read_verilog -lib -specify +/lattice/cells_sim_ecp5.v
+read_verilog -lib +/lattice/cells_bb_ecp5.v
+"""
+
+_PARTS = {
+    "look-up tables": "TRELLIS_COMB",
+    "flip-flops": "TRELLIS_FF",
+    "multipliers": "MULT18X18D",
+    "block RAMs": "DP16KD",
+    "PLLs": "EHXPLLL",
+}
+"""What is counted, and what nextpnr calls it."""
+
+
+@dataclass(frozen=True)
+class Board:
+    """A board that has an ECP5 and a connector for a monitor.
+
+    Parameters
+    ----------
+    name : str
+        On the command line.
+    module, platform : str
+        Where `amaranth_boards` has it.
+    options : tuple of str
+        Of nextpnr: device, package, speed grade.
+    reference : int
+        Rate of its clock, Hz.
+    buttons : tuple of (str, int)
+        Resources, up to six: what the top does with each is the top's.
+    block_rams, multipliers : int
+        Of its device.
+    lines : int
+        Of a band: the device has the memory.
+    loader : str
+        What openFPGALoader calls it.
+    compact : bool
+        Whether the device is small: compact geometry, shading that takes a span each 9 cycles.
+    """
+
+    name: str
+    module: str
+    platform: str
+    options: tuple[str, ...]
+    reference: int
+    buttons: tuple[tuple[str, int], ...]
+    block_rams: int
+    multipliers: int
+    lines: int
+    loader: str
+    compact: bool
+
+    def make(self) -> Any:
+        """The platform of amaranth-boards.
+
+        Raises
+        ------
+        InputError
+            If amaranth-boards is not installed.
+        """
+        try:
+            module = importlib.import_module(f"amaranth_boards.{self.module}")
+        except ModuleNotFoundError as error:
+            raise InputError("board", f"{error.name} is not installed", _REMEDY) from error
+        return getattr(module, self.platform)(toolchain="Trellis")
+
+
+_ULX3S_BUTTONS = tuple(
+    (f"button_{name}", number)
+    for name, number in (("fire", 0), ("fire", 1), ("up", 0), ("down", 0), ("left", 0), ("right", 0))
+)
+
+BOARDS = {
+    board.name: board
+    for board in (
+        Board(
+            *("ulx3s-25f", "ulx3s", "ULX3S_25F_Platform"),
+            options=("--25k", "--package", "CABGA381", "--speed", "6"),
+            reference=25_000_000,
+            buttons=_ULX3S_BUTTONS,
+            block_rams=56,
+            multipliers=28,
+            lines=8,
+            loader="ulx3s",
+            compact=True,
+        ),
+        Board(
+            *("ulx3s-85f", "ulx3s", "ULX3S_85F_Platform"),
+            options=("--85k", "--package", "CABGA381", "--speed", "6"),
+            reference=25_000_000,
+            buttons=_ULX3S_BUTTONS,
+            block_rams=208,
+            multipliers=156,
+            lines=16,
+            loader="ulx3s",
+            compact=False,
+        ),
+        Board(
+            *("icepi-zero", "icepi_zero", "IcepiZero1_3Platform"),
+            options=("--25k", "--package", "CABGA256", "--speed", "6"),
+            reference=50_000_000,
+            buttons=(("button", 0), ("button", 1)),
+            block_rams=56,
+            multipliers=28,
+            lines=8,
+            loader="icepi-zero",
+            compact=True,
+        ),
+    )
+}
+"""Boards by name."""
+
+
+def board_named(name: str) -> Board:
+    """A board by its name.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name; the line has the list.
+    """
+    if name not in BOARDS:
+        raise InputError(f"board {name}", "unknown", f"use {', '.join(BOARDS)}")
+    return BOARDS[name]
+
+
+def packages_missing() -> None:
+    """Check that every tool of a bitstream is installed.
+
+    Raises
+    ------
+    InputError
+        If one is not, naming all that are missing.
+    """
+    needed = ("amaranth-boards", "pyosys", ECP5.package)
+    missing = [package for package in needed if version_of(package) is None]
+    if missing:
+        verb = "is" if len(missing) == 1 else "are"
+        raise InputError("board", f"{' and '.join(missing)} {verb} not installed", _REMEDY)
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A clock of a design that was placed, or the paths from one clock to another.
+
+    Parameters
+    ----------
+    name : str
+        Its domain, or ``one to another``.
+    needed, reached : float
+        Rates, MHz.
+    path : str
+        The slowest path, from register to register, and its delay.
+    """
+
+    name: str
+    needed: float
+    reached: float
+    path: str
+
+    @property
+    def met(self) -> bool:
+        """Whether it is fast enough."""
+        return self.reached >= self.needed
+
+
+@dataclass(frozen=True)
+class Built:
+    """A bitstream, and what it took.
+
+    Parameters
+    ----------
+    parts : dict of str to (int, int)
+        Used and available, by name.
+    clocks : tuple of Clock
+        Every clock of the design.
+    closed : int
+        Multipliers with registers inside on both sides, between which nextpnr does not time.
+    seed : int
+        Of the placement.
+    bitstream : bytes
+        As the FPGA loads it.
+    words : int
+        Words of memory that were read back from the bitstream and are equal.
+    """
+
+    parts: dict[str, tuple[int, int]]
+    clocks: tuple[Clock, ...]
+    closed: int
+    seed: int
+    bitstream: bytes
+    words: int
+
+
+def _script() -> str:
+    """Yosys's commands: as for a unit, with the cells of pins and PLL known."""
+    return _LIBRARY + MAP_BEFORE + ECP5.synthesis + MAP_AFTER
+
+
+def _nextpnr(name: str) -> str:
+    module = ECP5.package.replace("-", "_")
+    return f"import sys, {module} as n; sys.exit(n.run_{name}(sys.argv[1:]))"
+
+
+def build(
+    board: Board,
+    top: Elaboratable,
+    rates: Mapping[str, float],
+    seeds: int = 1,
+    progress: Callable[[str], object] = lambda step: None,
+) -> Built:
+    """Make the bitstream of a top that requests its pins of the platform.
+
+    Parameters
+    ----------
+    board : Board
+        The board.
+    top : Elaboratable
+        Its domains are its own.
+    rates : dict of str to float
+        Of the clocks, MHz, by domain: what its PLL makes.
+    seeds : int
+        Placements to try until every clock is met; of none that does, the best is the result.
+    progress : callable
+        Called with the name of each step.
+
+    Raises
+    ------
+    InputError
+        If a tool is missing.
+    TooLarge
+        If it does not fit the device.
+    ToolError
+        If a tool fails, or the bitstream reads back as another configuration.
+    """
+    packages_missing()
+    platform = board.make()
+    plan = platform.prepare(top, "top", debug_verilog=False)
+    runner = ToolRunner()
+    with tempfile.TemporaryDirectory(prefix="blysk-") as name, contextlib.ExitStack() as stack:
+        stack.callback(runner.stop)
+        folder = Path(name)
+        for file in ("top.il", "top.lpf"):
+            text = plan.files[file]
+            (folder / file).write_bytes(text if isinstance(text, bytes) else text.encode())
+        progress("mapping")
+        runner.run("Yosys", YOSYS, [], folder, _script())
+        mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
+        mapped, absorbed = absorb_registers(mapped)
+        (folder / "top.json").write_text(json.dumps(mapped), encoding="utf-8")
+        _refuse_too_large(board, mapped)
+        best = None
+        for seed in range(1, seeds + 1):
+            progress(f"placement {seed}")
+            _place(board, runner, folder, seed)
+            report = json.loads((folder / f"{seed}.json").read_text(encoding="utf-8"))
+            clocks = _clocks(report, rates)
+            slack = min(clock.reached / clock.needed for clock in clocks)
+            if best is None or slack > best[0]:
+                best = slack, seed, report, clocks
+            if slack >= 1:
+                break
+        _, seed, report, clocks = best
+        progress("bitstream")
+        words = _pack(runner, folder, f"{seed}.config")
+        return Built(
+            {name: _used(report, kind) for name, kind in _PARTS.items()},
+            clocks,
+            absorbed.closed,
+            seed,
+            (folder / "top.bit").read_bytes(),
+            words,
+        )
+
+
+def _refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
+    """Refuse what has no place: the placer would say so after minutes, or try for ever."""
+    kinds = Counter(cell["type"] for cell in netlist["modules"]["top"]["cells"].values())
+    for name, kind, most in (
+        ("block RAMs", "DP16KD", board.block_rams),
+        ("multipliers", "MULT18X18D", board.multipliers),
+    ):
+        if kinds[kind] > most:
+            raise TooLarge(f"does not fit the {board.name}: {kinds[kind]} {name} of {most}")
+
+
+def _place(board: Board, runner: ToolRunner, folder: Path, seed: int) -> None:
+    options = [
+        *board.options,
+        *ECP5.large,
+        *("--json", f"{MOUNT}/top.json", "--lpf", f"{MOUNT}/top.lpf", "--textcfg", f"{MOUNT}/{seed}.config"),
+        *("--report", f"{MOUNT}/{seed}.json", "--seed", str(seed), "--timing-allow-fail"),
+    ]
+    try:
+        runner.run("nextpnr", _nextpnr("nextpnr_ecp5"), options, folder)
+    except ToolError as error:
+        if "legal placement" in str(error) or "Unable to place" in str(error):
+            raise TooLarge(f"does not fit the {board.name}: {error}") from None
+        raise
+
+
+def _used(report: Mapping[str, Any], kind: str) -> tuple[int, int]:
+    found = report["utilization"].get(kind, {"used": 0, "available": 0})
+    return int(found["used"]), int(found["available"])
+
+
+def _clocks(report: Mapping[str, Any], rates: Mapping[str, float]) -> tuple[Clock, ...]:
+    """Clocks of nextpnr's report, with the path that limits each; then paths between clocks."""
+    names, result = {}, []
+    for net, rate in report["fmax"].items():
+        name = next(
+            (name for name, asked in rates.items() if abs(rate["constraint"] / asked - 1) < 1e-3), None
+        )
+        if name is None or name in names.values():
+            raise ToolError(
+                f"nextpnr constrains {net} to {rate['constraint']:.2f} MHz, which no clock asks for"
+            )
+        names[net] = name
+    for path in report["critical_paths"]:
+        edges = [path[side].removeprefix("posedge ") for side in ("from", "to")]
+        if not all(edge in names for edge in edges):
+            continue
+        start, end = (names[edge] for edge in edges)
+        name = start if start == end else f"{start} to {end}"
+        delay = sum(step["delay"] for step in path["path"])
+        reached = report["fmax"][edges[0]]["achieved"] if start == end else 1e3 * PERIODS / delay
+        result.append(Clock(name, rates[end], reached, _told(path["path"], delay)))
+    missing = set(rates) - {clock.name for clock in result}
+    if missing:
+        raise ToolError(f"nextpnr reports no path of {', '.join(sorted(missing))}")
+    return tuple(sorted(result, key=lambda clock: (" " in clock.name, clock.name)))
+
+
+def _told(path: Sequence[Mapping[str, Any]], delay: float) -> str:
+    cells = sum(step["type"] == "logic" for step in path)
+    start, end = (signal_name(path[k][side]["cell"], ECP5) for k, side in ((0, "from"), (-1, "to")))
+    return f"{start} -> {end}, {delay:.1f} ns, {cells} cells"
+
+
+def _pack(runner: ToolRunner, folder: Path, configuration: str) -> int:
+    """Make ``top.bit`` of a configuration in text, read it back, and compare.
+
+    What is read back names some settings otherwise, as several names are one bit. So it is packed again,
+    which must give the same bytes; contents of memories are compared as they are.
+
+    Returns
+    -------
+    int
+        Words of memory that are equal.
+    """
+    steps = (
+        ("ecppack", configuration, "--bit", "top.bit"),
+        ("ecpunpack", "top.bit", "--textcfg", "back.config"),
+        ("ecppack", "back.config", "--bit", "again.bit"),
+    )
+    for tool, source, option, target in steps:
+        files = ["--input", f"{MOUNT}/{source}", option, f"{MOUNT}/{target}"]
+        compress = ["--compress"] if tool == "ecppack" else []
+        runner.run(tool, _nextpnr(tool), files + compress, folder)
+    if (folder / "top.bit").read_bytes() != (folder / "again.bit").read_bytes():
+        raise ToolError("the bitstream that is read back and packed again is another one")
+    sent, back = (_memories((folder / name).read_text()) for name in (configuration, "back.config"))
+    if sent != back:
+        raise ToolError("the bitstream reads back with other contents of memories")
+    return sum(map(len, sent.values()))
+
+
+def _memories(text: str) -> dict[str, list[str]]:
+    """Words of the block RAMs of a configuration in text, by their numbers."""
+    found = re.findall(r"^\.bram_init (\d+)\n((?:[0-9a-f ]+\n)+)", text, re.MULTILINE)
+    return {number: words.split() for number, words in found}

@@ -1,0 +1,181 @@
+"""What a board draws: a scene with its presets for the buttons, and the top with the board's pins."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from amaranth.hdl import Cat, ClockDomain, Elaboratable, Module
+from amaranth.lib import io
+from amaranth.lib.wiring import Component
+
+from blysk.bench.tools.board_build import Board
+from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID
+from blysk.golden.gpu import Gpu
+from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.reference.scene import Scene
+from blysk.golden.video.band_buffer import RGB565, RGB888, BandBuffer
+from blysk.golden.video.clock_plan import ClockPlan
+from blysk.golden.video.controls import Controls
+from blysk.golden.video.display_timing import VGA
+from blysk.golden.video.draw_unit import Drawing
+from blysk.golden.video.mesh_memory import MeshMemory, block_rams
+from blysk.golden.video.serialiser import LANES
+from blysk.hdl.video.clocks import ClockUnit
+from blysk.hdl.video.output_cells import OutputCells
+from blysk.sim.api.design import design_of
+from blysk.sim.api.options import DESIGN, SCENE
+from blysk.sim.api.scene import load, scenes_of
+from blysk.sim.api.settings import read_settings
+from blysk.sim.errors import InputError
+from blysk.sim.frames.animation import turned as turned_views
+
+__all__ = ["COLOURS", "OPTIONS", "BoardTop", "gpu_of", "least_cycles"]
+
+COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
+"""Bits of a pixel in the band buffer."""
+
+_LEFT_OUT = ("size", "projection", "viewer", "target", "method", "operand", "gate", "setup_interval", "style")
+
+OPTIONS = {name: option for name, option in {**SCENE, **DESIGN}.items() if name not in _LEFT_OUT}
+"""Options of the command: the picture's size is the display's, the camera a perspective one."""
+
+_DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
+
+COMPACT_INTERVAL = 9
+"""Cycles from a span to the next on a small device."""
+
+MAX_LIGHTS = 4
+"""Lights of a board's scene."""
+
+_SHINIER = 4
+"""How many times the exponent of the second material."""
+
+_RENDERER_BLOCKS = 16
+"""Block RAMs of the renderer's own tables and buffers, as placed, of lists of commands and of motion."""
+
+
+def gpu_of(
+    board: Board, mesh: str, given: Mapping[str, Any], colours: str = "rgb888"
+) -> tuple[Gpu, list[Scene]]:
+    """The drawing of a mesh on a board, and the scenes of its presets.
+
+    Presets: the material as given, and one with four times the exponent; the lights as given, and turned by a
+    quarter around the upright.
+
+    Parameters
+    ----------
+    board : Board
+        Whose memory the mesh must fit.
+    mesh : str
+        File, scene file, or ``teapot``.
+    given : dict
+        Options of `OPTIONS`.
+    colours : str
+        Of `COLOURS`.
+
+    Raises
+    ------
+    InputError
+        If the mesh cannot be read, or does not fit, or an option is not accepted.
+    """
+    interval = {"setup_interval": COMPACT_INTERVAL} if board.compact else {}
+    settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **_DEFAULTS, **interval)
+    if settings["size"] != VGA.size:
+        raise settings.refuse("size", "the display has 640x480 pixels", "leave it out", "")
+    loaded = load(settings)
+    (scene,) = scenes_of(loaded, settings)
+    scenes = _presets(scene, settings["up"])
+    if len(scene.lights) > MAX_LIGHTS:
+        raise settings.refuse("lights", f"{len(scene.lights)} lights", f"give at most {MAX_LIGHTS}", "")
+    design = design_of(settings, len(scene.lights), len(scene.materials))
+    background = tuple(round(255 * channel) for channel in scene.background)
+    buffer = BandBuffer(VGA, board.lines, colour_bits=COLOURS[colours], background=background)
+    _check_memory(board, mesh, scene, buffer)
+    try:
+        drawing = Drawing.of(
+            scenes, design, lines=buffer.lines, axis=settings["up"], controls=Controls(materials=2, lights=2)
+        )
+    except ValueError as error:
+        raise InputError(f"--mesh {mesh}", str(error), "use another mesh, camera or material") from error
+    return Gpu(drawing, buffer), scenes
+
+
+def _presets(scene: Scene, up: Any) -> list[Scene]:
+    """Two lights by two materials, the material changing first."""
+    shiny = tuple(
+        replace(material, exponent=min(_SHINIER * material.exponent, MAX_EXPONENT))
+        for material in scene.materials
+    )
+    lights = tuple(
+        replace(light, direction=tuple(turned_views(light.direction, up, 4)[1].tolist()))
+        if light.position is None
+        else light
+        for light in scene.lights
+    )
+    return [
+        replace(scene, material=material, lights=light)
+        for light in (scene.lights, lights)
+        for material in (scene.material, shiny)
+    ]
+
+
+def _check_memory(board: Board, name: str, scene: Scene, buffer: BandBuffer) -> None:
+    """Refuse a mesh that does not fit beside the bands."""
+    colours = block_rams(2 * buffer.pixels, sum(buffer.colour_bits))
+    depths = block_rams(buffer.pixels, 27)
+    left = board.block_rams - colours - depths - _RENDERER_BLOCKS
+    screen_bits = 2 * GRID.bits + DEPTH.width + 3 * ATTRIBUTE.width + 1
+    mesh, most = scene.mesh, MeshMemory.LARGEST - 1
+    fits = len(mesh.faces) <= most and len(mesh.vertices) <= most
+    if not fits or MeshMemory.of([mesh]).blocks(screen_bits) > left:
+        least = MeshMemory.triangles_that_fit(left, screen_bits)
+        raise InputError(
+            f"--mesh {name}",
+            f"its {len(mesh.faces):,} triangles do not fit the memory of the {board.name} beside the bands",
+            f"use one of at most about {least:,}",
+        )
+
+
+def least_cycles(drawing: Drawing) -> int:
+    """Cycles that a frame of a drawing takes at least: walking its triangles for every band, its vertices."""
+    return 3 * drawing.mesh.triangles * drawing.bands + 30 * drawing.mesh.vertices
+
+
+class BoardTop(Elaboratable):
+    """The drawing, its display, the clocks and the pins of a board.
+
+    Parameters
+    ----------
+    board : Board
+        The board.
+    gpu : Component
+        A `GpuUnit`, or another component with ``pairs``, and ``buttons`` if it has some.
+    plan : ClockPlan
+        Of the board's clock.
+    """
+
+    def __init__(self, board: Board, gpu: Component, plan: ClockPlan):
+        self.board, self.gpu, self.plan = board, gpu, plan
+
+    def elaborate(self, platform):
+        """Request the pins: clock, lanes of the connector ``hdmi``, buttons."""
+        m = Module()
+        clock = platform.request(platform.default_clk, dir="-")
+        m.submodules.clock = buffer = io.Buffer("i", clock)
+        m.submodules.clocks = clocks = ClockUnit(self.plan)
+        m.domains += [ClockDomain(name) for name in clocks.clocks]
+        m.d.comb += clocks.reference.eq(buffer.i)
+        names = [pin.name for pin in platform.lookup("hdmi", 0).ios if hasattr(pin, "ios")]
+        connector = platform.request("hdmi", 0, dir=dict.fromkeys(names, "-"))
+        lanes = [*(connector.d[k] for k in range(LANES - 1)), connector.clk]
+        m.submodules.cells = cells = OutputCells(LANES, lanes)
+        m.submodules.gpu = gpu = self.gpu
+        m.d.comb += cells.pairs.eq(gpu.pairs)
+        buttons, pressed = [], gpu.buttons if hasattr(gpu, "buttons") else ()
+        for k, (name, number) in enumerate(self.board.buttons[: len(pressed)]):
+            port = platform.request(name, number, dir="-")
+            m.submodules[f"button_{k}"] = button = io.Buffer("i", port)
+            buttons.append(button.i)
+        if buttons:
+            m.d.comb += pressed.eq(Cat(buttons))
+        return m

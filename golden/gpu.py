@@ -1,0 +1,55 @@
+"""A mesh in memory to the frames of a monitor, and their bit-accurate model."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from blysk.golden.video.band_buffer import BandBuffer
+from blysk.golden.video.draw_unit import Drawing
+
+__all__ = ["Gpu"]
+
+
+@dataclass(frozen=True)
+class Gpu:
+    """Bit-accurate model of a drawing on a display.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        What is drawn; its picture is the display's.
+    buffer : BandBuffer
+        Bands of as many lines, colours, the background.
+
+    Raises
+    ------
+    ValueError
+        If sizes or lines differ.
+
+    Source: docs/theory/video.md#bands.
+    """
+
+    drawing: Drawing
+    buffer: BandBuffer = field(default_factory=BandBuffer)
+
+    def __post_init__(self):
+        if self.drawing.size != self.buffer.mode.size or self.drawing.lines != self.buffer.lines:
+            raise ValueError(
+                f"drawn are {self.drawing.size} pixels by {self.drawing.lines} lines, shown "
+                f"{self.buffer.mode.size} by {self.buffer.lines}"
+            )
+
+    def frames(self, count: int) -> np.ndarray:
+        """Frames from power-up, without a button pressed and none late; shape (count, height, width, 3)."""
+        controls, result = self.drawing.controls, []
+        state = controls.start
+        for _ in range(count):
+            state = controls.advance(state)
+            result.append(self.frame(state.angle, controls.list_of(state)))
+        return np.array(result)
+
+    def frame(self, angle: int, preset: int = 0, late: Collection[int] = ()) -> np.ndarray:
+        """The frame of an angle and a list, with bands that are late."""
+        picture = self.drawing.picture(angle, preset, self.buffer.background)
+        return self.buffer.compute(picture, late).astype(np.uint8)

@@ -1,0 +1,1 @@
+"""Bit-accurate models of the display side: timing, bands of colour, TMDS, serial lanes."""

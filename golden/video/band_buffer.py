@@ -1,0 +1,111 @@
+"""Band buffer: bands of lines that are drawn while others are shown, and which band is drawn next."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.video.display_timing import VGA, DisplayMode
+
+__all__ = ["RGB565", "RGB888", "BandBuffer"]
+
+RGB888 = (8, 8, 8)
+RGB565 = (5, 6, 5)
+"""Bits of red, green and blue that a buffer keeps."""
+
+
+@dataclass(frozen=True)
+class BandBuffer:
+    """Two bands of colour: one is shown, the other is drawn; what was not drawn is the background.
+
+    A band of `lines` lines takes the display its lines' time, its *slot*. A band that is not complete when
+    its slot begins is *late*: the background is shown in its place, and it is dropped when it is complete.
+    Drawn next is the band after the last one, unless its slot has begun: then the band of the next slot
+    (`following`). So the lines of a frame are each either right or background, and the display's timing
+    does not depend on what is drawn.
+
+    Colours are kept by their highest bits, ``channel >> (8 - bits)``, and shown with these repeated below:
+    black stays black, white stays white, and a channel is off by at most ``2^(8 - bits) - 1``.
+
+    Parameters
+    ----------
+    mode : DisplayMode
+        Size of the picture.
+    lines : int
+        Of a band, a power of two that divides the picture's lines into four bands or more.
+    colour_bits : tuple of int
+        `RGB888`, `RGB565` or others from 4 to 8.
+    background : tuple of int
+        Red, green and blue, 0 to 255.
+
+    Raises
+    ------
+    ValueError
+        If the lines are no such number, or the bits or the background out of range.
+
+    Source: docs/theory/video.md#bands.
+    """
+
+    mode: DisplayMode = VGA
+    lines: int = 16
+    colour_bits: tuple[int, int, int] = RGB888
+    background: tuple[int, int, int] = (0, 0, 0)
+
+    def __post_init__(self):
+        height = self.mode.vertical.visible
+        if self.lines < 2 or self.lines & (self.lines - 1) or height % self.lines or height < 4 * self.lines:
+            raise ValueError(
+                f"a band has 2, 4, 8, ... lines, and {height} lines are four bands or more of them"
+            )
+        if not all(4 <= bits <= 8 for bits in self.colour_bits):
+            raise ValueError("a channel is kept by 4 to 8 bits")
+        if not all(0 <= channel <= 255 for channel in self.background):
+            raise ValueError("channels of the background are 0 to 255")
+
+    @property
+    def bands(self) -> int:
+        """Bands of a picture."""
+        return self.mode.vertical.visible // self.lines
+
+    @property
+    def pixels(self) -> int:
+        """Pixels of a band."""
+        return self.mode.horizontal.visible * self.lines
+
+    @property
+    def error(self) -> int:
+        """Largest difference of a channel between a colour drawn and shown."""
+        return (1 << 8 - min(self.colour_bits)) - 1
+
+    def kept(self, colour: np.ndarray) -> np.ndarray:
+        """Channels as the buffer has them, shape (..., 3)."""
+        return np.asarray(colour) >> 8 - np.array(self.colour_bits)
+
+    def shown(self, code: np.ndarray) -> np.ndarray:
+        """Channels of 8 bits, shape (..., 3), of those that the buffer has."""
+        bits = np.array(self.colour_bits)
+        return np.asarray(code) << 8 - bits | np.asarray(code) >> 2 * bits - 8
+
+    def compute(self, picture: np.ndarray, late: Collection[int] = ()) -> np.ndarray:
+        """The frame that is shown of a picture that is drawn.
+
+        Parameters
+        ----------
+        picture : int array, shape (height, width, 3)
+            With the background where nothing is drawn.
+        late : collection of int
+            Bands that were late.
+        """
+        shown = self.shown(self.kept(picture))
+        for band in late:
+            shown[band * self.lines : (band + 1) * self.lines] = self.shown(self.kept(self.background))
+        return shown
+
+    def following(self, band: np.ndarray, slot: np.ndarray) -> np.ndarray:
+        """Band that is drawn after ``band``, if the last slot that has begun is ``slot``.
+
+        With two buffers at most the next two slots' bands are worth drawing.
+        """
+        next_band = (band + 1) % self.bands
+        ahead = (next_band - slot) % self.bands
+        return np.where((ahead == 1) | (ahead == 2), next_band, (slot + 1) % self.bands)

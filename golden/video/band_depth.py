@@ -1,0 +1,73 @@
+"""Band depth: the depths of one band, cleared for the next by a tag."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.geometry.depth_test import DepthTest
+
+__all__ = ["BandDepth"]
+
+
+@dataclass(frozen=True)
+class BandDepth:
+    """A memory of depths of which every word counts as cleared that was not written in this band.
+
+    A word holds a depth and a tag of ``tag_bits`` bits: the number of the band in which it was written,
+    modulo ``2^tag_bits``. Another tag than the present one reads as `DepthTest.CLEARED`. So that no tag comes
+    round again, ``swept`` words are written with the tag before the present one when a band begins, in turn
+    those that were swept longest ago: with ``2^t`` tags every word is swept again at most ``2^t - 2`` bands
+    later, one before that tag is the present one.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and lines of a band.
+    tag_bits : int
+        2 to 8.
+
+    Source: docs/theory/video.md#bands; not in the documents.
+    """
+
+    size: tuple[int, int]
+    tag_bits: int = 3
+
+    def __post_init__(self):
+        if self.tag_bits not in range(2, 9):
+            raise ValueError(f"tag_bits must be 2 to 8, not {self.tag_bits!r}")
+
+    @property
+    def words(self) -> int:
+        """Pixels of a band."""
+        return self.size[0] * self.size[1]
+
+    @property
+    def swept(self) -> int:
+        """Words swept for a band."""
+        return -(-self.words // ((1 << self.tag_bits) - 2))
+
+    def compute(
+        self, begins: np.ndarray, writes: np.ndarray, place: np.ndarray, depth: np.ndarray
+    ) -> np.ndarray:
+        """What reads give: of each step the last depth written at its place since the last band began.
+
+        Parameters
+        ----------
+        begins : bool array, shape (N,)
+            Steps on which a band begins; its other words mean nothing.
+        writes : bool array, shape (N,)
+            Steps that write ``depth`` after they have read.
+        place, depth : int64 arrays, shape (N,)
+            Where, and what.
+        """
+        band = np.cumsum(begins)
+        key = band * self.words + place
+        order = np.argsort(key, kind="stable")
+        step = np.arange(len(key))
+        wrote = np.where((writes & ~begins)[order], step, -1)
+        # The last write before each step of the same key.
+        last = np.r_[-1, np.maximum.accumulate(wrote)[:-1]] if len(key) else wrote
+        same = (last >= 0) & (key[order][np.maximum(last, 0)] == key[order])
+        result = np.empty(len(key), dtype=np.int64)
+        result[order] = np.where(same, depth[order][np.maximum(last, 0)], DepthTest.CLEARED)
+        return result

@@ -1,0 +1,105 @@
+"""Controls: what buttons do to the frames that follow."""
+
+from dataclasses import dataclass, replace
+
+from blysk.golden.video.motion import ANGLE_BITS
+
+__all__ = ["BUTTONS", "ControlState", "Controls"]
+
+BUTTONS = ("pause", "step", "material", "light")
+"""What each button does: stop or go on; other way or, in a pause, one step; next material; next light."""
+
+
+@dataclass(frozen=True)
+class ControlState:
+    """State between frames.
+
+    Parameters
+    ----------
+    angle : int
+        Of the frame.
+    running, backwards : bool
+        Whether frames turn, and which way.
+    material, light : int
+        Chosen preset.
+    """
+
+    angle: int = 0
+    running: bool = True
+    backwards: bool = False
+    material: int = 0
+    light: int = 0
+
+
+@dataclass(frozen=True)
+class Controls:
+    """Angle and preset of each frame from buttons.
+
+    A button counts when it has been down for `2^debounce_bits` samples after as many up; the press of
+    ``step`` turns by one step in a pause, else it turns the motion round. The list of a frame is that of
+    ``light * materials + material``.
+
+    Parameters
+    ----------
+    materials, lights : int
+        How many presets there are of each, 1 or more.
+    step : int
+        Codes of an angle from a frame to the next.
+    first : int
+        Angle before the first frame.
+    debounce_bits : int
+        Of the counter of a button, in cycles.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range.
+
+    Source: docs/theory/video.md#bands; not in the documents.
+    """
+
+    materials: int = 1
+    lights: int = 1
+    step: int = 8
+    first: int = 0
+    debounce_bits: int = 19
+
+    def __post_init__(self):
+        for name, low, high in (
+            ("materials", 1, 64),
+            ("lights", 1, 64),
+            ("step", 1, (1 << ANGLE_BITS) - 1),
+            ("first", 0, (1 << ANGLE_BITS) - 1),
+            ("debounce_bits", 1, 24),
+        ):
+            if not low <= getattr(self, name) <= high:
+                raise ValueError(f"{name} must be {low} to {high}, not {getattr(self, name)!r}")
+
+    @property
+    def start(self) -> ControlState:
+        """State before the first frame."""
+        return ControlState(angle=self.first)
+
+    def press(self, state: ControlState, button: str) -> ControlState:
+        """State after a press of one of `BUTTONS`."""
+        if button == "pause":
+            return replace(state, running=not state.running)
+        if button == "step":
+            if state.running:
+                return replace(state, backwards=not state.backwards)
+            return replace(state, angle=self._turned(state))
+        if button == "material":
+            return replace(state, material=(state.material + 1) % self.materials)
+        return replace(state, light=(state.light + 1) % self.lights)
+
+    def advance(self, state: ControlState) -> ControlState:
+        """State of the next frame."""
+        return replace(state, angle=self._turned(state)) if state.running else state
+
+    def list_of(self, state: ControlState) -> int:
+        """Index of the list that is walked."""
+        return state.light * self.materials + state.material
+
+    def _turned(self, state: ControlState) -> int:
+        step = -self.step if state.backwards else self.step
+        return (state.angle + step) % (1 << ANGLE_BITS)

@@ -1,0 +1,106 @@
+"""Draw commands: lists that are walked for every band, and what a scene compiles to."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.video.mesh_memory import MeshMemory
+
+__all__ = ["COMMAND_BITS", "KINDS", "DrawCommands"]
+
+KINDS = ("end", "transform", "frame_constant", "constant", "draw")
+"""Kinds of commands by their codes."""
+
+_FIELDS = {"kind": 3, "index": 9, "first": 12, "count": 12}
+
+COMMAND_BITS = sum(_FIELDS.values())
+"""Bits of a command: kind, index, first, count from the lowest bit up."""
+
+_ONCE = (KINDS.index("transform"), KINDS.index("frame_constant"))
+
+
+@dataclass(frozen=True)
+class DrawCommands:
+    """Lists of commands in one memory; each ends with ``end``.
+
+    ================== ======================= ================== ============= =======================
+    kind               index                   first              count         does
+    ================== ======================= ================== ============= =======================
+    end                                                                         ends the band
+    transform          slot of a matrix        first vertex       vertices      in the first band only
+    frame_constant     address of a write      low 12 bits        next 6 bits   in the first band only
+    constant           address of a write      low 12 bits        next 6 bits   in every band
+    draw               material                first triangle     triangles     in every band
+    ================== ======================= ================== ============= =======================
+
+    Parameters
+    ----------
+    words : int64 array, shape (C, 4)
+        Kind, index, first, count.
+    starts : tuple of int
+        Where each list begins.
+
+    Raises
+    ------
+    ValueError
+        If a field does not fit, or a list does not end.
+
+    Source: docs/theory/video.md#bands; [T] chapter 4.
+    """
+
+    words: np.ndarray
+    starts: tuple[int, ...]
+
+    def __post_init__(self):
+        for column, (name, bits) in enumerate(_FIELDS.items()):
+            values = self.words[:, column]
+            if values.min() < 0 or values.max() >= 1 << bits:
+                raise ValueError(f"a command's {name} must be 0 to {(1 << bits) - 1}, not {values.max()}")
+        if self.words[-1, 0] != KINDS.index("end") or self.words[:, 0].max() >= len(KINDS):
+            raise ValueError("commands must be known, and the last must be an end")
+
+    @classmethod
+    def of(
+        cls, mesh: MeshMemory, presets: Sequence[Sequence[FrameConstants]], cull: Sequence[int] = ()
+    ) -> "DrawCommands":
+        """A list for each preset: its constants, then each part transformed by the slot of its number, drawn.
+
+        Parameters
+        ----------
+        mesh : MeshMemory
+            What is drawn.
+        presets : sequence of sequence of FrameConstants
+            Of each preset the constants of every material.
+        cull : sequence of int
+            Parts left out.
+        """
+        rows, starts = [], []
+        for constants in presets:
+            starts.append(len(rows))
+            writes = writes_of(constants)
+            data = np.asarray(writes["data"])
+            kind = np.full(len(data), KINDS.index("frame_constant"))
+            rows += np.stack([kind, writes["address"], data & 0xFFF, data >> 12], axis=1).tolist()
+            kept = [(slot, part) for slot, part in enumerate(mesh.parts) if slot not in cull]
+            rows += [[KINDS.index("transform"), slot, part.first, part.count] for slot, part in kept]
+            rows += [
+                [KINDS.index("draw"), material, first, count]
+                for _, part in kept
+                for material, first, count in part.draws
+            ]
+            rows.append([KINDS.index("end"), 0, 0, 0])
+        return cls(np.array(rows, dtype=np.int64), tuple(starts))
+
+    @property
+    def codes(self) -> list[int]:
+        """Words of the memory."""
+        shift = np.cumsum([0, *_FIELDS.values()])[:-1]
+        return (self.words << shift).sum(axis=1).tolist()
+
+    def compute(self, start: int, first_band: bool) -> np.ndarray:
+        """Commands of a band from a list's start to its end, shape (C, 4)."""
+        end = start + int(np.argmax(self.words[start:, 0] == KINDS.index("end"))) + 1
+        words = self.words[start:end]
+        return words if first_band else words[~np.isin(words[:, 0], _ONCE)]

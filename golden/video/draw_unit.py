@@ -1,0 +1,267 @@
+"""Drawing a frame band by band: from a mesh in memory to the pixels of each band."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import constants_of
+from blysk.golden.frames.triangle_frame import span_angle
+from blysk.golden.geometry.triangles import Frame, Triangles
+from blysk.golden.pipeline import Design
+from blysk.golden.presets import preset
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.scene import Scene
+from blysk.golden.render import DrawnPixels, Renderer
+from blysk.golden.video.controls import Controls
+from blysk.golden.video.draw_commands import KINDS, DrawCommands
+from blysk.golden.video.mesh_memory import MeshMemory
+from blysk.golden.video.motion import Motion, rotation
+from blysk.golden.video.triangle_assembly import TriangleAssembly
+from blysk.golden.video.vertex_unit import ScreenVertices, VertexTransform
+
+__all__ = ["BandPixels", "Drawing", "board_design", "turned"]
+
+
+@dataclass(frozen=True)
+class BandPixels:
+    """Pixels of a band in the order in which they are drawn.
+
+    Parameters
+    ----------
+    band : int
+        Index, 0 at the top.
+    x, y : int64 arrays, shape (P,)
+        Column, and line of the band.
+    color : uint8 array, shape (P, 3)
+        Red, green, blue.
+    counts : dict of str to int
+        Those of `TriangleAssembly` and of `Renderer`.
+    """
+
+    band: int
+    x: np.ndarray
+    y: np.ndarray
+    color: np.ndarray
+    counts: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Bit-accurate model of drawing in bands: a mesh memory, its motion, lists of commands, a renderer.
+
+    A frame's vertices are transformed once; its triangles are walked for every band, clipped to its lines,
+    and shaded. As a pixel's depth and colour follow from its triangle alone, whatever the clipping, the bands
+    together are the picture of the whole frame, to the bit.
+
+    Parameters
+    ----------
+    mesh : MeshMemory
+        Vertices and triangles.
+    motion : Motion
+        A slot for each part of the memory.
+    commands : DrawCommands
+        Lists, one for each preset of ``controls``.
+    presets : tuple of tuple of FrameConstants
+        What the lists write, of each material.
+    renderer : Renderer
+        Of a design whose ``x_bits`` and ``y_bits`` hold a band.
+    size : (int, int)
+        Width and height of the picture.
+    frame : Frame
+        The whole picture.
+    controls : Controls
+        Angle and preset of each frame.
+    lines : int
+        Of a band.
+    transform : VertexTransform
+        Of vertices.
+
+    Raises
+    ------
+    ValueError
+        If the design is made for another size, or presets and lists differ in number.
+
+    Source: docs/theory/video.md#bands; [T] figure 4.10.
+    """
+
+    mesh: MeshMemory
+    motion: Motion
+    commands: DrawCommands
+    presets: tuple[tuple[FrameConstants, ...], ...]
+    renderer: Renderer
+    size: tuple[int, int]
+    frame: Frame
+    controls: Controls = field(default_factory=Controls)
+    lines: int = 16
+    transform: VertexTransform = field(default_factory=VertexTransform)
+
+    def __post_init__(self):
+        design, bits = self.renderer.design, self.place_bits(self.size, self.lines)
+        if (design.x_bits, design.y_bits) != bits:
+            raise ValueError(
+                f"the design has {design.x_bits} and {design.y_bits} bits of a place, a band of "
+                f"{self.size[0]}x{self.lines} has {bits[0]} and {bits[1]}"
+            )
+        wanted = self.controls.materials * self.controls.lights
+        if len(self.commands.starts) != wanted or len(self.presets) != wanted:
+            raise ValueError(f"the controls choose from {wanted} lists, there are {len(self.presets)}")
+        if self.motion.slots != len(self.mesh.parts):
+            raise ValueError(f"{len(self.mesh.parts)} meshes need as many slots, not {self.motion.slots}")
+
+    @staticmethod
+    def place_bits(size: tuple[int, int], lines: int) -> tuple[int, int]:
+        """Bits of a column and of a line of a band, as a design is to have them."""
+        return max((size[0] - 1).bit_length(), 1), max((lines - 1).bit_length(), 1)
+
+    @classmethod
+    def of(
+        cls,
+        scenes: Sequence[Scene],
+        design: Design | None = None,
+        *,
+        lines: int = 16,
+        axis: Sequence[float] = (0.0, 1.0, 0.0),
+        controls: Controls | None = None,
+        transform: VertexTransform | None = None,
+        angle: float | None = None,
+    ) -> "Drawing":
+        """Drawing of a scene's mesh, which turns around its own middle.
+
+        Parameters
+        ----------
+        scenes : sequence of Scene
+            Of one mesh, camera and size; they differ in materials and lights, and are the presets.
+        design : Design, optional
+            Shading; its ``x_bits`` and ``y_bits`` are replaced. By default `board_design` for the lights and
+            materials of the scenes.
+        lines : int
+            Of a band.
+        axis : three floats
+            The axis.
+        controls : Controls, optional
+            By default every scene is a material.
+        transform : VertexTransform, optional
+            Of vertices.
+        angle : float, optional
+            As `sent_triangles` has it.
+
+        Raises
+        ------
+        ValueError
+            If a scene does not fit the design, the mesh the memory, or the camera the matrix.
+        """
+        scene, transform = scenes[0], transform or VertexTransform()
+        design = design or board_design(max(len(each.lights) for each in scenes), len(scene.materials))
+        size = scene.width, scene.height
+        x_bits, y_bits = cls.place_bits(size, lines)
+        design = replace(design, x_bits=x_bits, y_bits=y_bits)
+        mesh = MeshMemory.of([scene.mesh])
+        presets = tuple(tuple(constants_of(each, design)) for each in scenes)
+        widest = min(span_angle(each, design) for each in scenes) if angle is None else angle
+        return cls(
+            mesh=mesh,
+            motion=Motion.of(mesh, scene.camera, size, axis, transform),
+            commands=DrawCommands.of(mesh, presets),
+            presets=presets,
+            renderer=Renderer(design),
+            size=size,
+            frame=Frame.centred(*size, back_faces=scene.back_faces, limit=Frame.limit_of(widest)),
+            controls=controls or Controls(materials=len(scenes)),
+            lines=lines,
+            transform=transform,
+        )
+
+    @property
+    def bands(self) -> int:
+        """Number of bands."""
+        return -(-self.size[1] // self.lines)
+
+    @property
+    def assembly(self) -> TriangleAssembly:
+        """Assembly of its triangles."""
+        return TriangleAssembly(self.mesh, self.transform.grid)
+
+    def rows(self, band: int) -> Frame:
+        """The frame of a band."""
+        top = self.frame.top + band * self.lines
+        return replace(self.frame, top=top, bottom=min(top + self.lines, self.frame.bottom))
+
+    def vertices(self, angle: int) -> ScreenVertices:
+        """All vertices at an angle's code."""
+        made = [
+            self.transform.compute(
+                self.mesh.position[part.first : part.first + part.count],
+                self.mesh.normal[part.first : part.first + part.count],
+                self.motion.matrix(slot, angle),
+            )
+            for slot, part in enumerate(self.mesh.parts)
+        ]
+        names = ("x", "y", "depth", "normal", "outside")
+        return ScreenVertices(*(np.concatenate([getattr(part, name) for part in made]) for name in names))
+
+    def triangles(self, angle: int, preset: int, rows: Frame) -> tuple[Triangles, dict[str, int]]:
+        """Triangles of some scanlines, and what the assembly counts."""
+        words = self.commands.compute(self.commands.starts[preset], True)
+        draws = words[words[:, 0] == KINDS.index("draw")]
+        return self.assembly.compute(
+            self.vertices(angle), draws[:, 2], draws[:, 3], draws[:, 1], rows.top, rows.bottom
+        )
+
+    def band(self, band: int, angle: int, preset: int = 0) -> BandPixels:
+        """Bit-accurate pixels of a band.
+
+        Parameters
+        ----------
+        band : int
+            Index.
+        angle : int
+            Code of the angle.
+        preset : int
+            Index of the list.
+        """
+        rows = self.rows(band)
+        triangles, counts = self.triangles(angle, preset, rows)
+        drawn = self.renderer.compute(triangles, rows, self.presets[preset])
+        return BandPixels(band, drawn.x, drawn.y, drawn.color, counts | drawn.counts)
+
+    def whole(self, angle: int, preset: int = 0) -> DrawnPixels:
+        """The same triangles through a renderer of whole frames."""
+        design = self.renderer.design
+        y_bits = max((self.size[1] - 1).bit_length(), 1)
+        renderer = Renderer(replace(design, y_bits=y_bits), self.renderer.geometry)
+        triangles, _ = self.triangles(angle, preset, self.frame)
+        return renderer.compute(triangles, self.frame, self.presets[preset])
+
+    def picture(self, angle: int, preset: int = 0, background: Sequence[int] = (0, 0, 0)) -> np.ndarray:
+        """Frame buffer of all bands, uint8, shape (height, width, 3)."""
+        image = np.empty((self.size[1], self.size[0], 3), dtype=np.uint8)
+        image[...] = background
+        for index in range(self.bands):
+            pixels = self.band(index, angle, preset)
+            image[index * self.lines + pixels.y, pixels.x] = pixels.color
+        return image
+
+
+def board_design(lights: int = 1, materials: int = 1) -> Design:
+    """The shading that a small device shows a picture with: chord, cosquad, a span each 9 cycles.
+
+    13 multipliers with one light, where a span each 3 cycles takes 18; with the geometry's 10, and one each
+    for vertices and motion, 25 of the 28 of an ECP5-25F.
+
+    Parameters
+    ----------
+    lights, materials : int
+        As `Design` has them.
+    """
+    return preset("chord", "cosquad", lights, materials=materials, setup_interval=9)
+
+
+def turned(scene: Scene, angle: int, axis: Sequence[float] = (0.0, 1.0, 0.0)) -> Scene:
+    """The scene whose mesh is turned by an angle's code, in float64: what the frame should show."""
+    mesh = scene.mesh
+    centre = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    turn = rotation(axis, Motion.radians(angle))
+    vertices = (mesh.vertices - centre) @ turn.T + centre
+    return replace(scene, mesh=Mesh(vertices, mesh.faces, mesh.normals @ turn.T, mesh.material))

@@ -1,0 +1,187 @@
+"""Mesh memory: vertices and triangles of meshes as words of block RAM."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.golden.reference.geometry import Mesh
+
+__all__ = ["BLOCK_BITS", "MeshMemory", "Part", "block_rams"]
+
+BLOCK_BITS = 36
+"""Width of an ECP5's block RAM of 512 words."""
+
+_BLOCK_WORDS = 512
+
+
+def block_rams(words: int, width: int) -> int:
+    """Block RAMs of an ECP5 (18 kbit, 36 bits wide at most) that a memory of so many words takes, at least.
+
+    Blocks have ``512 2^k`` words of ``36 / 2^k`` bits, 9 down to 1 bit from 2048 words on without the ninth
+    for bits; the best k is taken.
+    """
+    shapes = ((512, 36), (1024, 18), (2048, 9), (4096, 4), (8192, 2), (16384, 1))
+    return min(-(-words // depth) * -(-width // bits) for depth, bits in shapes)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A mesh in the memory.
+
+    Parameters
+    ----------
+    first, count : int
+        Its vertices.
+    draws : tuple of (int, int, int)
+        Material, first triangle and triangles of each of its ranges.
+    centre : float64 array, shape (3,)
+        Where the middle of its box was, in world units.
+    scale : float
+        World units of 1 in the memory.
+    """
+
+    first: int
+    count: int
+    draws: tuple[tuple[int, int, int], ...]
+    centre: np.ndarray
+    scale: float
+
+
+@dataclass(frozen=True)
+class MeshMemory:
+    """Contents of the memories of vertices and of triangles.
+
+    Positions count from the middle of their mesh's box in such units that the largest component is ONE;
+    they and the normals are rounded to ``SQ(1, 17)``, so that a position is off by at most 2^-18 of half the
+    box's longest side.
+
+    Parameters
+    ----------
+    position, normal : int64 arrays, shape (V, 3)
+        ``SQ(1, 17)``.
+    faces : int64 array, shape (T, 3)
+        Indices of the corners.
+    parts : tuple of Part
+        The meshes.
+
+    Source: docs/theory/video.md#vertices; not in the documents.
+    """
+
+    position: np.ndarray
+    normal: np.ndarray
+    faces: np.ndarray
+    parts: tuple[Part, ...]
+
+    VERTEX_BITS = 6 * COMPONENT.width
+    LARGEST = 4096
+
+    def __post_init__(self):
+        for name, count in (("vertices", len(self.position)), ("triangles", len(self.faces))):
+            if not 1 <= count < self.LARGEST:
+                raise ValueError(f"a mesh memory holds 1 to {self.LARGEST - 1} {name}, not {count}")
+
+    @classmethod
+    def of(cls, meshes: Sequence[Mesh]) -> "MeshMemory":
+        """The memory of meshes; triangles of one material follow each other.
+
+        Raises
+        ------
+        ValueError
+            If there are more than `LARGEST` - 1 vertices or triangles.
+        """
+        positions, normals, faces, parts = [], [], [], []
+        vertices = triangles = 0
+        for mesh in meshes:
+            low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+            centre = (low + high) / 2
+            half = float(np.abs(mesh.vertices - centre).max()) or 1.0
+            codes = np.rint((mesh.vertices - centre) / half * ONE).astype(np.int64)
+            order = np.argsort(mesh.material, kind="stable")
+            counts = np.bincount(mesh.material)
+            starts = triangles + np.cumsum(counts) - counts
+            draws = tuple(
+                (material, int(start), int(count))
+                for material, (start, count) in enumerate(zip(starts, counts, strict=True))
+                if count
+            )
+            scale = half * 2.0**COMPONENT.fraction_bits / ONE
+            parts.append(Part(vertices, len(codes), draws, centre, scale))
+            positions.append(codes)
+            normals.append(quantise(mesh.normals))
+            faces.append(mesh.faces[order] + vertices)
+            vertices, triangles = vertices + len(codes), triangles + len(order)
+        return cls(np.concatenate(positions), np.concatenate(normals), np.concatenate(faces), tuple(parts))
+
+    @property
+    def vertices(self) -> int:
+        """Number of vertices."""
+        return len(self.position)
+
+    @property
+    def triangles(self) -> int:
+        """Number of triangles."""
+        return len(self.faces)
+
+    @property
+    def index_bits(self) -> int:
+        """Bits of the index of a vertex."""
+        return max((self.vertices - 1).bit_length(), 1)
+
+    @property
+    def vertex_words(self) -> list[int]:
+        """Words of the vertices: position x, y, z, normal x, y, z from the lowest bit up."""
+        return _words(np.concatenate((self.position, self.normal), axis=1), COMPONENT.width)
+
+    @property
+    def triangle_words(self) -> list[int]:
+        """Words of the triangles: three indices from the lowest bit up."""
+        return _words(self.faces, self.index_bits)
+
+    def world(self, part: Part) -> Mesh:
+        """The mesh that a part stands for, as it is stored."""
+        chosen = slice(part.first, part.first + part.count)
+        position = Fixed(COMPONENT, self.position[chosen]).values * part.scale + part.centre
+        normal = self.normal[chosen] / np.linalg.norm(self.normal[chosen], axis=1, keepdims=True)
+        ranges = [np.arange(start, start + count) for _, start, count in part.draws]
+        material = np.repeat([m for m, _, _ in part.draws], [count for _, _, count in part.draws])
+        return Mesh(position, self.faces[np.concatenate(ranges)] - part.first, normal, material)
+
+    def blocks(self, screen_bits: int) -> int:
+        """Block RAMs of vertices, triangles, and screen vertices of so many bits."""
+        return (
+            block_rams(self.vertices, self.VERTEX_BITS)
+            + block_rams(self.triangles, 3 * self.index_bits)
+            + block_rams(self.vertices, screen_bits)
+        )
+
+    @classmethod
+    def triangles_that_fit(cls, blocks: int, screen_bits: int, vertices_per_triangle: float = 0.6) -> int:
+        """Triangles of a mesh that fit so many block RAMs.
+
+        Parameters
+        ----------
+        blocks : int
+            Block RAMs that are left for the mesh.
+        screen_bits : int
+            Bits of a screen vertex.
+        vertices_per_triangle : float
+            A closed mesh has 0.5 and some more for its seams.
+        """
+        best = 0
+        for triangles in range(1, cls.LARGEST):
+            vertices = max(int(np.ceil(triangles * vertices_per_triangle)), 3)
+            index_bits = (vertices - 1).bit_length()
+            taken = block_rams(triangles, 3 * index_bits)
+            taken += block_rams(vertices, cls.VERTEX_BITS) + block_rams(vertices, screen_bits)
+            if vertices < cls.LARGEST and taken <= blocks:
+                best = triangles
+        return best
+
+
+def _words(codes: np.ndarray, width: int) -> list[int]:
+    """Rows of codes as words, the first from the lowest bit up."""
+    mask = (1 << width) - 1
+    return [sum((code & mask) << (width * k) for k, code in enumerate(row)) for row in codes.tolist()]

@@ -1,0 +1,174 @@
+"""Motion: the matrices of meshes that turn, by a table of sines."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from blysk.golden.geometry.triangles import Frame
+from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.video.mesh_memory import MeshMemory
+from blysk.golden.video.vertex_unit import ENTRY, OFFSET, Matrix, VertexTransform
+
+__all__ = ["ANGLE_BITS", "ENTRIES", "Motion", "rotation"]
+
+ANGLE_BITS = 12
+"""Bits of an angle, a whole turn."""
+
+ENTRIES = 21
+"""Words of a matrix: nine of positions, three offsets, nine of normals."""
+
+
+def rotation(axis: Sequence[float], angle: float) -> np.ndarray:
+    """Matrix that turns by an angle in radians around an axis, anticlockwise seen against it, in float64."""
+    constant, cosine, sine = _turns(axis)
+    return constant + np.cos(angle) * cosine + np.sin(angle) * sine
+
+
+def _turns(axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """``a a^T``, ``1 - a a^T`` and the cross product's matrix, of the unit axis a."""
+    x, y, z = a = normalise(axis)
+    along = np.outer(a, a)
+    return along, np.eye(3) - along, np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Entries ``c0 + c1 cos a + c2 sin a`` of the matrices of turning meshes.
+
+    Whatever the axis and the camera, every entry of camera times rotation has this form. The sine of
+    ``(k + 1/2) 2 pi / 2^12`` stands in a table of a quarter turn, 1024 words, in ``SQ(2, 16)``; the half step
+    makes the other quarters its mirror images. Two products an entry; their sum with c0 is rounded to 20
+    fraction bits for offsets, to 16 for the others.
+
+    An entry is off by at most `ENTRY_ERROR`: 2^-17 for each of sine and cosine times coefficients below 2;
+    2^-17 for each of those; 2^-21 for c0; and half a step for the rounding.
+
+    Parameters
+    ----------
+    constant : int64 array, shape (S, 21)
+        c0 of each slot, `OFFSET`.
+    cosine, sine : int64 arrays, shape (S, 21)
+        c1 and c2, `ENTRY`.
+
+    Raises
+    ------
+    ValueError
+        If a coefficient is out of range.
+
+    Source: docs/theory/video.md#vertices; not in the documents.
+    """
+
+    constant: np.ndarray
+    cosine: np.ndarray
+    sine: np.ndarray
+
+    TABLE_BITS = ANGLE_BITS - 2
+    ENTRY_ERROR = 2 * 2 * 2.0**-17 + 2 * 2.0**-17 + 2.0**-21 + 2.0**-17
+
+    @classmethod
+    def of(
+        cls,
+        mesh: MeshMemory,
+        camera: Camera,
+        size: tuple[int, int],
+        axis: Sequence[float] = (0.0, 1.0, 0.0),
+        unit: VertexTransform | None = None,
+    ) -> "Motion":
+        """Slots of a memory's parts: each turns around an axis through its own middle, before a camera.
+
+        Parameters
+        ----------
+        mesh : MeshMemory
+            The parts.
+        camera : Camera
+            A perspective one.
+        size : (int, int)
+            Width and height of the picture, which is in the middle of the grid.
+        axis : three floats
+            The axis.
+        unit : VertexTransform, optional
+            Its ``scale_bits`` count.
+
+        Raises
+        ------
+        ValueError
+            If the camera is orthographic, or a coefficient is out of range.
+        """
+        if camera.projection != "perspective":
+            raise ValueError("turning meshes need a perspective camera, not an orthographic one")
+        pixels = 1 << (unit or VertexTransform()).scale_bits
+        width, height = size
+        frame = Frame.centred(width, height)
+        points = np.vstack([np.zeros(3), np.eye(3)])
+        rows = camera.homogeneous(points, width, height)[:, :3]
+        rows = rows + rows[:, 2:] * [frame.left, frame.top, 0]
+        rows = rows / camera.near / [pixels, pixels, 1]
+        offset, linear = rows[0], (rows[1:] - rows[0]).T
+        turns = _turns(axis)
+        made = [[], [], []]
+        for part in mesh.parts:
+            for k, turn in enumerate(turns):
+                moved = linear @ part.centre + offset if k == 0 else np.zeros(3)
+                made[k].append(np.concatenate([(linear @ turn * part.scale).ravel(), moved, turn.ravel()]))
+        try:
+            return cls(
+                Fixed.round(OFFSET, made[0]).codes,
+                Fixed.round(ENTRY, made[1]).codes,
+                Fixed.round(ENTRY, made[2]).codes,
+            )
+        except ValueError as error:
+            raise ValueError(f"the camera is too near to a mesh, or too far from it: {error}") from None
+
+    @property
+    def slots(self) -> int:
+        """Number of matrices."""
+        return len(self.constant)
+
+    @cached_property
+    def table(self) -> Fixed:
+        """Sines of the first quarter turn, ``SQ(2, 16)``."""
+        count = 1 << self.TABLE_BITS
+        return Fixed.round(ENTRY, np.sin((np.arange(count) + 0.5) * (np.pi / 2 / count)))
+
+    @staticmethod
+    def radians(angle: int) -> float:
+        """The angle that a code stands for."""
+        return (angle + 0.5) * 2 * np.pi / (1 << ANGLE_BITS)
+
+    def turn(self, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Bit-accurate cosine and sine of angles."""
+        quarter = 1 << self.TABLE_BITS
+
+        def sine(code):
+            code = code % (4 * quarter)
+            low = code % quarter
+            value = self.table.codes[np.where(code // quarter % 2, quarter - 1 - low, low)]
+            return np.where(code // (2 * quarter), -value, value)
+
+        return sine(np.asarray(angle) + quarter), sine(np.asarray(angle))
+
+    def compute(self, slot: np.ndarray, angle: np.ndarray) -> np.ndarray:
+        """Bit-accurate entries, shape (..., 21), in `OFFSET`; those but the offsets have 16 fraction bits.
+
+        Parameters
+        ----------
+        slot, angle : int64 arrays
+            Indices of slots; codes of angles.
+        """
+        cosine, sine = (Fixed(ENTRY, value[..., np.newaxis]) for value in self.turn(angle))
+        total = Fixed(OFFSET, self.constant[slot]) + (
+            Fixed(ENTRY, self.cosine[slot]) * cosine + Fixed(ENTRY, self.sine[slot]) * sine
+        )
+        fine = total.round_half_up(OFFSET.fraction_bits).saturate(SQ(5, 20)).codes
+        coarse = total.round_half_up(ENTRY.fraction_bits).saturate(ENTRY).codes
+        is_offset = np.isin(np.arange(ENTRIES), (9, 10, 11))
+        return np.where(is_offset, fine, coarse)
+
+    def matrix(self, slot: int, angle: int) -> Matrix:
+        """The matrix of a slot at an angle."""
+        entries = self.compute(np.int64(slot), np.int64(angle))
+        return Matrix(entries[:9].reshape(3, 3), entries[9:12], entries[12:].reshape(3, 3))

@@ -1,0 +1,199 @@
+"""Vertex unit: a vertex times a matrix, its perspective division, and its place on the screen."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from blysk.golden.geometry.reciprocal import Reciprocal
+from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, Grid
+from blysk.golden.geometry.wide_product import LOST, wide_product
+from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE
+
+__all__ = ["ENTRY", "OFFSET", "Matrix", "ScreenVertices", "VertexTransform"]
+
+ENTRY = SQ(2, 16)
+"""Number format of an entry of a matrix."""
+
+OFFSET = SQ(5, 20)
+"""Number format of an offset, in near planes."""
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Where vertices go: rows X, Y and W for positions, rows x, y and z for normals.
+
+    Parameters
+    ----------
+    position : int64 array, shape (3, 3)
+        `ENTRY`; rows X, Y, W.
+    offset : int64 array, shape (3,)
+        `OFFSET`, added to the rows.
+    normal : int64 array, shape (3, 3)
+        `ENTRY`; a rotation.
+    """
+
+    position: np.ndarray
+    offset: np.ndarray
+    normal: np.ndarray
+
+    @property
+    def codes(self) -> dict[str, np.ndarray]:
+        """What the hardware is given."""
+        return {name: getattr(self, name) for name in ("position", "offset", "normal")}
+
+
+@dataclass(frozen=True)
+class ScreenVertices:
+    """Vertices on the screen.
+
+    Parameters
+    ----------
+    x, y : int64 arrays, shape (V,)
+        Steps of the grid.
+    depth : int64 array, shape (V,)
+        0 at the near plane, `DEPTH`.
+    normal : int64 array, shape (V, 3)
+        N/W, `ATTRIBUTE`.
+    outside : bool array, shape (V,)
+        Nearer than the near plane, as far as `VertexTransform.FAR` near planes, or beside the grid; the other
+        words then mean nothing.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    depth: np.ndarray
+    normal: np.ndarray
+    outside: np.ndarray
+
+    @property
+    def beats(self) -> dict:
+        """What the hardware gives."""
+        return dict(vars(self))
+
+
+@dataclass(frozen=True)
+class VertexTransform:
+    """``x = X/W``, ``y = Y/W``, ``1 - 1/W`` and ``N/W`` of vertices by a matrix.
+
+    W counts near planes: it is 1 on the near plane, and a vertex with W under 1 is outside, as is one with W
+    of `FAR` or more. X/W and Y/W count ``2^scale_bits`` pixels from the middle of the grid. The depth
+    ``1 - 1/W`` and N/W are linear on the screen; the scale of N/W is that of the frame, the same for all
+    triangles, so that a vertex is transformed once for all of its triangles.
+
+    ============ ============ =====================================================================
+    word         format       why
+    ============ ============ =====================================================================
+    p, N         SQ(1, 17)    18 bits for the multiplier
+    entries      SQ(2, 16)    likewise; rotations hold 1
+    X, Y, W      SQ(6, 25)    sum of three products and the offset, rounded
+    m            UQ(1, 25)    W shifted by s = 0 to 3 to 1 and below 2; cut
+    r = 1/m      UQ(1, 25)    `Reciprocal`
+    X', Y'       SQ(6, 25)    shifted by s; cut
+    x, y         SQ(3, 17)    from three products, 20 fraction bits, then rounded to the grid (scale 9)
+    depth        UQ(24, 0)    ``1 - r 2^-s``, cut
+    N'           SQ(1, 17)    rounded, saturates to ONE
+    r'           UQ(1, 16)    r rounded for the multiplier
+    N/W          SQ(1, 23)    ``N' r' 2^-s``, rounded to 26 fraction bits before the shift, then cut
+    ============ ============ =====================================================================
+
+    With the entries as they are, a coordinate of a vertex inside is off by at most `ERROR` steps of the grid:
+    the last rounding; an eighth of `wide_product.LOST`; and, times ``2^17``, by the roundings of X (2^-26 and
+    the cut 2^-25), the reciprocal's error times X' (at most 8) and the cut of m, 2^-25, times 4. The depth is
+    off by at most `DEPTH_ERROR`: 1 for the cut, half of the reciprocal's error and of m's cut in 2^-25. A
+    component of N/W is off by at most `NORMAL_ERROR`: 2^-18 for N', 2^-17 for r' (whose error only scales N/W
+    of the vertex), 2^-27 and 2^-23 for N/W.
+
+    29 multiplications.
+
+    Parameters
+    ----------
+    scale_bits : int
+        Pixels of 1 in X/W, as a power of two: 4 to 11; 9 serves pictures up to 1024 pixels wide.
+    grid : Grid
+        Fraction bits of the coordinates.
+
+    Raises
+    ------
+    ValueError
+        If ``scale_bits`` is another number.
+
+    Source: docs/theory/video.md#vertices; not in the documents.
+    """
+
+    scale_bits: int = 9
+    grid: Grid = field(default_factory=lambda: GRID)
+
+    SPACE = SQ(6, 25)
+    SHIFTS = 3
+    FAR = 2 << SHIFTS
+    X_LOW, RECIPROCAL_LOW = 13, 9
+    GUARD = 3
+    FACTOR_FORMAT = UQ(1, 16)
+    ERROR = 0.5 + LOST / 8 + 2.0**17 * (2.0**-26 + 2.0**-25 + 8 * Reciprocal.ERROR + 4 * 2.0**-25) + 2.0**-8
+    DEPTH_ERROR = 1 + (Reciprocal.ERROR + 2.0**-25 + 2.0**-26) * 2.0**24
+    NORMAL_ERROR = 2.0**-18 + 2.0**-17 + 2.0**-27 + 2.0**-23
+
+    def __post_init__(self):
+        if self.scale_bits not in range(4, 12):
+            raise ValueError(f"scale_bits must be 4 to 11, not {self.scale_bits!r}")
+
+    @property
+    def place(self):
+        """Number format of x and y in X/W: those of the grid."""
+        return self.grid.coordinate.scaled(-self.scale_bits)
+
+    def space(self, position: np.ndarray, matrix: Matrix) -> Fixed:
+        """``X, Y, W`` of positions, shape (V, 3)."""
+        total = Fixed(OFFSET, matrix.offset)
+        for k in range(3):
+            entry = Fixed(ENTRY, matrix.position[:, k])
+            product = Fixed(COMPONENT, position[:, k, np.newaxis]) * entry
+            total = total + product
+        return total.round_half_up(self.SPACE.fraction_bits).wrap(self.SPACE)
+
+    def compute(self, position: np.ndarray, normal: np.ndarray, matrix: Matrix) -> ScreenVertices:
+        """Bit-accurate vertices on the screen.
+
+        Parameters
+        ----------
+        position, normal : int64 arrays, shape (V, 3)
+            ``SQ(1, 17)``.
+        matrix : Matrix
+            The matrix.
+        """
+        space = self.space(position, matrix)
+        w = space.codes[:, 2]
+        one = 1 << self.SPACE.fraction_bits
+        outside = (w < one) | (w >= self.FAR * one)
+        w = np.where(outside, one, w)
+        shift = sum((w >= one << k).astype(np.int64) for k in range(1, self.SHIFTS + 1))
+        r = Reciprocal().compute(Fixed(Reciprocal.FORMAT, w >> shift))
+        places = []
+        for axis in (0, 1):
+            shifted = Fixed(self.SPACE, space.codes[:, axis] >> shift)
+            product = wide_product(
+                shifted, r, self.X_LOW, self.RECIPROCAL_LOW, self.place.fraction_bits + self.GUARD
+            )
+            rounded = product.round_half_up(self.place.fraction_bits)
+            place = rounded.saturate(self.place)
+            outside = outside | (place.codes != rounded.codes)
+            places.append(place.codes)
+        factor = r.round_half_up(self.FACTOR_FORMAT.fraction_bits).wrap(self.FACTOR_FORMAT)
+        turned = self._normals(normal, matrix)
+        scaled = (turned * factor[:, np.newaxis]).round_half_up(26).codes >> shift[:, np.newaxis]
+        return ScreenVertices(
+            x=places[0],
+            y=places[1],
+            depth=(one - (r.codes >> shift)) >> (25 - DEPTH.width),
+            normal=scaled >> (26 - ATTRIBUTE.fraction_bits),
+            outside=outside,
+        )
+
+    def _normals(self, normal: np.ndarray, matrix: Matrix) -> Fixed:
+        """``R N``, shape (V, 3), `COMPONENT`, -ONE to ONE."""
+        products = [
+            Fixed(COMPONENT, normal[:, k, np.newaxis]) * Fixed(ENTRY, matrix.normal[:, k]) for k in range(3)
+        ]
+        total = ((products[0] + products[1]) + products[2]).round_half_up(COMPONENT.fraction_bits)
+        return Fixed(COMPONENT, np.clip(total.codes, -ONE, ONE))

@@ -1,0 +1,76 @@
+"""A mesh in memory to the lanes of a monitor."""
+
+from amaranth.hdl import Module, Signal
+from amaranth.lib import data, wiring
+from amaranth.lib.cdc import FFSynchronizer
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.gpu import Gpu
+from blysk.golden.video.serialiser import LANES
+from blysk.hdl.geometry.triangles import counters_shape
+from blysk.hdl.video.display import DisplayUnit
+from blysk.hdl.video.draw_unit import STATUS as DRAWN
+from blysk.hdl.video.draw_unit import DrawUnit
+
+__all__ = ["STATUS", "GpuUnit"]
+
+STATUS = (*DRAWN, "late_bands", "frames_shown")
+"""Counters of `GpuUnit`: of the drawing, and of the display."""
+
+
+class GpuUnit(wiring.Component):
+    """`DrawUnit` and `DisplayUnit`: `Gpu` is the bit-accurate model.
+
+    Three clocks, see `DisplayUnit`. Pixels are drawn as fast as they come, and shown a band later.
+
+    Parameters
+    ----------
+    parameters : Gpu
+        Bit-accurate model, with all contents of memories.
+    setups, compact
+        As `RenderUnit` has them.
+
+    Members
+    -------
+    buttons : :py:`In(4)`
+        See `ControlsUnit`; from any clock.
+    pairs : :py:`Out(data.ArrayLayout(2, 4))`
+        Domain ``serial``, see `DisplayUnit`.
+    status : :py:`Out(counters_shape(*STATUS))`
+        Counters since the reset.
+
+    Source: docs/theory/video.md#bands.
+    """
+
+    def __init__(self, parameters: Gpu, setups: int = 1, compact: bool | None = None):
+        self.parameters = parameters
+        self.draw = DrawUnit(parameters.drawing, setups, compact)
+        self.display = DisplayUnit(parameters.buffer)
+        super().__init__(
+            {
+                "buttons": In(self.draw.signature.members["buttons"].shape),
+                "pairs": Out(data.ArrayLayout(2, LANES)),
+                "status": Out(counters_shape(*STATUS)),
+            }
+        )
+
+    def elaborate(self, platform):
+        """The two units, and the streams between them."""
+        m = Module()
+        m.submodules.draw, m.submodules.display = draw, display = self.draw, self.display
+        pressed = Signal.like(self.buttons, name="pressed")
+        m.submodules.pressed = FFSynchronizer(self.buttons, pressed)
+        for source, sink in ((display.request, draw.request), (draw.done, display.done)):
+            wiring.connect(m, source, sink)
+        drawn, taken = draw.pixels, display.pixels
+        m.d.comb += [
+            draw.buttons.eq(pressed),
+            *(taken.payload[name].eq(drawn.payload[name]) for name in "xyrgb"),
+            taken.valid.eq(drawn.valid),
+            drawn.ready.eq(taken.ready),
+            self.pairs.eq(display.pairs),
+            *(self.status[name].eq(draw.status[name]) for name in DRAWN),
+            self.status.late_bands.eq(display.status.late_bands),
+            self.status.frames_shown.eq(display.status.frames),
+        ]
+        return m

@@ -1,0 +1,1 @@
+"""Units of the display side: timing, bands of colour, TMDS, serial lanes."""

@@ -1,0 +1,209 @@
+"""Band buffer: bands of lines that are drawn while others are shown, and which band is drawn next."""
+
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.cdc import FFSynchronizer, PulseSynchronizer
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.video.band_buffer import BandBuffer
+from blysk.hdl.geometry.triangles import count_events, counters_shape
+from blysk.hdl.video.display_timing import timing_shape
+
+__all__ = ["BandBufferUnit", "band_pixel_shape", "shown_shape"]
+
+
+def band_pixel_shape(parameters: BandBuffer) -> data.StructLayout:
+    """Shape of a pixel that is drawn: column, line of the band, colour."""
+    width, lines = parameters.mode.horizontal.visible, parameters.lines
+    place = {"x": unsigned((width - 1).bit_length()), "y": unsigned((lines - 1).bit_length())}
+    return data.StructLayout(place | {channel: unsigned(8) for channel in "rgb"})
+
+
+def shown_shape(parameters: BandBuffer) -> data.StructLayout:
+    """Shape of a cycle of the pixel clock: the timing's, and the colour."""
+    timing = timing_shape(parameters.mode).members
+    return data.StructLayout(dict(timing) | {channel: unsigned(8) for channel in "rgb"})
+
+
+class BandBufferUnit(wiring.Component):
+    """Two bands in a memory with two clocks: `BandBuffer` is the bit-accurate model.
+
+    The domain ``sync`` draws, the domain ``pixel`` shows. A buffer that is free is cleared, a word a cycle,
+    while its band is already asked for; then pixels are written as they come, one a cycle. With ``done`` it
+    goes to the display, which gives it back after its last line, or at the beginning of the next slot if it
+    came too late. The display takes no notice of how long drawing takes: its addresses follow from the
+    timing alone. What is shown leaves a cycle after its timing. No multipliers.
+
+    Between the clocks go four toggles (a buffer is filled; it is free), one of a slot that begins, and one of
+    a late band, each through two flip-flops; and the numbers of bands and of the slot, each written a cycle
+    before its toggle or with it and read two cycles of the reader's clock later or more: constraint: their
+    paths take less than one period of the reader's clock. A slot lasts longer than any of this takes: its
+    lines have 800 pixels each by default.
+
+    Parameters
+    ----------
+    parameters : BandBuffer
+        Bit-accurate model.
+
+    Members
+    -------
+    request : :py:`Out(stream.Signature(band))`
+        Bands to draw, in the order of the picture but for those whose slot has begun.
+    pixels : :py:`In(stream.Signature(band_pixel_shape(parameters)))`
+        Pixels of the band asked for last.
+    done : :py:`In(stream.Signature(band))`
+        That band's number: all its pixels have been taken.
+    timing : :py:`In(timing_shape(parameters.mode))`
+        Domain ``pixel``.
+    shown : :py:`Out(shown_shape(parameters))`
+        Domain ``pixel``: the timing a cycle later, and the colour.
+    status : :py:`Out(counters_shape("late_bands", "frames"))`
+        Bands in whose place the background was shown, and frames begun, since the reset.
+
+    Source: docs/theory/video.md#bands.
+    """
+
+    latency = 1
+
+    def __init__(self, parameters: BandBuffer | None = None):
+        self.parameters = parameters or BandBuffer()
+        self._band = unsigned((self.parameters.bands - 1).bit_length())
+        super().__init__(
+            {
+                "request": Out(stream.Signature(self._band)),
+                "pixels": In(stream.Signature(band_pixel_shape(self.parameters))),
+                "done": In(stream.Signature(self._band)),
+                "timing": In(timing_shape(self.parameters.mode)),
+                "shown": Out(shown_shape(self.parameters)),
+                "status": Out(counters_shape("late_bands", "frames")),
+            }
+        )
+
+    def elaborate(self, platform):
+        """The memory, both sides of it, and what crosses between them."""
+        m = Module()
+        given, width = self.parameters, sum(self.parameters.colour_bits)
+        m.submodules.colours = memory = Memory(shape=width, depth=2 * given.pixels, init=[])
+        # Written by `sync`: a buffer is filled, its band. By `pixel`: it is free, the slot, its beginning.
+        self._filled, self._bands = Signal(2, name="filled"), [self._number(f"band_{k}") for k in range(2)]
+        self._freed, self._slot = Signal(2, name="freed"), self._number("slot", given.bands - 1)
+        self._begun = Signal(name="begun")
+        m.submodules.late = self._late = PulseSynchronizer("pixel", "sync")
+        self._draw(m, memory.write_port())
+        self._show(m, memory.read_port(domain="pixel"))
+        return m
+
+    def _number(self, name: str, init: int = 0) -> Signal:
+        return Signal(self._band, name=name, init=init)
+
+    def _plus_one(self, band: Value) -> Value:
+        return Mux(band == self.parameters.bands - 1, 0, band + 1)
+
+    @property
+    def _clear(self) -> int:
+        """The background's word, by which words are XORed: a memory of zeros is cleared."""
+        return sum(
+            int(code) << sum(self.parameters.colour_bits[:k])
+            for k, code in enumerate(self.parameters.kept(self.parameters.background))
+        )
+
+    def _draw(self, m: Module, write) -> None:
+        """Clear a free buffer, ask for its band, write its pixels, hand it over."""
+        given = self.parameters
+        freed, begun = Signal(2, name="freed_seen"), Signal(name="begun_seen")
+        m.submodules += [FFSynchronizer(self._freed, freed), FFSynchronizer(self._begun, begun)]
+        before, slot = Signal(name="begun_before"), self._number("slot_seen", given.bands - 1)
+        m.d.sync += before.eq(begun)
+        with m.If(begun != before):
+            m.d.sync += slot.eq(self._slot)
+        which, last = Signal(name="which"), self._number("last", given.bands - 1)
+        busy, asked = Signal(2, name="busy"), Signal(name="asked")
+        m.d.comb += busy.eq(self._filled ^ freed)
+        address = Signal(range(given.pixels), name="address")
+
+        coming, after_slot = self._plus_one(last), self._plus_one(slot)
+        worth = (coming == after_slot) | (coming == self._plus_one(after_slot))
+        pixel = self.pixels.payload
+        place = Signal(range(2 * given.pixels), name="place")
+        word = Cat(pixel[channel][8 - bits :] for channel, bits in zip("rgb", given.colour_bits, strict=True))
+        m.d.comb += self.request.payload.eq(last)
+        with m.FSM(name="draw"):
+            with m.State("wait"), m.If(~Array(busy)[which]):
+                m.d.sync += [last.eq(Mux(worth, coming, after_slot)), address.eq(0), asked.eq(0)]
+                m.next = "clear"
+            with m.State("clear"):
+                m.d.comb += [place.eq(address), write.en.eq(1), self.request.valid.eq(~asked)]
+                m.d.sync += [address.eq(address + 1), asked.eq(asked | self.request.ready)]
+                with m.If(address == given.pixels - 1):
+                    m.next = "draw"
+            with m.State("draw"):
+                m.d.comb += [
+                    self.request.valid.eq(~asked),
+                    self.pixels.ready.eq(1),
+                    self.done.ready.eq(1),
+                    place.eq(_times(pixel.y, given.mode.horizontal.visible) + pixel.x),
+                    write.en.eq(self.pixels.valid),
+                    write.data.eq(word ^ self._clear),
+                ]
+                m.d.sync += asked.eq(asked | self.request.ready)
+                with m.If(self.done.valid):
+                    m.d.sync += which.eq(~which)
+                    for k, band in enumerate(self._bands):
+                        with m.If(which == k):
+                            m.d.sync += [self._filled[k].eq(~self._filled[k]), band.eq(last)]
+                    m.next = "wait"
+        m.d.comb += write.addr.eq(place + Mux(which, given.pixels, 0))
+        first = (begun != before) & (self._slot == 0)
+        count_events(m, self.status, late_bands=self._late.o, frames=first)
+
+    def _show(self, m: Module, read) -> None:
+        """Choose the buffer of each slot, read it along with the timing, and give it back."""
+        given, timing = self.parameters, self.timing
+        line, frame = given.mode.horizontal, given.mode.vertical
+        filled = Signal(2, name="filled_seen")
+        m.submodules += FFSynchronizer(self._filled, filled, o_domain="pixel")
+        full, fits, stays = (Signal(2, name=name) for name in ("full", "fits", "stays"))
+        coming = self._number("coming")
+        m.d.comb += [full.eq(filled ^ self._freed), coming.eq(self._plus_one(self._slot))]
+        for k, band in enumerate(self._bands):
+            m.d.comb += [
+                fits[k].eq(full[k] & (band == coming)),
+                stays[k].eq(band == self._plus_one(coming)),
+            ]
+        last_line = (timing.y & given.lines - 1 == given.lines - 1) & (timing.y < frame.visible)
+        is_shown, which = Signal(name="is_shown"), Signal(name="which_shown")
+        place = Signal(range(2 * given.pixels), name="place_shown")
+        with m.If(timing.active):
+            m.d.pixel += place.eq(place + 1)
+        with m.If(last_line & (timing.x == line.visible)):
+            m.d.pixel += [
+                is_shown.eq(0),
+                self._freed.eq(self._freed ^ Cat(is_shown & ~which, is_shown & which)),
+            ]
+        begins = (timing.y == frame.total - 1) | (last_line & (timing.y != frame.visible - 1))
+        with m.If(begins & (timing.x == line.total - 1)):
+            m.d.pixel += [
+                self._slot.eq(coming),
+                self._begun.eq(~self._begun),
+                is_shown.eq(fits.any()),
+                which.eq(fits[1]),
+                place.eq(Mux(fits[1], given.pixels, 0)),
+                self._freed.eq(self._freed ^ (full & ~fits & ~stays)),
+            ]
+            m.d.comb += self._late.i.eq(~fits.any())
+        m.d.comb += [read.addr.eq(place), read.en.eq(1)]
+
+        later = Signal.like(timing, name="timing_shown")
+        coloured = Signal(name="coloured")
+        m.d.pixel += [later.eq(timing), coloured.eq(is_shown)]
+        m.d.comb += [self.shown[name].eq(later[name]) for name in timing.shape().members]
+        word = Mux(coloured, read.data, Const(0, len(read.data))) ^ self._clear
+        for channel, bits in zip("rgb", given.colour_bits, strict=True):
+            code, word = word[:bits], word[bits:]
+            m.d.comb += self.shown[channel].eq(Cat(code[2 * bits - 8 :], code) if bits < 8 else code)
+
+
+def _times(value: Value, factor: int) -> Value:
+    """A product by a constant, as sums: no multiplier for four bits."""
+    return sum(value << k for k in range(factor.bit_length()) if factor >> k & 1)

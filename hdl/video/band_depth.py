@@ -1,0 +1,74 @@
+"""Band depth: the depths of one band, cleared for the next by a tag."""
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.geometry.triangles import DEPTH
+from blysk.golden.video.band_depth import BandDepth
+from blysk.hdl.geometry.depth_test import DepthMemory
+
+__all__ = ["BandDepthUnit"]
+
+
+class BandDepthUnit(wiring.Component):
+    """The memory behind a `DepthMemory` port that a band begins anew: `BandDepth` is the bit-accurate model.
+
+    With ``begin`` the tag goes on, and `BandDepth.swept` words are swept, one a cycle, or all with the first
+    band after a reset; ``busy`` is high for so long, and the port must not be used. No multipliers.
+
+    Parameters
+    ----------
+    parameters : BandDepth
+        Bit-accurate model.
+    x_bits, y_bits : int
+        Bits of a place.
+
+    Members
+    -------
+    memory : :py:`In(DepthMemory(x_bits, y_bits))`
+        Depths of the band.
+    begin : :py:`In(1)`
+        A band begins; while ``busy`` is low.
+    busy : :py:`Out(1)`
+        Words are swept.
+
+    Source: docs/theory/video.md#bands; not in the documents.
+    """
+
+    def __init__(self, parameters: BandDepth, x_bits: int, y_bits: int):
+        self.parameters = parameters
+        super().__init__({"memory": In(DepthMemory(x_bits, y_bits)), "begin": In(1), "busy": Out(1)})
+
+    def elaborate(self, platform):
+        """The memory; the tag; the sweep."""
+        m = Module()
+        given, port = self.parameters, self.memory
+        bits = given.tag_bits
+        m.submodules.depths = memory = Memory(shape=DEPTH.width + bits, depth=given.words, init=[])
+        read, write = memory.read_port(), memory.write_port()
+        # Of what a reset found in the memory nothing counts.
+        fresh = Signal(name="fresh", init=1)
+        tag, before = Signal(bits, name="tag"), Signal(bits, name="tag_before")
+        place, left = Signal(range(given.words), name="place"), Signal(range(given.words + 1), name="left")
+        m.d.comb += [before.eq(tag - 1), self.busy.eq(left != 0)]
+        with m.If(self.begin):
+            m.d.sync += [tag.eq(tag + 1), left.eq(Mux(fresh, given.words, given.swept)), fresh.eq(0)]
+        with m.Elif(self.busy):
+            m.d.sync += [left.eq(left - 1), place.eq(Mux(place == given.words - 1, 0, place + 1))]
+
+        def address(place) -> Value:
+            return (place.y * given.size[0] + place.x)[: len(read.addr)]
+
+        depth, its_tag = read.data[: DEPTH.width], read.data[DEPTH.width :]
+        m.d.comb += [
+            read.addr.eq(address(port.read_place)),
+            read.en.eq(port.read_enable),
+            port.read_data.eq(Mux(its_tag == tag, depth, DepthTest.CLEARED)),
+            write.en.eq(port.write_enable | self.busy),
+            write.addr.eq(Mux(self.busy, place, address(port.write_place))),
+            write.data.eq(Mux(self.busy, Cat(port.write_data, before), Cat(port.write_data, tag))),
+        ]
+        return m

@@ -1,0 +1,86 @@
+"""Clocks: a PLL that makes the clocks of a display and of what draws for it, of a board's clock."""
+
+from amaranth.hdl import ClockSignal, Const, Instance, Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.cdc import ResetSynchronizer
+from amaranth.lib.wiring import In
+
+from blysk.golden.video.clock_plan import ClockPlan
+
+__all__ = ["ClockUnit"]
+
+
+class ClockUnit(wiring.Component):
+    """ECP5's PLL, ``EHXPLLL``, which drives the domains ``sync``, ``pixel``, ``serial``.
+
+    They are in reset until it is locked. Who uses it defines them.
+
+    Parameters
+    ----------
+    parameters : ClockPlan
+        Dividers.
+
+    Members
+    -------
+    reference : :py:`In(1)`
+        The board's clock.
+
+    Attributes
+    ----------
+    clocks : dict of str to Signal
+        By domain, for constraints.
+
+    Source: docs/theory/video.md#display; Lattice FPGA-TN-02200, ECP5 sysCLOCK PLL.
+    """
+
+    def __init__(self, parameters: ClockPlan):
+        self.parameters = parameters
+        self.clocks = {name: Signal(name=f"{name}_clock") for name in ("sync", "pixel", "serial")}
+        super().__init__({"reference": In(1)})
+
+    def elaborate(self, platform):
+        """The PLL; a reset synchroniser a domain."""
+        m = Module()
+        plan, locked, loop = self.parameters, Signal(name="locked"), Signal(name="loop")
+        outputs = {
+            "OP": (plan.loop, loop),
+            "OS": (plan.serial, self.clocks["serial"]),
+            "OS2": (plan.pixel, self.clocks["pixel"]),
+            "OS3": (plan.draw, self.clocks["sync"]),
+        }
+        arguments = {}
+        for (name, (divider, signal)), letter in zip(outputs.items(), "ABCD", strict=True):
+            arguments |= {
+                f"p_OUTDIVIDER_MUX{letter}": f"DIV{letter}",
+                f"p_CLK{name}_ENABLE": "ENABLED",
+                f"p_CLK{name}_DIV": divider,
+                # Phase 0.
+                f"p_CLK{name}_CPHASE": divider - 1,
+                f"p_CLK{name}_FPHASE": 0,
+                f"o_CLK{name}": signal,
+            }
+        m.submodules.pll = Instance(
+            "EHXPLLL",
+            a_ICP_CURRENT="12",
+            a_LPF_RESISTOR="8",
+            a_MFG_ENABLE_FILTEROPAMP="1",
+            a_MFG_GMCREF_SEL="2",
+            p_PLLRST_ENA="DISABLED",
+            p_INTFB_WAKE="DISABLED",
+            p_STDBY_ENABLE="DISABLED",
+            p_DPHASE_SOURCE="DISABLED",
+            p_FEEDBK_PATH="CLKOP",
+            p_CLKI_DIV=plan.input_divider,
+            p_CLKFB_DIV=plan.feedback_divider,
+            **arguments,
+            i_CLKI=self.reference,
+            i_CLKFB=loop,
+            o_LOCK=locked,
+            **{f"i_{name}": Const(0) for name in ("RST", "STDBY", "PHASESEL0", "PHASESEL1", "PLLWAKESYNC")},
+            **{f"i_{name}": Const(1) for name in ("PHASEDIR", "PHASESTEP", "PHASELOADREG")},
+            **{f"i_{name}": Const(0) for name in ("ENCLKOP", "ENCLKOS", "ENCLKOS2", "ENCLKOS3")},
+        )
+        for name, clock in self.clocks.items():
+            m.d.comb += ClockSignal(name).eq(clock)
+            m.submodules[f"reset_{name}"] = ResetSynchronizer(~locked, domain=name)
+        return m

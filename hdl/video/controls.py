@@ -1,0 +1,93 @@
+"""Controls: what buttons do to the frames that follow."""
+
+from amaranth.hdl import Module, Mux, Signal
+from amaranth.lib import wiring
+from amaranth.lib.cdc import FFSynchronizer
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.video.controls import BUTTONS, Controls
+from blysk.golden.video.motion import ANGLE_BITS
+
+__all__ = ["ControlsUnit"]
+
+
+class ControlsUnit(wiring.Component):
+    """Angle and list of each frame: `Controls` is the bit-accurate model.
+
+    Buttons go through two flip-flops, then each through a counter that moves to one end while it is down and
+    to the other while it is up; a press is the moment at which it gets to the upper end after the lower. On
+    the cycle after ``frame`` the next frame's angle and list are there, and stay until the next one, but for
+    presses. No multipliers.
+
+    Parameters
+    ----------
+    parameters : Controls
+        Bit-accurate model.
+
+    Members
+    -------
+    buttons : :py:`In(4)`
+        From `BUTTONS`, 1 while down, of any clock.
+    frame : :py:`In(1)`
+        A frame begins.
+    angle : :py:`Out(12)`
+        Its angle.
+    index : :py:`Out(range(materials * lights))`
+        Its list.
+
+    Source: docs/theory/video.md#bands; not in the documents.
+    """
+
+    def __init__(self, parameters: Controls | None = None):
+        self.parameters = parameters or Controls()
+        given = self.parameters
+        super().__init__(
+            {
+                "buttons": In(len(BUTTONS)),
+                "frame": In(1),
+                "angle": Out(ANGLE_BITS),
+                "index": Out(range(given.materials * given.lights)),
+            }
+        )
+
+    def elaborate(self, platform):
+        """Buttons, then the state."""
+        m = Module()
+        given = self.parameters
+        pressed = dict(zip(BUTTONS, (self._pressed(m, k) for k in range(len(BUTTONS))), strict=True))
+        angle = Signal(ANGLE_BITS, name="angle_now", init=given.first)
+        running, backwards = Signal(name="running", init=1), Signal(name="backwards")
+        chosen = [Signal(range(count), name=name) for name, count in self._counts()]
+        turned = Mux(backwards, angle - given.step, angle + given.step)[:ANGLE_BITS]
+        with m.If((self.frame & running) | (pressed["step"] & ~running)):
+            m.d.sync += angle.eq(turned)
+        with m.If(pressed["pause"]):
+            m.d.sync += running.eq(~running)
+        with m.If(pressed["step"] & running):
+            m.d.sync += backwards.eq(~backwards)
+        for (name, count), value in zip(self._counts(), chosen, strict=True):
+            with m.If(pressed[name]):
+                m.d.sync += value.eq(Mux(value == count - 1, 0, value + 1))
+        m.d.comb += [self.angle.eq(angle), self.index.eq(chosen[1] * given.materials + chosen[0])]
+        return m
+
+    def _counts(self):
+        return ("material", self.parameters.materials), ("light", self.parameters.lights)
+
+    def _pressed(self, m: Module, k: int) -> Signal:
+        """Whether a button gets down on this cycle, without its bounces."""
+        down, count = Signal(name=f"down_{k}"), Signal(self.parameters.debounce_bits, name=f"count_{k}")
+        state, before = Signal(name=f"state_{k}"), Signal(name=f"before_{k}")
+        m.submodules[f"button_{k}"] = FFSynchronizer(self.buttons[k], down)
+        with m.If(down & ~count.all()):
+            m.d.sync += count.eq(count + 1)
+        with m.Elif(~down & count.any()):
+            m.d.sync += count.eq(count - 1)
+        with m.If(count.all()):
+            m.d.sync += state.eq(1)
+        with m.Elif(~count.any()):
+            m.d.sync += state.eq(0)
+        m.d.sync += before.eq(state)
+        pressed = Signal(name=f"pressed_{k}")
+        m.d.comb += pressed.eq(state & ~before)
+        return pressed

@@ -1,0 +1,72 @@
+"""Display timing: which pixel a display shows on each cycle of the pixel clock, and its sync pulses."""
+
+from amaranth.hdl import Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, wiring
+from amaranth.lib.wiring import Out
+
+from blysk.golden.video.display_timing import Axis, DisplayMode, DisplayTiming
+
+__all__ = ["DisplayTimingUnit", "timing_shape"]
+
+
+def timing_shape(mode: DisplayMode) -> data.StructLayout:
+    """Shape of a cycle of the pixel clock: position, whether it is in the picture, both sync signals."""
+    return data.StructLayout(
+        {
+            "x": unsigned((mode.horizontal.total - 1).bit_length()),
+            "y": unsigned((mode.vertical.total - 1).bit_length()),
+            "active": 1,
+            "hsync": 1,
+            "vsync": 1,
+        }
+    )
+
+
+class DisplayTimingUnit(wiring.Component):
+    """Two counters and the signals that follow from them: `DisplayTiming` is the bit-accurate model.
+
+    Free-running: the display never waits. A position a cycle, the model's cycle 0 on the first after the
+    reset. No multipliers. Its clock is the pixel clock.
+
+    Parameters
+    ----------
+    parameters : DisplayTiming
+        Bit-accurate model.
+
+    Members
+    -------
+    o : :py:`Out(timing_shape(parameters.mode))`
+        The cycle.
+
+    Source: docs/theory/video.md#display.
+    """
+
+    def __init__(self, parameters: DisplayTiming | None = None):
+        self.parameters = parameters or DisplayTiming()
+        super().__init__({"o": Out(timing_shape(self.parameters.mode))})
+
+    def elaborate(self, platform):
+        """Count pixels, and lines at the end of each."""
+        m = Module()
+        line, frame = self.parameters.mode.horizontal, self.parameters.mode.vertical
+        shape: data.StructLayout = self.o.shape()
+        x, y = Signal(shape["x"].shape, name="x"), Signal(shape["y"].shape, init=frame.visible, name="y")
+        m.d.sync += x.eq(x + 1)
+        with m.If(x == line.total - 1):
+            m.d.sync += [x.eq(0), y.eq(y + 1)]
+            with m.If(y == frame.total - 1):
+                m.d.sync += y.eq(0)
+        m.d.comb += [
+            self.o.x.eq(x),
+            self.o.y.eq(y),
+            self.o.active.eq((x < line.visible) & (y < frame.visible)),
+            self.o.hsync.eq(_sync(x, line)),
+            self.o.vsync.eq(Mux(x >= line.pulse[0], _sync(y, frame, 1), _sync(y, frame))),
+        ]
+        return m
+
+
+def _sync(position: Value, axis: Axis, early: int = 0) -> Value:
+    begin, end = axis.pulse
+    pulse = (position >= begin - early) & (position < end - early)
+    return pulse if axis.positive else ~pulse

@@ -1,0 +1,87 @@
+"""Draw commands: the lists of a memory, walked for every band."""
+
+from amaranth.hdl import Module, Signal, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.video.draw_commands import COMMAND_BITS, KINDS, DrawCommands
+from blysk.hdl.core.stream import skid_buffer
+
+__all__ = ["DrawCommandsUnit", "command_shape", "walk_request_shape"]
+
+
+def command_shape() -> data.StructLayout:
+    """Shape of a command; see `DrawCommands`."""
+    return data.StructLayout(
+        {"kind": unsigned(3), "index": unsigned(9), "first": unsigned(12), "count": unsigned(12)}
+    )
+
+
+def walk_request_shape(commands: int) -> data.StructLayout:
+    """Shape of what asks for a walk: where the list begins, and whether it is a frame's first band."""
+    bits = max((commands - 1).bit_length(), 1)
+    return data.StructLayout({"start": unsigned(bits), "first_band": unsigned(1)})
+
+
+class DrawCommandsUnit(wiring.Component):
+    """Walks a list from its start to its end: `DrawCommands` is the bit-accurate model.
+
+    A word a cycle is read; those of a frame's first band are left out in others. The first command is offered
+    two cycles after the request was accepted, and the next request accepted after the end was taken. No
+    multipliers.
+
+    Parameters
+    ----------
+    parameters : DrawCommands
+        Bit-accurate model with the words, fixed at build time.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(walk_request_shape(commands)))`
+        Requests.
+    o : :py:`Out(stream.Signature(command_shape()))`
+        Commands, up to and with the end.
+
+    Source: docs/theory/video.md#bands; [T] chapter 4.
+    """
+
+    def __init__(self, parameters: DrawCommands):
+        self.parameters = parameters
+        super().__init__(
+            {
+                "i": In(stream.Signature(walk_request_shape(len(parameters.words)))),
+                "o": Out(stream.Signature(command_shape())),
+            }
+        )
+
+    def elaborate(self, platform):
+        """The address, and the word behind it."""
+        m = Module()
+        words = self.parameters.codes
+        m.submodules.commands = memory = Memory(shape=COMMAND_BITS, depth=len(words), init=words)
+        read = memory.read_port()
+        address, first_band = Signal.like(self.i.payload.start, name="address"), Signal(name="first_band")
+        walks, waits, valid = Signal(name="walks"), Signal(name="waits"), Signal(name="valid")
+        command = data.View(command_shape(), read.data)
+        once = (command.kind == KINDS.index("transform")) | (command.kind == KINDS.index("frame_constant"))
+        ends = valid & (command.kind == KINDS.index("end"))
+        advance = skid_buffer(m, self.o, valid & (first_band | ~once), read.data)
+        m.d.comb += [
+            read.addr.eq(address),
+            read.en.eq(advance),
+            self.i.ready.eq(~walks & ~waits),
+        ]
+        with m.If(self.i.valid & self.i.ready):
+            m.d.sync += [address.eq(self.i.payload.start), first_band.eq(self.i.payload.first_band)]
+            m.d.sync += walks.eq(1)
+        with m.If(advance):
+            m.d.sync += valid.eq(walks & ~ends)
+            with m.If(walks):
+                m.d.sync += address.eq(address + 1)
+            with m.If(ends):
+                # What was read behind the end is no command.
+                m.d.sync += [walks.eq(0), waits.eq(1)]
+        with m.If(waits & ~self.o.valid):
+            m.d.sync += waits.eq(0)
+        return m

@@ -1,0 +1,245 @@
+"""Drawing a frame band by band: from a mesh in memory to the pixels of each band."""
+
+from amaranth.hdl import Array, Const, Module, Mux, Signal, Value, signed, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.edge_setup import X_BITS
+from blysk.golden.video.band_depth import BandDepth
+from blysk.golden.video.controls import BUTTONS
+from blysk.golden.video.draw_commands import KINDS
+from blysk.golden.video.draw_unit import Drawing
+from blysk.golden.video.triangle_assembly import COUNTERS
+from blysk.hdl.core.stream import connect
+from blysk.hdl.geometry.triangles import count_events, counters_shape
+from blysk.hdl.render import STATUS as RENDERED
+from blysk.hdl.render import RenderUnit
+from blysk.hdl.video.band_depth import BandDepthUnit
+from blysk.hdl.video.controls import ControlsUnit
+from blysk.hdl.video.draw_commands import DrawCommandsUnit
+from blysk.hdl.video.mesh_memory import MeshMemoryUnit
+from blysk.hdl.video.motion import MotionUnit
+from blysk.hdl.video.triangle_assembly import TriangleAssemblyUnit
+from blysk.hdl.video.vertex_unit import VertexUnit, matrix_shape
+
+__all__ = ["STATUS", "DrawUnit", "band_shape", "drawn_band_pixel_shape"]
+
+STATUS = (*COUNTERS, *RENDERED, "frames", "bands", "busy")
+"""Counters of `DrawUnit`: of the assembly, of the renderer; frames and bands begun, cycles without a wait."""
+
+
+def band_shape(bands: int):
+    """Shape of a band's index."""
+    return unsigned(max((bands - 1).bit_length(), 1))
+
+
+def drawn_band_pixel_shape(x_bits: int, y_bits: int) -> data.StructLayout:
+    """Shape of a pixel of a band: column, line of the band, colour."""
+    place = {"x": unsigned(x_bits), "y": unsigned(y_bits)}
+    return data.StructLayout(place | {channel: unsigned(8) for channel in "rgb"})
+
+
+class DrawUnit(wiring.Component):
+    """Draws bands as they are asked for: `Drawing` is the bit-accurate model.
+
+    A band that does not follow the one before it begins a frame: the controls move on, the vertices of all
+    meshes are transformed, and the constants written. Then, and for every other band at once, the list's
+    triangles are walked, those of the band drawn. When the last pixel has left, ``done`` gives the band's
+    index; the depths are cleared for the next one while nothing is asked for.
+
+    A frame takes, beside the renderer's cycles: three for a triangle and a band; 30 for a vertex; 150 for a
+    mesh; `BandDepth.swept` for a band where the next one is asked for at once.
+
+    Parameters
+    ----------
+    parameters : Drawing
+        Bit-accurate model, with all contents of memories.
+    setups, compact
+        As `RenderUnit` has them.
+
+    Members
+    -------
+    request : :py:`In(stream.Signature(band_shape(bands)))`
+        Bands to draw, from 0 on; some may be left out.
+    done : :py:`Out(stream.Signature(band_shape(bands)))`
+        Bands of which every pixel has been taken.
+    pixels : :py:`Out(stream.Signature(drawn_band_pixel_shape(x_bits, y_bits)))`
+        Pixels of the band asked for last; later ones count over earlier ones.
+    buttons : :py:`In(4)`
+        See `ControlsUnit`.
+    status : :py:`Out(counters_shape(*STATUS))`
+        Counters since the reset.
+
+    Source: docs/theory/video.md#bands; [T] figure 4.10.
+    """
+
+    def __init__(self, parameters: Drawing, setups: int = 1, compact: bool | None = None):
+        self.parameters = given = parameters
+        design = given.renderer.design
+        self.render = RenderUnit(given.renderer, None, setups, compact)
+        self.depth = BandDepthUnit(BandDepth((given.size[0], given.lines)), design.x_bits, design.y_bits)
+        self.mesh, self.commands = MeshMemoryUnit(given.mesh), DrawCommandsUnit(given.commands)
+        self.vertex = VertexUnit(given.transform, given.mesh.index_bits)
+        self.assembly = TriangleAssemblyUnit(given.assembly)
+        self.motion, self.controls = MotionUnit(given.motion), ControlsUnit(given.controls)
+        band = band_shape(given.bands)
+        super().__init__(
+            {
+                "request": In(stream.Signature(band)),
+                "done": Out(stream.Signature(band)),
+                "pixels": Out(stream.Signature(drawn_band_pixel_shape(design.x_bits, design.y_bits))),
+                "buttons": In(len(BUTTONS)),
+                "status": Out(counters_shape(*STATUS)),
+            }
+        )
+
+    def elaborate(self, platform):
+        """The units, and what one command after the other does with them."""
+        m = Module()
+        for name in ("render", "depth", "mesh", "commands", "vertex", "assembly", "motion", "controls"):
+            m.submodules[name] = getattr(self, name)
+        render, drawn = self.render, self.render.o
+        connect(m, self.mesh.o, self.vertex.i)
+        connect(m, self.vertex.o, self.assembly.write)
+        connect(m, self.assembly.o, render.i)
+        wiring.connect(m, render.memory, self.depth.memory)
+        m.d.comb += [
+            *(self.pixels.payload[name].eq(drawn.payload[name]) for name in "xyrgb"),
+            self.pixels.valid.eq(drawn.valid),
+            drawn.ready.eq(self.pixels.ready),
+            self.controls.buttons.eq(self.buttons),
+        ]
+        self._matrix(m)
+        self._band(m)
+        return m
+
+    def _matrix(self, m: Module) -> None:
+        """The matrix's registers, one after the other."""
+        matrix = Signal(matrix_shape(), name="matrix")
+        given = self.motion.o.payload
+        words = [word for name in ("position", "normal") for row in matrix[name] for word in row]
+        words[9:9] = list(matrix.offset)
+        m.d.comb += [self.vertex.constants.eq(matrix), self.motion.o.ready.eq(1)]
+        for index, word in enumerate(words):
+            with m.If(self.motion.o.valid & (given.index == index)):
+                code = Value.cast(word)
+                m.d.sync += code.eq(Value.cast(given.value)[: len(code)])
+
+    def _band(self, m: Module) -> None:
+        """One band after the other."""
+        given, command, commands = self.parameters, self.commands.o.payload, self.commands
+        frame, render = given.frame, self.render
+        band, first = Signal.like(self.request.payload, name="band"), Signal(name="first_band")
+        begun = Signal(name="begun")
+        angle, index = (
+            Signal.like(self.controls.angle, name="angle"),
+            Signal.like(self.controls.index, name="index"),
+        )
+        rows = [Signal(signed(X_BITS), name=name) for name in ("top", "bottom")]
+        bounds = [given.rows(k) for k in range(given.bands)]
+        m.d.comb += [
+            *(
+                render.constants[name].eq(Const(frame.codes[name], render.constants[name].shape()))
+                for name in ("left", "right", "back_faces", "limit")
+            ),
+            render.constants.top.eq(rows[0]),
+            render.constants.bottom.eq(rows[1]),
+            self.assembly.constants.top.eq(rows[0]),
+            self.assembly.constants.bottom.eq(rows[1]),
+            commands.i.payload.start.eq(Array(given.commands.starts)[index]),
+            commands.i.payload.first_band.eq(first),
+            self.motion.i.payload.slot.eq(command.index),
+            self.motion.i.payload.angle.eq(angle),
+            *(self.mesh.i.payload[name].eq(command[name]) for name in ("first", "count")),
+            *(self.assembly.i.payload[name].eq(command[name]) for name in ("first", "count")),
+            self.assembly.i.payload.material.eq(command.index),
+            render.write.payload.address.eq(command.index),
+            render.write.payload.data.eq((command.count << 12) | command.first),
+            self.done.payload.eq(band),
+        ]
+        idle = Signal(name="idle")
+        m.d.comb += idle.eq(self.assembly.idle & render.idle)
+        with m.FSM(name="state") as state:
+            with m.State("clear"):
+                m.d.comb += self.depth.begin.eq(1)
+                m.next = "wait"
+            with m.State("wait"):
+                m.d.comb += self.request.ready.eq(~self.depth.busy)
+                m.d.sync += [band.eq(self.request.payload), first.eq(~begun | (self.request.payload <= band))]
+                with m.If(self.request.valid & self.request.ready):
+                    m.d.sync += begun.eq(1)
+                    m.next = "begin"
+                with m.Else():
+                    m.d.sync += [band.eq(band), first.eq(first)]
+            with m.State("begin"):
+                m.d.comb += self.controls.frame.eq(first)
+                m.d.sync += [
+                    rows[0].eq(frame.top + band * given.lines),
+                    rows[1].eq(
+                        Mux(band == given.bands - 1, bounds[-1].bottom, frame.top + (band + 1) * given.lines)
+                    ),
+                ]
+                m.next = "choose"
+            with m.State("choose"):
+                with m.If(first):
+                    m.d.sync += [angle.eq(self.controls.angle), index.eq(self.controls.index)]
+                m.next = "ask"
+            with m.State("ask"):
+                m.d.comb += commands.i.valid.eq(1)
+                with m.If(commands.i.ready):
+                    m.next = "command"
+            self._command(m, idle)
+            with m.State("end"), m.If(idle):
+                m.next = "done"
+            with m.State("done"):
+                m.d.comb += self.done.valid.eq(1)
+                with m.If(self.done.ready):
+                    m.next = "clear"
+            begins = state.ongoing("begin")
+            waits = state.ongoing("wait")
+        self._count(m, frames=begins & first, bands=begins, busy=~waits | self.depth.busy)
+
+    def _command(self, m: Module, idle: Signal) -> None:
+        """States of the commands."""
+        kind, take, valid = self.commands.o.payload.kind, self.commands.o.ready, self.commands.o.valid
+        left = Signal(12, name="vertices_left")
+        with m.State("command"), m.Switch(kind):
+            with m.Case(KINDS.index("end")):
+                m.d.comb += take.eq(1)
+                with m.If(valid):
+                    m.next = "end"
+            with m.Case(KINDS.index("transform")):
+                m.d.comb += self.motion.i.valid.eq(valid)
+                with m.If(valid & self.motion.i.ready):
+                    m.next = "turn"
+            with m.Case(KINDS.index("draw")):
+                m.d.comb += [self.assembly.i.valid.eq(valid), take.eq(self.assembly.i.ready)]
+            with m.Default():
+                m.d.comb += [
+                    self.render.write.valid.eq(valid & idle),
+                    take.eq(idle & self.render.write.ready),
+                ]
+        with m.State("turn"):
+            m.d.sync += left.eq(self.commands.o.payload.count)
+            # The motion waits again when its last entry was taken.
+            with m.If(self.motion.i.ready):
+                m.next = "read"
+        with m.State("read"):
+            m.d.comb += self.mesh.i.valid.eq(1)
+            with m.If(self.mesh.i.ready):
+                m.next = "transform"
+        with m.State("transform"):
+            with m.If(self.assembly.write.valid & self.assembly.write.ready):
+                m.d.sync += left.eq(left - 1)
+            with m.If(left == 0):
+                m.d.comb += take.eq(1)
+                m.next = "command"
+
+    def _count(self, m: Module, **events) -> None:
+        """Counters of this unit and of those inside."""
+        own = self.status
+        count_events(m, own, **events)
+        m.d.comb += [
+            *(own[name].eq(self.assembly.status[name]) for name in COUNTERS),
+            *(own[name].eq(self.render.status[name]) for name in RENDERED),
+        ]

@@ -1,0 +1,80 @@
+"""Mesh memory: the vertices of a range, one after the other."""
+
+from amaranth.hdl import Module, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.video.mesh_memory import MeshMemory
+from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.video.vertex_unit import mesh_vertex_shape
+
+__all__ = ["RANGE_BITS", "MeshMemoryUnit", "range_shape"]
+
+RANGE_BITS = 12
+"""Bits of the first vertex or triangle of a range, and of their number."""
+
+
+def range_shape() -> data.StructLayout:
+    """Shape of a range: first vertex or triangle, and how many there are, at least one."""
+    return data.StructLayout({"first": unsigned(RANGE_BITS), "count": unsigned(RANGE_BITS)})
+
+
+class MeshMemoryUnit(wiring.Component):
+    """Reads the vertices of ranges from a memory with contents fixed at build time, one a cycle.
+
+    A range is accepted while none is read. Its first vertex is offered two cycles later. No multipliers.
+
+    Parameters
+    ----------
+    parameters : MeshMemory
+        The vertices.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(range_shape()))`
+        Ranges.
+    o : :py:`Out(stream.Signature(mesh_vertex_shape(index_bits)))`
+        Their vertices.
+
+    Source: docs/theory/video.md#vertices; not in the documents.
+    """
+
+    latency = 2
+
+    def __init__(self, parameters: MeshMemory):
+        self.parameters = parameters
+        super().__init__(
+            {
+                "i": In(stream.Signature(range_shape())),
+                "o": Out(stream.Signature(mesh_vertex_shape(parameters.index_bits))),
+            }
+        )
+
+    def elaborate(self, platform):
+        """A counter, the memory, and the index beside its word."""
+        m = Module()
+        given = self.parameters
+        m.submodules.vertices = memory = Memory(
+            shape=given.VERTEX_BITS, depth=given.vertices, init=given.vertex_words
+        )
+        read = memory.read_port()
+        left, address = Signal(RANGE_BITS, name="left"), Signal(given.index_bits, name="address")
+        valid, index = Signal(name="valid"), Signal(given.index_bits, name="index")
+        payload = Signal(self.o.payload.shape(), name="vertex")
+        advance = skid_buffer(m, self.o, valid, payload)
+        words = Value.cast(payload)[given.index_bits :]
+        m.d.comb += [
+            payload.index.eq(index),
+            words.eq(read.data),
+            read.addr.eq(address),
+            read.en.eq(advance),
+            self.i.ready.eq(left == 0),
+        ]
+        with m.If(advance):
+            m.d.sync += [valid.eq(left != 0), index.eq(address)]
+        with m.If(left == 0), m.If(self.i.valid):
+            m.d.sync += [left.eq(self.i.payload.count), address.eq(self.i.payload.first)]
+        with m.Elif(advance):
+            m.d.sync += [left.eq(left - 1), address.eq(address + 1)]
+        return m

@@ -1,0 +1,57 @@
+"""Output cells: pins that send two bits a cycle."""
+
+from collections.abc import Sequence
+
+from amaranth.hdl import Module, Signal
+from amaranth.lib import data, io, wiring
+from amaranth.lib.wiring import In, Out
+
+__all__ = ["OutputCells"]
+
+
+class OutputCells(wiring.Component):
+    """A cell a lane that sends bit 0 of a pair in the first half of a cycle, bit 1 in the second.
+
+    With ports it is the FPGA's own, by Amaranth's `DDRBuffer`: ``ODDRX1F`` on ECP5. Without, it is the model
+    of one: ``bits`` has on each cycle the pair that the pins send, two cycles after it was given, as
+    ``ODDRX1F`` has it. Its clock is the domain ``serial``.
+
+    Parameters
+    ----------
+    lanes : int
+        Lanes.
+    ports : sequence of amaranth.lib.io.PortLike, optional
+        One a lane, a pin or a differential pair.
+
+    Members
+    -------
+    pairs : :py:`In(data.ArrayLayout(2, lanes))`
+        What to send.
+    bits : :py:`Out(data.ArrayLayout(2, lanes))`
+        What is sent; without ports only.
+
+    Source: docs/theory/video.md#tmds.
+    """
+
+    def __init__(self, lanes: int, ports: Sequence[io.PortLike] | None = None):
+        if ports is not None and len(ports) != lanes:
+            raise ValueError(f"{lanes} lanes need {lanes} ports, not {len(ports)}")
+        self._ports = ports
+        members = {"pairs": In(data.ArrayLayout(2, lanes))}
+        super().__init__(
+            members if ports is not None else members | {"bits": Out(data.ArrayLayout(2, lanes))}
+        )
+
+    def elaborate(self, platform):
+        """Buffers, or two registers in their place."""
+        m = Module()
+        if self._ports is None:
+            waiting = Signal(self.pairs.shape(), name="waiting")
+            sent = Signal(self.pairs.shape(), name="sent")
+            m.d.serial += [waiting.eq(self.pairs), sent.eq(waiting)]
+            m.d.comb += self.bits.eq(sent)
+            return m
+        for k, port in enumerate(self._ports):
+            m.submodules[f"lane_{k}"] = cell = io.DDRBuffer("o", port, o_domain="serial")
+            m.d.comb += [cell.o[half].eq(self.pairs[k][half]) for half in range(2)]
+        return m

@@ -1,0 +1,65 @@
+"""Serialiser: words of several lanes, two bits of each a cycle."""
+
+from amaranth.hdl import Module, Mux, Signal, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.video.serialiser import Serialiser
+from blysk.golden.video.tmds_encoder import BITS
+from blysk.hdl.core.stream import skid_buffer
+
+__all__ = ["SerialiserUnit"]
+
+
+class SerialiserUnit(wiring.Component):
+    """Five pairs of each word: `Serialiser` is the bit-accurate model.
+
+    A word every 5 cycles; its first pair leaves a cycle after it was taken in. Its clock is the serial clock.
+    No multipliers.
+
+    Parameters
+    ----------
+    parameters : Serialiser
+        Bit-accurate model.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(data.ArrayLayout(10, lanes)))`
+        Words.
+    o : :py:`Out(stream.Signature(data.ArrayLayout(2, lanes)))`
+        Pairs of bits; bit 0 is sent first.
+
+    Source: docs/theory/video.md#tmds.
+    """
+
+    latency = 1
+
+    def __init__(self, parameters: Serialiser | None = None):
+        self.parameters = parameters or Serialiser()
+        lanes = self.parameters.lanes
+        super().__init__(
+            {
+                "i": In(stream.Signature(data.ArrayLayout(unsigned(BITS), lanes))),
+                "o": Out(stream.Signature(data.ArrayLayout(unsigned(2), lanes))),
+            }
+        )
+
+    def elaborate(self, platform):
+        """A shift register a lane, and one bit that goes with the last pair."""
+        m = Module()
+        pairs = self.parameters.PAIRS
+        # One bit a pair that is left; a register that is empty takes a word as well as one at its last pair.
+        left = Signal(pairs, name="left")
+        lanes = [Signal(BITS, name=f"lane_{k}", reset_less=True) for k in range(self.parameters.lanes)]
+        payload = Signal(self.o.payload.shape(), name="pair")
+        m.d.comb += [payload[k].eq(lane[:2]) for k, lane in enumerate(lanes)]
+        advance = skid_buffer(m, self.o, left[0], payload)
+        takes = advance & ~left[1]
+        m.d.comb += self.i.ready.eq(takes)
+        with m.If(advance):
+            m.d.sync += left.eq(left >> 1)
+            m.d.sync += [lane.eq(lane >> 2) for lane in lanes]
+        with m.If(takes):
+            m.d.sync += left.eq(Mux(self.i.valid, (1 << pairs) - 1, 0))
+            m.d.sync += [lane.eq(self.i.payload[k]) for k, lane in enumerate(lanes)]
+        return m

@@ -1,0 +1,181 @@
+"""Triangle assembly: triangles of a range of the mesh memory that lie in a band, from screen vertices."""
+
+from amaranth.hdl import Array, Module, Mux, Signal, Value, signed, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.edge_setup import X_BITS
+from blysk.golden.geometry.triangles import MATERIAL_BITS
+from blysk.golden.video.triangle_assembly import COUNTERS, TriangleAssembly
+from blysk.hdl.geometry.triangles import count_events, counters_shape, first_centre, triangle_shape
+from blysk.hdl.video.mesh_memory import RANGE_BITS, range_shape
+from blysk.hdl.video.vertex_unit import screen_vertex_shape
+
+__all__ = ["TriangleAssemblyUnit", "band_rows_shape", "draw_shape"]
+
+
+def draw_shape() -> data.StructLayout:
+    """Shape of a range of triangles with its material."""
+    return data.StructLayout(dict(range_shape().members) | {"material": unsigned(MATERIAL_BITS)})
+
+
+def band_rows_shape() -> data.StructLayout:
+    """Shape of a band: its scanlines, ``top`` to ``bottom - 1``."""
+    return data.StructLayout({"top": signed(X_BITS), "bottom": signed(X_BITS)})
+
+
+class TriangleAssemblyUnit(wiring.Component):
+    """Keeps vertices of a frame, makes triangles of them: `TriangleAssembly` is the bit-accurate model.
+
+    A triangle takes three cycles, one for each corner that is read, whether it is sent or not; it is offered
+    `latency` cycles after its first corner's address. A range is accepted while none is read, and costs two
+    cycles more. No multipliers.
+
+    Parameters
+    ----------
+    parameters : TriangleAssembly
+        Bit-accurate model, with the mesh memory.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(draw_shape()))`
+        Ranges of triangles.
+    o : :py:`Out(stream.Signature(triangle_shape(grid)))`
+        Those to be drawn.
+    write : :py:`In(stream.Signature({"index", "vertex": screen_vertex_shape(grid)}))`
+        Vertices of the frame, one a cycle.
+    constants : :py:`In(band_rows_shape())`
+        The band; stays while triangles are read.
+    status : :py:`Out(counters_shape(*COUNTERS))`
+        What was counted since the reset.
+
+    Attributes
+    ----------
+    idle : Signal
+        No range is being read, and no triangle waits.
+
+    Source: docs/theory/video.md#vertices; [T] figure 4.10.
+    """
+
+    latency = 5
+
+    def __init__(self, parameters: TriangleAssembly):
+        self.parameters = parameters
+        vertex = screen_vertex_shape(parameters.grid)
+        index = unsigned(parameters.mesh.index_bits)
+        super().__init__(
+            {
+                "i": In(stream.Signature(draw_shape())),
+                "o": Out(stream.Signature(triangle_shape(parameters.grid))),
+                "write": In(stream.Signature(data.StructLayout({"index": index, "vertex": vertex}))),
+                "constants": In(band_rows_shape()),
+                "status": Out(counters_shape(*COUNTERS)),
+            }
+        )
+        self.idle = Signal(name="idle")
+
+    def elaborate(self, platform):
+        """The walk through the triangles' words; the corners' words; the test of the band."""
+        m = Module()
+        mesh = self.parameters.mesh
+        m.submodules.triangles = triangles = Memory(
+            shape=3 * mesh.index_bits, depth=mesh.triangles, init=mesh.triangle_words
+        )
+        vertex = self.write.payload.vertex.shape()
+        m.submodules.vertices = vertices = Memory(shape=vertex.size, depth=mesh.vertices, init=[])
+        write, face, read = vertices.write_port(), triangles.read_port(), vertices.read_port()
+        result, valid = Signal(self.o.payload.shape(), name="result"), Signal(name="valid")
+        advance = Signal(name="advance")
+        m.d.comb += [
+            write.addr.eq(self.write.payload.index),
+            write.data.eq(Value.cast(self.write.payload.vertex)),
+            write.en.eq(self.write.valid),
+            self.write.ready.eq(1),
+            # A skid buffer would hold 400 bits more, where what follows takes five cycles or more a triangle.
+            advance.eq(~valid | self.o.ready),
+            self.o.valid.eq(valid),
+            self.o.payload.eq(result),
+        ]
+
+        # A triangle's word is read a cycle before the address of its first corner, and held for three.
+        left, following = Signal(RANGE_BITS, name="left"), Signal(RANGE_BITS, name="following")
+        material, corner = Signal(MATERIAL_BITS, name="material"), Signal(2, name="corner")
+        walks = Signal(name="walks")
+        last = corner == 2
+        m.d.comb += [
+            self.i.ready.eq((left == 0) & ~walks),
+            face.addr.eq(following),
+            face.en.eq(advance & (~walks | last)),
+            read.addr.eq(Array(face.data.word_select(k, mesh.index_bits) for k in range(3))[corner]),
+            read.en.eq(advance),
+        ]
+        with m.If(self.i.ready), m.If(self.i.valid):
+            given = self.i.payload
+            m.d.sync += [left.eq(given.count), following.eq(given.first), material.eq(given.material)]
+        with m.Elif(advance):
+            with m.If(~walks | last):
+                m.d.sync += [walks.eq(left != 0), corner.eq(0)]
+                with m.If(left != 0):
+                    m.d.sync += [left.eq(left - 1), following.eq(following + 1)]
+            with m.Else():
+                m.d.sync += corner.eq(corner + 1)
+        found = self._gather(m, advance, walks, corner, data.View(vertex, read.data), material)
+        self._judge(m, advance, found, result, valid)
+        inside = walks | (left != 0) | found["inside"] | found["valid"] | valid
+        m.d.comb += self.idle.eq(~inside)
+        return m
+
+    def _gather(self, m: Module, advance, walks, corner, word, material) -> dict:
+        """Shift corners in; the range of their scanlines, and whether one is outside."""
+        grid = self.parameters.grid
+        arrives, arriving = Signal(name="arrives"), Signal(2, name="arriving")
+        corners = [Signal(word.shape(), name=f"corner_{k}") for k in range(3)]
+        low, high = (Signal(signed(X_BITS), name=name) for name in ("low", "high"))
+        outside, whole = Signal(name="outside"), Signal(name="whole")
+        kept = Signal.like(material, name="material_of_corners")
+        row = first_centre(word.y, grid)
+        first = arriving == 0
+        with m.If(advance):
+            m.d.sync += [arrives.eq(walks), arriving.eq(corner), whole.eq(arrives & (arriving == 2))]
+            with m.If(arrives):
+                m.d.sync += [
+                    corners[0].eq(corners[1]),
+                    corners[1].eq(corners[2]),
+                    corners[2].eq(word),
+                    low.eq(Mux(first | (row < low), row, low)),
+                    high.eq(Mux(first | (row > high), row, high)),
+                    outside.eq(word.outside | (outside & ~first)),
+                ]
+                with m.If(first):
+                    m.d.sync += kept.eq(material)
+        return {
+            "corners": corners,
+            "low": low,
+            "high": high,
+            "outside": outside,
+            "valid": whole,
+            "inside": arrives,
+            "material": kept,
+        }
+
+    def _judge(self, m: Module, advance, found: dict, result, valid) -> None:
+        """The triangle, if it is in the band."""
+        band = self.constants
+        low = Mux(found["low"] > band.top, found["low"], band.top)
+        high = Mux(found["high"] < band.bottom, found["high"], band.bottom)
+        covered = low < high
+        whole, outside = found["valid"], found["outside"]
+        with m.If(advance):
+            m.d.sync += valid.eq(whole & covered & ~outside)
+            for k, corner in enumerate(found["corners"]):
+                m.d.sync += [result[name][k].eq(corner[name]) for name in ("x", "y", "depth", "normal")]
+            m.d.sync += result.material.eq(found["material"])
+        moves = advance & whole
+        count_events(
+            m,
+            self.status,
+            sent=moves & covered & ~outside,
+            rejected=moves & ~covered & ~outside,
+            outside=moves & outside,
+        )

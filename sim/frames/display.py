@@ -1,0 +1,174 @@
+"""Frames of a display: a top simulated down to its four lanes, on one clock, and the lanes decoded."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from amaranth.hdl import Cat, DomainRenamer, EnableInserter, Module, Signal
+from amaranth.lib import stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.video.display import Display
+from blysk.golden.video.display_timing import DisplayMode
+from blysk.golden.video.serialiser import LANES
+from blysk.hdl.video.output_cells import OutputCells
+from blysk.hdl.video.word_crossing import WordCrossing
+from blysk.sim.engines.simulate import simulate
+
+__all__ = ["OneClock", "Shown", "show"]
+
+CYCLES = 4
+"""Cycles of the serial clock whose bits leave in a beat: 32 bits."""
+
+
+class OneClock(wiring.Component):
+    """A top with the clocks ``sync``, ``pixel`` and ``serial`` on one clock, for the engines.
+
+    The one clock is the serial clock. The pixel clock's registers move on every fifth of its cycles, those of
+    ``sync`` on as many as its rate asks for, spread evenly: on each clock edge every register does what it
+    does with clocks of its own whose edges fall on the serial clock's. Its output cells are our models.
+
+    Parameters
+    ----------
+    top : Component
+        With ``pairs`` and ``status``, and ``buttons`` where it has some.
+    rate : Fraction
+        Rate of ``sync`` over that of ``serial``, at most 1.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(buttons))`
+        The buttons from now on.
+    o : :py:`Out(stream.Signature(32))`
+        Bits of the lanes, those of four cycles at a time: of each cycle two bits of lane 0, of lane 1, ...;
+        the sink must be ready.
+    status : :py:`Out(...)`
+        That of the top.
+
+    Raises
+    ------
+    ValueError
+        If ``sync`` is faster than the serial clock.
+    """
+
+    def __init__(self, top: wiring.Component, rate: Fraction):
+        self.top, self.rate = top, Fraction(rate)
+        if not 0 < self.rate <= 1:
+            raise ValueError("the drawing clock is not faster than the serial clock")
+        members = top.signature.members
+        buttons = members["buttons"].shape if "buttons" in members else 1
+        super().__init__(
+            {
+                "i": In(stream.Signature(buttons)),
+                "o": Out(stream.Signature(2 * LANES * CYCLES)),
+                "status": Out(members["status"].shape),
+            }
+        )
+
+    def elaborate(self, platform):
+        """The enables, the top under them, and a register that collects bits."""
+        m = Module()
+        inner, top = Module(), self.top
+        cells = OutputCells(LANES)
+        inner.submodules.top, inner.submodules.cells = top, cells
+        inner.d.comb += cells.pairs.eq(top.pairs)
+        draws, shows = Signal(name="draws"), Signal(name="shows")
+        ratio, rate = WordCrossing.RATIO, self.rate
+        turn, phase = Signal(range(ratio), name="turn"), Signal(range(rate.denominator), name="phase")
+        m.d.sync += turn.eq(turn + 1)
+        with m.If(shows):
+            m.d.sync += turn.eq(0)
+        m.d.comb += [shows.eq(turn == ratio - 1), draws.eq(phase >= rate.denominator - rate.numerator)]
+        m.d.sync += phase.eq(phase + rate.numerator)
+        with m.If(draws):
+            m.d.sync += phase.eq(phase - (rate.denominator - rate.numerator))
+        enabled = EnableInserter({"sync": draws, "pixel": shows})(inner)
+        m.submodules.inner = DomainRenamer({"pixel": "sync", "serial": "sync"})(enabled)
+
+        m.d.comb += self.i.ready.eq(1)
+        if "buttons" in top.signature.members:
+            buttons = Signal.like(top.buttons, name="pressed")
+            with m.If(self.i.valid):
+                m.d.sync += buttons.eq(self.i.payload)
+            m.d.comb += top.buttons.eq(buttons)
+        count, word = Signal(range(CYCLES), name="count"), Signal(2 * LANES * CYCLES, name="word")
+        last = Signal(name="last")
+        m.d.sync += [
+            word.eq(Cat(word, cells.bits)[2 * LANES :]),
+            count.eq(count + 1),
+            last.eq(count == CYCLES - 1),
+        ]
+        m.d.comb += [self.o.payload.eq(word), self.o.valid.eq(last), self.status.eq(top.status)]
+        return m
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a display shows.
+
+    Parameters
+    ----------
+    frames : uint8 array, shape (n, height, width, 3)
+        Decoded from the lanes.
+    status : dict
+        Counters of the top after the run, by name.
+    cycles : int
+        Cycles of the serial clock.
+    """
+
+    frames: np.ndarray
+    status: dict[str, int]
+    cycles: int
+
+
+def show(
+    top: OneClock,
+    mode: DisplayMode,
+    count: int,
+    buttons: np.ndarray | None = None,
+    engine: str = "cxxrtl",
+    progress: Callable[[int], object] | None = None,
+) -> Shown:
+    """Simulate a top for some frames of its display, and decode what its lanes send.
+
+    Parameters
+    ----------
+    top : OneClock
+        The top.
+    mode : DisplayMode
+        Its display's.
+    count : int
+        Frames, from the first after power-up.
+    buttons : int array, optional
+        Buttons from power-up on; each value for a cycle, the last one stays.
+    engine : str
+        As `simulate` has it.
+    progress : callable, optional
+        Called with the pixels sent so far.
+
+    Raises
+    ------
+    LaneError
+        If a display would not show what the lanes send.
+    SimulationError
+        If the simulation goes wrong.
+    """
+    # Some pixels more, for the latency of the encoders and of the crossing.
+    pixels = count * mode.cycles + 16 * CYCLES
+    beats = pixels * WordCrossing.RATIO // CYCLES
+    run = simulate(
+        top,
+        np.zeros(0, dtype=np.int64) if buttons is None else buttons,
+        count=beats,
+        engine=engine,
+        settle=0,
+        progress=None if progress is None else lambda beat: progress(beat * CYCLES // WordCrossing.RATIO),
+    )
+    words = np.asarray(run.beats).astype(np.uint32)
+    pairs = words[:, np.newaxis] >> 8 * np.arange(CYCLES, dtype=np.uint32) & 255
+    pairs = pairs.reshape(-1, 1) >> 2 * np.arange(LANES, dtype=np.uint32) & 3
+    bits = (pairs[:, np.newaxis] >> np.arange(2, dtype=np.uint32)[:, np.newaxis] & 1).astype(np.uint8)
+    frames = Display(mode).decode(bits.reshape(-1, LANES))
+    status = {name: int(run.status[name]) for name in run.status.dtype.names}
+    return Shown(frames, status, run.total_cycles)

@@ -1,0 +1,1 @@
+"""Records of the units of the display side."""

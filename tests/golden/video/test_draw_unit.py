@@ -1,0 +1,89 @@
+"""Bands against whole frames, and against the exact frame of every pixel."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blysk.golden.presets import preset
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.renderer import render
+from blysk.golden.reference.scene import Scene
+from blysk.golden.video.controls import Controls
+from blysk.golden.video.draw_commands import KINDS, DrawCommands
+from blysk.golden.video.draw_unit import Drawing, turned
+from blysk.sim.meshes.teapot import teapot
+
+SIZE = 160, 120
+
+
+def scene(triangles=400, size=SIZE, back_faces="cull", distance=1.0):
+    mesh = teapot(triangles)
+    camera = Camera.framing(mesh.vertices, (0.3, 0.5, 1), "perspective", size[0] / size[1], margin=0.12)
+    if distance != 1:
+        toward = np.subtract(camera.position, camera.target) * distance + camera.target
+        camera = replace(camera, position=tuple(toward.tolist()))
+    material = Material((0.1, 0.05, 0.05), (0.6, 0.3, 0.2), (0.7, 0.7, 0.7), 60)
+    return Scene(mesh, camera, *size, material, (Light((0.5, 0.8, 1)),), back_faces=back_faces)
+
+
+@pytest.mark.parametrize(("lines", "angle"), [(16, 8), (16, 1500), (7, 3000)])
+def test_bands_are_the_whole_frame(lines, angle):
+    """To the bit; bands of 7 lines leave a last one of a line."""
+    drawing = Drawing.of([scene()], preset(), lines=lines)
+    whole, image = drawing.whole(angle), np.zeros((*SIZE[::-1], 3), dtype=np.uint8)
+    image[whole.y, whole.x] = whole.color
+    np.testing.assert_array_equal(drawing.picture(angle), image)
+    assert len(whole.x) > 3000
+
+
+@pytest.mark.parametrize("angle", [8, 2000])
+def test_error_against_exact_normals_of_every_pixel(angle):
+    """The exact frame rounds vertices of its own: where they are a step of 1/256 pixel apart, in some small
+    triangles, a pixel differs by more than one LSB.
+    """
+    shown = scene()
+    drawing = Drawing.of([shown], preset(model="cosquad"))
+    whole = drawing.whole(angle)
+    drawn = np.zeros(SIZE[::-1], dtype=bool)
+    drawn[whole.y, whole.x] = True
+    exact = render(turned(shown, angle), "phong", drawing.renderer.design.specular.model)
+    assert (drawn ^ exact.mask).sum() <= 3
+    both = drawn & exact.mask
+    error = np.abs(drawing.picture(angle)[both] - 255 * exact.image[both]).max(axis=1)
+    assert (error > 1).mean() < 0.01
+    assert np.sqrt((error**2).mean()) < 0.6
+
+
+def test_triangles_near_the_camera_are_dropped_and_counted():
+    near = scene(distance=0.3)
+    drawing = Drawing.of([near], preset())
+    outside = drawing.vertices(0).outside
+    assert 0 < outside.sum() < len(outside)
+    kept, counts = drawing.triangles(0, 0, drawing.frame)
+    touched = outside[drawing.mesh.faces].any(axis=1)
+    assert counts["outside"] == touched.sum()
+    assert len(kept) + counts["rejected"] == (~touched).sum()
+
+
+def test_commands_of_a_scene():
+    """Constants and the transform in a frame's first band, the draw in every one."""
+    drawing = Drawing.of([scene(), replace(scene(), ambient_light=(0, 0, 0))], preset())
+    assert len(drawing.commands.starts) == 2
+    first, other = (drawing.commands.compute(drawing.commands.starts[1], begins) for begins in (True, False))
+    assert [KINDS[kind] for kind in other[:, 0]] == ["draw", "end"]
+    writes = first[first[:, 0] == KINDS.index("frame_constant")]
+    wanted = drawing.presets[1][0].writes()
+    np.testing.assert_array_equal(writes[:, 1], wanted["address"])
+    np.testing.assert_array_equal(writes[:, 2] | writes[:, 3] << 12, wanted["data"])
+
+
+def test_what_does_not_fit_is_refused():
+    drawing = Drawing.of([scene()], preset())
+    with pytest.raises(ValueError, match="a band of 160x8 has 8 and 3"):
+        replace(drawing, lines=8)
+    with pytest.raises(ValueError, match="choose from 2 lists, there are 1"):
+        replace(drawing, controls=Controls(lights=2))
+    with pytest.raises(ValueError, match="last must be an end"):
+        DrawCommands(np.array([[1, 0, 0, 1]]), (0,))

@@ -1,0 +1,86 @@
+"""Matrices of turning meshes against a camera in float64."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT
+from blysk.golden.reference.camera import Camera
+from blysk.golden.video.mesh_memory import MeshMemory, block_rams
+from blysk.golden.video.motion import Motion, rotation
+from blysk.golden.video.vertex_unit import VertexTransform
+from blysk.sim.meshes.teapot import teapot
+
+SIZE = 640, 480
+AXIS = 0.2, 1.0, 0.1
+
+
+@pytest.fixture(scope="module")
+def memory():
+    return MeshMemory.of([teapot(300)])
+
+
+@pytest.fixture(scope="module")
+def camera(memory):
+    return Camera.framing(memory.world(memory.parts[0]).vertices, (0.3, 0.5, 1), "perspective", margin=0.2)
+
+
+@pytest.mark.parametrize("angle", [0, 511, 1024, 2500, 4095])
+def test_vertices_land_where_the_camera_sees_them(memory, camera, angle):
+    """The matrix's rounding counts too: with 16 fraction bits less than a step and a half of 1/256 pixel."""
+    motion, part = Motion.of(memory, camera, SIZE, AXIS), memory.parts[0]
+    found = VertexTransform().compute(memory.position, memory.normal, motion.matrix(0, angle))
+    world = Fixed(COMPONENT, memory.position).values * part.scale
+    turned = world @ rotation(AXIS, Motion.radians(angle)).T + part.centre
+    exact = camera.project(turned, *SIZE)
+    x, y = (found.x / 256 + SIZE[0] / 2, found.y / 256 + SIZE[1] / 2)
+    assert not found.outside.any()
+    assert max(np.abs(x - exact[:, 0]).max(), np.abs(y - exact[:, 1]).max()) * 256 < 4
+    depth = (1 - camera.near / exact[:, 2]) * 2.0**24
+    assert np.abs(found.depth - depth).max() < 2.0**24 * 2 * Motion.ENTRY_ERROR * np.sqrt(3)
+
+
+def test_entries_are_within_their_bound(memory, camera):
+    motion, angle = Motion.of(memory, camera, SIZE, AXIS), np.arange(4096)
+    found = motion.compute(np.zeros(4096, dtype=np.int64), angle)
+    exact = np.stack([rotation(AXIS, Motion.radians(code)).ravel() for code in angle.tolist()])
+    error = np.abs(found[:, 12:] * 2.0**-16 - exact).max()
+    assert 2.0**-17 < error <= Motion.ENTRY_ERROR
+
+
+def test_the_axis_turns_anticlockwise():
+    np.testing.assert_allclose(rotation((0, 0, 1), np.pi / 2) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+
+
+def test_an_orthographic_camera_is_refused(memory):
+    camera = Camera((0, 0, 9), (0, 0, 0))
+    with pytest.raises(ValueError, match="need a perspective camera"):
+        Motion.of(memory, camera, SIZE)
+
+
+def test_a_camera_too_near_is_refused(memory):
+    camera = Camera((0, 1, 9), (0, 1, 0), projection="perspective", near=0.01)
+    with pytest.raises(ValueError, match="too near to a mesh"):
+        Motion.of(memory, camera, SIZE)
+
+
+def test_the_memory_holds_the_mesh(memory):
+    mesh, stored = teapot(300), memory.world(memory.parts[0])
+    half = np.ptp(mesh.vertices, axis=0).max() / 2
+    assert np.abs(stored.vertices - mesh.vertices).max() <= half * 2.0**-18 * 1.001
+    assert np.degrees(np.arccos(np.clip((stored.normals * mesh.normals).sum(axis=1), -1, 1))).max() < 0.002
+    np.testing.assert_array_equal(stored.faces, mesh.faces)
+
+
+def test_block_rams_by_hand():
+    """512 words of 36 bits; 640 x 16 of 27 bits in blocks of 2048 x 9."""
+    assert [block_rams(512, 36), block_rams(513, 18), block_rams(10240, 27)] == [1, 1, 15]
+    assert MeshMemory.triangles_that_fit(0, 137) == 0
+    few, more = (MeshMemory.triangles_that_fit(blocks, 137) for blocks in (10, 20))
+    assert 800 < few < more
+
+
+def test_too_many_triangles_are_refused():
+    mesh = teapot(10_000)
+    with pytest.raises(ValueError, match="holds 1 to 4095 vertices"):
+        MeshMemory.of([mesh])

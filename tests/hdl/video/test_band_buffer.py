@@ -1,0 +1,161 @@
+# amaranth: UnusedElaboratable=no
+"""Bands through two clocks: each is shown as it was drawn last or as background, at any speed of drawing."""
+
+import numpy as np
+import pytest
+from amaranth.hdl import Signal
+from amaranth.sim import Simulator
+
+from blysk.golden.video.band_buffer import RGB565, RGB888, BandBuffer
+from blysk.golden.video.display_timing import Axis, DisplayMode, DisplayTiming
+from blysk.hdl.video.band_buffer import BandBufferUnit
+
+MODE = DisplayMode(Axis(12, 2, 3, 3), Axis(16, 1, 2, 3))
+FRAMES = 3
+
+
+class Drawing:
+    """Pixels of any band of any frame: two of three, some drawn twice; what a band was drawn as last."""
+
+    def __init__(self, parameters):
+        self.parameters, self.frame, self.asked = parameters, -1, []
+        width, height = parameters.mode.size
+        self.picture = np.empty((height, width, 3), dtype=np.int64)
+
+    def band(self, band):
+        """Pixels of a band: x, y, r, g, b."""
+        given = self.parameters
+        self.frame += band == 0
+        self.asked.append(band)
+        rng = np.random.default_rng([self.frame + 1, band])
+        x, y = rng.integers(0, given.mode.size[0], given.pixels), rng.integers(0, given.lines, given.pixels)
+        colour = rng.integers(0, 256, (given.pixels, 3))
+        lines = self.picture[band * given.lines : (band + 1) * given.lines]
+        lines[:] = given.background
+        for k in range(given.pixels):
+            lines[y[k], x[k]] = colour[k]
+        return np.c_[x, y, colour].tolist()
+
+
+def show(parameters, wait, periods=(1.0, 1.37), frames=FRAMES):
+    """Frames that are shown, those that should be, late bands, the buffer's counts, and the bands asked for.
+
+    ``wait`` gives the cycles that a band takes beside its pixels.
+    """
+    unit, timing, drawing = BandBufferUnit(parameters), DisplayTiming(parameters.mode), Drawing(parameters)
+    simulator = Simulator(unit)
+    simulator.add_clock(periods[0] * 1e-6, domain="sync")
+    simulator.add_clock(periods[1] * 1e-6, domain="pixel", phase=0.3e-6)
+    cycles = timing.compute((frames + 1) * parameters.mode.cycles)
+    found, status, stop = [], {}, Signal()
+
+    async def draw(ctx):
+        count = 0
+        while True:
+            ctx.set(unit.request.ready, 1)
+            (band,) = await ctx.tick().sample(unit.request.payload).until(unit.request.valid | stop)
+            if ctx.get(stop):
+                return
+            ctx.set(unit.request.ready, 0)
+            pixels = drawing.band(band)
+            await ctx.tick().repeat(1 + wait(count))
+            count += 1
+            for values in pixels:
+                ctx.set(unit.pixels.payload, dict(zip("xyrgb", values, strict=True)))
+                ctx.set(unit.pixels.valid, 1)
+                await ctx.tick().until(unit.pixels.ready | stop)
+            ctx.set(unit.pixels.valid, 0)
+            ctx.set(unit.done.payload, band)
+            ctx.set(unit.done.valid, 1)
+            await ctx.tick().until(unit.done.ready | stop)
+            ctx.set(unit.done.valid, 0)
+
+    async def watch(ctx):
+        names = list(unit.shown.shape().members)
+        for k in range(len(cycles["x"])):
+            ctx.set(unit.timing, {name: int(values[k]) for name, values in cycles.items()})
+            await ctx.tick("pixel")
+            found.append([ctx.get(unit.shown[name]) for name in names])
+        for name in ("late_bands", "frames"):
+            status[name] = ctx.get(unit.status[name])
+        ctx.set(stop, 1)
+
+    simulator.add_testbench(draw)
+    simulator.add_testbench(watch)
+    simulator.run()
+    found = dict(zip(unit.shown.shape().members, np.array(found).T, strict=True))
+    for name, values in cycles.items():
+        np.testing.assert_array_equal(found[name], values)
+    colours = np.stack([found[channel] for channel in "rgb"], axis=-1)[cycles["active"]]
+    width, height = parameters.mode.size
+    return colours.reshape(-1, height, width, 3), status, drawing
+
+
+def pictures(parameters, frames):
+    """The frames of a drawing that is fast enough."""
+    drawing, result = Drawing(parameters), []
+    for _ in range(frames):
+        for band in range(parameters.bands):
+            drawing.band(band)
+        result.append(parameters.compute(drawing.picture))
+    return np.array(result)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "periods"),
+    [
+        (BandBuffer(MODE, 4), (1.0, 3.3)),
+        (BandBuffer(MODE, 2, RGB565, (10, 200, 77)), (1.0, 2.9)),
+        (BandBuffer(MODE, 4, RGB888, (255, 1, 128)), (0.37, 1.0)),
+    ],
+)
+def test_every_frame_in_time(parameters, periods):
+    """At several clocks, formats and backgrounds."""
+    frames, status, _ = show(parameters, lambda count: count % 7, periods)
+    np.testing.assert_array_equal(frames[:FRAMES], pictures(parameters, FRAMES))
+    assert status == {"late_bands": 0, "frames": FRAMES + 1}
+
+
+def is_background(parameters, frames):
+    """Which bands of frames are all background; shape (frames, bands)."""
+    empty = parameters.shown(parameters.kept(parameters.background))
+    lines = (frames == empty).all((-1, -2)).reshape(len(frames), parameters.bands, parameters.lines)
+    return lines.all(-1)
+
+
+@pytest.mark.parametrize("wait", [lambda count: 260, lambda count: 1200])
+def test_late_bands_are_background_and_counted(wait):
+    """The timing goes on; every band is one that was drawn, whole, or background; as many as are counted."""
+    parameters = BandBuffer(MODE, 4, RGB888, (3, 2, 1))
+    frames, status, drawing = show(parameters, wait, (1.0, 1.4))
+    late = is_background(parameters, frames)
+    assert late.any()
+    assert late.sum() == status["late_bands"]
+    # Everything that was drawn, by band.
+    again, drawn = Drawing(parameters), {}
+    for band in drawing.asked:
+        again.band(band)
+        lines = slice(band * 4, band * 4 + 4)
+        drawn.setdefault(band, []).append(again.picture[lines].copy())
+    for frame, is_late in zip(frames, late, strict=True):
+        for band in np.flatnonzero(~is_late).tolist():
+            found = frame[band * 4 : band * 4 + 4]
+            assert any((found == lines).all() for lines in drawn[band])
+
+
+def test_it_recovers():
+    """After one heavy band the frames are whole again."""
+    parameters = BandBuffer(MODE, 4)
+    frames, status, _ = show(parameters, lambda count: 700 * (count == 3), (1.0, 2.4))
+    late = is_background(parameters, frames)
+    assert late.sum() == status["late_bands"] > 0
+    assert not late[2:].any()
+
+
+def test_asked_bands_follow_the_model():
+    """In order, and after a late one that of the next slot."""
+    parameters = BandBuffer(MODE, 4)
+    _, status, drawing = show(parameters, lambda count: 900, (1.0, 1.4), frames=3)
+    steps = np.diff(drawing.asked) % parameters.bands
+    assert status["late_bands"]
+    assert (steps > 1).any()

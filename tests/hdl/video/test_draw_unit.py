@@ -1,0 +1,120 @@
+"""Bands of simulated hardware against the model: frames in turn, stalls, bands left out, buttons."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blysk.golden.presets import preset
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.scene import Scene
+from blysk.golden.video.controls import BUTTONS, Controls
+from blysk.golden.video.draw_unit import Drawing
+from blysk.hdl.video.draw_unit import COUNTERS, RENDERED
+from blysk.sim.frames.drawing import DrawingSimulator
+from blysk.sim.meshes.teapot import teapot
+
+LAMPS = (Light((0.5, 0.8, 1)), Light((-1, 0.3, 0.4), (0.3, 0.9, 0.9)))
+
+
+def drawing_of(triangles, size, design, **options):
+    mesh = teapot(triangles)
+    camera = Camera.framing(mesh.vertices, (0.3, 0.5, 1), "perspective", size[0] / size[1], margin=0.12)
+    red = Material((0.1, 0.05, 0.05), (0.6, 0.3, 0.2), (0.7, 0.7, 0.7), 60)
+    blue = Material((0, 0, 0.1), (0.2, 0.3, 0.8), (0.5, 0.5, 0.5), 15)
+    material = (red, blue)[: design.materials]
+    faces = np.arange(len(mesh.faces)) % design.materials
+    mesh = Mesh(mesh.vertices, mesh.faces, mesh.normals, faces)
+    scenes = [
+        Scene(mesh, camera, *size, of, (lamp,), back_faces="cull")
+        for lamp in LAMPS
+        for of in (material, material[::-1])
+    ]
+    controls = Controls(materials=2, lights=2, step=300, debounce_bits=2)
+    return Drawing.of(scenes, design, controls=controls, **options)
+
+
+@pytest.fixture(scope="module")
+def simulator():
+    design = preset(model="cosquad", materials=2)
+    return DrawingSimulator(drawing_of(120, (96, 64), design))
+
+
+def expected(drawing, bands, buttons=None):
+    """Pixels of each band, and what is counted."""
+    controls, state, before, down = drawing.controls, drawing.controls.start, drawing.bands, 0
+    made = []
+    for index, band in enumerate(bands):
+        now = 0 if buttons is None else buttons[index]
+        if band <= before:
+            state = controls.advance(state)
+            frame = state
+        # The press counts some cycles later: this frame has begun.
+        for k, button in enumerate(BUTTONS):
+            if (now & ~down) >> k & 1:
+                state = controls.press(state, button)
+        made.append(drawing.band(band, frame.angle, controls.list_of(frame)))
+        before, down = band, now
+    return made
+
+
+def assert_equal(found, made):
+    for pixels, band in zip(found.pixels, made, strict=True):
+        for name, value in {"x": band.x, "y": band.y, **dict(zip("rgb", band.color.T, strict=True))}.items():
+            np.testing.assert_array_equal(pixels[name], value, err_msg=f"band {band.band}: {name}")
+
+
+def test_frames_equal_model(simulator):
+    """Two frames; every counter is the sum of the bands'."""
+    drawing = simulator.drawing
+    bands = [*range(drawing.bands)] * 2
+    found, made = simulator.run(bands), expected(drawing, bands)
+    np.testing.assert_array_equal(found.band, bands)
+    assert_equal(found, made)
+    counted = [name for name in (*COUNTERS, *RENDERED) if name in made[0].counts]
+    assert len(counted) >= 9
+    assert {name: found.counts[name] for name in counted} == {
+        name: sum(band.counts[name] for band in made) for name in counted
+    }
+    assert (found.counts["frames"], found.counts["bands"]) == (2, len(bands))
+    assert sum(len(pixels) for pixels in found.pixels) > 2000
+
+
+def test_stalls_change_no_pixel(simulator):
+    bands, rng = [*range(simulator.drawing.bands)], np.random.default_rng(5)
+    stalls = {"input_stalls": rng.random(997) < 0.7, "output_stalls": rng.random(1009) < 0.6}
+    assert_equal(simulator.run(bands, **stalls), expected(simulator.drawing, bands))
+
+
+def test_bands_may_be_left_out(simulator):
+    """A band that does not follow the one before begins a frame, the first of all too."""
+    bands = [2, 3, 1, 3, 3, 0, 2]
+    found = simulator.run(bands)
+    assert_equal(found, expected(simulator.drawing, bands))
+    assert found.counts["frames"] == 4
+
+
+def test_buttons_count_from_the_next_frame_on(simulator):
+    """Each button in turn, in the second band of a frame; in a pause a step."""
+    count = simulator.drawing.bands
+    presses = ["light", "material", "step", "pause", "step", "light"]
+    buttons = np.zeros((len(presses) + 1, count), dtype=int)
+    for frame, name in enumerate(presses):
+        buttons[frame, 1:-1] = 1 << BUTTONS.index(name)
+    bands = [*range(count)] * len(buttons)
+    buttons = buttons.ravel().tolist()
+    assert_equal(simulator.run(bands, buttons), expected(simulator.drawing, bands, buttons))
+
+
+@pytest.mark.long
+def test_a_teapot_of_1000_triangles_at_640_by_480():
+    """Whole frames as the board shows them, and their cycles: 60 frames a second at 75 MHz twice over."""
+    drawing = drawing_of(1000, (640, 480), preset(model="cosquad"))
+    drawing = replace(drawing, controls=replace(drawing.controls, step=1))
+    bands = [*range(drawing.bands)] * 2
+    simulator = DrawingSimulator(drawing)
+    found = simulator.run(bands)
+    assert_equal(found, expected(drawing, bands))
+    assert found.cycles[drawing.bands :].sum() < 75e6 / 60 / 2
