@@ -65,8 +65,8 @@ class Board:
         Rate of its clock, Hz.
     buttons : tuple of (str, int)
         Resources, up to six: what the top does with each is the top's.
-    block_rams, multipliers : int
-        Of its device.
+    luts, block_rams, multipliers : int
+        Of its device, which has as many flip-flops as look-up tables.
     lines : int
         Of a band: the device has the memory.
     loader : str
@@ -81,6 +81,7 @@ class Board:
     options: tuple[str, ...]
     reference: int
     buttons: tuple[tuple[str, int], ...]
+    luts: int
     block_rams: int
     multipliers: int
     lines: int
@@ -115,6 +116,7 @@ BOARDS = {
             options=("--25k", "--package", "CABGA381", "--speed", "6"),
             reference=25_000_000,
             buttons=_ULX3S_BUTTONS,
+            luts=24_288,
             block_rams=56,
             multipliers=28,
             lines=8,
@@ -126,6 +128,7 @@ BOARDS = {
             options=("--85k", "--package", "CABGA381", "--speed", "6"),
             reference=25_000_000,
             buttons=_ULX3S_BUTTONS,
+            luts=83_640,
             block_rams=208,
             multipliers=156,
             lines=16,
@@ -137,6 +140,7 @@ BOARDS = {
             options=("--25k", "--package", "CABGA256", "--speed", "6"),
             reference=50_000_000,
             buttons=(("button", 0), ("button", 1)),
+            luts=24_288,
             block_rams=56,
             multipliers=28,
             lines=8,
@@ -313,12 +317,17 @@ def build(
 def _refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
     """Refuse what has no place: the placer would say so after minutes, or try for ever."""
     kinds = Counter(cell["type"] for cell in netlist["modules"]["top"]["cells"].values())
-    for name, kind, most in (
-        ("block RAMs", "DP16KD", board.block_rams),
-        ("multipliers", "MULT18X18D", board.multipliers),
-    ):
-        if kinds[kind] > most:
-            raise TooLarge(f"does not fit the {board.name}: {kinds[kind]} {name} of {most}")
+    counts = {
+        # A carry cell takes two, a memory of 16 words four.
+        "look-up tables": kinds["LUT4"] + 2 * kinds["CCU2C"] + 4 * kinds["TRELLIS_DPR16X4"],
+        "flip-flops": kinds["TRELLIS_FF"],
+        "block RAMs": kinds["DP16KD"],
+        "multipliers": kinds["MULT18X18D"],
+    }
+    most = dict(zip(counts, (board.luts, board.luts, board.block_rams, board.multipliers), strict=True))
+    over = [f"{count:,} {name} of {most[name]:,}" for name, count in counts.items() if count > most[name]]
+    if over:
+        raise TooLarge(f"does not fit the {board.name}: {', '.join(over)}")
 
 
 def _place(board: Board, runner: ToolRunner, folder: Path, seed: int) -> None:
