@@ -19,8 +19,8 @@ __all__ = [
     "connect_late_fifo",
     "connect_slice",
     "count_down",
-    "pass_beside",
     "moving",
+    "pass_beside",
     "require_same_shape",
     "skid_buffer",
 ]
