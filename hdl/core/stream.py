@@ -315,7 +315,8 @@ def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[
     remaining = Signal(len(length), name="remaining")
     with m.If(advance):
         with m.If(ends):
-            m.d.sync += [active.eq(valid & (length != 0)), ends.eq(~valid | (length <= 1))]
+            # By bits: a comparison is a chain of carries.
+            m.d.sync += [active.eq(valid & length.any()), ends.eq(~(valid & length[1:].any()))]
             m.d.sync += remaining.eq(length)
         with m.Else():
             m.d.sync += [ends.eq(remaining == 2), remaining.eq(remaining - 1)]
