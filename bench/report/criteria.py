@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from blysk.bench.colors import style_of
 from blysk.bench.labels import Label, place_labels
 from blysk.bench.report import energy
@@ -173,7 +175,10 @@ def _drawing(frames: Sequence[tuple]) -> Drawing:
         style = style_of(method)
         axes.plot(counts, each, color=style.color, linestyle=style.dash, marker=style.marker, markersize=4.5)
         labels.append(Label(counts[-1], each[-1], method, style.color))
-        points += [*zip(counts, each, strict=True)]
+        # Labels keep clear of the lines, too.
+        logs = np.log(counts), np.log(each)
+        along = np.linspace(logs[0][0], logs[0][-1], 120)
+        points += [*zip(np.exp(along), np.exp(np.interp(along, *logs)), strict=True)]
     axes.set(xscale="log", yscale="log", xlabel="triangles of the teapot at 640x480", ylabel="cycles a pixel")
     axes.set_xlim(counts[0] * 0.7, counts[-1] * 8)
     axes.set_xticks(counts, [f"{count:,}" for count in counts], minor=False)

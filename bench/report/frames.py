@@ -18,10 +18,11 @@ from blysk.bench.report.perception import (
     identical_to_the_eye,
     perceived,
 )
+from blysk.bench.speed.cycle_model import frame_cycles, unit_of
 from blysk.bench.speed.renderer import timed
 from blysk.golden.frames.compare import method_in_float64
 from blysk.golden.frames.frame import model_frame
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.presets import LOBES, MODELS, preset
 from blysk.golden.reference.geometry import Mesh
@@ -171,7 +172,8 @@ def frames(
     list of dict
         By exponent: ``settings``, ``errors`` (keys of `ERRORS`; no PSNR of equal images), ``verdicts``
         (``total``, ``method``: whether they look identical), ``pictures`` (see `section`), ``pixels`` shaded,
-        ``shown`` ones, ``spans``, ``out_of_range_spans`` and ``cycles`` (``None`` if not simulated).
+        ``shown`` ones, ``spans``, ``out_of_range_spans``, ``cycles`` (``None`` if not
+        simulated) and ``modelled_cycles``, by `frame_cycles`.
     """
     design = preset(method, model, operand=operand)
     simulator = FrameSimulator(design, "cxxrtl") if simulated else None
@@ -179,6 +181,7 @@ def frames(
     for scene in scenes_of(view, exponents):
         frame = simulator.render(scene) if simulator else model_frame(scene, design)
         same_method = method_in_float64(scene, design, frame.cut_raster)
+        writes = sum(len(of.writes()["data"]) for of in constants_of(scene, design))
         names = {"method": method, "model": model, "engine": simulator.engine if simulator else "model"}
         names |= {"operand": operand} if operand else {}
         results.append(
@@ -189,6 +192,7 @@ def frames(
                 "spans": frame.spans,
                 "out_of_range_spans": frame.out_of_range_spans,
                 "cycles": frame.cycles if simulated else None,
+                "modelled_cycles": frame_cycles(unit_of(design), frame.prepared.spans, writes),
             }
         )
     return results

@@ -90,6 +90,8 @@ def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
     if not timed:
         return None
     on_front = _front(timed, "total_error")
+    if not on_front:
+        return None
     best = next((of for of in on_front if of["total_error"][1] <= 1), on_front[-1])
     scenes = max(of["samples"] for of in timed)
     sentence = (
@@ -134,6 +136,8 @@ def _front(found: Sequence[Mapping[str, Any]], kind: str) -> list[Mapping[str, A
     better than that in one of them, or has fewer multipliers.
     """
     found = [of for of in found if not of["is_prepared"]]
+    if not found:
+        return []
     error, cycles = np.array([(of[kind][1], of["cycles"][1]) for of in found]).T
     multipliers = np.array([of["multipliers"] or np.inf for of in found])
     # [i, j]: whether j is better than i.

@@ -256,7 +256,7 @@ def _of_designs(tasks: Sequence[Task], results: Sequence[Any]) -> dict[tuple, di
 
 
 class _Cycles:
-    """Cycles a pixel of frames: their own, or those of the same method and spans with another model."""
+    """Cycles a pixel of frames: their own, those of the same method and spans, or the cycle model's."""
 
     def __init__(self, tasks: Sequence[Task], results: Sequence[Any], of_design: Mapping[tuple, dict]):
         self._of_design = of_design
@@ -274,7 +274,8 @@ class _Cycles:
         latency, others = (self._of_design.get(of, {}).get("latency") for of in (key[1:-1], other))
         same = simulated and all(simulated[name] == found[name] for name in ("spans", "pixels"))
         if None in (latency, others) or not same:
-            return None
+            cycles = found.get("modelled_cycles")
+            return None if cycles is None else cycles / found["pixels"]
         return (simulated["cycles"] + latency - others) / found["pixels"]
 
 

@@ -124,8 +124,8 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
     if modelled:
         engines += (
             f", {len(modelled):,} through its bit-accurate model; these have the cycles of the simulated "
-            f"pipeline of the "
-            "same method, whose spans are the same, with the difference of latency"
+            "pipeline of the same method, if its spans are the same, with the difference of latency, and "
+            "else those of the cycle model"
         )
     return [*map(_glance, _by_scene(points).values()), of_error, of_time, f"{engines}."]
 

@@ -65,6 +65,7 @@ def open_page(watching, live_site):
             page.goto((folder / "index.html").as_uri())
             if waits:
                 page.wait_for_selector("body[data-frame]")
+                page.locator(".further").evaluate("fold => (fold.open = true)")
             return page
 
         open_page.allowed = "none"

@@ -4,6 +4,7 @@
 import base64
 import dataclasses
 import json
+import re
 import threading
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -185,8 +186,7 @@ def test_keyboard(open_page):
     page.keyboard.press("Enter")
     page.wait_for_selector("body[data-inside]")
     assert page.locator("#inside").is_visible()
-    # All that can be done is reached by the Tab key, once it is unfolded.
-    page.locator(".further summary").click()
+    # All that can be done is reached by the Tab key.
     page.locator("#frame").focus()
     reached = set()
     for _ in range(40):
@@ -211,6 +211,30 @@ def test_empty_place(open_page):
     page.evaluate("() => blysk.look(2, 3)")
     assert "no surface at column 2, row 3" in page.locator("#inside-title").inner_text()
     page.evaluate("() => blysk.setClock(4)")
+
+
+def test_opens_with_the_light_turning_unless_asked_not_to(open_page):
+    page = open_page(reduced_motion="no-preference")
+    count = page.evaluate("() => blysk.frames")
+    page.wait_for_function(f"() => blysk.frames > {count + 3}")
+    assert page.locator("#orbit").get_attribute("aria-pressed") == "true"
+    assert open_page().locator("#orbit").get_attribute("aria-pressed") == "false"
+
+
+def test_hardware_beside_hardware(open_page):
+    """Right of the divider the frame of `linear`, simulated too, with its own error."""
+    page = open_page()
+    exact = digest(picture_of(page, "golden"))
+    page.locator("#compare").select_option("rival")
+    page.wait_for_function("() => blysk.latest.rival")
+    state = state_of(page)
+    assert digest(picture_of(page)) == digest(by_model(state))
+    assert digest(picture_of(page, "golden")) == digest(by_model(state | {"method": "linear"})) != exact
+    assert re.fullmatch(r"linear: \d+(\.\d+)? LSB", page.locator("#other-text").inner_text())
+    page.locator("#split").fill("20")
+    stage = page.locator("#frame").bounding_box()
+    line = page.locator("#divider").bounding_box()
+    assert line["x"] + 1 == pytest.approx(stage["x"] + 0.2 * stage["width"], abs=1.5)
 
 
 def test_light_goes_round(open_page):
