@@ -8,9 +8,8 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import MATERIAL_BITS
 from blysk.golden.video.triangle_assembly import COUNTERS, TriangleAssembly
-from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.geometry.triangles import count_events, counters_shape, first_centre, triangle_shape
-from blysk.hdl.video.mesh_memory import RANGE_BITS, range_shape
+from blysk.hdl.video.mesh_memory import range_shape
 from blysk.hdl.video.vertex_unit import screen_vertex_shape
 
 __all__ = ["TriangleAssemblyUnit", "band_rows_shape", "draw_shape"]
@@ -93,11 +92,14 @@ class TriangleAssemblyUnit(wiring.Component):
             write.data.eq(Value.cast(self.write.payload.vertex)),
             write.en.eq(self.write.valid),
             self.write.ready.eq(1),
-            advance.eq(skid_buffer(m, self.o, valid, result)),
+            # A skid buffer would hold 400 bits more, where what follows takes five cycles or more a triangle.
+            advance.eq(~valid | self.o.ready),
+            self.o.valid.eq(valid),
+            self.o.payload.eq(result),
         ]
 
         # A triangle's word is read a cycle before the address of its first corner, and held for three.
-        left, following = Signal(RANGE_BITS, name="left"), Signal(RANGE_BITS, name="following")
+        left, following = (Signal(range(mesh.triangles + 1), name=name) for name in ("left", "following"))
         material, corner = Signal(MATERIAL_BITS, name="material"), Signal(2, name="corner")
         walks = Signal(name="walks")
         last = corner == 2
@@ -120,7 +122,7 @@ class TriangleAssemblyUnit(wiring.Component):
                 m.d.sync += corner.eq(corner + 1)
         found = self._gather(m, advance, walks, corner, data.View(vertex, read.data), material)
         self._judge(m, advance, found, result, valid)
-        inside = walks | (left != 0) | found["inside"] | found["valid"] | self.o.valid
+        inside = walks | (left != 0) | found["inside"] | found["valid"] | valid
         m.d.comb += self.idle.eq(~inside)
         return m
 

@@ -23,12 +23,12 @@ class MergedDrawUnit(wiring.Component):
     ----------
     parameters : Drawing
         What is drawn.
-    setups : int
-        As `DrawUnit` has it.
+    **options
+        As `DrawUnit` has them.
     """
 
-    def __init__(self, parameters: Drawing, setups: int = 1):
-        self.parameters, self.unit = parameters, DrawUnit(parameters, setups)
+    def __init__(self, parameters: Drawing, **options):
+        self.parameters, self.unit = parameters, DrawUnit(parameters, **options)
         design = parameters.renderer.design
         pixel = drawn_band_pixel_shape(design.x_bits, design.y_bits)
         band = band_shape(parameters.bands)
@@ -107,13 +107,13 @@ class DrawingSimulator:
         What is drawn.
     engine : str
         As `simulate` has it.
-    setups : int
-        As `DrawUnit` has it.
+    **options
+        As `DrawUnit` has them.
     """
 
-    def __init__(self, drawing: Drawing, engine: str = "auto", setups: int = 1):
+    def __init__(self, drawing: Drawing, engine: str = "auto", **options):
         self.drawing, self.engine = drawing, engine
-        self._unit = MergedDrawUnit(drawing, setups)
+        self._unit = MergedDrawUnit(drawing, **options)
 
     def run(self, bands: Sequence[int], buttons: Sequence[int] | None = None, **stalls) -> DrawnBands:
         """Ask for bands, and collect their pixels.
