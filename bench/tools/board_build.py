@@ -27,7 +27,16 @@ from blysk.bench.tools.place_and_route import (
 )
 from blysk.sim.errors import InputError
 
-__all__ = ["BOARDS", "Board", "Built", "Clock", "board_named", "build", "packages_missing"]
+__all__ = [
+    "BOARDS",
+    "Board",
+    "Built",
+    "Clock",
+    "board_named",
+    "build",
+    "packages_missing",
+    "refuse_too_large",
+]
 
 _REMEDY = "pip install 'blysk[board]'"
 
@@ -289,7 +298,7 @@ def build(
         mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
         mapped, absorbed = absorb_registers(mapped)
         (folder / "top.json").write_text(json.dumps(mapped), encoding="utf-8")
-        _refuse_too_large(board, mapped)
+        refuse_too_large(board, mapped)
         best = None
         for seed in range(1, seeds + 1):
             progress(f"placement {seed}")
@@ -314,8 +323,21 @@ def build(
         )
 
 
-def _refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
-    """Refuse what has no place: the placer would say so after minutes, or try for ever."""
+def refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
+    """Refuse what has no place: the placer would say so after minutes, or try for ever.
+
+    Parameters
+    ----------
+    board : Board
+        The board.
+    netlist : dict
+        Yosys's JSON, mapped.
+
+    Raises
+    ------
+    TooLarge
+        If it takes more of something than the device has, naming all of it.
+    """
     kinds = Counter(cell["type"] for cell in netlist["modules"]["top"]["cells"].values())
     counts = {
         # A carry cell takes two, a memory of 16 words four.

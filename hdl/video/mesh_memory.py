@@ -59,7 +59,10 @@ class MeshMemoryUnit(wiring.Component):
             shape=given.VERTEX_BITS, depth=given.vertices, init=given.vertex_words
         )
         read = memory.read_port()
-        left, address = Signal(RANGE_BITS, name="left"), Signal(given.index_bits, name="address")
+        left, address = (
+            Signal(range(given.vertices + 1), name="left"),
+            Signal(given.index_bits, name="address"),
+        )
         valid, index = Signal(name="valid"), Signal(given.index_bits, name="index")
         payload = Signal(self.o.payload.shape(), name="vertex")
         advance = skid_buffer(m, self.o, valid, payload)

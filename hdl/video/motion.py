@@ -78,7 +78,7 @@ class MotionUnit(wiring.Component):
         )
         read = memory.read_port()
         sines = given.table.codes.tolist()
-        m.submodules.sines = table = Memory(shape=ENTRY.width, depth=len(sines), init=sines)
+        m.submodules.sines = table = Memory(shape=ENTRY.width - 1, depth=len(sines), init=sines)
         look = table.read_port()
 
         angle, index = Signal(ANGLE_BITS, name="angle"), Signal(range(ENTRIES), name="entry")
@@ -87,7 +87,7 @@ class MotionUnit(wiring.Component):
         bits = given.TABLE_BITS
         code = Mux(step == 0, angle + (1 << bits), angle)[:ANGLE_BITS]
         negative = Signal(name="negative")
-        looked = Mux(negative, -look.data.as_signed(), look.data.as_signed())[: ENTRY.width].as_signed()
+        looked = Mux(negative, -look.data, look.data)[: ENTRY.width].as_signed()
         m.d.comb += [
             look.addr.eq(code[:bits] ^ code[bits].replicate(bits)),
             read.addr.eq(address),

@@ -9,7 +9,7 @@ from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import MATERIAL_BITS
 from blysk.golden.video.triangle_assembly import COUNTERS, TriangleAssembly
 from blysk.hdl.geometry.triangles import count_events, counters_shape, first_centre, triangle_shape
-from blysk.hdl.video.mesh_memory import RANGE_BITS, range_shape
+from blysk.hdl.video.mesh_memory import range_shape
 from blysk.hdl.video.vertex_unit import screen_vertex_shape
 
 __all__ = ["TriangleAssemblyUnit", "band_rows_shape", "draw_shape"]
@@ -99,7 +99,7 @@ class TriangleAssemblyUnit(wiring.Component):
         ]
 
         # A triangle's word is read a cycle before the address of its first corner, and held for three.
-        left, following = Signal(RANGE_BITS, name="left"), Signal(RANGE_BITS, name="following")
+        left, following = (Signal(range(mesh.triangles + 1), name=name) for name in ("left", "following"))
         material, corner = Signal(MATERIAL_BITS, name="material"), Signal(2, name="corner")
         walks = Signal(name="walks")
         last = corner == 2

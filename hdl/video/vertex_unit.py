@@ -130,7 +130,7 @@ class VertexUnit(PipelinedUnit):
             "beyond", lambda c: c[-1] | ~c[places:-1].any() | c[places + p.SHIFTS + 1 : -1].any(), code
         )
         shift = g.register(
-            "shift", lambda c: sum(c[places + k : places + p.SHIFTS + 1].any() for k in (1, 2, 3)), code
+            "shift", lambda c: sum(c[places + k : places + p.SHIFTS + 1].any() for k in (1, 2, 3))[:2], code
         )
 
         def mantissa(c, shift, outside):

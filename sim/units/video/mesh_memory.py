@@ -23,6 +23,7 @@ def _ranges(unit, rng, count):
     vertices = unit.parameters.vertices
     first = rng.integers(0, vertices, count)
     size = 1 + (rng.random(count) ** 3 * (vertices - first)).astype(np.int64)
+    first[:2], size[:2] = 0, vertices
     return Case({"first": first, "count": size})
 
 

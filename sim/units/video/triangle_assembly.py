@@ -36,6 +36,7 @@ def _case(unit, rng, count, spread, outside):
     }
     first = rng.integers(0, mesh.triangles, count)
     size = 1 + (rng.random(count) ** 4 * (mesh.triangles - first)).astype(np.int64)
+    first[:2], size[:2] = 0, mesh.triangles
     beats = {"first": first, "count": size, "material": rng.integers(0, 1024, count)}
     return Case(beats, _BAND, {"index": np.arange(mesh.vertices), "vertex": vertices})
 
@@ -61,5 +62,6 @@ RECORD = Record(
     status=lambda unit, case: _made(unit, case)[1],
     stimuli={"around": Stimulus(_around, 60), "within": Stimulus(_within, 60)},
     axis="",
+    still={"counters go on to 2^32": "count_sent[9-31] count_rejected[7-31] count_outside[7-31]"},
     remembers=True,
 )

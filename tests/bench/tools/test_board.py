@@ -6,9 +6,9 @@ from importlib.util import find_spec
 import pytest
 
 from blysk.bench.tools.board import built_lines, missed
-from blysk.bench.tools.board_build import BOARDS, Built, Clock, build
+from blysk.bench.tools.board_build import BOARDS, Built, Clock, build, refuse_too_large
 from blysk.bench.tools.board_design import BoardTop
-from blysk.bench.tools.place_and_route import ToolError, tool_versions
+from blysk.bench.tools.place_and_route import TooLarge, ToolError, tool_versions
 from blysk.golden.video.band_buffer import BandBuffer
 from blysk.golden.video.clock_plan import clock_plan
 from blysk.golden.video.display_timing import VGA
@@ -109,6 +109,16 @@ def test_a_missed_clock_is_named_with_its_path():
     assert [line.split(";")[0].split()[-1] for line in list(built_lines(BUILT))[1:]] == ["met", "MISSED"]
     met = Built(BUILT.parts, BUILT.clocks[:1], 0, 1, b"", 0)
     assert missed(met) == ""
+
+
+def test_too_large_is_told_before_placement():
+    """All that is over, with what there is; a carry cell is two look-up tables, a small memory four."""
+    kinds = {"LUT4": 24_000, "CCU2C": 141, "TRELLIS_DPR16X4": 2, "TRELLIS_FF": 100, "MULT18X18D": 29}
+    cells = {f"{kind}{k}": {"type": kind} for kind, count in kinds.items() for k in range(count)}
+    netlist = {"modules": {"top": {"cells": cells}}}
+    with pytest.raises(TooLarge, match=r"ulx3s-25f: 24,290 look-up tables of 24,288, 29 multipliers of 28$"):
+        refuse_too_large(BOARDS["ulx3s-25f"], netlist)
+    refuse_too_large(BOARDS["ulx3s-85f"], netlist)
 
 
 @pytest.mark.long
