@@ -46,6 +46,7 @@ _TITLES = {
     "cosines": "Cosines without normals",
     "methods": "Whole methods",
     "lighting": "Light",
+    "video": "From a mesh in memory to a monitor",
     "bus": "In somebody else's design",
     "": "All of it",
 }

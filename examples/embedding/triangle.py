@@ -31,6 +31,7 @@ TRIANGLE = {
     "depth": [1000, 3000, 2000],
     "normal": [[-5033165, 2516582, 6174015], [-838861, -5033165, 6658042], [5872026, 1677722, 5751001]],
     "material": 0,
+    "two_sided": 0,
 }
 
 
@@ -58,6 +59,7 @@ class Triangle(wiring.Component):
             core.write.valid.eq(n < 16),
             core.i.valid.eq(n == 16),
             core.i.payload.material.eq(TRIANGLE["material"]),
+            core.i.payload.two_sided.eq(TRIANGLE["two_sided"]),
         ]
         for k in range(3):
             for name in ("x", "y", "depth"):

@@ -30,7 +30,7 @@ module triangle (input clk, input rst, output done);
   // Corners in 1/256 pixel about the middle of the picture; normals times 2^23.
   blysk core (.clk(clk), .rst(rst),
     .write_address(address), .write_data(data), .write_valid(n < 16), .write_ready(write_ready),
-    .i_valid(n == 16), .i_ready(i_ready), .i_material(10'd0),
+    .i_valid(n == 16), .i_ready(i_ready), .i_material(10'd0), .i_two_sided(1'd0),
     .i_x_0(-20'sd3584), .i_x_1(-20'sd1024), .i_x_2(20'sd3328), .i_y_0(-20'sd2560), .i_y_1(20'sd2816), .i_y_2(-20'sd512),
     .i_depth_0(24'd1000), .i_depth_1(24'd3000), .i_depth_2(24'd2000),
     .i_normal_0_0(-24'sd5033165), .i_normal_0_1(24'sd2516582), .i_normal_0_2(24'sd6174015),

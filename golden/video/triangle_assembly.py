@@ -73,6 +73,7 @@ class TriangleAssembly:
             depth=vertices.depth[kept],
             normal=vertices.normal[kept],
             material=np.repeat(material, count)[covered & ~outside],
+            two_sided=np.zeros(len(kept), dtype=bool),
         )
         counts = {
             "sent": len(kept),

@@ -16,8 +16,6 @@ from blysk.hdl.geometry.wide_product import wide_product
 
 __all__ = ["VertexUnit", "matrix_shape", "mesh_vertex_shape", "screen_vertex_shape"]
 
-_MULTIPLICATIONS = 29
-
 
 def matrix_shape() -> data.StructLayout:
     """Shape of `Matrix.codes`."""
@@ -79,7 +77,7 @@ class VertexUnit(PipelinedUnit):
         if initiation_interval < 15:
             raise ValueError(f"initiation_interval must be at least 15, not {initiation_interval}")
         self.parameters = parameters or VertexTransform()
-        self._graph = Dataflow(initiation_interval, _MULTIPLICATIONS)
+        self._graph = Dataflow(initiation_interval)
         self._results = self._describe()
         self.multipliers = self._graph.multiplier.count
         vertex = screen_vertex_shape(self.parameters.grid)
@@ -140,7 +138,7 @@ class VertexUnit(PipelinedUnit):
 
         m = g.register("mantissa", mantissa, code, shift, outside)
         shift = g.register("shift_inside", lambda shift, outside: Mux(outside, 0, shift), shift, outside)
-        table = shared_table(g, 1, lambda: self._module)
+        table = shared_table(g, lambda: self._module)
         r = reciprocal_word(g, table, "reciprocal", m)
         words = {"index": index}
         for name, value in (("x", x), ("y", y)):

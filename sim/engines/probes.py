@@ -238,8 +238,8 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
     product = Intensity.COLOR_FORMAT * Intensity.TERM_FORMAT
     total = product + product
     for name, own, title, format in (
-        ("red_diffuse", "diffuse_0_r_0", "red, diffuse", product),
-        ("red_specular", "specular_0_r_0", "red, specular", product),
+        ("red_diffuse", "diffuse_0_r", "red, diffuse", product),
+        ("red_specular", "specular_0_r", "red, specular", product),
         ("red", "sum_1_0_r", "red, all light", total + total),
     ):
         age = light.latency + ages[own]

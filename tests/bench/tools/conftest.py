@@ -29,7 +29,7 @@ def calls(monkeypatch):
             }
             (folder / f"{seed}.json").write_text(json.dumps(report))
 
-    monkeypatch.setattr(place_and_route._Runner, "run", run)
+    monkeypatch.setattr(place_and_route.ToolRunner, "run", run)
     for module in (fpga, place_and_route):
         monkeypatch.setattr(module, "versions_of", lambda family: {"pyosys": "1", family.package: "2"})
     return calls

@@ -59,6 +59,17 @@ PARTS = {
     "LineAccumulatorUnit": "difference accumulators, in the renormalising interpolator",
     "LineAdapterUnit": "true lines of spans, in the render unit",
     "SlopeUnit": "in every specular unit",
+    "AxiLiteUnit": "a bus on one side",
+    "WishboneUnit": "a bus on one side",
+    "BusUnit": "framing and registers around a core",
+    "BandBufferUnit": "memories between two clocks",
+    "BandDepthUnit": "a memory, no streams",
+    "ClockUnit": "cells of the vendor",
+    "ControlsUnit": "buttons, no streams",
+    "DisplayTimingUnit": "counters, no streams",
+    "DisplayUnit": "bands to a monitor, in the GPU",
+    "DrawUnit": "a mesh to bands, in the GPU",
+    "GpuUnit": "a mesh to a monitor",
 }
 # What the units state of themselves: latency, interval, multipliers, bits of ROM.
 STATED = {

@@ -110,7 +110,7 @@ def test_what_nextpnr_does_not_time_is_not_placed(family, cell, name, cache, mon
         assert tool == "Yosys"
         (folder / "netlist.json").write_text(json.dumps(netlist(("LUT4", {}, 3, 4), cell)))
 
-    monkeypatch.setattr(place_and_route._Runner, "run", run)
+    monkeypatch.setattr(place_and_route.ToolRunner, "run", run)
     monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
     with pytest.raises(ToolError, match=f"has a cell {name}, which nextpnr does not time paths through"):
         lay_out("counter", Counter(), 1, family=family)
@@ -136,7 +136,7 @@ def test_what_does_not_fit_is_not_placed(family, cell, most, name, cache, monkey
         else:
             raise ToolError("it is placed")
 
-    monkeypatch.setattr(place_and_route._Runner, "run", run)
+    monkeypatch.setattr(place_and_route.ToolRunner, "run", run)
     monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
     with pytest.raises(ToolError, match=r"^it is placed$"):
         lay_out("counter", Counter(), 1, family=family)
@@ -146,7 +146,7 @@ def test_what_does_not_fit_is_not_placed(family, cell, most, name, cache, monkey
 
 
 def test_what_finds_no_place_does_not_fit(calls, cache, monkeypatch):
-    run = place_and_route._Runner.run
+    run = place_and_route.ToolRunner.run
 
     def fails(self, name, *arguments):
         if name == "nextpnr":
@@ -155,7 +155,7 @@ def test_what_finds_no_place_does_not_fit(calls, cache, monkeypatch):
             )
         run(self, name, *arguments)
 
-    monkeypatch.setattr(place_and_route._Runner, "run", fails)
+    monkeypatch.setattr(place_and_route.ToolRunner, "run", fails)
     with pytest.raises(
         TooLarge, match=r"^does not fit: from seed 1 nextpnr ends with status 125: ERROR: Unable"
     ):
@@ -225,7 +225,7 @@ def test_placer_by_size(luts, placer, cache, monkeypatch):
             given.extend(arguments)
             (folder / "1.json").write_text(json.dumps(REPORT))
 
-    monkeypatch.setattr(place_and_route._Runner, "run", run)
+    monkeypatch.setattr(place_and_route.ToolRunner, "run", run)
     monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
     lay_out("counter", Counter(), 1)
     place = given.index("--placer") if placer else 0
@@ -244,7 +244,7 @@ def test_another_design_family_or_tool_is_another_entry(calls, cache, monkeypatc
 
 
 def test_seeds_that_are_done_stay_when_one_fails(calls, cache, monkeypatch):
-    run = place_and_route._Runner.run
+    run = place_and_route.ToolRunner.run
 
     def fails(self, name, code, arguments, folder, text=""):
         if arguments[-1:] == ["2"]:
@@ -252,14 +252,14 @@ def test_seeds_that_are_done_stay_when_one_fails(calls, cache, monkeypatch):
         run(self, name, code, arguments, folder, text)
 
     with monkeypatch.context() as patch:
-        patch.setattr(place_and_route._Runner, "run", fails)
+        patch.setattr(place_and_route.ToolRunner, "run", fails)
         with pytest.raises(ToolError, match="no place"):
             lay_out("counter", Counter(), 3)
     assert [path.name[-6] for path in cache.iterdir()] == ["1"]
 
 
 def test_runner_names_the_tools_own_error(tmp_path):
-    runner = place_and_route._Runner()
+    runner = place_and_route.ToolRunner()
     code = "import sys; print('INFO: x'); print('ERROR: no such cell'); print('more'); sys.exit(3)"
     with pytest.raises(ToolError, match=r"^Yosys ends with status 3: ERROR: no such cell$"):
         runner.run("Yosys", code, [], tmp_path)
@@ -270,7 +270,7 @@ def test_runner_names_the_tools_own_error(tmp_path):
 
 
 def test_stopped_runner_ends_what_runs(tmp_path):
-    runner = place_and_route._Runner()
+    runner = place_and_route.ToolRunner()
     pool = place_and_route.ThreadPoolExecutor(1)
     waiting = pool.submit(runner.run, "nextpnr", "import time; time.sleep(600)", [], tmp_path)
     while not runner._running:

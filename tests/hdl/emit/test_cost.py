@@ -68,7 +68,7 @@ MULTIPLIERS = {
     "diffuse": 0,
     "light": 2,
     "intensity": 6,
-    "pipeline": 19,
+    "pipeline": 16,
     "edge_setup": 0,
     "plane_setup": 1,
     "gradient_setup": 3,
