@@ -213,7 +213,7 @@ def _frame(ready: Rendering, vcd: str | None) -> RenderedFrame:
 def _animation(
     ready: Rendering, pictures: Sequence[str], jobs: int | None, address: str | None, drawn: list[str]
 ) -> dict[str, Any]:
-    """Render the frames of a turntable, write them and append their names to ``drawn``; the figures of all."""
+    """Render and write the frames of a turntable, their names to ``drawn``; the figures of all."""
     start = perf_counter()
     smallest = ready.specialisation
     animation = Animation(
