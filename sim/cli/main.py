@@ -36,6 +36,8 @@ class _Group(click.Group):
         return sorted({*_COMMANDS, *entry_points(group="blysk.commands").names})
 
     def get_command(self, ctx, cmd_name):
+        # Before the import, as Matplotlib looks for its folder when it is imported.
+        provide_caches()
         if cmd_name in _COMMANDS:
             return import_module(f"blysk.sim.cli.{cmd_name}").command
         for entry in entry_points(group="blysk.commands", name=cmd_name):
@@ -57,7 +59,6 @@ def cli():
     except OSError as error:
         reason = f"cannot be used ({error.strerror})"
         raise InputError("the current folder", reason, "change to one that exists") from error
-    provide_caches()
 
 
 def _run(arguments: list[str]) -> int:

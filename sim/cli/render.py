@@ -1,7 +1,7 @@
 """``blysk render``: a mesh or a scene file through the simulated pipeline."""
 
-from collections.abc import Sequence
-from contextlib import nullcontext
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -133,7 +133,8 @@ def command(
         check_outputs(inputs, pictures=[output, comparison], others=[figures, vcd])
         written = {"frame": output, "comparison": comparison}
     # The frames of an animation are written as they are done.
-    together = nullcontext() if frames else all_or_none()
+    drawn: list[str] = []
+    together = _removed_on_failure(drawn) if frames else all_or_none()
     with together, tqdm(bar_format="{desc}", leave=False, disable=None) as stage:
         ready = prepare_rendering(
             settings,
@@ -144,9 +145,10 @@ def command(
         )
         stage.set_description_str("rasterising and simulating")
         if frames:
-            report = _animation(ready, pictures, jobs, address)
+            report = _animation(ready, pictures, jobs, address, drawn)
             stage.set_description_str("writing the animation")
             write_gif(gif, pictures)
+            drawn.append(gif)
             report["seconds"]["animation"] = perf_counter() - start - sum(report["seconds"].values())
         else:
             frame = _frame(ready, vcd)
@@ -176,6 +178,17 @@ def command(
             print(f"{name:<12}{path}")
 
 
+@contextmanager
+def _removed_on_failure(files: Sequence[str]) -> Iterator[None]:
+    """Remove files if another output of the block cannot be written; an interrupt leaves them."""
+    try:
+        yield
+    except InputError:
+        for path in files:
+            Path(path).unlink(missing_ok=True)
+        raise
+
+
 def _told(bar: tqdm, text: str) -> None:
     """Show a stage of the work; of the longest say how long it takes."""
     bar.set_description_str(text)
@@ -198,9 +211,9 @@ def _frame(ready: Rendering, vcd: str | None) -> RenderedFrame:
 
 
 def _animation(
-    ready: Rendering, pictures: Sequence[str], jobs: int | None, address: str | None
+    ready: Rendering, pictures: Sequence[str], jobs: int | None, address: str | None, drawn: list[str]
 ) -> dict[str, Any]:
-    """Render and write the frames of a turntable; the figures of all."""
+    """Render and write the frames of a turntable, their names to ``drawn``; the figures of all."""
     start = perf_counter()
     smallest = ready.specialisation
     animation = Animation(
@@ -216,6 +229,7 @@ def _animation(
     with workers as executor, tqdm(total=len(cameras), unit=" frames", leave=False, disable=None) as bar:
         for index, frame in render_frames(executor, cameras):
             write_image(pictures[index], frame.image)
+            drawn.append(pictures[index])
             counts = {**ready.counts, **frame.figures["counts"]}
             done[index] = {"picture": pictures[index], **mesh, **frame.figures, "counts": counts}
             bar.update()

@@ -42,6 +42,13 @@ def test_no_cache(tmp_path, places):
     assert os.listdir(tmp_path) == ["a.png"]
 
 
+def test_no_home_for_other_tools(tmp_path):
+    """A command that imports Matplotlib, which has lines of its own to say."""
+    status, _, errors = blysk("bench", "--help", folder=tmp_path, HOME="/proc")
+    assert (status, len(errors)) == (0, 1), errors
+    assert errors[0].endswith(WARNING)
+
+
 @pytest.mark.long
 def test_compiled_engine_without_a_cache(tmp_path):
     """Yosys' WebAssembly, the compiler and the model, in a folder that is gone afterwards."""

@@ -72,6 +72,15 @@ def test_a_turntable_of_one_frame_is_the_frame(capsys):
     assert Path("a-0001.png").read_bytes() == Path("b.png").read_bytes()
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a disk that is full")
+def test_failed_figures_leave_no_frames(capsys):
+    """A turntable whose figures cannot be written; files of others stay."""
+    Path("a-0003.png").write_text("another's")
+    assert main(["render", *TINY, "--frames", "2", "-o", "a.gif", "--json", "/dev/full"]) == 2
+    assert capsys.readouterr().err.startswith("blysk: /dev/full: cannot be written, the disk is full; ")
+    assert [path.name for path in files()] == ["a-0003.png"]
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_interrupt_of_a_turntable():
     """Ctrl-C in a terminal reaches all processes: frames done stay, whole, and no process goes on."""
