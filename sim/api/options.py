@@ -328,7 +328,8 @@ DESIGN: dict[str, Option] = {
     "setup_interval": Option(
         Whole(1, 46),
         None,
-        "Least cycles from a span to the next; fewer take more multipliers.  [default: 4; compact: the most]",
+        "Least cycles from a span to the next; fewer take more multipliers.  "
+        "[default: 3 or 4, by the method; compact: the most]",
         "pipeline.setup_interval",
     ),
     "style": Option(
