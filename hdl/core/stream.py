@@ -88,7 +88,9 @@ def connect(m: Module, source: stream.Interface, sink: stream.Interface) -> None
     ]
 
 
-def connect_fifo(m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int) -> None:
+def connect_fifo(
+    m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int
+) -> fifo.SyncFIFOBuffered:
     """Connect two streams through a FIFO, which takes payloads in while the sink waits.
 
     A payload takes `FIFO_LATENCY` cycles through the empty FIFO.
@@ -101,6 +103,11 @@ def connect_fifo(m: Module, name: str, source: stream.Interface, sink: stream.In
         As for `connect`.
     depth : int
         Payloads that the FIFO holds, at least 3.
+
+    Returns
+    -------
+    SyncFIFOBuffered
+        The FIFO.
 
     Raises
     ------
@@ -118,6 +125,7 @@ def connect_fifo(m: Module, name: str, source: stream.Interface, sink: stream.In
         sink.valid.eq(buffer.r_rdy),
         buffer.r_en.eq(sink.ready),
     ]
+    return buffer
 
 
 def connect_late_fifo(
@@ -140,24 +148,16 @@ def connect_late_fifo(
     TypeError
         If the payloads differ in a field or in a fixed-point format.
     """
-    require_same_shape(source.payload.shape(), sink.payload.shape())
-    width = Shape.cast(source.payload.shape()).width
-    m.submodules[name] = buffer = fifo.SyncFIFOBuffered(width=width, depth=depth)
-    payload = Signal(width, name=f"{name}_payload", reset_less=True)
+    late = stream.Signature(source.payload.shape()).create(path=(f"{name}_late",))
+    payload = Signal(Shape.cast(source.payload.shape()).width, name=f"{name}_payload", reset_less=True)
     written, room = Signal(name=f"{name}_written"), Signal(name=f"{name}_room", init=1)
+    buffer = connect_fifo(m, name, late, sink, depth)
     m.d.sync += [
         payload.eq(source.payload),
         written.eq(source.valid & room),
         room.eq(buffer.level < depth - UNCOUNTED),
     ]
-    m.d.comb += [
-        source.ready.eq(room),
-        buffer.w_data.eq(payload),
-        buffer.w_en.eq(written),
-        Value.cast(sink.payload).eq(buffer.r_data),
-        sink.valid.eq(buffer.r_rdy),
-        buffer.r_en.eq(sink.ready),
-    ]
+    m.d.comb += [source.ready.eq(room), Value.cast(late.payload).eq(payload), late.valid.eq(written)]
 
 
 def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Signal:
