@@ -386,9 +386,9 @@ class Design:
     def _values(self, spans: Spans, constants: FrameConstants) -> SpanValues:
         """Values of spans for a chord method."""
         if self.takes_values:
-            return spans.values
+            return cast(SpanValues, spans.values)
         words = spans.normal_left, spans.middle, spans.normal_right, constants.direction, constants.halfway
-        return self.interpolator.values(*(Fixed(COMPONENT, codes) for codes in words))
+        return cast(Any, self.interpolator).values(*(Fixed(COMPONENT, codes) for codes in words))
 
     def _wide_spans(self, spans: Spans, constants: Sequence[FrameConstants]) -> int:
         """How many spans the span limit flags."""

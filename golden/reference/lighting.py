@@ -248,7 +248,7 @@ class Material:
         """
         if self.fresnel is None:
             return np.array(self.specular)
-        return self.specular * schlick(self.fresnel, 1.0 if cosine is None else cosine)
+        return np.array(self.specular) * schlick(self.fresnel, 1.0 if cosine is None else cosine)
 
     def parameter(self, model: ReflectionModel) -> float | None:
         """Exponent or roughness, as `ReflectionModel.PARAMETER` of a model says, or ``None``."""
@@ -286,7 +286,7 @@ def distant_cosine(light: Light, viewer: ArrayLike | None) -> float | None:
     """
     if light.position is not None or viewer is None:
         return None
-    return float(np.clip(halfway_vector(light.direction, viewer) @ np.asarray(viewer), 0, 1))
+    return float(np.clip(halfway_vector(np.asarray(light.direction), viewer) @ np.asarray(viewer), 0, 1))
 
 
 def gram_determinant(normal: np.ndarray, light_direction: np.ndarray, viewer: np.ndarray) -> np.ndarray:

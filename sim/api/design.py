@@ -106,9 +106,9 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
         made = preset(method, settings["model"], lights, **options)
     except ValueError as error:
         raise settings.refuse("operand", str(error), "leave it out") from None
-    served = unit_of(made.interpolator).setup_intervals(made.interpolator)
-    if settings["setup_interval"] not in (None, *served):
-        remedy = f"give {spelled(served)}" if served else "leave it out"
+    intervals = unit_of(made.interpolator).setup_intervals(made.interpolator)
+    if settings["setup_interval"] not in (None, *intervals):
+        remedy = f"give {spelled(intervals)}" if intervals else "leave it out"
         raise settings.refuse("setup_interval", f"method {method} is not built for it", remedy)
     if isinstance(made.specular, Lobe):
         made = replace(made, specular=replace(made.specular, banks=min(materials, Lobe.MAX_BANKS)))
@@ -166,9 +166,9 @@ def pixel_pipelines(design: Design, pipes: int, merged: bool = False) -> Shading
 
 def header_of(unit: ShadingUnit) -> list[str]:
     """What a pipeline is, in lines: version, design and cycles; of several, what each of them is."""
-    made = unit.parameters
-    several = made if isinstance(made, PixelPipelines) else None
-    made = several.design if several else made
+    parameters = unit.parameters
+    several = parameters if isinstance(parameters, PixelPipelines) else None
+    made = parameters.design if isinstance(parameters, PixelPipelines) else parameters
     gate = ", highlight gate" if made.gate else ""
     lines = [
         f"blysk {version('blysk')} shading pipeline, MIT licence",
@@ -359,6 +359,7 @@ def verilog_and_unit(
     else:
         lines = _render_header(core) if isinstance(core, RenderUnit) else header_of(core)
     words = [*constants, *example_of(p)]
+    descriptions: Mapping[str, str]
     if isinstance(unit, BusUnit):
         header, descriptions = bus_header(unit, bus, lines, words), bus_descriptions(unit)
     elif isinstance(unit, GeometryUnit):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal, Unpack
+from typing import Any, Literal, Unpack, cast
 
 import numpy as np
 from PIL import Image
@@ -263,7 +263,7 @@ class Rendering:
             if vcd is None:
                 whole = FrameSimulator(self.design, self.engine, self.pipes).render(self.scenes[0])
                 details["specialisation"]["full_cycles"] = whole.cycles
-                details["specialisation"] |= difference_figures(frame, whole)
+                details["specialisation"] |= difference_figures(cast(SimulatedFrame, frame), whole)
         return RenderedFrame(self.scenes[0], self.design, frame, self.loaded.name, details)
 
 
