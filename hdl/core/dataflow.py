@@ -350,7 +350,7 @@ def dot(
         A vector.
     b : Word or callable
         The other; or what makes it from the value of ``a``.
-    sums : Operator or None
+    sums : FunctionalUnit or None
         From `shared_sums`; ``None``: the sums have registers of their own.
     """
 

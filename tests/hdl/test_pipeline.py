@@ -111,7 +111,7 @@ def test_cycles(method, interval):
     ],
 )
 def test_cycles_of_long_spans(method, latency, interval, lights):
-    """Spans that the register slice holds ready cost their length alone."""
+    """Spans that are set up while the one before is shaded cost their length alone."""
     rng = np.random.default_rng(7)
     lengths = np.r_[rng.integers(interval, 40, 300), [4095, 4095, interval]]
     design = preset(method, lights=lights)
