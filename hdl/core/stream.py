@@ -11,6 +11,7 @@ from blysk.hdl.core.fixed import FixedShape
 
 __all__ = [
     "FIFO_LATENCY",
+    "LATE_FIFO_LATENCY",
     "SLICE_LATENCY",
     "UNCOUNTED",
     "PipelinedUnit",
@@ -27,6 +28,9 @@ __all__ = [
 
 FIFO_LATENCY = 2
 """Clocks that a payload takes through an empty buffer."""
+
+LATE_FIFO_LATENCY = 4
+"""Clocks that a payload takes through the empty FIFO of `connect_late_fifo`."""
 
 SLICE_LATENCY = 1
 """Clocks that a payload takes through the register of `connect_slice`."""
@@ -131,33 +135,54 @@ def connect_fifo(
 def connect_late_fifo(
     m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int
 ) -> None:
-    """Connect two streams through a FIFO behind a register, so that the source's handshake ends there.
+    """Connect two streams through a FIFO in a memory, between registers.
 
-    Whether there is room follows from the FIFO's level alone, in a register; `UNCOUNTED` payloads of the
-    depth are for those that the level does not have yet. A payload takes a cycle more than `FIFO_LATENCY`.
+    One is before the memory, so that the source's handshake ends there, and one behind it, which an FPGA's
+    memories have inside. Whether there is room follows from the FIFO's level alone, in a register; `UNCOUNTED`
+    payloads of the depth are for those that the level does not have yet. A payload takes `LATE_FIFO_LATENCY`
+    cycles through the empty FIFO.
 
     Parameters
     ----------
     m, name, source, sink
         As for `connect_fifo`.
     depth : int
-        Payloads that the FIFO holds, at least 5.
+        Payloads that the memory holds, at least 3; two more wait behind it.
 
     Raises
     ------
     TypeError
         If the payloads differ in a field or in a fixed-point format.
     """
-    late = stream.Signature(source.payload.shape()).create(path=(f"{name}_late",))
-    payload = Signal(Shape.cast(source.payload.shape()).width, name=f"{name}_payload", reset_less=True)
+    require_same_shape(source.payload.shape(), sink.payload.shape())
+    width = Shape.cast(source.payload.shape()).width
+    payload, word = (Signal(width, name=f"{name}_{kind}", reset_less=True) for kind in ("payload", "word"))
     written, room = Signal(name=f"{name}_written"), Signal(name=f"{name}_room", init=1)
-    buffer = connect_fifo(m, name, late, sink, depth)
+    level = Signal(range(depth + 1), name=f"{name}_level")
+    # Whether the memory's word and the one behind it count.
+    read, there = Signal(name=f"{name}_read"), Signal(name=f"{name}_there")
+    moves, reads = ~there | sink.ready, Signal(name=f"{name}_reads")
+    m.submodules[name] = memory = Memory(shape=width, depth=1 << (depth - 1).bit_length(), init=[])
+    port, output = memory.write_port(), memory.read_port()
+    m.d.comb += [
+        source.ready.eq(room),
+        port.data.eq(payload),
+        port.en.eq(written),
+        output.en.eq(moves),
+        reads.eq(moves & level.any()),
+        Value.cast(sink.payload).eq(word),
+        sink.valid.eq(there),
+    ]
     m.d.sync += [
         payload.eq(source.payload),
         written.eq(source.valid & room),
-        room.eq(buffer.level < depth - UNCOUNTED),
+        room.eq(level < depth - UNCOUNTED),
+        level.eq(level + written - reads),
+        port.addr.eq(port.addr + written),
+        output.addr.eq(output.addr + reads),
     ]
-    m.d.comb += [source.ready.eq(room), Value.cast(late.payload).eq(payload), late.valid.eq(written)]
+    with m.If(moves):
+        m.d.sync += [word.eq(output.data), read.eq(reads), there.eq(read)]
 
 
 def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Signal:

@@ -8,7 +8,7 @@ from blysk.hdl.core.dataflow import Dataflow, dot
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.shapes import light_vectors_shape, normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
-from blysk.hdl.cosines.chord import chord
+from blysk.hdl.cosines.chord import chord_exact
 
 __all__ = ["ChordValuesUnit", "light_values_shape"]
 
@@ -77,7 +77,7 @@ class ChordValuesUnit(PipelinedUnit):
             cosine = dot(g, f"f_{i}_exact", normal, lambda _, i=i: self.constants[i].direction)
             words = {"diffuse": self._rounded(f"f_{i}", cosine, p.DIFFUSE_FORMAT)}
             if highlights:
-                u = chord(g, f"u_{i}_exact", normal, lambda i=i: self.constants[i].halfway)
+                u = chord_exact(g, f"u_{i}_exact", normal, lambda i=i: self.constants[i].halfway)
                 words["highlight"] = self._rounded(f"u_{i}", u, p.HIGHLIGHT_FORMAT)
             self._words.append(words)
         self.multipliers = g.multiplier.count
@@ -91,10 +91,11 @@ class ChordValuesUnit(PipelinedUnit):
         )
 
     def _rounded(self, name, word, format):
-        """A word in a format of fewer bits."""
-        return self._graph.register(
-            name, lambda value: value.round_half_up(format.fraction_bits).saturate(format), word
+        """A word in a format of fewer bits: two cycles."""
+        rounded = self._graph.register(
+            f"{name}_rounded", lambda value: value.round_half_up(format.fraction_bits), word
         )
+        return self._graph.register(name, lambda value: value.saturate(format), rounded)
 
     def datapath(self, m, operands):
         """Describe the registers of the graph."""

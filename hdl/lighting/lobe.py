@@ -127,9 +127,8 @@ class LobeUnit(PipelinedUnit):
 
     Table, formats and error bounds are those of `Lobe`, the bit-accurate model.
 
-    With an initiation interval of 1 the latency is 8 cycles: one minus, saturation, leading one, shift, word,
-    register, product, sum. A longer interval takes 2 more: the input has a register, and the multiplier has
-    registers for its operands and its product (`registered_product`). At every interval there is one
+    With an initiation interval of 1 the latency is 9 cycles: one minus, saturation, leading one, shift, word,
+    register, operands, product, sum. A longer interval takes 1 more: the input has a register. At every interval there is one
     multiplier of 18 by 18 bits. A beat that is dark, or whose N·H is not positive, works as if its argument
     were 0: from one to the next nothing toggles but the input and the first registers.
 
@@ -260,7 +259,7 @@ class LobeUnit(PipelinedUnit):
         """Term of a word and its fraction: ``v + D f``."""
         p, g = self.parameters, self._graph
         if g.interval == 1:
-            # A memory takes most of a clock's period, and so does a multiplier.
+            # A memory takes most of a clock's period: an FPGA's memories have such a register inside.
             word = g.register("word_register", lambda code: code, word)
         formats = {"value": p.VALUE_FORMAT, "difference": p.DIFFERENCE_FORMAT, "fraction": p.fraction_format}
         parts, first = [], 0
@@ -272,6 +271,9 @@ class LobeUnit(PipelinedUnit):
             first += format.width
         value, difference, fraction = parts
         if g.interval == 1:
+            # Registers of the multiplier's own: that behind the memory is inside the memory.
+            difference = g.register("difference", lambda x: x, difference)
+            fraction = g.register("fraction", lambda x: x, fraction)
             product = g.register("product", lambda x, y: x * y, difference, fraction)
         else:
             product = g.multiply("product", difference, fraction)

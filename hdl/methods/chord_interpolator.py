@@ -1,19 +1,20 @@
 """The chord method: forward differences of N·L and of half the squared chord from N to H."""
 
 import enum
-from collections.abc import Iterable, Sequence
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed, unsigned
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, ValueLike, signed, unsigned
 from amaranth.lib import data, fifo, stream, wiring
+from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
-from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_slice, pass_beside
+from blysk.hdl.core.stream import FIFO_LATENCY, connect, pass_beside
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape, span_values_shape
 from blysk.hdl.cosines.chord_values import ChordValuesUnit, light_values_shape
 from blysk.hdl.cosines.span_limit import SpanLimitUnit, octave_limit
@@ -25,30 +26,15 @@ from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 __all__ = ["ChordAccumulatorUnit", "ChordInterpolatorUnit", "ChordSpansUnit"]
 
 
-def least_highlight(m: Module, name: str, values: Sequence[FixedValue]) -> Value:
-    """`SpanLimit.least` of three values of u, two cycles after them.
-
-    Parameters
-    ----------
-    m : Module
-        Module that gets the registers.
-    name : str
-        Common part of their names.
-    values : sequence of FixedValue
-        u at the first pixel, in the middle and at the last pixel.
-    """
-    left, middle, right = (value.as_value() for value in values)
-    smaller = Signal.like(left, name=f"smaller_{name}", reset_less=True)
-    bulge = Signal(signed(len(left) + 2), name=f"bulge_{name}", reset_less=True)
-    m.d.sync += [smaller.eq(Mux(left < right, left, right)), bulge.eq(left + right - (middle << 1))]
-    least = (smaller << 1) - Mux(bulge > 0, bulge, 0)
-    result = Signal.like(least, name=f"least_{name}", reset_less=True)
-    m.d.sync += result.eq(least)
-    return result
+_LONG = 3
+"""Pixels of the shortest span that has differences."""
 
 
 class ChordAccumulatorUnit(AccumulatorUnit):
     """``N . L`` and u of each light, two quadratics a light; see `AccumulatorUnit`.
+
+    The words of a span are taken in later than its length, so that a register drives all that take them in.
+    A span of m pixels gives its first values 3 cycles after it was accepted.
 
     Parameters
     ----------
@@ -60,35 +46,94 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         Whether there is u.
     gated : bool
         Whether spans bring a gate's decision for each light, ``lit``.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"length": 12, "lit": lights})))`
+        Lengths of spans, 1 or more, and decisions.
+    words : :py:`In(StructLayout({"start": ..., "lights": ...}))`
+        First values of the span that is taken in, and its differences.
+    taken : :py:`Out(1)`
+        High for one cycle as the words of the span are taken in that was accepted before.
+    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
+        Operands of the pixels.
+
+    Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.10.
     """
 
+    latency = 3
+
     def __init__(
-        self, parameters: ChordInterpolator, lights: int, *, highlights: bool = True, gated: bool = False
+        self,
+        parameters: ChordInterpolator | None = None,
+        lights: int = 1,
+        *,
+        highlights: bool = True,
+        gated: bool = False,
     ):
-        self.parameters = p = parameters
+        self.parameters = p = parameters or ChordInterpolator()
         self.gated = gated
         self.functions = ("diffuse", "highlight") if highlights else ("diffuse",)
-        span = {
-            "start": light_values_shape(lights, highlights=highlights),
-            "lights": chord_differences_shape(lights, highlights, p.setup)["lights"].shape,
-            "length": unsigned(LENGTH_BITS),
-        }
+        self.words_shape = data.StructLayout(
+            {
+                "start": light_values_shape(lights, highlights=highlights),
+                "lights": chord_differences_shape(lights, highlights, p.setup)["lights"].shape,
+            }
+        )
+        span = {"length": unsigned(LENGTH_BITS)}
         if gated:
             span["lit"] = unsigned(lights)
         super().__init__(
-            data.StructLayout(span), operands_shape(p, lights, highlights=highlights, gated=gated)
+            data.StructLayout(span),
+            operands_shape(p, lights, highlights=highlights, gated=gated),
+            {"words": In(self.words_shape), "taken": Out(1)},
         )
+
+    @classmethod
+    def begin(cls, parameters, start):
+        """The start alone where half a step of the result would take a sum: it is added to the result."""
+        return (
+            start.extend(parameters.format)
+            if cls._adds_late(parameters)
+            else super().begin(parameters, start)
+        )
+
+    @classmethod
+    def rounded(cls, parameters, value):
+        """The value, with the half that it does not have yet."""
+        return super().begin(parameters, value) if cls._adds_late(parameters) else value
+
+    @staticmethod
+    def _adds_late(parameters: DifferenceAccumulator) -> bool:
+        """Whether the start has a bit of the weight of half a step of the result."""
+        return parameters.start_format.fraction_bits > parameters.result_format.fraction_bits
+
+    @property
+    def span(self):
+        """Words of the span that is taken in."""
+        return self.words
+
+    def load(self, m, advance, active):
+        """A cycle after the span was accepted."""
+        load, present = Signal(name="load"), Signal(name="present")
+        if self.gated:
+            self._lit = Signal.like(self.i.payload.lit, name="lit", reset_less=True)
+        with m.If(advance):
+            m.d.sync += [load.eq(self.i.valid & self.i.ready), present.eq(active)]
+            if self.gated:
+                m.d.sync += self._lit.eq(self.i.payload.lit)
+        m.d.comb += self.taken.eq(load & advance)
+        return self.taken, present
 
     def carried(self, values):
         """The decision of each light."""
         if self.gated:
             for index, light in enumerate(values):
-                yield ~self.i.payload.lit[index], light.gated
+                yield ~self._lit[index], light.gated
 
     def quadratics(self, values):
         """Those of each light."""
-        span = self.i.payload
-        for index, (start, light) in enumerate(zip(span.start, span.lights, strict=True)):
+        for index, (start, light) in enumerate(zip(self.span.start, self.span.lights, strict=True)):
             result = values[index]
             for name in self.functions:
                 words = start[name], light[name].first, light[name].second
@@ -99,8 +144,9 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 class ChordSpansUnit(wiring.Component):
     """Values of spans in, the operands of their pixels out: chord setup, then accumulators.
 
-    A span of three pixels or more goes through the setup, and its start past it through a FIFO; a span of one
-    pixel through the FIFO alone. So short spans take a cycle each, and wait only for those before them.
+    A span of three pixels or more goes through the setup, and its start past it through a memory; a span of
+    one pixel through the memory alone. So short spans take a cycle each, and wait only for those before them.
+    The setup never waits: a span is accepted only if there is room for its differences behind the setup.
 
     Parameters
     ----------
@@ -154,7 +200,8 @@ class ChordSpansUnit(wiring.Component):
         self.multipliers = self._setup.multipliers
         gated = gate is not None
         self._accumulator = ChordAccumulatorUnit(parameters, lights, highlights=highlights, gated=gated)
-        self.latency = self._setup.latency + self._accumulator.latency
+        # A cycle for the count of the differences that wait.
+        self.latency = self._setup.latency + 1 + self._accumulator.latency
         waits = FIFO_LATENCY + (gate.latency if gate else 0)
         self.short_latency = waits + self._accumulator.latency
         output = operands_shape(parameters, lights, highlights=highlights, gated=gated)
@@ -177,60 +224,102 @@ class ChordSpansUnit(wiring.Component):
             | (gate.ports if gated else {})
         )
 
+    @property
+    def starts_inside(self) -> int:
+        """Depth of the memory of starts: all spans that may follow one that has just begun its setup.
+
+        Or come before it: its values may take an interval, in which none comes.
+        """
+        needed = self._setup.latency + self._setup.initiation_interval + FIFO_LATENCY + self._LATE
+        return 1 << (needed - 1).bit_length()
+
+    @property
+    def differences_inside(self) -> int:
+        """Depth of the memory of differences: those inside the setup, too, a pixel a cycle behind it."""
+        needed = -(-self._setup.latency // _LONG) + FIFO_LATENCY + self._LATE
+        return 1 << (needed - 1).bit_length()
+
+    _LATE = 3
+    """Spans more than counted when the count is known: two that come then, and one of which the words wait."""
+
     def elaborate(self, platform):
-        """FIFO of starts beside the setup, and the accumulators."""
+        """Memory of starts beside the setup, one of differences behind it, and the accumulators."""
         m = Module()
         m.submodules.chord_setup = setup = self._setup
         m.submodules.chord_accumulator = accumulator = self._accumulator
-        span = self.i.payload
-        functions = span["values"][0].shape().members
-        joined = accumulator.i
-        start_shape = data.StructLayout(
-            {"start": joined.payload.start.shape(), "length": span.length.shape(), "long": 1}
-        )
-        # As many starts as may follow a span that has just begun its setup, or come before it: its values may
-        # take an interval, in which none comes.
-        depth = setup.latency + setup.initiation_interval + FIFO_LATENCY + 1
-        m.submodules.starts = starts = fifo.SyncFIFOBuffered(width=start_shape.size, depth=depth)
-        decided, gate_ready = Signal(init=1), Signal(init=1)
+        span, joined = self.i.payload, accumulator.i
+        depth = self.starts_inside
+        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=len(span.length) + 1, depth=depth + 1)
+        known, gate_ready, accepted, popped = (Signal() for _ in range(4))
         if self._gate is not None:
-            self._decide(m, joined, starts, decided, gate_ready)
+            self._decide(m, joined, depth, known, gate_ready)
         else:
-            m.d.comb += [decided.eq(1), gate_ready.eq(1)]
-        given, taken = Signal(start_shape, name="given"), Signal(start_shape, name="taken")
-        # A register, so that no comparison of the level is between the handshakes.
+            m.d.comb += [known.eq(1), gate_ready.eq(1)]
+        # A register, so that no comparison of a level is between the handshakes.
         room = Signal(name="room", init=1)
-        m.d.sync += room.eq(starts.level < depth - 1)
+        length, is_long = lengths.r_data[:-1], lengths.r_data[-1]
+        waiting, waits = self._count(m, accepted & self.long, popped)
         m.d.comb += [
-            given.length.eq(span.length),
-            given.long.eq(self.long),
-            *(
-                given.start[i][name].eq(values[name][0])
-                for i, values in enumerate(span["values"])
-                for name in functions
-            ),
-            starts.w_data.eq(given),
-            starts.w_en.eq(self.i.valid & gate_ready & room & (setup.i.ready | ~given.long)),
             setup.i.payload.eq(span),
-            setup.i.valid.eq(self.i.valid & gate_ready & room & given.long),
-            self.i.ready.eq(room & gate_ready & (setup.i.ready | ~given.long)),
-            taken.eq(starts.r_data),
-            joined.payload.start.eq(taken.start),
-            joined.payload.length.eq(taken.length),
-            joined.payload.lights.eq(setup.o.payload.lights),
-            joined.valid.eq(starts.r_rdy & decided & (setup.o.valid | ~taken.long)),
-            starts.r_en.eq(joined.ready & decided & (setup.o.valid | ~taken.long)),
-            setup.o.ready.eq(joined.ready & starts.r_rdy & decided & taken.long),
-            self.out_of_range.eq(setup.o.valid & setup.o.ready & setup.o.payload.out_of_range),
+            setup.i.valid.eq(self.i.valid & gate_ready & room & self.long),
+            setup.o.ready.eq(1),
+            self.i.ready.eq(room & gate_ready & (setup.i.ready | ~self.long)),
+            accepted.eq(self.i.valid & self.i.ready),
+            lengths.w_data.eq(Cat(span.length, self.long)),
+            lengths.w_en.eq(accepted),
+            joined.payload.length.eq(length),
+            joined.valid.eq(lengths.r_rdy & known & (waits | ~is_long)),
+            lengths.r_en.eq(joined.ready & known & (waits | ~is_long)),
+            popped.eq(joined.valid & joined.ready & is_long),
+            self.out_of_range.eq(setup.o.valid & setup.o.payload.out_of_range),
         ]
+        m.d.sync += room.eq(
+            (lengths.level <= depth - self._LATE) & (waiting <= self.differences_inside - self._LATE)
+        )
+        self._keep_words(m, accepted, is_long)
         connect(m, accumulator.o, wiring.flipped(self.o))
         return m
 
-    def _decide(self, m: Module, joined: stream.Interface, starts, decided: Value, ready: Value) -> None:
+    def _count(self, m: Module, accepted: Value, popped: Value) -> tuple[Signal, Signal]:
+        """Spans of three pixels or more from their setup to the accumulators; whether differences wait.
+
+        Between two of them that the accumulators accept are two cycles or more, so that a register may tell.
+        """
+        bits = range(self.differences_inside + 1)
+        inside, behind, waits = Signal(bits, name="inside"), Signal(bits, name="behind"), Signal(name="waits")
+        following, gone = Signal.like(behind, name="following"), Signal(name="gone")
+        m.d.comb += following.eq(behind + self._setup.o.valid - gone)
+        m.d.sync += [
+            gone.eq(popped),
+            inside.eq(inside + accepted - gone),
+            behind.eq(following),
+            waits.eq(following.any()),
+        ]
+        return inside, waits
+
+    def _keep_words(self, m: Module, accepted: Value, is_long: Value) -> None:
+        """Memories of starts and of differences; both are read as the accumulators take words in."""
+        accumulator, setup = self._accumulator, self._setup
+        start, differences = Signal.like(accumulator.words.start), setup.o.payload.lights
+        for i, values in enumerate(self.i.payload["values"]):
+            for name in accumulator.functions:
+                m.d.comb += start[i][name].eq(values[name][0])
+        takes_long = Signal(name="takes_long")
+        with m.If(accumulator.i.valid & accumulator.i.ready):
+            m.d.sync += takes_long.eq(is_long)
+        taken = accumulator.taken
+        words = _keep(m, "starts", start, accepted, taken, self.starts_inside)
+        m.d.comb += Value.cast(accumulator.words.start).eq(words)
+        words = _keep(
+            m, "differences", differences, setup.o.valid, taken & takes_long, self.differences_inside
+        )
+        m.d.comb += Value.cast(accumulator.words.lights).eq(words)
+
+    def _decide(self, m: Module, joined: stream.Interface, depth: int, known: Value, ready: Value) -> None:
         """The gate beside the setup: a span waits for its decision."""
         m.submodules.value_gate = gate = self._gate
         lights = len(gate.o.payload)
-        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=lights, depth=starts.depth)
+        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=lights, depth=depth)
         long = self.long
         for given, light in zip(gate.i.payload, self.i.payload["values"], strict=True):
             first, *others = (light.highlight[k].as_value() for k in range(3))
@@ -243,12 +332,37 @@ class ChordSpansUnit(wiring.Component):
             decisions.w_data.eq(gate.o.payload),
             decisions.w_en.eq(gate.o.valid),
             gate.o.ready.eq(decisions.w_rdy),
-            decided.eq(decisions.r_rdy),
-            decisions.r_en.eq(starts.r_en & starts.r_rdy),
+            known.eq(decisions.r_rdy),
+            decisions.r_en.eq(joined.valid & joined.ready),
             joined.payload.lit.eq(decisions.r_data),
         ]
         if gate.ports:
             m.d.comb += gate.constants.eq(self.constants)
+
+
+def _keep(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Value:
+    """Memory of words in their order, without handshakes: the first that has not been taken.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the memory as a submodule ``name``.
+    word : ValueLike
+        Word that comes.
+    written, taken : Value
+        Whether it does, and whether the first is taken.
+    depth : int
+        Words at most, a power of two.
+    """
+    word = Value.cast(word)
+    m.submodules[name] = memory = Memory(shape=len(word), depth=depth, init=[])
+    write, read = memory.write_port(), memory.read_port(domain="comb")
+    m.d.comb += [write.data.eq(word), write.en.eq(written)]
+    with m.If(written):
+        m.d.sync += write.addr.eq(write.addr + 1)
+    with m.If(taken):
+        m.d.sync += read.addr.eq(read.addr + 1)
+    return read.data
 
 
 class _Place(enum.IntEnum):
@@ -374,21 +488,22 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
     def _send(self, m: Module, values, limit, word) -> None:
         """Normals of a span: the first as the span is accepted, those that follow from registers."""
         span = self.i.payload
-        right, middle = Signal.like(span.normal_right), Signal.like(span.normal_middle)
-        length, following = Signal.like(span.length), Signal(2)
-        long = Signal()
-        idle = following == _Place.PIXEL
-        takes = Signal()
+        right, middle = (
+            Signal.like(normal, name=name, reset_less=True)
+            for normal, name in ((span.normal_right, "right"), (span.normal_middle, "middle"))
+        )
+        length, following = Signal.like(span.length, name="length"), Signal(2, name="following")
+        long, idle, last = Signal(), Signal(name="idle", init=1), Signal(name="last")
         m.d.comb += [
             # By bits: a comparison is a chain of carries.
             long.eq(span.length[2:].any() | span.length[:2].all()),
-            # The limit is ready again before the last normal of a long span is sent.
-            takes.eq(values.i.ready & limit.i.ready),
-            self.i.ready.eq(idle & takes),
+            self.i.ready.eq(idle & values.i.ready),
+            # The limit is ready again as the last normal of a long span is sent, and never waits.
             limit.i.valid.eq(self.i.valid & idle & long & values.i.ready),
             limit.i.payload.normal_left.eq(span.normal_left),
             limit.i.payload.normal_right.eq(span.normal_right),
-            values.i.valid.eq(Mux(idle, self.i.valid & limit.i.ready, 1)),
+            limit.o.ready.eq(1),
+            values.i.valid.eq(self.i.valid | ~idle),
         ]
         with m.If(idle):
             m.d.comb += [
@@ -397,42 +512,37 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
                 word.length.eq(Mux(long, span.length, 1)),
             ]
         with m.Else():
-            last = following == _Place.MIDDLE
             m.d.comb += [
                 Value.cast(values.i.payload).eq(Mux(last, Value.cast(middle), Value.cast(right))),
                 word.place.eq(Mux((length == 2) & ~last, _Place.PIXEL, following)),
                 word.length.eq(Mux(length == 2, 1, length)),
             ]
+        with m.If(idle):
+            # Of the span that is accepted, and of any before it.
+            m.d.sync += [
+                Value.cast(right).eq(Value.cast(span.normal_right)),
+                Value.cast(middle).eq(Value.cast(span.normal_middle)),
+                length.eq(span.length),
+            ]
         with m.If(values.i.valid & values.i.ready):
             with m.If(idle):
-                m.d.sync += [
-                    Value.cast(right).eq(Value.cast(span.normal_right)),
-                    Value.cast(middle).eq(Value.cast(span.normal_middle)),
-                    length.eq(span.length),
-                    following.eq(Mux(span.length[1:].any(), _Place.RIGHT, _Place.PIXEL)),
-                ]
+                several = span.length[1:].any()
+                m.d.sync += [following.eq(Mux(several, _Place.RIGHT, _Place.PIXEL)), idle.eq(~several)]
             with m.Elif((following == _Place.RIGHT) & (length > 2)):
-                m.d.sync += following.eq(_Place.MIDDLE)
+                m.d.sync += [following.eq(_Place.MIDDLE), last.eq(1)]
             with m.Else():
-                m.d.sync += following.eq(_Place.PIXEL)
+                m.d.sync += [following.eq(_Place.PIXEL), idle.eq(1), last.eq(0)]
 
     def _collect(self, m: Module, values, limit, word, spans) -> None:
         """Values of a pixel, or of three places, as a span; and the flag of wide spans."""
-        limited = limit.o
-        if self.setup_interval > limit.initiation_interval:
-            # Its result is there before the middle values, and must not keep the next span out.
-            limited = limit.o.signature.create(path=("limited",))
-            connect_slice(m, limit.o, limited)
         left, right = (Signal.like(values.o.payload, name=f"values_{side}") for side in ("left", "right"))
         is_pixel, is_middle = word.place == _Place.PIXEL, word.place == _Place.MIDDLE
-        complete = Signal()
+        complete = is_pixel | is_middle
         m.d.comb += [
-            complete.eq(is_pixel | (is_middle & limited.valid)),
             spans.i.valid.eq(values.o.valid & complete),
             spans.i.payload.length.eq(word.length),
             spans.long.eq(is_middle),
-            values.o.ready.eq(Mux(is_pixel | is_middle, complete & spans.i.ready, 1)),
-            limited.ready.eq(values.o.valid & is_middle & spans.i.ready),
+            values.o.ready.eq(spans.i.ready | ~complete),
         ]
         for place, side in ((_Place.LEFT, left), (_Place.RIGHT, right)):
             with m.If(values.o.valid & (word.place == place)):
@@ -446,45 +556,78 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
                     given[i][name][1].eq(light[name]),
                     given[i][name][2].eq(right[i][name]),
                 ]
-        # Of long spans, whose first value is in its register.
-        self._flag(m, spans.i, limited.payload, zip(left, values.o.payload, right, strict=True))
+        self._flag(m, spans, limit, values.o, word, left)
 
-    def _flag(self, m: Module, spans: stream.Interface, limited: data.View, places: Iterable) -> None:
-        """Whether a span is wide, as it is complete: its angle, and where a highlight may be.
+    def _flag(self, m: Module, spans, limit, values: stream.Interface, word, left) -> None:
+        """Whether a span is wide, some cycles after it is complete: its angle, and where a highlight may be.
 
         Parameters
         ----------
         m : Module
             Module that gets the logic.
-        spans : stream.Interface
-            Complete spans.
-        limited : data.View
-            Output of the span limit.
-        places : iterable of tuple of data.View
-            Of each light the values at the first pixel, in the middle and at the last pixel.
+        spans, limit : wiring.Component
+            Where complete spans go, and whose results there are in their order.
+        values : stream.Interface
+            Values of the normals.
+        word, left : data.View
+            What a normal is to its span, and the values at the first pixel.
         """
         p = self._limit.parameters
-        wide, wide_if_lit = Signal(2), Signal(2)
-        long = spans.payload.length >= p.SHORTEST
-        fires = spans.valid & spans.ready & long
-        m.d.sync += [
-            wide.eq(Cat(fires & limited.wide, wide[0])),
-            wide_if_lit.eq(Cat(fires & limited.wide_if_lit, wide_if_lit[0])),
-        ]
-        lit = []
+        # A result can be read two cycles after it is there.
+        first = 2 * (self.setup_interval // 3) + self._values.latency
+        wait = max(2, limit.latency + 2 - first)
+        complete, flagged = Signal(wait, name="complete"), Signal(wait, name="flagged")
+        fires = spans.i.valid & spans.i.ready & spans.long
+        shown = fires & (spans.i.payload.length >= p.SHORTEST)
+        m.d.sync += [complete.eq(Cat(fires, complete)), flagged.eq(Cat(shown, flagged))]
+        limited = limit.o.payload.shape()(
+            pass_beside(m, "limits", limit.o.payload, limit.o.valid, complete[-1], self._LIMITS_INSIDE)
+        )
+        lit = Const(0)
         if self.highlights:
             if self.takes_threshold:
                 level = Signal(FixedShape(p.LEVEL_FORMAT), name="level", reset_less=True)
                 m.d.sync += level.eq(self.threshold)
             else:
                 level = octave_limit(m, "level", self.exponent, p.levels)
-            for i, light in enumerate(places):
-                front = Signal(2, name=f"front_{i}")
-                behind = p.BEHIND.codes.item()
-                now = Cat(at.diffuse.as_value() >= behind for at in light).any()
-                m.d.sync += front.eq(Cat(now, front[0]))
-                least = least_highlight(m, f"{i}", [at.highlight for at in light])
-                lit.append(front[1] & (least < level.as_value()))
+            lit = Cat(
+                self._is_lit(m, f"{i}", values, word, first, light, level.as_value())
+                for i, (first, light) in enumerate(zip(left, values.payload, strict=True))
+            ).any()
+            for k in range(wait - 2):
+                later = Signal(name=f"lit_{k}")
+                m.d.sync += later.eq(lit)
+                lit = later
         wide_now = Signal()
-        m.d.sync += wide_now.eq(wide[1] | (wide_if_lit[1] & Cat(lit).any()))
+        m.d.sync += wide_now.eq(flagged[-1] & (limited.wide | (limited.wide_if_lit & lit)))
         m.d.comb += self.wide.eq(wide_now)
+
+    _LIMITS_INSIDE = 8
+    """Results of the limit that wait at most for the values of their spans."""
+
+    def _is_lit(self, m: Module, name: str, values: stream.Interface, word, first, light, level) -> Value:
+        """Whether a light is not behind a span and may have a highlight there, two cycles after its values.
+
+        `SpanLimit.least` is the least of ``2 l``, ``2 r`` and ``2 m - |l - r|``, l, r and m being u at the first
+        pixel, the last and in the middle, which come in this order.
+        """
+        taken = values.valid & values.ready
+        now, first = light.highlight.as_value(), first.highlight.as_value()
+        behind = self._limit.parameters.BEHIND.codes.item()
+        fronts, unders = (Signal(3, name=f"{kind}_{name}") for kind in ("fronts", "unders"))
+        slope = Signal(signed(len(now) + 1), name=f"slope_{name}", reset_less=True)
+        excess = Signal(signed(max(len(now), len(level)) + 2), name=f"excess_{name}", reset_less=True)
+        lit, front = Signal(name=f"bright_{name}"), Signal(name=f"front_{name}")
+        with m.If(taken):
+            m.d.sync += [
+                fronts.eq(Cat(light.diffuse.as_value() >= behind, fronts)),
+                unders.eq(Cat((now << 1) < level, unders)),
+                excess.eq((now << 1) - level),
+            ]
+        with m.If(values.valid & (word.place == _Place.RIGHT)):
+            m.d.sync += slope.eq(first - now)
+        m.d.sync += [
+            front.eq(fronts.any()),
+            lit.eq(unders[1:].any() | (excess - slope < 0) | (excess + slope < 0)),
+        ]
+        return front & lit
