@@ -258,7 +258,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     @property
     def _waiting_spans(self) -> int:
-        """Depth of the FIFOs parallel to the interpolator and the lights: all spans that may be inside these."""
+        """Depth of the FIFOs parallel to interpolator and lights: all spans that may be inside these."""
         interval = getattr(self._interpolator, "shortest_interval", None) or self.setup_interval
         return max(-(-self.latency // interval) + UNCOUNTED, 17)
 

@@ -8,6 +8,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Member, Out
 
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.memory import registered_read
 
 __all__ = [
     "FIFO_LATENCY",
@@ -137,8 +138,8 @@ def connect_late_fifo(
 ) -> None:
     """Connect two streams through a FIFO in a memory, between registers.
 
-    One is before the memory, so that the source's handshake ends there, and one behind it, which an FPGA's
-    memories have inside. Whether there is room follows from the FIFO's level alone, in a register; `UNCOUNTED`
+    One is before the memory, so that the source's handshake ends there; behind it is that of
+    `registered_read`. Whether there is room follows from the FIFO's level alone, in a register; `UNCOUNTED`
     payloads of the depth are for those that the level does not have yet. A payload takes `LATE_FIFO_LATENCY`
     cycles through the empty FIFO.
 
@@ -156,20 +157,22 @@ def connect_late_fifo(
     """
     require_same_shape(source.payload.shape(), sink.payload.shape())
     width = Shape.cast(source.payload.shape()).width
-    payload, word = (Signal(width, name=f"{name}_{kind}", reset_less=True) for kind in ("payload", "word"))
+    payload = Signal(width, name=f"{name}_payload", reset_less=True)
     written, room = Signal(name=f"{name}_written"), Signal(name=f"{name}_room", init=1)
     level = Signal(range(depth + 1), name=f"{name}_level")
     # Whether the memory's word and the one behind it count.
     read, there = Signal(name=f"{name}_read"), Signal(name=f"{name}_there")
-    moves, reads = ~there | sink.ready, Signal(name=f"{name}_reads")
-    m.submodules[name] = memory = Memory(shape=width, depth=1 << (depth - 1).bit_length(), init=[])
-    port, output = memory.write_port(), memory.read_port()
+    address, reads = Signal((depth - 1).bit_length(), name=f"{name}_address"), Signal(name=f"{name}_reads")
+    m.submodules[name] = memory = Memory(shape=width, depth=1 << len(address), init=[])
+    port = memory.write_port()
+    wanted, some = ~there | sink.ready, Signal(name=f"{name}_some")
+    word, moves = registered_read(m, memory, address, wanted, port)
     m.d.comb += [
         source.ready.eq(room),
         port.data.eq(payload),
         port.en.eq(written),
-        output.en.eq(moves),
-        reads.eq(moves & level.any()),
+        # Where there is a word, none is written to its address.
+        reads.eq(wanted & some),
         Value.cast(sink.payload).eq(word),
         sink.valid.eq(there),
     ]
@@ -178,11 +181,14 @@ def connect_late_fifo(
         written.eq(source.valid & room),
         room.eq(level < depth - UNCOUNTED),
         level.eq(level + written - reads),
+        some.eq(written | level[1:].any() | (level[0] & ~reads)),
         port.addr.eq(port.addr + written),
-        output.addr.eq(output.addr + reads),
+        address.eq(address + reads),
     ]
     with m.If(moves):
-        m.d.sync += [word.eq(output.data), read.eq(reads), there.eq(read)]
+        m.d.sync += [read.eq(reads), there.eq(read)]
+    with m.Elif(sink.ready):
+        m.d.sync += there.eq(0)
 
 
 def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Signal:

@@ -9,7 +9,7 @@ from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
-from blysk.hdl.cosines.chord import chord
+from blysk.hdl.cosines.chord import chord_exact
 
 __all__ = ["SpanLimitUnit", "octave_limit"]
 
@@ -69,8 +69,9 @@ class SpanLimitUnit(PipelinedUnit):
             g.input(name, lambda operands, name=name: operands[name])
             for name in ("normal_left", "normal_right")
         )
-        self._chord = chord(g, "chord", right, left)
-        self._result = g.register("result", self._compare, self._chord)
+        # The limits are under the largest code of `Chord.FORMAT`, so that nothing need be saturated.
+        half = chord_exact(g, "chord", right, left)
+        self._result = g.register("result", self._compare, half)
         self.multipliers = g.multiplier.count
         super().__init__(
             data.StructLayout({"normal_left": normal_shape(), "normal_right": normal_shape()}),

@@ -29,7 +29,9 @@ def map_component(component: Component, folder: Path) -> dict[str, Any]:
 
 def verilog_of(netlist: dict[str, Any], folder: Path) -> str:
     """Verilog of a netlist, cells as instances."""
-    modules = {"top": netlist["modules"]["top"]}
+    top = netlist["modules"]["top"]
+    cells = {name: {**cell, "connections": _connected(cell)} for name, cell in top["cells"].items()}
+    modules = {"top": {**top, "cells": cells}}
     (folder / "mapped.json").write_text(json.dumps({**netlist, "modules": modules}))
     yosys("read_json mapped.json\nwrite_verilog -noattr mapped.v\n", folder)
     return (folder / "mapped.v").read_text()
@@ -150,13 +152,22 @@ def same(before: dict[str, Any], after: dict[str, Any], folder: Path) -> str:
     (folder / "both.json").write_text(json.dumps({"creator": "", "modules": {"top": module}}))
     ours = _ours()
     memory, register = (ours.index(text) for text in ("// A memory of 1024", "// The register behind"))
-    models = cells_of("LUT4", "TRELLIS_FF") + ours[:memory] + ours[register : ours.index("// A port of a table")]
+    models = (
+        cells_of("LUT4", "TRELLIS_FF") + ours[:memory] + ours[register : ours.index("// A port of a table")]
+    )
     (folder / "models.v").write_text(models)
     yosys(_PROOF, folder)
     ports = json.loads((folder / "proof.json").read_text())["modules"]["top"]["ports"]
     left, right = (ports[name]["bits"] for name in ("left", "right"))
     differ = sum(a != b for a, b in zip(left, right, strict=True))
     return f"{differ} of {len(left)} nets are not shown to be equal" if differ or not left else ""
+
+
+def _connected(cell: dict[str, Any]) -> dict[str, Any]:
+    """Ports of a cell, but outputs that drive nothing."""
+    directions = cell["port_directions"]
+    given = cell["connections"].items()
+    return {port: bits for port, bits in given if directions[port] != "output" or bits != ["x"]}
 
 
 def _without_carry(cell: dict[str, Any]) -> dict[str, Any]:

@@ -1,0 +1,361 @@
+"""Spans of the chord methods: differences of three values a span, and accumulators of a pixel's values."""
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value, ValueLike, unsigned
+from amaranth.lib import data, fifo, stream, wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
+from blysk.golden.number.spans import LENGTH_BITS
+from blysk.hdl.core.stream import FIFO_LATENCY, connect
+from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape, span_values_shape
+from blysk.hdl.cosines.chord_values import light_values_shape
+from blysk.hdl.lighting.value_gate import ValueGateUnit
+from blysk.hdl.methods.light_products import operands_shape
+from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
+
+__all__ = ["ChordAccumulatorUnit", "ChordSpansUnit"]
+
+_LONG = 3
+"""Pixels of the shortest span that has differences."""
+
+
+class ChordAccumulatorUnit(AccumulatorUnit):
+    """``N . L`` and u of each light, two quadratics a light; see `AccumulatorUnit`.
+
+    The words of a span are taken in later than its length, so that a register drives all that take them in.
+    A span of m pixels gives its first values 3 cycles after it was accepted.
+
+    Parameters
+    ----------
+    parameters : ChordInterpolator
+        Formats.
+    lights : int
+        Number of lights, at least 1.
+    highlights : bool
+        Whether there is u.
+    gated : bool
+        Whether spans bring a gate's decision for each light, ``lit``.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"length": 12, "lit": lights})))`
+        Lengths of spans, 1 or more, and decisions.
+    words : :py:`In(StructLayout({"start": ..., "lights": ...}))`
+        First values of the span that is taken in, and its differences.
+    taken : :py:`Out(1)`
+        High for one cycle as the words of the span are taken in that was accepted before.
+    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
+        Operands of the pixels.
+
+    Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.10.
+    """
+
+    latency = 3
+
+    def __init__(
+        self,
+        parameters: ChordInterpolator | None = None,
+        lights: int = 1,
+        *,
+        highlights: bool = True,
+        gated: bool = False,
+    ):
+        self.parameters = p = parameters or ChordInterpolator()
+        self.gated = gated
+        self.functions = ("diffuse", "highlight") if highlights else ("diffuse",)
+        self.words_shape = data.StructLayout(
+            {
+                "start": light_values_shape(lights, highlights=highlights),
+                "lights": chord_differences_shape(lights, highlights, p.setup)["lights"].shape,
+            }
+        )
+        span = {"length": unsigned(LENGTH_BITS)}
+        if gated:
+            span["lit"] = unsigned(lights)
+        super().__init__(
+            data.StructLayout(span),
+            operands_shape(p, lights, highlights=highlights, gated=gated),
+            {"words": In(self.words_shape), "taken": Out(1)},
+        )
+
+    @classmethod
+    def begin(cls, parameters, start):
+        """The start alone where half a step of the result would take a sum: it is added to the result."""
+        return (
+            start.extend(parameters.format)
+            if cls._adds_late(parameters)
+            else super().begin(parameters, start)
+        )
+
+    @classmethod
+    def rounded(cls, parameters, value):
+        """The value, with the half that it does not have yet."""
+        return super().begin(parameters, value) if cls._adds_late(parameters) else value
+
+    @staticmethod
+    def _adds_late(parameters: DifferenceAccumulator) -> bool:
+        """Whether the start has a bit of the weight of half a step of the result."""
+        return parameters.start_format.fraction_bits > parameters.result_format.fraction_bits
+
+    @property
+    def span(self):
+        """Words of the span that is taken in."""
+        return self.words
+
+    def load(self, m, advance, active):
+        """A cycle after the span was accepted."""
+        load, present = Signal(name="load"), Signal(name="present")
+        if self.gated:
+            self._lit = Signal.like(self.i.payload.lit, name="lit", reset_less=True)
+        with m.If(advance):
+            m.d.sync += [load.eq(self.i.valid & self.i.ready), present.eq(active)]
+            if self.gated:
+                m.d.sync += self._lit.eq(self.i.payload.lit)
+        m.d.comb += self.taken.eq(load & advance)
+        return self.taken, present
+
+    def carried(self, values):
+        """The decision of each light."""
+        if self.gated:
+            for index, light in enumerate(values):
+                yield ~self._lit[index], light.gated
+
+    def quadratics(self, values):
+        """Those of each light."""
+        for index, (start, light) in enumerate(zip(self.span.start, self.span.lights, strict=True)):
+            result = values[index]
+            for name in self.functions:
+                words = start[name], light[name].first, light[name].second
+                value = result["cosine" if name == "diffuse" else name]
+                yield f"{name}_{index}", self.parameters.accumulators[name], words, value
+
+
+class ChordSpansUnit(wiring.Component):
+    """Values of spans in, the operands of their pixels out: chord setup, then accumulators.
+
+    A span of three pixels or more goes through the setup, and its start past it through a memory; a span of
+    one pixel through the memory alone. So short spans take a cycle each, and wait only for those before them.
+    The setup never waits: a span is accepted only if there is room for its differences behind the setup.
+
+    Parameters
+    ----------
+    parameters : ChordInterpolator
+        Bit-accurate model.
+    lights : int
+        Number of lights, at least 1.
+    initiation_interval : int
+        Least cycles from a span of three pixels or more to the next.
+    highlights : bool
+        Whether there is u.
+    length_bits : int
+        Bits of the length.
+    gate : ValueGateUnit or None
+        Decides which spans have no highlight; ``None``: nothing does.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"values": span_values_shape(...), "length": length_bits})))`
+        Spans of one pixel, of which the first value counts, or of three and more.
+    long : :py:`In(1)`
+        Whether the span that is offered has more than one pixel: its source knows without the length.
+    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
+        Operands of the pixels.
+    out_of_range : :py:`Out(1)`
+        High for one cycle for each span with a word that does not fit.
+    constants : :py:`In(10)` or :py:`In(18)`
+        Specular exponent or threshold, constant while spans are inside; only of a gate that has it as a port.
+
+    Source: docs/theory/chord.md#differences.
+    """
+
+    def __init__(
+        self,
+        parameters: ChordInterpolator,
+        lights: int,
+        *,
+        initiation_interval: int = 3,
+        highlights: bool = True,
+        length_bits: int = LENGTH_BITS,
+        gate: ValueGateUnit | None = None,
+    ):
+        self._gate = gate
+        self._setup = ChordSetupUnit(
+            parameters.setup,
+            lights,
+            initiation_interval=initiation_interval,
+            length_bits=length_bits,
+            highlights=highlights,
+        )
+        self.multipliers = self._setup.multipliers
+        gated = gate is not None
+        self._accumulator = ChordAccumulatorUnit(parameters, lights, highlights=highlights, gated=gated)
+        # A cycle for the count of the differences that wait.
+        self.latency = self._setup.latency + 1 + self._accumulator.latency
+        waits = FIFO_LATENCY + (gate.latency if gate else 0)
+        self.short_latency = waits + self._accumulator.latency
+        output = operands_shape(parameters, lights, highlights=highlights, gated=gated)
+        super().__init__(
+            {
+                "i": In(
+                    stream.Signature(
+                        data.StructLayout(
+                            {
+                                "values": span_values_shape(lights, highlights),
+                                "length": unsigned(length_bits),
+                            }
+                        )
+                    )
+                ),
+                "long": In(1),
+                "o": Out(stream.Signature(output)),
+                "out_of_range": Out(1),
+            }
+            | (gate.ports if gated else {})
+        )
+
+    @property
+    def starts_inside(self) -> int:
+        """Depth of the memory of starts: all spans that may follow one that has just begun its setup.
+
+        Or come before it: its values may take an interval, in which none comes.
+        """
+        needed = self._setup.latency + self._setup.initiation_interval + FIFO_LATENCY + self._LATE
+        return 1 << (needed - 1).bit_length()
+
+    @property
+    def differences_inside(self) -> int:
+        """Depth of the memory of differences: those inside the setup, too, a pixel a cycle behind it."""
+        needed = -(-self._setup.latency // _LONG) + FIFO_LATENCY + self._LATE
+        return 1 << (needed - 1).bit_length()
+
+    _LATE = 4
+    """Spans beyond those counted: three that come before the count is known, and one whose words wait."""
+
+    def elaborate(self, platform):
+        """Memory of starts beside the setup, one of differences behind it, and the accumulators."""
+        m = Module()
+        m.submodules.chord_setup = setup = self._setup
+        m.submodules.chord_accumulator = accumulator = self._accumulator
+        span, joined = self.i.payload, accumulator.i
+        depth = self.starts_inside
+        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=len(span.length) + 1, depth=depth + 1)
+        known, gate_ready, accepted, popped = (Signal() for _ in range(4))
+        if self._gate is not None:
+            self._decide(m, joined, depth, known, gate_ready)
+        else:
+            m.d.comb += [known.eq(1), gate_ready.eq(1)]
+        length, is_long = lengths.r_data[:-1], lengths.r_data[-1]
+        room, waits = self._count(m, accepted, popped)
+        m.d.comb += [
+            setup.i.payload.eq(span),
+            setup.i.valid.eq(self.i.valid & gate_ready & room & self.long),
+            setup.o.ready.eq(1),
+            self.i.ready.eq(room & gate_ready & (setup.i.ready | ~self.long)),
+            accepted.eq(self.i.valid & self.i.ready),
+            lengths.w_data.eq(Cat(span.length, self.long)),
+            lengths.w_en.eq(accepted),
+            joined.payload.length.eq(length),
+            joined.valid.eq(lengths.r_rdy & known & (waits | ~is_long)),
+            lengths.r_en.eq(joined.ready & known & (waits | ~is_long)),
+            popped.eq(joined.valid & joined.ready & is_long),
+            self.out_of_range.eq(setup.o.valid & setup.o.payload.out_of_range),
+        ]
+        self._keep_words(m, accepted, is_long)
+        connect(m, accumulator.o, wiring.flipped(self.o))
+        return m
+
+    def _count(self, m: Module, accepted: Value, popped: Value) -> tuple[Signal, Signal]:
+        """Whether there is room for a span, and whether differences wait; both are registers.
+
+        Between two spans of three pixels or more that the accumulators accept are two cycles or more, so that a
+        register may tell of differences. Spans are counted a cycle late, to count nothing between handshakes.
+        """
+        joined, setup = self._accumulator.i, self._setup
+        went, is_room = [], []
+        for name, comes, goes, depth in (
+            ("spans", accepted, joined.valid & joined.ready, self.starts_inside),
+            ("long", accepted & self.long, popped, self.differences_inside),
+        ):
+            entered, left = Signal(name=f"{name}_entered"), Signal(name=f"{name}_left")
+            inside = Signal(range(depth + 1), name=f"{name}_inside")
+            m.d.sync += [entered.eq(comes), left.eq(goes), inside.eq(inside + entered - left)]
+            went.append(left)
+            is_room.append(inside < depth - self._LATE)
+        behind = Signal(range(self.differences_inside + 1), name="behind")
+        following, waits = Signal.like(behind, name="following"), Signal(name="waits")
+        room = Signal(name="room", init=1)
+        m.d.comb += following.eq(behind + setup.o.valid - went[1])
+        m.d.sync += [behind.eq(following), waits.eq(following.any()), room.eq(Cat(is_room).all())]
+        return room, waits
+
+    def _keep_words(self, m: Module, accepted: Value, is_long: Value) -> None:
+        """Memories of starts and of differences; both are read as the accumulators take words in."""
+        accumulator, setup = self._accumulator, self._setup
+        start, differences = Signal.like(accumulator.words.start), setup.o.payload.lights
+        for i, values in enumerate(self.i.payload["values"]):
+            for name in accumulator.functions:
+                m.d.comb += start[i][name].eq(values[name][0])
+        takes_long = Signal(name="takes_long")
+        with m.If(accumulator.i.valid & accumulator.i.ready):
+            m.d.sync += takes_long.eq(is_long)
+        taken = accumulator.taken
+        # A cycle late, as what is accepted is known late.
+        kept, entered = Signal.like(start, name="kept", reset_less=True), Signal(name="entered")
+        m.d.sync += [kept.eq(start), entered.eq(accepted)]
+        words = _keep(m, "starts", kept, entered, taken, self.starts_inside)
+        m.d.comb += Value.cast(accumulator.words.start).eq(words)
+        words = _keep(
+            m, "differences", differences, setup.o.valid, taken & takes_long, self.differences_inside
+        )
+        m.d.comb += Value.cast(accumulator.words.lights).eq(words)
+
+    def _decide(self, m: Module, joined: stream.Interface, depth: int, known: Value, ready: Value) -> None:
+        """The gate beside the setup: a span waits for its decision."""
+        m.submodules.value_gate = gate = self._gate
+        lights = len(gate.o.payload)
+        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=lights, depth=depth)
+        long = self.long
+        for given, light in zip(gate.i.payload, self.i.payload["values"], strict=True):
+            first, *others = (light.highlight[k].as_value() for k in range(3))
+            m.d.comb += given[0].as_value().eq(first)
+            m.d.comb += [given[k].as_value().eq(Mux(long, u, first)) for k, u in enumerate(others, 1)]
+        m.d.comb += [
+            # Of what every span goes to, the starts and the gate, each waits for the other.
+            gate.i.valid.eq(self.i.valid & self.i.ready),
+            ready.eq(gate.i.ready),
+            decisions.w_data.eq(gate.o.payload),
+            decisions.w_en.eq(gate.o.valid),
+            gate.o.ready.eq(decisions.w_rdy),
+            known.eq(decisions.r_rdy),
+            decisions.r_en.eq(joined.valid & joined.ready),
+            joined.payload.lit.eq(decisions.r_data),
+        ]
+        if gate.ports:
+            m.d.comb += gate.constants.eq(self.constants)
+
+
+def _keep(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Value:
+    """Memory of words in their order, without handshakes: the first that has not been taken.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the memory as a submodule ``name``.
+    word : ValueLike
+        Word that comes.
+    written, taken : Value
+        Whether it does, and whether the first is taken.
+    depth : int
+        Words at most, a power of two.
+    """
+    word = Value.cast(word)
+    m.submodules[name] = memory = Memory(shape=len(word), depth=depth, init=[])
+    write, read = memory.write_port(), memory.read_port(domain="comb")
+    m.d.comb += [write.data.eq(word), write.en.eq(written)]
+    with m.If(written):
+        m.d.sync += write.addr.eq(write.addr + 1)
+    with m.If(taken):
+        m.d.sync += read.addr.eq(read.addr + 1)
+    return read.data
