@@ -193,7 +193,7 @@ class ChordSpansUnit(wiring.Component):
         self._accumulator = ChordAccumulatorUnit(parameters, lights, highlights=highlights, gated=gated)
         # A cycle for the count of the differences that wait.
         self.latency = self._setup.latency + 1 + self._accumulator.latency
-        waits = FIFO_LATENCY + (gate.latency if gate else 0)
+        waits = 1 + FIFO_LATENCY + (gate.latency if gate else 0)
         self.short_latency = waits + self._accumulator.latency
         output = operands_shape(parameters, lights, highlights=highlights, gated=gated)
         super().__init__(
@@ -254,23 +254,21 @@ class ChordSpansUnit(wiring.Component):
             setup.o.ready.eq(1),
             self.i.ready.eq(room & gate_ready & (setup.i.ready | ~self.long)),
             accepted.eq(self.i.valid & self.i.ready),
-            lengths.w_data.eq(Cat(span.length, self.long)),
-            lengths.w_en.eq(accepted),
             joined.payload.length.eq(length),
             joined.valid.eq(lengths.r_rdy & known & (waits | ~is_long)),
             lengths.r_en.eq(joined.ready & known & (waits | ~is_long)),
             popped.eq(joined.valid & joined.ready & is_long),
             self.out_of_range.eq(setup.o.valid & setup.o.payload.out_of_range),
         ]
-        self._keep_words(m, accepted, is_long)
+        self._keep_words(m, lengths, accepted)
         connect(m, accumulator.o, wiring.flipped(self.o))
         return m
 
     def _count(self, m: Module, accepted: Value, popped: Value) -> tuple[Signal, Signal]:
         """Whether there is room for a span, and whether differences wait; both are registers.
 
-        Between two spans of three pixels or more that the accumulators accept are two cycles or more, so that a
-        register may tell of differences. Spans are counted a cycle late, to count nothing between handshakes.
+        Between two spans of three pixels or more that the accumulators accept are two cycles or more, so that
+        a register may tell of differences. Spans are counted a cycle late: nothing is between handshakes.
         """
         joined, setup = self._accumulator.i, self._setup
         went, is_room = [], []
@@ -290,8 +288,8 @@ class ChordSpansUnit(wiring.Component):
         m.d.sync += [behind.eq(following), waits.eq(following.any()), room.eq(Cat(is_room).all())]
         return room, waits
 
-    def _keep_words(self, m: Module, accepted: Value, is_long: Value) -> None:
-        """Memories of starts and of differences; both are read as the accumulators take words in."""
+    def _keep_words(self, m: Module, lengths: fifo.SyncFIFOBuffered, accepted: Value) -> None:
+        """Lengths, and memories of starts and of differences, read as the accumulators take words in."""
         accumulator, setup = self._accumulator, self._setup
         start, differences = Signal.like(accumulator.words.start), setup.o.payload.lights
         for i, values in enumerate(self.i.payload["values"]):
@@ -299,11 +297,17 @@ class ChordSpansUnit(wiring.Component):
                 m.d.comb += start[i][name].eq(values[name][0])
         takes_long = Signal(name="takes_long")
         with m.If(accumulator.i.valid & accumulator.i.ready):
-            m.d.sync += takes_long.eq(is_long)
+            m.d.sync += takes_long.eq(lengths.r_data[-1])
         taken = accumulator.taken
         # A cycle late, as what is accepted is known late.
         kept, entered = Signal.like(start, name="kept", reset_less=True), Signal(name="entered")
-        m.d.sync += [kept.eq(start), entered.eq(accepted)]
+        length = Signal(len(lengths.w_data), name="length", reset_less=True)
+        m.d.sync += [
+            kept.eq(start),
+            length.eq(Cat(self.i.payload.length, self.long)),
+            entered.eq(accepted),
+        ]
+        m.d.comb += [lengths.w_data.eq(length), lengths.w_en.eq(entered)]
         words = _keep(m, "starts", kept, entered, taken, self.starts_inside)
         m.d.comb += Value.cast(accumulator.words.start).eq(words)
         words = _keep(

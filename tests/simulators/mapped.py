@@ -91,7 +91,8 @@ setattr -unset keep w:* c:*
 opt_expr
 opt_dff
 opt_clean
-simplemap t:$*dff*
+simplemap t:$*dff* t:$not
+dfflegalize -cell $_DFF_P_ 01 -cell $_DFFE_PP_ 01
 opt -full -share_all
 write_json proof.json
 """
@@ -100,8 +101,8 @@ write_json proof.json
 def same(before: dict[str, Any], after: dict[str, Any], folder: Path) -> str:
     """Whether two netlists do the same on every cycle; the reason why not, or nothing.
 
-    Those cells of the netlist ``after`` that are new or changed, multipliers, memories and look-up tables, are
-    put beside the netlist ``before`` and read its nets; a memory as one without a register, and the register.
+    Those cells of the netlist ``after`` that are new or changed, multipliers, memories and look-up tables,
+    are put beside the netlist ``before`` and read its nets; a memory as one without register, and it.
     A carry that is gone must have no reader. Yosys then merges equal cells of equal inputs and equal
     state at power-up. If each product of ``after`` is merged with the net of ``before`` that it drives in
     ``after``, then the nets of ``before`` satisfy every equation of ``after``, and there is one solution.

@@ -37,8 +37,8 @@ UNITS = (
     ("half_chord", "interval 4"),
 )
 
-READS = ("lobe", "blinn")
-"""A unit that reads a block RAM through the register inside it, and writes it."""
+READS = {"name": "lobe", "variant": "blinn", "beats": 1300}
+"""A unit that writes a block RAM and reads it through the register inside; more beats than table ends."""
 
 PIPELINES = ("chord, cosquad", "chord, blinn", "linear, cosquad")
 
@@ -86,7 +86,7 @@ def test_unit(check, name, variant):
 
 
 def test_unit_with_a_memory(check):
-    absorbed = check(*READS)
+    absorbed = check(**READS)
     assert absorbed.words == absorbed.products == 1
 
 
@@ -155,7 +155,7 @@ def wrong_word_bit(cells):
 @pytest.mark.parametrize("inject", [word_always_taken, half_a_word_without_register, no_word, wrong_word_bit])
 def test_faults_injected_in_a_memory_are_found(check, inject):
     with pytest.raises((AssertionError, BenchError)):
-        check(*READS, change=inject)
+        check(**READS, change=inject)
 
 
 @pytest.mark.long
