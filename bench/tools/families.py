@@ -111,9 +111,9 @@ ECP5 = Family(
     # does not end. The router takes wires on slow paths up again.
     large=("--placer", "static", "--tmg-ripup"),
     # Two registers on either side of a multiplier are for that one: equal ones are not made one. The mapper
-    # saves look-up tables where paths are shorter than 3 ns, of its estimate of wires of 0.3 ns.
+    # saves look-up tables where paths are shorter than 2.5 ns, of its estimate of wires of 0.3 ns.
     synthesis="""\
-scratchpad -set abc9.D 3000
+scratchpad -set abc9.D 2500
 setattr -set keep 1 t:$mul %ci4 t:$mul %co4 %u t:$*dff* %i
 synth_lattice -family ecp5 -top top -abc9""",
     look_up_tables="TRELLIS_COMB",

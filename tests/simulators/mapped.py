@@ -91,9 +91,12 @@ setattr -unset keep w:* c:*
 opt_expr
 opt_dff
 opt_clean
-simplemap t:$*dff* t:$not
-dfflegalize -cell $_DFF_P_ 01 -cell $_DFFE_PP_ 01
+simplemap t:$*dff*
 opt -full -share_all
+simplemap t:$not
+dfflegalize -cell $_DFF_P_ 01 -cell $_DFFE_PP_ 01
+opt_merge -share_all
+opt_clean
 write_json proof.json
 """
 
