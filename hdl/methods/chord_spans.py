@@ -295,7 +295,7 @@ class ChordSpansUnit(wiring.Component):
         for i, values in enumerate(self.i.payload["values"]):
             for name in accumulator.functions:
                 m.d.comb += start[i][name].eq(values[name][0])
-        takes_long = Signal(name="takes_long")
+        self._takes_long = takes_long = Signal(name="takes_long")
         with m.If(accumulator.i.valid & accumulator.i.ready):
             m.d.sync += takes_long.eq(lengths.r_data[-1])
         taken = accumulator.taken

@@ -6,6 +6,7 @@ import blysk.hdl.cosines.highlight_cosine
 import blysk.hdl.methods.angular_interpolator
 import blysk.hdl.methods.bisection_interpolator
 import blysk.hdl.methods.chord_interpolator
+import blysk.hdl.methods.chord_spans
 import blysk.hdl.methods.interpolator
 import blysk.hdl.methods.linear_interpolator
 import blysk.hdl.methods.quadratic_interpolator
@@ -187,7 +188,7 @@ def walk(find, place):
         one, none = (
             FixedValue.constant(NARROW.difference_format, value) for value in (NARROW.result_format.step, 0)
         )
-        begin = FixedValue(NARROW.start_format, Cat(first_word(find(self.i.payload)), Const(0, 1)))
+        begin = FixedValue(NARROW.start_format, Cat(first_word(find(self.span)), Const(0, 1)))
         result = FixedValue(NARROW.result_format, Value.cast(place(values))[: WORD_BITS + 1])
         yield "word", NARROW, (begin, one, none), result
 
@@ -239,7 +240,7 @@ def replace_parts(monkeypatch) -> None:
         (blysk.hdl.methods.quadratic_interpolator, "MiddleNormalUnit", middle_normal, 3),
         (blysk.hdl.methods.quadratic_interpolator, "GPQUnit", coefficients, 1),
         (blysk.hdl.methods.quadratic_interpolator, "DifferenceSetupUnit", difference_setup, 3),
-        (blysk.hdl.methods.chord_interpolator, "ChordSetupUnit", chord_setup, 3),
+        (blysk.hdl.methods.chord_spans, "ChordSetupUnit", chord_setup, 3),
         (blysk.hdl.methods.chord_interpolator, "ChordValuesUnit", chord_values, 2),
         (blysk.hdl.methods.chord_interpolator, "SpanLimitUnit", nothing, 2),
         (blysk.hdl.methods.angular_interpolator, "AngularSetupUnit", angular_setup, 3),
