@@ -91,7 +91,8 @@ def reciprocal_words(
     codes = reciprocal_codes(length_bits, table)
     word = graph.look_up("reciprocals", codes, table.format.width, address, registered=True)
     reciprocal = graph.wire("reciprocal", lambda word: FixedValue(table.format, word), word)
-    shift = graph.register("shift", lambda both, address: both[:half] + address.any(), positions, address)
+    ragged = graph.register("ragged", lambda address: address.any(), address)
+    shift = graph.register("shift", lambda both, ragged: both[:half] + ragged, positions, ragged)
     return reciprocal, shift
 
 
