@@ -12,14 +12,8 @@ from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.pipeline import Design
-from blysk.hdl.core.stream import (
-    FIFO_LATENCY,
-    LATE_FIFO_LATENCY,
-    UNCOUNTED,
-    connect,
-    connect_fifo,
-    connect_late_fifo,
-)
+from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo
+from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
 from blysk.hdl.frame_constants import FrameConstantsUnit, write_shape
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
