@@ -91,6 +91,7 @@ class ChordSetup:
     ============ ============ =====================================================================
     u            UQ(1, 26)    given; half a step costs ``1.25 n 255 2^-27``, 0.0024 LSB at n = 1000
     f            SQ(1, 25)    given; as many fraction bits as the N·L of a pixel
+    a            SQ(1, 25)    given, of lights that fade; all its words are those of f
     G            SQ(-2, 20)   multiplier operand; saturates
     P of u       SQ(0, 26)    exact, two words of 18 and 8 bits: every bit counts at the end of a span;
                               saturates
@@ -155,9 +156,9 @@ class ChordSetup:
         return product.extend(self.shifted_format)
 
     def compute(
-        self, diffuse: Fixed, highlight: Fixed, length: np.ndarray
-    ) -> tuple[Differences, Differences, np.ndarray]:
-        """Bit-accurate differences of f and of u.
+        self, diffuse: Fixed, highlight: Fixed, length: np.ndarray, factor: Fixed | None = None
+    ) -> tuple:
+        """Bit-accurate differences of f and of u, and of the factors a of lights that fade.
 
         Parameters
         ----------
@@ -167,11 +168,15 @@ class ChordSetup:
             u at the same three points.
         length : int array, shape (spans,)
             Pixels, 1 to 4095.
+        factor : Fixed, shape (spans, fading lights, 3), SQ(1, 25), optional
+            a at the same three points.
 
         Returns
         -------
         diffuse, highlight : Differences
             Of f and of u.
+        factor : Differences
+            Of a, where it is given.
         out_of_range : bool array, shape (spans,)
             Whether P or G of the span does not fit its word; the differences are then invalid.
 
@@ -186,13 +191,15 @@ class ChordSetup:
                 f"operands must be {self.DIFFUSE_FORMAT} and {self.HIGHLIGHT_FORMAT}, "
                 f"not {diffuse.format}, {highlight.format}"
             )
+        functions = [(diffuse, self.DIFFUSE_SLOPE_FORMAT), (highlight, self.SLOPE_FORMAT)]
+        if factor is not None:
+            if factor.format != self.DIFFUSE_FORMAT:
+                raise ValueError(f"factors must be {self.DIFFUSE_FORMAT}, not {factor.format}")
+            functions.append((factor, self.DIFFUSE_SLOPE_FORMAT))
         steps = self.steps(length)
         out_of_range = np.zeros(len(length), dtype=bool)
         results = []
-        for values, slope_format in (
-            (diffuse, self.DIFFUSE_SLOPE_FORMAT),
-            (highlight, self.SLOPE_FORMAT),
-        ):
+        for values, slope_format in functions:
             left, middle, right = (values[..., k] for k in range(3))
             exact = (left + right - middle.scale(1)).scale(1)
             exact = exact.round_half_up(self.CURVATURE_FORMAT.fraction_bits)

@@ -8,7 +8,7 @@ import numpy as np
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans, missed_spans
 from blysk.golden.frames.highlight_limits import HighlightLimits
-from blysk.golden.frames.local import line_ends, local_values, middle_normals
+from blysk.golden.frames.local import line_ends, local_operands, middle_normals
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.pipeline import Design, Spans
@@ -59,10 +59,15 @@ def prepare(scene: Scene, design: Design) -> PreparedFrame:
     Raises
     ------
     ValueError
-        If the scene has point lights or a near viewer, and the method does not take values.
+        If the scene has point lights or a near viewer, and the method does not take values; or a light that
+        fades has no factor in the design.
     """
     if scene.local and not design.takes_values:
         raise ValueError("point lights and a near viewer need the method chord-local")
+    if design.specular is not None:
+        for index, light in enumerate(scene.lights):
+            if light.fades and index not in design.factors:
+                raise ValueError(f"light {index} fades, and the design has no factor for it: give factors")
     raster = rasterise(scene)
     cut, count = cut_spans(scene, raster, design)
     cut = sort_by_material(cut, scene.mesh.material)
@@ -86,7 +91,8 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
     """
     spans = quantise_spans(cut, scene.mesh.material)
     if design.takes_values:
-        spans = replace(spans, values=local_values(scene, cut, design.lights))
+        values, factors = local_operands(scene, cut, design.lights, design.factors)
+        spans = replace(spans, values=values, factors=factors)
     elif design.interpolator.takes_line:
         left, right = quantise_line(*line_ends(cut))
         spans = replace(spans, normal_left=left, normal_right=right)

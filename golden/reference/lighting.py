@@ -60,7 +60,7 @@ def triple(name: str, value: Sequence[float], least: float = -math.inf, most: fl
 
 @dataclass(frozen=True)
 class Light:
-    """A directional light, or a point light: as bright at every distance.
+    """A directional light, or a point light, whose light may fade with the distance and outside a cone.
 
     Parameters
     ----------
@@ -70,17 +70,32 @@ class Light:
         Intensity I_i a channel, at least 0.
     position : three floats, optional
         In place of the direction: where a point light is, in the mesh's units.
+    attenuation : three floats
+        ``(k_0, k_1, k_2)`` of a point light, at least 0, see `factor`; ``(1, 0, 0)``: as bright at every
+        distance.
+    spot : three floats, optional
+        Axis of a spot light's cone, from the light, any length but 0; stored as a unit vector. ``None``: the
+        light shines to all sides.
+    cone : two floats, optional
+        Angles from the axis in degrees, inner and outer: full light up to the first, none from the second on.
+        With a spot by default 20 and 30.
 
     Raises
     ------
     ValueError
-        If a number is not finite, the direction is 0, a channel is negative, or there is not exactly one of
-        direction and position.
+        If a number is not finite, a direction is 0, a channel or a coefficient is negative, there is not
+        exactly one of direction and position, or the cone's angles are not ``0 <= inner < outer <= 180``;
+        if a directional light has an attenuation or a spot, or a cone has no axis.
+
+    Source: docs/theory/models.md#lighting, docs/theory/chord.md#local-lights.
     """
 
     direction: Triple | None = None
     color: Triple = (1.0, 1.0, 1.0)
     position: Triple | None = None
+    attenuation: Triple = (1.0, 0.0, 0.0)
+    spot: Triple | None = None
+    cone: tuple[float, float] | None = None
 
     def __post_init__(self):
         if (self.direction is None) == (self.position is None):
@@ -93,6 +108,70 @@ class Light:
                 raise ValueError("a light's direction must not be 0")
             object.__setattr__(self, "direction", tuple(normalise(direction).tolist()))
         object.__setattr__(self, "color", triple("a light's color", self.color, least=0))
+        attenuation = triple("a light's attenuation", self.attenuation, least=0)
+        if not any(attenuation):
+            raise ValueError("a light's attenuation must not be 0, 0, 0")
+        object.__setattr__(self, "attenuation", attenuation)
+        self._check_spot()
+        if self.position is None and self.fades:
+            raise ValueError("a directional light has no distance, attenuation or spot; give it a position")
+
+    def _check_spot(self) -> None:
+        """Axis and angles of a cone."""
+        if self.spot is None:
+            if self.cone is not None:
+                raise ValueError("a light's cone needs the direction of a spot")
+            return
+        axis = triple("a light's spot", self.spot)
+        if not any(axis):
+            raise ValueError("a light's spot must not be 0, 0, 0")
+        object.__setattr__(self, "spot", tuple(normalise(axis).tolist()))
+        inner, outer = (20.0, 30.0) if self.cone is None else map(float, self.cone)
+        if not 0 <= inner < outer <= 180:
+            raise ValueError(
+                f"a light's cone must be inner and outer degrees, 0 <= inner < outer <= 180, not "
+                f"{inner:g} and {outer:g}"
+            )
+        object.__setattr__(self, "cone", (inner, outer))
+
+    @property
+    def fades(self) -> bool:
+        """Whether its light depends on the place: its attenuation is not 1, or it is a spot."""
+        return self.spot is not None or self.attenuation != (1.0, 0.0, 0.0)
+
+    def factor(self, points: np.ndarray | None = None) -> np.ndarray:
+        """Factor a of the light that reaches points, 0 to 1: of the distance d times that of the cone.
+
+        ``min(1 / (k_0 + k_1 d + k_2 d^2), 1) s^2 (3 - 2 s)``, with s = 0 at the cone's outer angle and 1 at
+        its inner one, linear in the cosine of the angle between, and limited to 0 to 1.
+
+        Parameters
+        ----------
+        points : array, shape (..., 3), optional
+            Points; a light that does not fade does not read them.
+
+        Returns
+        -------
+        float64 array
+            Shape () of a light that does not fade, else (...).
+
+        Raises
+        ------
+        ValueError
+            If a light that fades is given no points.
+        """
+        if not self.fades:
+            return np.float64(1)
+        towards = self.towards(points)
+        distance = np.linalg.norm(np.asarray(self.position) - points, axis=-1)
+        k_0, k_1, k_2 = self.attenuation
+        # At most 1 on either way, and finite at any distance.
+        result = 1 / np.maximum(k_0 + distance * (k_1 + distance * k_2), 1.0)
+        if self.spot is not None:
+            inner, outer = np.cos(np.radians(self.cone))
+            share = np.clip((-(towards @ np.asarray(self.spot)) - outer) / (inner - outer), 0, 1)
+            result = result * share**2 * (3 - 2 * share)
+        return result
 
     @property
     def is_on(self) -> bool:
@@ -322,7 +401,8 @@ def intensity(
 ) -> np.ndarray:
     """Intensity of every normal, not saturated.
 
-    ``I = k_a I_a + sum_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6). The cosine of a
+    ``I = k_a I_a + sum_i a_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6), with the
+    `Light.factor` a_i of a light that fades, else 1. The cosine of a
     mirror model, such as Phong's, is R·V with ``R = 2 (N·L) N - L``, that of the others N·H. A light with
     ``N·L <= 0`` gives neither diffuse nor specular; one with ``L = -V`` has no half-way vector and gives no
     specular. A point light gives nothing to the point where it is. k_s is that of `Material.reflection` at
@@ -375,7 +455,9 @@ def intensity(
             highlight_cosine = _dot(normals, halfway)
         constant = distant_cosine(light, viewer if viewer.ndim == 1 else None)
         specular = light.color * material.reflection(constant)
-        _add_light(total, material, light, specular, cosine, highlight_cosine, halfway.any(axis=-1), model)
+        factor = light.factor(points)
+        given = cosine * factor, highlight_cosine, factor
+        _add_light(total, material, light, specular, *given, halfway.any(axis=-1), model)
     return total
 
 
@@ -387,6 +469,7 @@ def intensity_of_cosines(
     highlight_cosine: np.ndarray,
     model: ReflectionModel,
     viewer: ArrayLike | None = None,
+    factor: np.ndarray | None = None,
 ) -> np.ndarray:
     """The same, from what a method gives instead of a normal.
 
@@ -395,9 +478,11 @@ def intensity_of_cosines(
     material, lights, ambient_light, model
         As for `intensity`; of the lights only the colours are read, and for Fresnel's reflection directions.
     cosine, highlight_cosine : arrays, shape (..., lights)
-        N·L and N·H.
+        N·L, of a light that fades times its factor; and N·H.
     viewer : array, shape (3,), optional
         Unit vector V to a distant viewer, for Fresnel's reflection.
+    factor : array, shape (..., lights), optional
+        Factor of each light; ``None``: 1.
 
     Returns
     -------
@@ -408,7 +493,8 @@ def intensity_of_cosines(
     for index, light in enumerate(lights):
         given = cosine[..., index], highlight_cosine[..., index]
         specular = light.color * material.reflection(distant_cosine(light, viewer))
-        _add_light(total, material, light, specular, *given, np.True_, model)
+        own = np.float64(1) if factor is None else factor[..., index]
+        _add_light(total, material, light, specular, *given, own, np.True_, model)
     return total
 
 
@@ -416,14 +502,19 @@ def _dot(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
     return vectors @ others if others.ndim == 1 else np.einsum("...i,...i->...", vectors, others)
 
 
-def _add_light(total, material, light, specular, cosine, highlight_cosine, has_halfway, model) -> None:
-    """Both terms of a light, added in place; without a cosine of the highlight, the diffuse one alone."""
+def _add_light(
+    total, material, light, specular, cosine, highlight_cosine, factor, has_halfway, model
+) -> None:
+    """Both terms of a light, added in place; without a cosine of the highlight, the diffuse one alone.
+
+    The factor is that of the specular term; N·L has it already.
+    """
     color = np.asarray(light.color)
     total += np.maximum(cosine, 0.0)[..., np.newaxis] * (color * material.diffuse)
     if highlight_cosine is not None:
         highlight = model.reflect(highlight_cosine, material.parameter(model))
         highlight = np.where((cosine > 0) & has_halfway, highlight, 0.0)
-        total += highlight[..., np.newaxis] * specular
+        total += (factor * highlight)[..., np.newaxis] * specular
 
 
 def saturate(values: np.ndarray) -> np.ndarray:
