@@ -253,7 +253,7 @@ class Design:
         if self.loads_tables:
             threshold = self._thresholds(constants)[spans.material]
         if isinstance(gate, ValueGate):
-            highlight = self._values(spans, constants[0]).highlight.copy()
+            highlight = self._values(spans, constants[0]).highlight.astype(np.int64)
             short = np.asarray(spans.length) < 3
             # Of two pixels there is none in the middle.
             highlight[short, :, 1] = highlight[short][:, :, ::2].min(axis=-1)

@@ -14,7 +14,7 @@ from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
 from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_slice, pass_beside
-from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape, span_values_shape
+from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape, span_operands_shape
 from blysk.hdl.cosines.chord_values import ChordValuesUnit, light_values_shape
 from blysk.hdl.cosines.span_limit import SpanLimitUnit, octave_limit
 from blysk.hdl.lighting.value_gate import ValueGateUnit
@@ -60,13 +60,21 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         Whether there is u.
     gated : bool
         Whether spans bring a gate's decision for each light, ``lit``.
+    factors : sequence of int
+        Lights that fade, which have a quadratic more.
     """
 
     def __init__(
-        self, parameters: ChordInterpolator, lights: int, *, highlights: bool = True, gated: bool = False
+        self,
+        parameters: ChordInterpolator,
+        lights: int,
+        *,
+        highlights: bool = True,
+        gated: bool = False,
+        factors: Sequence[int] = (),
     ):
         self.parameters = p = parameters
-        self.gated = gated
+        self.gated, self.factors = gated, tuple(factors)
         self.functions = ("diffuse", "highlight") if highlights else ("diffuse",)
         span = {
             "start": light_values_shape(lights, highlights=highlights),
@@ -75,9 +83,13 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         }
         if gated:
             span["lit"] = unsigned(lights)
-        super().__init__(
-            data.StructLayout(span), operands_shape(p, lights, highlights=highlights, gated=gated)
-        )
+        if self.factors:
+            count = len(self.factors)
+            differences = chord_differences_shape(lights, highlights, p.setup, count)
+            span["factors"] = differences["factors"].shape
+            span["factor_start"] = data.ArrayLayout(FixedShape(p.setup.DIFFUSE_FORMAT), count)
+        output = operands_shape(p, lights, highlights=highlights, gated=gated, factored=bool(self.factors))
+        super().__init__(data.StructLayout(span), output)
 
     def carried(self, values):
         """The decision of each light."""
@@ -94,6 +106,9 @@ class ChordAccumulatorUnit(AccumulatorUnit):
                 words = start[name], light[name].first, light[name].second
                 value = result["cosine" if name == "diffuse" else name]
                 yield f"{name}_{index}", self.parameters.accumulators[name], words, value
+        for index, light in enumerate(self.factors):
+            words = span.factor_start[index], span.factors[index].first, span.factors[index].second
+            yield f"factor_{light}", self.parameters.accumulators["factor"], words, values[light].factor
 
 
 class ChordSpansUnit(wiring.Component):
@@ -116,10 +131,12 @@ class ChordSpansUnit(wiring.Component):
         Bits of the length.
     gate : ValueGateUnit or None
         Decides which spans have no highlight; ``None``: nothing does.
+    factors : sequence of int
+        Lights that fade.
 
     Members
     -------
-    i : :py:`In(stream.Signature(StructLayout({"values": span_values_shape(...), "length": length_bits})))`
+    i : :py:`In(stream.Signature(span_operands_shape(lights, highlights, length_bits, len(factors))))`
         Spans of one pixel, of which the first value counts, or of three and more.
     long : :py:`In(1)`
         Whether the span that is offered has more than one pixel: its source knows without the length.
@@ -142,36 +159,32 @@ class ChordSpansUnit(wiring.Component):
         highlights: bool = True,
         length_bits: int = LENGTH_BITS,
         gate: ValueGateUnit | None = None,
+        factors: Sequence[int] = (),
     ):
         self._gate = gate
+        self._factors = len(factors)
         self._setup = ChordSetupUnit(
             parameters.setup,
             lights,
             initiation_interval=initiation_interval,
             length_bits=length_bits,
             highlights=highlights,
+            factors=self._factors,
         )
         self.multipliers = self._setup.multipliers
         gated = gate is not None
-        self._accumulator = ChordAccumulatorUnit(parameters, lights, highlights=highlights, gated=gated)
+        self._accumulator = ChordAccumulatorUnit(
+            parameters, lights, highlights=highlights, gated=gated, factors=factors
+        )
         self.latency = self._setup.latency + self._accumulator.latency
         waits = FIFO_LATENCY + (gate.latency if gate else 0)
         self.short_latency = waits + self._accumulator.latency
-        output = operands_shape(parameters, lights, highlights=highlights, gated=gated)
+        span = span_operands_shape(lights, highlights, length_bits, self._factors)
         super().__init__(
             {
-                "i": In(
-                    stream.Signature(
-                        data.StructLayout(
-                            {
-                                "values": span_values_shape(lights, highlights),
-                                "length": unsigned(length_bits),
-                            }
-                        )
-                    )
-                ),
+                "i": In(stream.Signature(span)),
                 "long": In(1),
-                "o": Out(stream.Signature(output)),
+                "o": Out(stream.Signature(self._accumulator.o.payload.shape())),
                 "out_of_range": Out(1),
             }
             | (gate.ports if gated else {})
@@ -185,9 +198,10 @@ class ChordSpansUnit(wiring.Component):
         span = self.i.payload
         functions = span["values"][0].shape().members
         joined = accumulator.i
-        start_shape = data.StructLayout(
-            {"start": joined.payload.start.shape(), "length": span.length.shape(), "long": 1}
-        )
+        start = {"start": joined.payload.start.shape(), "length": span.length.shape(), "long": 1}
+        if self._factors:
+            start["factor_start"] = joined.payload.factor_start.shape()
+        start_shape = data.StructLayout(start)
         # As many starts as may follow a span that has just begun its setup, or come before it: its values may
         # take an interval, in which none comes.
         depth = setup.latency + setup.initiation_interval + FIFO_LATENCY + 1
@@ -223,6 +237,13 @@ class ChordSpansUnit(wiring.Component):
             setup.o.ready.eq(joined.ready & starts.r_rdy & decided & taken.long),
             self.out_of_range.eq(setup.o.valid & setup.o.ready & setup.o.payload.out_of_range),
         ]
+        for index in range(self._factors):
+            m.d.comb += [
+                given.factor_start[index].eq(span.factors[index][0]),
+                joined.payload.factor_start[index].eq(taken.factor_start[index]),
+            ]
+        if self._factors:
+            m.d.comb += joined.payload.factors.eq(setup.o.payload.factors)
         connect(m, accumulator.o, wiring.flipped(self.o))
         return m
 
