@@ -163,10 +163,11 @@ class Light:
         if not self.fades:
             return np.float64(1)
         towards = self.towards(points)
-        distance = np.linalg.norm(np.asarray(self.position) - points, axis=-1)
+        # No distance that matters overflows.
+        distance = np.linalg.norm(np.clip(np.asarray(self.position) - points, -1e100, 1e100), axis=-1)
         k_0, k_1, k_2 = self.attenuation
-        # At most 1 on either way, and finite at any distance.
-        result = 1 / np.maximum(k_0 + distance * (k_1 + distance * k_2), 1.0)
+        with np.errstate(over="ignore"):
+            result = 1 / np.maximum(k_0 + distance * (k_1 + distance * k_2), 1.0)
         if self.spot is not None:
             inner, outer = np.cos(np.radians(self.cone))
             share = np.clip((-(towards @ np.asarray(self.spot)) - outer) / (inner - outer), 0, 1)

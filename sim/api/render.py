@@ -7,7 +7,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -399,7 +399,8 @@ def _design(settings: Settings) -> Design:
     if local and not made.takes_values:
         reason = "point lights and a near viewer need the values of a span"
         raise settings.refuse("method", reason, "use chord-local")
-    return made
+    fading = [index for index, light in enumerate(lights) if light.fades]
+    return replace(made, factors=fading) if made.specular else made
 
 
 def _specialised(scenes: Sequence[Scene], design: Design, settings: Settings) -> Specialisation:
