@@ -241,9 +241,6 @@ class ShadingPipelineUnit(wiring.Component):
             self._tables = LobeMemory(p.specular, p.specular.fixed_tables, p.lights)
         # In the compact style a colour takes a cycle a channel at least.
         interval = max(kind.compact_interval(p.specular, exponent), p.intensity.channels) if compact else 1
-        # In lockstep all take as long as one that fades.
-        waits = None if compact or not p.factors else False
-        fades = (index in p.factors or waits for index in range(p.lights))
         return [
             LightUnit(
                 p.specular,
@@ -252,9 +249,10 @@ class ShadingPipelineUnit(wiring.Component):
                 exponent=exponent,
                 shares_slope=self._slope is not None or self._tables is not None,
                 gated=p.gate,
-                fades=of_light,
+                # In lockstep all take as long as one that fades.
+                fades=index in p.factors or (None if compact or not p.factors else False),
             )
-            for of_light in fades
+            for index in range(p.lights)
         ]
 
     @property

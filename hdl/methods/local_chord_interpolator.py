@@ -9,7 +9,7 @@ from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import connect
 from blysk.hdl.cosines.chord_setup import span_operands_shape
-from blysk.hdl.methods.chord_interpolator import ChordSpansUnit
+from blysk.hdl.methods.chord_spans import ChordSpansUnit
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 
 __all__ = ["LocalChordInterpolatorUnit"]
