@@ -38,6 +38,7 @@ from blysk.sim.meshes.mesh import LoadedMesh
 from blysk.sim.output import atomic_writer
 
 __all__ = [
+    "BUILDING",
     "SPECIALISING",
     "Engine",
     "RenderedFrame",
@@ -49,6 +50,9 @@ __all__ = [
 
 SPECIALISING = "finding out what the scene needs"
 """Stage of `prepare_rendering` in which a specialisation is found."""
+
+BUILDING = "building the model"
+"""Stage of `prepare_rendering` in which the hardware is compiled; what makes that long is said after it."""
 
 Engine = Literal["auto", "cxxrtl", "pysim"]
 """``"auto"``: compiled, or Amaranth's simulator where no C++ compiler works."""
@@ -322,7 +326,7 @@ def prepare_rendering(
             constants_of(scenes[0], made)
             stage(SPECIALISING if settings["specialise"] else "")
             smallest = _specialised(scenes, made, settings)
-            stage(f"building the model{_large(smallest.design)}")
+            stage(f"{BUILDING}{_large(smallest.design)}")
             try:
                 used = "pysim" if engine == "pysim" else "cxxrtl"
                 simulator = _simulator(smallest.design, scenes[0], settings, used)
@@ -344,8 +348,8 @@ def prepare_rendering(
 def _large(design: Design) -> str:
     """What a design has many of, which takes time where it is simulated for the first time."""
     counts = {"lights": design.lights, "materials": design.materials}
-    many = ", ".join(f"{count:,} {what}" for what, count in counts.items() if count > 2)
-    return f" of {many}: up to a minute, once" if many else ""
+    many = ", ".join(f"{count:,} {what}" for what, count in counts.items() if count > 4)
+    return f" of {many}: up to a minute the first time" if many else ""
 
 
 def _simulator(
