@@ -122,6 +122,7 @@ class Design:
             matching = replace(self.specular, operand=self.interpolator.operand)
             object.__setattr__(self, "specular", matching)
         Intensity(self.lights)
+        self._match_scale()
         if not 1 <= self.materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {self.materials}")
         if self.loads_tables:
@@ -137,6 +138,14 @@ class Design:
         object.__setattr__(self, "factors", tuple(self.factors))
         if self.factors:
             self._check_factors()
+
+    def _match_scale(self) -> None:
+        """Give the lobe the scale of the method's operand."""
+        scale = getattr(self.interpolator, "scale", 0)
+        if scale and not self.loads_tables:
+            raise ValueError("a scale of 1 - N·H needs a lobe with a table")
+        if self.loads_tables and self.specular.scale != scale:
+            object.__setattr__(self, "specular", replace(self.specular, scale=scale))
 
     def _check_factors(self) -> None:
         """Refuse factors of lights that there are not, or that nothing takes."""
@@ -168,13 +177,24 @@ class Design:
             return material.exponent
         return self.specular.model.steepness(self.highlight_parameter(material))
 
-    def for_materials(self, materials: Sequence[Material]) -> "Design":
-        """The same design for materials, with a bank for each of their lobes, at most `Lobe.MAX_BANKS`."""
-        specular = self.specular
+    def for_materials(self, materials: Sequence[Material], scaled: bool = True) -> "Design":
+        """The same design for materials, with a bank for each of their lobes, at most `Lobe.MAX_BANKS`.
+
+        Parameters
+        ----------
+        materials : sequence of Material
+            Of the scene.
+        scaled : bool
+            Whether the chord methods may have a scale for sharp lobes, see `Lobe.scale_of`: of spans that are
+            cut for the design.
+        """
+        specular, interpolator = self.specular, self.interpolator
         if isinstance(specular, Lobe) and specular.fixed is None:
-            lobes = len({self.highlight_parameter(material) for material in materials})
-            specular = replace(specular, banks=min(lobes, Lobe.MAX_BANKS))
-        return replace(self, materials=len(materials), specular=specular)
+            lobes = {self.highlight_parameter(material): None for material in materials}
+            specular = replace(specular, banks=min(len(lobes), Lobe.MAX_BANKS))
+            if scaled and isinstance(interpolator, ChordInterpolator):
+                interpolator = replace(interpolator, scale=specular.scale_of(list(lobes)))
+        return replace(self, materials=len(materials), specular=specular, interpolator=interpolator)
 
     def built(self, **changes) -> "Design":
         """The same design with other values of its `Build`."""

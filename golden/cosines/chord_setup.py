@@ -44,13 +44,15 @@ class SpanValues(NamedTuple):
     highlight: np.ndarray
 
     @classmethod
-    def quantise(cls, diffuse: np.ndarray, highlight: np.ndarray) -> "SpanValues":
+    def quantise(cls, diffuse: np.ndarray, highlight: np.ndarray, scale: int = 0) -> "SpanValues":
         """Nearest codes of exact values.
 
         Parameters
         ----------
         diffuse, highlight : float64 arrays, shape (spans, lights, 3)
             N·L, -1 to 1, and u, 0 to 2.
+        scale : int
+            s: over 0, the words of u are ``min(2^s u, 1)``; see `ChordValues`.
 
         Raises
         ------
@@ -58,6 +60,8 @@ class SpanValues(NamedTuple):
             If a value is out of range.
         """
         one = float(ONE_SQUARED.values)
+        if scale:
+            highlight = np.minimum(np.ldexp(highlight, scale), 1)
         return cls(
             Fixed.round(ChordSetup.DIFFUSE_FORMAT, np.multiply(diffuse, one)).codes,
             Fixed.round(ChordSetup.HIGHLIGHT_FORMAT, np.multiply(highlight, one)).codes,
@@ -129,6 +133,19 @@ class ChordSetup:
     DIFFUSE_SLOPE_FORMAT = SQ(0, 18)
     HIGH_FORMAT = SQ(0, 18)
     LOW_FORMAT = UQ(-18, 26)
+    MOST_SCALE = 6
+
+    @classmethod
+    def check_scale(cls, scale: int) -> None:
+        """Refuse a scale of u that is out of range, see `ChordValues`.
+
+        Raises
+        ------
+        ValueError
+            If it is not 0 to `MOST_SCALE`.
+        """
+        if scale not in range(cls.MOST_SCALE + 1):
+            raise ValueError(f"scale must be 0 to {cls.MOST_SCALE}, not {scale}")
 
     def __post_init__(self):
         if self.fraction_bits not in range(36, 47, 2):

@@ -83,7 +83,7 @@ def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarra
     interpolator = design.interpolator
     if isinstance(interpolator, ChordInterpolator):
         fading = [index for index, light in enumerate(scene.lights) if light.fades]
-        operands = local_operands(scene, raster, factors=fading)
+        operands = local_operands(scene, raster, factors=fading, scale=interpolator.scale)
         cosine, one_minus_cosine, *given = interpolator.exact_operands(
             operands[0], raster.length, operands[1]
         )

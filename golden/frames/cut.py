@@ -230,6 +230,13 @@ class _Pieces:
 
     def miss(self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray) -> np.ndarray:
         """Whether the curve of a method is too far from the exact one; bool, shape (pieces,)."""
+        if isinstance(interpolator, ChordInterpolator) and interpolator.scale:
+            scaled = tuple(place.scaled(interpolator.scale) for place in self.places)
+            return replace(self, places=scaled)._miss(interpolator, limits, material)
+        return self._miss(interpolator, limits, material)
+
+    def _miss(self, interpolator, limits, material) -> np.ndarray:
+        """The same, of places with u as the method's words have it."""
         pixels = (self.last - self.first + 1)[:, np.newaxis]
         chord = isinstance(interpolator, ChordInterpolator)
         # A curve through three values, or through two, has pixels between them from so many on.
@@ -344,7 +351,7 @@ class _Pieces:
             for name in ("diffuse", "highlight")
         )
         # Values are off by the rounding of N, L and H.
-        near = limit.least(highlight) / 2 < lit[:, np.newaxis] + 1e-4
+        near = limit.least(highlight) / 2 < lit[:, np.newaxis] + 1e-4 * 2**interpolator.scale
         near &= diffuse.max(axis=2) > float(limit.BEHIND.values) - 1e-4
         wide = (angle > limit.WIDEST) | ((angle > angles) & near.any(axis=1))
         return flagged | (wide & (self.last - self.first + 1 >= limit.SHORTEST))

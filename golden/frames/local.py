@@ -85,6 +85,10 @@ class SurfacePoints:
         highlight = np.where(halfway.any(axis=2).T, highlight, 2.0)
         return cls(normal, viewer, direction, np.clip(diffuse, -1, 1), np.clip(highlight, 0, 2), factor)
 
+    def scaled(self, scale: int) -> "SurfacePoints":
+        """The same places with ``min(2^s u, 1)`` in place of u."""
+        return replace(self, highlight=np.minimum(np.ldexp(self.highlight, scale), 1)) if scale else self
+
     def with_normal(self, normal: np.ndarray, chord: bool) -> "SurfacePoints":
         """The same places with other normals, shape (count, 3): f, and u as the squared chord or 1 - N·H."""
         diffuse = np.einsum("sk,lsk->sl", normal, self.direction) * self.factor
@@ -135,7 +139,11 @@ def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> Spa
 
 
 def local_operands(
-    scene: Scene, raster: Raster, lights: int | None = None, factors: Sequence[int] = ()
+    scene: Scene,
+    raster: Raster,
+    lights: int | None = None,
+    factors: Sequence[int] = (),
+    scale: int = 0,
 ) -> tuple[SpanValues, np.ndarray | None]:
     """`local_values`, and codes of the factors of some lights at the same three places.
 
@@ -145,6 +153,8 @@ def local_operands(
         As for `local_values`.
     factors : sequence of int
         Indices of the lights whose factors are wanted.
+    scale : int
+        Of u, see `SpanValues.quantise`.
 
     Returns
     -------
@@ -171,7 +181,7 @@ def local_operands(
             for values, of_place in zip(operands, found, strict=True):
                 values[has[part], :given, place] = of_place
     diffuse, highlight, factor = operands
-    values = SpanValues.quantise(diffuse, highlight)
+    values = SpanValues.quantise(diffuse, highlight, scale)
     if not factors:
         return values, None
     wanted = factor[:, list(factors)]

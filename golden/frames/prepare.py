@@ -91,7 +91,8 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
     """
     spans = quantise_spans(cut, scene.mesh.material)
     if design.takes_values:
-        values, factors = local_operands(scene, cut, design.lights, design.factors)
+        scale = getattr(design.interpolator, "scale", 0)
+        values, factors = local_operands(scene, cut, design.lights, design.factors, scale)
         spans = replace(spans, values=values, factors=factors)
     elif design.interpolator.takes_line:
         left, right = quantise_line(*line_ends(cut))

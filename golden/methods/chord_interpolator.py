@@ -58,6 +58,9 @@ class ChordInterpolator(Interpolator):
     ----------
     fraction_bits : int
         Of the setup.
+    scale : int
+        s: the words of u are ``min(2^s u, 1)``, for a lobe that is 0 from ``2^-s`` on; see `ChordValues` and
+        `Lobe.scale_of`.
 
     Raises
     ------
@@ -68,6 +71,7 @@ class ChordInterpolator(Interpolator):
     """
 
     fraction_bits: int = 46
+    scale: int = 0
 
     operand: ClassVar = "one_minus_cosine"
     COSINE_FORMAT = SQ(2, 25)
@@ -82,6 +86,7 @@ class ChordInterpolator(Interpolator):
 
     def __post_init__(self):
         _ = self.setup
+        ChordSetup.check_scale(self.scale)
 
     @property
     def name(self):
@@ -116,7 +121,7 @@ class ChordInterpolator(Interpolator):
         words = chord + chord**2, chord**2
         values, setup = ChordValues, self.setup
         errors = (
-            1.25 * values.highlight_error(2.0) + setup.highlight_error(*words),
+            2**self.scale * 1.25 * values.highlight_error(2.0) + setup.highlight_error(*words),
             1.25 * values.diffuse_error() + setup.diffuse_error(*words),
         )
         return float(max(errors)) + Specular.ARGUMENT_FORMAT.step
@@ -128,8 +133,9 @@ class ChordInterpolator(Interpolator):
         values = self.values(normal_left, normal_middle, normal_right, direction, halfway)
         return self.compute_values(values, length)
 
-    @staticmethod
-    def values(left: Fixed, middle: Fixed, right: Fixed, direction: Fixed, halfway: Fixed) -> SpanValues:
+    def values(
+        self, left: Fixed, middle: Fixed, right: Fixed, direction: Fixed, halfway: Fixed
+    ) -> SpanValues:
         """Bit-accurate values of spans at three normals, each of shape (spans, 3).
 
         Parameters
@@ -139,7 +145,9 @@ class ChordInterpolator(Interpolator):
         direction, halfway : Fixed, shape (lights, 3), SQ(1, 17)
             Unit vectors L and H of each light.
         """
-        three = [ChordValues().compute(normal, direction, halfway) for normal in (left, middle, right)]
+        three = [
+            ChordValues(self.scale).compute(normal, direction, halfway) for normal in (left, middle, right)
+        ]
         return SpanValues(*(np.stack([place[k].codes for place in three], axis=-1) for k in range(2)))
 
     def compute_values(
@@ -201,6 +209,7 @@ class ChordInterpolator(Interpolator):
         Returns
         -------
         cosine, one_minus_cosine : float64 arrays, shape (pixels, lights)
+            The latter without the scale, but up to ``2^-s`` alone.
         factor : float64 array, shape (pixels, fading lights)
             Only where it is given.
         """
@@ -215,6 +224,7 @@ class ChordInterpolator(Interpolator):
             square = 2 * (left + right - 2 * middle)
             slope = right - left - square
             results.append(left[span] + t * (slope[span] + t * square[span]))
+        results[1] = np.ldexp(results[1], -self.scale)
         return tuple(results)
 
     def highlight_tolerance(self, exponent: np.ndarray, u: np.ndarray) -> np.ndarray:

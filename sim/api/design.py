@@ -194,6 +194,8 @@ def header_of(unit: ShadingUnit) -> list[str]:
             f"i_values: a light's three codes of N.L, {formats[0]}, and three of 1 - N.H, {formats[1]},",
             "times (1 - 2^-17)^2: at the first pixel, the middle, the last pixel; no L and H are read",
         ]
+        if scale := made.interpolator.scale:
+            lines.append(f"1 - N.H is times {1 << scale}, and 1 at most; so it is in the table")
         if made.factors:
             lines += [
                 f"i_factors: three codes of the factor a, 0 to 1, in {formats[0]}, times (1 - 2^-17)^2, of "

@@ -321,7 +321,7 @@ def prepare_rendering(
         while True:
             scenes = tuple(scenes_of(loaded, settings, frames or 1))
             if design is None:
-                made = made.for_materials(scenes[0].materials)
+                made = made.for_materials(scenes[0].materials, settings["geometry"] == "software")
             _check_lobes(scenes[0], made, settings)
             constants_of(scenes[0], made)
             stage(SPECIALISING if settings["specialise"] else "")

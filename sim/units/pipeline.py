@@ -298,6 +298,7 @@ LONG_DESIGNS: dict[str, Design] = {
     "renormalise, power, compact": preset("renormalise", "blinn_product", style="compact"),
     "quadratic, power": preset("quadratic", "blinn_product"),
     "values, 2 lights": preset("chord-local", lights=2),
+    "sharp lobe": preset("chord", "ggx", 2, scale=6, gate=True),
     "values, 2 lights, one fades, compact, gate": preset(
         "chord-local", "lyon3", 2, factors=(0,), gate=True, style="compact"
     ),
