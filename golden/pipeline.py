@@ -178,7 +178,7 @@ class Design:
         return self.specular.model.steepness(self.highlight_parameter(material))
 
     def for_materials(self, materials: Sequence[Material], scaled: bool = True) -> "Design":
-        """The same design for materials, with a bank for each of their lobes, at most `Lobe.MAX_BANKS`.
+        """The same design for materials: a bank for each of their lobes, at most `Lobe.MAX_BANKS`; its steps.
 
         Parameters
         ----------
@@ -191,7 +191,7 @@ class Design:
         specular, interpolator = self.specular, self.interpolator
         if isinstance(specular, Lobe) and specular.fixed is None:
             lobes = {self.highlight_parameter(material): None for material in materials}
-            specular = replace(specular, banks=min(len(lobes), Lobe.MAX_BANKS))
+            specular = replace(specular, banks=min(len(lobes), Lobe.MAX_BANKS)).for_parameters(list(lobes))
             if scaled and isinstance(interpolator, ChordInterpolator):
                 interpolator = replace(interpolator, scale=specular.scale_of(list(lobes)))
         return replace(self, materials=len(materials), specular=specular, interpolator=interpolator)
