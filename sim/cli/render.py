@@ -221,7 +221,13 @@ def _animation(
     start = perf_counter()
     smallest = ready.specialisation
     animation = Animation(
-        smallest.scenes[0], smallest.design, ready.engine, ready.design, ready.pipes, ready.setups
+        smallest.scenes[0],
+        smallest.design,
+        ready.engine,
+        ready.design,
+        ready.pipes,
+        ready.setups,
+        ready.coarse,
     )
     cameras = [scene.camera for scene in ready.scenes]
     if address:
