@@ -79,8 +79,8 @@ class Lobe(HighlightOperand):
 
     *Error of u.* It comes on top, times the slope of the lobe: n for Blinn's power, ``4/alpha^2`` for
     ``ggx``. A step of 2^-25 is 0.008 LSB for n = 1000, and for ``ggx`` 0.3 LSB at alpha = 0.01, 4.9 at
-    0.0025: there B should be 30, or `scale` 6. With the operand ``cosine``, u is in units of `ONE_SQUARED`, and so too
-    small by ``2^-16 u``: under 0.002 LSB for either lobe. It is cut to B bits, another step. But a cosine
+    0.0025: there B is 30, or `scale` 6. With the operand ``cosine``, u is in units of `ONE_SQUARED`, and so
+    too small by ``2^-16 u``: under 0.002 LSB for either lobe. It is cut to B bits, another step. But a cosine
     also feels the length of the normal: a code that is off by 2^-18 in length moves u by as much, which is 1
     LSB for n = 1000. The chord form (operand ``one_minus_cosine``) feels that length at second order only.
 

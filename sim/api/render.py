@@ -409,8 +409,7 @@ def _design(settings: Settings) -> Design:
     if local and not made.takes_values:
         reason = "point lights and a near viewer need the values of a span"
         raise settings.refuse("method", reason, "use chord-local")
-    fading = [index for index, light in enumerate(lights) if light.fades]
-    return replace(made, factors=fading) if made.specular else made
+    return replace(made, factors=[index for index, light in enumerate(lights) if light.fades])
 
 
 def _specialised(scenes: Sequence[Scene], design: Design, settings: Settings) -> Specialisation:
