@@ -15,7 +15,6 @@ from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.emit.cost import cost_of
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.record import STALLS, Case, UnitRun
-from blysk.sim.units.record import first as first_of
 
 from ...checks import assert_equals_model
 
@@ -48,18 +47,15 @@ class GraphUnit(PipelinedUnit):
 
 
 def verify(unit, beats, expected):
-    """Under every pattern of stalls; some beats in Amaranth's simulator, too."""
+    """Under every pattern of stalls."""
     rng = np.random.default_rng(2026)
     for shares in STALLS:
         names, periods = ("input_stalls", "output_stalls"), (997, 1009)
         stalls = {name: rng.random(n) < s for name, n, s in zip(names, periods, shares, strict=True) if s}
-        assert_equals_model(unit, UnitRun(Case(beats), expected, None, stalls))
-        run = UnitRun(Case(first_of(beats, 20)), first_of(expected, 20), None, stalls)
-        slow, fast = (assert_equals_model(unit, run, engine) for engine in ("pysim", "auto"))
-        np.testing.assert_array_equal(slow.cycles, fast.cycles)
+        assert_equals_model(unit, UnitRun(Case(beats), expected, None, stalls), "pysim")
 
 
-def beats_of(rng, count=200):
+def beats_of(rng, count=100):
     a, b = rng.integers(-(2**17), 2**17, (2, count))
     ends = [-(2**17), 2**17 - 1]
     a[:4], b[:4] = np.repeat(ends, 2), np.tile(ends, 2)
@@ -232,10 +228,10 @@ def test_spaced_graphs_at_any_distance(interval, seed):
     beats = beats_of(rng)
     expected = graph.compute(beats)
     verify(unit, beats, expected)
-    distances = rng.integers(interval, 3 * interval + 1, 199)
+    distances = rng.integers(interval, 3 * interval + 1, 99)
     stalls = np.ones(int(distances.sum()) + 2, dtype=bool)
     stalls[np.r_[0, np.cumsum(distances)]] = False
-    run = simulate(unit, beats, count=200, engine="auto", input_stalls=stalls)
+    run = simulate(unit, beats, count=100, engine="pysim", input_stalls=stalls)
     for name, words in expected.items():
         np.testing.assert_array_equal(run.beats[name], words)
     # None has to wait for more than the interval.
