@@ -33,7 +33,7 @@ DESIGNS = {
 }
 
 
-QUICK = "chord", "materials, lights, gate", "values"
+QUICK = ("materials, lights, gate",)
 
 
 def colors(beats):
@@ -109,7 +109,8 @@ def test_gate_by_threshold():
         HighlightGateUnit(p, exponent=20, takes_threshold=True)
 
 
-@pytest.mark.parametrize("lights", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("lights", [1, 2])
 def test_one_multiplier_a_light(lights):
     """One fewer than cosine-quadratic light has, which multiplies by its slope; 17 fewer than by products."""
     multipliers = {
@@ -134,9 +135,8 @@ def test_rate_is_that_of_cosquad():
     assert units[0].cycles_per_pixel == 1
 
 
-@pytest.mark.parametrize(
-    ("lights", "materials"), [(2, 4), *(pytest.param(n, 1, marks=pytest.mark.long) for n in (1, 3))]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("lights", "materials"), [(2, 4), (1, 1), (3, 1)])
 def test_one_memory_for_all_lights(lights, materials):
     """One of 336 words of 35 bits a bank, in one place, whatever the lights."""
     with_table, without = (

@@ -68,7 +68,7 @@ def test_every_triangle_of_a_small_grid():
 def test_every_sample_of_a_shared_edge_is_drawn_once(step):
     """Triangulations of random points, on the grid, on sixteenths of a pixel, on its centres and borders."""
     rng, grid, frame = np.random.default_rng(step), Grid(), Frame(-20, -20, 20, 20)
-    for _ in range(40):
+    for _ in range(12):
         points = np.unique(rng.integers(-12 * 256 // step, 12 * 256 // step, (60, 2)), axis=0) * step
         mesh = Delaunay(points)
         _, y, begin, end = spans(triangles_of(points[mesh.simplices]), frame, grid)

@@ -20,7 +20,7 @@ STATED = [
 
 
 @pytest.mark.parametrize(
-    ("lights", "interval", "multipliers", "shifters", "latency"), mostly_long(STATED, STATED[2])
+    ("lights", "interval", "multipliers", "shifters", "latency"), mostly_long(STATED, STATED[4])
 )
 def test_times_and_parts(lights, interval, multipliers, shifters, latency):
     """14 products a span and 32 a light, as even as the interval allows; all of 18 bits."""

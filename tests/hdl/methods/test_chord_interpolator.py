@@ -4,6 +4,8 @@
 `tests.test_units` holds both units against their models under stalls.
 """
 
+from functools import cache
+
 import numpy as np
 import pytest
 from amaranth.hdl import ResetInserter, Signal, Value
@@ -35,6 +37,12 @@ def local(lights=1, **options):
 
 
 RECORDS = {chord: CHORD, local: LOCAL}
+
+
+@cache
+def unit_of(make, with_gate=False):
+    """One light, by the default options, the same for all tests: it is compiled once."""
+    return make(gate=gated(1)) if with_gate else make()
 
 
 def case_of(make, unit, length, seed=1):
@@ -72,6 +80,7 @@ def test_multipliers_and_latency(make, lights, interval):
     assert run.cycles[0] == run.input_cycles[0] + unit.latency
 
 
+@pytest.mark.long
 def test_highlights_and_gates_cost_no_multiplier_a_pixel():
     assert cost_of(chord(highlights=False)).multiplier_count == 6
     assert cost_of(chord(gate=gated(1))).multiplier_count == 9
@@ -102,7 +111,7 @@ LENGTHS = {
 @pytest.mark.parametrize("with_gate", [False, True])
 def test_a_pixel_in_every_cycle(make, length, with_gate):
     """Spans of any length, mixed: from the first pixel of a long span on one in every cycle."""
-    unit = make(gate=gated(1)) if with_gate else make()
+    unit = unit_of(make, with_gate)
     # A span of three pixels comes first: short ones then wait for it, and none comes before its turn.
     length = np.array([3, *length])
     case = case_of(make, unit, length)
@@ -116,7 +125,7 @@ def test_a_pixel_in_every_cycle(make, length, with_gate):
 @pytest.mark.parametrize("length", [1, 2])
 def test_short_spans_come_sooner(make, length):
     """By the cycles of the setup: nothing of them goes through it."""
-    unit = make()
+    unit = unit_of(make)
     case = case_of(make, unit, np.full(50, length))
     run = simulate(unit, case.beats, count=50 * length, constants=case.constants, engine="auto")
     np.testing.assert_array_equal(run.cycles, run.cycles[0] + np.arange(50 * length))
@@ -127,8 +136,8 @@ def test_short_spans_come_sooner(make, length):
 @pytest.mark.parametrize("interval", [3, *(pytest.param(k, marks=pytest.mark.long) for k in (9, 18))])
 def test_cycles_of_a_span(interval):
     """A span of k pixels takes ``min(k, 3)`` turns of the values, or its pixels, whichever is more."""
+    unit = chord(setup_interval=interval)
     for length in (1, 2, 3, 4, 9, 20, 40):
-        unit = chord(setup_interval=interval)
         count = 30
         case = case_of(chord, unit, np.full(count, length))
         run = simulate(unit, case.beats, count=count * length, constants=case.constants, engine="auto")
@@ -141,7 +150,7 @@ def test_cycles_of_a_span(interval):
 @pytest.mark.parametrize("make", [chord, local])
 def test_waiting_output_holds_the_input(make):
     """While no pixel is taken as many spans enter as fit, then none; afterwards all leave in a row."""
-    unit = make()
+    unit = unit_of(make)
     length = np.tile([4, 1, 3, 2], 40)
     case = case_of(make, unit, length)
     stalls = np.zeros(2000, dtype=bool)
