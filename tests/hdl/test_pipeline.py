@@ -61,7 +61,7 @@ def intervals():
                 quick = interval in (choice[0], choice[-1]) and method in ("quadratic", "chord")
                 marks = () if quick else pytest.mark.long
                 yield pytest.param(method, interval, marks=marks)
-        yield method, None
+        yield pytest.param(method, None, marks=pytest.mark.long if method == "bisection" else ())
 
 
 @pytest.mark.parametrize(("method", "interval"), list(intervals()))
@@ -240,7 +240,7 @@ def test_every_method_with_every_model(method, model):
         pytest.param("bisection", 89.99, 90.1, 50, marks=pytest.mark.long),
         ("quadratic", 44.99, 45.1, 50),
         pytest.param("quadratic-horner", 44.99, 45.1, 50, marks=pytest.mark.long),
-        ("angular", 150.0, 180.0, 50),
+        pytest.param("angular", 150.0, 180.0, 50, marks=pytest.mark.long),
     ],
 )
 def test_spans_out_of_range_are_counted(method, in_range, out_of_range, flagged):
@@ -293,10 +293,9 @@ LEFT_OUT = {
 }
 
 
-@pytest.mark.parametrize("style", ["throughput", pytest.param("compact", marks=pytest.mark.long)])
-@pytest.mark.parametrize(
-    "part", [pytest.param(k, marks=() if k == "all" else pytest.mark.long) for k in LEFT_OUT]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("part", LEFT_OUT)
 def test_less_hardware_shades_the_same(part, style):
     """A scene that does not need a part has the pixels of the full pipeline without it, and it costs less."""
     rng = np.random.default_rng(5)
@@ -320,6 +319,7 @@ def test_less_hardware_shades_the_same(part, style):
         assert less.multiplier_count < more.multiplier_count
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("never_built")
 def test_multipliers():
     """Without lights none; compact a colour one, a term one; products with normals two a light.

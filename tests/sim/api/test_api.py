@@ -152,18 +152,20 @@ def test_without_a_compiler(monkeypatch):
     with pytest.warns(RuntimeWarning, match=r"^pysim at 8x6 instead of cxxrtl, no working C\+\+ compiler"):
         frame = blysk.render("teapot", method="linear", **TINY)
     assert (frame.engine, frame.image.shape) == ("pysim", (6, 8, 3))
+    scene = blysk.scene(triangles=100, size=(9, 7))
     with pytest.warns(RuntimeWarning, match=r"^pysim instead of cxxrtl"):
-        assert blysk.render(blysk.scene(**TINY), method="linear").image.shape == (12, 16, 3)
+        assert blysk.render(scene, method="linear").image.shape == (7, 9, 3)
     with pytest.raises(blysk.CompilerMissing):
         blysk.render("teapot", method="linear", engine="cxxrtl", **TINY)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "options",
     [
         {"method": "linear"},
-        pytest.param({"method": "linear", "specialise": True}, marks=pytest.mark.long),
-        pytest.param({}, marks=pytest.mark.long),
+        {"method": "linear", "specialise": True},
+        {},
     ],
     ids=str,
 )
