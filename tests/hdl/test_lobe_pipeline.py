@@ -65,7 +65,7 @@ def test_equals_model(design):
 
 def test_a_frame_loads_its_own_tables():
     """Tables of the frame before, in every bank, are gone."""
-    design = preset("chord", "ggx", materials=3, gate=True)
+    design = DESIGNS["materials, lights, gate"]
     unit = ShadingPipelineUnit(design)
     spans, constants = _sample(design)
     material = Material((0.1,) * 3, (0.5,) * 3, (0.6,) * 3, 10)

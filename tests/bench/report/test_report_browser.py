@@ -302,6 +302,7 @@ def test_answers_first_and_the_rest_folded(open_page, points_section):
     assert page.locator("#section-plain .fold").get_attribute("open") is None
 
 
+@pytest.mark.long
 def test_page_without_scripts(open_page, points_section):
     page = open_page(java_script_enabled=False)
     for name in ("points", "plain"):

@@ -38,7 +38,7 @@ def drawing_of(triangles, size, design, **options):
 
 @pytest.fixture(scope="module")
 def simulator():
-    design = preset(model="cosquad", materials=2)
+    design = preset("linear", "cosquad", materials=2)
     return DrawingSimulator(drawing_of(120, (96, 64), design))
 
 

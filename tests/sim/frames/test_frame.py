@@ -293,7 +293,8 @@ def test_other_numbers_of_materials(simulator):
         simulator.render(scene)
 
 
-@pytest.mark.parametrize("exponent", [pytest.param(10, marks=pytest.mark.long), 1000])
+@pytest.mark.long
+@pytest.mark.parametrize("exponent", [10, 1000])
 def test_point_light_and_near_viewer(exponent):
     """Within an LSB of L, H and N at every pixel; the light is as near as the pot is large."""
     mesh = teapot(1000)

@@ -80,9 +80,9 @@ def rows(path):
 @pytest.mark.parametrize(
     "design",
     [
-        preset("chord-local", lights=2, materials=3),
-        preset("linear", None, grey=True, exponent=9),
         preset(lights=0),
+        pytest.param(preset("chord-local", lights=2, materials=3), marks=pytest.mark.long),
+        pytest.param(preset("linear", None, grey=True, exponent=9), marks=pytest.mark.long),
     ],
     ids=str,
 )

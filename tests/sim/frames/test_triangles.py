@@ -61,6 +61,7 @@ def test_another_size_is_refused(simulator):
         simulator.render(scene("teapot", size=(16, 12), triangles=200))
 
 
+@pytest.mark.long
 def test_a_wrong_model_is_found(monkeypatch):
     """A simulator checks some triangles of its own before a scene's."""
     renderer = Renderer(design())
