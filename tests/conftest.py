@@ -39,13 +39,16 @@ def interrupts():
 
 
 @pytest.fixture(scope="session", autouse=True)
-def model_cache(tmp_path_factory, worker_id):
+def model_cache(tmp_path_factory, worker_id, pytestconfig):
     """Compiled models of this run, shared by its workers."""
     shared = tmp_path_factory.getbasetemp()
     if worker_id != "master":
         shared = shared.parent
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("BLYSK_CACHE", str(Path(shared) / "models"))
+        if "not long" in pytestconfig.option.markexpr:
+            # Of few cycles the compiler takes most of the time.
+            patch.setenv("CXXFLAGS", "-O0")
         yield
 
 
