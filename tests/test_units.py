@@ -1,8 +1,8 @@
 # amaranth: UnusedElaboratable=no
 """Every unit, by its record: RTL equal to the bit-accurate model under stalls, pauses and resets.
 
-The quick run has all stimuli of the default variants, compiled: the engine itself compares the first beats with
-Amaranth's simulator. The long run has all variants, and both simulators under every pattern of stalls.
+The quick run has all stimuli of the default variants, compiled: the engine itself compares the first beats
+with Amaranth's simulator. The long run has all variants, and both simulators under every pattern of stalls.
 """
 
 import inspect
