@@ -109,39 +109,9 @@ def test_gate_by_threshold():
         HighlightGateUnit(p, exponent=20, takes_threshold=True)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("lights", [1, 2])
-def test_one_multiplier_a_light(lights):
-    """One fewer than cosine-quadratic light has, which multiplies by its slope; 17 fewer than by products."""
-    multipliers = {
-        model: cost_of(ShadingPipelineUnit(preset("chord", model, lights))).totals["multipliers"]
-        for model in ("blinn", "cosquad", "blinn_product")
-    }
-    plain = multipliers["blinn"] - lights
-    assert multipliers == {
-        "blinn": plain + lights,
-        "cosquad": plain + 2 * lights,
-        "blinn_product": plain + 18 * lights,
-    }
-    if lights == 1:
-        assert multipliers["blinn"] == 16
-
-
 def test_rate_is_that_of_cosquad():
     """And the latency, but for the register behind the table."""
     units = [ShadingPipelineUnit(preset("chord", model)) for model in ("blinn", "cosquad")]
     assert len({(unit.cycles_per_pixel, unit.setup_interval) for unit in units}) == 1
     assert units[0].latency == units[1].latency + 1
     assert units[0].cycles_per_pixel == 1
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("lights", "materials"), [(2, 4), (1, 1), (3, 1)])
-def test_one_memory_for_all_lights(lights, materials):
-    """One of 336 words of 35 bits a bank, in one place, whatever the lights."""
-    with_table, without = (
-        cost_of(ShadingPipelineUnit(preset("chord", model, lights, materials=materials)))
-        for model in ("blinn", None)
-    )
-    assert with_table.ram_bits - without.ram_bits >= materials * 336 * 35
-    assert with_table.rom_bits == without.rom_bits

@@ -319,21 +319,6 @@ def test_less_hardware_shades_the_same(part, style):
         assert less.multiplier_count < more.multiplier_count
 
 
-@pytest.mark.long
-@pytest.mark.usefixtures("never_built")
-def test_multipliers():
-    """Without lights none; compact a colour one, a term one; products with normals two a light.
-
-    Three values, setup and span limit of the chord method have one each.
-    """
-    assert cost_of(ShadingPipelineUnit(preset(lights=0, materials=2))).multiplier_count == 0
-    assert cost_of(ShadingPipelineUnit(preset("chord", style="compact"))).multiplier_count == 5
-    for method, lights in (("quadratic", 1), ("renormalise", 2)):
-        units = (ShadingPipelineUnit(preset(method, lights=lights, style=style)) for style in STYLES)
-        counts = [cost_of(unit._interpolator._products).multiplier_count for unit in units]
-        assert counts == [6 * lights, 2 * lights]
-
-
 # Refusals.
 
 

@@ -5,15 +5,7 @@ from amaranth.hdl import Cat, Module, Signal, signed, unsigned
 from amaranth.lib import memory, stream
 from amaranth.lib.wiring import Component, In, Out
 
-from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.lighting.specular import Specular
-from blysk.golden.presets import preset
-from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.emit.cost import Cost, cost_of
-from blysk.hdl.lighting.intensity import IntensityUnit
-from blysk.hdl.lighting.specular import SpecularUnit
-from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
-from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.units.registry import RECORDS
 
 
@@ -66,18 +58,3 @@ def test_operands_of_multipliers(name):
     record = RECORDS[name]
     cost = cost_of(record.variants[record.default].unit())
     assert all(width <= 18 for width, _ in cost.multipliers)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("lights", [2, 3])
-def test_lights_cost_fourteen_multipliers_each(lights):
-    design = preset("quadratic", lights=lights)
-    assert cost_of(ShadingPipelineUnit(design)).multiplier_count == 5 + 14 * lights
-    assert cost_of(IntensityUnit(Intensity(lights))).multiplier_count == 6 * lights
-
-
-def test_memories_are_as_stated():
-    assert cost_of(DifferenceSetupUnit()).rom_bits == 2048 * 17
-    for model, constant in (("cosquad", 0), ("cosquad7", 1), ("cosquad_lin", 1)):
-        cost = cost_of(SpecularUnit(Specular(REFLECTION_MODELS[model])))
-        assert (cost.rom_bits, cost.constant_multipliers) == (1024 * 17, constant)

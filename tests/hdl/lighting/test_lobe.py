@@ -271,20 +271,6 @@ def test_dark_beats_do_not_toggle(operand):
     assert all(any(now[name] != dark[0][name] for now in seen[99:]) for name in registers)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("interval", [1, 4])
-def test_cost(interval):
-    """One multiplier, the memory, and fewer registers than a cosine-quadratic unit and a table of slopes."""
-    for banks in (1, 3):
-        parameters = replace(LOBE, banks=banks)
-        written = cost_of(LobeUnit(parameters, interval))
-        fixed = cost_of(LobeUnit(parameters, interval, tables=[parameters.table(20)] * banks))
-        assert written.multipliers == fixed.multipliers == {(18, 18): 1}
-        assert written.constant_multipliers == fixed.constant_multipliers == 0
-        assert (written.ram_bits, written.rom_bits) == (banks * 336 * 35, 0)
-        assert (fixed.ram_bits, fixed.rom_bits) == (0, banks * 336 * 35)
-
-
 def test_bad_options_are_refused():
     table = LOBE.table(20)
     with pytest.raises(ValueError, match=r"^there must be a table for each of 2 banks, not 1$"):

@@ -80,13 +80,6 @@ def test_multipliers_and_latency(make, lights, interval):
     assert run.cycles[0] == run.input_cycles[0] + unit.latency
 
 
-@pytest.mark.long
-def test_highlights_and_gates_cost_no_multiplier_a_pixel():
-    assert cost_of(chord(highlights=False)).multiplier_count == 6
-    assert cost_of(chord(gate=gated(1))).multiplier_count == 9
-    assert cost_of(local(gate=gated(1))).multiplier_count == 2
-
-
 def runs_of(lengths):
     """Lengths as the parameter of a test."""
     return [pytest.param(length, id=name) for name, length in lengths.items()]

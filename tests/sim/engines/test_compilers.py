@@ -120,8 +120,9 @@ class Operations(Component):
         return np.array(rows, dtype=np.uint64)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("is_signed", [False, True], ids=["unsigned", "signed"])
+@pytest.mark.parametrize(
+    "is_signed", [pytest.param(False, marks=pytest.mark.long), True], ids=["unsigned", "signed"]
+)
 def test_operations_against_integers(is_signed):
     """The driver's own operations, which stand in for CXXRTL's, in Python's integers."""
     rng = random.Random(3)
