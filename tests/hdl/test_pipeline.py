@@ -61,7 +61,8 @@ def intervals():
                 quick = interval in (choice[0], choice[-1]) and method in ("quadratic", "chord")
                 marks = () if quick else pytest.mark.long
                 yield pytest.param(method, interval, marks=marks)
-        yield pytest.param(method, None, marks=pytest.mark.long if method == "bisection" else ())
+        quick = method in ("linear", "renormalise", "quadratic", "chord")
+        yield pytest.param(method, None, marks=() if quick else pytest.mark.long)
 
 
 @pytest.mark.parametrize(("method", "interval"), list(intervals()))

@@ -239,7 +239,7 @@ def test_no_word_wraps_in_its_domain(monkeypatch, samples):
 @pytest.mark.parametrize(
     "unit",
     [
-        pytest.param(name, marks=pytest.mark.long if name == "pipeline" else ())
+        pytest.param(name, marks=() if name in ("diffuse", "arccos") else pytest.mark.long)
         for name in dict.fromkeys(entry.record.name for entry in ENTRIES)
     ],
 )

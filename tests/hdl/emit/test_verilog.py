@@ -92,7 +92,7 @@ def needs_icarus():
         pytest.skip("Icarus Verilog (iverilog) is not installed")
 
 
-@pytest.mark.parametrize("language", ["1800-2017", "1364-2001"])
+@pytest.mark.parametrize("language", ["1364-2001", pytest.param("1800-2017", marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", NAMES)
 def test_verilator_has_no_warning(texts, name, language, tmp_path):
     path = tmp_path / f"{name}.v"

@@ -134,12 +134,14 @@ def test_specialised_pipeline():
     assert "left out    no specular path" in str(frame)
 
 
+@pytest.mark.long
 def test_waveforms(tmp_path):
     frame = blysk.render("teapot", method="linear", vcd=tmp_path / "a.vcd", **TINY)
     assert frame.engine == "pysim"
     assert "$enddefinitions" in (tmp_path / "a.vcd").read_text()
 
 
+@pytest.mark.long
 def test_without_a_compiler(monkeypatch):
     """pysim, with a warning and a smaller picture; a scene that is given keeps its size."""
     monkeypatch.setenv("PATH", "")

@@ -83,6 +83,7 @@ def test_failed_figures_leave_no_frames(capsys):
     assert [path.name for path in files()] == ["a-0003.png"]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_interrupt_of_a_turntable():
     """Ctrl-C in a terminal reaches all processes: frames done stay, whole, and no process goes on."""
