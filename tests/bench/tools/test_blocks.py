@@ -55,6 +55,9 @@ PARTS = {
 }
 # What the units state of themselves: latency, interval, multipliers, bits of ROM.
 STATED = {
+    ("chord", ""): (8, 1, {"18x18": 3}, 0),
+    ("dot_product", ""): (3, 1, {"18x18": 3}, 0),
+    ("gpq", ""): (3, 1, {}, 0),
     ("middle_normal", "exact"): (40, 6, {"18x18": 2}, 0),
     ("difference_accumulator", ""): (2, 1, {}, 0),
     ("quadratic_evaluator", "horner"): (17, 2, {"18x18": 3}, 2048 * 18),

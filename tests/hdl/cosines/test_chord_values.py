@@ -6,8 +6,6 @@ import pytest
 from blysk.hdl.cosines.chord_values import ChordValuesUnit
 from blysk.hdl.emit.cost import cost_of
 
-from ..variants import mostly_long
-
 FIGURES = {
     (1, 1): (6, 9),
     (1, 3): (2, 11),
@@ -19,7 +17,8 @@ FIGURES = {
 """Multipliers and latency, of numbers of lights and intervals."""
 
 
-@pytest.mark.parametrize(("lights", "interval"), mostly_long(list(FIGURES), (1, 3)))
+@pytest.mark.long
+@pytest.mark.parametrize(("lights", "interval"), FIGURES)
 def test_multipliers(lights, interval):
     """6 products a light, of 18 bits; 3 without highlights."""
     unit = ChordValuesUnit(None, lights, initiation_interval=interval)

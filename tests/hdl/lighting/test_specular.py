@@ -41,6 +41,7 @@ def quick(models, chosen):
     return [pytest.param(m, marks=[pytest.mark.long] * (m not in chosen)) for m in models]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", quick(TIMING, ("cosquad", "as_published")))
 def test_times_and_multipliers_at_every_interval(model):
     products, *latencies = TIMING[model]
@@ -110,6 +111,7 @@ def test_shared_slope_saves_the_prom(model, tables, interval):
     assert cost_of(SlopeUnit(parameters)).rom_bits == 1024 * 17
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", quick(("cosquad", "cosquad_q", "lyon3", "exp"), ("exp",)))
 def test_fixed_exponent_costs_less(model):
     """No PROM, and one multiplier less: that of the slope is by a constant. No cycle more."""

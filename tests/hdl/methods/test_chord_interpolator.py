@@ -25,7 +25,6 @@ from blysk.sim.units.methods.local_chord_interpolator import RECORD as LOCAL
 from blysk.sim.units.record import Case, first
 
 from ...checks import assert_beats_equal, words_of
-from ..variants import mostly_long
 
 
 def chord(lights=1, **options):
@@ -67,7 +66,8 @@ FIGURES = {
 """Multipliers and latency, of numbers of lights and setup intervals."""
 
 
-@pytest.mark.parametrize(("make", "lights", "interval"), mostly_long(list(FIGURES), (chord, 1, 3)))
+@pytest.mark.long
+@pytest.mark.parametrize(("make", "lights", "interval"), FIGURES)
 def test_multipliers_and_latency(make, lights, interval):
     """All of 18 bits; none of them a pixel's. The first pixel of a long span comes after the latency."""
     unit = make(lights, setup_interval=interval)

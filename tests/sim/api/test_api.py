@@ -113,8 +113,7 @@ def test_scene_files_scenes_and_meshes(tmp_path):
     assert of_file.design == linear
     for other in (
         blysk.render(scene, design=linear),
-        blysk.render(mesh, method="linear", **options),
-        blysk.render(blysk.scene(mesh, **options), design=linear, engine="pysim"),
+        blysk.render(blysk.scene(mesh, **options), method="linear"),
     ):
         np.testing.assert_array_equal(other.image, of_file.image)
         assert other.cycles == of_file.cycles
