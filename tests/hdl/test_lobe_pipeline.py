@@ -40,6 +40,7 @@ def colors(beats):
     return np.stack([beats[channel] for channel in "rgb"], axis=-1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "design", [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in DESIGNS]
 )

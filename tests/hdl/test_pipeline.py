@@ -61,7 +61,7 @@ def intervals():
                 quick = interval in (choice[0], choice[-1]) and method in ("quadratic", "chord")
                 marks = () if quick else pytest.mark.long
                 yield pytest.param(method, interval, marks=marks)
-        quick = method in ("linear", "renormalise", "quadratic", "chord")
+        quick = method in ("quadratic", "chord")
         yield pytest.param(method, None, marks=() if quick else pytest.mark.long)
 
 
@@ -147,7 +147,9 @@ def never_built():
 
 
 @pytest.mark.usefixtures("never_built")
-@pytest.mark.parametrize("method", INTERVALS)
+@pytest.mark.parametrize(
+    "method", [m if m in ("chord", "linear") else pytest.param(m, marks=pytest.mark.long) for m in INTERVALS]
+)
 def test_setup_intervals(method):
     """Those that there are; the largest to 4 by default; others are refused."""
     interpolator, choice = METHODS[method], INTERVALS[method]

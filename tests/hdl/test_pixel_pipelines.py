@@ -79,6 +79,7 @@ def test_both_engines_give_equal_cycles():
         np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pipes", [4, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2, 8))])
 def test_so_many_pixels_a_cycle(pipes):
     """Spans of as many pixels as there are pipelines, from scanline to scanline: no pipeline ever waits."""
@@ -107,6 +108,7 @@ def test_merged_stream_is_that_of_one_pipeline():
     assert run.cycles[-1] - run.cycles[0] == len(expected.x) - 1
 
 
+@pytest.mark.long
 def test_counters_are_sums_that_stop():
     unit = WidePipelinesUnit(PixelPipelines(PLAIN, 2), 4)
     rng, few = np.random.default_rng(8), 300

@@ -210,6 +210,7 @@ QUICK = [e for e in UNITS if "interpolator" not in e.record.name and not e.varia
 PIPELINES = [entry.name for entry in ENTRIES if entry.record.name == "pipeline"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("entry", UNITS, ids=lambda entry: entry.title)
 def test_errors_are_measured(entry):
     """The total error is none of an exact unit alone, and no larger than model and arithmetic make it."""

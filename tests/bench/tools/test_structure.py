@@ -135,6 +135,7 @@ def test_parts_are_those_of_the_netlist(unit):
 UNITS = [*FLAT, BisectionUnit, LightUnit, lambda: QuadraticEvaluatorUnit(QuadraticEvaluator("horner"))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("unit", UNITS)
 def test_every_port_takes_part(unit):
     graph = structure_of(unit)

@@ -64,7 +64,7 @@ def test_every_triangle_of_a_small_grid():
     assert assert_covers(triangles_of(place[index]), Frame(-4, -4, 4, 4), grid) > 60_000
 
 
-@pytest.mark.parametrize("step", [1, 16, 128])
+@pytest.mark.parametrize("step", [16, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 128))])
 def test_every_sample_of_a_shared_edge_is_drawn_once(step):
     """Triangulations of random points, on the grid, on sixteenths of a pixel, on its centres and borders."""
     rng, grid, frame = np.random.default_rng(step), Grid(), Frame(-20, -20, 20, 20)

@@ -30,7 +30,7 @@ def errors(stages):
     return np.maximum(*found) / bound[pieces.triangle], pieces.triangle
 
 
-@pytest.mark.parametrize("bits", [4, 8])
+@pytest.mark.parametrize("bits", [4, pytest.param(8, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("size", "count"), [(1.5, 9000), (12, 4000), (200, 150)])
 def test_bound(bits, size, count):
     """Every covered triangle but slivers, of every size."""

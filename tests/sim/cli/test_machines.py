@@ -46,6 +46,7 @@ def test_no_cache(tmp_path, places, command):
     assert os.listdir(tmp_path) == ["a.png"] * ("a.png" in command)
 
 
+@pytest.mark.long
 def test_no_home_for_other_tools(tmp_path):
     """A command that imports Matplotlib, which has lines of its own to say."""
     status, _, errors = blysk("bench", "--help", folder=tmp_path, HOME="/proc")

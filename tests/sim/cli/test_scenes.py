@@ -243,6 +243,7 @@ def test_point_lights(folder, refused, capsys):
     refused("render", "teapot", "--short-words", thing="--short-words", says="nothing is specialised")
 
 
+@pytest.mark.long
 def test_unit_of_the_mesh_does_not_matter(capsys):
     """Products of the coordinates of the second and third would under- and overflow."""
     pictures = []

@@ -65,6 +65,7 @@ def test_figures_of_a_turntable(turned):
         assert [float(value) for value in row.split()] == pytest.approx(values, abs=0.005)
 
 
+@pytest.mark.long
 def test_a_turntable_of_one_frame_is_the_frame(capsys):
     linear = [*TINY, "--method", "linear"]
     assert main(["render", *linear, "--frames", "1", "--jobs", "1", "-o", "a.gif"]) == 0

@@ -91,6 +91,7 @@ def test_frame_is_the_model_after_a_depth_test(simulator):
     assert len(np.unique(frame.image.reshape(-1, 3), axis=0)) > 100
 
 
+@pytest.mark.long
 def test_engines_give_the_same_frame(simulator):
     scene = scene_of("240", (24, 18))
     slow, fast = FrameSimulator(DESIGN, "pysim").render(scene), simulator.render(scene)
@@ -251,6 +252,7 @@ MATERIALS = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("engine", [pytest.param("cxxrtl", marks=pytest.mark.long), "pysim"])
 def test_frame_of_three_materials(engine):
     """Each pixel is that of a frame in its triangle's material alone, by the bit-accurate model.
