@@ -36,7 +36,8 @@ from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolato
 from blysk.hdl.core.stream import FIFO_LATENCY, PipelinedUnit, skid_buffer
 from blysk.hdl.methods.angular_interpolator import AngularInterpolatorUnit
 from blysk.hdl.methods.bisection_interpolator import BisectionInterpolatorUnit
-from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit, ChordSpansUnit
+from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit
+from blysk.hdl.methods.chord_spans import ChordSpansUnit
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.methods.linear_interpolator import LinearInterpolatorUnit
 from blysk.hdl.methods.quadratic_interpolator import QuadraticInterpolatorUnit
