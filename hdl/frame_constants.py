@@ -132,7 +132,7 @@ class FrameConstantsUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """A register or memory for each word, and one for its decoded address; a register for the data."""
+        """A register or memory for each word; registers for the data and for the address, half decoded."""
         m = Module()
         m.d.comb += self.write.ready.eq(~self.hold)
         words, of_material = {}, set()
@@ -157,10 +157,19 @@ class FrameConstantsUnit(wiring.Component):
             index = Signal(range(self.materials))
             with m.If(accepted & (self.write.payload.address == MATERIAL_ADDRESS)):
                 m.d.sync += index.eq(self.write.payload.data)
+        # Of the light, or the frame, and of the word within it.
+        address, decoded = self.write.payload.address, {}
+        for kind, digits, part in (
+            ("light", {word // LIGHT_STRIDE for word in words}, address[LIGHT_STRIDE.bit_length() - 1 :]),
+            ("field", {word % LIGHT_STRIDE for word in words}, address[: LIGHT_STRIDE.bit_length() - 1]),
+        ):
+            for digit in sorted(digits):
+                decoded[kind, digit] = is_digit = Signal(name=f"{kind}_{digit}")
+                m.d.sync += is_digit.eq((part == digit) & (accepted if kind == "light" else 1))
         for address, word in words.items():
             code = Value.cast(word)
-            written = Signal(name=f"written_{address}")
-            m.d.sync += written.eq(accepted & (self.write.payload.address == address))
+            light, field = divmod(address, LIGHT_STRIDE)
+            written = decoded["light", light] & decoded["field", field]
             if self.materials > 1 and address in of_material:
                 memory = Memory(shape=len(code), depth=self.materials, init=[])
                 m.submodules[f"word_{address}"] = memory

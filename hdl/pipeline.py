@@ -12,7 +12,8 @@ from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.pipeline import Design
-from blysk.hdl.core.stream import FIFO_LATENCY, UNCOUNTED, connect, connect_fifo, connect_late_fifo
+from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo
+from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
 from blysk.hdl.frame_constants import FrameConstantsUnit, write_shape
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
@@ -172,7 +173,7 @@ class ShadingPipelineUnit(wiring.Component):
         self._interpolator, self._gate, self._slope, self._lights = None, None, None, []
         self._tables = None
         self.setup_interval = self.cycles_per_pixel = 1
-        self.latency = 1 + FIFO_LATENCY + self._assembler.coordinates_latency
+        self.latency = LATE_FIFO_LATENCY + self._assembler.coordinates_latency
         if p.lights:
             self._make_units()
         elif p.build.setup_interval is not None:
@@ -257,17 +258,15 @@ class ShadingPipelineUnit(wiring.Component):
 
     @property
     def _waiting_spans(self) -> int:
-        """Depth of the FIFOs parallel to the interpolator and the lights: all spans that may be inside these.
-
-        17 are a memory of 16 words, and a register behind it.
-        """
+        """Depth of the FIFOs parallel to interpolator and lights: all spans that may be inside these."""
         interval = getattr(self._interpolator, "shortest_interval", None) or self.setup_interval
         return max(-(-self.latency // interval) + UNCOUNTED, 17)
 
     @property
     def spans_inside(self) -> int:
         """Spans that are inside at most."""
-        return self._waiting_spans + self._assembler.SPANS_INSIDE
+        # Two more wait behind the memory of the coordinates.
+        return self._waiting_spans + 2 + self._assembler.SPANS_INSIDE
 
     def elaborate(self, platform):
         """Frame constants, units from spans to colours, coordinates past them, admission, counters."""

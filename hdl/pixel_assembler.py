@@ -4,7 +4,7 @@ from amaranth.hdl import Cat, Module, Signal, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from blysk.hdl.core.stream import connect_slice, count_down, skid_buffer
+from blysk.hdl.core.stream import count_down, skid_buffer
 from blysk.hdl.lighting.intensity import pixel_color_shape
 
 __all__ = ["PixelAssemblerUnit", "coordinates_shape", "pixel_shape"]
@@ -33,7 +33,7 @@ class PixelAssemblerUnit(wiring.Component):
     """Joins the streams of colours and of spans' coordinates; counts x along the span and marks its end.
 
     A colour leaves as a pixel 1 cycle after it was accepted, and one is accepted on every cycle, if its
-    coordinates came 2 cycles before. Coordinates are accepted ahead of their colours. No multipliers.
+    coordinates came a cycle before. Coordinates are accepted ahead of their colours. No multipliers.
 
     Parameters
     ----------
@@ -54,11 +54,11 @@ class PixelAssemblerUnit(wiring.Component):
 
     latency = 1
 
-    coordinates_latency = 3
+    coordinates_latency = 2
     """Cycles from coordinates to their first pixel, if the colour waits."""
 
-    SPANS_INSIDE = 6
-    """Spans inside at most: coordinates of four, and two pixels that wait."""
+    SPANS_INSIDE = 4
+    """Spans inside at most: coordinates of two, and two pixels that wait."""
 
     def __init__(self, x_bits: int = 12, y_bits: int = 12, length_bits: int = 12):
         super().__init__(
@@ -73,20 +73,17 @@ class PixelAssemblerUnit(wiring.Component):
         """Coordinates of spans; from them those of pixels, which meet the colours; a pixel register."""
         m = Module()
         span, color = self.coordinates.payload, self.colors.payload
-        following = self.coordinates.signature.create(path=("following",))
-        connect_slice(m, wiring.flipped(self.coordinates), following)
-
         x, y = Signal.like(span.x), Signal.like(span.y)
         load, moves = Signal(), Signal()
-        active, ends = count_down(m, following.valid, following.payload.length, moves)
+        active, ends = count_down(m, self.coordinates.valid, span.length, moves)
         position = stream.Signature(data.StructLayout({"x": x.shape(), "y": y.shape(), "last": 1})).create()
         m.d.comb += [
             moves.eq(skid_buffer(m, position, active, Cat(x, y, ends))),
-            following.ready.eq(moves & ends),
-            load.eq(following.ready & following.valid),
+            self.coordinates.ready.eq(moves & ends),
+            load.eq(self.coordinates.ready & self.coordinates.valid),
         ]
         with m.If(load):
-            m.d.sync += [x.eq(following.payload.x), y.eq(following.payload.y)]
+            m.d.sync += [x.eq(span.x), y.eq(span.y)]
         with m.Elif(moves):
             m.d.sync += x.eq(x + 1)
 

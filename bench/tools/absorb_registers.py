@@ -1,9 +1,11 @@
-"""Registers beside multipliers moved into them: a step on an ECP5 netlist between Yosys and nextpnr.
+"""Registers beside multipliers and memories moved into them: a step on an ECP5 netlist before nextpnr.
 
-An ECP5 multiplier, MULT18X18D, has registers of its own for either operand and for the product. Yosys uses
-none of them. `absorb_registers` takes Yosys's JSON netlist and moves flip-flops that stand directly before or
-behind a multiplier into it; nothing else of the netlist changes, and what it does stays the same on every
-cycle from power-up on.
+An ECP5 multiplier, MULT18X18D, has registers of its own for either operand and for the product, and a block
+RAM, DP16KD, has one behind the word that it reads. Yosys uses none of them. `absorb_registers` takes Yosys's
+JSON netlist and moves flip-flops that stand directly before or behind a multiplier, or behind a block RAM,
+into it. It also takes the carry from the end of chains that nobody reads, for which nextpnr would add a pair
+of look-up tables. Nothing else of the netlist changes, and what it does stays the same on every cycle from
+power-up on.
 """
 
 from collections import defaultdict
@@ -15,7 +17,9 @@ __all__ = ["Absorbed", "absorb_registers"]
 
 _MULTIPLIER, _FLIP_FLOP = "MULT18X18D", "TRELLIS_FF"
 
-_OPERAND_BITS, _PRODUCT_BITS = 18, 36
+_MEMORY, _CARRY = "DP16KD", "CCU2C"
+
+_OPERAND_BITS, _PRODUCT_BITS, _WORD_BITS = 18, 36, 18
 
 _OUTPUT = "OUTPUT"
 
@@ -40,6 +44,10 @@ class Absorbed:
         Look-up tables added, one for each enable that flip-flops used inverted, which multipliers cannot.
     closed : int
         Multipliers with registers for both operands and the product.
+    words : int
+        Read ports of block RAMs that have a register inside.
+    carries : int
+        Chains whose last carry nobody reads.
     """
 
     operands: int = 0
@@ -47,6 +55,8 @@ class Absorbed:
     removed: int = 0
     inverters: int = 0
     closed: int = 0
+    words: int = 0
+    carries: int = 0
 
     def as_dict(self) -> dict[str, int]:
         """The figures under stable names."""
@@ -199,6 +209,79 @@ class _Netlist:
         self.use(cell, _OUTPUT, control)
         return True
 
+    def inverse_of(self, net: Any) -> Any:
+        """What a look-up table makes a net of by inverting it; ``None`` if nothing does."""
+        drivers = [name for name, port, _ in self.pins[net] if port == "Z"]
+        if not drivers or self.cells[drivers[0]]["type"] != "LUT4":
+            return None
+        cell = self.cells[drivers[0]]
+        given = [self.net(drivers[0], port) for port in "ABCD"]
+        sources = {bit for bit in given if isinstance(bit, int)}
+        if len(sources) != 1:
+            return None
+        table = int(cell["parameters"]["INIT"], 2)
+        low, high = (
+            table >> sum((bit == "1" or (isinstance(bit, int) and value)) << k for k, bit in enumerate(given))
+            for value in (0, 1)
+        )
+        return sources.pop() if low & 1 and not high & 1 else None
+
+    def absorb_word(self, cell: str, ports: str) -> bool:
+        """Move the flip-flops behind the word that a block RAM reads into it.
+
+        Where the flip-flops are enabled with the read port itself: whether its enable counts for the register
+        behind it, too, then does not matter.
+
+        Parameters
+        ----------
+        cell : str
+            The block RAM.
+        ports : str
+            ``A`` or ``B``, or both where these are one of 36 bits, which is read as ``B``.
+        """
+        moved: dict[str, str] = {}
+        for port in ports:
+            for k in range(_WORD_BITS):
+                name = f"DO{port}{k}"
+                bit = self.net(cell, name)
+                readers = self.pins[bit] - {(cell, name, 0)} if isinstance(bit, int) else set()
+                if bit in self.ports or len(readers) > 1:
+                    return False
+                for reader, pin, _ in readers:
+                    if self.cells[reader]["type"] != _FLIP_FLOP or pin != "DI":
+                        return False
+                    moved[name] = reader
+        controls = {self.control(name) for name in moved.values()}
+        if len(controls) != 1 or None in controls:
+            return False
+        (control,) = controls
+        reads = ports[-1]
+        enable = self.net(cell, f"CE{reads}")
+        wanted = self.inverse_of(enable) if control.inverted else enable
+        if control.clock != self.net(cell, f"CLK{reads}") or control.enable != wanted:
+            return False
+        for name, reader in moved.items():
+            bit = self.net(reader, "Q")
+            self.remove(reader)
+            self.connect(cell, name, bit)
+        for port in ports:
+            self.connect(cell, f"OCE{port}", enable)
+            self.cells[cell]["parameters"][f"REGMODE_{port}"] = "OUTREG"
+        return True
+
+    def absorb_words(self, cell: str) -> int:
+        """Move the flip-flops behind either port of a block RAM into it; how many ports."""
+        wide = int(str(self.cells[cell]["parameters"]["DATA_WIDTH_B"]), 2) == 2 * _WORD_BITS
+        return sum(self.absorb_word(cell, ports) for ports in (("AB",) if wide else "AB"))
+
+    def end_carry(self, cell: str) -> bool:
+        """Take the carry from the end of a chain, where nobody reads it."""
+        bit = self.net(cell, "COUT")
+        if not isinstance(bit, int) or bit in self.ports or self.pins[bit] != {(cell, "COUT", 0)}:
+            return False
+        self.connect(cell, "COUT", "x")
+        return True
+
     def beside_operand(self, cell: str, operand: str) -> tuple[_Control, dict[str, str]] | None:
         """Control of the flip-flops before an operand, and these by port; ``None`` if they cannot move."""
         found: dict[str, str] = {}
@@ -243,19 +326,21 @@ class _Netlist:
 
 
 def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict[str, Any], Absorbed]:
-    """Move flip-flops that stand directly beside a multiplier into its registers.
+    """Move flip-flops that stand directly beside a multiplier, or behind a block RAM, into its registers.
 
     All bits of an operand, or of a product, must be flip-flops of one clock and one enable that have no
     reset, are 0 at power-up, and are not at a port of the module. Bits of an operand may also be constant 0.
     A product must have no reader but its flip-flops, one each. A flip-flop of an operand that has another
     reader stays for that one. Of one operand alone they move only if flip-flops are before them and the
     product has a register, too. An enable that flip-flops use inverted gets one look-up table, for all
-    multipliers.
+    multipliers. The word that a block RAM reads has no reader but its flip-flops, which have the enable of
+    the read port.
 
     Parameters
     ----------
     netlist : dict
-        Yosys's JSON of a flat module, mapped to ECP5; it is not changed. Multipliers have no registers yet.
+        Yosys's JSON of a flat module, mapped to ECP5; it is not changed. Multipliers and block RAMs have no
+        registers yet.
     top : str
         The module.
 
@@ -263,7 +348,8 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
     -------
     netlist : dict
         With ``REG_INPUTA``, ``REG_INPUTB`` and ``REG_OUTPUT`` of its multipliers in use: clock ``CLK0``,
-        enables ``CE0`` to ``CE2``, reset ``RST0`` constant 0.
+        enables ``CE0`` to ``CE2``, reset ``RST0`` constant 0; ``REGMODE`` and ``OCE`` of its block RAMs; and
+        no ``COUT`` at the end of a chain.
     absorbed : Absorbed
         What was moved.
     """
@@ -276,6 +362,10 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
         products += product
         operands += inputs
         closed += product and inputs == 2
+    memories = sorted(name for name, cell in work.cells.items() if cell["type"] == _MEMORY)
+    words = sum(work.absorb_words(name) for name in memories)
+    chains = [name for name, cell in work.cells.items() if cell["type"] == _CARRY]
+    carries = sum(work.end_carry(name) for name in chains)
     modules = {**netlist["modules"], top: {**module, "cells": work.cells}}
-    found = Absorbed(operands, products, work.removed, len(work.inverted), closed)
+    found = Absorbed(operands, products, work.removed, len(work.inverted), closed, words, carries)
     return {**netlist, "modules": modules}, found

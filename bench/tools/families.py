@@ -107,11 +107,13 @@ ECP5 = Family(
         *("--25k", "--package", "CABGA381", "--speed", "6", "--freq", "150"),
         *("--lpf-allow-unconstrained", "--out-of-context", "--timing-allow-fail"),
     ),
-    # It brings registers nearer to their multipliers than the default placer; with hardly any logic it does
-    # not end.
-    large=("--placer", "static"),
-    # Two registers on either side of a multiplier are for that one: equal ones are not made one.
+    # The placer brings registers nearer to their multipliers than the default one; with hardly any logic it
+    # does not end. The router takes wires on slow paths up again.
+    large=("--placer", "static", "--tmg-ripup"),
+    # Two registers on either side of a multiplier are for that one: equal ones are not made one. The mapper
+    # saves look-up tables where paths are shorter than 2.5 ns, of its estimate of wires of 0.3 ns.
     synthesis="""\
+scratchpad -set abc9.D 2500
 setattr -set keep 1 t:$mul %ci4 t:$mul %co4 %u t:$*dff* %i
 synth_lattice -family ecp5 -top top -abc9""",
     look_up_tables="TRELLIS_COMB",

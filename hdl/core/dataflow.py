@@ -266,8 +266,10 @@ class Dataflow:
 
         return self.use(self.multiplier, name, (a, b), operands, product, since=since)
 
-    def look_up(self, name: str, words: Sequence[int], width: int, address: Word) -> Word:
-        """Word of a table at an address: one cycle.
+    def look_up(
+        self, name: str, words: Sequence[int], width: int, address: Word, registered: bool = False
+    ) -> Word:
+        """Word of a table at an address: one cycle, or two with a register, which an FPGA's memories have.
 
         Parameters
         ----------
@@ -279,16 +281,18 @@ class Dataflow:
             Bits of each.
         address : Word
             As many bits as needed, unsigned.
+        registered : bool
+            Whether there is a register behind the memory, enabled with it.
         """
         # The word that is read has the lifetime of the address.
-        word = Word(name, (address,), 1, address.lifetime)
+        word = Word(name, (address,), 1 + registered, address.lifetime)
 
         def make(build):
             memory = Memory(shape=width, depth=len(words), init=words)
             build.m.submodules[name] = memory
             port = memory.read_port()
             build.m.d.comb += port.addr.eq(build.at(address, word.read))
-            return port.data
+            return build.unit.register(build.m, port.data, f"{name}_word") if registered else port.data
 
         word.make = make
         return self._add(word)

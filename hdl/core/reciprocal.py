@@ -52,8 +52,8 @@ def reciprocal_words(
 ) -> tuple[Word, Word]:
     """``dt = 1/(m - 1) = 2 reciprocal 2^-shift``, by the address and shift of `reciprocal_address`.
 
-    Five cycles: m - 1, its leading one, the address, the table, a register. With fewer bits of the length the
-    table has ``2^(length_bits - 1)`` words.
+    Five cycles: m - 1, its leading one, the address, the table and its register. With fewer bits of the
+    length the table has ``2^(length_bits - 1)`` words.
 
     Parameters
     ----------
@@ -88,9 +88,11 @@ def reciprocal_words(
     steps = graph.register("steps", lambda length: (length - 1)[:length_bits], length, since=since)
     positions = graph.register("positions", leading, steps)
     address = graph.register("address", lambda steps, both: (steps << both[half:])[:top], steps, positions)
-    word = graph.look_up("reciprocals", reciprocal_codes(length_bits, table), table.format.width, address)
-    reciprocal = graph.register("reciprocal", lambda word: FixedValue(table.format, word), word)
-    shift = graph.register("shift", lambda both, address: both[:half] + address.any(), positions, address)
+    codes = reciprocal_codes(length_bits, table)
+    word = graph.look_up("reciprocals", codes, table.format.width, address, registered=True)
+    reciprocal = graph.wire("reciprocal", lambda word: FixedValue(table.format, word), word)
+    ragged = graph.register("ragged", lambda address: address.any(), address)
+    shift = graph.register("shift", lambda both, ragged: both[:half] + ragged, positions, ragged)
     return reciprocal, shift
 
 

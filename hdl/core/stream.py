@@ -12,11 +12,9 @@ from blysk.hdl.core.fixed import FixedShape
 __all__ = [
     "FIFO_LATENCY",
     "SLICE_LATENCY",
-    "UNCOUNTED",
     "PipelinedUnit",
     "connect",
     "connect_fifo",
-    "connect_late_fifo",
     "connect_slice",
     "count_down",
     "moving",
@@ -30,9 +28,6 @@ FIFO_LATENCY = 2
 
 SLICE_LATENCY = 1
 """Clocks that a payload takes through the register of `connect_slice`."""
-
-UNCOUNTED = 2
-"""Payloads that `connect_late_fifo` has taken and its level does not have yet."""
 
 
 def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> None:
@@ -126,38 +121,6 @@ def connect_fifo(
         buffer.r_en.eq(sink.ready),
     ]
     return buffer
-
-
-def connect_late_fifo(
-    m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int
-) -> None:
-    """Connect two streams through a FIFO behind a register, so that the source's handshake ends there.
-
-    Whether there is room follows from the FIFO's level alone, in a register; `UNCOUNTED` payloads of the
-    depth are for those that the level does not have yet. A payload takes a cycle more than `FIFO_LATENCY`.
-
-    Parameters
-    ----------
-    m, name, source, sink
-        As for `connect_fifo`.
-    depth : int
-        Payloads that the FIFO holds, at least 5.
-
-    Raises
-    ------
-    TypeError
-        If the payloads differ in a field or in a fixed-point format.
-    """
-    late = stream.Signature(source.payload.shape()).create(path=(f"{name}_late",))
-    payload = Signal(Shape.cast(source.payload.shape()).width, name=f"{name}_payload", reset_less=True)
-    written, room = Signal(name=f"{name}_written"), Signal(name=f"{name}_room", init=1)
-    buffer = connect_fifo(m, name, late, sink, depth)
-    m.d.sync += [
-        payload.eq(source.payload),
-        written.eq(source.valid & room),
-        room.eq(buffer.level < depth - UNCOUNTED),
-    ]
-    m.d.comb += [source.ready.eq(room), Value.cast(late.payload).eq(payload), late.valid.eq(written)]
 
 
 def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Signal:

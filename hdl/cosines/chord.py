@@ -13,11 +13,17 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
 
-__all__ = ["ChordUnit", "chord"]
+__all__ = ["ChordUnit", "chord", "chord_exact"]
 
 
 def chord(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]) -> Word:
-    """Word of ``|a - b|^2 / 2`` in ``UQ(2, 35)``: three multiplications of the graph.
+    """Word of ``|a - b|^2 / 2`` in ``UQ(2, 35)``; the parameters are those of `chord_exact`."""
+    square = chord_exact(graph, name, a, b)
+    return graph.register(name, lambda square: square.saturate(Chord.FORMAT), square)
+
+
+def chord_exact(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]) -> Word:
+    """Word of ``|a - b|^2 / 2``, exact for one of 34 fraction bits: three multiplications of the graph.
 
     Parameters
     ----------
@@ -56,7 +62,7 @@ def chord(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]
     operand = graph.wire(f"{name}_operand", halved, difference)
     square = dot(graph, f"{name}_square", operand, lambda v: v)
     square = graph.register(f"{name}_aligned", aligned, square, far)
-    return graph.register(name, lambda square: square.scale(-1).saturate(Chord.FORMAT), square)
+    return graph.wire(f"{name}_half", lambda square: square.scale(-1), square)
 
 
 class ChordUnit(PipelinedUnit):

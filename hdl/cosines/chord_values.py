@@ -8,7 +8,7 @@ from blysk.hdl.core.dataflow import Dataflow, dot
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import light_vectors_shape, normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
-from blysk.hdl.cosines.chord import chord
+from blysk.hdl.cosines.chord import chord_exact
 
 __all__ = ["ChordValuesUnit", "light_values_shape"]
 
@@ -77,7 +77,7 @@ class ChordValuesUnit(PipelinedUnit):
             cosine = dot(g, f"f_{i}_exact", normal, lambda _, i=i: self.constants[i].direction)
             words = {"diffuse": self._rounded(f"f_{i}", cosine, p.DIFFUSE_FORMAT)}
             if highlights:
-                u = chord(g, f"u_{i}_exact", normal, lambda i=i: self.constants[i].halfway)
+                u = chord_exact(g, f"u_{i}_exact", normal, lambda i=i: self.constants[i].halfway)
                 words["highlight"] = self._rounded(f"u_{i}", u, p.HIGHLIGHT_FORMAT, p.scale)
             self._words.append(words)
         self.multipliers = g.multiplier.count
@@ -91,17 +91,19 @@ class ChordValuesUnit(PipelinedUnit):
         )
 
     def _rounded(self, name, word, format, scale=0):
-        """A word in a format of fewer bits; times ``2^scale``, and then 1 at most."""
+        """A word in a format of fewer bits; times ``2^scale``, and then 1 at most: two cycles."""
 
-        def rounded(value):
-            value = value.scale(scale).round_half_up(format.fraction_bits).saturate(format)
+        def limited(value):
+            value = value.saturate(format)
             if not scale:
                 return value
-            one = 1 << format.fraction_bits
-            code = value.as_value()
+            one, code = 1 << format.fraction_bits, value.as_value()
             return FixedValue(format, Mux(code[-1], one, code)[: format.width])
 
-        return self._graph.register(name, rounded, word)
+        rounded = self._graph.register(
+            f"{name}_rounded", lambda value: value.scale(scale).round_half_up(format.fraction_bits), word
+        )
+        return self._graph.register(name, limited, rounded)
 
     def datapath(self, m, operands):
         """Describe the registers of the graph."""

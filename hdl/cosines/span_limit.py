@@ -1,6 +1,6 @@
 """Span limit unit: which spans are wider than the chord method's error bound allows at an exponent."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data
 
 from blysk.golden.cosines.span_limit import SpanLimit
@@ -9,30 +9,35 @@ from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
-from blysk.hdl.cosines.chord import chord
+from blysk.hdl.cosines.chord import chord_exact
 
 __all__ = ["SpanLimitUnit", "octave_limit"]
 
 
 def octave_limit(m: Module, name: str, exponent: Value, limits: Fixed) -> FixedValue:
-    """The limit of an exponent, from one for each number of its bits: a register, one clock.
+    """The limit of an exponent, from one for each number of its bits: two clocks.
 
     Parameters
     ----------
     m : Module
-        Module that gets the register.
+        Module that gets the registers.
     name : str
-        Of the register.
+        Of the second of them.
     exponent : Value
         Ten bits.
     limits : Fixed
         By the number of bits of the exponent, 0 to 10.
     """
-    chosen = limits.codes[0].item()
-    for bits, limit in enumerate(limits.codes.tolist()[1:]):
-        chosen = Mux(exponent[bits], limit, chosen)
+    count = Const(0, range(len(exponent) + 1))
+    for bit in range(len(exponent)):
+        count = Mux(exponent[bit], bit + 1, count)
+    octave = Signal(range(len(exponent) + 1), name=f"{name}_octave", reset_less=True)
     register = Signal(FixedShape(limits.format), name=name, reset_less=True)
-    m.d.sync += Value.cast(register).eq(chosen)
+    m.d.sync += octave.eq(count)
+    # Bit by bit: of a choice among constants a mapper makes resets of registers.
+    codes = limits.codes.tolist()
+    for place, bit in enumerate(Value.cast(register)):
+        m.d.sync += bit.eq(Cat(octave == k for k, code in enumerate(codes) if code >> place & 1).any())
     return register
 
 
@@ -56,7 +61,7 @@ class SpanLimitUnit(PipelinedUnit):
         Whether a span of four pixels or more is wide, whatever the light; or if a light that is not behind
         the span may have a highlight there.
     constants : :py:`In(10)`
-        Specular exponent, 1 to 1000, constant from 2 cycles before a beat. Only with highlights.
+        Specular exponent, 1 to 1000, constant from 3 cycles before a beat. Only with highlights.
 
     Source: docs/theory/chord.md#where-spans-are-cut.
     """
@@ -69,8 +74,9 @@ class SpanLimitUnit(PipelinedUnit):
             g.input(name, lambda operands, name=name: operands[name])
             for name in ("normal_left", "normal_right")
         )
-        self._chord = chord(g, "chord", right, left)
-        self._result = g.register("result", self._compare, self._chord)
+        # The limits are under the largest code of `Chord.FORMAT`, so that nothing need be saturated.
+        half = chord_exact(g, "chord", right, left)
+        self._result = g.register("result", self._compare, half)
         self.multipliers = g.multiplier.count
         super().__init__(
             data.StructLayout({"normal_left": normal_shape(), "normal_right": normal_shape()}),

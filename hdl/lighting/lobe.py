@@ -11,10 +11,14 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.lighting.lobe import Lobe, LobeTable
 from blysk.hdl.core.dataflow import Dataflow, Word
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.memory import registered_read
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.lighting.specular import highlight_shape, one_minus
 
 __all__ = ["LobeMemory", "LobeUnit", "lobe_read_signature", "lobe_write_shape"]
+
+_FINE = 2
+"""Bits of the shift that are left to its second stage."""
 
 
 def lobe_write_shape() -> data.StructLayout:
@@ -23,9 +27,9 @@ def lobe_write_shape() -> data.StructLayout:
 
 
 def lobe_read_signature(parameters: Lobe) -> wiring.Signature:
-    """Port for reading words: a clock after one with ``enable`` there is the word of its ``address``.
+    """Port for reading words: the word of an ``address`` is there two clocks with ``enable`` later.
 
-    Without ``enable`` the word stays.
+    Without ``enable`` the word stays; so it may while the word of the address is written.
     """
     return wiring.Signature(
         {
@@ -89,11 +93,12 @@ class LobeMemory(wiring.Component):
         m = Module()
         words = [word for table in self.tables or [] for word in table.words.tolist()]
         m.submodules.words = memory = Memory(shape=Lobe.WORD_BITS, depth=p.banks * p.entries, init=words)
+        write = memory.write_port() if self.tables is None else None
         for read in self.reads:
-            port = memory.read_port()
-            m.d.comb += [port.addr.eq(read.address), port.en.eq(read.enable), read.word.eq(port.data)]
-        if self.tables is None:
-            self._write(m, memory.write_port())
+            word, _ = registered_read(m, memory, read.address, read.enable, write)
+            m.d.comb += read.word.eq(word)
+        if write is not None:
+            self._write(m, write)
         return m
 
     def _write(self, m: Module, port: Any) -> None:
@@ -127,10 +132,10 @@ class LobeUnit(PipelinedUnit):
 
     Table, formats and error bounds are those of `Lobe`, the bit-accurate model.
 
-    With an initiation interval of 1 the latency is 8 cycles: one minus, saturation, leading one, shift, word,
-    register, product, sum. A longer interval takes 2 more: the input has a register, and the multiplier has
-    registers for its operands and its product (`registered_product`). At every interval there is one
-    multiplier of 18 by 18 bits. A beat that is dark, or whose N·H is not positive, works as if its argument
+    With an initiation interval of 1 the latency is 10 cycles: one minus, saturation, leading one, two for the
+    shift, two for the word, operands, product, sum. A longer interval takes 2 more: the input has a register,
+    and so have the multiplexers before the multiplier. At every interval there is one multiplier of 18 by 18
+    bits. A beat that is dark, or whose N·H is not positive, works as if its argument
     were 0: from one to the next nothing toggles but the input and the first registers.
 
     Parameters
@@ -237,9 +242,16 @@ class LobeUnit(PipelinedUnit):
             # Where lit it is under 1.
             return Mux(lit, Value.cast(wide.saturate(p.argument_format))[:bits], 0)[:bits]
 
-        def place(argument, zeros):
-            normal = (argument << Mux(zeros == p.octaves, p.octaves - 1, zeros))[:top]
+        def coarse(argument, zeros):
+            # By all but a few, then the rest.
+            shift = Mux(zeros == p.octaves, p.octaves - 1, zeros)
+            normal = (argument << Cat(Const(0, _FINE), shift[_FINE:]))[:top]
             row = (self._base + p.octaves - zeros)[: len(self._read.address) - p.step_bits]
+            return Cat(normal, shift[:_FINE], row)
+
+        def place(word):
+            fine, row = word[top : top + _FINE], word[top + _FINE :]
+            normal = (word[:top] << fine)[:top]
             step, rest = normal[top - p.step_bits :], normal[: top - p.step_bits]
             return Cat(step, row), rest[len(rest) - p.fraction_format.width :]
 
@@ -247,21 +259,19 @@ class LobeUnit(PipelinedUnit):
         argument = g.register("one_minus_cosine", lambda x: one_minus(p, x).truncate(bits), operand)
         argument = g.register("argument", limited, argument, lit)
         zeros = g.register("zeros", lambda code: _leading_zeros(code[bits - p.octaves :]), argument)
+        shifted = g.register("shifted", coarse, argument, zeros)
         shapes = unsigned(len(self._read.address)), unsigned(p.fraction_format.width)
-        memory = g.share("memory", shapes, 1, self._look_up)
-        return self._interpolate(g.use(memory, "word", (argument, zeros), place), lit)
+        memory = g.share("memory", shapes, 2, self._look_up)
+        return self._interpolate(g.use(memory, "word", (shifted,), place), lit)
 
     def _look_up(self, register: Callable[[Any, str], Any], address: Value, fraction: Value) -> Value:
         """Word of an address, and beside it the fraction."""
         self._module.d.comb += self._read.address.eq(address)
-        return Cat(self._read.word, register(fraction, "fraction"))
+        return Cat(self._read.word, register(register(fraction, "fraction_read"), "fraction"))
 
     def _interpolate(self, word: Word, lit: Word) -> Word:
         """Term of a word and its fraction: ``v + D f``."""
         p, g = self.parameters, self._graph
-        if g.interval == 1:
-            # A memory takes most of a clock's period, and so does a multiplier.
-            word = g.register("word_register", lambda code: code, word)
         formats = {"value": p.VALUE_FORMAT, "difference": p.DIFFERENCE_FORMAT, "fraction": p.fraction_format}
         parts, first = [], 0
         for name, format in formats.items():
@@ -272,6 +282,9 @@ class LobeUnit(PipelinedUnit):
             first += format.width
         value, difference, fraction = parts
         if g.interval == 1:
+            # Registers of the multiplier's own.
+            difference = g.register("difference", lambda x: x, difference)
+            fraction = g.register("fraction", lambda x: x, fraction)
             product = g.register("product", lambda x, y: x * y, difference, fraction)
         else:
             product = g.multiply("product", difference, fraction)

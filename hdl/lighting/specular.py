@@ -47,7 +47,7 @@ class SlopeUnit(wiring.Component):
     """Slope ``k = K 2^s`` and boundary of the cutoff: words of a `SpecularUnit` that the exponent determines.
 
     The bit-accurate models are `Specular.scale` and `Specular.boundaries`. ``slope`` follows the exponent
-    after two cycles.
+    after two cycles, the boundary after three.
 
     One unit serves all lights. The slope costs a multiplier by a constant, no multiplier for
     ``k = n / 2^j``, and a table of 1024 words of 27 bits for ``cosquad_q`` and the models by equal integrals.
@@ -92,8 +92,11 @@ class SlopeUnit(wiring.Component):
         boundary = Const(p.SHIFTED_FORMAT.max_code, p.SHIFTED_FORMAT.width)
         if not p.as_published:
             word = self._look_up(m, "boundaries", p.boundaries.codes, p.SHIFTED_FORMAT)
-            boundary = Signal(p.SHIFTED_FORMAT.width, reset_less=True)
-            m.d.sync += boundary.eq(word)
+            read, boundary = (
+                Signal(p.SHIFTED_FORMAT.width, name=name, reset_less=True) for name in ("read", "boundary")
+            )
+            # The first of them is inside an FPGA's memory, far from what the second serves.
+            m.d.sync += [read.eq(word), boundary.eq(read)]
         m.d.comb += [
             self.slope.scale.eq(scale),
             self.slope.shift.eq(shift),
@@ -156,7 +159,8 @@ class SpecularUnit(PipelinedUnit):
         Specular term.
     constants : :py:`In(StructLayout({"exponent": 10}))` or :py:`In(slope_shape())`
         Exponent, 1 to 1000, or the output of a `SlopeUnit`; the exponent is constant while beats are inside,
-        the slope from two cycles after the first beat on. No such port where the exponent is fixed.
+        the slope from two cycles after the first beat on, the boundary from three. No such port where the
+        exponent is fixed.
 
     Raises
     ------

@@ -1,9 +1,8 @@
 """The chord method: forward differences of N·L and of half the squared chord from N to H."""
 
 import enum
-from collections.abc import Iterable, Sequence
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed, unsigned
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -12,37 +11,15 @@ from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
-from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
-from blysk.hdl.core.stream import connect, connect_slice, pass_beside
+from blysk.hdl.core.stream import connect, pass_beside
 from blysk.hdl.cosines.chord_values import ChordValuesUnit
 from blysk.hdl.cosines.span_limit import SpanLimitUnit, octave_limit
 from blysk.hdl.methods.chord_spans import ChordSpansUnit
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 
 __all__ = ["ChordInterpolatorUnit"]
-
-
-def least_highlight(m: Module, name: str, values: Sequence[FixedValue]) -> Value:
-    """`SpanLimit.least` of three values of u, two cycles after them.
-
-    Parameters
-    ----------
-    m : Module
-        Module that gets the registers.
-    name : str
-        Common part of their names.
-    values : sequence of FixedValue
-        u at the first pixel, in the middle and at the last pixel.
-    """
-    left, middle, right = (value.as_value() for value in values)
-    smaller = Signal.like(left, name=f"smaller_{name}", reset_less=True)
-    bulge = Signal(signed(len(left) + 2), name=f"bulge_{name}", reset_less=True)
-    m.d.sync += [smaller.eq(Mux(left < right, left, right)), bulge.eq(left + right - (middle << 1))]
-    least = (smaller << 1) - Mux(bulge > 0, bulge, 0)
-    result = Signal.like(least, name=f"least_{name}", reset_less=True)
-    m.d.sync += result.eq(least)
-    return result
 
 
 class _Place(enum.IntEnum):
@@ -151,8 +128,10 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         tag = data.StructLayout({"place": unsigned(2), "length": unsigned(self.length_bits)})
         sent, collected = Signal(tag, name="sent"), Signal(tag, name="collected")
         accepted, taken = values.i.valid & values.i.ready, values.o.valid & values.o.ready
+        entered, kept = Signal(name="entered"), Signal(tag, name="kept", reset_less=True)
+        m.d.sync += [entered.eq(accepted), kept.eq(sent)]
         # One beat more may wait in the skid buffer.
-        m.d.comb += collected.eq(pass_beside(m, "tags", sent, accepted, taken, values.latency + 1))
+        m.d.comb += collected.eq(pass_beside(m, "tags", kept, entered, taken, values.latency + 1))
         self._send(m, values, limit, sent)
         self._collect(m, values, limit, collected, spans)
         connect(m, spans.o, wiring.flipped(self.o))
@@ -168,21 +147,22 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
     def _send(self, m: Module, values, limit, word) -> None:
         """Normals of a span: the first as the span is accepted, those that follow from registers."""
         span = self.i.payload
-        right, middle = Signal.like(span.normal_right), Signal.like(span.normal_middle)
-        length, following = Signal.like(span.length), Signal(2)
-        long = Signal()
-        idle = following == _Place.PIXEL
-        takes = Signal()
+        right, middle = (
+            Signal.like(normal, name=name, reset_less=True)
+            for normal, name in ((span.normal_right, "right"), (span.normal_middle, "middle"))
+        )
+        length, following = Signal.like(span.length, name="length"), Signal(2, name="following")
+        long, idle, last = Signal(), Signal(name="idle", init=1), Signal(name="last")
         m.d.comb += [
             # By bits: a comparison is a chain of carries.
             long.eq(span.length[2:].any() | span.length[:2].all()),
-            # The limit is ready again before the last normal of a long span is sent.
-            takes.eq(values.i.ready & limit.i.ready),
-            self.i.ready.eq(idle & takes),
+            self.i.ready.eq(idle & values.i.ready),
+            # The limit is ready again as the last normal of a long span is sent, and never waits.
             limit.i.valid.eq(self.i.valid & idle & long & values.i.ready),
             limit.i.payload.normal_left.eq(span.normal_left),
             limit.i.payload.normal_right.eq(span.normal_right),
-            values.i.valid.eq(Mux(idle, self.i.valid & limit.i.ready, 1)),
+            limit.o.ready.eq(1),
+            values.i.valid.eq(self.i.valid | ~idle),
         ]
         with m.If(idle):
             m.d.comb += [
@@ -191,42 +171,37 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
                 word.length.eq(Mux(long, span.length, 1)),
             ]
         with m.Else():
-            last = following == _Place.MIDDLE
             m.d.comb += [
                 Value.cast(values.i.payload).eq(Mux(last, Value.cast(middle), Value.cast(right))),
                 word.place.eq(Mux((length == 2) & ~last, _Place.PIXEL, following)),
                 word.length.eq(Mux(length == 2, 1, length)),
             ]
+        with m.If(idle):
+            # Of the span that is accepted, and of any before it.
+            m.d.sync += [
+                Value.cast(right).eq(Value.cast(span.normal_right)),
+                Value.cast(middle).eq(Value.cast(span.normal_middle)),
+                length.eq(span.length),
+            ]
         with m.If(values.i.valid & values.i.ready):
             with m.If(idle):
-                m.d.sync += [
-                    Value.cast(right).eq(Value.cast(span.normal_right)),
-                    Value.cast(middle).eq(Value.cast(span.normal_middle)),
-                    length.eq(span.length),
-                    following.eq(Mux(span.length[1:].any(), _Place.RIGHT, _Place.PIXEL)),
-                ]
+                several = span.length[1:].any()
+                m.d.sync += [following.eq(Mux(several, _Place.RIGHT, _Place.PIXEL)), idle.eq(~several)]
             with m.Elif((following == _Place.RIGHT) & (length > 2)):
-                m.d.sync += following.eq(_Place.MIDDLE)
+                m.d.sync += [following.eq(_Place.MIDDLE), last.eq(1)]
             with m.Else():
-                m.d.sync += following.eq(_Place.PIXEL)
+                m.d.sync += [following.eq(_Place.PIXEL), idle.eq(1), last.eq(0)]
 
     def _collect(self, m: Module, values, limit, word, spans) -> None:
         """Values of a pixel, or of three places, as a span; and the flag of wide spans."""
-        limited = limit.o
-        if self.setup_interval > limit.initiation_interval:
-            # Its result is there before the middle values, and must not keep the next span out.
-            limited = limit.o.signature.create(path=("limited",))
-            connect_slice(m, limit.o, limited)
         left, right = (Signal.like(values.o.payload, name=f"values_{side}") for side in ("left", "right"))
         is_pixel, is_middle = word.place == _Place.PIXEL, word.place == _Place.MIDDLE
-        complete = Signal()
+        complete = is_pixel | is_middle
         m.d.comb += [
-            complete.eq(is_pixel | (is_middle & limited.valid)),
             spans.i.valid.eq(values.o.valid & complete),
             spans.i.payload.length.eq(word.length),
             spans.long.eq(is_middle),
-            values.o.ready.eq(Mux(is_pixel | is_middle, complete & spans.i.ready, 1)),
-            limited.ready.eq(values.o.valid & is_middle & spans.i.ready),
+            values.o.ready.eq(spans.i.ready | ~complete),
         ]
         for place, side in ((_Place.LEFT, left), (_Place.RIGHT, right)):
             with m.If(values.o.valid & (word.place == place)):
@@ -240,45 +215,78 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
                     given[i][name][1].eq(light[name]),
                     given[i][name][2].eq(right[i][name]),
                 ]
-        # Of long spans, whose first value is in its register.
-        self._flag(m, spans.i, limited.payload, zip(left, values.o.payload, right, strict=True))
+        self._flag(m, spans, limit, values.o, word, left)
 
-    def _flag(self, m: Module, spans: stream.Interface, limited: data.View, places: Iterable) -> None:
-        """Whether a span is wide, as it is complete: its angle, and where a highlight may be.
+    def _flag(self, m: Module, spans, limit, values: stream.Interface, word, left) -> None:
+        """Whether a span is wide, some cycles after it is complete: its angle, and where a highlight may be.
 
         Parameters
         ----------
         m : Module
             Module that gets the logic.
-        spans : stream.Interface
-            Complete spans.
-        limited : data.View
-            Output of the span limit.
-        places : iterable of tuple of data.View
-            Of each light the values at the first pixel, in the middle and at the last pixel.
+        spans, limit : wiring.Component
+            Where complete spans go, and whose results there are in their order.
+        values : stream.Interface
+            Values of the normals.
+        word, left : data.View
+            What a normal is to its span, and the values at the first pixel.
         """
         p = self._limit.parameters
-        wide, wide_if_lit = Signal(2), Signal(2)
-        long = spans.payload.length >= p.SHORTEST
-        fires = spans.valid & spans.ready & long
-        m.d.sync += [
-            wide.eq(Cat(fires & limited.wide, wide[0])),
-            wide_if_lit.eq(Cat(fires & limited.wide_if_lit, wide_if_lit[0])),
-        ]
-        lit = []
+        # A result can be read two cycles after it is there.
+        first = 2 * (self.setup_interval // 3) + self._values.latency
+        wait = max(2, limit.latency + 2 - first)
+        complete, flagged = Signal(wait, name="complete"), Signal(wait, name="flagged")
+        fires = spans.i.valid & spans.i.ready & spans.long
+        shown = fires & (spans.i.payload.length >= p.SHORTEST)
+        m.d.sync += [complete.eq(Cat(fires, complete)), flagged.eq(Cat(shown, flagged))]
+        limited = limit.o.payload.shape()(
+            pass_beside(m, "limits", limit.o.payload, limit.o.valid, complete[-1], self._LIMITS_INSIDE)
+        )
+        lit = Const(0)
         if self.highlights:
             if self.takes_threshold:
                 level = Signal(FixedShape(p.LEVEL_FORMAT), name="level", reset_less=True)
                 m.d.sync += level.eq(self.threshold)
             else:
                 level = octave_limit(m, "level", self.exponent, p.levels)
-            for i, light in enumerate(places):
-                front = Signal(2, name=f"front_{i}")
-                behind = p.BEHIND.codes.item()
-                now = Cat(at.diffuse.as_value() >= behind for at in light).any()
-                m.d.sync += front.eq(Cat(now, front[0]))
-                least = least_highlight(m, f"{i}", [at.highlight for at in light])
-                lit.append(front[1] & (least < level.as_value()))
+            lit = Cat(
+                self._is_lit(m, f"{i}", values, word, first, light, level.as_value())
+                for i, (first, light) in enumerate(zip(left, values.payload, strict=True))
+            ).any()
+            for k in range(wait - 2):
+                later = Signal(name=f"lit_{k}")
+                m.d.sync += later.eq(lit)
+                lit = later
         wide_now = Signal()
-        m.d.sync += wide_now.eq(wide[1] | (wide_if_lit[1] & Cat(lit).any()))
+        m.d.sync += wide_now.eq(flagged[-1] & (limited.wide | (limited.wide_if_lit & lit)))
         m.d.comb += self.wide.eq(wide_now)
+
+    _LIMITS_INSIDE = 8
+    """Results of the limit that wait at most for the values of their spans."""
+
+    def _is_lit(self, m: Module, name: str, values: stream.Interface, word, first, light, level) -> Value:
+        """Whether a light is not behind a span and may have a highlight there, two cycles after it.
+
+        `SpanLimit.least` is the least of ``2 l``, ``2 r`` and ``2 m - |l - r|``, where l, r and m are u at
+        the first pixel, the last and in the middle, which come in this order.
+        """
+        taken = values.valid & values.ready
+        now, first = light.highlight.as_value(), first.highlight.as_value()
+        behind = self._limit.parameters.BEHIND.codes.item()
+        fronts, unders = (Signal(3, name=f"{kind}_{name}") for kind in ("fronts", "unders"))
+        slope = Signal(signed(len(now) + 1), name=f"slope_{name}", reset_less=True)
+        excess = Signal(signed(max(len(now), len(level)) + 2), name=f"excess_{name}", reset_less=True)
+        lit, front = Signal(name=f"bright_{name}"), Signal(name=f"front_{name}")
+        with m.If(taken):
+            m.d.sync += [
+                fronts.eq(Cat(light.diffuse.as_value() >= behind, fronts)),
+                unders.eq(Cat((now << 1) < level, unders)),
+                excess.eq((now << 1) - level),
+            ]
+        with m.If(values.valid & (word.place == _Place.RIGHT)):
+            m.d.sync += slope.eq(first - now)
+        m.d.sync += [
+            front.eq(fronts.any()),
+            lit.eq(unders[1:].any() | (excess - slope < 0) | (excess + slope < 0)),
+        ]
+        return front & lit

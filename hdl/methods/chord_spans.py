@@ -1,12 +1,14 @@
-"""Spans of values to the operands of their pixels: what the chord methods share."""
+"""Spans of the chord methods: differences of three values a span, and accumulators of a pixel's values."""
 
 from collections.abc import Sequence
 
-from amaranth.hdl import Module, Mux, Signal, Value, unsigned
+from amaranth.hdl import Cat, Module, Mux, Signal, Value, ValueLike, unsigned
 from amaranth.lib import data, fifo, stream, wiring
+from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import FIFO_LATENCY, connect
@@ -18,9 +20,15 @@ from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 
 __all__ = ["ChordAccumulatorUnit", "ChordSpansUnit"]
 
+_LONG = 3
+"""Pixels of the shortest span that has differences."""
+
 
 class ChordAccumulatorUnit(AccumulatorUnit):
-    """``N . L`` and u of each light, two quadratics a light; see `AccumulatorUnit`.
+    """``N . L`` and u of each light, and factors, a quadratic each; see `AccumulatorUnit`.
+
+    The words of a span are taken in later than its length, so that a register drives all that take them in.
+    A span of m pixels gives its first values 3 cycles after it was accepted.
 
     Parameters
     ----------
@@ -34,60 +42,115 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         Whether spans bring a gate's decision for each light, ``lit``.
     factors : sequence of int
         Lights that fade, which have a quadratic more.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"length": 12, "lit": lights})))`
+        Lengths of spans, 1 or more, and decisions.
+    words : :py:`In(StructLayout({"start": ..., "lights": ...}))`
+        First values of the span that is taken in, and its differences; with factors ``factor_start`` and
+        ``factors``, too.
+    taken : :py:`Out(1)`
+        High for one cycle as the words of the span are taken in that was accepted before.
+    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights, ...)))`
+        Operands of the pixels.
+
+    Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.10.
     """
+
+    latency = 3
 
     def __init__(
         self,
-        parameters: ChordInterpolator,
-        lights: int,
+        parameters: ChordInterpolator | None = None,
+        lights: int = 1,
         *,
         highlights: bool = True,
         gated: bool = False,
         factors: Sequence[int] = (),
     ):
-        self.parameters = p = parameters
+        self.parameters = p = parameters or ChordInterpolator()
         self.gated, self.factors = gated, tuple(factors)
         self.functions = ("diffuse", "highlight") if highlights else ("diffuse",)
-        span = {
+        differences = chord_differences_shape(lights, highlights, p.setup, len(self.factors))
+        words = {
             "start": light_values_shape(lights, highlights=highlights),
-            "lights": chord_differences_shape(lights, highlights, p.setup)["lights"].shape,
-            "length": unsigned(LENGTH_BITS),
+            "lights": differences["lights"].shape,
         }
+        if self.factors:
+            start = data.ArrayLayout(FixedShape(p.setup.DIFFUSE_FORMAT), len(self.factors))
+            words |= {"factor_start": start, "factors": differences["factors"].shape}
+        self.words_shape = data.StructLayout(words)
+        span = {"length": unsigned(LENGTH_BITS)}
         if gated:
             span["lit"] = unsigned(lights)
-        if self.factors:
-            count = len(self.factors)
-            differences = chord_differences_shape(lights, highlights, p.setup, count)
-            span["factors"] = differences["factors"].shape
-            span["factor_start"] = data.ArrayLayout(FixedShape(p.setup.DIFFUSE_FORMAT), count)
-        output = operands_shape(p, lights, highlights=highlights, gated=gated, factored=bool(self.factors))
-        super().__init__(data.StructLayout(span), output)
+        super().__init__(
+            data.StructLayout(span),
+            operands_shape(p, lights, highlights=highlights, gated=gated, factored=bool(self.factors)),
+            {"words": In(self.words_shape), "taken": Out(1)},
+        )
+
+    @classmethod
+    def begin(cls, parameters, start):
+        """The start alone where half a step of the result would take a sum: it is added to the result."""
+        return (
+            start.extend(parameters.format)
+            if cls._adds_late(parameters)
+            else super().begin(parameters, start)
+        )
+
+    @classmethod
+    def rounded(cls, parameters, value):
+        """The value, with the half that it does not have yet."""
+        return super().begin(parameters, value) if cls._adds_late(parameters) else value
+
+    @staticmethod
+    def _adds_late(parameters: DifferenceAccumulator) -> bool:
+        """Whether the start has a bit of the weight of half a step of the result."""
+        return parameters.start_format.fraction_bits > parameters.result_format.fraction_bits
+
+    @property
+    def span(self):
+        """Words of the span that is taken in."""
+        return self.words
+
+    def load(self, m, advance, active):
+        """A cycle after the span was accepted."""
+        load, present = Signal(name="load"), Signal(name="present")
+        if self.gated:
+            self._lit = Signal.like(self.i.payload.lit, name="lit", reset_less=True)
+        with m.If(advance):
+            m.d.sync += [load.eq(self.i.valid & self.i.ready), present.eq(active)]
+            if self.gated:
+                m.d.sync += self._lit.eq(self.i.payload.lit)
+        m.d.comb += self.taken.eq(load & advance)
+        return self.taken, present
 
     def carried(self, values):
         """The decision of each light."""
         if self.gated:
             for index, light in enumerate(values):
-                yield ~self.i.payload.lit[index], light.gated
+                yield ~self._lit[index], light.gated
 
     def quadratics(self, values):
         """Those of each light."""
-        span = self.i.payload
-        for index, (start, light) in enumerate(zip(span.start, span.lights, strict=True)):
+        for index, (start, light) in enumerate(zip(self.span.start, self.span.lights, strict=True)):
             result = values[index]
             for name in self.functions:
                 words = start[name], light[name].first, light[name].second
                 value = result["cosine" if name == "diffuse" else name]
                 yield f"{name}_{index}", self.parameters.accumulators[name], words, value
         for index, light in enumerate(self.factors):
-            words = span.factor_start[index], span.factors[index].first, span.factors[index].second
+            words = self.span.factor_start[index], *(self.span.factors[index][n] for n in ("first", "second"))
             yield f"factor_{light}", self.parameters.accumulators["factor"], words, values[light].factor
 
 
 class ChordSpansUnit(wiring.Component):
     """Values of spans in, the operands of their pixels out: chord setup, then accumulators.
 
-    A span of three pixels or more goes through the setup, and its start past it through a FIFO; a span of one
-    pixel through the FIFO alone. So short spans take a cycle each, and wait only for those before them.
+    A span of three pixels or more goes through the setup, and its start past it through a memory; a span of
+    one pixel through the memory alone. So short spans take a cycle each, and wait only for those before them.
+    The setup never waits: a span is accepted only if there is room for its differences behind the setup.
 
     Parameters
     ----------
@@ -134,27 +197,26 @@ class ChordSpansUnit(wiring.Component):
         factors: Sequence[int] = (),
     ):
         self._gate = gate
-        self._factors = len(factors)
         self._setup = ChordSetupUnit(
             parameters.setup,
             lights,
             initiation_interval=initiation_interval,
             length_bits=length_bits,
             highlights=highlights,
-            factors=self._factors,
+            factors=len(factors),
         )
         self.multipliers = self._setup.multipliers
         gated = gate is not None
         self._accumulator = ChordAccumulatorUnit(
             parameters, lights, highlights=highlights, gated=gated, factors=factors
         )
-        self.latency = self._setup.latency + self._accumulator.latency
-        waits = FIFO_LATENCY + (gate.latency if gate else 0)
+        # A cycle for the count of the differences that wait.
+        self.latency = self._setup.latency + 1 + self._accumulator.latency
+        waits = 1 + FIFO_LATENCY + (gate.latency if gate else 0)
         self.short_latency = waits + self._accumulator.latency
-        span = span_operands_shape(lights, highlights, length_bits, self._factors)
         super().__init__(
             {
-                "i": In(stream.Signature(span)),
+                "i": In(stream.Signature(span_operands_shape(lights, highlights, length_bits, len(factors)))),
                 "long": In(1),
                 "o": Out(stream.Signature(self._accumulator.o.payload.shape())),
                 "out_of_range": Out(1),
@@ -162,68 +224,119 @@ class ChordSpansUnit(wiring.Component):
             | (gate.ports if gated else {})
         )
 
+    @property
+    def starts_inside(self) -> int:
+        """Depth of the memory of starts: all spans that may follow one that has just begun its setup.
+
+        Or come before it: its values may take an interval, in which none comes.
+        """
+        needed = self._setup.latency + self._setup.initiation_interval + FIFO_LATENCY + self._LATE
+        return 1 << (needed - 1).bit_length()
+
+    @property
+    def differences_inside(self) -> int:
+        """Depth of the memory of differences: those inside the setup, too, a pixel a cycle behind it."""
+        needed = -(-self._setup.latency // _LONG) + FIFO_LATENCY + self._LATE
+        return 1 << (needed - 1).bit_length()
+
+    _LATE = 4
+    """Spans beyond those counted: three that come before the count is known, and one whose words wait."""
+
     def elaborate(self, platform):
-        """FIFO of starts beside the setup, and the accumulators."""
+        """Memory of starts beside the setup, one of differences behind it, and the accumulators."""
         m = Module()
         m.submodules.chord_setup = setup = self._setup
         m.submodules.chord_accumulator = accumulator = self._accumulator
-        span = self.i.payload
-        functions = span["values"][0].shape().members
-        joined = accumulator.i
-        start = {"start": joined.payload.start.shape(), "length": span.length.shape(), "long": 1}
-        if self._factors:
-            start["factor_start"] = joined.payload.factor_start.shape()
-        start_shape = data.StructLayout(start)
-        # As many starts as may follow a span that has just begun its setup, or come before it: its values may
-        # take an interval, in which none comes.
-        depth = setup.latency + setup.initiation_interval + FIFO_LATENCY + 1
-        m.submodules.starts = starts = fifo.SyncFIFOBuffered(width=start_shape.size, depth=depth)
-        decided, gate_ready = Signal(init=1), Signal(init=1)
+        span, joined = self.i.payload, accumulator.i
+        depth = self.starts_inside
+        m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=len(span.length) + 1, depth=depth + 1)
+        known, gate_ready, accepted, popped = (Signal() for _ in range(4))
         if self._gate is not None:
-            self._decide(m, joined, starts, decided, gate_ready)
+            self._decide(m, joined, depth, known, gate_ready)
         else:
-            m.d.comb += [decided.eq(1), gate_ready.eq(1)]
-        given, taken = Signal(start_shape, name="given"), Signal(start_shape, name="taken")
-        # A register, so that no comparison of the level is between the handshakes.
-        room = Signal(name="room", init=1)
-        m.d.sync += room.eq(starts.level < depth - 1)
+            m.d.comb += [known.eq(1), gate_ready.eq(1)]
+        length, is_long = lengths.r_data[:-1], lengths.r_data[-1]
+        room, waits = self._count(m, accepted, popped)
         m.d.comb += [
-            given.length.eq(span.length),
-            given.long.eq(self.long),
-            *(
-                given.start[i][name].eq(values[name][0])
-                for i, values in enumerate(span["values"])
-                for name in functions
-            ),
-            starts.w_data.eq(given),
-            starts.w_en.eq(self.i.valid & gate_ready & room & (setup.i.ready | ~given.long)),
             setup.i.payload.eq(span),
-            setup.i.valid.eq(self.i.valid & gate_ready & room & given.long),
-            self.i.ready.eq(room & gate_ready & (setup.i.ready | ~given.long)),
-            taken.eq(starts.r_data),
-            joined.payload.start.eq(taken.start),
-            joined.payload.length.eq(taken.length),
-            joined.payload.lights.eq(setup.o.payload.lights),
-            joined.valid.eq(starts.r_rdy & decided & (setup.o.valid | ~taken.long)),
-            starts.r_en.eq(joined.ready & decided & (setup.o.valid | ~taken.long)),
-            setup.o.ready.eq(joined.ready & starts.r_rdy & decided & taken.long),
-            self.out_of_range.eq(setup.o.valid & setup.o.ready & setup.o.payload.out_of_range),
+            setup.i.valid.eq(self.i.valid & gate_ready & room & self.long),
+            setup.o.ready.eq(1),
+            self.i.ready.eq(room & gate_ready & (setup.i.ready | ~self.long)),
+            accepted.eq(self.i.valid & self.i.ready),
+            joined.payload.length.eq(length),
+            joined.valid.eq(lengths.r_rdy & known & (waits | ~is_long)),
+            lengths.r_en.eq(joined.ready & known & (waits | ~is_long)),
+            popped.eq(joined.valid & joined.ready & is_long),
+            self.out_of_range.eq(setup.o.valid & setup.o.payload.out_of_range),
         ]
-        for index in range(self._factors):
-            m.d.comb += [
-                given.factor_start[index].eq(span.factors[index][0]),
-                joined.payload.factor_start[index].eq(taken.factor_start[index]),
-            ]
-        if self._factors:
-            m.d.comb += joined.payload.factors.eq(setup.o.payload.factors)
+        self._keep_words(m, lengths, accepted)
         connect(m, accumulator.o, wiring.flipped(self.o))
         return m
 
-    def _decide(self, m: Module, joined: stream.Interface, starts, decided: Value, ready: Value) -> None:
+    def _count(self, m: Module, accepted: Value, popped: Value) -> tuple[Signal, Signal]:
+        """Whether there is room for a span, and whether differences wait; both are registers.
+
+        Between two spans of three pixels or more that the accumulators accept are two cycles or more, so that
+        a register may tell of differences. Spans are counted a cycle late: nothing is between handshakes.
+        """
+        joined, setup = self._accumulator.i, self._setup
+        went, is_room = [], []
+        for name, comes, goes, depth in (
+            ("spans", accepted, joined.valid & joined.ready, self.starts_inside),
+            ("long", accepted & self.long, popped, self.differences_inside),
+        ):
+            entered, left = Signal(name=f"{name}_entered"), Signal(name=f"{name}_left")
+            inside = Signal(range(depth + 1), name=f"{name}_inside")
+            m.d.sync += [entered.eq(comes), left.eq(goes), inside.eq(inside + entered - left)]
+            went.append(left)
+            is_room.append(inside < depth - self._LATE)
+        behind = Signal(range(self.differences_inside + 1), name="behind")
+        following, waits = Signal.like(behind, name="following"), Signal(name="waits")
+        room = Signal(name="room", init=1)
+        m.d.comb += following.eq(behind + setup.o.valid - went[1])
+        m.d.sync += [behind.eq(following), waits.eq(following.any()), room.eq(Cat(is_room).all())]
+        return room, waits
+
+    def _keep_words(self, m: Module, lengths: fifo.SyncFIFOBuffered, accepted: Value) -> None:
+        """Lengths, and memories of starts and of differences, read as the accumulators take words in."""
+        accumulator, setup = self._accumulator, self._setup
+        words, span = accumulator.words, self.i.payload
+        starts, differences = ("start", "factor_start"), ("lights", "factors")
+        if not accumulator.factors:
+            starts, differences = starts[:1], differences[:1]
+        shape = data.StructLayout({name: words.shape().members[name] for name in starts})
+        start = Signal(shape, name="start")
+        for i, values in enumerate(span["values"]):
+            for name in accumulator.functions:
+                m.d.comb += start.start[i][name].eq(values[name][0])
+        for k in range(len(accumulator.factors)):
+            m.d.comb += start.factor_start[k].eq(span.factors[k][0])
+        self._takes_long = takes_long = Signal(name="takes_long")
+        with m.If(accumulator.i.valid & accumulator.i.ready):
+            m.d.sync += takes_long.eq(lengths.r_data[-1])
+        taken = accumulator.taken
+        # A cycle late, as what is accepted is known late.
+        kept, entered = Signal.like(start, name="kept", reset_less=True), Signal(name="entered")
+        length = Signal(len(lengths.w_data), name="length", reset_less=True)
+        m.d.sync += [
+            kept.eq(start),
+            length.eq(Cat(self.i.payload.length, self.long)),
+            entered.eq(accepted),
+        ]
+        m.d.comb += [lengths.w_data.eq(length), lengths.w_en.eq(entered)]
+        made = Cat(Value.cast(setup.o.payload[name]) for name in differences)
+        came = setup.o.valid, taken & takes_long, self.differences_inside
+        for names, kept_words in (
+            (starts, _keep(m, "starts", kept, entered, taken, self.starts_inside)),
+            (differences, _keep(m, "differences", made, *came)),
+        ):
+            m.d.comb += Cat(Value.cast(words[name]) for name in names).eq(kept_words)
+
+    def _decide(self, m: Module, joined: stream.Interface, depth: int, known: Value, ready: Value) -> None:
         """The gate beside the setup: a span waits for its decision."""
         m.submodules.value_gate = gate = self._gate
         lights = len(gate.o.payload)
-        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=lights, depth=starts.depth)
+        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=lights, depth=depth)
         long = self.long
         for given, light in zip(gate.i.payload, self.i.payload["values"], strict=True):
             first, *others = (light.highlight[k].as_value() for k in range(3))
@@ -236,9 +349,34 @@ class ChordSpansUnit(wiring.Component):
             decisions.w_data.eq(gate.o.payload),
             decisions.w_en.eq(gate.o.valid),
             gate.o.ready.eq(decisions.w_rdy),
-            decided.eq(decisions.r_rdy),
-            decisions.r_en.eq(starts.r_en & starts.r_rdy),
+            known.eq(decisions.r_rdy),
+            decisions.r_en.eq(joined.valid & joined.ready),
             joined.payload.lit.eq(decisions.r_data),
         ]
         if gate.ports:
             m.d.comb += gate.constants.eq(self.constants)
+
+
+def _keep(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Value:
+    """Memory of words in their order, without handshakes: the first that has not been taken.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the memory as a submodule ``name``.
+    word : ValueLike
+        Word that comes.
+    written, taken : Value
+        Whether it does, and whether the first is taken.
+    depth : int
+        Words at most, a power of two.
+    """
+    word = Value.cast(word)
+    m.submodules[name] = memory = Memory(shape=len(word), depth=depth, init=[])
+    write, read = memory.write_port(), memory.read_port(domain="comb")
+    m.d.comb += [write.data.eq(word), write.en.eq(written)]
+    with m.If(written):
+        m.d.sync += write.addr.eq(write.addr + 1)
+    with m.If(taken):
+        m.d.sync += read.addr.eq(read.addr + 1)
+    return read.data

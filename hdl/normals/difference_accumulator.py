@@ -1,6 +1,6 @@
 """Forward-difference accumulator ([T] figure 2.10): two accumulating adders a component."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from amaranth.hdl import Module, ShapeLike, Signal, Value, ValueCastable
 from amaranth.lib import data, stream, wiring
@@ -30,8 +30,11 @@ class AccumulatorUnit(wiring.Component):
         Shape of a prepared span; has a field ``length``.
     output_shape : ShapeLike
         Shape of the values of a pixel.
+    ports : mapping of str to Member, optional
+        Further members, by name.
 
-    A subclass may carry further words of a span to its pixels; see `carried`.
+    A subclass may carry further words of a span to its pixels; see `carried`. It may take the words of a span
+    in later than its length; see `load`.
 
     Members
     -------
@@ -45,8 +48,14 @@ class AccumulatorUnit(wiring.Component):
 
     latency = 2
 
-    def __init__(self, input_shape: data.StructLayout, output_shape: ShapeLike):
-        super().__init__({"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))})
+    def __init__(
+        self,
+        input_shape: data.StructLayout,
+        output_shape: ShapeLike,
+        ports: Mapping[str, wiring.Member] | None = None,
+    ):
+        members = {"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))}
+        super().__init__(members | dict(ports or {}))
 
     def quadratics(
         self, values: ValueCastable
@@ -58,19 +67,48 @@ class AccumulatorUnit(wiring.Component):
         """Words of the span, and elements of ``values`` that have them at each of its pixels."""
         yield from ()
 
+    @property
+    def span(self) -> data.View:
+        """Words of the span that is taken in."""
+        return self.i.payload
+
+    def load(self, m: Module, advance: Value, active: Value) -> tuple[Value, Value]:
+        """Whether the words of a span are taken in on this cycle, and whether the accumulators have a pixel.
+
+        Parameters
+        ----------
+        m : Module
+            Module that gets the logic.
+        advance : Value
+            Whether the accumulators move.
+        active : Value
+            Whether there is a pixel, a cycle after a span was accepted and on those that follow.
+        """
+        return self.i.valid & self.i.ready, active
+
+    @classmethod
+    def begin(cls, parameters: DifferenceAccumulator, start: FixedValue) -> FixedValue:
+        """First value of an accumulator: the start, and half a step of the result, so that cutting rounds."""
+        return start + FixedValue.constant(parameters.format, parameters.result_format.step / 2)
+
+    @classmethod
+    def rounded(cls, parameters: DifferenceAccumulator, value: FixedValue) -> FixedValue:
+        """What the result is cut from: the value."""
+        return value
+
     def elaborate(self, platform):
         """Accumulators, a pixel counter, and a register for the saturated values."""
         m = Module()
-        advance, load, valid = Signal(), Signal(), Signal()
+        advance, valid = Signal(), Signal()
         active, ends = count_down(m, self.i.valid, self.i.payload.length, advance)
         values = Signal(self.o.payload.shape())
         m.d.comb += [
             advance.eq(skid_buffer(m, self.o, valid, values)),
             self.i.ready.eq(advance & ends),
-            load.eq(self.i.valid & self.i.ready),
         ]
+        load, present = self.load(m, advance, active)
         with m.If(advance):
-            m.d.sync += valid.eq(active)
+            m.d.sync += valid.eq(present)
         for index, (word, result) in enumerate(self.carried(values)):
             of_span = Signal(len(word), name=f"carried_{index}")
             with m.If(load):
@@ -81,10 +119,9 @@ class AccumulatorUnit(wiring.Component):
             value = Signal(FixedShape(p.format), name=name)
             difference = Signal(FixedShape(p.difference_format), name=f"{name}_difference")
             second_difference = Signal(FixedShape(p.difference_format), name=f"{name}_second_difference")
-            half_step = FixedValue.constant(p.format, p.result_format.step / 2)
             with m.If(load):
                 m.d.sync += [
-                    value.eq((start + half_step).wrap(p.format)),
+                    value.eq(self.begin(p, start).wrap(p.format)),
                     difference.eq(first),
                     second_difference.eq(second),
                 ]
@@ -94,7 +131,8 @@ class AccumulatorUnit(wiring.Component):
                     difference.eq((difference + second_difference).wrap(p.difference_format)),
                 ]
             with m.If(advance):
-                m.d.sync += result.eq(value.truncate(p.result_format.fraction_bits).saturate(p.result_format))
+                exact = self.rounded(p, value)
+                m.d.sync += result.eq(exact.truncate(p.result_format.fraction_bits).saturate(p.result_format))
         return m
 
 

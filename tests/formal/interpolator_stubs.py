@@ -188,7 +188,7 @@ def walk(find, place):
         one, none = (
             FixedValue.constant(NARROW.difference_format, value) for value in (NARROW.result_format.step, 0)
         )
-        begin = FixedValue(NARROW.start_format, Cat(first_word(find(self.i.payload)), Const(0, 1)))
+        begin = FixedValue(NARROW.start_format, Cat(first_word(find(self.span)), Const(0, 1)))
         result = FixedValue(NARROW.result_format, Value.cast(place(values))[: WORD_BITS + 1])
         yield "word", NARROW, (begin, one, none), result
 

@@ -33,7 +33,7 @@ from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
-from blysk.hdl.core.stream import FIFO_LATENCY, PipelinedUnit, skid_buffer
+from blysk.hdl.core.stream import PipelinedUnit, skid_buffer
 from blysk.hdl.methods.angular_interpolator import AngularInterpolatorUnit
 from blysk.hdl.methods.bisection_interpolator import BisectionInterpolatorUnit
 from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit
@@ -51,7 +51,6 @@ from .interpolator_stubs import (
     cosine,
     first_value,
     gate,
-    gate_word,
     itself,
     left,
     light_difference,
@@ -173,18 +172,17 @@ def evaluator_stretches(unit) -> Iterator[Stretch]:
     yield Stretch(evaluator.o, unit.o, normal, cosine, held(products))
 
 
-def joined(came, leaves):
-    """Of a span of several pixels the differences are its own; the decision of a gate is."""
-    own = (came.length <= 1) | (tag(light_difference(leaves)) == tag(value(came)))
-    return own & (leaves.lit == gate_word(came)) if "lit" in leaves.shape().members else own
-
-
 def spans_stretches(unit, sink=None) -> Iterator[Stretch]:
-    """Setup with starts and decisions beside it, and registers; accumulator."""
+    """Setup with starts, lengths and decisions beside it, and accumulators."""
+    capacity = unit.starts_inside * ((1 << LENGTH_BITS) - 1) + pixels_held(unit._accumulator)
+    yield Stretch(unit.i, sink or unit.o, value, cosine, capacity)
+
+
+def words_meet(harness: Harness, unit: ChordSpansUnit) -> None:
+    """Claim that the accumulators take the start and the differences of one span."""
     accumulator = unit._accumulator
-    waiting = unit._setup.latency + unit._setup.initiation_interval + FIFO_LATENCY
-    yield Stretch(unit.i, accumulator.i, value, light_start, waiting + REGISTERED, joined)
-    yield Stretch(accumulator.i, sink or unit.o, light_start, cosine, pixels_held(accumulator))
+    same = tag(light_difference(accumulator.words)) == tag(light_start(accumulator.words))
+    harness.claim(~(accumulator.taken & unit._takes_long) | same)
 
 
 def gathered(came, place, leaves):
@@ -295,6 +293,7 @@ def tells_length(harness: Harness) -> None:
     unit = harness.unit
     if isinstance(unit, ChordSpansUnit):
         harness.assume(unit.long == (unit.i.payload.length > 1))
+        words_meet(harness, unit)
     if isinstance(unit, ChordInterpolatorUnit):
         spans = unit._spans
         harness.claim(~spans.i.valid | (spans.long == (spans.i.payload.length > 1)))
@@ -336,9 +335,9 @@ STRETCHES = {
     "renormalise": 5,
     "quadratic": 5,
     "quadratic-eval": 3,
-    "chord_spans": 2,
-    "chord_spans, gated": 2,
-    "chord_interpolator": 3,
+    "chord_spans": 1,
+    "chord_spans, gated": 1,
+    "chord_interpolator": 2,
     "angular": 6,
     "recurrence_interpolator": 5,
     "bisection_interpolator": 2,
@@ -391,21 +390,17 @@ BUGS = {
         "length.ready.eq(curve.i.ready)",
     ),
     "there is no room for a length": ("quadratic", "gpq.latency + 2", "gpq.latency - 2"),
-    "prepared spans are lost": (
-        "chord_spans",
-        "setup.o.ready.eq(joined.ready & starts.r_rdy & decided & taken.long)",
-        "setup.o.ready.eq(1)",
-    ),
     "a span does not wait for its differences": (
         "chord_spans",
-        "joined.valid.eq(starts.r_rdy & decided & (setup.o.valid | ~taken.long))",
-        "joined.valid.eq(starts.r_rdy & decided)",
+        "joined.valid.eq(lengths.r_rdy & known & (waits | ~is_long))",
+        "joined.valid.eq(lengths.r_rdy & known)",
     ),
-    "a span does not wait for its decision": (
-        "chord_spans, gated",
-        "decided.eq(decisions.r_rdy)",
-        "decided.eq(1)",
-        "_decide",
+    "differences stay": ("chord_spans", "taken & takes_long", "0", "_keep_words"),
+    "starts stay": (
+        "chord_spans",
+        "kept, entered, taken,",
+        "kept, entered, taken & takes_long,",
+        "_keep_words",
     ),
     "of two normals one is not sent": (
         "chord_interpolator",

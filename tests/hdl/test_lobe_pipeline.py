@@ -111,8 +111,8 @@ def test_gate_by_threshold():
 
 
 def test_rate_is_that_of_cosquad():
-    """And the latency, but for the register behind the table."""
+    """And the latency, but for a register of the shift, of the table and of the multiplier."""
     units = [ShadingPipelineUnit(preset("chord", model)) for model in ("blinn", "cosquad")]
     assert len({(unit.cycles_per_pixel, unit.setup_interval) for unit in units}) == 1
-    assert units[0].latency == units[1].latency + 1
+    assert units[0].latency == units[1].latency + 3
     assert units[0].cycles_per_pixel == 1

@@ -108,7 +108,7 @@ def test_cycles(method, interval):
     [
         pytest.param("quadratic", 72, 4, marks=pytest.mark.long),
         pytest.param("renormalise", 57, 4, marks=pytest.mark.long),
-        ("chord", 47, 3),
+        ("chord", 49, 3),
     ],
 )
 def test_cycles_of_long_spans(method, latency, interval, lights):

@@ -92,10 +92,10 @@ def test_joins_the_streams_under_stalls(seed):
     pixels, span_cycles, color_cycles, expected = drive(lengths, seed, shares)
     assert [pixel for _, pixel in pixels] == expected
     assert len(color_cycles) == len(pixels)
-    # Coordinates come before the first colour of their span is accepted, and four are inside at most.
+    # Coordinates come before the first colour of their span is accepted, and two are inside at most.
     last = np.cumsum(lengths) - 1
-    assert np.all(np.array(span_cycles) + 2 <= np.array(color_cycles)[last - lengths + 1])
-    assert np.all(span_cycles[4:] > np.array(color_cycles)[last[:-4]])
+    assert np.all(np.array(span_cycles) + 1 <= np.array(color_cycles)[last - lengths + 1])
+    assert np.all(span_cycles[2:] > np.array(color_cycles)[last[:-2]])
 
 
 def test_one_pixel_a_cycle():

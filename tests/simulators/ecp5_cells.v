@@ -105,12 +105,12 @@ module DP16KD (
   wire [17:0] dib = {DIB17, DIB16, DIB15, DIB14, DIB13, DIB12, DIB11, DIB10, DIB9,
                      DIB8, DIB7, DIB6, DIB5, DIB4, DIB3, DIB2, DIB1, DIB0};
   reg [17:0] doa = 0, dob = 0;
+  wire [17:0] qa, qb;
   reg [17:0] words [0:1023];
   integer k;
   initial for (k = 0; k < 1024; k = k + 1) words[k] = INITIAL[20 * k +: 18];
 
   generate
-    if (REGMODE_A != "NOREG" || REGMODE_B != "NOREG") a_mode_without_a_model stop ();
     if (DATA_WIDTH_A == 36 && DATA_WIDTH_B == 36) begin : simple
       always @(posedge CLKA)
         if (CEA && WEA) begin
@@ -133,9 +133,28 @@ module DP16KD (
   endgenerate
 
   assign {DOA17, DOA16, DOA15, DOA14, DOA13, DOA12, DOA11, DOA10, DOA9,
-          DOA8, DOA7, DOA6, DOA5, DOA4, DOA3, DOA2, DOA1, DOA0} = doa;
+          DOA8, DOA7, DOA6, DOA5, DOA4, DOA3, DOA2, DOA1, DOA0} = qa;
   assign {DOB17, DOB16, DOB15, DOB14, DOB13, DOB12, DOB11, DOB10, DOB9,
-          DOB8, DOB7, DOB6, DOB5, DOB4, DOB3, DOB2, DOB1, DOB0} = dob;
+          DOB8, DOB7, DOB6, DOB5, DOB4, DOB3, DOB2, DOB1, DOB0} = qb;
+
+  // A port of 36 bits is read by the clock and the enable of B.
+  localparam WIDE = DATA_WIDTH_B == 36;
+  ecp5_word #(.REGMODE(REGMODE_A)) word_a (.clk(WIDE ? CLKB : CLKA), .ce(OCEA), .rst(RSTA), .d(doa), .q(qa));
+  ecp5_word #(.REGMODE(REGMODE_B)) word_b (.clk(CLKB), .ce(OCEB), .rst(RSTB), .d(dob), .q(qb));
+endmodule
+
+// The register behind a memory's word, or wires.
+module ecp5_word (input clk, input ce, input rst, input [17:0] d, output [17:0] q);
+  parameter REGMODE = "NOREG";
+  generate
+    if (REGMODE == "NOREG") begin : wires
+      assign q = d;
+    end else if (REGMODE == "OUTREG") begin : register
+      reg [17:0] held = 0;
+      always @(posedge clk) if (rst) held <= 0; else if (ce) held <= d;
+      assign q = held;
+    end else a_mode_without_a_model stop ();
+  endgenerate
 endmodule
 
 // A port of a table: of 9 or 18 bits, and never written.

@@ -29,7 +29,9 @@ def map_component(component: Component, folder: Path) -> dict[str, Any]:
 
 def verilog_of(netlist: dict[str, Any], folder: Path) -> str:
     """Verilog of a netlist, cells as instances."""
-    modules = {"top": netlist["modules"]["top"]}
+    top = netlist["modules"]["top"]
+    cells = {name: {**cell, "connections": _connected(cell)} for name, cell in top["cells"].items()}
+    modules = {"top": {**top, "cells": cells}}
     (folder / "mapped.json").write_text(json.dumps({**netlist, "modules": modules}))
     yosys("read_json mapped.json\nwrite_verilog -noattr mapped.v\n", folder)
     return (folder / "mapped.v").read_text()
@@ -91,6 +93,10 @@ opt_dff
 opt_clean
 simplemap t:$*dff*
 opt -full -share_all
+simplemap t:$not
+dfflegalize -cell $_DFF_P_ 01 -cell $_DFFE_PP_ 01
+opt_merge -share_all
+opt_clean
 write_json proof.json
 """
 
@@ -98,8 +104,9 @@ write_json proof.json
 def same(before: dict[str, Any], after: dict[str, Any], folder: Path) -> str:
     """Whether two netlists do the same on every cycle; the reason why not, or nothing.
 
-    Those cells of the netlist ``after`` that are new or changed, multipliers and look-up tables, are put
-    beside the netlist ``before`` and read its nets. Yosys then merges equal cells of equal inputs and equal
+    Those cells of the netlist ``after`` that are new or changed, multipliers, memories and look-up tables,
+    are put beside the netlist ``before`` and read its nets; a memory as one without register, and it.
+    A carry that is gone must have no reader. Yosys then merges equal cells of equal inputs and equal
     state at power-up. If each product of ``after`` is merged with the net of ``before`` that it drives in
     ``after``, then the nets of ``before`` satisfy every equation of ``after``, and there is one solution.
     """
@@ -112,6 +119,7 @@ def same(before: dict[str, Any], after: dict[str, Any], folder: Path) -> str:
     for cell in new["cells"].values():
         for port, bits in cell["connections"].items():
             (reads.update if cell["port_directions"][port] == "input" else drives.extend)(bits)
+    drives = [bit for bit in drives if isinstance(bit, int)]
     if len(drives) != len(set(drives)):
         return "a net with two drivers"
     if lacking := reads - set(drives) - {"0", "1", "x"}:
@@ -126,7 +134,9 @@ def same(before: dict[str, Any], after: dict[str, Any], folder: Path) -> str:
                 return f"{name} is changed"
             cells[name] = cell
             continue
-        if cell["type"] != "MULT18X18D":
+        if cell["type"] == "CCU2C" and _without_carry(cell) == _without_carry(old["cells"][name]):
+            continue
+        if cell["type"] not in ("MULT18X18D", "DP16KD"):
             return f"{name} is changed"
         connections = dict(cell["connections"])
         for port, (bit,) in cell["connections"].items():
@@ -136,19 +146,71 @@ def same(before: dict[str, Any], after: dict[str, Any], folder: Path) -> str:
                     left.append(bit)
                     right.append(fresh)
                 fresh += 1
-        cells[f"{name}$after"] = {**cell, "connections": connections}
+        cells[f"{name}$after"] = cell = {**cell, "connections": connections}
+        if cell["type"] == "DP16KD":
+            fresh = _take_registers_out(cells, f"{name}$after", old["cells"][name], fresh)
     outputs = {
         name: {"direction": "output", "bits": bits} for name, bits in (("left", left), ("right", right))
     }
     module = {**old, "cells": cells, "ports": {**old["ports"], **outputs}}
     (folder / "both.json").write_text(json.dumps({"creator": "", "modules": {"top": module}}))
-    models = cells_of("LUT4", "TRELLIS_FF") + _ours().split("// A memory of 1024")[0]
+    ours = _ours()
+    memory, register = (ours.index(text) for text in ("// A memory of 1024", "// The register behind"))
+    models = (
+        cells_of("LUT4", "TRELLIS_FF") + ours[:memory] + ours[register : ours.index("// A port of a table")]
+    )
     (folder / "models.v").write_text(models)
     yosys(_PROOF, folder)
     ports = json.loads((folder / "proof.json").read_text())["modules"]["top"]["ports"]
     left, right = (ports[name]["bits"] for name in ("left", "right"))
     differ = sum(a != b for a, b in zip(left, right, strict=True))
     return f"{differ} of {len(left)} nets are not shown to be equal" if differ or not left else ""
+
+
+def _connected(cell: dict[str, Any]) -> dict[str, Any]:
+    """Ports of a cell, but outputs that drive nothing."""
+    directions = cell["port_directions"]
+    given = cell["connections"].items()
+    return {port: bits for port, bits in given if directions[port] != "output" or bits != ["x"]}
+
+
+def _without_carry(cell: dict[str, Any]) -> dict[str, Any]:
+    connections = {port: bits for port, bits in cell["connections"].items() if port != "COUT"}
+    return {**cell, "connections": connections}
+
+
+def _take_registers_out(cells: dict[str, Any], name: str, before: dict[str, Any], fresh: int) -> int:
+    """Put the registers of a memory's words behind it, as cells of their own; the next net that is free."""
+    cell = cells[name]
+    connections, parameters = dict(cell["connections"]), dict(cell["parameters"])
+    wide = int(str(parameters["DATA_WIDTH_B"]), 2) == 36
+    for port in "AB":
+        if parameters[f"REGMODE_{port}"] != "OUTREG":
+            continue
+        outputs = {k: connections[f"DO{port}{k}"] for k in range(18)}
+        for k in outputs:
+            connections[f"DO{port}{k}"] = [fresh + k]
+        pins = {
+            "clk": connections["CLKB" if wide else f"CLK{port}"],
+            "ce": connections[f"OCE{port}"],
+            "rst": connections[f"RST{port}"],
+            "d": list(range(fresh, fresh + 18)),
+            "q": [bit for k in range(18) for bit in outputs[k]],
+        }
+        fresh += 18
+        cells[f"{name}_{port}"] = {
+            "hide_name": 0,
+            "type": "ecp5_word",
+            "parameters": {"REGMODE": "OUTREG"},
+            "attributes": {},
+            "port_directions": {pin: "output" if pin == "q" else "input" for pin in pins},
+            "connections": pins,
+        }
+        # What the port's own pins are without the register.
+        parameters[f"REGMODE_{port}"] = before["parameters"][f"REGMODE_{port}"]
+        connections[f"OCE{port}"] = before["connections"][f"OCE{port}"]
+    cells[name] = {**cell, "connections": connections, "parameters": parameters}
+    return fresh
 
 
 def _nets(module: dict[str, Any]) -> set[Any]:

@@ -1,4 +1,4 @@
-"""Mapped ECP5 netlists with registers inside multipliers, simulated against the bit-accurate models.
+"""Mapped ECP5 netlists with registers inside multipliers and memories, against the bit-accurate models.
 
 Cells are Yosys's models and ours. Quick: a unit, and faults that are injected into its netlist. Long: more
 units, and a frame through pipelines, whose netlists are also proved to do what they did before the step.
@@ -36,6 +36,9 @@ UNITS = (
     ("quadratic_evaluator", "direct"),
     ("half_chord", "interval 4"),
 )
+
+READS = {"name": "lobe", "variant": "blinn", "beats": 1300}
+"""A unit that writes a block RAM and reads it through the register inside; more beats than table ends."""
 
 PIPELINES = ("chord, cosquad", "chord, blinn", "linear, cosquad")
 
@@ -82,6 +85,11 @@ def test_unit(check, name, variant):
     assert check(name, variant).products
 
 
+def test_unit_with_a_memory(check):
+    absorbed = check(**READS)
+    assert absorbed.words == absorbed.products == 1
+
+
 def first(cells, kind):
     return next(cell for cell in cells.values() if cell["type"] == kind)
 
@@ -126,6 +134,31 @@ def test_injected_faults_are_found(check, inject):
         check("dot_product", change=inject)
 
 
+def word_always_taken(cells):
+    """A word is not held while the unit waits."""
+    pins = first(cells, "DP16KD")["connections"]
+    pins["OCEA"] = pins["OCEB"] = ["1"]
+
+
+def half_a_word_without_register(cells):
+    first(cells, "DP16KD")["parameters"]["REGMODE_A"] = "NOREG"
+
+
+def no_word(cells):
+    first(cells, "DP16KD")["connections"]["OCEB"] = ["0"]
+
+
+def wrong_word_bit(cells):
+    pins = first(cells, "DP16KD")["connections"]
+    pins["DOB4"], pins["DOB5"] = pins["DOB5"], pins["DOB4"]
+
+
+@pytest.mark.parametrize("inject", [word_always_taken, half_a_word_without_register, no_word, wrong_word_bit])
+def test_faults_injected_in_a_memory_are_found(check, inject):
+    with pytest.raises((AssertionError, BenchError)):
+        check(**READS, change=inject)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("name", PIPELINES)
 def test_a_frame_of_a_pipeline(name, tmp_path):
@@ -135,6 +168,7 @@ def test_a_frame_of_a_pipeline(name, tmp_path):
     before = map_component(unit, tmp_path)
     netlist, absorbed = absorb_registers(before)
     assert absorbed.closed
+    assert absorbed.words
     assert absorbed.removed
     assert same(before, netlist, tmp_path) == ""
     rng = np.random.default_rng(2026)

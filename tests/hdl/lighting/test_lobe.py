@@ -222,7 +222,7 @@ def test_two_units_share_a_memory(intervals, fixed):
         for name, terms in expected.items():
             np.testing.assert_array_equal(run.beats[name], terms)
     unit = LobeUnit(LOBE, shares_memory=True)
-    assert unit.latency == 8
+    assert unit.latency == 10
     assert cost_of(unit).totals["memory_bits"] == 0
     assert cost_of(both.memory).totals["memory_bits"] == 336 * 35
 

@@ -1,0 +1,115 @@
+"""Memories read through the register that an FPGA's memories have behind their word, and a FIFO of one."""
+
+from amaranth.hdl import Module, Shape, Signal, Value
+from amaranth.lib import stream
+from amaranth.lib.memory import Memory, WritePort
+
+from blysk.hdl.core.stream import require_same_shape
+
+__all__ = ["LATE_FIFO_LATENCY", "UNCOUNTED", "connect_late_fifo", "registered_read"]
+
+LATE_FIFO_LATENCY = 4
+"""Clocks that a payload takes through the empty FIFO of `connect_late_fifo`."""
+
+UNCOUNTED = 2
+"""Payloads that `connect_late_fifo` has taken and its level does not have yet."""
+
+
+def registered_read(
+    m: Module,
+    memory: Memory,
+    address: Value,
+    wanted: Value,
+    write: WritePort | None = None,
+) -> tuple[Signal, Value]:
+    """Word of a memory, two cycles after its address; both registers move by one enable.
+
+    A memory's word is there late in a clock's period, one from its register early. What a memory gives on the
+    clock on which the same word is written differs between FPGAs: then nothing moves, so that no logic is
+    needed for that between the memory and the register.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the registers; the memory is its submodule.
+    memory : Memory
+        The memory.
+    address : Value
+        Of the word.
+    wanted : Value
+        Whether the registers are to move.
+    write : WritePort or None
+        Port that writes the memory; ``None``: none does.
+
+    Returns
+    -------
+    word : Signal
+        The word.
+    moves : Value
+        Whether the registers move.
+    """
+    port = memory.read_port(domain="comb")
+    moves = wanted if write is None else wanted & ~(write.en & (write.addr == address))
+    read, word = (Signal(len(port.data), name=name, reset_less=True) for name in ("read", "word"))
+    m.d.comb += port.addr.eq(address)
+    with m.If(moves):
+        m.d.sync += [read.eq(port.data), word.eq(read)]
+    return word, moves
+
+
+def connect_late_fifo(
+    m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int
+) -> None:
+    """Connect two streams through a FIFO in a memory, between registers.
+
+    One is before the memory, so that the source's handshake ends there; behind it is that of
+    `registered_read`. Whether there is room follows from the FIFO's level alone, in a register; `UNCOUNTED`
+    payloads of the depth are for those that the level does not have yet. A payload takes `LATE_FIFO_LATENCY`
+    cycles through the empty FIFO.
+
+    Parameters
+    ----------
+    m, name, source, sink
+        As for `connect_fifo`.
+    depth : int
+        Payloads that the memory holds, at least 3; two more wait behind it.
+
+    Raises
+    ------
+    TypeError
+        If the payloads differ in a field or in a fixed-point format.
+    """
+    require_same_shape(source.payload.shape(), sink.payload.shape())
+    width = Shape.cast(source.payload.shape()).width
+    payload = Signal(width, name=f"{name}_payload", reset_less=True)
+    written, room = Signal(name=f"{name}_written"), Signal(name=f"{name}_room", init=1)
+    level = Signal(range(depth + 1), name=f"{name}_level")
+    # Whether the memory's word and the one behind it count.
+    read, there = Signal(name=f"{name}_read"), Signal(name=f"{name}_there")
+    address, reads = Signal((depth - 1).bit_length(), name=f"{name}_address"), Signal(name=f"{name}_reads")
+    m.submodules[name] = memory = Memory(shape=width, depth=1 << len(address), init=[])
+    port = memory.write_port()
+    wanted, some = ~there | sink.ready, Signal(name=f"{name}_some")
+    word, moves = registered_read(m, memory, address, wanted, port)
+    m.d.comb += [
+        source.ready.eq(room),
+        port.data.eq(payload),
+        port.en.eq(written),
+        # Where there is a word, none is written to its address.
+        reads.eq(wanted & some),
+        Value.cast(sink.payload).eq(word),
+        sink.valid.eq(there),
+    ]
+    m.d.sync += [
+        payload.eq(source.payload),
+        written.eq(source.valid & room),
+        room.eq(level < depth - UNCOUNTED),
+        level.eq(level + written - reads),
+        some.eq(written | level[1:].any() | (level[0] & ~reads)),
+        port.addr.eq(port.addr + written),
+        address.eq(address + reads),
+    ]
+    with m.If(moves):
+        m.d.sync += [read.eq(reads), there.eq(read)]
+    with m.Elif(sink.ready):
+        m.d.sync += there.eq(0)
