@@ -6,6 +6,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigne
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from blysk.golden.cosines.chord_values import ChordValues
 from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
@@ -76,7 +77,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
     def __init__(self, parameters: ChordInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
         self._values = ChordValuesUnit(
-            None,
+            ChordValues(parameters.scale),
             lights,
             initiation_interval=self.setup_interval // 3,
             highlights=self.highlights,

@@ -1,5 +1,7 @@
 """Spans of the chord methods: differences of three values a span, and accumulators of a pixel's values."""
 
+from collections.abc import Sequence
+
 from amaranth.hdl import Cat, Module, Mux, Signal, Value, ValueLike, unsigned
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.memory import Memory
@@ -8,8 +10,9 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.spans import LENGTH_BITS
+from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import FIFO_LATENCY, connect
-from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape, span_values_shape
+from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape, span_operands_shape
 from blysk.hdl.cosines.chord_values import light_values_shape
 from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.light_products import operands_shape
@@ -22,7 +25,7 @@ _LONG = 3
 
 
 class ChordAccumulatorUnit(AccumulatorUnit):
-    """``N . L`` and u of each light, two quadratics a light; see `AccumulatorUnit`.
+    """``N . L`` and u of each light, and factors, a quadratic each; see `AccumulatorUnit`.
 
     The words of a span are taken in later than its length, so that a register drives all that take them in.
     A span of m pixels gives its first values 3 cycles after it was accepted.
@@ -37,16 +40,19 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         Whether there is u.
     gated : bool
         Whether spans bring a gate's decision for each light, ``lit``.
+    factors : sequence of int
+        Lights that fade, which have a quadratic more.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"length": 12, "lit": lights})))`
         Lengths of spans, 1 or more, and decisions.
     words : :py:`In(StructLayout({"start": ..., "lights": ...}))`
-        First values of the span that is taken in, and its differences.
+        First values of the span that is taken in, and its differences; with factors ``factor_start`` and
+        ``factors``, too.
     taken : :py:`Out(1)`
         High for one cycle as the words of the span are taken in that was accepted before.
-    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
+    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights, ...)))`
         Operands of the pixels.
 
     Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.10.
@@ -61,22 +67,26 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         *,
         highlights: bool = True,
         gated: bool = False,
+        factors: Sequence[int] = (),
     ):
         self.parameters = p = parameters or ChordInterpolator()
-        self.gated = gated
+        self.gated, self.factors = gated, tuple(factors)
         self.functions = ("diffuse", "highlight") if highlights else ("diffuse",)
-        self.words_shape = data.StructLayout(
-            {
-                "start": light_values_shape(lights, highlights=highlights),
-                "lights": chord_differences_shape(lights, highlights, p.setup)["lights"].shape,
-            }
-        )
+        differences = chord_differences_shape(lights, highlights, p.setup, len(self.factors))
+        words = {
+            "start": light_values_shape(lights, highlights=highlights),
+            "lights": differences["lights"].shape,
+        }
+        if self.factors:
+            start = data.ArrayLayout(FixedShape(p.setup.DIFFUSE_FORMAT), len(self.factors))
+            words |= {"factor_start": start, "factors": differences["factors"].shape}
+        self.words_shape = data.StructLayout(words)
         span = {"length": unsigned(LENGTH_BITS)}
         if gated:
             span["lit"] = unsigned(lights)
         super().__init__(
             data.StructLayout(span),
-            operands_shape(p, lights, highlights=highlights, gated=gated),
+            operands_shape(p, lights, highlights=highlights, gated=gated, factored=bool(self.factors)),
             {"words": In(self.words_shape), "taken": Out(1)},
         )
 
@@ -130,6 +140,9 @@ class ChordAccumulatorUnit(AccumulatorUnit):
                 words = start[name], light[name].first, light[name].second
                 value = result["cosine" if name == "diffuse" else name]
                 yield f"{name}_{index}", self.parameters.accumulators[name], words, value
+        for index, light in enumerate(self.factors):
+            words = self.span.factor_start[index], *(self.span.factors[index][n] for n in ("first", "second"))
+            yield f"factor_{light}", self.parameters.accumulators["factor"], words, values[light].factor
 
 
 class ChordSpansUnit(wiring.Component):
@@ -153,10 +166,12 @@ class ChordSpansUnit(wiring.Component):
         Bits of the length.
     gate : ValueGateUnit or None
         Decides which spans have no highlight; ``None``: nothing does.
+    factors : sequence of int
+        Lights that fade.
 
     Members
     -------
-    i : :py:`In(stream.Signature(StructLayout({"values": span_values_shape(...), "length": length_bits})))`
+    i : :py:`In(stream.Signature(span_operands_shape(lights, highlights, length_bits, len(factors))))`
         Spans of one pixel, of which the first value counts, or of three and more.
     long : :py:`In(1)`
         Whether the span that is offered has more than one pixel: its source knows without the length.
@@ -179,6 +194,7 @@ class ChordSpansUnit(wiring.Component):
         highlights: bool = True,
         length_bits: int = LENGTH_BITS,
         gate: ValueGateUnit | None = None,
+        factors: Sequence[int] = (),
     ):
         self._gate = gate
         self._setup = ChordSetupUnit(
@@ -187,29 +203,22 @@ class ChordSpansUnit(wiring.Component):
             initiation_interval=initiation_interval,
             length_bits=length_bits,
             highlights=highlights,
+            factors=len(factors),
         )
         self.multipliers = self._setup.multipliers
         gated = gate is not None
-        self._accumulator = ChordAccumulatorUnit(parameters, lights, highlights=highlights, gated=gated)
+        self._accumulator = ChordAccumulatorUnit(
+            parameters, lights, highlights=highlights, gated=gated, factors=factors
+        )
         # A cycle for the count of the differences that wait.
         self.latency = self._setup.latency + 1 + self._accumulator.latency
         waits = 1 + FIFO_LATENCY + (gate.latency if gate else 0)
         self.short_latency = waits + self._accumulator.latency
-        output = operands_shape(parameters, lights, highlights=highlights, gated=gated)
         super().__init__(
             {
-                "i": In(
-                    stream.Signature(
-                        data.StructLayout(
-                            {
-                                "values": span_values_shape(lights, highlights),
-                                "length": unsigned(length_bits),
-                            }
-                        )
-                    )
-                ),
+                "i": In(stream.Signature(span_operands_shape(lights, highlights, length_bits, len(factors)))),
                 "long": In(1),
-                "o": Out(stream.Signature(output)),
+                "o": Out(stream.Signature(self._accumulator.o.payload.shape())),
                 "out_of_range": Out(1),
             }
             | (gate.ports if gated else {})
@@ -291,10 +300,17 @@ class ChordSpansUnit(wiring.Component):
     def _keep_words(self, m: Module, lengths: fifo.SyncFIFOBuffered, accepted: Value) -> None:
         """Lengths, and memories of starts and of differences, read as the accumulators take words in."""
         accumulator, setup = self._accumulator, self._setup
-        start, differences = Signal.like(accumulator.words.start), setup.o.payload.lights
-        for i, values in enumerate(self.i.payload["values"]):
+        words, span = accumulator.words, self.i.payload
+        starts, differences = ("start", "factor_start"), ("lights", "factors")
+        if not accumulator.factors:
+            starts, differences = starts[:1], differences[:1]
+        shape = data.StructLayout({name: words.shape().members[name] for name in starts})
+        start = Signal(shape, name="start")
+        for i, values in enumerate(span["values"]):
             for name in accumulator.functions:
-                m.d.comb += start[i][name].eq(values[name][0])
+                m.d.comb += start.start[i][name].eq(values[name][0])
+        for k in range(len(accumulator.factors)):
+            m.d.comb += start.factor_start[k].eq(span.factors[k][0])
         self._takes_long = takes_long = Signal(name="takes_long")
         with m.If(accumulator.i.valid & accumulator.i.ready):
             m.d.sync += takes_long.eq(lengths.r_data[-1])
@@ -308,12 +324,13 @@ class ChordSpansUnit(wiring.Component):
             entered.eq(accepted),
         ]
         m.d.comb += [lengths.w_data.eq(length), lengths.w_en.eq(entered)]
-        words = _keep(m, "starts", kept, entered, taken, self.starts_inside)
-        m.d.comb += Value.cast(accumulator.words.start).eq(words)
-        words = _keep(
-            m, "differences", differences, setup.o.valid, taken & takes_long, self.differences_inside
-        )
-        m.d.comb += Value.cast(accumulator.words.lights).eq(words)
+        made = Cat(Value.cast(setup.o.payload[name]) for name in differences)
+        came = setup.o.valid, taken & takes_long, self.differences_inside
+        for names, kept_words in (
+            (starts, _keep(m, "starts", kept, entered, taken, self.starts_inside)),
+            (differences, _keep(m, "differences", made, *came)),
+        ):
+            m.d.comb += Cat(Value.cast(words[name]) for name in names).eq(kept_words)
 
     def _decide(self, m: Module, joined: stream.Interface, depth: int, known: Value, ready: Value) -> None:
         """The gate beside the setup: a span waits for its decision."""

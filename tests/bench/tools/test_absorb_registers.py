@@ -273,7 +273,12 @@ def multipliers(netlist):
     return [cell for cell in netlist["modules"]["top"]["cells"].values() if cell["type"] == "MULT18X18D"]
 
 
-@pytest.mark.parametrize("name", CASES)
+QUICK = "three enables", "a reset", "another reader of an operand", "a shared operand", "narrow operands"
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in CASES]
+)
 def test_what_moves_and_that_nothing_else_changes(name, mapped, tmp_path):
     describe, expected = CASES[name]
     before = mapped(name, Beside(describe))
@@ -363,12 +368,12 @@ def in_reset(cell):
     "inject",
     [
         swapped_operand_bits,
-        swapped_product_bits,
-        always_enabled,
         enable_of_another,
-        no_register,
-        unsigned_operand,
         in_reset,
+        *(
+            pytest.param(fault, marks=pytest.mark.long)
+            for fault in (swapped_product_bits, always_enabled, no_register, unsigned_operand)
+        ),
     ],
 )
 def test_injected_faults_are_found(inject, mapped, tmp_path):
