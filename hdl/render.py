@@ -8,7 +8,7 @@ from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.render import Renderer
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import connect, connect_fifo, moving
+from blysk.hdl.core.stream import connect, connect_fifo, connect_register, moving
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.depth_test import DepthMemory, DepthTestUnit, drawn_pixel_shape
 from blysk.hdl.geometry.geometry import GeometryUnit
@@ -65,7 +65,7 @@ STATUS = (*COUNTERS, "spans", "pixels", "hidden", *_SHADING)
 """Counters of `RenderUnit`."""
 
 WAITING_SPANS = 33
-"""Spans between geometry and shading: a memory of 32 words, and a register behind it."""
+"""Spans between geometry and shading: a memory of 32 words, and a register behind it; not compact."""
 
 
 class RenderUnit(wiring.Component):
@@ -159,7 +159,11 @@ class RenderUnit(wiring.Component):
             made.valid.eq(geometry.o.valid),
             geometry.o.ready.eq(made.ready),
         ]
-        connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS)
+        if geometry.compact:
+            # Slower than shading: spans hardly wait.
+            connect_register(m, "waiting_span", made, ready)
+        else:
+            connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS)
         count = Signal(COUNTER_BITS, name="count_spans")
         with m.If(made.valid & made.ready):
             m.d.sync += count.eq(count + 1)

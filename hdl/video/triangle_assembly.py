@@ -44,7 +44,7 @@ class TriangleAssemblyUnit(wiring.Component):
     o : :py:`Out(stream.Signature(triangle_shape(grid)))`
         Those to be drawn.
     write : :py:`In(stream.Signature({"index", "vertex": screen_vertex_shape(grid)}))`
-        Vertices of the frame, one a cycle.
+        Vertices of the frame, one a cycle, while no triangle is read.
     constants : :py:`In(band_rows_shape())`
         The band; stays while triangles are read.
     status : :py:`Out(counters_shape(*COUNTERS))`
@@ -88,7 +88,8 @@ class TriangleAssemblyUnit(wiring.Component):
         result, valid = Signal(self.o.payload.shape(), name="result"), Signal(name="valid")
         advance = Signal(name="advance")
         m.d.comb += [
-            write.addr.eq(self.write.payload.index),
+            # One address: a block RAM that reads and writes at different ones needs registers beside it.
+            write.addr.eq(read.addr),
             write.data.eq(Value.cast(self.write.payload.vertex)),
             write.en.eq(self.write.valid),
             self.write.ready.eq(1),
@@ -107,7 +108,13 @@ class TriangleAssemblyUnit(wiring.Component):
             self.i.ready.eq((left == 0) & ~walks),
             face.addr.eq(following),
             face.en.eq(advance & (~walks | last)),
-            read.addr.eq(Array(face.data.word_select(k, mesh.index_bits) for k in range(3))[corner]),
+            read.addr.eq(
+                Mux(
+                    self.write.valid,
+                    self.write.payload.index,
+                    Array(face.data.word_select(k, mesh.index_bits) for k in range(3))[corner],
+                )
+            ),
             read.en.eq(advance),
         ]
         with m.If(self.i.ready), m.If(self.i.valid):
