@@ -160,7 +160,7 @@ class RenderUnit(wiring.Component):
             geometry.o.ready.eq(made.ready),
         ]
         if geometry.compact:
-            # Slower than shading: spans hardly wait.
+            # Memories of 16 words for one span and the next would cost as much as they win.
             connect_register(m, "waiting_span", made, ready)
         else:
             connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS)

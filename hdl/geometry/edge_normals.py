@@ -52,7 +52,7 @@ class EdgeNormalsUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
 
-    COMPACT_INTERVAL = 4
+    COMPACT_INTERVAL = 3
 
     def __init__(self, parameters: EdgeNormals | None = None, compact: bool = False):
         self.parameters, self.compact = parameters or EdgeNormals(), compact

@@ -46,8 +46,8 @@ _SORTED = 17
 _SCALES = 4
 """Triangles whose scales wait for their attributes."""
 
-_COMPACT_GRADIENT = 40
-"""Cycles from an attribute to the next in the compact style: hardly a word outlives its register."""
+_COMPACT_GRADIENT = 16
+"""Cycles from an attribute to the next in the compact style: four take as long as the edges do."""
 
 _INSIDE_BITS = 10
 """Bits of the difference of two counters: more than triangles are inside at most."""

@@ -54,8 +54,9 @@ class SpanAttributesUnit(wiring.Component):
     modulo 4.
 
     *Serial*, one attribute after the other goes through the same adders, and its words through rings of
-    registers: all takes four times as many cycles, a scanline is given four times, each time with another
-    attribute's plane, and the output's ready goes through to the input's.
+    registers: a scanline takes four cycles, and so does a piece for every two bits of its pixels and of those
+    cut off. A scanline is given four times, each time with another attribute's plane, and the output's ready
+    goes through to the input's.
 
     Parameters
     ----------
@@ -268,16 +269,20 @@ class _Along:
         self.pace = pace
         self.emits, self.leaves, self.cuts = (Signal(name=name) for name in ("emits", "leaves", "cuts"))
         self.skipping, whole = Signal(name="skipping"), Signal(name="whole")
-        self.moves, self.ends, self.bit = (Signal(name=name) for name in ("moves", "ends", "bit"))
-        self.single = Signal(name="single")
+        self.moves, self.ends = (Signal(name=name) for name in ("moves", "ends"))
+        radix = 2 if pace.serial else 1
+        self.digit = Signal(radix, name="digit")
+        self.single, self.double = Signal(name="single"), Signal(name="double")
         m.d.comb += [
-            self.bit.eq(bits[0]),
-            self.ends.eq(~bits[1:].any()),
+            self.digit.eq(bits[:radix]),
+            self.ends.eq(~bits[radix:].any()),
             self.moves.eq(busy & pace.advance & pace.steps),
             pace.leaves.eq(self.ends & ~self.skipping & ~whole),
             self.emits.eq(self.moves & self.ends & ~self.skipping),
             self.leaves.eq(self.emits & ~whole),
             self.single.eq(piece == 0),
+            # The last of a whole piece's steps is of one bit, or of two.
+            self.double.eq(~piece[0] & (piece != 0) if pace.serial else 0),
         ]
         # A piece that is whole and not the last has 2^piece pixels.
         after = (left - (1 << piece))[:PIXEL_BITS]
@@ -297,7 +302,7 @@ class _Along:
             ]
         with m.Elif(self.moves & pace.ends):
             with m.If(~self.ends):
-                m.d.sync += bits.eq(bits >> 1)
+                m.d.sync += bits.eq(bits >> radix)
             with m.Else():
                 m.d.sync += [bits.eq(its[0]), self.pixels.eq(its[0]), whole.eq(its[1]), self.skipping.eq(0)]
                 with m.If(~self.skipping):
@@ -310,15 +315,16 @@ class _Along:
         """Values of an attribute at the piece's ends; ``inward`` is its step, once loaded ``kept``."""
         nears, totals, steps = (_Kept(m, f"{name}_{word}", self.pace) for word in ("near", "total", "step"))
         near, total, step = nears.value, totals.value, steps.value
-        far = (total + Mux(self.bit, step, 0))[:_BITS]
-        following = (near + Mux(self.single, step, step << 1))[:_BITS]
+        far = (total + sum(Mux(bit, step << k, 0) for k, bit in enumerate(self.digit)))[:_BITS]
+        whole = Mux(self.single, step, Mux(self.double, step << 2, step << 1))
+        following = (near + whole)[:_BITS]
         with m.If(loads):
             for word, value in ((nears, base), (totals, base), (steps, inward)):
                 word.becomes(m, value)
         with m.Elif(self.moves):
             with m.If(~self.ends):
                 totals.becomes(m, far)
-                steps.becomes(m, step << 1)
+                steps.becomes(m, step << len(self.digit))
             with m.Else():
                 begin = Mux(self.skipping, far, following)
                 for word, value in ((nears, begin), (totals, begin), (steps, kept)):

@@ -180,7 +180,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
         g, p = self._graph, self.parameters
         vector, flip = (g.input(name, lambda o, name=name: o[name]) for name in ("vector", "flip"))
         places = self._places(vector)
-        shifter, bits = self._shifter(), p.format.width - 1
+        shifter = self._shifter()
         words = [
             g.use(
                 shifter,
