@@ -46,8 +46,8 @@ _SORTED = 17
 _SCALES = 4
 """Triangles whose scales wait for their attributes."""
 
-_COMPACT_GRADIENT = 16
-"""Cycles from an attribute to the next in the compact style: four take as long as the edges do."""
+_COMPACT_GRADIENT = 12
+"""Cycles from an attribute to the next in the compact style: as many as it has products."""
 
 _INSIDE_BITS = 10
 """Bits of the difference of two counters: more than triangles are inside at most."""
@@ -69,7 +69,7 @@ class _TriangleSetup(wiring.Component):
     def __init__(self, grid: Grid, compact: bool, cuts: bool):
         self._compact, skid = compact, not compact
         self._serialiser = AttributeSerialiserUnit(skid)
-        self._edges = EdgeSetupUnit(grid, *((1, 1) if compact else (3, 2)), skid=skid)
+        self._edges = EdgeSetupUnit(grid, 1 if compact else 3, 2, skid=skid)
         interval = self._edges.initiation_interval
         self._planes = PlaneSetupUnit(grid, interval, skid)
         self._gradients = GradientSetupUnit(_COMPACT_GRADIENT if compact else interval // ATTRIBUTES, skid)
