@@ -132,13 +132,14 @@ class DepthTestUnit(wiring.Component):
 
         code = total.as_signed() >> SPAN_DEPTH.fraction_bits
         depth = Mux(code < 0, 0, Mux(code > DepthTest.FARTHEST, DepthTest.FARTHEST, code))
-        there, drawn = Signal(DEPTH.width, name="there"), Signal(name="drawn")
+        nearer, drawn = Signal(name="nearer"), Signal(name="drawn")
         # Written a clock after the read, or on the clock of the read.
         late = [(valid[2], stages[2]), (Signal(name="before_valid"), Signal.like(stages[2], name="before"))]
-        m.d.comb += [there.eq(port.read_data), drawn.eq(valid[1] & (stages[1].depth < there))]
+        # Compared before it is known which counts: the memory's word comes late.
+        m.d.comb += [nearer.eq(stages[1].depth < port.read_data), drawn.eq(valid[1] & nearer)]
         for written, pixel in reversed(late):
             with m.If(written & (_place(pixel) == _place(stages[1]))):
-                m.d.comb += there.eq(pixel.depth)
+                m.d.comb += nearer.eq(stages[1].depth < pixel.depth)
         with m.If(advance):
             m.d.sync += [
                 valid[0].eq(accept),

@@ -94,7 +94,7 @@ class EdgeNormalsUnit(wiring.Component):
             last.eq(turn == Mux(piece.length > 2, 2, piece.length - 1)),
             normaliser.i.valid.eq(busy & ((turn != 0) | rest.w_rdy)),
             moves.eq(normaliser.i.valid & normaliser.i.ready),
-            self.i.ready.eq(~busy | (moves & last)),
+            self.i.ready.eq(~busy if self.compact else ~busy | (moves & last)),
             rest.w_en.eq(moves & (turn == 0)),
             rest.w_data.eq(
                 Cat(*(Value.cast(piece[name]) for name in ("left", "right", *span_words_shape())))
@@ -110,6 +110,8 @@ class EdgeNormalsUnit(wiring.Component):
             m.d.sync += [busy.eq(self.i.valid), turn.eq(0), piece.eq(self.i.payload)]
         with m.Elif(moves):
             m.d.sync += turn.eq(turn + 1)
+            if self.compact:
+                m.d.sync += busy.eq(~last)
 
     def _collect(self, m: Module, normaliser, words, rest) -> Value:
         """Normals as they come, a lost one replaced by the one before; whether one was, on this cycle."""
