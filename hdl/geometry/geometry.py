@@ -106,7 +106,8 @@ class _TriangleSetup(wiring.Component):
         for to in (corners.payload, walks.payload):
             m.d.comb += [to[name].eq(edges.o.payload[name]) for name in to.shape().members]
         if self._compact:
-            connect(m, corners, planes.i)
+            # Registers end the chain of readies from the assembler to the sort.
+            connect_register(m, "waiting_corners", corners, planes.i)
             connect_register(m, "waiting_walk", walks, wiring.flipped(self.walks))
         else:
             connect_fifo(m, "waiting_corners", corners, planes.i, depth=3)

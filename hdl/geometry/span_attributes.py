@@ -220,7 +220,7 @@ class _Pace:
     """
 
     def __init__(self, m: Module, rows: stream.Interface, busy: Signal, serial: bool):
-        self.serial, self.busy = serial, busy
+        self.serial, self.given = serial, rows.valid
         self.advance, self.leaves = Signal(name="advance"), Signal(name="would_leave")
         self.lane, self.ends, self.steps = Signal(2, name="lane"), Signal(name="ends"), Signal(name="steps")
         free, accepts = Signal(name="free"), Signal(name="accepts")
@@ -287,7 +287,18 @@ class _Along:
         # A piece that is whole and not the last has 2^piece pixels.
         after = (left - (1 << piece))[:PIXEL_BITS]
         count, size = row.length - 1, Mux(self.skipping, left, after)
-        mine, its = _piece(count[:PIXEL_BITS], most), _piece(size, piece)
+        its = _piece(size, piece)
+        if pace.serial:
+            # The scanline comes three times before it is taken.
+            waiting, size = Signal(PIXEL_BITS, name="waiting"), Signal(len(most), name="waiting_piece")
+            length, more = Signal(PIXEL_BITS, name="waiting_pixels"), Signal(name="waiting_more")
+            with m.If(pace.given):
+                m.d.sync += [waiting.eq(count), size.eq(most)]
+            mine = _piece(waiting, size)
+            m.d.sync += [length.eq(mine[0]), more.eq(mine[1])]
+            count, mine = waiting, (length, more)
+        else:
+            mine = _piece(count[:PIXEL_BITS], most)
         first = Signal(name="first_piece")
         m.d.comb += self.cuts.eq(self.emits & whole & first)
         with m.If(loads & pace.ends):

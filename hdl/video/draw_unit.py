@@ -162,7 +162,8 @@ class DrawUnit(wiring.Component):
             self.done.payload.eq(band),
         ]
         idle = Signal(name="idle")
-        m.d.comb += idle.eq(self.assembly.idle & render.idle)
+        # A cycle late, which is before the command behind a draw is there.
+        m.d.sync += idle.eq(self.assembly.idle & render.idle)
         with m.FSM(name="state") as state:
             with m.State("clear"):
                 m.d.comb += self.depth.begin.eq(1)
