@@ -142,17 +142,19 @@ class GeometryUnit(wiring.Component):
 
     The units of the room in a row. Corners go to the edges and, one attribute after the other, to a FIFO,
     where they meet the scales of their triangle; edges wait in a FIFO until their planes are there. In the
-    *compact* style one divider finds one quotient bit a cycle, and attributes share a multiplier.
+    *compact* style one divider finds the quotients of all edges, attributes share a multiplier, and on the
+    way along the spans attributes take turns, as do the normals of a span; no FIFO is wider than an attribute.
 
     A triangle takes as long as the slowest of its units, while others work on its neighbours:
 
-    - setup: `interval` cycles where it is drawn, 16 or compact 67, with two lanes half of that; 5 to 9 where
+    - setup: `interval` cycles where it is drawn, 16 or compact 48, with two lanes half of that; 5 to 9 where
       it is dropped by the sort;
     - the walk: a cycle for a scanline without pixels in the picture;
     - a span, or a piece of it, of p pixels: as many cycles as ``p - 1`` has bits, but at least 1 for 1 pixel,
-      2 for 2 pixels and 3 for more. Never more than it has pixels.
+      2 for 2 pixels and 3 for more. Never more than it has pixels. In the compact style four for every two
+      of those bits, and for each scanline, and three for each normal.
 
-    The multipliers are `multipliers`: 10, in the compact style 8; without normals 4 and 2; a second lane
+    The multipliers are `multipliers`: 10, in the compact style 5; without normals 4 and 2; a second lane
     has 4, compact 2.
 
     Parameters
@@ -254,7 +256,8 @@ class GeometryUnit(wiring.Component):
         for name in ("walks", "planes"):
             sources = [getattr(lane, name) for lane in lanes]
             joined = _between(name, sources[0])
-            turn = _turns(m, name, joined, len(lanes))
+            serial = self.compact and name == "planes"
+            turn = _turns(m, name, joined, len(lanes), ATTRIBUTES if serial else 1)
             m.d.comb += [
                 joined.valid.eq(Array(source.valid for source in sources)[turn]),
                 Value.cast(joined.payload).eq(Array(Value.cast(source.payload) for source in sources)[turn]),
@@ -316,12 +319,12 @@ def _between(name: str, port: stream.Interface) -> stream.Interface:
     return stream.Signature(port.payload.shape()).create(path=(name,))
 
 
-def _turns(m: Module, name: str, moving: stream.Interface, count: int) -> Signal:
-    """Whose turn it is, the next one's with each payload."""
-    turn = Signal(range(count), name=f"turn_of_{name}")
+def _turns(m: Module, name: str, moving: stream.Interface, count: int, each: int = 1) -> Signal:
+    """Whose turn it is, the next one's when so many payloads, a power of two of them, have gone."""
+    passed = Signal(range(count * each), name=f"turn_of_{name}")
     with m.If(moving.valid & moving.ready):
-        m.d.sync += turn.eq(turn + 1)
-    return turn
+        m.d.sync += passed.eq(passed + 1)
+    return passed[each.bit_length() - 1 :]
 
 
 def _fork(m: Module, source: stream.Interface, first: stream.Interface, second: stream.Interface) -> None:
