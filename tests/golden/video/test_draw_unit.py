@@ -52,7 +52,7 @@ def rounded_places(drawing, exact, found):
 
 @pytest.mark.parametrize("angle", [8, 2000])
 def test_error_is_that_of_shading_and_of_rounded_places(angle, monkeypatch):
-    """With the places of the exact frame no pixel is off by 1 LSB; its own are a step of 1/256 pixel apart."""
+    """With the places of the exact frame no pixel is off by 1 LSB; its own are a step of the grid apart."""
     shown = scene()
     drawing = Drawing.of([shown], preset(model="cosquad"))
     exact = turned(shown, angle)
