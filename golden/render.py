@@ -1,11 +1,12 @@
 """Triangles to pixels: geometry, shading and depth test, and their bit-accurate model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.geometry.depth_test import DepthTest
 from blysk.golden.geometry.edge_normals import TrueSpans
 from blysk.golden.geometry.geometry import Geometry
@@ -33,7 +34,8 @@ class DrawnPixels:
     spans : TrueSpans or LineSpans
         What was shaded.
     counts : dict of str to int
-        `COUNTERS` of geometry; ``spans`` and ``pixels`` shaded and how many of them were ``hidden``.
+        `COUNTERS` of geometry; ``spans`` and ``pixels`` shaded and how many of them were ``hidden``; pixels
+        of spans that were ``dropped`` before.
     out_of_range_spans : int
         Spans of a larger angle than the method serves.
     wide_spans : int
@@ -68,6 +70,8 @@ class Renderer:
     geometry : Geometry
         Triangles to spans; of a method that takes the true line with ``lines``. ``None``: as the method has
         it.
+    coarse : CoarseDepth, optional
+        Drops spans that are hidden for their whole length before they are shaded; the picture is the same.
 
     Raises
     ------
@@ -79,6 +83,7 @@ class Renderer:
 
     design: Design = field(default_factory=Design)
     geometry: Geometry = None  # type: ignore[assignment]  # becomes one
+    coarse: CoarseDepth | None = None
 
     def __post_init__(self):
         lines = self.design.interpolator.takes_line
@@ -105,6 +110,12 @@ class Renderer:
             As for `Design.compute`.
         """
         spans, counts = self.geometry.compute(triangles, frame)
+        dropped = 0
+        if self.coarse is not None:
+            places = (spans.x, spans.y, spans.length, spans.depth, spans.depth_step)
+            hidden = self.coarse.compute(*places)
+            dropped = int(spans.length[hidden].sum())
+            spans = replace(spans, **{name: value[~hidden] for name, value in vars(spans).items()})
         pixels = self.design.compute(shading_spans(spans), constants)
         test = DepthTest()
         depth = test.depths(spans.length, spans.depth, spans.depth_step)
@@ -117,7 +128,9 @@ class Renderer:
             depth=depth[drawn],
             triangle=np.repeat(spans.triangle, spans.length)[drawn],
             spans=spans,
-            counts=counts | {"spans": len(spans), "pixels": len(drawn), "hidden": int((~drawn).sum())},
+            counts=counts
+            | {"spans": len(spans), "pixels": len(drawn), "hidden": int((~drawn).sum())}
+            | {"dropped": dropped},
             out_of_range_spans=pixels.out_of_range_spans,
             wide_spans=pixels.wide_spans,
         )

@@ -1,6 +1,6 @@
 """Triangles to pixels: geometry, shading and depth test."""
 
-from amaranth.hdl import Module, Shape, Signal
+from amaranth.hdl import Const, Module, Shape, Signal, Value, unsigned
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -10,6 +10,7 @@ from blysk.golden.render import Renderer
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import connect, connect_fifo, connect_register, moving
 from blysk.hdl.frame_constants import write_shape
+from blysk.hdl.geometry.coarse_depth import CoarseDepthUnit
 from blysk.hdl.geometry.depth_test import DepthMemory, DepthTestUnit, drawn_pixel_shape
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.geometry.span_adapter import connect_shading_span
@@ -39,6 +40,7 @@ PORT_DESCRIPTIONS = {
     "constants_bottom": "the row after the last",
     "constants_back_faces": "see above",
     "constants_limit": "widest span, see above",
+    "constants_picture": "changes with each picture: the coarse depth test begins anew",
     "status_empty": "triangles that cover no pixel",
     "status_zero_area": "triangles without area",
     "status_culled": "back faces left out",
@@ -48,6 +50,7 @@ PORT_DESCRIPTIONS = {
     "status_spans": "spans shaded",
     "status_pixels": "pixels shaded",
     "status_hidden": "of them those behind others",
+    "status_dropped": "pixels of spans that the coarse depth test dropped before shading",
     "status_out_of_range_spans": "spans of an angle that the method does not serve",
     "status_wide_spans": "spans wider than the error bound of the exponent allows",
     "memory_read_place": "pixel whose depth is read",
@@ -61,7 +64,7 @@ PORT_DESCRIPTIONS = {
 
 _SHADING = ("out_of_range_spans", "wide_spans")
 
-STATUS = (*COUNTERS, "spans", "pixels", "hidden", *_SHADING)
+STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", *_SHADING)
 """Counters of `RenderUnit`."""
 
 WAITING_SPANS = 33
@@ -72,7 +75,8 @@ class RenderUnit(wiring.Component):
     """Triangles to the pixels that are to be written: `Renderer` is the bit-accurate model.
 
     `GeometryUnit`, `ShadingPipelineUnit` and `DepthTestUnit` in a row; spans wait between the first two in a
-    FIFO, and their depths pass the pipeline in another. Each takes as long as it would alone, at the same
+    FIFO, and their depths pass the pipeline in another. With a coarse depth test a span waits there for its
+    answer, too, and leaves, or is dropped on one cycle. Each takes as long as it would alone, at the same
     time as the others: a frame as many cycles as the slowest, if none of them waits for long. The compact
     style is that of the design's build, of shading and, unless told otherwise, of geometry.
 
@@ -99,7 +103,8 @@ class RenderUnit(wiring.Component):
     write : :py:`In(stream.Signature(write_shape()))`
         Frame constants of the shading pipeline.
     constants : :py:`In(frame_shape())`
-        The picture; stays while triangles are inside.
+        The picture; stays while triangles are inside. With a coarse depth test it has a bit ``picture`` more,
+        which is another for each picture.
     status : :py:`Out(counters_shape(*STATUS))`
         Counters since the reset.
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
@@ -125,12 +130,14 @@ class RenderUnit(wiring.Component):
         compact = design.build.style == "compact" if compact is None else compact
         self.geometry = GeometryUnit(grid, compact, self.parameters.geometry.lines, setups)
         self.pipeline = ShadingPipelineUnit(design)
-        self.depth = DepthTestUnit(design.x_bits, design.y_bits, size)
+        coarse, bits = self.parameters.coarse, (design.x_bits, design.y_bits)
+        self.coarse = None if coarse is None else CoarseDepthUnit(coarse, *bits)
+        self.depth = DepthTestUnit(*bits, size)
         members = {
             "i": In(stream.Signature(triangle_shape(grid))),
             "o": Out(stream.Signature(drawn_pixel_shape(design.x_bits, design.y_bits))),
             "write": In(stream.Signature(write_shape())),
-            "constants": In(frame_shape()),
+            "constants": In(_constants_shape(self.parameters)),
             "status": Out(counters_shape(*STATUS)),
         }
         if size is None:
@@ -143,7 +150,7 @@ class RenderUnit(wiring.Component):
         m = Module()
         geometry, pipeline, depth = self.geometry, self.pipeline, self.depth
         m.submodules.geometry, m.submodules.pipeline, m.submodules.depth = geometry, pipeline, depth
-        m.d.comb += geometry.constants.eq(self.constants)
+        m.d.comb += (geometry.constants[name].eq(self.constants[name]) for name in frame_shape().members)
         connect(m, wiring.flipped(self.i), geometry.i)
         connect(m, wiring.flipped(self.write), pipeline.write)
         connect(m, depth.o, wiring.flipped(self.o))
@@ -156,19 +163,21 @@ class RenderUnit(wiring.Component):
         connect_shading_span(m, geometry.o.payload, made.payload.span)
         m.d.comb += [
             *(made.payload[name].eq(geometry.o.payload[name]) for name in deep),
-            made.valid.eq(geometry.o.valid),
-            geometry.o.ready.eq(made.ready),
+            made.valid.eq(geometry.o.valid & (room := Signal(name="room"))),
+            geometry.o.ready.eq(made.ready & room),
         ]
-        if geometry.compact:
+        known, drops = self._judge(m, room, made.ready, ready)
+        if geometry.compact and self.coarse is None:
             # Memories of 16 words for one span and the next would cost as much as they win.
             connect_register(m, "waiting_span", made, ready)
         else:
             connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS)
+        given, dropped = Signal(name="given"), Signal(name="dropped")
         count = Signal(COUNTER_BITS, name="count_spans")
-        with m.If(made.valid & made.ready):
+        with m.If(pipeline.i.valid & pipeline.i.ready):
             m.d.sync += count.eq(count + 1)
         shape = data.StructLayout(deep)
-        spans = moving(m, "spans", made, depth.i, pixel_last := Signal(name="pixel_last"))
+        spans = moving(m, "spans", made, depth.i, pixel_last := Signal(name="pixel_last"), dropped)
         m.d.comb += [
             pixel_last.eq(pipeline.o.payload.last),
             self.idle.eq(geometry.idle & depth.idle & ~spans),
@@ -183,9 +192,11 @@ class RenderUnit(wiring.Component):
             pipeline.i.payload.eq(ready.payload.span),
             *(word[name].eq(ready.payload[name]) for name in deep),
             depths.w_data.eq(word),
-            depths.w_en.eq(ready.valid & pipeline.i.ready),
-            pipeline.i.valid.eq(ready.valid & depths.w_rdy),
-            ready.ready.eq(pipeline.i.ready & depths.w_rdy),
+            given.eq(ready.valid & known),
+            dropped.eq(given & drops),
+            depths.w_en.eq(given & ~drops & pipeline.i.ready),
+            pipeline.i.valid.eq(given & ~drops & depths.w_rdy),
+            ready.ready.eq(known & (drops | (pipeline.i.ready & depths.w_rdy))),
             depth.i.payload.pixel.eq(pixel.payload),
             *(depth.i.payload[name].eq(waiting[name]) for name in deep),
             depth.i.valid.eq(pixel.valid & depths.r_rdy),
@@ -197,3 +208,32 @@ class RenderUnit(wiring.Component):
             *(self.status[name].eq(pipeline.status[name]) for name in _SHADING),
         ]
         return m
+
+    def _judge(self, m: Module, room: Signal, taken: Value, head: stream.Interface) -> tuple[Value, Value]:
+        """Whether it is known of the first span that waits if it is hidden, and whether it is.
+
+        The coarse depth test, if there is one, gets the spans of geometry, too, while it has ``room``.
+        """
+        if self.coarse is None:
+            m.d.comb += room.eq(1)
+            return Const(1), Const(0)
+        m.submodules.coarse = coarse = self.coarse
+        span, place = self.geometry.o, coarse.i.payload
+        answers = stream.Signature(1).create(path=("answers",))
+        connect_fifo(m, "answers", coarse.o, answers, depth=WAITING_SPANS)
+        m.d.comb += [
+            *(place[name].eq(span.payload[name]) for name in ("x", "y", "length", "depth", "depth_step")),
+            place.picture.eq(self.constants.picture),
+            coarse.i.valid.eq(span.valid & taken),
+            room.eq(coarse.i.ready),
+            answers.ready.eq(head.valid & head.ready),
+            self.status.dropped.eq(count := Signal(COUNTER_BITS, name="count_dropped")),
+        ]
+        with m.If(answers.ready & answers.valid & answers.payload):
+            m.d.sync += count.eq(count + head.payload.span.length)
+        return answers.valid, answers.payload
+
+
+def _constants_shape(parameters: Renderer) -> data.StructLayout:
+    shape = frame_shape()
+    return data.StructLayout(shape.members | {"picture": unsigned(1)}) if parameters.coarse else shape

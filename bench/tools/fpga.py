@@ -31,8 +31,9 @@ from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F, Family
 from blysk.bench.tools.place_and_route import SEEDS, Layout, TooLarge, lay_out, versions_of
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.presets import METHODS
-from blysk.sim.api.design import design, pixel_pipelines
-from blysk.sim.api.options import DESIGN, PIPES
+from blysk.hdl.bus.tops import TOPS
+from blysk.sim.api.design import design, pixel_pipelines, renderer_of
+from blysk.sim.api.options import DESIGN, PIPES, PORTS
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.errors import InputError
 from blysk.sim.output import check_writable, write_json
@@ -93,25 +94,29 @@ def _units(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Comp
 
 
 def _pipelines(
-    given: Mapping[str, Any], lights: int, every: bool, pipes: int = 1
+    given: Mapping[str, Any], lights: int, every: bool, pipes: int = 1, top: str = "shader"
 ) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
-    """The pipeline, of one method or every one, by the options that are given."""
+    """The pipeline or another core, of one method or every one, by the options that are given."""
     for method in METHODS if every else (given.get("method", DESIGN["method"].default),):
         chosen = {**given, "method": method}
         made = design(lights=lights, **chosen)
-        name = [f"pipeline {method}", made.model or "no model"]
+        name = [f"{'pipeline' if top == 'shader' else top} {method}", made.model or "no model"]
         name += [f"{lights} lights" if lights != 1 else "1 light"]
         name += [chosen[option] for option in ("operand",) if option in chosen]
         name += [made.build.style] if made.build.style != "throughput" else []
         name += [f"interval {chosen['setup_interval']}"] if "setup_interval" in chosen else []
         name += ["gate"] if made.gate else []
         name += [f"{pipes} pipelines"] if pipes > 1 else []
-        yield ", ".join(name), partial(pixel_pipelines, made, pipes)
+        if top == "shader":
+            yield ", ".join(name), partial(pixel_pipelines, made, pipes)
+        elif not made.takes_values or not every:
+            yield ", ".join(name), partial(TOPS[top].unit, renderer_of(made, "top", top))
 
 
 @click.command(short_help="Place and route for an FPGA: parts, clock rate.")
 @options_of(DESIGN)
 @options_of(PIPES)
+@options_of({"top": PORTS["top"]})
 @click.option(
     "--family",
     "family_name",
@@ -142,7 +147,7 @@ def _pipelines(
 @click.option("--json", "figures", type=OutputFile(), help="Every figure, and the slowest path of each seed.")
 @click.pass_context
 def command(
-    context, family_name, lights, pipes, every_method, units, seeds, jobs, keep_registers, figures, **_
+    context, family_name, lights, pipes, top, every_method, units, seeds, jobs, keep_registers, figures, **_
 ):
     """Place and route the pipeline on an FPGA, and print its parts and clock rate.
 
@@ -158,19 +163,23 @@ def command(
         blysk fpga --method chord --seeds 3 --json chord.json
         blysk fpga --family nexus --unit specular
         blysk fpga --pipes 4 --seeds 1
+        blysk fpga --top render --style compact --seeds 1
     """
     pipes = pipes or PIPES["pipes"].default
     family = DEVICES[family_name] if family_name else ECP5_85F if pipes > 1 else ECP5
     chosen = given_options(context, list(DESIGN))
-    given = [*chosen, *given_options(context, ["lights", "pipes", "every_method"])]
+    top = top or "shader"
+    given = [*chosen, *given_options(context, ["lights", "pipes", "top", "every_method"])]
     if units and given:
         option = f"--{given[0].replace('_', '-')}"
         raise InputError(option, "is for the pipeline", "leave it out, or --unit")
     if every_method and "method" in given:
         raise InputError("--method", "is one of every method", "leave it out, or --every-method")
+    if pipes > 1 and top != "shader":
+        raise InputError(f"--pipes {pipes}", "triangles go to one pipeline", "leave it out, or --top")
     if figures:
         check_writable(figures)
-    designs = list(_units(units) if units else _pipelines(chosen, lights, every_method, pipes))
+    designs = list(_units(units) if units else _pipelines(chosen, lights, every_method, pipes, top))
     tools = versions_of(family)
     layouts, too_large = [], {}
     with tqdm(total=len(designs) * seeds, unit=" placements", leave=False, disable=None) as bar:

@@ -110,8 +110,14 @@ class Register:
         return code | ((1 << WORD_BITS) - (1 << self.width) if negative else 0)
 
 
-def frame_registers() -> list[Register]:
-    """Registers of the picture, of a core that takes triangles; see `Frame`."""
+def frame_registers(picture: bool = False) -> list[Register]:
+    """Registers of the picture, of a core that takes triangles; see `Frame`.
+
+    Parameters
+    ----------
+    picture : bool
+        Whether there is a bit that changes with each picture, of a core with a coarse depth test.
+    """
     borders = {
         "left": "first column of the picture on the grid",
         "top": "first row",
@@ -124,6 +130,8 @@ def frame_registers() -> list[Register]:
         ("back_faces", 2, False, f"back faces, {kinds}"),
         ("limit", LIMIT_BITS, False, "largest chord between the unit normals of a span's ends, in 1/1024"),
     ]
+    if picture:
+        rows.append(("picture", 1, False, "changes with each picture: the coarse depth test begins anew"))
     return [
         Register(name, FRAME + 4 * k, "read-write", width, signed, text)
         for k, (name, width, signed, text) in enumerate(rows)

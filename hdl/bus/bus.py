@@ -92,11 +92,12 @@ class BusUnit(wiring.Component):
             if name != "busy"
         ]
         of_core = self.framing.core.signature.members
+        constants = of_core["constants"].shape if "constants" in of_core else None
         design = parameters.design if isinstance(parameters, Renderer) else parameters
         self.map = RegisterMap(
             self.framing.top.title,
             counters,
-            frame_registers() if "constants" in of_core else (),
+            frame_registers("picture" in constants.members) if constants else (),
             constant_registers(design) if "write" in of_core else (),
         )
         self._registers = RegistersUnit(self.map)

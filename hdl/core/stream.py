@@ -311,7 +311,12 @@ def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -
 
 
 def moving(
-    m: Module, name: str, source: stream.Interface, sink: stream.Interface, last: ValueLike = 1
+    m: Module,
+    name: str,
+    source: stream.Interface,
+    sink: stream.Interface,
+    last: ValueLike = 1,
+    dropped: ValueLike = 0,
 ) -> Value:
     """Whether payloads are between two streams: more went in than came out.
 
@@ -325,10 +330,12 @@ def moving(
         Where payloads go in and come out.
     last : ValueLike
         Whether what comes out is the last, or only, part of a payload.
+    dropped : ValueLike
+        Whether a payload ends between the two.
     """
     inside = Signal(10, name=f"{name}_inside")
     enters, leaves = source.valid & source.ready, sink.valid & sink.ready & last
-    m.d.sync += inside.eq(inside + enters - leaves)
+    m.d.sync += inside.eq(inside + enters - leaves - dropped)
     return inside.any()
 
 

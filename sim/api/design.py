@@ -8,6 +8,7 @@ from typing import Any, Literal, Unpack
 
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.frame_constants import address_table
+from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.geometry.triangles import ATTRIBUTE
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
@@ -27,7 +28,7 @@ from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, p
 from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
 from blysk.hdl.render import RenderUnit
 from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, geometry_descriptions, unit_of_top
-from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS, DesignOptions
+from blysk.sim.api.options import COARSE, COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS, DesignOptions
 from blysk.sim.api.settings import Settings, checked, read_settings
 from blysk.sim.api.verilog_example import example_of
 from blysk.sim.errors import OptionError
@@ -222,7 +223,19 @@ def _render_header(unit: RenderUnit) -> list[str]:
         first.replace("shading pipeline", "triangles to pixels"),
         *lines,
         *_geometry_lines(unit.geometry),
+        *_coarse_lines(unit),
         "memory_*: a depth for each pixel; read data a clock after the place; all ones before a frame",
+    ]
+
+
+def _coarse_lines(unit: RenderUnit) -> list[str]:
+    if unit.coarse is None:
+        return []
+    given = unit.coarse.parameters
+    return [
+        f"coarse depth test: pictures of at most {given.width}x{given.height}, {given.blocks:,} words of "
+        f"{given.word_bits} bits; constants_picture changes with each picture, is 0 for the first; the first "
+        f"span of a picture waits for {given.swept:,} cycles"
     ]
 
 
@@ -253,7 +266,8 @@ def _geometry_header(unit: GeometryUnit) -> list[str]:
 def _descriptions(unit: ShadingUnit | RenderUnit, pipes: int) -> Mapping[str, str]:
     """Descriptions of the ports of a core that gives pixels."""
     if isinstance(unit, RenderUnit):
-        return RENDER_PORT_DESCRIPTIONS
+        picture = [] if unit.coarse else ["constants_picture"]
+        return {port: text for port, text in RENDER_PORT_DESCRIPTIONS.items() if port not in picture}
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
     texts = port_descriptions(pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
     return {port: text for port, text in texts.items() if not port.startswith("i_") or port in fields}
@@ -285,6 +299,7 @@ def verilog(
     top: str | None = None,
     bus: str = "native",
     setups: int = 1,
+    coarse: tuple[int, int] | None = None,
 ) -> str:
     """Verilog-2001 of a pipeline for synthesis, with a table of its ports and frame constants.
 
@@ -306,6 +321,8 @@ def verilog(
         Its own ports, or AXI4-Stream with registers on AXI4-Lite or Wishbone.
     setups : int
         Lanes of triangle setup, 1 or 2, of what takes triangles.
+    coarse : (int, int), optional
+        Size of the largest picture of a coarse depth test, of triangles to pixels; see `CoarseDepth`.
 
     Raises
     ------
@@ -314,7 +331,7 @@ def verilog(
         cannot be so many pipelines, or not this core on this bus.
     """
     design = Design() if design is None else design
-    return verilog_and_unit(design, name, geometry, pipes, merged, top, bus, setups)[0]
+    return verilog_and_unit(design, name, geometry, pipes, merged, top, bus, setups, coarse)[0]
 
 
 def verilog_and_unit(
@@ -326,6 +343,7 @@ def verilog_and_unit(
     top: str | None = None,
     bus: str = "native",
     setups: int = 1,
+    coarse: tuple[int, int] | None = None,
 ) -> tuple[str, ShadingUnit | RenderUnit | GeometryUnit | BusUnit]:
     """The same, and the hardware that it is of."""
     (chosen,) = checked({"geometry": geometry}, GEOMETRY).values()
@@ -344,6 +362,11 @@ def verilog_and_unit(
         raise OptionError("pipes", str(pipes), f"a core on {bus} has one pipeline", "leave it out, or bus")
     asked = ("geometry", chosen) if chosen == "hardware" else ("top", top)
     parameters = renderer_of(design, *asked) if hardware else design
+    if coarse is not None:
+        if top != "render":
+            raise OptionError("coarse", "", "it is of triangles to pixels", "give --top render, too")
+        size = checked({"coarse": coarse}, COARSE)["coarse"]
+        parameters = replace(parameters, coarse=CoarseDepth(*size))
     if hardware or bus != "native":
         lanes = {"setups": setups} if hardware else {}
         unit = unit_of_top(top, bus, parameters, **lanes)

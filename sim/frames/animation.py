@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from PIL import Image
 
 from blysk.golden.frames.compare import compare, compare_image
+from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import normalise
@@ -128,6 +129,8 @@ class Animation:
         Number of pipelines.
     setups : int
         Lanes of triangle setup, of hardware that takes triangles; 0: it takes spans.
+    coarse : bool
+        Whether that hardware has a coarse depth test.
     """
 
     scene: Scene
@@ -136,6 +139,7 @@ class Animation:
     full: Design | None = None
     pipes: int = 1
     setups: int = 0
+    coarse: bool = False
 
 
 @dataclass(frozen=True)
@@ -164,8 +168,11 @@ def _simulator(design: Design, engine: str, pipes: int = 1) -> FrameSimulator:
 
 
 @functools.lru_cache(maxsize=1)
-def _triangle_simulator(design: Design, engine: str, size: tuple[int, int], setups: int) -> TriangleSimulator:
-    return TriangleSimulator(Renderer(design), size, engine, setups=setups)
+def _triangle_simulator(
+    design: Design, engine: str, size: tuple[int, int], setups: int, coarse: bool
+) -> TriangleSimulator:
+    renderer = Renderer(design, coarse=CoarseDepth(*size) if coarse else None)
+    return TriangleSimulator(renderer, size, engine, setups=setups)
 
 
 def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
@@ -177,7 +184,8 @@ def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
         scene = replace(animation.scene, camera=camera)
         if animation.setups:
             design, size = animation.design, (scene.width, scene.height)
-            drawn = _triangle_simulator(design, animation.engine, size, animation.setups).render(scene)
+            lanes = animation.setups, animation.coarse
+            drawn = _triangle_simulator(design, animation.engine, size, *lanes).render(scene)
             comparison = compare_image(scene, design, drawn.image)
             return AnimationFrame(drawn.image, triangle_figures(scene, design, drawn, comparison))
         frame = _simulator(animation.design, animation.engine, animation.pipes).render(scene)

@@ -103,6 +103,7 @@ def triangle_figures(
             "repaired_span_normals": counts["repaired"],
             "cut_spans": counts["cut"],
             "hidden_pixels": counts["hidden"],
+            "dropped_pixels": counts["dropped"],
             "wide_spans": counts["wide_spans"],
             "out_of_range_spans": counts["out_of_range_spans"],
         },

@@ -224,7 +224,7 @@ def sample_constants(design: Design, rng: np.random.Generator | None = None) -> 
     constants = []
     for index in range(design.materials):
         colors = rng.integers(0, 255 * 64, (2, design.lights, 3))
-        exponent = design.build.exponent or 7 + index
+        exponent = design.build.exponent or 7 + index % 64
         ambient = rng.integers(0, 255 * 8, 3)
         constants.append(FrameConstants(exponent, ambient, vectors[0], vectors[1], colors[0], colors[1]))
     if design.loads_tables:
@@ -235,7 +235,7 @@ def sample_constants(design: Design, rng: np.random.Generator | None = None) -> 
 
 def sample_material(design: Design, index: int) -> Material:
     """A material whose highlight the pipeline has a bank for, or the exponent that is fixed, by a number."""
-    material = Material((0.08, 0.05, 0.03), (0.5,) * 3, (0.6,) * 3, design.build.exponent or 7 + index)
+    material = Material((0.08, 0.05, 0.03), (0.5,) * 3, (0.6,) * 3, design.build.exponent or 7 + index % 64)
     if not design.loads_tables:
         return material
     lobe = design.specular

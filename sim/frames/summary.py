@@ -19,6 +19,7 @@ _COUNTS = {
     "sliver_triangles": "triangles at most 1/256 pixel wide",
     "hidden_spans": "spans wholly hidden, left out",
     "hidden_pixels": "pixels shaded behind others",
+    "dropped_pixels": "pixels of hidden spans dropped before shading",
     "cut_spans": "spans cut to the range of the method",
     "missed_spans": "spans that this method misses by over 0.25 LSB (chord and renormalise do not)",
     "wide_spans": "spans wider than the error bound of the exponent allows",

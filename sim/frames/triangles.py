@@ -130,7 +130,7 @@ class TriangleSimulator:
             self._unit,
             triangles.beats,
             count=len(expected.x),
-            constants=frame.codes,
+            constants=self._constants(frame),
             write=writes_of(constants),
             engine=self.engine,
         )
@@ -138,6 +138,10 @@ class TriangleSimulator:
         self.engine = run.engine
         if not all(np.array_equal(run.beats[name], value) for name, value in expected.beats.items()):
             raise SimulationError("the simulated hardware's pixels are not those of its bit-accurate model")
+
+    def _constants(self, frame: Frame) -> dict[str, int]:
+        """Codes of the frame, the first picture."""
+        return frame.codes | ({} if self.renderer.coarse is None else {"picture": 0})
 
     def render(
         self,
@@ -182,7 +186,7 @@ class TriangleSimulator:
             self._unit,
             sent.triangles.beats,
             count=count,
-            constants=sent.frame.codes,
+            constants=self._constants(sent.frame),
             write=writes_of(constants_of(scene, self.renderer.design)),
             engine=self.engine,
             progress=None if progress is None else lambda done: progress(done, done),

@@ -2,6 +2,7 @@
 
 import base64
 import binascii
+import importlib.util
 import math
 import os
 import struct
@@ -22,6 +23,7 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "
 _ROUNDED = math.sqrt(3) / 127
 _INSTANCING = "EXT_mesh_gpu_instancing"
 _MAX_INSTANCES = 100_000
+_DRACO = "KHR_draco_mesh_compression"
 _LINES, _FAN, _MODES = 3, 6, 7
 
 
@@ -142,6 +144,24 @@ class _Arrays:
             return np.maximum(values / np.iinfo(kind).max, -1.0)
         return values.astype(np.float64 if kind.kind == "f" else np.int64)
 
+    def check_draco(self, compressed: dict) -> None:
+        """Refuse compressed data that its decoder refuses: trimesh would leave the part out.
+
+        Without the decoder only what stands there uncompressed, too, comes here, and is read.
+        """
+        if importlib.util.find_spec("DracoPy") is None:
+            return
+        import DracoPy
+
+        views = self.document.get("bufferViews", [])
+        view = views[_whole(compressed.get("bufferView"), "Draco-compressed data", len(views))]
+        data = self.buffers[view["buffer"]][view.get("byteOffset", 0) :][: view["byteLength"]]
+        try:
+            DracoPy.decode(data)
+        # The decoder raises whatever it trips over.
+        except Exception as error:
+            raise Refused("its Draco-compressed data is damaged", REEXPORT) from error
+
     def add(self, values: np.ndarray) -> int:
         """Number of a new accessor with these values: float32 vectors, or indices of 32 bits."""
         kind, component = ("<f4", _FLOAT) if values.dtype.kind == "f" else ("<u4", 5125)
@@ -191,6 +211,8 @@ def plain_arrays(document: dict, buffers: list[bytes]) -> list[bytes]:
     for mesh in document.get("meshes", []):
         for primitive in mesh["primitives"]:
             if primitive.get("mode", 4) > _LINES:
+                if compressed := primitive.get("extensions", {}).get(_DRACO):
+                    arrays.check_draco(compressed)
                 _plain_primitive(primitive, arrays)
     _plain_instances(document, arrays)
     if arrays.more:

@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.geometry.triangles import Frame, Triangles
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
@@ -30,7 +31,8 @@ def _constants(rng, design):
 def _made(unit, case):
     parameters = unit.parameters
     constants = list(_constants(np.random.default_rng(_SEED), parameters.design))
-    return parameters.compute(Triangles(**case.beats), frame_of(case.constants), constants)
+    frame = {name: code for name, code in case.constants.items() if name != "picture"}
+    return parameters.compute(Triangles(**case.beats), frame_of(frame), constants)
 
 
 def _status(unit, case):
@@ -45,7 +47,8 @@ def _triangles(unit, rng, count, size=6.0, spread=0.2):
     triangles.material[:] = rng.integers(0, design.materials, count)
     frame = Frame.centred(*_SIZE, limit=Frame.limit_of(15.0))
     write = writes_of(list(_constants(np.random.default_rng(_SEED), design)))
-    return Case(triangles.beats, frame.codes, write)
+    picture = {} if unit.coarse is None else {"picture": 0}
+    return Case(triangles.beats, frame.codes | picture, write)
 
 
 def _tiny(unit, rng, count):
@@ -58,9 +61,11 @@ def _variants():
         ("chord", {}),
         ("chord, compact", {"style": "compact"}),
         ("renormalise, 2 lights, 3 materials", {"method": "renormalise", "lights": 2, "materials": 3}),
+        ("linear, coarse", {"method": "linear"}),
     ):
         design = preset(**{"method": "chord", "x_bits": 5, "y_bits": 5} | options)
-        yield name, Variant(partial(RenderUnit, Renderer(design), _SIZE), long=name != "chord")
+        renderer = Renderer(design, coarse=CoarseDepth(*_SIZE) if "coarse" in name else None)
+        yield name, Variant(partial(RenderUnit, renderer, _SIZE), long=name != "chord")
 
 
 RECORD = Record(

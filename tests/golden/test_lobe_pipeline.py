@@ -54,6 +54,11 @@ def test_frame_is_exact_blinn(exponent):
     assert found.method_error.max_lsb < 0.75
 
 
+def test_frame_is_exact_where_a_lobe_has_a_kink():
+    design, given = preset("chord", "phong_coplanar"), scene(1, mesh=teapot(2000))
+    assert compare(given, design, model_frame(given, design)).method_error.max_lsb < 0.75
+
+
 @pytest.mark.parametrize("roughness", [0.05, 0.1, 0.3, 0.6, 1])
 def test_frame_is_exact_ggx(roughness):
     design = preset("chord", "ggx")

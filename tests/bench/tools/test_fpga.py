@@ -20,6 +20,8 @@ from blysk.bench.tools.place_and_route import (
     lay_out,
 )
 from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS
+from blysk.hdl.geometry.geometry import GeometryUnit
+from blysk.hdl.render import RenderUnit
 from blysk.sim.cli.main import main
 
 from .test_place_and_route import tools
@@ -43,6 +45,27 @@ def test_command_goes_on_after_what_does_not_fit(calls, cache, tmp_path, capsys,
     # Alone it is an error.
     assert main(["fpga", "--unit", "diffuse", "--seeds", "1"]) == 1
     assert capsys.readouterr().err == "blysk: does not fit: 30 multipliers\n"
+
+
+@pytest.mark.long
+def test_cores_that_take_triangles(calls, cache, capsys, monkeypatch):
+    """Each is named by what it does."""
+    placed = []
+
+    def place(name, unit, *others):
+        placed.append(type(unit))
+        return lay_out(name, unit, *others)
+
+    monkeypatch.setattr(fpga, "lay_out", place)
+    for top in ("geometry", "render"):
+        assert main(["fpga", "--top", top, "--method", "linear", "--seeds", "1"]) == 0
+        assert capsys.readouterr().out.splitlines()[2].startswith(f"{top} linear, blinn, 1 light ")
+    assert placed == [GeometryUnit, RenderUnit]
+
+
+def test_triangles_go_to_one_pipeline(capsys):
+    assert main(["fpga", "--top", "render", "--pipes", "2"]) == 2
+    assert capsys.readouterr().err.startswith("blysk: --pipes 2: triangles go to one pipeline")
 
 
 def test_table():

@@ -11,6 +11,7 @@ from blysk.golden.lighting.lobe import Lobe, LobeTable
 from blysk.golden.lighting.power import Power
 from blysk.golden.number.fixed import UQ, Fixed
 from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.presets import LOBES
 from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX, TabulatedModel
 from blysk.golden.reference.reflection import BLINN, PHONG, REFLECTION_MODELS
 
@@ -202,6 +203,12 @@ def test_error_at_every_exponent():
     assert np.argmax(errors) == 1
     assert errors[1] <= 0.05
     assert errors[4:].max() <= 0.04
+
+
+def test_error_of_coplanar_phong_at_every_exponent():
+    """With the size that `LOBES` gives it: a step begins beside the kink of exponent 1."""
+    lobe = replace(LOBES["phong_coplanar"], operand=CHORD)
+    assert max(largest_error(lobe, exponent, 16) for exponent in range(1, 1001, 3)) <= 0.06
 
 
 def test_error_of_ggx_at_every_roughness():

@@ -52,6 +52,33 @@ def test_what_triangles_cannot_be_drawn_with(refused, options, says):
 
 
 @pytest.mark.long
+def test_coarse_depth_test():
+    """The same picture, of fewer pixels that were shaded, in fewer cycles."""
+    found = {}
+    for name, options in {"plain": [], "coarse": ["--coarse"]}.items():
+        arguments = [*SMALL, *HARDWARE, *options, "-o", f"{name}.png", "--json", f"{name}.json"]
+        assert main(["render", *arguments]) == 0
+        found[name] = json.loads(Path(f"{name}.json").read_text())
+    np.testing.assert_array_equal(picture("plain.png"), picture("coarse.png"))
+    plain, coarse = found["plain"], found["coarse"]
+    assert coarse["pixels"] + coarse["counts"]["dropped_pixels"] == plain["pixels"]
+    assert coarse["cycles"] < 0.95 * plain["cycles"]
+
+
+def test_coarse_depth_test_of_spans(refused):
+    refused("render", *SMALL, "--coarse", thing="--coarse", says="give geometry hardware, too")
+    refused("verilog", "--coarse", "64x48", thing="--coarse", says="give --top render, too")
+
+
+def test_coarse_depth_test_in_verilog(capsys):
+    """The header names it, and the register map of a bus has its bit."""
+    options = ["--top", "render", "--method", "linear", "--coarse", "64x48", "--bus", "axi", "-o", "core.v"]
+    assert main(["verilog", *options]) == 0
+    assert "coarse depth test: pictures of at most 64x48, 384 words of 36 bits" in Path("core.v").read_text()
+    assert "changes with each picture" in Path("core.md").read_text()
+
+
+@pytest.mark.long
 def test_two_setups():
     """The same picture, in fewer cycles; spans are refused."""
     found = {}

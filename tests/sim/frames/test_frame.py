@@ -23,7 +23,7 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_spans
 from blysk.golden.reference.scene import Scene
 from blysk.sim.engines.engine import SimulationError
-from blysk.sim.frames.frame import FrameSimulator
+from blysk.sim.frames.frame import FrameSimulator, sample_constants
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.teapot import teapot
 
@@ -318,3 +318,10 @@ def test_point_light_and_near_viewer(exponent):
     assert np.abs(simulator.render(far).image.astype(int) - frame.image).max() > 20
     with pytest.raises(ValueError, match=r"^point lights and a near viewer need the method chord-local$"):
         prepare(scene, preset("chord", lights=2))
+
+
+@pytest.mark.parametrize("model", ["blinn", "cosquad"])
+def test_model_is_checked_with_as_many_materials_as_there_may_be(model):
+    constants = sample_constants(preset("chord", model, materials=1024))
+    assert len(constants) == 1024
+    assert all(1 <= of.exponent <= 1000 for of in constants)

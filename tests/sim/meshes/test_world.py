@@ -11,6 +11,7 @@ import pytest
 
 from blysk import scene
 from blysk.golden.reference.renderer import render
+from blysk.sim.errors import InputError
 from blysk.sim.meshes.mesh import load_mesh
 
 WORLD = Path(__file__).parent / "world"
@@ -188,6 +189,19 @@ def test_draco():
     found, expected = read("gltf-transform-draco.glb"), read("three-scene.glb")
     assert len(found) == len(expected)
     np.testing.assert_allclose(moments(found), moments(expected), rtol=1e-3, atol=0.02)
+
+
+@pytest.mark.parametrize("start", [0, 60, 200])
+def test_damaged_draco_is_refused(tmp_path, start):
+    """trimesh would leave out the part, one of three."""
+    pytest.importorskip("DracoPy")
+    data = bytearray((WORLD / "gltf-transform-draco.glb").read_bytes())
+    start += data.index(b"DRACO")
+    data[start : start + 40] = b"\xff" * 40
+    path = tmp_path / "damaged.glb"
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="its Draco-compressed data is damaged"):
+        load_mesh(str(path))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,275 @@
+"""Coarse depth test: spans that are hidden for their whole length, by a bound of the depths of each block."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, ValueLike, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.coarse_depth import CoarseDepth
+from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
+from blysk.golden.geometry.triangles import DEPTH
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import skid_buffer
+
+__all__ = ["CoarseDepthUnit", "deep_span_shape"]
+
+# As in the depth test: a sign, and a bit more than any step of a span can add.
+_SUM_BITS = 37
+
+
+def deep_span_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
+    """Shape of a span's place and depth, and of a bit that changes with each picture."""
+    place = {"x": unsigned(x_bits), "y": unsigned(y_bits), "length": unsigned(x_bits)}
+    depth = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
+    return data.StructLayout(place | depth | {"picture": unsigned(1)})
+
+
+class CoarseDepthUnit(wiring.Component):
+    """Tells which spans are hidden for their whole length: `CoarseDepth` is the bit-accurate model.
+
+    A block of pixels a cycle, so that a span takes as many cycles as it touches blocks; the answer stands on
+    the output 8 cycles after a span of one block came in. A block's word is read, compared and written; the
+    three blocks before it count if they are the same, as the memory does not have them yet. No multipliers:
+    a part of a block's step is a sum of shifts.
+
+    The first span whose ``picture`` is another than that of the span before begins the next picture: it waits
+    until those before it have left and `CoarseDepth.swept` words are swept, one a cycle. After a reset the
+    picture is 0, and all words are swept, but those of a memory that is as it was at power-up.
+
+    Parameters
+    ----------
+    parameters : CoarseDepth
+        Bit-accurate model.
+    x_bits, y_bits : int
+        Bits of a place.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(deep_span_shape(x_bits, y_bits)))`
+        Spans, inside the picture.
+    o : :py:`Out(stream.Signature(1))`
+        Of each span in its turn whether it is hidden.
+
+    Attributes
+    ----------
+    idle : Signal
+        No span is inside, and no word is swept.
+
+    Raises
+    ------
+    ValueError
+        If the picture has places of more bits.
+
+    Source: docs/theory/geometry.md#depth; not in the documents.
+    """
+
+    def __init__(self, parameters: CoarseDepth, x_bits: int = 12, y_bits: int = 12):
+        if (parameters.width - 1) >> x_bits or (parameters.height - 1) >> y_bits:
+            raise ValueError(
+                f"a picture of {parameters.width}x{parameters.height} has places of more than {x_bits} and "
+                f"{y_bits} bits"
+            )
+        self.parameters, self.x_bits, self.y_bits = parameters, x_bits, y_bits
+        super().__init__(
+            {
+                "i": In(stream.Signature(deep_span_shape(x_bits, y_bits))),
+                "o": Out(stream.Signature(1)),
+            }
+        )
+        self.idle = Signal(name="idle")
+
+    def elaborate(self, platform):
+        """Blocks of a span; depths at both ends of each; the memory's word; comparison; the write."""
+        m = Module()
+        given, bits = self.parameters, self.parameters.block.bit_length() - 1
+        valid, answer, advance = Signal(name="valid"), Signal(name="answer"), Signal(name="advance")
+        m.d.comb += advance.eq(skid_buffer(m, self.o, valid, answer))
+        word = data.StructLayout(
+            {
+                # The bound, inverted: a cleared word is 0.
+                "nearness": given.depth_bits,
+                "candidate": given.depth_bits,
+                "mask": given.block,
+                "tag": given.tag_bits,
+            }
+        )
+        m.submodules.words = memory = Memory(shape=word, depth=given.blocks, init=[])
+        read, write = memory.read_port(), memory.write_port()
+        tag, empty = Signal(given.tag_bits, name="tag"), Signal(name="empty")
+        span, span_valid, swept, sweeping, held = self._pictures(m, tag, empty)
+        block, waiting = self._blocks(m, bits, advance, (span, span_valid, held))
+        steps, ends, bound = self._bounds(m, bits, advance, block)
+
+        part = Signal(bound.shape(), name="part")
+        there = Signal(word, name="there", reset_less=True)
+        # Words that the memory did not have yet when the part's was read.
+        late = data.StructLayout({"valid": 1, "place": range(given.blocks), "word": word})
+        written = [Signal(late, name=f"written_{k}") for k in range(3)]
+        same = [Signal(name=f"same_{k}") for k in range(3)]
+        old, new = Signal(word, name="old"), Signal(word, name="new")
+        hidden, so_far = Signal(name="hidden"), Signal(name="so_far", reset_less=True)
+        m.d.comb += old.eq(Mux(there.tag == tag, there, 0))
+        for k in reversed(range(3)):
+            with m.If(same[k]):
+                m.d.comb += old.eq(written[k].word)
+        limit, mask = ~old.nearness, old.mask | part.mask
+        candidate = Mux(part.hi > old.candidate, part.hi, old.candidate)
+        m.d.comb += [new.eq(old), new.tag.eq(tag), hidden.eq((part.lo > limit) & (part.begins | so_far))]
+        with m.If(part.hi < limit):
+            with m.If(mask.all()):
+                m.d.comb += [new.nearness.eq(~candidate), new.candidate.eq(0), new.mask.eq(0)]
+            with m.Else():
+                m.d.comb += [new.candidate.eq(candidate), new.mask.eq(mask)]
+        of_part = (part.valid, part.place), *((of.valid, of.place) for of in written[:2])
+        with m.If(advance):
+            m.d.sync += [
+                part.eq(bound),
+                there.eq(read.data),
+                *(
+                    flag.eq(on & (place == bound.place))
+                    for flag, (on, place) in zip(same, of_part, strict=True)
+                ),
+                written[0].eq(Cat(part.valid, part.place, new)),
+                written[1].eq(written[0]),
+                written[2].eq(written[1]),
+                valid.eq(part.valid & part.ends),
+                answer.eq(hidden),
+                so_far.eq(hidden),
+            ]
+        m.d.comb += [
+            read.addr.eq(ends.place),
+            read.en.eq(advance),
+            write.addr.eq(Mux(sweeping, swept, written[0].place)),
+            write.data.eq(Mux(sweeping, 0, written[0].word)),
+            write.en.eq(sweeping | written[0].valid),
+            empty.eq(~(waiting | Cat(of.valid for of in (steps, ends, bound, part, *written)).any())),
+            self.idle.eq(empty & ~(span_valid | sweeping | self.o.valid)),
+        ]
+        return m
+
+    def _pictures(self, m: Module, tag: Signal, empty: Signal) -> tuple:
+        """The span that is to go on, and whether it must wait; the words that are swept."""
+        given = self.parameters
+        shape = {"x": self.x_bits, "last": self.x_bits, "line": range(given.blocks), "picture": 1}
+        shape |= {"depth": SPAN_DEPTH.width, "step": DEPTH_STEP.width}
+        span = Signal(data.StructLayout(shape), name="span", reset_less=True)
+        span_valid, picture = Signal(name="span_valid"), Signal(name="picture")
+        fresh, used = Signal(name="fresh", init=1), Signal(name="used", reset_less=True)
+        left, place = Signal(range(given.blocks + 1), name="left"), Signal(range(given.blocks), name="place")
+        sweeping, other, held = Signal(name="sweeping"), Signal(name="other"), Signal(name="held")
+        m.d.comb += [
+            sweeping.eq(left.any()),
+            other.eq(span.picture != picture),
+            held.eq(fresh | sweeping | other),
+        ]
+        with m.If(fresh):
+            # What a reset leaves in the memory counts for nothing.
+            m.d.sync += [fresh.eq(0), left.eq(Mux(used, given.blocks, 0))]
+        with m.Elif(sweeping):
+            m.d.sync += [left.eq(left - 1), place.eq(Mux(place == given.blocks - 1, 0, place + 1))]
+        with m.Elif(span_valid & other & empty):
+            m.d.sync += [picture.eq(span.picture), tag.eq(tag + 1), left.eq(given.swept)]
+        with m.If(span_valid):
+            m.d.sync += used.eq(1)
+        return span, span_valid, place, sweeping, held
+
+    def _blocks(self, m: Module, bits: int, advance: Signal, given_span: tuple) -> tuple[data.View, Value]:
+        """Spans in blocks, one a cycle; whether there is a block, or one to follow."""
+        given, incoming = self.parameters, self.i.payload
+        span, span_valid, held = given_span
+        step = {"step": DEPTH_STEP.width}
+        ends = {"first": bits, "last": bits, "border": 1, "left": self.x_bits - bits}
+        ends |= {"place": range(given.blocks)} | step
+        next_shape = ends | {"depth": SPAN_DEPTH.width, "back": _SUM_BITS}
+        following = Signal(data.StructLayout(next_shape), name="following", reset_less=True)
+        block_shape = {"valid": 1, "begins": 1, "ends": 1} | ends | {"depth": _SUM_BITS}
+        block, following_valid = (
+            Signal(data.StructLayout(block_shape), name="block"),
+            Signal(name="following_valid"),
+        )
+        taken = ~block.valid | block.ends
+        goes = taken | ~following_valid
+        accepts = ~span_valid | (goes & ~held)
+        m.d.comb += self.i.ready.eq(advance & accepts)
+        with m.If(advance & accepts):
+            m.d.sync += [
+                span_valid.eq(self.i.valid),
+                span.x.eq(incoming.x),
+                span.last.eq(incoming.x + incoming.length - 1),
+                span.line.eq(_times(given.blocks_per_line, incoming.y)),
+                span.picture.eq(incoming.picture),
+                span.depth.eq(Value.cast(incoming.depth)),
+                span.step.eq(Value.cast(incoming.depth_step)),
+            ]
+        with m.If(advance & goes):
+            m.d.sync += [
+                following_valid.eq(span_valid & ~held),
+                following.first.eq(span.x[:bits]),
+                following.last.eq(span.last[:bits]),
+                following.border.eq(span.last == given.width - 1),
+                following.left.eq(span.last[bits:] - span.x[bits:]),
+                following.place.eq(span.line + span.x[bits:]),
+                following.depth.eq(span.depth),
+                following.back.eq(_times(span.step.as_signed(), span.x[:bits])),
+                following.step.eq(span.step),
+            ]
+        with m.If(advance & taken):
+            m.d.sync += [
+                block.valid.eq(following_valid),
+                block.begins.eq(1),
+                block.ends.eq(~following.left.any()),
+                *(block[name].eq(following[name]) for name in ends),
+                # Where the block begins, which may be before the span.
+                block.depth.eq(following.depth - following.back),
+            ]
+        with m.Elif(advance):
+            m.d.sync += [
+                block.begins.eq(0),
+                block.ends.eq(block.left == 1),
+                block.first.eq(0),
+                block.left.eq(block.left - 1),
+                block.place.eq(block.place + 1),
+                block.depth.eq(block.depth + (block.step.as_signed() << bits)),
+            ]
+        return block, following_valid | block.valid
+
+    def _bounds(self, m: Module, bits: int, advance: Signal, block: data.View) -> tuple[data.View, ...]:
+        """What goes to the ends of a part; its depths there; the least and the largest, on three cycles."""
+        given, last = self.parameters, self.parameters.block - 1
+        common = {"valid": 1, "begins": 1, "ends": 1, "place": range(given.blocks), "mask": given.block}
+        both = dict.fromkeys(("near", "far"), _SUM_BITS)
+        shape = common | {"falls": 1} | both
+        steps = Signal(data.StructLayout(shape | {"depth": _SUM_BITS}), name="steps")
+        ends = Signal(data.StructLayout(shape), name="ends")
+        bounds = dict.fromkeys(("lo", "hi"), given.depth_bits)
+        bound = Signal(data.StructLayout(common | bounds), name="bound")
+        slope = block.step.as_signed()
+        marked = Mux(block.ends & ~block.border, block.last, last)
+        with m.If(advance):
+            m.d.sync += [
+                *(steps[name].eq(block[name]) for name in ("valid", "begins", "ends", "place", "depth")),
+                steps.mask.eq(Cat((block.first <= k) & (marked >= k) for k in range(given.block))),
+                steps.falls.eq(slope < 0),
+                steps.near.eq(_times(slope, block.first)),
+                steps.far.eq(_times(slope, Mux(block.ends, block.last, last))),
+                *(ends[name].eq(steps[name]) for name in (*common, "falls")),
+                *(ends[name].eq(steps.depth + steps[name]) for name in both),
+                *(bound[name].eq(ends[name]) for name in common),
+                bound.lo.eq(self._upper(Mux(ends.falls, ends.far, ends.near))),
+                bound.hi.eq(self._upper(Mux(ends.falls, ends.near, ends.far))),
+            ]
+        return steps, ends, bound
+
+    def _upper(self, code: Value) -> Value:
+        """Upper bits of a depth, between 0 and the farthest."""
+        depth, farthest = code.as_signed() >> SPAN_DEPTH.fraction_bits, DepthTest.FARTHEST
+        inside = Mux(depth < 0, 0, Mux(depth > farthest, farthest, depth))
+        return inside[DEPTH.width - self.parameters.depth_bits : DEPTH.width]
+
+
+def _times(value: ValueLike, count: Value) -> Value:
+    """A product as a sum of shifts; of a constant, of those of its ones."""
+    if isinstance(value, int):
+        return sum((count << k for k in range(value.bit_length()) if value >> k & 1), start=Const(0))
+    return sum((Mux(count[k], value << k, 0) for k in range(len(count))), start=Const(0))
