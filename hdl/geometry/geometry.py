@@ -143,7 +143,7 @@ class GeometryUnit(wiring.Component):
     The units of the room in a row. Corners go to the edges and, one attribute after the other, to a FIFO,
     where they meet the scales of their triangle; edges wait in a FIFO until their planes are there. In the
     *compact* style one divider finds the quotients of all edges, attributes share a multiplier, and on the
-    way along the spans attributes take turns, as do the normals of a span; no FIFO is wider than an attribute.
+    way along the spans attributes take turns, as do the normals of a span; no FIFO is wider than one of them.
 
     A triangle takes as long as the slowest of its units, while others work on its neighbours:
 
