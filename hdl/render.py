@@ -8,7 +8,8 @@ from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.render import Renderer
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import connect, connect_fifo, connect_register, moving
+from blysk.hdl.core.single_register import connect_register
+from blysk.hdl.core.stream import connect, connect_fifo, moving
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.coarse_depth import CoarseDepthUnit
 from blysk.hdl.geometry.depth_test import DepthMemory, DepthTestUnit, drawn_pixel_shape

@@ -17,7 +17,6 @@ __all__ = [
     "connect",
     "connect_fifo",
     "connect_late_fifo",
-    "connect_register",
     "connect_slice",
     "count_down",
     "hold_output",
@@ -252,37 +251,6 @@ def hold_output(m: Module, output: stream.Interface, valid: ValueLike, payload: 
     """
     m.d.comb += [output.valid.eq(valid), Value.cast(output.payload).eq(Value.cast(payload))]
     return ~Value.cast(valid) | output.ready
-
-
-def connect_register(m: Module, name: str, source: stream.Interface, sink: stream.Interface) -> None:
-    """Connect two streams through one register, which takes a payload each two cycles at most.
-
-    The source's ready and the sink's valid follow from a register.
-
-    Parameters
-    ----------
-    m, source, sink
-        As for `connect`.
-    name : str
-        Of the registers.
-
-    Raises
-    ------
-    TypeError
-        If the payloads differ in a field or in a fixed-point format.
-    """
-    require_same_shape(source.payload.shape(), sink.payload.shape())
-    full = Signal(name=f"{name}_full")
-    payload = Signal(Shape.cast(source.payload.shape()).width, name=name, reset_less=True)
-    m.d.comb += [
-        source.ready.eq(~full),
-        sink.valid.eq(full),
-        Value.cast(sink.payload).eq(payload),
-    ]
-    with m.If(~full):
-        m.d.sync += [full.eq(source.valid), payload.eq(source.payload)]
-    with m.Elif(sink.ready):
-        m.d.sync += full.eq(0)
 
 
 def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -> None:

@@ -7,7 +7,8 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.triangles import ATTRIBUTES, GRID, Grid
-from blysk.hdl.core.stream import connect, connect_fifo, connect_register, moving
+from blysk.hdl.core.single_register import connect_register
+from blysk.hdl.core.stream import connect, connect_fifo, moving
 from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit, serial_attribute_shape
 from blysk.hdl.geometry.edge_normals import EdgeNormalsUnit, true_spans_shape
 from blysk.hdl.geometry.edge_setup import EdgeSetupUnit

@@ -10,7 +10,8 @@ from blysk.golden.video.controls import BUTTONS
 from blysk.golden.video.draw_commands import KINDS
 from blysk.golden.video.draw_unit import Drawing
 from blysk.golden.video.triangle_assembly import COUNTERS
-from blysk.hdl.core.stream import connect, connect_register
+from blysk.hdl.core.single_register import connect_register
+from blysk.hdl.core.stream import connect
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 from blysk.hdl.render import STATUS as RENDERED
 from blysk.hdl.render import RenderUnit
