@@ -39,8 +39,8 @@ def test_bands_are_the_whole_frame(lines, angle):
     assert len(whole.x) > 3000
 
 
-def rounded_places(drawing, exact, found):
-    """Vertices of the drawing, but for their places: those of float64, rounded to the grid."""
+def rounded_coordinates(drawing, exact, found):
+    """Vertices of the drawing, but for their coordinates: those of float64, rounded to the grid."""
     sent = scene_triangles(exact)
     x, y = found.x.copy(), found.y.copy()
     faces = exact.mesh.faces[sent.source]
@@ -51,13 +51,13 @@ def rounded_places(drawing, exact, found):
 
 
 @pytest.mark.parametrize("angle", [8, 2000])
-def test_error_is_that_of_shading_and_of_rounded_places(angle, monkeypatch):
-    """With the places of the exact frame no pixel is off by 1 LSB; its own are a step of the grid apart."""
+def test_error_is_that_of_shading_and_of_rounded_coordinates(angle, monkeypatch):
+    """With the coordinates of the exact frame no pixel is off by 1 LSB; its own are a step apart."""
     shown = scene()
     drawing = Drawing.of([shown], preset(model="cosquad"))
     exact = turned(shown, angle)
     frame = render(exact, "phong", drawing.renderer.design.specular.model)
-    vertices = rounded_places(drawing, exact, drawing.vertices(angle))
+    vertices = rounded_coordinates(drawing, exact, drawing.vertices(angle))
     monkeypatch.setattr(Drawing, "vertices", lambda self, angle: vertices)
     whole = drawing.whole(angle)
     drawn = np.zeros(SIZE[::-1], dtype=bool)
@@ -68,7 +68,7 @@ def test_error_is_that_of_shading_and_of_rounded_places(angle, monkeypatch):
 
 @pytest.mark.parametrize("angle", [8, 2000])
 def test_error_against_exact_normals_of_every_pixel(angle):
-    """Places a step apart show at the outline, and where triangles are seen at a grazing angle."""
+    """Coordinates a step apart show at the outline, and where triangles are seen at a grazing angle."""
     shown = scene()
     drawing = Drawing.of([shown], preset(model="cosquad"))
     whole = drawing.whole(angle)
