@@ -18,7 +18,7 @@ demo: $(VENV)/.installed
 test: $(VENV)/.installed-test lint
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder
 
-# What `make test` leaves out: sweeps, proofs, browsers.
+# What `make test` leaves out: other structures of the units, costs, sweeps, proofs, browsers.
 test-long: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m "long or prove"
 

@@ -1,4 +1,4 @@
-"""The shading pipeline: its input and output, the composition of a design, and its bit-accurate model."""
+"""The shading pipeline: the composition of a design, and its bit-accurate model."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -7,10 +7,12 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from blysk.golden.beats import Pixels, Spans
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe, LobeTable
@@ -21,92 +23,10 @@ from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
-from blysk.golden.number.unit_vector import COMPONENT, quantise
-from blysk.golden.reference.geometry import normalise
+from blysk.golden.number.unit_vector import COMPONENT
 from blysk.golden.reference.lighting import Material
 
 __all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]
-
-
-@dataclass(frozen=True)
-class Spans:
-    """Raster spans with quantised normals: the pipeline's input.
-
-    Parameters
-    ----------
-    x, y : int arrays, shape (spans,)
-        First pixel of each span, 0 to 4095, or the largest coordinate of the pipeline.
-    length : int array, shape (spans,)
-        Pixels, 0 to 4095. A span of length 0 gives no pixel; past the largest x, x goes on from 0.
-    normal_left, normal_right : int arrays, shape (spans, 3)
-        Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``; or what the method takes, in
-        its `Interpolator.END_FORMAT`.
-    material : int array, shape (spans,), optional
-        Index of the material; ``None``: 0 for all.
-    values : SpanValues, optional
-        Values of each light, for methods with `Interpolator.TAKES_VALUES`, which read no normals.
-    normal_middle : int array, shape (spans, 3), optional
-        Unit normals in the middle of each span, for methods with `Interpolator.TAKES_MIDDLE`; ``None``: the
-        bisectors of the two ends.
-    """
-
-    x: np.ndarray
-    y: np.ndarray
-    length: np.ndarray
-    normal_left: np.ndarray
-    normal_right: np.ndarray
-    material: np.ndarray = None  # type: ignore[assignment]  # becomes an array
-    values: SpanValues | None = None
-    normal_middle: np.ndarray | None = None
-
-    def __post_init__(self):
-        if self.material is None:
-            object.__setattr__(self, "material", np.zeros(len(self.length), dtype=np.int64))
-
-    @cached_property
-    def middle(self) -> np.ndarray:
-        """`normal_middle`, or the bisectors; of opposite ends, the left one."""
-        if self.normal_middle is not None:
-            return self.normal_middle
-        total = np.add(self.normal_left, self.normal_right)
-        return quantise(normalise(np.where(np.any(total, axis=1, keepdims=True), total, self.normal_left)))
-
-    def __len__(self):
-        return len(self.length)
-
-    def __getitem__(self, which: slice | np.ndarray) -> "Spans":
-        """Some of the spans, by a slice, indices or a mask."""
-        values = self.values if self.values is None else SpanValues(*(codes[which] for codes in self.values))
-        fields = ("x", "y", "length", "normal_left", "normal_right", "material")
-        middle = self.normal_middle if self.normal_middle is None else self.normal_middle[which]
-        chosen = {name: getattr(self, name)[which] for name in fields}
-        return Spans(**chosen, values=values, normal_middle=middle)
-
-
-@dataclass(frozen=True)
-class Pixels:
-    """Pixels: the pipeline's output.
-
-    Parameters
-    ----------
-    x, y : int arrays, shape (pixels,)
-        Column and row.
-    color : uint8 array, shape (pixels, 3)
-        Red, green, blue.
-    last : bool array, shape (pixels,)
-        Whether a pixel is the last of its span.
-    out_of_range_spans : int
-        Spans of a larger angle than the method serves, whose pixels have no error bound.
-    wide_spans : int
-        Spans of a larger angle than the method's error bound allows at the exponent; see `SpanLimit`.
-    """
-
-    x: np.ndarray
-    y: np.ndarray
-    color: np.ndarray
-    last: np.ndarray
-    out_of_range_spans: int
-    wide_spans: int = 0
 
 
 STYLES = ("throughput", "compact")
@@ -168,6 +88,10 @@ class Design:
         One channel in place of three: it has red's colour operands, and the pixel has it three times.
     x_bits, y_bits, length_bits : int
         Bits of the coordinates, 1 to 12, and of a span's length, 2 to 12.
+    factors : tuple of int
+        Indices, in ascending order, of the lights that fade by their distance or as a spot: each has a
+        factor of its specular term, of a method that takes values. Other lights pay nothing for it; without
+        specular light none does.
     build : Build
         How it is built.
 
@@ -176,7 +100,7 @@ class Design:
     ValueError
         If the number of lights or materials or a number of bits is out of range, a gate is asked for
         without specular light or with a method that has no error bound or no normals, or an exponent is fixed
-        where a lobe has tables.
+        where a lobe has tables; or factors are no lights, or without specular light or values.
 
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
@@ -190,6 +114,7 @@ class Design:
     x_bits: int = 12
     y_bits: int = 12
     length_bits: int = 12
+    factors: tuple[int, ...] = ()
     build: Build = field(default_factory=Build)
 
     def __post_init__(self):
@@ -197,6 +122,7 @@ class Design:
             matching = replace(self.specular, operand=self.interpolator.operand)
             object.__setattr__(self, "specular", matching)
         Intensity(self.lights)
+        self._match_scale()
         if not 1 <= self.materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {self.materials}")
         if self.loads_tables:
@@ -208,6 +134,25 @@ class Design:
         for name, least in (("x_bits", 1), ("y_bits", 1), ("length_bits", 2)):
             if not least <= getattr(self, name) <= LENGTH_BITS:
                 raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
+
+        object.__setattr__(self, "factors", tuple(self.factors))
+        if self.factors:
+            self._check_factors()
+
+    def _match_scale(self) -> None:
+        """Give the lobe the scale of the method's operand."""
+        scale = getattr(self.interpolator, "scale", 0)
+        if scale and not self.loads_tables:
+            raise ValueError("a scale of 1 - N·H needs a lobe with a table")
+        if self.loads_tables and self.specular.scale != scale:
+            object.__setattr__(self, "specular", replace(self.specular, scale=scale))
+
+    def _check_factors(self) -> None:
+        """Refuse factors of lights that there are not, or that nothing takes."""
+        if not (self.takes_values and self.specular):
+            raise ValueError("factors of lights need values of spans, of chord-local, and specular light")
+        if list(self.factors) != sorted(set(self.factors) & set(range(self.lights))):
+            raise ValueError(f"factors must be different lights of {self.lights}, in order")
 
     def _check_lobe(self) -> None:
         """Refuse what a lobe's tables do not serve."""
@@ -232,13 +177,24 @@ class Design:
             return material.exponent
         return self.specular.model.steepness(self.highlight_parameter(material))
 
-    def for_materials(self, materials: Sequence[Material]) -> "Design":
-        """The same design for materials, with a bank for each of their lobes, at most `Lobe.MAX_BANKS`."""
-        specular = self.specular
+    def for_materials(self, materials: Sequence[Material], scaled: bool = True) -> "Design":
+        """The same design for materials: a bank for each of their lobes, at most `Lobe.MAX_BANKS`; its steps.
+
+        Parameters
+        ----------
+        materials : sequence of Material
+            Of the scene.
+        scaled : bool
+            Whether the chord methods may have a scale for sharp lobes, see `Lobe.scale_of`: of spans that are
+            cut for the design.
+        """
+        specular, interpolator = self.specular, self.interpolator
         if isinstance(specular, Lobe) and specular.fixed is None:
-            lobes = len({self.highlight_parameter(material) for material in materials})
-            specular = replace(specular, banks=min(lobes, Lobe.MAX_BANKS))
-        return replace(self, materials=len(materials), specular=specular)
+            lobes = {self.highlight_parameter(material): None for material in materials}
+            specular = replace(specular, banks=min(len(lobes), Lobe.MAX_BANKS)).for_parameters(list(lobes))
+            if scaled and isinstance(interpolator, ChordInterpolator):
+                interpolator = replace(interpolator, scale=specular.scale_of(list(lobes)))
+        return replace(self, materials=len(materials), specular=specular, interpolator=interpolator)
 
     def built(self, **changes) -> "Design":
         """The same design with other values of its `Build`."""
@@ -317,7 +273,7 @@ class Design:
         if self.loads_tables:
             threshold = self._thresholds(constants)[spans.material]
         if isinstance(gate, ValueGate):
-            highlight = self._values(spans, constants[0]).highlight.copy()
+            highlight = self._values(spans, constants[0]).highlight.astype(np.int64)
             short = np.asarray(spans.length) < 3
             # Of two pixels there is none in the middle.
             highlight[short, :, 1] = highlight[short][:, :, ::2].min(axis=-1)
@@ -369,7 +325,8 @@ class Design:
                 for index in np.unique(material):
                     which = np.flatnonzero(material == index)
                     terms = operands.cosine[which], operands.highlight[which], dark[which]
-                    color[pixels][which] = self._shade(*terms, constants[index])
+                    factor = operands.factor[which] if operands.factor is not None else None
+                    color[pixels][which] = self._shade(*terms, constants[index], factor)
                 out_of_range += int(np.count_nonzero(operands.out_of_range))
                 first = pixels.stop
         else:
@@ -424,6 +381,9 @@ class Design:
             return
         if spans.values is None or spans.values.diffuse.shape != (len(spans), self.lights, 3):
             raise ValueError(f"method {self.method} takes spans with values for {self.lights} lights")
+        given = (len(spans), 0, 3) if spans.factors is None else spans.factors.shape
+        if given != (len(spans), len(self.factors), 3):
+            raise ValueError(f"the design takes spans with factors for {len(self.factors)} lights")
 
     def operands(self, spans: Spans, constants: FrameConstants) -> Operands:
         """Bit-accurate operands of every pixel of spans of one pixel or more, in the order of the spans.
@@ -445,8 +405,11 @@ class Design:
         if self.takes_values:
             interpolator, values = cast(ChordInterpolator, self.interpolator), spans[kept].values
             assert values is not None
+            factors = spans[kept].factors
             return lambda part: interpolator.compute_values(
-                SpanValues(*(codes[part] for codes in values)), length[part]
+                SpanValues(*(codes[part] for codes in values)),
+                length[part],
+                None if factors is None else factors[part],
             )
         format = self.interpolator.END_FORMAT
         left, right = (Fixed(format, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
@@ -459,7 +422,12 @@ class Design:
         )
 
     def _shade(
-        self, cosine: Fixed, highlight: Fixed, dark: np.ndarray, constants: FrameConstants
+        self,
+        cosine: Fixed,
+        highlight: Fixed,
+        dark: np.ndarray,
+        constants: FrameConstants,
+        factor: Fixed | None = None,
     ) -> np.ndarray:
         """Colours of pixels of one material, shape (pixels, 3); of the operands, shape (pixels, lights)."""
         diffuse_unit = Diffuse(cosine.format)
@@ -468,6 +436,11 @@ class Design:
         specular = Fixed(Intensity.TERM_FORMAT, np.zeros(dark.shape, dtype=np.int64))
         if self.specular is not None:
             specular = self.specular.compute(highlight, dark, cast(Any, constants.highlight))
+        if factor is not None:
+            codes = specular.codes.copy()
+            fading = list(self.factors)
+            codes[:, fading] = Factor().compute(specular[:, fading], factor).codes
+            specular = Fixed(specular.format, codes)
         return self.intensity.compute(*self._colors(constants), diffuse, specular)
 
     def _ambient(self, constants: Sequence[FrameConstants], material: np.ndarray) -> np.ndarray:

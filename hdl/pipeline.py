@@ -33,6 +33,7 @@ PORT_DESCRIPTIONS = {
     "i_normal_middle": "unit normal in the middle between them",
     "i_normal_right": "unit normal at the last pixel centre",
     "i_values": "codes of N.L and 1 - N.H of each light at the first pixel, the middle and the last pixel",
+    "i_factors": "codes of a, each light's that fades, at the same three pixels",
     "i_material": "index of the span's material",
     "o_x": "column of the pixel",
     "o_y": "row",
@@ -72,6 +73,7 @@ def span_shape(parameters: Design) -> data.StructLayout:
             parameters.lights,
             highlights=parameters.specular is not None,
             length_bits=parameters.length_bits,
+            **({"factors": len(parameters.factors)} if parameters.factors else {}),
         ).members
     if parameters.materials > 1:
         members["material"] = Shape.cast(range(parameters.materials))
@@ -200,11 +202,13 @@ class ShadingPipelineUnit(wiring.Component):
             product_interval=product_interval,
             gate=value_gate,
             takes_threshold=p.has_threshold,
+            factors=p.factors,
         )
         self.setup_interval = self._interpolator.setup_interval
         self._lights = self._light_units(compact)
         self._intensity = (CompactIntensityUnit if compact else IntensityUnit)(p.intensity)
-        chain = (self._interpolator, self._lights[0], self._intensity, self._assembler)
+        slowest = max(self._lights, key=lambda light: light.latency)
+        chain = (self._interpolator, slowest, self._intensity, self._assembler)
         self.latency = sum(unit.latency for unit in chain)
         if p.gate and value_gate is None:
             interval = min(self.setup_interval, 3 + 12 * p.lights)
@@ -245,8 +249,10 @@ class ShadingPipelineUnit(wiring.Component):
                 exponent=exponent,
                 shares_slope=self._slope is not None or self._tables is not None,
                 gated=p.gate,
+                # In lockstep all take as long as one that fades.
+                fades=index in p.factors or (None if compact or not p.factors else False),
             )
-            for _ in range(p.lights)
+            for index in range(p.lights)
         ]
 
     @property
@@ -409,6 +415,8 @@ class ShadingPipelineUnit(wiring.Component):
             if p.gate:
                 decision = words.gated if gated is None else gated[index]
                 m.d.comb += light.i.payload.gated.eq(decision)
+            if light.fades:
+                m.d.comb += light.i.payload.factor.eq(words.factor)
             if self._slope is not None:
                 m.d.comb += light.constants.eq(self._slope.slope)
             elif "constants" in light.signature.members:

@@ -13,12 +13,9 @@ from blysk.bench.quality.mutation import Wrapped, flags_of
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.record import Case, first, length_of
+from blysk.sim.units.record import Case
 
-__all__ = ["assert_beats_equal", "assert_equals_model", "resets"]
-
-FEW = 24
-"""Input beats that both simulators are compared by; fewer, but 8, where the input stalls often."""
+__all__ = ["assert_beats_equal", "assert_equals_model", "known", "resets"]
 
 
 def assert_beats_equal(actual, expected, path="beat"):
@@ -56,8 +53,13 @@ def with_status(unit: Component, run) -> Component:
     return _counted[unit]
 
 
+def known(unit: Component) -> Component:
+    """The component by which a unit is compiled: itself, or the one that counts its flags."""
+    return _counted.get(unit, unit)
+
+
 def assert_equals_model(unit, run, engine="auto"):
-    """Every beat, the status, of a pipelined unit without stalls every cycle; of some runs both engines."""
+    """Every beat, the status, and of a pipelined unit without stalls every cycle."""
     case, component = run.case, with_status(unit, run)
     options = {"constants": case.constants, "write": case.write, **run.stalls}
     found = simulate(component, case.beats, count=run.count, engine=engine, **options)
@@ -70,16 +72,6 @@ def assert_equals_model(unit, run, engine="auto"):
         expected = start + np.arange(run.count) * unit.initiation_interval
         np.testing.assert_array_equal(found.input_cycles, expected)
         np.testing.assert_array_equal(found.cycles, found.input_cycles + unit.latency)
-    if run.slow:
-        # Where the input stalls often, a cycle without a beat costs as much as one with it.
-        share = 1 - np.mean(run.stalls.get("input_stalls", 0))
-        few = min(length_of(case.beats), max(8, int(FEW * share)))
-        beats = first(case.beats, few)
-        fast = simulate(component, beats, count=None, engine=engine, idle_timeout=2000, **options)
-        # Told how many beats come, the slow engine need not wait for more.
-        slow = simulate(component, beats, count=len(fast.beats), engine="pysim", idle_timeout=2000, **options)
-        for name in ("beats", "cycles", "input_cycles"):
-            np.testing.assert_array_equal(getattr(slow, name), getattr(fast, name))
     return found
 
 

@@ -1,16 +1,13 @@
-"""What the tests of every hardware unit share: one way to hold RTL against its bit-accurate model."""
+"""What all tests share: what one worker runs, interrupts, the cache of compiled models, pairs of normals."""
 
 import re
 import signal
 import threading
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 from xdist.scheduler import LoadScopeScheduling
-
-from blysk.sim.engines.simulate import simulate
 
 
 class Groups(LoadScopeScheduling):
@@ -42,63 +39,17 @@ def interrupts():
 
 
 @pytest.fixture(scope="session", autouse=True)
-def model_cache(tmp_path_factory, worker_id):
+def model_cache(tmp_path_factory, worker_id, pytestconfig):
     """Compiled models of this run, shared by its workers."""
     shared = tmp_path_factory.getbasetemp()
     if worker_id != "master":
         shared = shared.parent
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("BLYSK_CACHE", str(Path(shared) / "models"))
+        if "not long" in pytestconfig.option.markexpr:
+            # Of few cycles the compiler takes most of the time.
+            patch.setenv("CXXFLAGS", "-O0")
         yield
-
-
-def take(beats, count):
-    """First beats of a (nested) mapping of arrays."""
-    if isinstance(beats, Mapping):
-        return {name: take(value, count) for name, value in beats.items()}
-    return beats[:count]
-
-
-def length_of(beats) -> int:
-    return length_of(next(iter(beats.values()))) if isinstance(beats, Mapping) else len(beats)
-
-
-def assert_beats_equal(actual, expected, path="beat"):
-    if isinstance(expected, Mapping):
-        for name, value in expected.items():
-            assert_beats_equal(actual[name], value, f"{path}.{name}")
-    else:
-        np.testing.assert_array_equal(actual, expected, err_msg=path)
-
-
-@pytest.fixture
-def verify():
-    """Hold a unit of fixed latency against its bit-accurate model: beats, cycles, both engines, stalls."""
-
-    def verify(unit, beats, expected, *, constants=None, seed=2026):
-        rng = np.random.default_rng(seed)
-        count = length_of(beats)
-        run = simulate(unit, beats, count=count, constants=constants, engine="auto")
-        assert_beats_equal(run.beats, expected)
-        np.testing.assert_array_equal(run.input_cycles, np.arange(count) * unit.initiation_interval)
-        np.testing.assert_array_equal(run.cycles, run.input_cycles + unit.latency)
-        for input_share, output_share in ((0.4, 0.4), (0.9, 0.1), (0.1, 0.9)):
-            stalls = {
-                "input_stalls": rng.random(997) < input_share,
-                "output_stalls": rng.random(1009) < output_share,
-            }
-            run = simulate(unit, beats, count=count, constants=constants, engine="auto", **stalls)
-            assert_beats_equal(run.beats, expected)
-            few = min(count, 60)
-            slow, fast = (
-                simulate(unit, take(beats, few), count=few, constants=constants, engine=engine, **stalls)
-                for engine in ("pysim", "auto")
-            )
-            assert_beats_equal(slow.beats, take(expected, few))
-            np.testing.assert_array_equal(slow.cycles, fast.cycles)
-            np.testing.assert_array_equal(slow.input_cycles, fast.input_cycles)
-
-    return verify
 
 
 @pytest.fixture(scope="session")

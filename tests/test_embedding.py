@@ -39,6 +39,7 @@ def expected(example):
     return picture
 
 
+@pytest.mark.long
 def test_amaranth(example, expected):
     np.testing.assert_array_equal(example["picture"](), expected)
 

@@ -1,8 +1,8 @@
 # amaranth: UnusedElaboratable=no
 """Every unit, by its record: RTL equal to the bit-accurate model under stalls, pauses and resets.
 
-The quick run has all stimuli of the default variants, compiled, and some beats of the other variants
-in Amaranth's simulator; the long run all variants, compiled.
+The quick run has all stimuli of the default variants, compiled: the engine itself compares the first beats
+with Amaranth's simulator. The long run has all variants, and both simulators under every pattern of stalls.
 """
 
 import inspect
@@ -16,7 +16,7 @@ from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.record import STALLS, Case, UnitRun, first
 from blysk.sim.units.registry import RECORDS
 
-from .checks import assert_equals_model, resets
+from .checks import assert_equals_model, known, resets
 
 FEW = 24
 """Beats in Amaranth's simulator; spans are as short as for 200 pixels."""
@@ -59,22 +59,26 @@ def test_equals_model(name, variant, stimulus):
         assert_equals_model(unit, run)
 
 
-@pytest.mark.parametrize(
-    ("name", "variant"),
-    [
-        pytest.param(name, v, id=f"{name}-{v}", marks=pytest.mark.long if given.long else ())
-        for name, record in RECORDS.items()
-        for v, given in record.variants.items()
-    ],
-)
-def test_few_beats_equal_model(name, variant):
-    """Of every variant, under stalls, in Amaranth's simulator; the default one's also on the same cycles."""
+def _few():
+    for name, record in RECORDS.items():
+        for variant in record.variants:
+            # How both simulators take stalls is no matter of the variant.
+            for pattern, shares in enumerate(STALLS[1:] if variant == record.default else STALLS[1:2], 1):
+                yield pytest.param(name, variant, shares, id=f"{name}-{variant}-{pattern}")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "variant", "shares"), list(_few()))
+def test_few_beats_equal_model(name, variant, shares):
+    """In Amaranth's simulator; the compiled model of a default variant takes the same cycles."""
     record, unit = RECORDS[name], unit_of(name, variant)
-    case = few_of(record, variant, unit)
-    rng = np.random.default_rng(2026)
+    case, rng = few_of(record, variant, unit), np.random.default_rng(2026)
+    if shares[0] > 0.5:
+        # A cycle without a beat costs as much as one with it.
+        case = Case(first(case.beats, 8), case.constants, case.write)
     stalls = {
         end: rng.random(997) < share
-        for end, share in zip(("input_stalls", "output_stalls"), STALLS[1], strict=True)
+        for end, share in zip(("input_stalls", "output_stalls"), shares, strict=True)
     }
     status = None if record.status is None else record.status(unit, case)
     run = UnitRun(case, record.expect(unit, case), status, stalls)
@@ -97,17 +101,17 @@ def test_reset_leaves_nothing_behind(name):
     """Reset with beats inside: the unit then answers as from power-up, on the same cycles."""
     record = RECORDS[name]
     unit = unit_of(name, record.default)
-    case, count = few_of(record, record.default, unit), 12
+    case, count = few_of(record, record.default, unit), 6
     if isinstance(unit, PipelinedUnit):
-        interval, count = unit.initiation_interval, 6
+        interval = unit.initiation_interval
         cycles, befores = unit.latency + 6 * interval, (1, 2 * interval + 1, unit.latency + 2)
         expected = [unit.latency + interval * k for k in range(6)]
     else:
         beats = first(case.beats, count)
         options = {"constants": case.constants, "write": case.write, "idle_timeout": 2000}
-        run = simulate(unit, beats, count=None, engine="auto", **options)
+        run = simulate(known(unit), beats, count=None, engine="auto", **options)
         cycles = run.total_cycles - int(run.input_cycles[0]) + 5
-        befores = 1, cycles // 4, cycles // 2, 3 * cycles // 4
+        befores = 1, cycles // 3, 2 * cycles // 3
         expected = [cycle - run.input_cycles[0] for cycle in run.cycles.tolist()]
     found, *others = resets(unit, case, befores, cycles, count)
     assert [cycle for cycle, _ in found] == expected

@@ -85,8 +85,8 @@ def command(context, board_name, mesh, output, simulate, colours, clock, seeds, 
     if output is None:
         raise InputError("board", "nothing to write", "give -o FILE.bit, or --simulate N -o FOLDER")
     given = given_options(context, OPTIONS.keys() - {"lights"})
-    if options["lights"] or options["point_lights"]:
-        given["lights"] = lights_of(options["lights"], options["point_lights"])
+    if lights := lights_of(options):
+        given["lights"] = lights
     loader = _loader() if load else ""
     if simulate and load:
         raise InputError("--load", "there is no bitstream of a simulation", "leave out --simulate or --load")

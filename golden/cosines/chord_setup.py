@@ -44,13 +44,15 @@ class SpanValues(NamedTuple):
     highlight: np.ndarray
 
     @classmethod
-    def quantise(cls, diffuse: np.ndarray, highlight: np.ndarray) -> "SpanValues":
+    def quantise(cls, diffuse: np.ndarray, highlight: np.ndarray, scale: int = 0) -> "SpanValues":
         """Nearest codes of exact values.
 
         Parameters
         ----------
         diffuse, highlight : float64 arrays, shape (spans, lights, 3)
             N·L, -1 to 1, and u, 0 to 2.
+        scale : int
+            s: over 0, the words of u are ``min(2^s u, 1)``; see `ChordValues`.
 
         Raises
         ------
@@ -58,6 +60,8 @@ class SpanValues(NamedTuple):
             If a value is out of range.
         """
         one = float(ONE_SQUARED.values)
+        if scale:
+            highlight = np.minimum(np.ldexp(highlight, scale), 1)
         return cls(
             Fixed.round(ChordSetup.DIFFUSE_FORMAT, np.multiply(diffuse, one)).codes,
             Fixed.round(ChordSetup.HIGHLIGHT_FORMAT, np.multiply(highlight, one)).codes,
@@ -91,6 +95,7 @@ class ChordSetup:
     ============ ============ =====================================================================
     u            UQ(1, 26)    given; half a step costs ``1.25 n 255 2^-27``, 0.0024 LSB at n = 1000
     f            SQ(1, 25)    given; as many fraction bits as the N·L of a pixel
+    a            SQ(1, 25)    given, of lights that fade; all its words are those of f
     G            SQ(-2, 20)   multiplier operand; saturates
     P of u       SQ(0, 26)    exact, two words of 18 and 8 bits: every bit counts at the end of a span;
                               saturates
@@ -128,6 +133,19 @@ class ChordSetup:
     DIFFUSE_SLOPE_FORMAT = SQ(0, 18)
     HIGH_FORMAT = SQ(0, 18)
     LOW_FORMAT = UQ(-18, 26)
+    MOST_SCALE = 6
+
+    @classmethod
+    def check_scale(cls, scale: int) -> None:
+        """Refuse a scale of u that is out of range, see `ChordValues`.
+
+        Raises
+        ------
+        ValueError
+            If it is not 0 to `MOST_SCALE`.
+        """
+        if scale not in range(cls.MOST_SCALE + 1):
+            raise ValueError(f"scale must be 0 to {cls.MOST_SCALE}, not {scale}")
 
     def __post_init__(self):
         if self.fraction_bits not in range(36, 47, 2):
@@ -155,9 +173,9 @@ class ChordSetup:
         return product.extend(self.shifted_format)
 
     def compute(
-        self, diffuse: Fixed, highlight: Fixed, length: np.ndarray
-    ) -> tuple[Differences, Differences, np.ndarray]:
-        """Bit-accurate differences of f and of u.
+        self, diffuse: Fixed, highlight: Fixed, length: np.ndarray, factor: Fixed | None = None
+    ) -> tuple:
+        """Bit-accurate differences of f and of u, and of the factors a of lights that fade.
 
         Parameters
         ----------
@@ -167,11 +185,15 @@ class ChordSetup:
             u at the same three points.
         length : int array, shape (spans,)
             Pixels, 1 to 4095.
+        factor : Fixed, shape (spans, fading lights, 3), SQ(1, 25), optional
+            a at the same three points.
 
         Returns
         -------
         diffuse, highlight : Differences
             Of f and of u.
+        factor : Differences
+            Of a, where it is given.
         out_of_range : bool array, shape (spans,)
             Whether P or G of the span does not fit its word; the differences are then invalid.
 
@@ -186,13 +208,15 @@ class ChordSetup:
                 f"operands must be {self.DIFFUSE_FORMAT} and {self.HIGHLIGHT_FORMAT}, "
                 f"not {diffuse.format}, {highlight.format}"
             )
+        functions = [(diffuse, self.DIFFUSE_SLOPE_FORMAT), (highlight, self.SLOPE_FORMAT)]
+        if factor is not None:
+            if factor.format != self.DIFFUSE_FORMAT:
+                raise ValueError(f"factors must be {self.DIFFUSE_FORMAT}, not {factor.format}")
+            functions.append((factor, self.DIFFUSE_SLOPE_FORMAT))
         steps = self.steps(length)
         out_of_range = np.zeros(len(length), dtype=bool)
         results = []
-        for values, slope_format in (
-            (diffuse, self.DIFFUSE_SLOPE_FORMAT),
-            (highlight, self.SLOPE_FORMAT),
-        ):
+        for values, slope_format in functions:
             left, middle, right = (values[..., k] for k in range(3))
             exact = (left + right - middle.scale(1)).scale(1)
             exact = exact.round_half_up(self.CURVATURE_FORMAT.fraction_bits)

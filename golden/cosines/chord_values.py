@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.normals.dot_product import DotProduct
@@ -28,11 +30,27 @@ class ChordValues:
     Against the exact values of the vectors' directions, in units of `ONE_SQUARED`: `diffuse_error` and
     `highlight_error`.
 
+    Parameters
+    ----------
+    scale : int
+        s, 0 to `ChordSetup.MOST_SCALE`. Over 0, the word of u is ``min(2^s u, 1)``, for lobes that are 0 from
+        ``u = 2^-s`` on: it has s bits more of a small u, for wires.
+
+    Raises
+    ------
+    ValueError
+        If the scale is out of range.
+
     Source: docs/theory/chord.md#differences; [Lyon93].
     """
 
+    scale: int = 0
+
     DIFFUSE_FORMAT = ChordSetup.DIFFUSE_FORMAT
     HIGHLIGHT_FORMAT = ChordSetup.HIGHLIGHT_FORMAT
+
+    def __post_init__(self):
+        ChordSetup.check_scale(self.scale)
 
     def compute(self, normal: Fixed, direction: Fixed, halfway: Fixed) -> tuple[Fixed, Fixed]:
         """Bit-accurate f and u.
@@ -59,10 +77,10 @@ class ChordValues:
         normal = Fixed(COMPONENT, normal.codes[:, None])
         diffuse, highlight = self.DIFFUSE_FORMAT, self.HIGHLIGHT_FORMAT
         cosine, chord = DotProduct().compute(normal, direction), Chord().compute(normal, halfway)
-        return (
-            cosine.round_half_up(diffuse.fraction_bits).saturate(diffuse),
-            chord.round_half_up(highlight.fraction_bits).saturate(highlight),
-        )
+        u = chord.scale(self.scale).round_half_up(highlight.fraction_bits).saturate(highlight)
+        if self.scale:
+            u = Fixed(highlight, np.minimum(u.codes, 1 << highlight.fraction_bits))
+        return cosine.round_half_up(diffuse.fraction_bits).saturate(diffuse), u
 
     @classmethod
     def diffuse_error(cls) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from blysk.golden.frames.frame import Frame
-from blysk.golden.frames.local import line_ends, local_values
+from blysk.golden.frames.local import line_ends, local_operands
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
@@ -82,9 +82,16 @@ def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarra
     """
     interpolator = design.interpolator
     if isinstance(interpolator, ChordInterpolator):
-        values = local_values(scene, raster)
-        cosine, one_minus_cosine = interpolator.exact_operands(values, raster.length)
-        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, _model_of(design))
+        fading = [index for index, light in enumerate(scene.lights) if light.fades]
+        operands = local_operands(scene, raster, factors=fading, scale=interpolator.scale)
+        cosine, one_minus_cosine, *given = interpolator.exact_operands(
+            operands[0], raster.length, operands[1]
+        )
+        factor = None
+        if given:
+            factor = np.ones(cosine.shape)
+            factor[:, fading] = given[0]
+        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, _model_of(design), factor)
     if interpolator.takes_line:
         left, right = line_ends(raster)
         raster = replace(raster, normal_left=left, normal_right=right)

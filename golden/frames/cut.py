@@ -1,6 +1,6 @@
 """Cutting of spans that are too wide for an interpolation method."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -150,7 +150,9 @@ def cut_by_error(
       the highlight by the exponent of the span's material and the least u on the span, as it may be coarse
       where it is dark;
     - a light's N·L changes its sign, or nearly, where its highlight shows, and the pixels might not have the
-      sign of the exact value at every one of them, unless that is within 2^-25 of 0.
+      sign of the exact value at every one of them, unless that is within 2^-25 of 0;
+    - a light that fades has a pixel, whatever lies between the places above, that misses what
+      `LocalChordInterpolator` allows; N·L is then times the factor.
 
     Of lights that are behind the surface along all of a span only the turn counts; those that are off do not.
 
@@ -228,12 +230,21 @@ class _Pieces:
 
     def miss(self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray) -> np.ndarray:
         """Whether the curve of a method is too far from the exact one; bool, shape (pieces,)."""
+        if isinstance(interpolator, ChordInterpolator) and interpolator.scale:
+            scaled = tuple(place.scaled(interpolator.scale) for place in self.places)
+            return replace(self, places=scaled)._miss(interpolator, limits, material)
+        return self._miss(interpolator, limits, material)
+
+    def _miss(self, interpolator, limits, material) -> np.ndarray:
+        """The same, of places with u as the method's words have it."""
         pixels = (self.last - self.first + 1)[:, np.newaxis]
         chord = isinstance(interpolator, ChordInterpolator)
         # A curve through three values, or through two, has pixels between them from so many on.
         between = pixels > (3 if chord else 2)
-        curves = {name: _Quadratic.of(self.places, name) for name in ("diffuse", "highlight")}
-        diffuse, highlight = curves.values()
+        fading = np.array([light.fades for light in self.scene.lights], dtype=bool)
+        names = ("diffuse", "highlight", "factor") if fading.any() else ("diffuse", "highlight")
+        curves = {name: _Quadratic.of(self.places, name) for name in names}
+        diffuse, highlight = curves["diffuse"], curves["highlight"]
         if chord:
             wrong = self._flagged(interpolator, limits, material, curves)
             misses = {name: curve.miss(self.places, name) for name, curve in curves.items()}
@@ -250,9 +261,15 @@ class _Pieces:
         in_front = diffuse.largest + errors["diffuse"] >= 0
         least = np.maximum(highlight.least - margin / ChordInterpolator.MARGIN * misses["highlight"], 0)
         too_far = errors["diffuse"] > ChordInterpolator().diffuse_tolerance
-        too_far |= errors["highlight"] > limits.tolerance(material, least)
+        tolerance, lit = limits.tolerance(material, least), limits.is_lit(material, least)
+        # Of a light that fades every pixel is looked at, below.
+        too_far |= (errors["highlight"] > tolerance) & ~fading
         wrong |= (too_far & in_front & between).any(axis=1)
-        turns_dark = in_front & (diffuse.least - errors["diffuse"] <= 0) & limits.is_lit(material, least)
+        if fading.any():
+            chosen = np.flatnonzero(between[:, 0] & ~wrong)
+            shares = errors["highlight"][chosen] / tolerance[chosen], lit[chosen]
+            wrong[chosen] = (self._fades_wrong(chosen, curves, *shares) & fading).any(axis=1)
+        turns_dark = in_front & (diffuse.least - errors["diffuse"] <= 0) & lit
         chosen = np.flatnonzero(turns_dark.any(axis=1) & ~wrong)
         if chord:
             kept = diffuse.left, diffuse.slope, diffuse.curvature
@@ -262,6 +279,37 @@ class _Pieces:
                 *(field[chosen] for field in (self.origin, self.first, self.last, turns_dark, *kept)),
             )
         return wrong
+
+    def _fades_wrong(self, chosen, curves, highlight_share, lit) -> np.ndarray:
+        """Whether the factor of a light, or its product with N·L, is too far off at any pixel of a piece.
+
+        Parameters
+        ----------
+        chosen : int array
+            Pieces.
+        curves : dict of _Quadratic
+            Those of ``diffuse`` and ``factor``, of all pieces.
+        highlight_share : float64 array, shape (chosen, lights)
+            Error of u as a share of its tolerance.
+        lit : bool array, shape (chosen, lights)
+            Whether a light may have a highlight.
+
+        Returns
+        -------
+        bool array, shape (chosen, lights)
+        """
+        method = ChordInterpolator()
+        names = ("diffuse", "factor")
+        curves = {name: curves[name].part(chosen) for name in names}
+        ends = (field[chosen] for field in (self.origin, self.first, self.last))
+        misses, largest = _misses_of_pixels(self.scene, self.raster, *ends, curves)
+        words = {name: method.setup.diffuse_error(*curve.sizes) for name, curve in curves.items()}
+        # A light that fades may be brighter than white where it is near.
+        bright = np.array([max(1.0, *light.color) for light in self.scene.lights])
+        factor = np.where(lit, 255 * bright * (misses["factor"] + words["factor"]), 0)
+        total = factor + method.HIGHLIGHT_BUDGET * highlight_share * largest * bright
+        wrong = bright * (misses["diffuse"] + words["diffuse"]) > method.diffuse_tolerance
+        return wrong | ((factor > method.FACTOR_BUDGET) | (total > method.HIGHLIGHT_BUDGET)) & (largest > 0)
 
     def _margin(self) -> np.ndarray:
         """Bound of the largest error on each piece, in multiples of that at its quarters.
@@ -285,6 +333,7 @@ class _Pieces:
         """Whether the chord method flags a piece, for certain not if this says no."""
         setup, limit, one = interpolator.setup, SpanLimit(), float(ONE_SQUARED.values)
         formats = {"diffuse": setup.DIFFUSE_SLOPE_FORMAT, "highlight": setup.SLOPE_FORMAT}
+        formats["factor"] = setup.DIFFUSE_SLOPE_FORMAT
         flagged = np.zeros(len(self.origin), dtype=bool)
         for name, curve in curves.items():
             slope, curvature = (one * size for size in curve.sizes)
@@ -297,10 +346,12 @@ class _Pieces:
         angle = np.degrees(np.arccos(np.minimum(cosine, 1)))
         angles = np.array([limit.angle(word) for word in limits.words])[material]
         lit = limits.least_dark[material]
-        values = (np.stack([getattr(self.places[k], name) for k in (0, 2, 4)], axis=-1) for name in curves)
-        diffuse, highlight = values
+        diffuse, highlight = (
+            np.stack([getattr(self.places[k], name) for k in (0, 2, 4)], axis=-1)
+            for name in ("diffuse", "highlight")
+        )
         # Values are off by the rounding of N, L and H.
-        near = limit.least(highlight) / 2 < lit[:, np.newaxis] + 1e-4
+        near = limit.least(highlight) / 2 < lit[:, np.newaxis] + 1e-4 * 2**interpolator.scale
         near &= diffuse.max(axis=2) > float(limit.BEHIND.values) - 1e-4
         wide = (angle > limit.WIDEST) | ((angle > angles) & near.any(axis=1))
         return flagged | (wide & (self.last - self.first + 1 >= limit.SHORTEST))
@@ -345,6 +396,16 @@ class _Quadratic:
         three = left, right, vertex
         return cls(left, slope, curvature, np.minimum.reduce(three), np.maximum.reduce(three))
 
+    def part(self, chosen: np.ndarray) -> "_Quadratic":
+        """Those of some pieces."""
+        kept = self.left, self.slope, self.curvature, self.least, self.largest
+        return _Quadratic(*(field[chosen] for field in kept))
+
+    def at(self, piece: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Values at t of pieces, shape (count, lights)."""
+        t = t[:, np.newaxis]
+        return self.left[piece] + t * (self.slope[piece] + t * self.curvature[piece])
+
     @property
     def sizes(self) -> tuple[np.ndarray, np.ndarray]:
         """Absolute values of P and G."""
@@ -360,19 +421,52 @@ class _Quadratic:
         )
 
 
-def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, curvature) -> np.ndarray:
-    """Whether N·L of a pixel of a span might have the wrong sign, for the lights that are told."""
-    result = np.zeros(len(origin), dtype=bool)
-    bound = ChordSetup().diffuse_error(np.abs(slope), np.abs(curvature))
+def _pixels_of(scene, raster, origin, first, last) -> Iterator[tuple[np.ndarray, SurfacePoints, np.ndarray]]:
+    """Piece, exact values and t on the piece of every pixel of pieces, some at a time."""
     for run in runs_of(last - first + 1, CHUNK):
         span, step = pixels_of((last - first + 1)[run])
         of_pixel = run.start + span
         place = (first[of_pixel] + step) / (raster.length[origin[of_pixel]] - 1)
-        exact = SurfacePoints.at(scene, raster, origin[of_pixel], place).diffuse
-        t = (step / (last - first)[of_pixel])[:, np.newaxis]
+        exact = SurfacePoints.at(scene, raster, origin[of_pixel], place)
+        yield of_pixel, exact, step / (last - first)[of_pixel]
+
+
+def _misses_of_pixels(scene, raster, origin, first, last, curves) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Largest distance of curves from the exact values at the pixels of pieces.
+
+    Returns
+    -------
+    misses : dict of float64 array, shape (pieces, lights)
+        Of ``diffuse``, where values under 0 count as 0, and of ``factor`` where the light is not behind.
+    largest : float64 array, shape (pieces, lights)
+        Largest factor where it is not behind; else 0.
+    """
+    shape = len(origin), len(scene.lights)
+    misses, largest = {name: np.zeros(shape) for name in curves}, np.zeros(shape)
+    for of_pixel, exact, t in _pixels_of(scene, raster, origin, first, last):
+        starts = np.flatnonzero(np.r_[True, of_pixel[1:] != of_pixel[:-1]])
+        pieces = of_pixel[starts]
+        fit = {name: curve.at(of_pixel, t) for name, curve in curves.items()}
+        reached = exact.diffuse > -ChordSetup.DIFFUSE_FORMAT.step
+        for values, of_all in (
+            (np.abs(np.maximum(fit["diffuse"], 0) - np.maximum(exact.diffuse, 0)), misses["diffuse"]),
+            (np.where(reached, np.abs(fit["factor"] - exact.factor), 0), misses["factor"]),
+            (np.where(reached, exact.factor, 0), largest),
+        ):
+            of_all[pieces] = np.maximum.reduceat(values, starts)
+    return misses, largest
+
+
+def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, curvature) -> np.ndarray:
+    """Whether N·L of a pixel of a span might have the wrong sign, for the lights that are told."""
+    result = np.zeros(len(origin), dtype=bool)
+    bound = ChordSetup().diffuse_error(np.abs(slope), np.abs(curvature))
+    for of_pixel, exact, t in _pixels_of(scene, raster, origin, first, last):
+        t = t[:, np.newaxis]
         fit = left[of_pixel] + t * (slope[of_pixel] + t * curvature[of_pixel])
-        wrong = np.where(exact > 0, fit <= bound[of_pixel], fit > -bound[of_pixel])
-        # Nearer to 0 no word tells the sign.
-        wrong &= (np.abs(exact) > ChordSetup.DIFFUSE_FORMAT.step) & lights[of_pixel]
+        wrong = np.where(exact.diffuse > 0, fit <= bound[of_pixel], fit > -bound[of_pixel])
+        # Nearer to 0 no word tells the sign; and what a light that fades has left may be had or lost.
+        wrong &= np.abs(exact.diffuse) > ChordSetup.DIFFUSE_FORMAT.step
+        wrong &= (exact.factor > ChordInterpolator.FACTOR_BUDGET / 255) & lights[of_pixel]
         result |= np.bincount(of_pixel, wrong.any(axis=1), len(origin)) > 0
     return result

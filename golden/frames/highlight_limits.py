@@ -23,11 +23,13 @@ class _Curve:
 
     model: ReflectionModel
     parameter: float | None
+    scale: int = 0
 
     @cached_property
     def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Arguments u in ascending order; the steepest ``|dS/du|`` and the largest S from each u on."""
         u, value, slope = curve_lines(self.model, self.parameter)
+        u, slope = np.ldexp(u, self.scale), np.ldexp(slope, -self.scale)
         return u, *(np.maximum.accumulate(of[::-1])[::-1] for of in (slope, value))
 
     def _from(self, values: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -35,7 +37,7 @@ class _Curve:
 
     def tolerance(self, u: np.ndarray) -> np.ndarray:
         """As of `HighlightLimits`."""
-        slope = np.maximum(self._from(self._points[1], u), 1.0)
+        slope = np.maximum(self._from(self._points[1], u), 2.0**-self.scale)
         return ChordInterpolator.HIGHLIGHT_BUDGET / (255 * slope)
 
     def is_lit(self, u: np.ndarray) -> np.ndarray:
@@ -85,7 +87,7 @@ class HighlightLimits:
                     level = 2.0
                     if design.has_threshold:
                         level = design.threshold_of(design.specular.table(parameter)).values.item() / 2
-                    made[parameter] = _Curve(model, parameter), level
+                    made[parameter] = _Curve(model, parameter, design.specular.scale), level
                 curves[index], dark[index] = made[parameter]
         return cls(np.asarray(exponents, dtype=np.float64), tuple(curves), np.asarray(dark))
 

@@ -1,6 +1,6 @@
 """Exact operands of lights along spans: N·L and 1 - N·H of points on the surface, perspective-correct."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,16 @@ from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["CHUNK", "SurfacePoints", "along_spans", "chunks", "line_ends", "local_values", "middle_normals"]
+__all__ = [
+    "CHUNK",
+    "SurfacePoints",
+    "along_spans",
+    "chunks",
+    "line_ends",
+    "local_operands",
+    "local_values",
+    "middle_normals",
+]
 
 CHUNK = 1 << 16
 """Spans worked on at once; bounds the memory, changes no result."""
@@ -43,13 +52,17 @@ def middle_normals(raster: Raster) -> np.ndarray:
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """What places on the surface have: N and V (count, 3); f, u (count, lights); L (lights, count, 3)."""
+    """What places on the surface have: N and V (count, 3); f, u, a (count, lights); L (lights, count, 3).
+
+    a is the factor of a light that fades, else 1; f is N·L times a.
+    """
 
     normal: np.ndarray
     viewer: np.ndarray
     direction: np.ndarray
     diffuse: np.ndarray
     highlight: np.ndarray
+    factor: np.ndarray
 
     @classmethod
     def at(cls, scene: Scene, raster: Raster, span: np.ndarray, t: np.ndarray) -> "SurfacePoints":
@@ -62,17 +75,23 @@ class SurfacePoints:
         points = np.einsum("sn,snk->sk", share, corners)
         viewer = np.broadcast_to(scene.view_vectors(points), points.shape)
         direction = np.empty((len(scene.lights), *points.shape))
+        factor = np.ones((len(points), len(scene.lights)))
         for index, light in enumerate(scene.lights):
             direction[index] = light.towards(points)
+            factor[:, index] = light.factor(points)
         halfway = halfway_vector(direction, viewer)
-        diffuse = np.einsum("sk,lsk->sl", normal, direction)
+        diffuse = np.einsum("sk,lsk->sl", normal, direction) * factor
         highlight = np.square(normal - halfway).sum(axis=2).T / 2
         highlight = np.where(halfway.any(axis=2).T, highlight, 2.0)
-        return cls(normal, viewer, direction, np.clip(diffuse, -1, 1), np.clip(highlight, 0, 2))
+        return cls(normal, viewer, direction, np.clip(diffuse, -1, 1), np.clip(highlight, 0, 2), factor)
+
+    def scaled(self, scale: int) -> "SurfacePoints":
+        """The same places with ``min(2^s u, 1)`` in place of u."""
+        return replace(self, highlight=np.minimum(np.ldexp(self.highlight, scale), 1)) if scale else self
 
     def with_normal(self, normal: np.ndarray, chord: bool) -> "SurfacePoints":
         """The same places with other normals, shape (count, 3): f, and u as the squared chord or 1 - N·H."""
-        diffuse = np.einsum("sk,lsk->sl", normal, self.direction)
+        diffuse = np.einsum("sk,lsk->sl", normal, self.direction) * self.factor
         halfway = halfway_vector(self.direction, self.viewer)
         if chord:
             highlight = np.square(normal - halfway).sum(axis=2).T / 2
@@ -104,7 +123,7 @@ def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> Spa
 
     N, L and H are of unit length at each of the three. Where a point light is on the surface itself N·L is 0;
     where there is no half-way vector (``L = -V``) u is 2. A span of two pixels has nothing in the middle: it
-    gets the mean.
+    gets the mean. N·L of a light that fades is times its factor.
 
     Parameters
     ----------
@@ -116,20 +135,54 @@ def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> Spa
         Lights of the pipeline, by default those of the scene. Lights that the scene does not have have an
         N·L of 0, and are dark; so have those that are off.
     """
+    return local_operands(scene, raster, lights)[0]
+
+
+def local_operands(
+    scene: Scene,
+    raster: Raster,
+    lights: int | None = None,
+    factors: Sequence[int] = (),
+    scale: int = 0,
+) -> tuple[SpanValues, np.ndarray | None]:
+    """`local_values`, and codes of the factors of some lights at the same three places.
+
+    Parameters
+    ----------
+    scene, raster, lights
+        As for `local_values`.
+    factors : sequence of int
+        Indices of the lights whose factors are wanted.
+    scale : int
+        Of u, see `SpanValues.quantise`.
+
+    Returns
+    -------
+    values : SpanValues
+    factors : int64 array, shape (spans, len(factors), 3), or None
+        In the format of N·L; ``None`` if none is wanted.
+    """
     count = len(scene.lights) if lights is None else lights
+    given = len(scene.lights)
     on = np.array([light.is_on for light in scene.lights], dtype=bool)
     spans = np.arange(len(raster.length))
-    diffuse, highlight = np.zeros((2, len(spans), count, 3))
+    operands = np.zeros((3, len(spans), count, 3))
     # Of a span of one pixel the first value is all three; of two, there is none in the middle.
     for place, t, pixels in ((0, 0.0, 1), (2, 1.0, 2), (1, 0.5, 3)):
         has = spans[raster.length >= pixels]
         lacks = spans[raster.length < pixels]
-        for values in (diffuse, highlight):
+        for values in operands:
             values[lacks, :, place] = (
                 values[lacks, :, ::2].mean(axis=2) if place == 1 else values[lacks, :, 0]
             )
         for part in chunks(len(has)):
             exact = SurfacePoints.at(scene, raster, has[part], np.full(len(has[part]), t))
-            diffuse[has[part], : len(scene.lights), place] = exact.diffuse * on
-            highlight[has[part], : len(scene.lights), place] = exact.highlight
-    return SpanValues.quantise(diffuse, highlight)
+            found = exact.diffuse * on, exact.highlight, exact.factor
+            for values, of_place in zip(operands, found, strict=True):
+                values[has[part], :given, place] = of_place
+    diffuse, highlight, factor = operands
+    values = SpanValues.quantise(diffuse, highlight, scale)
+    if not factors:
+        return values, None
+    wanted = factor[:, list(factors)]
+    return values, SpanValues.quantise(wanted, np.zeros_like(wanted)).diffuse

@@ -8,11 +8,11 @@ import numpy as np
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans, missed_spans
 from blysk.golden.frames.highlight_limits import HighlightLimits
-from blysk.golden.frames.local import line_ends, local_values, middle_normals
+from blysk.golden.frames.local import line_ends, local_operands, middle_normals
 from blysk.golden.normals.line_setup import quantise_line
-from blysk.golden.number.unit_vector import quantise
+from blysk.golden.number.unit_vector import quantise, quantise_direction
 from blysk.golden.pipeline import Design, Spans
-from blysk.golden.reference.lighting import Material
+from blysk.golden.reference.lighting import Material, halfway_vector
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.scene import Scene
 
@@ -59,10 +59,15 @@ def prepare(scene: Scene, design: Design) -> PreparedFrame:
     Raises
     ------
     ValueError
-        If the scene has point lights or a near viewer, and the method does not take values.
+        If the scene has point lights or a near viewer, and the method does not take values; or a light that
+        fades has no factor in the design.
     """
     if scene.local and not design.takes_values:
         raise ValueError("point lights and a near viewer need the method chord-local")
+    if design.specular is not None:
+        for index, light in enumerate(scene.lights):
+            if light.fades and index not in design.factors:
+                raise ValueError(f"light {index} fades, and the design has no factor for it: give factors")
     raster = rasterise(scene)
     cut, count = cut_spans(scene, raster, design)
     cut = sort_by_material(cut, scene.mesh.material)
@@ -85,13 +90,20 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
         The pipeline.
     """
     spans = quantise_spans(cut, scene.mesh.material)
+    scale = getattr(design.interpolator, "scale", 0)
     if design.takes_values:
-        spans = replace(spans, values=local_values(scene, cut, design.lights))
+        values, factors = local_operands(scene, cut, design.lights, design.factors, scale)
+        spans = replace(spans, values=values, factors=factors)
     elif design.interpolator.takes_line:
         left, right = quantise_line(*line_ends(cut))
         spans = replace(spans, normal_left=left, normal_right=right)
     elif design.interpolator.TAKES_MIDDLE:
         spans = replace(spans, normal_middle=quantise(middle_normals(cut)))
+        if scale:
+            # Sharp lobes: directions count more than lengths.
+            normals = cut.normal_left, cut.normal_right, middle_normals(cut)
+            ends = dict(zip(("normal_left", "normal_right", "normal_middle"), normals, strict=True))
+            spans = replace(spans, **{name: quantise_direction(normal) for name, normal in ends.items()})
     return spans
 
 
@@ -107,7 +119,19 @@ def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
     if len(scene.materials) != design.materials:
         raise ValueError(f"the pipeline has {design.materials} materials, the scene {len(scene.materials)}")
     constants = [FrameConstants.of(scene, design.lights, index=index) for index in range(design.materials)]
+    if getattr(design.interpolator, "scale", 0) and not scene.local:
+        constants = [replace(of, halfway=_halfway_directions(scene, of.halfway)) for of in constants]
     return with_tables(constants, scene.materials, design) if design.loads_tables else constants
+
+
+def _halfway_directions(scene: Scene, codes: np.ndarray) -> np.ndarray:
+    """Codes of half-way vectors by `quantise_direction`; those that are 0 stay."""
+    result = codes.copy()
+    for index, light in enumerate(scene.lights):
+        if codes[index].any():
+            exact = halfway_vector(light.direction, scene.camera.viewer)
+            result[index] = quantise_direction(exact)
+    return result
 
 
 def with_tables(

@@ -1,7 +1,7 @@
 """Lobe unit: any curve of 1 - N·H from one small table, addressed by octaves; one multiplier interpolates."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import ClassVar, Literal
 
@@ -10,6 +10,7 @@ import numpy as np
 from blysk.golden.lighting.specular import HighlightOperand
 from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
 from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.reference.lobes import curve_lines
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
 
 __all__ = ["Lobe", "LobeTable"]
@@ -78,8 +79,8 @@ class Lobe(HighlightOperand):
 
     *Error of u.* It comes on top, times the slope of the lobe: n for Blinn's power, ``4/alpha^2`` for
     ``ggx``. A step of 2^-25 is 0.008 LSB for n = 1000, and for ``ggx`` 0.3 LSB at alpha = 0.01, 4.9 at
-    0.0025: there B should be 30. With the operand ``cosine``, u is in units of `ONE_SQUARED`, and so too
-    small by ``2^-16 u``: under 0.002 LSB for either lobe. It is cut to B bits, another step. But a cosine
+    0.0025: there B is 30, or `scale` 6. With the operand ``cosine``, u is in units of `ONE_SQUARED`, and so
+    too small by ``2^-16 u``: under 0.002 LSB for either lobe. It is cut to B bits, another step. But a cosine
     also feels the length of the normal: a code that is off by 2^-18 in length moves u by as much, which is 1
     LSB for n = 1000. The chord form (operand ``one_minus_cosine``) feels that length at second order only.
 
@@ -113,6 +114,9 @@ class Lobe(HighlightOperand):
         B, 20 to 34.
     cutoff : float
         Entries of a table under it are 0; at least 0, under 1.
+    scale : int
+        s: the operand is ``min(2^s u, 1)``, of chord methods with that scale, for lobes that are 0 from ``u =
+        2^-s`` on. The hardware does not depend on it.
     fixed : tuple of float or None
         Parameters of the tables that are fixed at build time, one for each bank (``None`` where the model has
         no parameter). ``None``: the tables are written.
@@ -133,12 +137,16 @@ class Lobe(HighlightOperand):
     banks: int = 1
     fraction_bits: int = 25
     cutoff: float = 0.0
+    scale: int = 0
     fixed: tuple[float | None, ...] | None = None
 
     VALUE_FORMAT: ClassVar[Format] = UQ(0, 17)
     DIFFERENCE_FORMAT: ClassVar[Format] = SQ(1, 17)
     WORD_BITS: ClassVar[int] = VALUE_FORMAT.width + DIFFERENCE_FORMAT.width
     MAX_BANKS: ClassVar[int] = 64
+    MOST_SCALE: ClassVar[int] = 6
+    SHARP: ClassVar[float] = 2.0**14
+    FINER: ClassVar[tuple[int, int]] = (14, 32)
     ERROR: ClassVar[float] = 3 * 2.0**-17
 
     def __post_init__(self):
@@ -160,6 +168,8 @@ class Lobe(HighlightOperand):
             raise ValueError(f"banks must be 1 to {self.MAX_BANKS}, not {self.banks}")
         if not 0 <= self.cutoff < 1:
             raise ValueError(f"cutoff must be at least 0 and under 1, not {self.cutoff}")
+        if self.scale < 0 or (self.scale and self.operand == "cosine"):
+            raise ValueError(f"scale must be 0, or more of the operand one_minus_cosine, not {self.scale}")
         if self.fixed is not None:
             object.__setattr__(self, "fixed", tuple(self.fixed))
             if len(self.fixed) != self.banks:
@@ -239,7 +249,11 @@ class Lobe(HighlightOperand):
         """
         if parameter is None and self.model.PARAMETER is not None:
             raise ValueError(f"a table of {self.name} needs its {self.model.PARAMETER}")
-        curve: Callable[[np.ndarray], np.ndarray] = partial(self.model.reflect, parameter=parameter)
+        reflect: Callable[[np.ndarray], np.ndarray] = partial(self.model.reflect, parameter=parameter)
+
+        def curve(cosine):
+            return reflect(1 - np.ldexp(1 - cosine, -self.scale)) if self.scale else reflect(cosine)
+
         # At the end the value that the curve tends to: at a right angle itself it is 0.
         knots = np.minimum(self.knots, 1 - 2.0**-40)
         value = curve(1 - knots)
@@ -254,6 +268,48 @@ class Lobe(HighlightOperand):
             codes = (np.minimum if falls else np.maximum).accumulate(codes)
         values = Fixed(format, np.where(codes < self.cutoff / format.step, 0, codes))
         return LobeTable(self, values, parameter)
+
+    def scale_of(self, parameters: Sequence[float | None]) -> int:
+        """Largest scale, up to `MOST_SCALE`, that serves lobes of which one is so sharp as to need it.
+
+        A lobe needs it if its slope is over `SHARP`, where a step of 2^-25 of u is over 0.1 LSB. It is served
+        by s if it is under a quarter of the least entry from ``u = 2^-s`` on.
+
+        Parameters
+        ----------
+        parameters : sequence of float or None
+            Parameters of the model.
+        """
+        lines = [curve_lines(self.model, parameter) for parameter in dict.fromkeys(parameters)]
+        if all(slope.max() <= self.SHARP for _, _, slope in lines):
+            return 0
+        dark = max(u[np.flatnonzero(value > self.VALUE_FORMAT.step / 4)[-1]] for u, value, _ in lines)
+        return int(np.clip(np.floor(-np.log2(dark)), 0, self.MOST_SCALE))
+
+    def for_parameters(self, parameters: Sequence[float | None]) -> "Lobe":
+        """The unit with `FINER` steps in place of the default ones, if a lobe's table is off by over 1/4 LSB.
+
+        That is one with a steep end near a right angle, such as Beckmann's of roughness 1. Both are one block
+        RAM for one bank. A sharp lobe, which needs the octaves, keeps them.
+
+        Parameters
+        ----------
+        parameters : sequence of float or None
+            Parameters of the model.
+        """
+        if (self.octaves, self.steps) != (Lobe.octaves, Lobe.steps):
+            return self
+        finer = replace(self, **dict(zip(("octaves", "steps"), self.FINER, strict=True)))
+        errors = [max(of._line_error(one) for one in dict.fromkeys(parameters)) for of in (self, finer)]
+        return finer if errors[0] > 1 / 1020 and errors[1] < errors[0] else self
+
+    def _line_error(self, parameter: float | None) -> float:
+        """Largest error of the lines between a table's entries, without that of the arithmetic."""
+        values, knots = self.table(parameter).values.values, self.knots
+        share = np.arange(1, 8) / 8
+        u = (knots[:-1] + np.diff(knots) * share[:, np.newaxis]).ravel()
+        exact = self.model.reflect(1 - np.ldexp(u, -self.scale), parameter)
+        return float(np.abs(np.interp(u, knots, values) - exact).max())
 
     @property
     def last_lit_arguments(self):

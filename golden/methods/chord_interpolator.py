@@ -9,6 +9,7 @@ import numpy as np
 from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
 from blysk.golden.cosines.chord_values import ChordValues
 from blysk.golden.cosines.span_limit import SpanLimit
+from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
@@ -57,6 +58,9 @@ class ChordInterpolator(Interpolator):
     ----------
     fraction_bits : int
         Of the setup.
+    scale : int
+        s: the words of u are ``min(2^s u, 1)``, for a lobe that is 0 from ``2^-s`` on; see `ChordValues` and
+        `Lobe.scale_of`.
 
     Raises
     ------
@@ -67,6 +71,7 @@ class ChordInterpolator(Interpolator):
     """
 
     fraction_bits: int = 46
+    scale: int = 0
 
     operand: ClassVar = "one_minus_cosine"
     COSINE_FORMAT = SQ(2, 25)
@@ -74,12 +79,14 @@ class ChordInterpolator(Interpolator):
     TAKES_MIDDLE = True
     HIGHLIGHT_BUDGET: ClassVar[float] = 0.4
     DIFFUSE_BUDGET: ClassVar[float] = 0.12
+    FACTOR_BUDGET: ClassVar[float] = 0.25
     MAX_VECTOR_ANGLE: ClassVar[float] = 30.0
     MAX_HALFWAY_CHANGE: ClassVar[float] = 0.5
     MARGIN: ClassVar[float] = 4 / 3
 
     def __post_init__(self):
         _ = self.setup
+        ChordSetup.check_scale(self.scale)
 
     @property
     def name(self):
@@ -93,10 +100,12 @@ class ChordInterpolator(Interpolator):
 
     @property
     def accumulators(self) -> dict[str, DifferenceAccumulator]:
-        """Models of the accumulators, ``diffuse`` of N·L and ``highlight`` of u."""
+        """Models of the accumulators, ``diffuse`` of N·L, ``highlight`` of u, ``factor`` of a."""
         format, difference = SQ(3, self.fraction_bits), self.setup.format
         starts = {"diffuse": ChordSetup.DIFFUSE_FORMAT, "highlight": ChordSetup.HIGHLIGHT_FORMAT}
+        starts["factor"] = ChordSetup.DIFFUSE_FORMAT
         results = {"diffuse": self.COSINE_FORMAT, "highlight": Specular.ARGUMENT_FORMAT}
+        results["factor"] = Factor.FORMAT
         return {
             name: DifferenceAccumulator(start, format, difference, results[name])
             for name, start in starts.items()
@@ -112,7 +121,7 @@ class ChordInterpolator(Interpolator):
         words = chord + chord**2, chord**2
         values, setup = ChordValues, self.setup
         errors = (
-            1.25 * values.highlight_error(2.0) + setup.highlight_error(*words),
+            2**self.scale * 1.25 * values.highlight_error(2.0) + setup.highlight_error(*words),
             1.25 * values.diffuse_error() + setup.diffuse_error(*words),
         )
         return float(max(errors)) + Specular.ARGUMENT_FORMAT.step
@@ -124,8 +133,9 @@ class ChordInterpolator(Interpolator):
         values = self.values(normal_left, normal_middle, normal_right, direction, halfway)
         return self.compute_values(values, length)
 
-    @staticmethod
-    def values(left: Fixed, middle: Fixed, right: Fixed, direction: Fixed, halfway: Fixed) -> SpanValues:
+    def values(
+        self, left: Fixed, middle: Fixed, right: Fixed, direction: Fixed, halfway: Fixed
+    ) -> SpanValues:
         """Bit-accurate values of spans at three normals, each of shape (spans, 3).
 
         Parameters
@@ -135,10 +145,14 @@ class ChordInterpolator(Interpolator):
         direction, halfway : Fixed, shape (lights, 3), SQ(1, 17)
             Unit vectors L and H of each light.
         """
-        three = [ChordValues().compute(normal, direction, halfway) for normal in (left, middle, right)]
+        three = [
+            ChordValues(self.scale).compute(normal, direction, halfway) for normal in (left, middle, right)
+        ]
         return SpanValues(*(np.stack([place[k].codes for place in three], axis=-1) for k in range(2)))
 
-    def compute_values(self, values: SpanValues, length: np.ndarray) -> Operands:
+    def compute_values(
+        self, values: SpanValues, length: np.ndarray, factors: np.ndarray | None = None
+    ) -> Operands:
         """Bit-accurate operands of every pixel, in the order of the spans.
 
         Parameters
@@ -147,6 +161,8 @@ class ChordInterpolator(Interpolator):
             Of each span and light; those in the middle matter from 3 pixels on, those at the end from 2.
         length : int array, shape (spans,)
             Pixels, 1 to 4095.
+        factors : int64 array, shape (spans, fading lights, 3), optional
+            Codes of the factors of lights that fade, as those of N·L.
 
         Raises
         ------
@@ -154,10 +170,12 @@ class ChordInterpolator(Interpolator):
             If a code or a length is out of range.
         """
         length = np.asarray(length)
+        given = tuple(values) if factors is None else (*values, factors)
         *quadratics, out_of_range = self.setup.compute(
             Fixed(ChordSetup.DIFFUSE_FORMAT, values.diffuse),
             Fixed(ChordSetup.HIGHLIGHT_FORMAT, values.highlight),
             length,
+            None if factors is None else Fixed(ChordSetup.DIFFUSE_FORMAT, factors),
         )
         # A pixel of a span of one or two is a span of its own.
         short = length < 3
@@ -165,16 +183,18 @@ class ChordInterpolator(Interpolator):
         pieces_short = short[pieces]
         pixels = pixels_of(np.where(pieces_short, 1, length[pieces]))
         results = []
-        for quadratic, codes, model in zip(quadratics, values, self.accumulators.values(), strict=True):
+        for quadratic, codes, model in zip(quadratics, given, self.accumulators.values(), strict=False):
             start = np.where(place[:, np.newaxis], codes[pieces, :, 2], codes[pieces, :, 0])
             first, second = (
                 Fixed(word.format, np.where(pieces_short[:, np.newaxis], 0, word.codes[pieces]))
                 for word in (quadratic.first, quadratic.second)
             )
             results.append(model.compute(Fixed(model.start_format, start), first, second, *pixels))
-        return Operands(*results, out_of_range & ~short)
+        return Operands(*results[:2], out_of_range & ~short, *results[2:])
 
-    def exact_operands(self, values: SpanValues, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def exact_operands(
+        self, values: SpanValues, length: np.ndarray, factors: np.ndarray | None = None
+    ) -> tuple[np.ndarray, ...]:
         """The quadratics through the values in float64, in units of 1.
 
         Parameters
@@ -183,20 +203,28 @@ class ChordInterpolator(Interpolator):
             Of each span and light.
         length : int array, shape (spans,)
             Pixels.
+        factors : int64 array, shape (spans, fading lights, 3), optional
+            Those of `compute_values`.
 
         Returns
         -------
         cosine, one_minus_cosine : float64 arrays, shape (pixels, lights)
+            The latter without the scale, but up to ``2^-s`` alone.
+        factor : float64 array, shape (pixels, fading lights)
+            Only where it is given.
         """
         span, step = pixels_of(length)
         t = (step / np.maximum(length - 1, 1)[span])[:, np.newaxis]
-        formats = ChordSetup.DIFFUSE_FORMAT, ChordSetup.HIGHLIGHT_FORMAT
+        formats = [ChordSetup.DIFFUSE_FORMAT, ChordSetup.HIGHLIGHT_FORMAT, ChordSetup.DIFFUSE_FORMAT]
         results = []
-        for codes, format in zip(values, formats, strict=True):
+        for codes, format in zip((*values, factors), formats, strict=True):
+            if codes is None:
+                continue
             left, middle, right = np.moveaxis(codes * (format.step / float(ONE_SQUARED.values)), 2, 0)
             square = 2 * (left + right - 2 * middle)
             slope = right - left - square
             results.append(left[span] + t * (slope[span] + t * square[span]))
+        results[1] = np.ldexp(results[1], -self.scale)
         return tuple(results)
 
     def highlight_tolerance(self, exponent: np.ndarray, u: np.ndarray) -> np.ndarray:

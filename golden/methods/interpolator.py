@@ -43,11 +43,14 @@ class Operands(NamedTuple):
         N·H, or 1 - N·H.
     out_of_range : bool array, shape (spans,)
         Whether the angle of the span is larger than the method serves: its operands mean nothing.
+    factor : Fixed, shape (pixels, fading lights), optional
+        Factor of each light that fades, of methods with `Interpolator.TAKES_VALUES`.
     """
 
     cosine: Fixed
     highlight: Fixed
     out_of_range: np.ndarray
+    factor: Fixed | None = None
 
 
 @dataclass(frozen=True)

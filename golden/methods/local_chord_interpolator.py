@@ -15,6 +15,13 @@ class LocalChordInterpolator(ChordInterpolator):
     A span carries three values of each, computed where positions are known; everything else is that of
     `ChordInterpolator`.
 
+    A light that fades, by its distance or as a spot, has a factor a. Its N·L comes with it, ``a N·L``; the
+    specular term is multiplied by a itself, a third quadratic of the light with the words of N·L, at each
+    pixel (`Factor`). Spans are cut until, at every pixel that such a light reaches, a N·L is within
+    `DIFFUSE_BUDGET`; and the errors of a, at most `FACTOR_BUDGET` where the highlight shows, and of u, times
+    the largest a of the span, are within `HIGHLIGHT_BUDGET` together. All of them count times the largest
+    channel of the light's colour, where that is over 1, as a light that fades may be brighter than white.
+
     Parameters
     ----------
     fraction_bits : int

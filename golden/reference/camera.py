@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.lighting import Triple, triple
+from blysk.golden.reference.light import Triple, triple
 
 __all__ = ["PROJECTIONS", "Camera"]
 

@@ -1,6 +1,5 @@
-"""Lights, a material, and the intensity that a normal gives, in float64."""
+"""A material, and the intensity that a normal gives under lights, in float64."""
 
-import math
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.light import Light, Triple, triple
 from blysk.golden.reference.lobes import (
     LEAST_ROUGHNESS,
     checked_roughness,
@@ -28,100 +28,6 @@ __all__ = [
     "saturate",
     "schlick",
 ]
-
-Triple = tuple[float, float, float]
-
-
-def triple(name: str, value: Sequence[float], least: float = -math.inf, most: float = math.inf) -> Triple:
-    """Three finite floats in [least, most], or a ValueError that names the thing.
-
-    Parameters
-    ----------
-    name : str
-        What the numbers are, for the error's text.
-    value : sequence of three numbers
-        The numbers.
-    least, most : float
-        The range.
-
-    Raises
-    ------
-    ValueError
-        If there are not three numbers, or one is not finite or out of range.
-    """
-    array = np.asarray(value, dtype=np.float64)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise ValueError(f"{name} must be three finite numbers, not {value!r}")
-    if (array < least).any() or (array > most).any():
-        limits = f"at least {least:g}" if math.isinf(most) else f"in {least:g} to {most:g}"
-        raise ValueError(f"{name} must be {limits}, not {value!r}")
-    return tuple(array.tolist())
-
-
-@dataclass(frozen=True)
-class Light:
-    """A directional light, or a point light: as bright at every distance.
-
-    Parameters
-    ----------
-    direction : three floats, optional
-        Vector *to* the light, any length but 0; stored as a unit vector.
-    color : three floats
-        Intensity I_i a channel, at least 0.
-    position : three floats, optional
-        In place of the direction: where a point light is, in the mesh's units.
-
-    Raises
-    ------
-    ValueError
-        If a number is not finite, the direction is 0, a channel is negative, or there is not exactly one of
-        direction and position.
-    """
-
-    direction: Triple | None = None
-    color: Triple = (1.0, 1.0, 1.0)
-    position: Triple | None = None
-
-    def __post_init__(self):
-        if (self.direction is None) == (self.position is None):
-            raise ValueError("a light must have either a direction or a position")
-        if self.position is not None:
-            object.__setattr__(self, "position", triple("a light's position", self.position))
-        else:
-            direction = triple("a light's direction", self.direction)
-            if not any(direction):
-                raise ValueError("a light's direction must not be 0")
-            object.__setattr__(self, "direction", tuple(normalise(direction).tolist()))
-        object.__setattr__(self, "color", triple("a light's color", self.color, least=0))
-
-    @property
-    def is_on(self) -> bool:
-        """Whether its colour is not 0."""
-        return any(self.color)
-
-    def towards(self, points: np.ndarray | None = None) -> np.ndarray:
-        """Unit vectors L from points of the surface to the light; 0 where a point light is at the point.
-
-        Parameters
-        ----------
-        points : array, shape (..., 3), optional
-            Points; a directional light does not read them.
-
-        Returns
-        -------
-        float64 array
-            Shape (3,) of a directional light, else that of the points.
-
-        Raises
-        ------
-        ValueError
-            If a point light is given no points.
-        """
-        if self.position is None:
-            return np.array(self.direction)
-        if points is None:
-            raise ValueError("a point light needs the points that it lights")
-        return normalise(np.asarray(self.position) - points)
 
 
 def schlick(f0: ArrayLike, cosine: ArrayLike) -> np.ndarray:
@@ -322,7 +228,8 @@ def intensity(
 ) -> np.ndarray:
     """Intensity of every normal, not saturated.
 
-    ``I = k_a I_a + sum_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6). The cosine of a
+    ``I = k_a I_a + sum_i a_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6), with the
+    `Light.factor` a_i of a light that fades, else 1. The cosine of a
     mirror model, such as Phong's, is R·V with ``R = 2 (N·L) N - L``, that of the others N·H. A light with
     ``N·L <= 0`` gives neither diffuse nor specular; one with ``L = -V`` has no half-way vector and gives no
     specular. A point light gives nothing to the point where it is. k_s is that of `Material.reflection` at
@@ -375,7 +282,9 @@ def intensity(
             highlight_cosine = _dot(normals, halfway)
         constant = distant_cosine(light, viewer if viewer.ndim == 1 else None)
         specular = light.color * material.reflection(constant)
-        _add_light(total, material, light, specular, cosine, highlight_cosine, halfway.any(axis=-1), model)
+        factor = light.factor(points)
+        given = cosine * factor, highlight_cosine, factor
+        _add_light(total, material, light, specular, *given, halfway.any(axis=-1), model)
     return total
 
 
@@ -387,6 +296,7 @@ def intensity_of_cosines(
     highlight_cosine: np.ndarray,
     model: ReflectionModel,
     viewer: ArrayLike | None = None,
+    factor: np.ndarray | None = None,
 ) -> np.ndarray:
     """The same, from what a method gives instead of a normal.
 
@@ -395,9 +305,11 @@ def intensity_of_cosines(
     material, lights, ambient_light, model
         As for `intensity`; of the lights only the colours are read, and for Fresnel's reflection directions.
     cosine, highlight_cosine : arrays, shape (..., lights)
-        N·L and N·H.
+        N·L, of a light that fades times its factor; and N·H.
     viewer : array, shape (3,), optional
         Unit vector V to a distant viewer, for Fresnel's reflection.
+    factor : array, shape (..., lights), optional
+        Factor of each light; ``None``: 1.
 
     Returns
     -------
@@ -408,7 +320,8 @@ def intensity_of_cosines(
     for index, light in enumerate(lights):
         given = cosine[..., index], highlight_cosine[..., index]
         specular = light.color * material.reflection(distant_cosine(light, viewer))
-        _add_light(total, material, light, specular, *given, np.True_, model)
+        own = np.float64(1) if factor is None else factor[..., index]
+        _add_light(total, material, light, specular, *given, own, np.True_, model)
     return total
 
 
@@ -416,14 +329,19 @@ def _dot(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
     return vectors @ others if others.ndim == 1 else np.einsum("...i,...i->...", vectors, others)
 
 
-def _add_light(total, material, light, specular, cosine, highlight_cosine, has_halfway, model) -> None:
-    """Both terms of a light, added in place; without a cosine of the highlight, the diffuse one alone."""
+def _add_light(
+    total, material, light, specular, cosine, highlight_cosine, factor, has_halfway, model
+) -> None:
+    """Both terms of a light, added in place; without a cosine of the highlight, the diffuse one alone.
+
+    The factor is that of the specular term; N·L has it already.
+    """
     color = np.asarray(light.color)
     total += np.maximum(cosine, 0.0)[..., np.newaxis] * (color * material.diffuse)
     if highlight_cosine is not None:
         highlight = model.reflect(highlight_cosine, material.parameter(model))
         highlight = np.where((cosine > 0) & has_halfway, highlight, 0.0)
-        total += highlight[..., np.newaxis] * specular
+        total += (factor * highlight)[..., np.newaxis] * specular
 
 
 def saturate(values: np.ndarray) -> np.ndarray:

@@ -313,7 +313,12 @@ def shade_spans(
 
 
 def shade_operands(
-    scene: Scene, raster: Raster, cosine: np.ndarray, highlight_cosine: np.ndarray, model: ReflectionModel
+    scene: Scene,
+    raster: Raster,
+    cosine: np.ndarray,
+    highlight_cosine: np.ndarray,
+    model: ReflectionModel,
+    factor: np.ndarray | None = None,
 ) -> np.ndarray:
     """Picture from what a method without normals gives for every fragment.
 
@@ -324,9 +329,11 @@ def shade_operands(
     raster : Raster
         The fragments; span, pixel, visible and triangle are used.
     cosine, highlight_cosine : arrays, shape (fragments, lights)
-        N·L and N·H.
+        N·L, of a light that fades times its factor; and N·H.
     model : ReflectionModel
         The highlight.
+    factor : array, shape (fragments, lights), optional
+        Factor of each light; ``None``: 1.
 
     Returns
     -------
@@ -347,6 +354,7 @@ def shade_operands(
                 highlight_cosine[chosen],
                 model,
                 scene.distant_viewer,
+                None if factor is None else factor[chosen],
             )
             colors[raster.pixel[chosen]] = saturate(shaded)
     return image

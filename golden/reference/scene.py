@@ -7,7 +7,8 @@ import numpy as np
 
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
-from blysk.golden.reference.lighting import Light, Material, Triple, triple
+from blysk.golden.reference.light import Light, Triple, triple
+from blysk.golden.reference.lighting import Material
 
 __all__ = ["BACK_FACES", "LARGEST_SIDE", "VIEWERS", "Scene"]
 

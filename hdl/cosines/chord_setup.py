@@ -11,7 +11,13 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.reciprocal import checked_length_bits, reciprocal_words, square_words
 from blysk.hdl.core.stream import PipelinedUnit
 
-__all__ = ["ChordSetupUnit", "chord_differences_shape", "span_values_shape"]
+__all__ = [
+    "ChordSetupUnit",
+    "chord_differences_shape",
+    "span_factors_shape",
+    "span_operands_shape",
+    "span_values_shape",
+]
 
 
 def span_values_shape(lights: int, highlights: bool = True) -> data.ArrayLayout:
@@ -22,19 +28,32 @@ def span_values_shape(lights: int, highlights: bool = True) -> data.ArrayLayout:
     return data.ArrayLayout(data.StructLayout(light), lights)
 
 
-def chord_differences_shape(
-    lights: int, highlights: bool = True, parameters: ChordSetup | None = None
+def span_factors_shape(factors: int) -> data.ArrayLayout:
+    """Shape of the factors of so many lights that fade, at the same three pixels, in the format of N·L."""
+    return data.ArrayLayout(data.ArrayLayout(FixedShape(ChordSetup.DIFFUSE_FORMAT), 3), factors)
+
+
+def span_operands_shape(
+    lights: int, highlights: bool = True, length_bits: int = LENGTH_BITS, factors: int = 0
 ) -> data.StructLayout:
-    """Shape of the differences of N·L and of u along a span, for each light; and its flag."""
+    """Shape of a span: `span_values_shape`, with factors `span_factors_shape`, and the length."""
+    members: dict = {"values": span_values_shape(lights, highlights)}
+    if factors:
+        members["factors"] = span_factors_shape(factors)
+    return data.StructLayout(members | {"length": unsigned(length_bits)})
+
+
+def chord_differences_shape(
+    lights: int, highlights: bool = True, parameters: ChordSetup | None = None, factors: int = 0
+) -> data.StructLayout:
+    """Shape of the differences of N·L and of u along a span, for each light; of factors; and its flag."""
     format = (parameters or ChordSetup()).format
     names = ("diffuse", "highlight") if highlights else ("diffuse",)
     differences = data.StructLayout({"first": FixedShape(format), "second": FixedShape(format)})
-    return data.StructLayout(
-        {
-            "lights": data.ArrayLayout(data.StructLayout(dict.fromkeys(names, differences)), lights),
-            "out_of_range": unsigned(1),
-        }
-    )
+    members: dict = {"lights": data.ArrayLayout(data.StructLayout(dict.fromkeys(names, differences)), lights)}
+    if factors:
+        members["factors"] = data.ArrayLayout(differences, factors)
+    return data.StructLayout(members | {"out_of_range": unsigned(1)})
 
 
 class ChordSetupUnit(PipelinedUnit):
@@ -43,7 +62,8 @@ class ChordSetupUnit(PipelinedUnit):
     `ChordSetup` is the bit-accurate model; it has formats and error bounds.
 
     One product of a span, 3 of each u and 2 of each f share multipliers of 18x18 bits, 2 for one light and an
-    initiation interval of 3; the attribute ``multipliers`` tells. Without highlights a light has 2 products.
+    initiation interval of 3; the attribute ``multipliers`` tells. Without highlights a light has 2 products,
+    one that fades has 2 more.
     Beats come at any distance from the interval on. A table of ``2^(length_bits - 1)`` words of 17 bits holds
     the reciprocals. The attribute ``latency`` depends on how the products share the multipliers.
 
@@ -59,6 +79,8 @@ class ChordSetupUnit(PipelinedUnit):
         Bits of the length, 2 to 12: spans have at most ``2^length_bits - 1`` pixels.
     highlights : bool
         Whether there are differences of u.
+    factors : int
+        Number of lights that fade.
 
     Raises
     ------
@@ -68,8 +90,8 @@ class ChordSetupUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"values": span_values_shape(...), "length": length_bits})))`
-        Spans; the length is at least 1.
-    o : :py:`Out(stream.Signature(chord_differences_shape(lights, highlights)))`
+        Spans; the length is at least 1. With factors also ``factors``, `span_factors_shape`.
+    o : :py:`Out(stream.Signature(chord_differences_shape(lights, highlights, parameters, factors)))`
         Differences; ``out_of_range``: P or G does not fit its word, and the differences are invalid.
 
     Source: docs/theory/chord.md#differences; [Lyon93].
@@ -83,19 +105,20 @@ class ChordSetupUnit(PipelinedUnit):
         initiation_interval: int = 3,
         length_bits: int = LENGTH_BITS,
         highlights: bool = True,
+        factors: int = 0,
     ):
         self.parameters = parameters or ChordSetup()
         self.highlights = highlights
         self.lights = lights
+        self.factors = factors
         self.length_bits = checked_length_bits(length_bits)
         self._graph = Dataflow(initiation_interval, spaced=True)
         self._shifters = shared_shifters(self._graph, self.parameters)
         self._results = self._describe()
         self.multipliers = self._graph.multiplier.count
-        values = span_values_shape(lights, highlights)
         super().__init__(
-            data.StructLayout({"values": values, "length": unsigned(length_bits)}),
-            chord_differences_shape(lights, highlights, self.parameters),
+            span_operands_shape(lights, highlights, length_bits, factors),
+            chord_differences_shape(lights, highlights, self.parameters, factors),
             latency=max(word.stage for word in self._results.values()),
             initiation_interval=initiation_interval,
             spaced=True,
@@ -109,29 +132,33 @@ class ChordSetupUnit(PipelinedUnit):
         functions = [("diffuse", p.DIFFUSE_SLOPE_FORMAT)]
         if self.highlights:
             functions.insert(0, ("highlight", p.SLOPE_FORMAT))
+        quadratics = [(i, *function) for i in range(self.lights) for function in functions]
+        quadratics += [(k, "factor", p.DIFFUSE_SLOPE_FORMAT) for k in range(self.factors)]
         results, flags = {}, []
-        for i in range(self.lights):
-            for function, slope_format in functions:
-                slope, curvature = self._quadratic(i, function, slope_format, flags)
-                words = difference_words(
-                    g,
-                    self._shifters,
-                    f"{function}_{i}",
-                    slope,
-                    curvature,
-                    steps,
-                    has_low=slope_format.width > p.HIGH_FORMAT.width,
-                    parameters=p,
-                )
-                results.update({(i, function, name): word for name, word in words.items()})
+        for i, function, slope_format in quadratics:
+            slope, curvature = self._quadratic(i, function, slope_format, flags)
+            words = difference_words(
+                g,
+                self._shifters,
+                f"{function}_{i}",
+                slope,
+                curvature,
+                steps,
+                has_low=slope_format.width > p.HIGH_FORMAT.width,
+                parameters=p,
+            )
+            results.update({(i, function, name): word for name, word in words.items()})
         results["out_of_range"] = g.register("out_of_range", lambda *flags: Cat(flags).any(), *flags)
         return results
 
     def _quadratic(self, i: int, function: str, slope_format: Format, flags: list[Word]):
-        """Words of P and G of f or u; the flags get a word where P or G is out of range."""
+        """Words of P and G of f, u or a; the flags get a word where P or G is out of range."""
         g, p = self._graph, self.parameters
         name = f"{function}_{i}"
-        values = g.input(name, lambda operands: operands["values"][i][function])
+        values = g.input(
+            name,
+            lambda operands: operands.factors[i] if function == "factor" else operands["values"][i][function],
+        )
         ends = g.register(f"{name}_ends", lambda v: v[0] + v[2], values)
         rise = g.register(f"{name}_rise", lambda v: v[2] - v[0], values)
         exact = g.register(
@@ -168,6 +195,10 @@ class ChordSetupUnit(PipelinedUnit):
                 for name in ("first", "second"):
                     word = self._results[index, function, name]
                     m.d.comb += light[function][name].eq(value(word, self.latency))
+        for index in range(self.factors):
+            for name in ("first", "second"):
+                word = self._results[index, "factor", name]
+                m.d.comb += result.factors[index][name].eq(value(word, self.latency))
         m.d.comb += result.out_of_range.eq(value(self._results["out_of_range"], self.latency))
         return result
 

@@ -1,11 +1,11 @@
 """Chord values unit: N·L and half the squared chord from N to H of a normal, for every light."""
 
-from amaranth.hdl import Signal
+from amaranth.hdl import Mux, Signal
 from amaranth.lib import data
 
 from blysk.golden.cosines.chord_values import ChordValues
 from blysk.hdl.core.dataflow import Dataflow, dot
-from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import light_vectors_shape, normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.cosines.chord import chord
@@ -78,7 +78,7 @@ class ChordValuesUnit(PipelinedUnit):
             words = {"diffuse": self._rounded(f"f_{i}", cosine, p.DIFFUSE_FORMAT)}
             if highlights:
                 u = chord(g, f"u_{i}_exact", normal, lambda i=i: self.constants[i].halfway)
-                words["highlight"] = self._rounded(f"u_{i}", u, p.HIGHLIGHT_FORMAT)
+                words["highlight"] = self._rounded(f"u_{i}", u, p.HIGHLIGHT_FORMAT, p.scale)
             self._words.append(words)
         self.multipliers = g.multiplier.count
         super().__init__(
@@ -90,11 +90,18 @@ class ChordValuesUnit(PipelinedUnit):
             spaced=True,
         )
 
-    def _rounded(self, name, word, format):
-        """A word in a format of fewer bits."""
-        return self._graph.register(
-            name, lambda value: value.round_half_up(format.fraction_bits).saturate(format), word
-        )
+    def _rounded(self, name, word, format, scale=0):
+        """A word in a format of fewer bits; times ``2^scale``, and then 1 at most."""
+
+        def rounded(value):
+            value = value.scale(scale).round_half_up(format.fraction_bits).saturate(format)
+            if not scale:
+                return value
+            one = 1 << format.fraction_bits
+            code = value.as_value()
+            return FixedValue(format, Mux(code[-1], one, code)[: format.width])
+
+        return self._graph.register(name, rounded, word)
 
     def datapath(self, m, operands):
         """Describe the registers of the graph."""

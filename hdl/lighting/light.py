@@ -8,12 +8,14 @@ from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import PipelinedUnit, connect_fifo
+from blysk.hdl.core.stream import PipelinedUnit, connect, connect_fifo, pass_beside
 from blysk.hdl.lighting.diffuse import DiffuseUnit
+from blysk.hdl.lighting.factor import FactorUnit
 from blysk.hdl.lighting.lobe import LobeUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SlopeUnit, SpecularUnit
@@ -78,7 +80,8 @@ class LightUnit(wiring.Component):
     a longer one, dark beats bypass the specular unit: they wait beside it in order, and take a cycle each.
 
     The latency, the initiation interval and the multipliers are those of the specular unit, for beats that
-    are not dark.
+    are not dark. Of a light that fades a `FactorUnit` follows, two cycles and a multiplier more; the factor
+    passes beside the units before it.
 
     Parameters
     ----------
@@ -95,12 +98,14 @@ class LightUnit(wiring.Component):
         `Power` needs none.
     gated : bool
         Whether there is a highlight gate.
+    fades : bool or None
+        Whether the light has a factor. ``False``: it has none, and waits as long as one that has.
 
     Members
     -------
-    i : :py:`In(stream.Signature(StructLayout({"cosine", "highlight", "gated"})))`
-        ``N . L`` and the specular operand; the last, only where there is a gate, tells that the beat's span
-        has no highlight.
+    i : :py:`In(stream.Signature(StructLayout({"cosine", "highlight", "gated", "factor"})))`
+        ``N . L`` and the specular operand; the third, only where there is a gate, tells that the beat's span
+        has no highlight; the last, ``UQ(0, 17)``, only of a light that fades.
     o : :py:`Out(stream.Signature(StructLayout({"diffuse", "specular"})))`
         Terms, ``UQ(0, 17)``.
     constants
@@ -120,22 +125,27 @@ class LightUnit(wiring.Component):
         exponent: int | None = None,
         shares_slope: bool = False,
         gated: bool = False,
+        fades: bool | None = None,
     ):
         self.parameters = p = parameters or Specular()
         self._specular = SPECULAR_KINDS[type(p)].unit(
             p, initiation_interval=initiation_interval, exponent=exponent, shares_slope=shares_slope
         )
         self.exponent = exponent
-        self.latency = self._specular.latency
+        self._factor = None if fades is None else FactorUnit(has_factor=fades)
+        self.fades = bool(fades)
+        self.latency = self._specular.latency + (self._factor.latency if self._factor else 0)
         self.initiation_interval = self._specular.initiation_interval
         self.skips_dark = self.initiation_interval > 1
-        self._diffuse = DiffuseUnit(diffuse, latency=2 if self.skips_dark else self.latency)
+        self._diffuse = DiffuseUnit(diffuse, latency=2 if self.skips_dark else self._specular.latency)
         operands = {
             "cosine": FixedShape(self._diffuse.parameters.operand_format),
             "highlight": FixedShape(self.parameters.operand_format),
         }
         if gated:
             operands["gated"] = unsigned(1)
+        if self.fades:
+            operands["factor"] = FixedShape(Factor.FORMAT)
         terms = dict.fromkeys(("diffuse", "specular"), FixedShape(Diffuse.RESULT_FORMAT))
         members = {
             "i": In(stream.Signature(data.StructLayout(operands))),
@@ -157,8 +167,9 @@ class LightUnit(wiring.Component):
         return "constants" in self._specular.signature.members
 
     def elaborate(self, platform):
-        """Two units side by side."""
+        """Two units side by side, and perhaps the factor unit behind them."""
         m = Module()
+        o = self.o if self._factor is None else self._apply_factor(m)
         m.submodules.diffuse = diffuse = self._diffuse
         m.submodules.specular = specular = self._specular
         cosine = Value.cast(self.i.payload.cosine)
@@ -178,22 +189,43 @@ class LightUnit(wiring.Component):
         elif "constants" in self.signature.members:
             m.d.comb += Value.cast(specular.constants).eq(Value.cast(self.constants))
         if self.skips_dark:
-            self._skip(m, diffuse, specular, dark)
+            self._skip(m, diffuse, specular, dark, o)
             return m
         m.d.comb += [
             self.i.ready.eq(diffuse.i.ready),
-            self.o.payload.diffuse.eq(diffuse.o.payload),
-            self.o.payload.specular.eq(specular.o.payload),
-            self.o.valid.eq(diffuse.o.valid),
+            o.payload.diffuse.eq(diffuse.o.payload),
+            o.payload.specular.eq(specular.o.payload),
+            o.valid.eq(diffuse.o.valid),
         ]
         for unit in (diffuse, specular):
-            m.d.comb += [unit.i.valid.eq(self.i.valid), unit.o.ready.eq(self.o.ready)]
+            m.d.comb += [unit.i.valid.eq(self.i.valid), unit.o.ready.eq(o.ready)]
         return m
 
-    def _skip(self, m: Module, diffuse: DiffuseUnit, specular: PipelinedUnit, dark: Value) -> None:
+    def _apply_factor(self, m: Module) -> stream.Interface:
+        """The factor unit before the output; the stream that it takes the terms from."""
+        m.submodules.factor = factor = self._factor
+        connect(m, factor.o, wiring.flipped(self.o))
+        if self.fades:
+            accepted, taken = self.i.valid & self.i.ready, factor.i.valid & factor.i.ready
+            # As many as the units have inside, their outputs included.
+            most = self._depth + self._diffuse.latency if self.skips_dark else self._specular.latency + 1
+            word = pass_beside(m, "factors", self.i.payload.factor, accepted, taken, most)
+            m.d.comb += Value.cast(factor.i.payload.factor).eq(word)
+        return factor.i
+
+    @property
+    def _depth(self) -> int:
+        """Terms that wait for the specular unit at most.
+
+        As many as it has inside, one that it is about to take, and one for the output.
+        """
+        return max(self._specular.latency // self._specular.initiation_interval + 2, 3)
+
+    def _skip(
+        self, m: Module, diffuse: DiffuseUnit, specular: PipelinedUnit, dark: Value, o: stream.Interface
+    ) -> None:
         """Diffuse terms wait for the specular ones, which not all have."""
-        # As many as the specular unit has inside, one that it is about to take, and one for the output.
-        depth = max(specular.latency // specular.initiation_interval + 2, 3)
+        depth = self._depth
         # A term is under way while its mark waits.
         m.submodules.skips = skips = fifo.SyncFIFOBuffered(width=1, depth=depth + diffuse.latency)
         terms = diffuse.o.signature.create(path=("terms",))
@@ -206,11 +238,11 @@ class LightUnit(wiring.Component):
             diffuse.i.valid.eq(self.i.valid & skips.w_rdy & (dark | specular.i.ready)),
             skips.w_en.eq(self.i.valid & self.i.ready),
             skips.w_data.eq(dark),
-            self.o.valid.eq(terms.valid & skips.r_rdy & (skip | specular.o.valid)),
-            gives.eq(self.o.valid & self.o.ready),
+            o.valid.eq(terms.valid & skips.r_rdy & (skip | specular.o.valid)),
+            gives.eq(o.valid & o.ready),
             terms.ready.eq(gives),
             skips.r_en.eq(gives),
             specular.o.ready.eq(gives & ~skip),
-            self.o.payload.diffuse.eq(terms.payload),
-            Value.cast(self.o.payload.specular).eq(Mux(skip, 0, Value.cast(specular.o.payload))),
+            o.payload.diffuse.eq(terms.payload),
+            Value.cast(o.payload.specular).eq(Mux(skip, 0, Value.cast(specular.o.payload))),
         ]

@@ -59,6 +59,8 @@ class InterpolatorUnit(wiring.Component):
         Decides which spans have no highlight, of the chord methods; operands then have ``gated``.
     takes_threshold : bool
         Whether a threshold tells where highlights end, in place of the exponent; see `Design.threshold_of`.
+    factors : sequence of int
+        Lights that fade, of methods with `TAKES_VALUES`; see `Design`.
 
     Members
     -------
@@ -136,6 +138,7 @@ class InterpolatorUnit(wiring.Component):
         product_interval: int = 1,
         gate: ValueGateUnit | None = None,
         takes_threshold: bool = False,
+        factors: Sequence[int] = (),
     ):
         intervals = self.setup_intervals(parameters)
         if setup_interval not in (None, *intervals):
@@ -150,12 +153,15 @@ class InterpolatorUnit(wiring.Component):
         self.product_interval = product_interval
         self.gate = gate
         self.takes_threshold = takes_threshold
-        span = self.span_shape(lights, highlights=highlights, length_bits=length_bits)
+        self.factors = tuple(factors)
+        further = {"factors": len(factors)} if factors else {}
+        span = self.span_shape(lights, highlights=highlights, length_bits=length_bits, **further)
+        gated, factored = gate is not None, bool(factors)
         members = {
             "i": In(stream.Signature(span)),
             "o": Out(
                 stream.Signature(
-                    operands_shape(parameters, lights, highlights=highlights, gated=gate is not None)
+                    operands_shape(parameters, lights, highlights=highlights, gated=gated, factored=factored)
                 )
             ),
             "out_of_range": Out(1),

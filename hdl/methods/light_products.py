@@ -3,6 +3,7 @@
 from amaranth.hdl import Signal
 from amaranth.lib import data
 
+from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
@@ -16,7 +17,12 @@ __all__ = ["LightProductsUnit", "operands_shape"]
 
 
 def operands_shape(
-    parameters: Interpolator, lights: int, *, highlights: bool = True, gated: bool = False
+    parameters: Interpolator,
+    lights: int,
+    *,
+    highlights: bool = True,
+    gated: bool = False,
+    factored: bool = False,
 ) -> data.ArrayLayout:
     """Shape of the operands of a pixel: for each light N·L, and N·H or 1 - N·H.
 
@@ -30,12 +36,16 @@ def operands_shape(
         Whether there is specular light.
     gated : bool
         Whether a gate's decision, that there is no highlight, comes with them.
+    factored : bool
+        Whether the factor comes with them of lights that fade; of others it is 0, and means nothing.
     """
     operands = {"cosine": FixedShape(parameters.COSINE_FORMAT)}
     if highlights:
         operands["highlight"] = FixedShape(Specular(operand=parameters.operand).operand_format)
     if gated:
         operands["gated"] = 1
+    if factored:
+        operands["factor"] = FixedShape(Factor.FORMAT)
     return data.ArrayLayout(data.StructLayout(operands), lights)
 
 

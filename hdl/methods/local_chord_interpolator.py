@@ -1,13 +1,15 @@
 """The chord method for point lights and a near viewer: three values of N·L and of the chord a span."""
 
-from amaranth.hdl import Module, Signal, Value, unsigned
+from collections.abc import Iterator
+
+from amaranth.hdl import Module, Signal, Value
 from amaranth.lib import data, wiring
 
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import connect
-from blysk.hdl.cosines.chord_setup import span_values_shape
-from blysk.hdl.methods.chord_interpolator import ChordSpansUnit
+from blysk.hdl.cosines.chord_setup import span_operands_shape
+from blysk.hdl.methods.chord_spans import ChordSpansUnit
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 
 __all__ = ["LocalChordInterpolatorUnit"]
@@ -47,10 +49,9 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
         return (1, 2, 3, 6)
 
     @classmethod
-    def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS):
-        """Three values of each operand of each light, and the length."""
-        values = span_values_shape(lights, highlights)
-        return data.StructLayout({"values": values, "length": unsigned(length_bits)})
+    def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS, factors=0):
+        """Three values of each operand of each light, of the factors of lights that fade, and the length."""
+        return span_operands_shape(lights, highlights, length_bits, factors)
 
     def __init__(self, parameters: LocalChordInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
@@ -61,6 +62,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
             highlights=self.highlights,
             length_bits=self.length_bits,
             gate=self.gate,
+            factors=self.factors,
         )
         self.multipliers = self._spans.multipliers
         self.latency = self._spans.latency
@@ -82,17 +84,24 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
             m.d.comb += spans.i.payload.length.eq(1)
         with m.If(spans.i.valid & spans.i.ready):
             m.d.sync += second.eq(pair & ~second)
-        for index, (given, light) in enumerate(zip(spans.i.payload["values"], span["values"], strict=True)):
-            for name in light.shape().members:
-                end = Signal.like(light[name][2], name=f"{name}_{index}_end", reset_less=True)
-                with m.If(second):
-                    m.d.comb += Value.cast(given[name][0]).eq(Value.cast(end))
-                with m.Else():
-                    m.d.sync += Value.cast(end).eq(Value.cast(light[name][2]))
+        for name, given, values in self._values(spans.i.payload, span):
+            end = Signal.like(values[2], name=f"{name}_end", reset_less=True)
+            with m.If(second):
+                m.d.comb += Value.cast(given[0]).eq(Value.cast(end))
+            with m.Else():
+                m.d.sync += Value.cast(end).eq(Value.cast(values[2]))
         connect(m, spans.o, wiring.flipped(self.o))
         if "constants" in spans.signature.members:
             m.d.comb += spans.constants.eq(self.constants)
         return m
+
+    def _values(self, *spans: data.View) -> Iterator[tuple]:
+        """Name of each three values, and these of spans."""
+        for index, lights in enumerate(zip(*(span["values"] for span in spans), strict=True)):
+            for name in lights[0].shape().members:
+                yield f"{name}_{index}", *(light[name] for light in lights)
+        for index in range(len(self.factors)):
+            yield f"factor_{index}", *(span.factors[index] for span in spans)
 
     def further_members(self):
         """Exponent or threshold of a gate."""

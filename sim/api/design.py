@@ -50,13 +50,17 @@ ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
 """Hardware from spans to pixels."""
 
 
-def design(*, lights: int = 1, materials: int = 1, **options: Unpack[DesignOptions]) -> Design:
+def design(
+    *, lights: int = 1, materials: int = 1, factors: int = 0, **options: Unpack[DesignOptions]
+) -> Design:
     """A pipeline with the defaults of the command line.
 
     Parameters
     ----------
     lights, materials : int
         How many it serves: 1 to 16, and 1 to 1024.
+    factors : int
+        How many of the lights, the first ones, fade by distance or as spots, of ``chord-local``.
     method : str
         Interpolation along a span: one of `METHODS`, by default ``"chord"``.
     model : str
@@ -75,9 +79,14 @@ def design(*, lights: int = 1, materials: int = 1, **options: Unpack[DesignOptio
     InputError
         If there is no such pipeline.
     """
-    counts = {"lights": lights, "materials": materials}
+    counts = {"lights": lights, "materials": materials, "factors": factors}
     settings = read_settings("", {**options, **counts}, {**DESIGN, **COUNTS})
-    return design_of(settings, settings["lights"], settings["materials"])
+    made = design_of(settings, settings["lights"], settings["materials"])
+    try:
+        return replace(made, factors=range(settings["factors"]))
+    except ValueError as error:
+        remedy = "use chord-local, and at most as many as lights"
+        raise settings.refuse("factors", str(error), remedy) from None
 
 
 def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
@@ -186,6 +195,15 @@ def header_of(unit: ShadingUnit) -> list[str]:
             f"i_values: a light's three codes of N.L, {formats[0]}, and three of 1 - N.H, {formats[1]},",
             "times (1 - 2^-17)^2: at the first pixel, the middle, the last pixel; no L and H are read",
         ]
+        if scale := made.interpolator.scale:
+            lines.append(f"1 - N.H is times {1 << scale}, and 1 at most; so it is in the table")
+        if made.factors:
+            lines += [
+                f"i_factors: three codes of the factor a, 0 to 1, in {formats[0]}, times (1 - 2^-17)^2, of "
+                f"light{'s' * (len(made.factors) > 1)} {', '.join(map(str, made.factors))}, which "
+                f"fade{'s' * (len(made.factors) == 1)};",
+                "their N.L in i_values is times a",
+            ]
     elif made.interpolator.takes_line:
         lines.append(
             "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, "

@@ -137,7 +137,7 @@ class Roughness(Number):
 
 
 class Lights(Value):
-    """Lights: objects, or tables of a direction or a position and a colour."""
+    """Lights: objects, or tables of a direction or a position, a colour, attenuation, spot and cone."""
 
     name = "lights"
     remedy = "write [[lights]] and its direction and color below, for each light"
@@ -145,6 +145,9 @@ class Lights(Value):
         "direction": Vector("three numbers", direction=True),
         "position": Vector("three numbers"),
         "color": Color(math.inf),
+        "attenuation": Vector("three numbers", metavar="K0,K1,K2"),
+        "spot": Vector("three numbers", direction=True),
+        "cone": Vector("two angles", (2,), "INNER,OUTER"),
     }
 
     def check(self, value):
@@ -177,7 +180,11 @@ class Lights(Value):
             raise PartError(f"{key}.direction", "is missing", remedy)
         if "direction" in parts and "position" in parts:
             raise PartError(key, "holds both direction and position", "leave one of them out")
-        return Light(**parts)
+        try:
+            return Light(**parts)
+        except ValueError as error:
+            remedy = "see the keys of lights in blysk render --help"
+            raise PartError(key, str(error), remedy) from None
 
 
 class Direction(Vector):
@@ -342,6 +349,11 @@ DESIGN: dict[str, Option] = {
 COUNTS: dict[str, Option] = {
     "lights": Option(Whole(1, MAX_LIGHTS), 1, "Number of lights."),
     "materials": Option(Whole(1, MAX_MATERIALS), 1, "Number of materials."),
+    "factors": Option(
+        Whole(0, MAX_LIGHTS),
+        0,
+        "How many of the lights, the first ones, fade by distance or as spots; needs --method chord-local.",
+    ),
 }
 """Counts of a design, which a scene gives where there is one."""
 

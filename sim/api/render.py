@@ -7,7 +7,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -324,7 +324,7 @@ def prepare_rendering(
         while True:
             scenes = tuple(scenes_of(loaded, settings, frames or 1))
             if design is None:
-                made = made.for_materials(scenes[0].materials)
+                made = made.for_materials(scenes[0].materials, settings["geometry"] == "software")
             _check_lobes(scenes[0], made, settings)
             constants_of(scenes[0], made)
             stage(SPECIALISING if settings["specialise"] else "")
@@ -409,7 +409,7 @@ def _design(settings: Settings) -> Design:
     if local and not made.takes_values:
         reason = "point lights and a near viewer need the values of a span"
         raise settings.refuse("method", reason, "use chord-local")
-    return made
+    return replace(made, factors=[index for index, light in enumerate(lights) if light.fades])
 
 
 def _specialised(scenes: Sequence[Scene], design: Design, settings: Settings) -> Specialisation:

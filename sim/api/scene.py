@@ -60,7 +60,8 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
         See `Scene`; ``"near"`` needs the method ``chord-local``.
     lights : sequence of Light
         At most 16; by default one from (-0.5, 0.8, 0.7). Those with a position need the method
-        ``chord-local``. Those whose colour is 0 are off, and left out.
+        ``chord-local``; they may fade by the distance, and be spots. Those whose colour is 0 are off, and
+        left out.
     ambient, diffuse, specular, exponent, roughness, fresnel
         See `Material`; by default those of the mesh file's materials, else copper and 50. An exponent that is
         given counts before a file's roughness, too.
@@ -161,7 +162,11 @@ def _scaled(light: Light, shift: int) -> Light:
     """A light in a mesh whose unit has been multiplied by ``2**shift``."""
     if light.position is None:
         return light
-    return replace(light, position=_shifted(light.position, shift))
+    # Of a distance that is 2^shift times as much: k_1 d and k_2 d^2 stay.
+    with np.errstate(over="ignore", under="ignore"):
+        attenuation = np.ldexp(light.attenuation, [0, -shift, -2 * shift])
+    attenuation = tuple(np.minimum(attenuation, 1e300).tolist()) if attenuation.any() else (1.0, 0.0, 0.0)
+    return replace(light, position=_shifted(light.position, shift), attenuation=attenuation)
 
 
 def _cameras(vertices: np.ndarray, shift: int, settings: Settings, count: int) -> list[Camera]:

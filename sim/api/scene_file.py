@@ -69,6 +69,9 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         direction = [-0.5, 0.8, 0.7]        # to the light
         # position                          # of a point light, in place of direction, in the mesh's own units
         color = [1, 1, 1]                   # or "#rrggbb"; may exceed 1
+        # attenuation = [1, 0, 0]           # of a point light: 1/(k0 + k1 d + k2 d^2), at most 1; d: distance
+        # spot = [0, -1, 0]                 # a point light that shines along this
+        # cone = [20, 30]                   # degrees from there: in full up to, not at all from
 
         [material]
         ambient = [0.08, 0.05, 0.03]        # colours, as background

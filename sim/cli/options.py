@@ -13,9 +13,36 @@ from blysk.sim.value_types import Truth, Vector
 
 __all__ = ["given_options", "lights_of", "option_error", "options_of"]
 
-LIGHT = Vector("a light", (3, 6), "X,Y,Z or X,Y,Z,R,G,B")
+_LIGHTS = {
+    "--light": ("lights", Vector("a light", (3, 6), "X,Y,Z or X,Y,Z,R,G,B"), ("direction", "color")),
+    "--point-light": (
+        "point_lights",
+        Vector("a point light", (3, 6, 9), "X,Y,Z or X,Y,Z,R,G,B or X,Y,Z,R,G,B,K0,K1,K2"),
+        ("position", "color", "attenuation"),
+    ),
+    "--spot-light": (
+        "spot_lights",
+        Vector("a spot light", (8, 11, 14), "X,Y,Z,DX,DY,DZ,INNER,OUTER or ...,R,G,B or ...,R,G,B,K0,K1,K2"),
+        ("position", "spot", "cone", "color", "attenuation"),
+    ),
+}
+"""Options of lights: their parameters, their numbers, and the fields of `Light` that these are, in order."""
 
-_POINT_LIGHT = "Position of a light in the mesh's units, and its colour; needs --method chord-local."
+_COUNTS = {"cone": 2}
+"""Numbers of a field that are not three."""
+
+_HELP = {
+    "--point-light": "Position of a light in the mesh's units, its colour, and its attenuation: at the "
+    "distance d it counts 1/(K0 + K1 d + K2 d^2), at most 1; needs --method chord-local.",
+    "--spot-light": "The same of a light that shines along DX,DY,DZ: in full up to INNER degrees from there, "
+    "and not at all from OUTER on.",
+}
+
+_REMEDIES = {
+    "--light": "give a direction other than 0 and colours of 0 or more",
+    "--point-light": "give colours and coefficients of 0 or more",
+    "--spot-light": "give an axis other than 0, a larger outer angle, colours and coefficients of 0 or more",
+}
 
 Command = Callable[..., Any]
 
@@ -42,21 +69,17 @@ def _click_option(name: str, option: Option) -> Callable[[Command], Command]:
 def options_of(table: Mapping[str, Option]) -> Callable[[Command], Command]:
     """Decorator of a command that adds the options of a table.
 
-    None has a default here: what is not given is left to the Python interface. ``lights`` become ``--light``
-    and ``--point-light``, see `lights_of`.
+    None has a default here: what is not given is left to the Python interface. ``lights`` become ``--light``,
+    ``--point-light`` and ``--spot-light``, see `lights_of`.
     """
 
     def decorate(command: Command) -> Command:
         for name, option in reversed(table.items()):
             if name == "lights" and not isinstance(option.default, int):
-                point = "Position of a light in the mesh's units, and its colour; needs --method chord-local."
-                command = click.option(
-                    "--point-light", "point_lights", multiple=True, type=LIGHT, help=point
-                )(command)
-                direction = f"{option.help}  [default: -0.5,0.8,0.7]"
-                command = click.option("--light", "lights", multiple=True, type=LIGHT, help=direction)(
-                    command
-                )
+                help = {"--light": f"{option.help}  [default: -0.5,0.8,0.7]"} | _HELP
+                for flag, (parameter, kind, _) in reversed(_LIGHTS.items()):
+                    added = click.option(flag, parameter, multiple=True, type=kind, help=help[flag])
+                    command = added(command)
             else:
                 command = _click_option(name, option)(command)
         return command
@@ -73,26 +96,27 @@ def given_options(context: click.Context, names: Sequence[str]) -> dict[str, Any
     }
 
 
-def lights_of(directions: Sequence[tuple[float, ...]], positions: Sequence[tuple[float, ...]]) -> list[Light]:
-    """Lights of ``--light`` and ``--point-light``.
+def lights_of(options: Mapping[str, Any]) -> list[Light]:
+    """Lights of ``--light``, ``--point-light`` and ``--spot-light``, in this order; empty without any.
 
     Raises
     ------
     InputError
-        If a direction is 0 or a colour negative.
+        If `Light` refuses a number.
     """
     lights = []
-    for option, kind, rows in (
-        ("--light", "direction", directions),
-        ("--point-light", "position", positions),
-    ):
-        for numbers in rows:
+    for flag, (parameter, _, fields) in _LIGHTS.items():
+        for numbers in options[parameter]:
+            parts, rest = {}, tuple(numbers)
+            for field in fields:
+                count = _COUNTS.get(field, 3)
+                if rest:
+                    parts[field], rest = rest[:count], rest[count:]
             try:
-                lights.append(Light(color=numbers[3:] or (1.0, 1.0, 1.0), **{kind: numbers[:3]}))
+                lights.append(Light(**parts))
             except ValueError as error:
-                thing = f"{option} {','.join(f'{number:g}' for number in numbers)}"
-                remedy = "give a direction other than 0 and colours of 0 or more"
-                raise InputError(thing, str(error), remedy) from None
+                thing = f"{flag} {','.join(f'{number:g}' for number in numbers)}"
+                raise InputError(thing, str(error), _REMEDIES[flag]) from None
     return lights
 
 

@@ -56,6 +56,7 @@ Examples:
     blysk render scene.toml --exponent 100
     blysk render scene.toml --gate --specialise
     blysk render teapot --method chord-local --point-light 3,4,5 --viewer near
+    blysk render teapot --method chord-local --spot-light 3,6,5,-3,-5,-5,8,14
     blysk render scene.toml --frames 36 -o turntable.gif
 
 \b
@@ -112,8 +113,8 @@ def command(
     if not Path(mesh).stem:
         raise InputError(f"MESH {mesh!r}", "is no file's name", "give a mesh or scene file, or teapot")
     given = given_options(context, {**SCENE, **DESIGN, **RENDERING}.keys() - {"lights"})
-    if options["lights"] or options["point_lights"]:
-        given["lights"] = lights_of(options["lights"], options["point_lights"])
+    if lights := lights_of(options):
+        given["lights"] = lights
     if vcd and engine == "cxxrtl":
         raise InputError("--vcd", "the engine cxxrtl writes no waveforms", "use --engine pysim")
     settings = rendering_settings(mesh, given, vcd)

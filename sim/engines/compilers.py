@@ -56,9 +56,20 @@ def _system_compiler(command: list[str]) -> Compiler | None:
         return None
     path = os.path.abspath(path)  # The build runs elsewhere.
     flags = _GCC_FLAGS if "Free Software Foundation" in version else ()
+    own = shlex.split(os.environ.get("CXXFLAGS", ""))
     return Compiler(
         name=shlex.join(command),
-        compile=(path, *command[1:], "-std=c++17", "-O2", *flags, "-DCXXRTL_NDEBUG", "-fPIC", "-shared"),
+        compile=(
+            path,
+            *command[1:],
+            "-std=c++17",
+            "-O2",
+            *flags,
+            *own,
+            "-DCXXRTL_NDEBUG",
+            "-fPIC",
+            "-shared",
+        ),
         link=(),
         identity=f"{os.path.realpath(path)} {version}",
     )
@@ -95,6 +106,8 @@ def _zig() -> Compiler | None:
 
 def find_compilers() -> Iterator[Compiler]:
     """Compilers of this machine, best first: ``c++``, ``g++``, ``clang++``, ziglang; ``$CXX`` alone if set.
+
+    But for ziglang the flags in ``$CXXFLAGS`` follow ours.
 
     Yields
     ------

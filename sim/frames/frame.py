@@ -213,6 +213,8 @@ def _sample(design: Design) -> tuple[Spans, list[FrameConstants]]:
     if design.takes_values:
         start, step = rng.uniform(0, 0.3, (2, 2, len(length), design.lights, 1))
         spans = replace(spans, values=SpanValues.quantise(*(start + step * (0, 0.4, 1))))
+        if design.factors:
+            spans = replace(spans, factors=spans.values.diffuse[:, list(design.factors)])
     return spans, sample_constants(design, rng)
 
 

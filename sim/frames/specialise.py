@@ -135,11 +135,13 @@ def _without_dark_lights(
         return scenes, []
     count = int(np.count_nonzero(bright))
     kept = tuple(light for light, lit in zip(scenes[0].lights, bright, strict=False) if lit)
+    place = np.cumsum(bright) - 1
+    factors = tuple(int(place[index]) for index in full.factors if bright[index])
     scenes = tuple(replace(scene, lights=kept) for scene in scenes)
     if count:
         reason = f"{full.lights - count} of {full.lights} lights: they light nothing"
-        return scenes, [Reduction(reason, {"lights": count})]
-    nothing = {"lights": 0, "specular": None, "gate": False}
+        return scenes, [Reduction(reason, {"lights": count, "factors": factors})]
+    nothing = {"lights": 0, "specular": None, "gate": False, "factors": ()}
     return scenes, [Reduction("no light path: no light lights anything", nothing)]
 
 
@@ -173,7 +175,7 @@ def _without_highlights(
 ) -> list[Reduction]:
     if design.specular is None or not design.lights:
         return []
-    nothing = {"specular": None, "gate": False}
+    nothing = {"specular": None, "gate": False, "factors": ()}
     if not any(of.specular.any() for of in constants):
         return [Reduction("no specular path: every k_s is 0", nothing)]
     if not design.interpolator.serves_gate:

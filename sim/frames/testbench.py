@@ -60,10 +60,13 @@ def teapot_frame(
         replace(sample_material(design, 13 + k % 100), diffuse=tuple(np.roll((0.75, 0.42, 0.2), k)))
         for k in range(design.materials)
     ]
-    lights = [
-        Light((np.cos(2 * k + 2), 0.8, np.sin(2 * k + 2)), np.roll((1.0, 0.8, 0.6), k) / design.lights)
-        for k in range(design.lights)
-    ]
+    lights = []
+    for k in range(design.lights):
+        way = np.cos(2 * k + 2), 0.8, np.sin(2 * k + 2)
+        light = {"direction": way}
+        if k in design.factors:
+            light = {"position": np.multiply(8, way), "attenuation": (0.5, 0.1, 0), "spot": np.negative(way)}
+        lights.append(Light(color=np.roll((1.0, 0.8, 0.6), k) / design.lights, **light))
     scene = Scene(
         mesh=replace(mesh, material=np.arange(len(mesh.faces)) % design.materials),
         camera=Camera.framing(mesh.vertices, (0.4, 0.5, 1.0), "perspective", width / height),

@@ -114,7 +114,8 @@ def spans_of(beats) -> Spans:
     normals = (beats.get(name, none) for name in ("normal_left", "normal_right"))
     values = values_of(beats) if "values" in beats else None
     of_span = (beats[name] for name in ("x", "y", "length"))
-    return Spans(*of_span, *normals, beats.get("material"), values, beats.get("normal_middle"))
+    further = beats.get("material"), values, beats.get("normal_middle"), beats.get("factors")
+    return Spans(*of_span, *normals, *further)
 
 
 def _pixels(unit, case):
@@ -280,6 +281,7 @@ DESIGNS: dict[str, Design] = {
     "gate": preset("chord", "coscos2", gate=True),
     "gate, compact": preset("quadratic", "lyon3", gate=True, style="compact"),
     "exponent": preset("chord", "coscos4", 2, exponent=60),
+    "values, the second of 2 lights fades": preset("chord-local", "blinn", 2, factors=(1,)),
     "no specular light, grey, few bits": replace(_FULL, specular=None, gate=False, grey=True, **_LESS),
     "without lights": preset(lights=0, materials=2),
 }
@@ -296,6 +298,10 @@ LONG_DESIGNS: dict[str, Design] = {
     "renormalise, power, compact": preset("renormalise", "blinn_product", style="compact"),
     "quadratic, power": preset("quadratic", "blinn_product"),
     "values, 2 lights": preset("chord-local", lights=2),
+    "sharp lobe": preset("chord", "ggx", 2, scale=6, gate=True),
+    "values, 2 lights, one fades, compact, gate": preset(
+        "chord-local", "lyon3", 2, factors=(0,), gate=True, style="compact"
+    ),
     "values, compact, 3 materials": preset("chord-local", materials=3, style="compact"),
     "compact, chord": preset("chord", style="compact"),
     "compact, exponent": preset("quadratic", "exp", exponent=20, style="compact"),

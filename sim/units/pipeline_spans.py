@@ -22,7 +22,7 @@ from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.geometry import normalise
-from blysk.sim.units.cosines.chord_setup import any_values
+from blysk.sim.units.cosines.chord_setup import any_factors, any_values
 from blysk.sim.units.operands import pairs_at, pairs_chosen, turned, unit_codes
 
 __all__ = [
@@ -154,6 +154,7 @@ def any_spans(rng: np.random.Generator, design: Design, length: np.ndarray) -> S
         normal_right=right,
         material=np.sort(rng.integers(0, design.materials, count)),
         values=any_values(rng, count, design.lights) if design.takes_values else None,
+        factors=any_factors(rng, count, len(design.factors)) if design.factors else None,
     )
 
 

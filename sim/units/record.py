@@ -232,16 +232,12 @@ class UnitRun:
         Expected members of the status after the run, see `Record.status`.
     stalls : dict
         Arguments ``input_stalls`` and ``output_stalls`` of `simulate`; empty for none.
-    slow : bool
-        Whether some of its beats go through Amaranth's own simulator too, on the same cycles: of the runs of
-        a unit three. That simulator takes most of the time of a test, and the beats do not change the cycles.
     """
 
     case: Case
     expected: Beats
     status: Mapping[str, int] | None
     stalls: dict[str, np.ndarray]
-    slow: bool = False
 
     @property
     def count(self) -> int:
@@ -331,7 +327,6 @@ class Record:
             Of the random generator.
         """
         given = self.stimuli[stimulus]
-        leads = stimulus == next(iter(self.stimuli))
         for repeat in range(given.repeats):
             rng = np.random.default_rng([seed, *stimulus.encode(), repeat])
             case = given.make(unit, rng, given.count)
@@ -344,15 +339,12 @@ class Record:
                     for name, period, share in zip(names, periods, shares, strict=True)
                     if share
                 }
-                # The even pattern is that of a test of its own.
-                slow = leads and repeat == 0 and shares in STALLS[2:]
-                yield UnitRun(case, expected, status, stalls, slow)
+                yield UnitRun(case, expected, status, stalls)
             if given.stalled:
                 few = Case(first(case.beats, PAUSED), case.constants, case.write)
                 pauses = np.arange(PAUSE * PAUSED) % PAUSE != 0
                 stalls = {"input_stalls": pauses}
-                slow = leads and repeat == 0
-                yield UnitRun(few, self.expect(unit, few), self._status(unit, few), stalls, slow)
+                yield UnitRun(few, self.expect(unit, few), self._status(unit, few), stalls)
 
     def _status(self, unit: Component, case: Case) -> Mapping[str, int] | None:
         return None if self.status is None else self.status(unit, case)

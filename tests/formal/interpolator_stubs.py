@@ -6,6 +6,7 @@ import blysk.hdl.cosines.highlight_cosine
 import blysk.hdl.methods.angular_interpolator
 import blysk.hdl.methods.bisection_interpolator
 import blysk.hdl.methods.chord_interpolator
+import blysk.hdl.methods.chord_spans
 import blysk.hdl.methods.interpolator
 import blysk.hdl.methods.linear_interpolator
 import blysk.hdl.methods.quadratic_interpolator
@@ -18,7 +19,7 @@ from blysk.hdl.core.fixed import FixedValue
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.lighting.value_gate import ValueGateUnit
-from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
+from blysk.hdl.methods.chord_spans import ChordAccumulatorUnit
 from blysk.hdl.methods.renormalise_interpolator import LineAccumulatorUnit
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit, DifferenceAccumulatorUnit
@@ -239,7 +240,7 @@ def replace_parts(monkeypatch) -> None:
         (blysk.hdl.methods.quadratic_interpolator, "MiddleNormalUnit", middle_normal, 3),
         (blysk.hdl.methods.quadratic_interpolator, "GPQUnit", coefficients, 1),
         (blysk.hdl.methods.quadratic_interpolator, "DifferenceSetupUnit", difference_setup, 3),
-        (blysk.hdl.methods.chord_interpolator, "ChordSetupUnit", chord_setup, 3),
+        (blysk.hdl.methods.chord_spans, "ChordSetupUnit", chord_setup, 3),
         (blysk.hdl.methods.chord_interpolator, "ChordValuesUnit", chord_values, 2),
         (blysk.hdl.methods.chord_interpolator, "SpanLimitUnit", nothing, 2),
         (blysk.hdl.methods.angular_interpolator, "AngularSetupUnit", angular_setup, 3),

@@ -7,7 +7,7 @@ from amaranth.lib import data
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
+from blysk.hdl.methods.chord_spans import ChordAccumulatorUnit
 from blysk.hdl.normals import difference_accumulator
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit, DifferenceAccumulatorUnit
 

@@ -36,7 +36,8 @@ from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolato
 from blysk.hdl.core.stream import FIFO_LATENCY, PipelinedUnit, skid_buffer
 from blysk.hdl.methods.angular_interpolator import AngularInterpolatorUnit
 from blysk.hdl.methods.bisection_interpolator import BisectionInterpolatorUnit
-from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit, ChordSpansUnit
+from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit
+from blysk.hdl.methods.chord_spans import ChordSpansUnit
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.methods.linear_interpolator import LinearInterpolatorUnit
 from blysk.hdl.methods.quadratic_interpolator import QuadraticInterpolatorUnit
@@ -344,9 +345,9 @@ STRETCHES = {
 }
 
 
-BOUNDED = {"chord_spans": 18, "chord_spans, gated": 16, "chord_interpolator": 18}
-"""Cycles from power-up of what is not decided in time for runs of any length: FIFOs beside a setup. Each FIFO
-is filled and its addresses begin anew."""
+BOUNDED = {"chord_spans": 14, "chord_spans, gated": 14, "chord_interpolator": 16}
+"""Cycles from power-up of what is not decided in time for runs of any length: FIFOs beside a setup. These
+take 15 seconds of a processor; each further cycle more than doubles that."""
 
 JOINED = (("chord_spans", 0), ("chord_spans, gated", 0), ("chord_interpolator", 1))
 """The stretches with these FIFOs."""

@@ -90,7 +90,7 @@ def test_bugs_are_found(refute, inject, make, bug):
 
 
 LOCKSTEP_BUGS = {
-    "the specular unit goes on alone": ("unit.o.ready.eq(self.o.ready)", "unit.o.ready.eq(unit is specular)"),
+    "the specular unit goes on alone": ("unit.o.ready.eq(o.ready)", "unit.o.ready.eq(unit is specular)"),
     "it takes what the light does not": (
         "self.i.ready.eq(diffuse.i.ready)",
         "self.i.ready.eq(diffuse.i.ready & self.o.ready)",

@@ -11,7 +11,7 @@ from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
-from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
+from blysk.hdl.methods.chord_spans import ChordAccumulatorUnit
 from blysk.hdl.methods.renormalise_interpolator import LineAccumulatorUnit
 from blysk.hdl.normals.dot_product import DotProductUnit
 from blysk.sim.units.registry import RECORDS

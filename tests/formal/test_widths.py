@@ -29,7 +29,7 @@ from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
 from blysk.hdl.cosines.span_limit import SpanLimitUnit
-from blysk.hdl.methods.chord_interpolator import ChordAccumulatorUnit
+from blysk.hdl.methods.chord_spans import ChordAccumulatorUnit
 from blysk.hdl.methods.renormalise_interpolator import LineAccumulatorUnit
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 from blysk.hdl.normals.bisection import BisectionUnit

@@ -68,7 +68,7 @@ async def write(ctx, unit, address, data):
     ctx.set(unit.write.payload, {"address": 511, "data": 2**18 - 1})
 
 
-@pytest.mark.parametrize("lights", [1, 3])
+@pytest.mark.parametrize("lights", [3, pytest.param(1, marks=pytest.mark.long)])
 def test_every_address_writes_its_constant_and_no_other(lights):
     """All 512 addresses, in random order, twice: a word is seen two cycles later, every other one stays."""
     rng = np.random.default_rng(lights)
@@ -95,7 +95,7 @@ def test_every_address_writes_its_constant_and_no_other(lights):
     run_bench(unit, bench)
 
 
-@pytest.mark.parametrize("lights", [1, 3])
+@pytest.mark.parametrize("lights", [1, pytest.param(3, marks=pytest.mark.long)])
 def test_every_address_writes_its_materials_constant_and_no_other(lights):
     """All 512 addresses, and now and then another material, in random order.
 
@@ -301,7 +301,7 @@ def pixels_of(design, spans, constants):
 @pytest.mark.parametrize(
     ("late_cycle", "materials", "method"),
     [
-        (18, 1, "quadratic"),
+        pytest.param(18, 1, "quadratic", marks=pytest.mark.long),
         pytest.param(80, 1, "quadratic", marks=pytest.mark.long),
         pytest.param(150, 1, "quadratic", marks=pytest.mark.long),
         pytest.param(150, 3, "quadratic", marks=pytest.mark.long),
@@ -351,7 +351,7 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method, norm
     ("reset_at", "materials", "method"),
     [
         pytest.param(25, 1, "quadratic", marks=pytest.mark.long),
-        (90, 1, "quadratic"),
+        pytest.param(90, 1, "quadratic", marks=pytest.mark.long),
         pytest.param(131, 1, "quadratic", marks=pytest.mark.long),
         pytest.param(131, 2, "quadratic", marks=pytest.mark.long),
         pytest.param(180, 2, "quadratic", marks=pytest.mark.long),

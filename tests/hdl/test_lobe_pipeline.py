@@ -33,13 +33,14 @@ DESIGNS = {
 }
 
 
-QUICK = "chord", "materials, lights, gate", "values"
+QUICK = ("materials, lights, gate",)
 
 
 def colors(beats):
     return np.stack([beats[channel] for channel in "rgb"], axis=-1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "design", [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in DESIGNS]
 )
@@ -65,7 +66,7 @@ def test_equals_model(design):
 
 def test_a_frame_loads_its_own_tables():
     """Tables of the frame before, in every bank, are gone."""
-    design = preset("chord", "ggx", materials=3, gate=True)
+    design = DESIGNS["materials, lights, gate"]
     unit = ShadingPipelineUnit(design)
     spans, constants = _sample(design)
     material = Material((0.1,) * 3, (0.5,) * 3, (0.6,) * 3, 10)
@@ -109,39 +110,9 @@ def test_gate_by_threshold():
         HighlightGateUnit(p, exponent=20, takes_threshold=True)
 
 
-@pytest.mark.parametrize("lights", [1, pytest.param(2, marks=pytest.mark.long)])
-def test_one_multiplier_a_light(lights):
-    """One fewer than cosine-quadratic light has, which multiplies by its slope; 17 fewer than by products."""
-    multipliers = {
-        model: cost_of(ShadingPipelineUnit(preset("chord", model, lights))).totals["multipliers"]
-        for model in ("blinn", "cosquad", "blinn_product")
-    }
-    plain = multipliers["blinn"] - lights
-    assert multipliers == {
-        "blinn": plain + lights,
-        "cosquad": plain + 2 * lights,
-        "blinn_product": plain + 18 * lights,
-    }
-    if lights == 1:
-        assert multipliers["blinn"] == 16
-
-
 def test_rate_is_that_of_cosquad():
     """And the latency, but for the register behind the table."""
     units = [ShadingPipelineUnit(preset("chord", model)) for model in ("blinn", "cosquad")]
     assert len({(unit.cycles_per_pixel, unit.setup_interval) for unit in units}) == 1
     assert units[0].latency == units[1].latency + 1
     assert units[0].cycles_per_pixel == 1
-
-
-@pytest.mark.parametrize(
-    ("lights", "materials"), [(2, 4), *(pytest.param(n, 1, marks=pytest.mark.long) for n in (1, 3))]
-)
-def test_one_memory_for_all_lights(lights, materials):
-    """One of 336 words of 35 bits a bank, in one place, whatever the lights."""
-    with_table, without = (
-        cost_of(ShadingPipelineUnit(preset("chord", model, lights, materials=materials)))
-        for model in ("blinn", None)
-    )
-    assert with_table.ram_bits - without.ram_bits >= materials * 336 * 35
-    assert with_table.rom_bits == without.rom_bits

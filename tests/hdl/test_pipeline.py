@@ -61,7 +61,8 @@ def intervals():
                 quick = interval in (choice[0], choice[-1]) and method in ("quadratic", "chord")
                 marks = () if quick else pytest.mark.long
                 yield pytest.param(method, interval, marks=marks)
-        yield method, None
+        quick = method in ("quadratic", "chord")
+        yield pytest.param(method, None, marks=() if quick else pytest.mark.long)
 
 
 @pytest.mark.parametrize(("method", "interval"), list(intervals()))
@@ -146,7 +147,9 @@ def never_built():
 
 
 @pytest.mark.usefixtures("never_built")
-@pytest.mark.parametrize("method", INTERVALS)
+@pytest.mark.parametrize(
+    "method", [m if m in ("chord", "linear") else pytest.param(m, marks=pytest.mark.long) for m in INTERVALS]
+)
 def test_setup_intervals(method):
     """Those that there are; the largest to 4 by default; others are refused."""
     interpolator, choice = METHODS[method], INTERVALS[method]
@@ -240,7 +243,7 @@ def test_every_method_with_every_model(method, model):
         pytest.param("bisection", 89.99, 90.1, 50, marks=pytest.mark.long),
         ("quadratic", 44.99, 45.1, 50),
         pytest.param("quadratic-horner", 44.99, 45.1, 50, marks=pytest.mark.long),
-        ("angular", 150.0, 180.0, 50),
+        pytest.param("angular", 150.0, 180.0, 50, marks=pytest.mark.long),
     ],
 )
 def test_spans_out_of_range_are_counted(method, in_range, out_of_range, flagged):
@@ -293,10 +296,9 @@ LEFT_OUT = {
 }
 
 
-@pytest.mark.parametrize("style", ["throughput", pytest.param("compact", marks=pytest.mark.long)])
-@pytest.mark.parametrize(
-    "part", [pytest.param(k, marks=() if k == "all" else pytest.mark.long) for k in LEFT_OUT]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("part", LEFT_OUT)
 def test_less_hardware_shades_the_same(part, style):
     """A scene that does not need a part has the pixels of the full pipeline without it, and it costs less."""
     rng = np.random.default_rng(5)
@@ -318,20 +320,6 @@ def test_less_hardware_shades_the_same(part, style):
     assert less.multiplier_count <= more.multiplier_count
     if part in ("specular", "exponent", "channels") and style == "throughput":
         assert less.multiplier_count < more.multiplier_count
-
-
-@pytest.mark.usefixtures("never_built")
-def test_multipliers():
-    """Without lights none; compact a colour one, a term one; products with normals two a light.
-
-    Three values, setup and span limit of the chord method have one each.
-    """
-    assert cost_of(ShadingPipelineUnit(preset(lights=0, materials=2))).multiplier_count == 0
-    assert cost_of(ShadingPipelineUnit(preset("chord", style="compact"))).multiplier_count == 5
-    for method, lights in (("quadratic", 1), ("renormalise", 2)):
-        units = (ShadingPipelineUnit(preset(method, lights=lights, style=style)) for style in STYLES)
-        counts = [cost_of(unit._interpolator._products).multiplier_count for unit in units]
-        assert counts == [6 * lights, 2 * lights]
 
 
 # Refusals.

@@ -46,8 +46,8 @@ def assert_lanes(lanes, expected):
 
 @pytest.fixture(scope="module")
 def wide():
-    """Two materials, four pipelines; FIFOs are short enough to be full."""
-    return WidePipelinesUnit(PixelPipelines(preset("linear", materials=2), 4), 5)
+    """Two materials, two pipelines; FIFOs are short enough to be full."""
+    return WidePipelinesUnit(PixelPipelines(preset("linear", materials=2), 2), 5)
 
 
 @pytest.mark.parametrize("shares", STALLS)
@@ -67,6 +67,7 @@ def test_each_lane_equals_its_model_under_stalls(wide, shares):
     assert run.status["empty_spans"] == np.count_nonzero(spans.length == 0)
 
 
+@pytest.mark.long
 def test_both_engines_give_equal_cycles():
     unit = WidePipelinesUnit(PixelPipelines(PLAIN, 4), 4)
     rng = np.random.default_rng(3)
@@ -78,6 +79,7 @@ def test_both_engines_give_equal_cycles():
         np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pipes", [4, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2, 8))])
 def test_so_many_pixels_a_cycle(pipes):
     """Spans of as many pixels as there are pipelines, from scanline to scanline: no pipeline ever waits."""
@@ -95,10 +97,10 @@ def test_merged_stream_is_that_of_one_pipeline():
     """The first pixel after `latency` cycles, then one a cycle."""
     unit = MergedPipelinesUnit(PixelPipelines(PLAIN, 4), 9)
     rng = np.random.default_rng(6)
-    spans = any_spans(rng, PLAIN, rng.integers(4, 9, 100))
+    spans = any_spans(rng, PLAIN, rng.integers(4, 9, 40))
     constants = any_constants(rng, PLAIN, spans)
     expected = unit.parameters.compute(spans, constants)
-    sent = {"count": len(expected.x), "write": writes_of(constants), "engine": "auto"}
+    sent = {"count": len(expected.x), "write": writes_of(constants), "engine": "pysim"}
     run = simulate(unit, beats_of(unit, spans), **sent)
     np.testing.assert_array_equal(run.beats["x"], expected.x)
     np.testing.assert_array_equal(run.beats["y"], expected.y)
@@ -106,6 +108,7 @@ def test_merged_stream_is_that_of_one_pipeline():
     assert run.cycles[-1] - run.cycles[0] == len(expected.x) - 1
 
 
+@pytest.mark.long
 def test_counters_are_sums_that_stop():
     unit = WidePipelinesUnit(PixelPipelines(PLAIN, 2), 4)
     rng, few = np.random.default_rng(8), 300

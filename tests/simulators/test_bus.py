@@ -93,6 +93,7 @@ def check(tmp_path, monkeypatch):
     return check
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("bus", ["axi"])
 def test_spans(check, bus):
     check("shader", bus, "icarus")

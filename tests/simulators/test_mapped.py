@@ -117,6 +117,7 @@ def in_reset(cells):
     first(cells, "MULT18X18D")["connections"]["RST0"] = ["1"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "inject", [wrong_enable, not_inverted, wrong_operand_bit, wrong_product_bit, no_register, in_reset]
 )

@@ -10,7 +10,7 @@ from amaranth.lib.wiring import Component, In, Out
 
 from blysk.sim.engines.simulate import simulate
 
-from .verilog_bench import SIMULATORS, BenchError, VerilogBench, missing_tool
+from .verilog_bench import BenchError, VerilogBench, missing_tool
 
 
 class Sums(Component):
@@ -90,7 +90,7 @@ def register(**injected):
     return text
 
 
-@pytest.fixture(params=SIMULATORS)
+@pytest.fixture(params=["icarus", pytest.param("verilator", marks=pytest.mark.long)])
 def simulator(request):
     if missing_tool(request.param):
         pytest.skip(missing_tool(request.param))

@@ -3,6 +3,7 @@
 import io
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from markdown import table
@@ -11,12 +12,16 @@ from matplotlib.figure import Figure
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
+from blysk.golden.frames.compare import compare
 from blysk.golden.frames.cut import cut_spans
+from blysk.golden.frames.frame import model_frame
 from blysk.golden.number.polynomials import half_angle_factor, minimax
 from blysk.golden.number.unit_vector import quantise, values
 from blysk.golden.presets import preset
+from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.curves import interpolate
-from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.light import Light
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import COSQUAD, REFLECTION_MODELS, ReflectionModel
 from blysk.golden.reference.scene import Scene
@@ -348,7 +353,52 @@ def svg() -> str:
     return "\n".join(line.rstrip() for line in buffer.getvalue().splitlines()) + "\n"
 
 
+def _fading_lights(mesh: Mesh) -> dict[str, Light]:
+    """Point lights above a mesh: as bright everywhere, fading by the distance, and spots at its middle."""
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    middle, far = (low + high) / 2, 0.9 * np.linalg.norm(high - low)
+    place = middle + far * normalise(np.array([-0.5, 0.8, 0.7]))
+    bare = Light(position=tuple(place))
+    spot = replace(bare, spot=tuple(middle - place), cone=(10, 20))
+    by_distance = replace(bare, color=(4.0,) * 3, attenuation=(1.0, 0.0, 15 / far**2))
+    return {
+        "point light": bare,
+        "by distance": replace(bare, attenuation=(0.0, 0.0, 1 / (0.4 * far) ** 2)),
+        "spot": spot,
+        "narrow border": replace(spot, cone=(8, 9)),
+        "both, 4 times white": replace(by_distance, spot=spot.spot, cone=spot.cone),
+    }
+
+
+def _factors() -> str:
+    square = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], dtype=float)
+    faces = np.array([[0, 2, 1], [0, 3, 2]])
+    flat = Mesh(square, faces, np.tile([0.0, 1.0, 0.0], (4, 1)), material=np.zeros(2, np.int64))
+    rows = []
+    for name, mesh in {
+        "teapot, 992": teapot(1_000),
+        "teapot, 10,712": teapot(10_000),
+        "square, 2": flat,
+    }.items():
+        lights = _fading_lights(mesh)
+        for projection in ("perspective", "orthographic"):
+            camera = Camera.framing(mesh.vertices, (0.4, 0.5, 1.0), projection, 4 / 3)
+            row = [name, projection]
+            for light in lights.values():
+                design = preset("chord-local", "blinn", factors=(0,) if light.fades else ())
+                errors, cuts = [], {}
+                for exponent in (1, 50, 1000):
+                    scene = replace(scene_for(mesh, exponent, 320, 240), lights=(light,), camera=camera)
+                    frame = model_frame(scene, design)
+                    errors.append(compare(scene, design, frame).total_error.max_lsb)
+                    cuts[exponent] = frame.spans / len(frame.raster.length)
+                row.append(f"{max(errors):.2f}, {cuts[50]:.2f}")
+            rows.append(row)
+    return table(["mesh, triangles", "projection", *lights], rows, 2)
+
+
 TABLES: dict[str, Callable[[], str]] = {
+    "chord-factors": _factors,
     "chord-errors": _errors,
     "chord-widest": _widest,
     "chord-arithmetic": _arithmetic,

@@ -29,7 +29,9 @@ __all__ = [
     "FORMATS",
     "LOCAL",
     "RECORD",
+    "any_factors",
     "any_values",
+    "factors_of",
     "local_curves",
     "parabola",
     "three_values",
@@ -100,11 +102,22 @@ def values_of(beats) -> SpanValues:
     return SpanValues(diffuse, values["highlight"] if "highlight" in values.dtype.names else 0 * diffuse)
 
 
+def factors_of(beats) -> np.ndarray | None:
+    """Codes of the factors that input beats carry, or ``None``."""
+    return beats["factors"] if "factors" in beats.dtype.names else None
+
+
 def _expect(unit, case):
     beats = case.beats
     words = (Fixed(format, code) for format, code in zip(FORMATS.values(), values_of(beats), strict=True))
-    *differences, out_of_range = unit.parameters.compute(*words, beats["length"])
+    codes = factors_of(beats)
+    factor = None if codes is None else Fixed(FORMATS["diffuse"], codes)
+    *differences, out_of_range = unit.parameters.compute(*words, beats["length"], factor)
     expected = np.zeros(len(out_of_range), dtype_of(unit.o.payload.shape()))
+    if factor is not None:
+        of_factors = differences.pop()
+        for field in ("first", "second"):
+            expected["factors"][field] = getattr(of_factors, field).codes
     lights = expected["lights"]
     for name, of_function in zip(FORMATS, differences, strict=True):
         for field in ("first", "second") if name in lights.dtype.names else ():
@@ -124,12 +137,26 @@ def any_values(rng: np.random.Generator, count: int, lights: int) -> SpanValues:
     return SpanValues(*values)
 
 
+def any_factors(rng: np.random.Generator, count: int, factors: int) -> np.ndarray:
+    """Codes of factors on curves of every size, most of them in 0 to 1; of every eighth span any codes."""
+    format = FORMATS["diffuse"]
+    codes = any_codes(rng, format, count, factors, 3)
+    start = rng.uniform(0, 1, (count, factors, 1))
+    size = 10.0 ** rng.uniform(-5, -0.5, (count, factors, 1)) * rng.choice([0, 1], (count, factors, 1))
+    curve = np.clip(start + size * rng.uniform(-0.3, 0.3, (count, factors, 3)), 0, 1)
+    curve = np.rint(curve * format.max_code).astype(np.int64)
+    return np.where(np.arange(count)[:, None, None] % 8, curve, codes)
+
+
 def value_beats(unit, values: SpanValues, length: np.ndarray) -> np.ndarray:
-    """Input beats of a unit that takes values of spans."""
+    """Input beats of a unit that takes values of spans; factors follow from the values."""
     beats = np.zeros(len(length), dtype_of(unit.i.payload.shape()))
     for name, codes in zip(FORMATS, values, strict=True):
         if name in beats["values"].dtype.names:
             beats["values"][name] = codes
+    if "factors" in beats.dtype.names:
+        seed = int(np.abs(values.diffuse).sum() % (1 << 32))
+        beats["factors"] = any_factors(np.random.default_rng(seed), *beats["factors"].shape[:2])
     beats["length"] = length
     return beats
 
@@ -188,6 +215,7 @@ def _variants():
     yield "9 bits of length", Variant(partial(ChordSetupUnit, length_bits=9), long=True)
     unit = partial(ChordSetupUnit, None, 2, initiation_interval=2, highlights=False)
     yield "no highlights", Variant(unit)
+    yield "2 lights, one fades", Variant(partial(ChordSetupUnit, None, 2, factors=1))
 
 
 RECORD = Record(

@@ -83,6 +83,7 @@ def _variants():
         unit = partial(ChordValuesUnit, None, lights, initiation_interval=interval)
         yield f"{lights} lights, interval {interval}", Variant(unit, long=lights == 1)
     yield "no highlights", Variant(partial(ChordValuesUnit, None, 2, highlights=False))
+    yield "2 lights, scale 6", Variant(partial(ChordValuesUnit, ChordValues(6), 2, initiation_interval=3))
 
 
 RECORD = Record(

@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 
 from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.normals.dot_product import DotProduct
@@ -58,6 +59,8 @@ def _expect(unit, case):
     specular = p.compute(
         Fixed(p.operand_format, case.beats["highlight"]), dark, exponent_of(unit, case.constants)
     )
+    if unit.fades:
+        specular = Factor().compute(specular, Fixed(Factor.FORMAT, case.beats["factor"]))
     return {"diffuse": Diffuse(format).compute(cosine).codes, "specular": specular.codes}
 
 
@@ -69,6 +72,8 @@ def _operands(unit, rng, count, exponent=None):
     beats = {"cosine": cosine, "highlight": case.beats["operand"]}
     if "gated" in unit.i.payload.shape().members:
         beats["gated"] = np.repeat(rng.random(-(-count // 20)) < 0.4, 20)[:count]
+    if unit.fades:
+        beats["factor"] = any_codes(rng, Factor.FORMAT, count)
     return Case(beats, case.constants)
 
 
@@ -110,6 +115,9 @@ def _variants():
         )
         variant = f"exact power of a chord, interval {interval}" + ", gated" * gated
         yield variant, Variant(unit, long=not gated)
+    for interval, fades in ((1, True), (3, True), (1, False)):
+        unit = partial(LightUnit, initiation_interval=interval, gated=True, fades=fades)
+        yield f"interval {interval}, {'fades' if fades else 'waits'}", Variant(unit, long=interval == 1)
     for name, p in (("cosquad", Specular()), ("exact power", Power())):
         yield f"{name}, exponent 77", Variant(partial(LightUnit, p, exponent=77), long=True)
 

@@ -94,8 +94,8 @@ def gated(lights: int, exponent: int | None = None, *, takes_threshold: bool = F
     return ValueGateUnit(ValueGate(), lights, exponent=exponent, takes_threshold=takes_threshold)
 
 
-def _variant(lights=1, fraction_bits=46, long=True, **build):
-    unit = partial(ChordInterpolatorUnit, ChordInterpolator(fraction_bits), lights, **build)
+def _variant(lights=1, fraction_bits=46, scale=0, long=True, **build):
+    unit = partial(ChordInterpolatorUnit, ChordInterpolator(fraction_bits, scale), lights, **build)
     return Variant(unit, beat=SPAN | {"normal_middle": SPAN["normal_left"]}, long=long)
 
 
@@ -277,6 +277,7 @@ RECORD = Record(
         "gated": Variant(_Gated(1)),
         "2 lights, interval 9, gated, exponent 60": Variant(_Gated(2, 60, setup_interval=9), long=True),
         "threshold": _variant(long=False, takes_threshold=True),
+        "scale 5": _variant(scale=5),
         "2 lights, gated, threshold": Variant(_Gated(2, takes_threshold=True), long=True),
     },
     expect=_expect,

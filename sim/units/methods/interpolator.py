@@ -133,7 +133,11 @@ def operand_beats(unit: Component, operands: Operands, **others: np.ndarray) -> 
     """Output beats of a unit with these operands, and with codes of fields that are none."""
     beats = np.zeros(operands.cosine.codes.shape, dtype_of(unit.o.payload.shape().elem_shape))
     for name in beats.dtype.names:
-        beats[name] = others[name] if name in others else getattr(operands, name).codes
+        if name == "factor":
+            # Of the lights that fade; of others it is 0.
+            beats[name][:, list(unit.factors)] = operands.factor.codes
+        else:
+            beats[name] = others[name] if name in others else getattr(operands, name).codes
     return beats
 
 

@@ -13,6 +13,7 @@ from blysk.sim.units.cosines.chord_setup import (
     FORMATS,
     LOCAL,
     any_values,
+    factors_of,
     local_curves,
     parabola,
     three_values,
@@ -50,13 +51,14 @@ def _measure(rng, count):
 
 def _expect(unit, case):
     values, length = values_of(case.beats), case.beats["length"]
-    operands = unit.parameters.compute_values(values, length)
+    operands = unit.parameters.compute_values(values, length, factors_of(case.beats))
     constant = {"threshold" if unit.takes_threshold else "exponent": case.constants}
     return gated_beats(unit, operands, values, length, **{"exponent": 1} | constant)
 
 
 def _status(unit, case):
-    operands = unit.parameters.compute_values(values_of(case.beats), case.beats["length"])
+    values, length = values_of(case.beats), case.beats["length"]
+    operands = unit.parameters.compute_values(values, length, factors_of(case.beats))
     return {"out_of_range": int(np.count_nonzero(operands.out_of_range))}
 
 
@@ -137,6 +139,7 @@ RECORD = Record(
         "2 lights, interval 1": options(_METHOD, 2, setup_interval=1),
         "3 lights, interval 6": options(_METHOD, 3, setup_interval=6),
         "no highlights": options(_METHOD, 2, setup_interval=2, highlights=False, length_bits=5),
+        "2 lights, the second fades": options(_METHOD, 2, setup_interval=3, factors=(1,)),
         **_GATED,
     },
     expect=_expect,

@@ -50,6 +50,7 @@ def test_parts_make_the_whole():
     assert rows[-1] == {"design": "all", "pixels": 2 * len(work), "cycles": 3 * len(work)}
 
 
+@pytest.mark.long
 def test_beats_are_counted_and_a_wrong_one_stops_the_run(monkeypatch):
     found = measure(pixels=3000, **DESIGN)
     assert 3000 <= found["pixels"] < 3000 + 4096

@@ -144,6 +144,7 @@ def test_pictures():
         assert 0 < found[model]["max_lsb"] <= 0.162 * 0.55 * 255
 
 
+@pytest.mark.long
 def test_published_table(made):
     """All reproduce to the digits published but fQ's 1.255 % and fQ2's 1.256 %."""
     table = made[2].parts[0]
@@ -162,6 +163,7 @@ def test_published_table(made):
         assert abs(row["ours"] - row["published"]) < max(0.005 * row["published"], 0.5 * 10**-digits)
 
 
+@pytest.mark.long
 def test_section(made):
     chosen, found, whole = made
     drawings = [part for part in whole.parts if hasattr(part, "svg")]

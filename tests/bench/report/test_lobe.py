@@ -38,6 +38,7 @@ def test_errors_of_a_model_that_is_not_exact_count_against_blinn():
     assert row["total_spans"] < 1
 
 
+@pytest.mark.long
 def test_front_has_the_table_and_its_baselines():
     assert set(lobe.FRONT) <= {*MODELS, *LOBES}
     costs = {model: lobe.pipeline_cost(model) for model in ("blinn", "cosquad")}

@@ -31,7 +31,9 @@ def test_every_pixel_is_compared(method):
     assert pixels > 500
 
 
-@pytest.mark.parametrize("field", ["x", "last", "g", "out_of_range_spans"])
+@pytest.mark.parametrize(
+    "field", ["g", *(pytest.param(f, marks=pytest.mark.long) for f in ("x", "last", "out_of_range_spans"))]
+)
 def test_a_difference_is_found(monkeypatch, field):
     def changed(*arguments, **options):
         run = simulate(*arguments, **options)

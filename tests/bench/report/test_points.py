@@ -156,6 +156,7 @@ def test_mesh_that_does_not_show(tmp_path):
         frames("linear", "cosquad", view, [10], False)
 
 
+@pytest.mark.long
 def test_simulated_point_is_that_of_the_frame_runner(found):
     design = preset(*SIMULATED)
     mesh = teapot(PLACE["triangles"])
@@ -170,6 +171,7 @@ def test_simulated_point_is_that_of_the_frame_runner(found):
         assert point["hardware"]["multipliers"] > 0
 
 
+@pytest.mark.long
 def test_model_has_the_simulated_frame(measured):
     simulated = measured[1][0]
     model = frames(*SIMULATED, PLACE, [10, 100], simulated=False)
@@ -180,6 +182,7 @@ def test_model_has_the_simulated_frame(measured):
         assert same == other
 
 
+@pytest.mark.long
 def test_model_error_is_the_models_own(found):
     """The largest difference over all angles, times k_s, is all but met somewhere; Blinn's own is none."""
     cosine = np.linspace(0, 1, 100_001)
@@ -198,6 +201,7 @@ def test_model_error_is_the_models_own(found):
         assert errors["model_psnr_db"] is None
 
 
+@pytest.mark.long
 def test_errors_of_software(found):
     phong, gouraud = (found[f"teapot/{shading}/100"]["errors"] for shading in ("phong", "gouraud"))
     assert phong["total_max_lsb"] == phong["arithmetic_max_lsb"] <= 0.5
@@ -251,6 +255,7 @@ def test_front_of_few():
     assert front([1.0, 1.0], [2.0, 2.0]).tolist() == [True, True]
 
 
+@pytest.mark.long
 def test_fronts(measured):
     figures = section(*measured).figures
     assert set(figures["fronts"]) == {f"{e['key']}|{t['key']}" for e in ERRORS for t in TIMES}
@@ -274,6 +279,7 @@ def test_fronts(measured):
     assert fast["id"] in figures["fronts"]["total_max_lsb|simulated_pixels_per_second"]
 
 
+@pytest.mark.long
 def test_clock_rate(measured):
     """That of the section on place and route, without which there are no nanoseconds."""
     chosen, results = measured
@@ -289,6 +295,7 @@ def test_clock_rate(measured):
         assert point["hardware"]["multipliers"] != 3
 
 
+@pytest.mark.long
 def test_section(measured):
     made = section(*measured)
     assert (made.name, made.title) == ("points", "Error against run time")
@@ -327,6 +334,7 @@ def picture(uri):
     return Image.open(io.BytesIO(base64.b64decode(data)))
 
 
+@pytest.mark.long
 def test_pictures_hold_the_frame_and_its_errors(found, measured):
     point = found["teapot/chord-local/cosquad/100"]
     scene = accuracy.scene_for(teapot(PLACE["triangles"]), 100, 64, 48)
@@ -392,6 +400,7 @@ def test_command_makes_the_point_again(found, name, tmp_path, monkeypatch, capsy
     assert figures["visible_pixels"] == point["counts"]["shown"]
 
 
+@pytest.mark.long
 def test_command_in_python(found):
     point = found["teapot/gouraud/10"]
     program, option, code = shlex.split(point["command"])

@@ -320,6 +320,7 @@ def test_interrupt_says_what_is_kept(run, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_interrupt_leaves_nothing_behind(interrupted):
     """A worker in the midst of a program of its own."""
     status, text = interrupted(

@@ -11,6 +11,8 @@ from blysk.bench.report.report import about, write_report
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
+pytestmark = pytest.mark.long
+
 WIDTHS = {"desktop": (1280, 800), "phone": (375, 740)}
 
 
@@ -108,7 +110,6 @@ def test_a_point_opens_its_figures(open_page, figures):
     assert not page.locator("#panel").is_visible()
 
 
-@pytest.mark.long
 def test_axes_and_front(open_page, figures):
     page = open_page()
     for error, time, exponent in [
@@ -142,7 +143,6 @@ def test_axes_and_front(open_page, figures):
         assert page.locator("#plot text", has_text=re.compile("^0$")).count() == zero
 
 
-@pytest.mark.long
 def test_groups(open_page, figures):
     page = open_page()
     page.locator("#groups input[value=baseline]").uncheck()
@@ -155,7 +155,6 @@ def test_groups(open_page, figures):
     assert shown == rows.count() == sum(point["group"] != "baseline" for point in figures["points"]) / 2
 
 
-@pytest.mark.long
 def test_keyboard(open_page, figures):
     page = open_page()
     places = dots(page)
@@ -190,7 +189,6 @@ def column(page, table, title):
     return heading, cells
 
 
-@pytest.mark.long
 def test_table_of_points_sorts(open_page, figures):
     page = open_page()
     heading, cells = column(page, "#part-points", "hardware, cycles, cycles a pixel")
@@ -221,7 +219,6 @@ def test_table_of_points_has_all_columns(open_page, points_section):
     assert visible.count() == len(points_section.parts[1].columns)
 
 
-@pytest.mark.long
 def test_other_tables_sort_and_filter(open_page):
     page = open_page()
     heading, cells = column(page, "#part-long", "<text>")
@@ -234,7 +231,6 @@ def test_other_tables_sort_and_filter(open_page):
     assert page.locator("#part-long .rows").inner_text() == "1 of 30 rows"
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_page_fits_its_window(open_page, width, scheme):
@@ -264,7 +260,6 @@ def brightness(color):
     return sum(int(color.strip()[k : k + 2], 16) for k in (1, 3, 5)) / 3 / 255
 
 
-@pytest.mark.long
 def test_touch(open_page, figures):
     page = open_page("phone", has_touch=True)
     place = next(iter(dots(page).values()))
@@ -272,7 +267,6 @@ def test_touch(open_page, figures):
     assert page.locator("#panel").is_visible()
 
 
-@pytest.mark.long
 def test_print(open_page):
     page = open_page()
     page.emulate_media(media="print", color_scheme="dark")
@@ -313,7 +307,6 @@ def test_page_without_scripts(open_page, points_section):
     assert page.locator(".shot img").first.is_visible()
 
 
-@pytest.mark.long
 def test_quick_report(open_page, quick_report):
     figures = json.loads((quick_report / "report.json").read_text())
     for width in WIDTHS:

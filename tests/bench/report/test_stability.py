@@ -41,7 +41,7 @@ from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_spans
 
-QUICK = ("linear", "quadratic", "chord", "chord-local")
+QUICK = ("chord", "chord-local")
 NAMES = [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in METHODS]
 FROM_SPANS = [group for group in GROUPS if group != STREAM_GROUP]
 
@@ -206,7 +206,7 @@ def test_worst_grade(grades, worst):
 
 @pytest.mark.parametrize(
     "method",
-    [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in METHODS],
+    [name if name in ("linear", "chord") else pytest.param(name, marks=pytest.mark.long) for name in METHODS],
 )
 def test_ranges(method):
     """Where the docstrings say that spans are flagged, and every range is good or fair to its end."""
@@ -236,6 +236,7 @@ def test_ranges(method):
         assert (twice["grade"], twice["flagged"]) == ("fair", outside[-1]["spans"])
 
 
+@pytest.mark.long
 def test_section():
     """Of a method's own measurements, through JSON as from the cache."""
     chosen = [task for task in tasks(quick=True) if task.settings["method"] == "chord"]

@@ -147,6 +147,7 @@ def test_prices():
     assert min(found.values()) > 0
 
 
+@pytest.mark.long
 def test_hardware():
     """The direct renormaliser gives a normal a cycle and has 8 multipliers."""
     found = hardware("renormaliser")
@@ -230,6 +231,7 @@ def made():
     return chosen, found, section(chosen, found)
 
 
+@pytest.mark.long
 def test_software_table(made):
     chosen, found, whole = made
     by_name = {part.name: part for part in whole.parts}
@@ -249,6 +251,7 @@ def test_software_table(made):
         assert f"measured {min(ratios):.2f} to {max(ratios):.2f}" in whole.text[0]
 
 
+@pytest.mark.long
 def test_price_of_a_root(made):
     """With roots and divisions at that price the counts give the published ratio."""
     for task, result in zip(*made[:2], strict=True):
@@ -269,6 +272,7 @@ def test_price_of_a_root(made):
             assert costs[1] / costs[0] >= claim.published
 
 
+@pytest.mark.long
 def test_hardware_tables(made):
     by_name = {part.name: part for part in made[2].parts}
     units = {row["unit"]: row for row in by_name["thesis-units"].records()}

@@ -29,6 +29,7 @@ def test_table_and_targets():
     assert missed([replace(ONE, same=False)]) == ["ring, 1 pipelines: the picture is another"]
 
 
+@pytest.mark.long
 def test_measured_is_simulated():
     """Two pipelines halve the cycles of long spans, and draw the same picture."""
     one, two = (next(measure(n, ["ring"], 64, 48, "linear")) for n in (1, 2))

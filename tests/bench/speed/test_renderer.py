@@ -24,6 +24,7 @@ def test_vtk_draws_the_same_picture():
     assert (difference > 2).mean() < 0.01
 
 
+@pytest.mark.long
 def test_report_and_exit_status(monkeypatch, capsys):
     monkeypatch.setattr(
         renderer, "vtk_image", lambda scene: (lambda: np.zeros((12, 16, 3), np.uint8), "nothing")

@@ -29,6 +29,7 @@ def spans(lengths):
     return Spans(places, places, lengths, normal, normal)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "interval"), [("chord", 9), pytest.param("quadratic", 7, marks=pytest.mark.long)]
 )

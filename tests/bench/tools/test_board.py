@@ -73,7 +73,9 @@ def test_missing_tools_and_loader_are_named(capsys, monkeypatch):
     assert "openFPGALoader is not installed" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", BOARDS)
+@pytest.mark.parametrize(
+    "name", [next(iter(BOARDS)), *(pytest.param(name, marks=pytest.mark.long) for name in [*BOARDS][1:])]
+)
 def test_pins_of_the_board(name):
     """Lanes stand on the connector's pins as differential pairs; the clock is constrained."""
     if find_spec("amaranth_boards") is None:

@@ -107,6 +107,7 @@ def test_every_method_is_in_the_default_sweep():
     assert {one.method for one in printed} == set(PUBLISHED)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("candidate", "is_plain"),
     [

@@ -119,10 +119,10 @@ def test_what_nextpnr_does_not_time_is_not_placed(family, cell, name, cache, mon
 @pytest.mark.parametrize(
     ("family", "cell", "most", "name"),
     [
-        (ECP5, "TRELLIS_FF", 24_288, "flip-flops"),
+        pytest.param(ECP5, "TRELLIS_FF", 24_288, "flip-flops", marks=pytest.mark.long),
         (ECP5, "MULT18X18D", 28, "multipliers"),
         (ECP5, "DP16KD", 56, "block RAMs"),
-        (ECP5, "LUT4", 24_288, "look-up tables"),
+        pytest.param(ECP5, "LUT4", 24_288, "look-up tables", marks=pytest.mark.long),
         (NEXUS, "MULT18X18", 56, "multipliers"),
     ],
 )

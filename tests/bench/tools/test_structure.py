@@ -113,7 +113,9 @@ def test_sample():
 FLAT = [DotProductUnit, GPQUnit, DifferenceSetupUnit, DifferenceAccumulatorUnit, SpecularUnit]
 
 
-@pytest.mark.parametrize("unit", FLAT)
+@pytest.mark.parametrize(
+    "unit", [GPQUnit, *(pytest.param(unit, marks=pytest.mark.long) for unit in FLAT if unit is not GPQUnit)]
+)
 def test_parts_are_those_of_the_netlist(unit):
     graph, cost = structure_of(unit), cost_of(unit())
     for symbol, count in (("×", cost.multiplier_count), ("×c", cost.constant_multipliers)):
@@ -133,6 +135,7 @@ def test_parts_are_those_of_the_netlist(unit):
 UNITS = [*FLAT, BisectionUnit, LightUnit, lambda: QuadraticEvaluatorUnit(QuadraticEvaluator("horner"))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("unit", UNITS)
 def test_every_port_takes_part(unit):
     graph = structure_of(unit)

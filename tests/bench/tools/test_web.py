@@ -144,6 +144,7 @@ def names_in(braces):
     return [name for entry in entries if (name := entry.partition(":")[0].strip()) not in ("", "...")]
 
 
+@pytest.mark.long
 def test_exact_values_are_those_of_the_probes(script, probes):
     (braces,) = re.findall(r"found\.set\(n, \{(.*?)\n +\}\);", script, re.DOTALL)
     names = names_in(braces)
@@ -151,6 +152,7 @@ def test_exact_values_are_those_of_the_probes(script, probes):
     assert set(names) == {probe.exact for probe in probes if probe.exact}
 
 
+@pytest.mark.long
 def test_dark_words_are_probes(script, probes):
     (names,) = re.findall(r"const isDark = (\[.*?\])", script)
     dark = set(json.loads(names))
@@ -159,6 +161,7 @@ def test_dark_words_are_probes(script, probes):
     assert dark == {probe.name for probe in probes if probe.block == "specular" and probe.name != "specular"}
 
 
+@pytest.mark.long
 def test_every_block_has_a_stage(script, probes, monkeypatch):
     def uncompiled(component):
         Fragment.get(component, None)

@@ -64,11 +64,11 @@ def test_every_triangle_of_a_small_grid():
     assert assert_covers(triangles_of(place[index]), Frame(-4, -4, 4, 4), grid) > 60_000
 
 
-@pytest.mark.parametrize("step", [1, 16, 128])
+@pytest.mark.parametrize("step", [16, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 128))])
 def test_every_sample_of_a_shared_edge_is_drawn_once(step):
     """Triangulations of random points, on the grid, on sixteenths of a pixel, on its centres and borders."""
     rng, grid, frame = np.random.default_rng(step), Grid(), Frame(-20, -20, 20, 20)
-    for _ in range(40):
+    for _ in range(12):
         points = np.unique(rng.integers(-12 * 256 // step, 12 * 256 // step, (60, 2)), axis=0) * step
         mesh = Delaunay(points)
         _, y, begin, end = spans(triangles_of(points[mesh.simplices]), frame, grid)

@@ -52,9 +52,13 @@ def some_codes(lobe, rng, count=20_000):
     return np.unique(np.r_[knots[:-1], knots[1:] - 1, others, 0, one - 1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("octaves", "steps"),
-    [(20, 16), (3, 256), *(pytest.param(*size, marks=pytest.mark.long) for size in SIZES[:6] + SIZES[-1:])],
+    [
+        (20, 16),
+        *(pytest.param(*size, marks=pytest.mark.long) for size in ((3, 256), *SIZES[:6], *SIZES[-1:])),
+    ],
 )
 def test_address_of_every_argument(octaves, steps):
     """From the definition: the entry at or before u, and the share of the way to the next one, cut."""
@@ -105,13 +109,9 @@ def test_falls_at_every_address(model, parameter, octaves, steps):
         assert (terms <= first).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
-    ("model", "parameter"),
-    [
-        (BLINN, 1000),
-        (GGX, 0.05),
-        *(pytest.param(*case, marks=pytest.mark.long) for case in ((BLINN, 10), (BECKMANN, 0.3), (GGX, 0.9))),
-    ],
+    ("model", "parameter"), [(BLINN, 10), (BLINN, 1000), (BECKMANN, 0.3), (GGX, 0.05), (GGX, 0.9)]
 )
 def test_every_argument(model, parameter):
     """Falls with u over all 2^25 of them, and is off by at most a step of 2^-17 more than samples are."""

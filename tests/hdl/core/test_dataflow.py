@@ -14,6 +14,9 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.emit.cost import cost_of
 from blysk.sim.engines.simulate import simulate
+from blysk.sim.units.record import STALLS, Case, UnitRun
+
+from ...checks import assert_equals_model
 
 OPERAND = SQ(1, 17)
 INPUTS = data.StructLayout({"a": FixedShape(OPERAND), "b": FixedShape(OPERAND), "n": unsigned(5)})
@@ -43,7 +46,16 @@ class GraphUnit(PipelinedUnit):
         return self.o.payload.shape()(Cat(words))
 
 
-def beats_of(rng, count=200):
+def verify(unit, beats, expected):
+    """Under every pattern of stalls."""
+    rng = np.random.default_rng(2026)
+    for shares in STALLS:
+        names, periods = ("input_stalls", "output_stalls"), (997, 1009)
+        stalls = {name: rng.random(n) < s for name, n, s in zip(names, periods, shares, strict=True) if s}
+        assert_equals_model(unit, UnitRun(Case(beats), expected, None, stalls), "pysim")
+
+
+def beats_of(rng, count=100):
     a, b = rng.integers(-(2**17), 2**17, (2, count))
     ends = [-(2**17), 2**17 - 1]
     a[:4], b[:4] = np.repeat(ends, 2), np.tile(ends, 2)
@@ -67,7 +79,7 @@ def copies(g, a, b, n):
 
 
 @pytest.mark.parametrize("interval", INTERVALS)
-def test_copies_hold_values(verify, interval):
+def test_copies_hold_values(interval):
     beats = beats_of(np.random.default_rng(interval))
     unit = GraphUnit(interval, copies)
     assert unit.latency == 14 + (interval > 1)
@@ -88,7 +100,7 @@ def products(g, a, b, n):
 
 
 @pytest.mark.parametrize("interval", INTERVALS)
-def test_products(verify, interval):
+def test_products(interval):
     beats = beats_of(np.random.default_rng(interval))
     a, b = (Fixed(OPERAND, beats[name]) for name in "ab")
     ab, bb = a * b, b * b
@@ -115,7 +127,7 @@ def table(g, a, b, n):
 
 
 @pytest.mark.parametrize("interval", INTERVALS)
-def test_look_up(verify, interval):
+def test_look_up(interval):
     beats = beats_of(np.random.default_rng(interval))
     total = beats["n"] ** 2 + beats["n"]
     verify(GraphUnit(interval, table), beats, {"square": beats["n"] ** 2, "total": total, "late": total})
@@ -143,7 +155,7 @@ def shifts(g, a, b, n):
 
 
 @pytest.mark.parametrize("interval", INTERVALS)
-def test_operator_of_three_registers(verify, interval):
+def test_operator_of_three_registers(interval):
     beats = beats_of(np.random.default_rng(interval))
     amount = beats["n"] & 15
 
@@ -209,17 +221,17 @@ class RandomGraph:
 
 @pytest.mark.parametrize("interval", INTERVALS)
 @pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in range(2, 7))])
-def test_spaced_graphs_at_any_distance(verify, interval, seed):
+def test_spaced_graphs_at_any_distance(interval, seed):
     """A random graph equals its function, at the interval, and at every distance from there on."""
     graph, rng = RandomGraph([interval, seed]), np.random.default_rng(seed)
     unit = GraphUnit(interval, graph.describe, spaced=True)
     beats = beats_of(rng)
     expected = graph.compute(beats)
     verify(unit, beats, expected)
-    distances = rng.integers(interval, 3 * interval + 1, 199)
+    distances = rng.integers(interval, 3 * interval + 1, 99)
     stalls = np.ones(int(distances.sum()) + 2, dtype=bool)
     stalls[np.r_[0, np.cumsum(distances)]] = False
-    run = simulate(unit, beats, count=200, engine="auto", input_stalls=stalls)
+    run = simulate(unit, beats, count=100, engine="pysim", input_stalls=stalls)
     for name, words in expected.items():
         np.testing.assert_array_equal(run.beats[name], words)
     # None has to wait for more than the interval.
@@ -292,7 +304,7 @@ def late_and_early(g, a, b, n):
 
 
 @pytest.mark.parametrize("interval", INTERVALS)
-def test_late_words_and_early_results(verify, interval):
+def test_late_words_and_early_results(interval):
     beats = beats_of(np.random.default_rng(interval))
     total = beats["a"] + beats["b"]
     expected = {"early": total, "late": beats["a"] & 31 ^ beats["n"], "again": total}
@@ -301,7 +313,7 @@ def test_late_words_and_early_results(verify, interval):
 
 @pytest.mark.parametrize("shared", [False, True])
 @pytest.mark.parametrize("interval", [3, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2, 5, 9))])
-def test_dot_products(verify, interval, shared):
+def test_dot_products(interval, shared):
     """Of two words, of a word and itself, and of a word and what is made from it."""
 
     def describe(g, a, b, n):

@@ -10,8 +10,6 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.cosines.chord_setup import RECORD
 
-from ..variants import mostly_long
-
 MULTIPLIERS = {
     **{(1, 1): 6, (1, 2): 3, (1, 3): 2, (1, 4): 2, (1, 6): 2, (1, 9): 1, (1, 18): 1},
     **{(2, 3): 5, (2, 9): 2, (3, 18): 1},
@@ -22,7 +20,8 @@ A multiplier serves products that are less than an interval apart, as beats may 
 """
 
 
-@pytest.mark.parametrize(("lights", "interval"), mostly_long(list(MULTIPLIERS), (1, 3)))
+@pytest.mark.long
+@pytest.mark.parametrize(("lights", "interval"), MULTIPLIERS)
 def test_multipliers(lights, interval):
     """1 product a span and 5 a light, all of 18 bits."""
     unit = ChordSetupUnit(None, lights, initiation_interval=interval)

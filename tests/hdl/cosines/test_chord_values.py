@@ -17,6 +17,7 @@ FIGURES = {
 """Multipliers and latency, of numbers of lights and intervals."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("lights", "interval"), FIGURES)
 def test_multipliers(lights, interval):
     """6 products a light, of 18 bits; 3 without highlights."""

@@ -6,13 +6,12 @@ import pytest
 from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.emit.cost import cost_of
 
-from ..variants import mostly_long
-
 # Latency and multipliers for the initiation intervals 1 to 6, as the unit's text states them.
 STATED = [(1, 25, 6), (2, 28, 3), (3, 26, 2), (4, 27, 2), (5, 26, 2), (6, 32, 1)]
 
 
-@pytest.mark.parametrize(("interval", "latency", "multipliers"), mostly_long(STATED, STATED[-1]))
+@pytest.mark.long
+@pytest.mark.parametrize(("interval", "latency", "multipliers"), STATED)
 def test_times_and_parts(interval, latency, multipliers):
     unit = HalfChordUnit(initiation_interval=interval)
     assert (unit.latency, cost_of(unit).multiplier_count) == (latency, multipliers)

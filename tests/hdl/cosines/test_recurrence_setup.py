@@ -6,8 +6,6 @@ import pytest
 from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
 from blysk.hdl.emit.cost import cost_of
 
-from ..variants import mostly_long
-
 STATED = [
     (1, 1, 46, 18, 112),
     (1, 2, 23, 9, 121),
@@ -19,9 +17,8 @@ STATED = [
 """Lights, interval, multipliers, shifters and latency, as the unit's text states them."""
 
 
-@pytest.mark.parametrize(
-    ("lights", "interval", "multipliers", "shifters", "latency"), mostly_long(STATED, STATED[2])
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("lights", "interval", "multipliers", "shifters", "latency"), STATED)
 def test_times_and_parts(lights, interval, multipliers, shifters, latency):
     """14 products a span and 32 a light, as even as the interval allows; all of 18 bits."""
     unit = RecurrenceSetupUnit(None, lights, initiation_interval=interval)

@@ -5,15 +5,7 @@ from amaranth.hdl import Cat, Module, Signal, signed, unsigned
 from amaranth.lib import memory, stream
 from amaranth.lib.wiring import Component, In, Out
 
-from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.lighting.specular import Specular
-from blysk.golden.presets import preset
-from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.emit.cost import Cost, cost_of
-from blysk.hdl.lighting.intensity import IntensityUnit
-from blysk.hdl.lighting.specular import SpecularUnit
-from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
-from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.units.registry import RECORDS
 
 
@@ -58,43 +50,11 @@ def test_counts():
     assert cost.multiplier_count == 2
 
 
-MULTIPLIERS = {
-    "dot_product": 3,
-    "middle_normal": 2,
-    "gpq": 0,
-    "difference_setup": 1,
-    "difference_accumulator": 0,
-    "specular": 2,
-    "diffuse": 0,
-    "light": 2,
-    "intensity": 6,
-    "pipeline": 16,
-    "edge_setup": 0,
-    "plane_setup": 1,
-    "gradient_setup": 3,
-    "vector_normaliser": 6,
-    "geometry": 10,
-}
-
-
-@pytest.mark.parametrize("name", MULTIPLIERS)
-def test_multipliers(name):
-    """Of the default variants; every other figure is a baseline."""
+@pytest.mark.parametrize(
+    "name", ["dot_product", *(pytest.param(name, marks=pytest.mark.long) for name in RECORDS)]
+)
+def test_operands_of_multipliers(name):
+    """Of 18 bits at most; how many there are is a baseline."""
     record = RECORDS[name]
     cost = cost_of(record.variants[record.default].unit())
-    assert cost.multiplier_count == MULTIPLIERS[name]
     assert all(width <= 18 for width, _ in cost.multipliers)
-
-
-@pytest.mark.parametrize("lights", [2, pytest.param(3, marks=pytest.mark.long)])
-def test_lights_cost_fourteen_multipliers_each(lights):
-    design = preset("quadratic", lights=lights)
-    assert cost_of(ShadingPipelineUnit(design)).multiplier_count == 5 + 14 * lights
-    assert cost_of(IntensityUnit(Intensity(lights))).multiplier_count == 6 * lights
-
-
-def test_memories_are_as_stated():
-    assert cost_of(DifferenceSetupUnit()).rom_bits == 2048 * 17
-    for model, constant in (("cosquad", 0), ("cosquad7", 1), ("cosquad_lin", 1)):
-        cost = cost_of(SpecularUnit(Specular(REFLECTION_MODELS[model])))
-        assert (cost.rom_bits, cost.constant_multipliers) == (1024 * 17, constant)

@@ -8,6 +8,7 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 
 
+@pytest.mark.long
 def test_delay_costs_a_register_for_each_interval():
     """Stages; operand, slot and ready where the interval is over 1; rounded, result; a copy an interval."""
     assert DiffuseUnit().latency == 2

@@ -26,6 +26,7 @@ def test_times_and_multipliers_as_stated():
     assert counts == [15, 8, 5, 4, 3, 3, 3, *[2] * 7, 1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("lights", "exponent", "interval"), [(2, 60, 27), (3, None, 4), (1, 60, 6)])
 def test_multipliers_and_tables_of_several_lights(lights, exponent, interval):
     cost = cost_of(HighlightGateUnit(None, lights, initiation_interval=interval, exponent=exponent))

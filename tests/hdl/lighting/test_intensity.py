@@ -48,6 +48,7 @@ def test_halves_of_the_record_are_halves(unit):
     assert np.all(np.bincount((1 << 22) - rest[:, 0]) > 300)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lights", [1, 2, pytest.param(16, marks=pytest.mark.long)])
 def test_compact_costs_one_multiplier(lights):
     cost = cost_of(CompactIntensityUnit(Intensity(lights)))

@@ -62,7 +62,7 @@ def check(unit, beats, expected, **options):
     np.testing.assert_array_equal(run.beats, expected)
 
 
-@pytest.mark.parametrize("interval", [1, 3])
+@pytest.mark.parametrize("interval", [3, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("fixed", [False, True])
 def test_banks(fixed, interval):
     """Each bank has its own table, whatever order they are written in, and one may be written again."""
@@ -84,6 +84,7 @@ def test_writes_that_are_lost():
     old, new, other = (parameters.table(exponent) for exponent in (7, 100, 1000))
     beyond = {"value": np.arange(1000) * 131 % 2**17, "begins": np.zeros(1000, dtype=np.int64)}
     no_bank = other.writes()
+    unit = LobeUnit(parameters)
     for bank in (3, 4, 7, 64, 2**16, 2**17 - 1):
         no_bank["value"][0] = bank
         part = {name: column[:50] for name, column in new.writes(1).items()}
@@ -91,7 +92,6 @@ def test_writes_that_are_lost():
         half = replace(
             old, values=Fixed(old.values.format, np.r_[new.values.codes[:49], old.values.codes[49:]])
         )
-        unit = LobeUnit(parameters)
         for k in range(3):
             beats, expected = beats_of(parameters, operands(parameters, k), half if k == 1 else old)
             if k == 1:
@@ -205,7 +205,7 @@ class TwoLights(wiring.Component):
 
 
 @pytest.mark.parametrize("fixed", [False, True])
-@pytest.mark.parametrize("intervals", [(1, 1), (3, 1)])
+@pytest.mark.parametrize("intervals", [(3, 1), pytest.param((1, 1), marks=pytest.mark.long)])
 def test_two_units_share_a_memory(intervals, fixed):
     table = replace(LOBE, model=GGX).table(0.4)
     tables = [table] if fixed else None
@@ -269,19 +269,6 @@ def test_dark_beats_do_not_toggle(operand):
     assert all(now == dark[0] for now in dark)
     # All of them move once there is light.
     assert all(any(now[name] != dark[0][name] for now in seen[99:]) for name in registers)
-
-
-@pytest.mark.parametrize("interval", [1, 4])
-def test_cost(interval):
-    """One multiplier, the memory, and fewer registers than a cosine-quadratic unit and a table of slopes."""
-    for banks in (1, 3):
-        parameters = replace(LOBE, banks=banks)
-        written = cost_of(LobeUnit(parameters, interval))
-        fixed = cost_of(LobeUnit(parameters, interval, tables=[parameters.table(20)] * banks))
-        assert written.multipliers == fixed.multipliers == {(18, 18): 1}
-        assert written.constant_multipliers == fixed.constant_multipliers == 0
-        assert (written.ram_bits, written.rom_bits) == (banks * 336 * 35, 0)
-        assert (fixed.ram_bits, fixed.rom_bits) == (0, banks * 336 * 35)
 
 
 def test_bad_options_are_refused():

@@ -7,6 +7,7 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.value_gate import ValueGateUnit
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lights", [1, 3])
 def test_parts(lights):
     """No multiplier; for all lights a PROM of 1024 words of 18 bits, none without a port for the exponent."""

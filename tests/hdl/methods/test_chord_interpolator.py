@@ -4,6 +4,8 @@
 `tests.test_units` holds both units against their models under stalls.
 """
 
+from functools import cache
+
 import numpy as np
 import pytest
 from amaranth.hdl import ResetInserter, Signal, Value
@@ -23,7 +25,6 @@ from blysk.sim.units.methods.local_chord_interpolator import RECORD as LOCAL
 from blysk.sim.units.record import Case, first
 
 from ...checks import assert_beats_equal, words_of
-from ..variants import mostly_long
 
 
 def chord(lights=1, **options):
@@ -35,6 +36,12 @@ def local(lights=1, **options):
 
 
 RECORDS = {chord: CHORD, local: LOCAL}
+
+
+@cache
+def unit_of(make, with_gate=False):
+    """One light, by the default options, the same for all tests: it is compiled once."""
+    return make(gate=gated(1)) if with_gate else make()
 
 
 def case_of(make, unit, length, seed=1):
@@ -59,7 +66,8 @@ FIGURES = {
 """Multipliers and latency, of numbers of lights and setup intervals."""
 
 
-@pytest.mark.parametrize(("make", "lights", "interval"), mostly_long(list(FIGURES), (chord, 1, 3)))
+@pytest.mark.long
+@pytest.mark.parametrize(("make", "lights", "interval"), FIGURES)
 def test_multipliers_and_latency(make, lights, interval):
     """All of 18 bits; none of them a pixel's. The first pixel of a long span comes after the latency."""
     unit = make(lights, setup_interval=interval)
@@ -70,12 +78,6 @@ def test_multipliers_and_latency(make, lights, interval):
     case = case_of(make, unit, [3, 1])
     run = simulate(unit, case.beats, count=4, constants=case.constants, engine="auto")
     assert run.cycles[0] == run.input_cycles[0] + unit.latency
-
-
-def test_highlights_and_gates_cost_no_multiplier_a_pixel():
-    assert cost_of(chord(highlights=False)).multiplier_count == 6
-    assert cost_of(chord(gate=gated(1))).multiplier_count == 9
-    assert cost_of(local(gate=gated(1))).multiplier_count == 2
 
 
 def runs_of(lengths):
@@ -99,10 +101,10 @@ LENGTHS = {
 
 @pytest.mark.parametrize("make", [chord, local])
 @pytest.mark.parametrize("length", runs_of(LENGTHS))
-@pytest.mark.parametrize("with_gate", [False, True])
+@pytest.mark.parametrize("with_gate", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_a_pixel_in_every_cycle(make, length, with_gate):
     """Spans of any length, mixed: from the first pixel of a long span on one in every cycle."""
-    unit = make(gate=gated(1)) if with_gate else make()
+    unit = unit_of(make, with_gate)
     # A span of three pixels comes first: short ones then wait for it, and none comes before its turn.
     length = np.array([3, *length])
     case = case_of(make, unit, length)
@@ -116,7 +118,7 @@ def test_a_pixel_in_every_cycle(make, length, with_gate):
 @pytest.mark.parametrize("length", [1, 2])
 def test_short_spans_come_sooner(make, length):
     """By the cycles of the setup: nothing of them goes through it."""
-    unit = make()
+    unit = unit_of(make)
     case = case_of(make, unit, np.full(50, length))
     run = simulate(unit, case.beats, count=50 * length, constants=case.constants, engine="auto")
     np.testing.assert_array_equal(run.cycles, run.cycles[0] + np.arange(50 * length))
@@ -127,8 +129,8 @@ def test_short_spans_come_sooner(make, length):
 @pytest.mark.parametrize("interval", [3, *(pytest.param(k, marks=pytest.mark.long) for k in (9, 18))])
 def test_cycles_of_a_span(interval):
     """A span of k pixels takes ``min(k, 3)`` turns of the values, or its pixels, whichever is more."""
+    unit = chord(setup_interval=interval)
     for length in (1, 2, 3, 4, 9, 20, 40):
-        unit = chord(setup_interval=interval)
         count = 30
         case = case_of(chord, unit, np.full(count, length))
         run = simulate(unit, case.beats, count=count * length, constants=case.constants, engine="auto")
@@ -141,7 +143,7 @@ def test_cycles_of_a_span(interval):
 @pytest.mark.parametrize("make", [chord, local])
 def test_waiting_output_holds_the_input(make):
     """While no pixel is taken as many spans enter as fit, then none; afterwards all leave in a row."""
-    unit = make()
+    unit = unit_of(make)
     length = np.tile([4, 1, 3, 2], 40)
     case = case_of(make, unit, length)
     stalls = np.zeros(2000, dtype=bool)

@@ -47,6 +47,7 @@ def test_chord_is_that_of_vectors():
     assert bound / 8 < error <= bound + 2 * (1 - ONE_SQUARED.values)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("operand", "latency"), TIMES.items())
 def test_timing_and_multipliers(operand, latency):
     method = LinearInterpolator(operand=operand)

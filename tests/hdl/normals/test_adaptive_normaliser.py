@@ -64,6 +64,7 @@ def test_front_runs_ahead_until_the_fifo_is_full():
     assert (run.input_cycles < wait).sum() == (2 << unit.parameters.depth) + 2
 
 
+@pytest.mark.long
 def test_parts():
     cost = cost_of(AdaptiveNormaliserUnit())
     assert cost.multiplier_count == 3

@@ -27,6 +27,7 @@ def test_latency_by_level(variant):
     np.testing.assert_array_equal(run.input_cycles[1:], run.cycles[:-1] + 1)
 
 
+@pytest.mark.long
 def test_parts():
     unit = BisectionChainUnit()
     assert unit.latency(2) == 51

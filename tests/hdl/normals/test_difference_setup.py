@@ -17,6 +17,7 @@ STATED = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("as_published", "order", "interval"),
     mostly_long(

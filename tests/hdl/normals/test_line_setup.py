@@ -6,6 +6,7 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.normals.line_setup import LineSetupUnit
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("interval", "multipliers"), [(1, 9), (2, 5), (3, 3), (4, 3), (5, 2), (9, 1)])
 def test_times_and_parts(interval, multipliers):
     unit = LineSetupUnit(initiation_interval=interval)

@@ -6,13 +6,12 @@ import pytest
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.normals.middle_normal import MiddleNormalUnit
 
-from ..variants import mostly_long
-
 # Latency and multipliers for the initiation intervals 1 to 9, as the unit's text states them.
 STATED = [(26, 9), (28, 5), (29, 3), (28, 3), (30, 2), (34, 2), (30, 2), (28, 2), (39, 1)]
 
 
-@pytest.mark.parametrize("interval", mostly_long(range(1, 10), 6))
+@pytest.mark.long
+@pytest.mark.parametrize("interval", range(1, 10))
 def test_intervals_and_parts(interval):
     unit = MiddleNormalUnit(initiation_interval=interval)
     cost = cost_of(unit)

@@ -47,6 +47,7 @@ def test_short_spans_come_seven_cycles_apart(unit):
     assert np.all((late >= 0) & (late < unit.cycles_per_pixel))
 
 
+@pytest.mark.long
 def test_parts(unit):
     cost = cost_of(unit)
     assert cost.multiplier_count == {"direct": 7, "horner": 3}[unit.parameters.form]

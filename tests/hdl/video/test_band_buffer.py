@@ -104,9 +104,9 @@ def pictures(parameters, frames):
 @pytest.mark.parametrize(
     ("parameters", "periods"),
     [
-        (BandBuffer(MODE, 4), (1.0, 3.3)),
+        pytest.param(BandBuffer(MODE, 4), (1.0, 3.3), marks=pytest.mark.long),
         (BandBuffer(MODE, 2, RGB565, (10, 200, 77)), (1.0, 2.9)),
-        (BandBuffer(MODE, 4, RGB888, (255, 1, 128)), (0.37, 1.0)),
+        pytest.param(BandBuffer(MODE, 4, RGB888, (255, 1, 128)), (0.37, 1.0), marks=pytest.mark.long),
     ],
 )
 def test_every_frame_in_time(parameters, periods):

@@ -38,7 +38,7 @@ def drawing_of(triangles, size, design, **options):
 
 @pytest.fixture(scope="module")
 def simulator():
-    design = preset(model="cosquad", materials=2)
+    design = preset("linear", "cosquad", materials=2)
     return DrawingSimulator(drawing_of(120, (96, 64), design))
 
 
@@ -66,6 +66,7 @@ def assert_equal(found, made):
             np.testing.assert_array_equal(pixels[name], value, err_msg=f"band {band.band}: {name}")
 
 
+@pytest.mark.long
 def test_frames_equal_model(simulator):
     """Two frames; every counter is the sum of the bands'."""
     drawing = simulator.drawing
@@ -82,12 +83,14 @@ def test_frames_equal_model(simulator):
     assert sum(len(pixels) for pixels in found.pixels) > 2000
 
 
+@pytest.mark.long
 def test_stalls_change_no_pixel(simulator):
     bands, rng = [*range(simulator.drawing.bands)], np.random.default_rng(5)
     stalls = {"input_stalls": rng.random(997) < 0.7, "output_stalls": rng.random(1009) < 0.6}
     assert_equal(simulator.run(bands, **stalls), expected(simulator.drawing, bands))
 
 
+@pytest.mark.long
 def test_bands_may_be_left_out(simulator):
     """A band that does not follow the one before begins a frame, the first of all too."""
     bands = [2, 3, 1, 3, 3, 0, 2]
@@ -96,6 +99,7 @@ def test_bands_may_be_left_out(simulator):
     assert found.counts["frames"] == 4
 
 
+@pytest.mark.long
 def test_buttons_count_from_the_next_frame_on(simulator):
     """Each button in turn, in the second band of a frame; in a pause a step."""
     count = simulator.drawing.bands

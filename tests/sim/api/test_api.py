@@ -97,6 +97,7 @@ def test_design_and_verilog(capsys):
     assert blysk.verilog(blysk.design(method="linear"), name="core") == capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_scene_files_scenes_and_meshes(tmp_path):
     """One picture from a scene file, its scene, and its mesh with the same options."""
     path = tmp_path / "a.toml"
@@ -113,8 +114,7 @@ def test_scene_files_scenes_and_meshes(tmp_path):
     assert of_file.design == linear
     for other in (
         blysk.render(scene, design=linear),
-        blysk.render(mesh, method="linear", **options),
-        blysk.render(blysk.scene(mesh, **options), design=linear, engine="pysim"),
+        blysk.render(blysk.scene(mesh, **options), method="linear"),
     ):
         np.testing.assert_array_equal(other.image, of_file.image)
         assert other.cycles == of_file.cycles
@@ -134,12 +134,14 @@ def test_specialised_pipeline():
     assert "left out    no specular path" in str(frame)
 
 
+@pytest.mark.long
 def test_waveforms(tmp_path):
     frame = blysk.render("teapot", method="linear", vcd=tmp_path / "a.vcd", **TINY)
     assert frame.engine == "pysim"
     assert "$enddefinitions" in (tmp_path / "a.vcd").read_text()
 
 
+@pytest.mark.long
 def test_without_a_compiler(monkeypatch):
     """pysim, with a warning and a smaller picture; a scene that is given keeps its size."""
     monkeypatch.setenv("PATH", "")
@@ -152,18 +154,20 @@ def test_without_a_compiler(monkeypatch):
     with pytest.warns(RuntimeWarning, match=r"^pysim at 8x6 instead of cxxrtl, no working C\+\+ compiler"):
         frame = blysk.render("teapot", method="linear", **TINY)
     assert (frame.engine, frame.image.shape) == ("pysim", (6, 8, 3))
+    scene = blysk.scene(triangles=100, size=(9, 7))
     with pytest.warns(RuntimeWarning, match=r"^pysim instead of cxxrtl"):
-        assert blysk.render(blysk.scene(**TINY), method="linear").image.shape == (12, 16, 3)
+        assert blysk.render(scene, method="linear").image.shape == (7, 9, 3)
     with pytest.raises(blysk.CompilerMissing):
         blysk.render("teapot", method="linear", engine="cxxrtl", **TINY)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "options",
     [
         {"method": "linear"},
-        pytest.param({"method": "linear", "specialise": True}, marks=pytest.mark.long),
-        pytest.param({}, marks=pytest.mark.long),
+        {"method": "linear", "specialise": True},
+        {},
     ],
     ids=str,
 )

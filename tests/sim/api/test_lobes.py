@@ -99,8 +99,8 @@ def test_bad_csv(tmp_path, monkeypatch, text, reason):
     assert "\n" not in message
 
 
+@pytest.mark.long
 def test_verilog_tells_the_addresses_of_tables():
     text = verilog(blysk.design(model="ggx", method="chord", gate=True))
     assert "the next value of a table, UQ(0, 17); with bit 17 the bank whose table begins" in text
     assert "of the table: where its highlight ends; UQ(3, 15)" in text
-    assert "the next value of a table" not in verilog(blysk.design(model="cosquad", gate=True))

@@ -126,6 +126,11 @@ def test_point_lights(write):
     [[lights]]
     position = [1, -2, 3.5]
     color = [0.5, 0, 4]
+    [[lights]]
+    position = [1, 2, 3]
+    attenuation = [0.5, 0, 2]
+    spot = [0, -2, 0]
+    cone = [5, 10.5]
     """
     file = read_scene_file(write(MESH + text))
     assert file.values["viewer"] == "near"
@@ -133,6 +138,7 @@ def test_point_lights(write):
         Light(position=(0, 0, 0)),
         Light((1, 2, 3), (2, 2, 2)),
         Light(position=(1, -2, 3.5), color=(0.5, 0, 4)),
+        Light(position=(1, 2, 3), attenuation=(0.5, 0, 2), spot=(0, -1, 0), cone=(5, 10.5)),
     )
     assert file.keys["viewer"] == "camera.viewer"
     assert read_scene_file(write("lights = []\n" + MESH)).values == {"mesh": "teapot", "lights": ()}
@@ -194,6 +200,11 @@ BAD = {
     "lights = [{color = 1}]": ("a.toml, lights[1].direction", "is missing"),
     "lights = [{direction = [1, 0, 0]}, {direction = [0, 0, 0]}]": ("a.toml, lights[2].direction", "no dir"),
     "lights = [{direction = [1, 0, 0], color = -1}]": ("a.toml, lights[1].color", "of 0 or more"),
+    "lights = [{position = [1, 0, 0], spot = [0, 1, 0], cone = [3, 2]}]": ("a.toml, lights[1]", "3 and 2; "),
+    "lights = [{position = [1, 0, 0], cone = [1, 2]}]": ("a.toml, lights[1]", "cone needs the direction of"),
+    "lights = [{position = [1, 0, 0], cone = [1]}]": ("a.toml, lights[1].cone", "give INNER,OUTER"),
+    "lights = [{position = [1, 0, 0], attenuation = [1, 0, -1]}]": ("a.toml, lights[1]", "at least 0, not"),
+    "lights = [{direction = [1, 0, 0], attenuation = [1, 1, 0]}]": ("a.toml, lights[1]", "give it a posit"),
     "lights = [{direction = [1, 0, 0], bulb = 1}]": (
         "a.toml, lights[1].bulb",
         "use one of direction, position, color",

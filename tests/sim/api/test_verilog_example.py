@@ -34,6 +34,7 @@ def test_no_example_of_a_table_that_is_fixed_for_another_exponent():
     assert example_of(preset("chord", "blinn", exponent=20)) == []
 
 
+@pytest.mark.long
 def test_header_has_an_instance_of_every_port():
     text = blysk.verilog(blysk.design(method="linear", model="cosquad"), name="core")
     ports = re.search(r"^module core \(([^)]*)\);", text, re.MULTILINE)[1]

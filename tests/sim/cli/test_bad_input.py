@@ -64,8 +64,8 @@ def check(rows):
 
 
 def test_some_malformed_input(tmp_path):
-    rows = attempts(tmp_path, seed=1, files=60, every=40)
-    assert len(rows) > 90
+    rows = attempts(tmp_path, seed=1, files=40, every=60)
+    assert len(rows) > 60
     check(rows)
 
 

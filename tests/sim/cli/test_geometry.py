@@ -101,6 +101,7 @@ def test_setups_need_triangles(refused):
     refused("render", "a.toml", thing="a.toml, pipeline.setups", says=needs)
 
 
+@pytest.mark.long
 def test_turntable():
     """Each frame is the model's; errors, cycles and counters are those of all."""
     options = [*SMALL, *HARDWARE, "--frames", "2", "--jobs", "1", "-o", "a.gif", "--json", "a.json"]
@@ -130,6 +131,7 @@ def test_unknown(refused):
         refused(*command, "--geometry", "x", thing="--geometry x", says="use one of software, hardware")
 
 
+@pytest.mark.long
 def test_verilog():
     """Triangles in, pixels and a memory of depths out."""
     assert main(["verilog", *HARDWARE, "-o", "a.v"]) == 0

@@ -109,6 +109,10 @@ KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS | PUBLISHED)}"
         (["--frames", "2", "-o", "no/a.gif"], "no/a.gif", "there is no folder no"),
         (["--frames", "2", "-o", "a.gif", "--json", "a-0002.png"], "a-0002.png", "another output"),
         (["--frames", "2", "--view", "0,1,0"], "--view 0,1,0", "looks along the axis"),
+        (["--point-light", "1,2,3,1,1,1,1,-1,0"], "--point-light 1,2,3,1,1,1,1,-1,0", "coefficients of 0 or"),
+        (["--spot-light", "1,2,3,0,0,0,10,20"], "--spot-light 1,2,3,0,0,0,10,20", "spot must not be 0, 0, 0"),
+        (["--spot-light", "1,2,3,0,1,0,20,10"], "--spot-light 1,2,3,0,1,0,20,10", "give an axis other than"),
+        (["--spot-light", "1,2,3,0,1,0,10,20"], "--method chord", "use chord-local"),
     ],
 )
 def test_bad_option(refused, options, thing, says):
@@ -123,6 +127,10 @@ def test_design_that_cannot_be(refused, command):
     refused(*command, "--method", "chord", "--operand", "cosine", thing="--operand cosine", says=says)
     says = "method linear is not built for it; "
     refused(*command, "--method", "linear", "--setup-interval", "26", thing="--setup-interval 26", says=says)
+    if command[0] == "verilog":
+        refused(*command, "--factors", "1", thing="--factors 1", says="need values of spans, of chord-local")
+        local = ["--method", "chord-local", "--factors", "2"]
+        refused(*command, *local, thing="--factors 2", says="and at most as many as lights")
 
 
 def test_triangles_of_a_file(refused):

@@ -236,20 +236,30 @@ def test_point_lights(folder, refused, capsys):
     assert json.loads(Path("c.json").read_text())["specialisation"]["different_pixels"] == 0
     capsys.readouterr()
     what = "need the values of a span; use chord-local"
-    refused("render", "teapot", "--point-light", "3,4,5", thing="--method quadratic", says=what)
+    refused("render", "teapot", "--point-light", "3,4,5", thing="--method chord", says=what)
     refused("render", "a.toml", "--method", "chord", thing="--method chord", says=what)
+    spot = ["--spot-light", "3,4,5,-3,-3,-5,8,14,1,1,1,0.5,0.1,0", "--method", "chord-local"]
+    assert main(["render", "teapot", *spot, "--size", "48x36", "-o", "c.png", "--json", "a.json"]) == 0
+    assert json.loads(Path("a.json").read_text())["method_error"]["max_lsb"] < 1
+    Path("b.toml").write_text(
+        '[mesh]\nfile = "teapot"\n[[lights]]\nposition = [3, 4, 5]\nspot = [-3, -3, -5]\ncone = [8, 14]\n'
+        'attenuation = [0.5, 0.1, 0]\n[pipeline]\nmethod = "chord-local"\n'
+    )
+    assert main(["render", "b.toml", "--size", "48x36", "-o", "d.png"]) == 0
+    np.testing.assert_array_equal(picture("c.png"), picture("d.png"))
+    capsys.readouterr()
     refused("render", "teapot", *local, "--projection", "orthographic", thing="--viewer near", says="distant")
-    refused("render", "teapot", *local, "--gate", thing="--gate", says="has no normals for one")
     refused("render", "teapot", "--short-words", thing="--short-words", says="nothing is specialised")
 
 
+@pytest.mark.long
 def test_unit_of_the_mesh_does_not_matter(capsys):
     """Products of the coordinates of the second and third would under- and overflow."""
     pictures = []
     for unit in ("", "e-310", "e300"):
         points = [f"v -1{unit} 0 0", f"v 1{unit} 0 0", f"v 0 1{unit} 0", "f 1 2 3"]
         Path("a.obj").write_text("\n".join(points))
-        assert main(["render", "a.obj", "--size", "16x12"]) == 0
+        assert main(["render", "a.obj", "--size", "8x6", "--method", "linear"]) == 0
         assert capsys.readouterr().err == ""
         pictures.append(picture("a-blysk.png"))
     assert len(np.unique(pictures[0].reshape(-1, 3), axis=0)) > 1

@@ -65,9 +65,11 @@ def test_figures_of_a_turntable(turned):
         assert [float(value) for value in row.split()] == pytest.approx(values, abs=0.005)
 
 
+@pytest.mark.long
 def test_a_turntable_of_one_frame_is_the_frame(capsys):
-    assert main(["render", *TINY, "--frames", "1", "-o", "a.gif"]) == 0
-    assert main(["render", *TINY, "-o", "b.png"]) == 0
+    linear = [*TINY, "--method", "linear"]
+    assert main(["render", *linear, "--frames", "1", "--jobs", "1", "-o", "a.gif"]) == 0
+    assert main(["render", *linear, "-o", "b.png"]) == 0
     assert capsys.readouterr().err == ""
     assert Path("a-0001.png").read_bytes() == Path("b.png").read_bytes()
 
@@ -76,15 +78,17 @@ def test_a_turntable_of_one_frame_is_the_frame(capsys):
 def test_failed_figures_leave_no_frames(capsys):
     """A turntable whose figures cannot be written; files of others stay."""
     Path("a-0003.png").write_text("another's")
-    assert main(["render", *TINY, "--frames", "2", "-o", "a.gif", "--json", "/dev/full"]) == 2
+    options = ["--method", "linear", "--frames", "2", "--jobs", "1", "-o", "a.gif", "--json", "/dev/full"]
+    assert main(["render", *TINY, *options]) == 2
     assert capsys.readouterr().err.startswith("blysk: /dev/full: cannot be written, the disk is full; ")
     assert [path.name for path in files()] == ["a-0003.png"]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_interrupt_of_a_turntable():
     """Ctrl-C in a terminal reaches all processes: frames done stay, whole, and no process goes on."""
-    arguments = ["render", "teapot", "--triangles", "500", "--size", "64x48", "--engine", "pysim"]
+    arguments = ["render", "teapot", "--triangles", "100", "--size", "32x24", "--engine", "pysim"]
     process = subprocess.Popen(
         [*PROGRAM, *arguments, "--frames", "200", "--jobs", "2", "-o", "a.gif"],
         stdout=subprocess.PIPE,
@@ -109,7 +113,7 @@ def test_interrupt_of_a_turntable():
     assert all(re.fullmatch(r"a-\d{4}\.png", name) for name in names), names
     assert 1 <= len(names) < 200
     for name in names:
-        assert picture(name).shape == (48, 64, 3)
+        assert picture(name).shape == (24, 32, 3)
 
 
 @pytest.mark.long

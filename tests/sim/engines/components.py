@@ -3,7 +3,6 @@
 import numpy as np
 from amaranth.hdl import Module, Mux, Signal, signed, unsigned
 from amaranth.lib import data, stream
-from amaranth.lib.fifo import SyncFIFOBuffered
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Component, In, Out
 
@@ -37,64 +36,6 @@ class Register(Component):
     @staticmethod
     def model(beats):
         return 2 * beats["y"].astype(np.int64) + 1
-
-
-class Pipeline(Component):
-    """``x y`` and ``(x y)^2 mod 2^63`` behind three stages with a common enable."""
-
-    i: In(stream.Signature(PAIR))
-    o: Out(stream.Signature(data.StructLayout({"product": signed(34), "square": unsigned(63)})))
-
-    def elaborate(self, platform):
-        m = Module()
-        x, y, product, again = Signal(16), Signal(signed(18)), Signal(signed(34)), Signal(signed(34))
-        square, valid = Signal(63), Signal(3)
-        m.d.comb += [
-            self.i.ready.eq(~self.o.valid | self.o.ready),
-            self.o.valid.eq(valid[2]),
-            self.o.payload.product.eq(again),
-            self.o.payload.square.eq(square),
-        ]
-        with m.If(self.i.ready):
-            m.d.sync += [
-                x.eq(self.i.payload.x),
-                y.eq(self.i.payload.y),
-                product.eq(x * y),
-                again.eq(product),
-                square.eq(product * product),
-                valid.eq(valid << 1 | self.i.valid),
-            ]
-        return m
-
-    @staticmethod
-    def model(beats):
-        product = beats["x"].astype(np.int64) * beats["y"]
-        square = [value * value % (1 << 63) for value in product.tolist()]
-        return np.array(list(zip(product.tolist(), square, strict=True)), dtype="i8, u8")
-
-
-class Queue(Component):
-    """Amaranth's own buffered queue."""
-
-    i: In(stream.Signature(PAIR))
-    o: Out(stream.Signature(PAIR))
-
-    def elaborate(self, platform):
-        m = Module()
-        m.submodules.fifo = fifo = SyncFIFOBuffered(width=34, depth=5)
-        m.d.comb += [
-            fifo.w_data.eq(self.i.payload),
-            fifo.w_en.eq(self.i.valid),
-            self.i.ready.eq(fifo.w_rdy),
-            self.o.payload.eq(fifo.r_data),
-            self.o.valid.eq(fifo.r_rdy),
-            fifo.r_en.eq(self.o.ready),
-        ]
-        return m
-
-    @staticmethod
-    def model(beats):
-        return np.array(list(zip(beats["x"].tolist(), beats["y"].tolist(), strict=True)), dtype="u2, i4")
 
 
 class Expander(Component):
@@ -202,7 +143,7 @@ class Accumulator(Component):
         return m
 
 
-ALL = [Register, Pipeline, Queue, Expander, Lookup]
+ALL = [Register, Expander, Lookup]
 
 
 class Plain(Component):

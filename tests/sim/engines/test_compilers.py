@@ -157,6 +157,14 @@ def test_no_compiler(monkeypatch, cache):
         assert scaled(engine="auto") == (3 * BEATS).tolist()
 
 
+def test_flags_of_the_environment_come_last(monkeypatch):
+    monkeypatch.setenv("CXXFLAGS", "-O0 '-DA=b c'")
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    for compiler in compilers.find_compilers():
+        assert compiler.compile.index("-O2") < compiler.compile.index("-O0")
+        assert "-DA=b c" in compiler.compile
+
+
 def test_chosen_compiler_is_not_there(monkeypatch):
     monkeypatch.setenv("CXX", "/nowhere/c++ -m64")
     with pytest.raises(CompilerMissing) as caught:

@@ -43,8 +43,6 @@ def stall_patterns(seed):
     rng = np.random.default_rng(seed)
     return {
         "free": (None, None),
-        "source": (rng.random(61) < 0.5, None),
-        "sink": (None, rng.random(53) < 0.5),
         "both": (rng.random(61) < 0.3, rng.random(53) < 0.7),
         "alternating": (np.array([True, False]), np.array([False, True])),
     }

@@ -101,6 +101,7 @@ class Chain(Component):
         return m
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("engine", ["pysim", "auto"])
 def test_many_wide_registers(engine):
     """Stage k shows what it and those before held after reset, last first, then the beats."""

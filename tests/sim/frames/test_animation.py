@@ -181,6 +181,7 @@ def assert_the_same(frame, expected):
         assert frame.figures[name]["rmse_lsb"] == getattr(comparison, name).rmse_lsb
 
 
+@pytest.mark.long
 def test_frames_of_processes_are_those_drawn_singly(animation, cameras, singly):
     order = [3, 0, 4, 2, 1]
     children = set(multiprocessing.active_children())
@@ -239,6 +240,7 @@ def scheduler():
         yield local
 
 
+@pytest.mark.long
 def test_frames_of_a_cluster_are_those_drawn_singly(animation, cameras, singly, scheduler):
     order = [4, 1, 0, 3, 2]
     with dask_executor(animation, scheduler.scheduler_address) as executor:

@@ -91,6 +91,7 @@ def test_frame_is_the_model_after_a_depth_test(simulator):
     assert len(np.unique(frame.image.reshape(-1, 3), axis=0)) > 100
 
 
+@pytest.mark.long
 def test_engines_give_the_same_frame(simulator):
     scene = scene_of("240", (24, 18))
     slow, fast = FrameSimulator(DESIGN, "pysim").render(scene), simulator.render(scene)
@@ -251,6 +252,7 @@ MATERIALS = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("engine", [pytest.param("cxxrtl", marks=pytest.mark.long), "pysim"])
 def test_frame_of_three_materials(engine):
     """Each pixel is that of a frame in its triangle's material alone, by the bit-accurate model.
@@ -293,7 +295,8 @@ def test_other_numbers_of_materials(simulator):
         simulator.render(scene)
 
 
-@pytest.mark.parametrize("exponent", [pytest.param(10, marks=pytest.mark.long), 1000])
+@pytest.mark.long
+@pytest.mark.parametrize("exponent", [10, 1000])
 def test_point_light_and_near_viewer(exponent):
     """Within an LSB of L, H and N at every pixel; the light is as near as the pot is large."""
     mesh = teapot(1000)

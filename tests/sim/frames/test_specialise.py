@@ -150,6 +150,18 @@ def test_black_lights():
     assert "lights" in reasons(specialise(faint, preset("linear", lights=3)))
 
 
+def test_factors_of_lights():
+    """The factor of a light that fades goes with it, and all of them with the specular path."""
+    lamp = Light(position=(1, 2, 3), attenuation=(1, 1, 0))
+    scene = scene_of(lights=(BLACK, KEY, lamp), size=(60, 50))
+    full = preset("chord-local", "cosquad", 3, factors=(0, 2))
+    special = specialise(scene, full)
+    assert special.design.factors == (1,)
+    assert_same_frame(scene, special)
+    matt = replace(scene, material=replace(CLAY, specular=(0, 0, 0)))
+    assert specialise(matt, full).design.factors == ()
+
+
 def test_a_light_that_is_off_costs_nothing():
     """No span more, and in the compact style no cycle, in a pipeline that has it: its terms are 0."""
     design, found = preset("chord", "blinn", lights=2, style="compact"), []

@@ -80,9 +80,9 @@ def rows(path):
 @pytest.mark.parametrize(
     "design",
     [
-        preset("chord-local", lights=2, materials=3),
-        preset("linear", None, grey=True, exponent=9),
         preset(lights=0),
+        pytest.param(preset("chord-local", lights=2, materials=3), marks=pytest.mark.long),
+        pytest.param(preset("linear", None, grey=True, exponent=9), marks=pytest.mark.long),
     ],
     ids=str,
 )
@@ -115,6 +115,7 @@ def test_frame_shows_every_light_and_material():
         assert (darker < pixels.color).any()
 
 
+@pytest.mark.long
 def test_what_is_in_the_folder(made):
     assert sorted(path.name for path in made.iterdir()) == FILES
     assert sorted(path.name for path in (made / "vectors").iterdir()) == TABLES
@@ -132,6 +133,7 @@ def test_what_is_in_the_folder(made):
     assert status == [{f"status_{name}": count for name, count in expected.items()}]
 
 
+@pytest.mark.long
 def test_imports_nothing_of_the_project(made):
     """The standard library and cocotb."""
     for path in made.glob("*.py"):
@@ -142,6 +144,7 @@ def test_imports_nothing_of_the_project(made):
             assert tops <= {"cocotb", "cocotb_tools"} | set(sys.stdlib_module_names)
 
 
+@pytest.mark.long
 def test_an_empty_folder_will_do_and_verilog_in_a_file_too(made, tmp_path, capsys):
     core, folder = tmp_path / "core.v", tmp_path / "bench"
     folder.mkdir()
@@ -172,6 +175,7 @@ def test_refuses_a_folder(tmp_path, capsys, kind):
     assert {path: path.read_text() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
+@pytest.mark.long
 def test_passes_in_icarus(run, folder):
     done = run(folder)
     assert done.returncode == 0, done.stdout
@@ -192,6 +196,7 @@ def test_passes_in_both(run, tmp_path, simulator, options):
         assert "PASS=4 FAIL=0" in done.stdout
 
 
+@pytest.mark.long
 def test_finds_one_bit_of_an_expected_pixel(run, folder):
     path = folder / "vectors" / "pixels.csv"
     lines = path.read_text().splitlines()

@@ -20,6 +20,7 @@ def simulator():
     return TriangleSimulator(Renderer(design()), SIZE)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("triangles", "back_faces"), [(200, "flip"), (1000, "cull")])
 def test_frame_is_the_model_s(simulator, triangles, back_faces):
     """Picture and counters; and no more cycles than setup or pixels of each triangle ask for."""
@@ -36,6 +37,7 @@ def test_frame_is_the_model_s(simulator, triangles, back_faces):
     assert frame.cycles < np.maximum(16, pixels).sum() + 600
 
 
+@pytest.mark.long
 def test_two_sided(simulator):
     """Back faces of a two-sided material are turned where others are left out."""
     drawn = scene("teapot", size=SIZE, triangles=200, back_faces="cull")
@@ -47,6 +49,7 @@ def test_two_sided(simulator):
     assert frame.counts["culled"] == 0
 
 
+@pytest.mark.long
 def test_an_empty_picture(simulator):
     """No triangle of the mesh is in front of the camera."""
     away = scene("teapot", size=SIZE, triangles=200, position=(0, 0, 9), target=(0, 0, 99))
@@ -55,12 +58,14 @@ def test_an_empty_picture(simulator):
     assert len(np.unique(frame.image.reshape(-1, 3), axis=0)) == 1
 
 
+@pytest.mark.long
 def test_another_size_is_refused(simulator):
     """The memory of depths has the size of the picture."""
     with pytest.raises(ValueError, match="the scene is 16x12, the memory 64x48"):
         simulator.render(scene("teapot", size=(16, 12), triangles=200))
 
 
+@pytest.mark.long
 def test_a_wrong_model_is_found(monkeypatch):
     """A simulator checks some triangles of its own before a scene's."""
     renderer = Renderer(design())

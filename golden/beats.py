@@ -1,0 +1,97 @@
+"""Input and output of the shading pipeline: raster spans, and pixels."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from blysk.golden.cosines.chord_setup import SpanValues
+from blysk.golden.number.unit_vector import quantise
+from blysk.golden.reference.geometry import normalise
+
+__all__ = ["Pixels", "Spans"]
+
+
+@dataclass(frozen=True)
+class Spans:
+    """Raster spans with quantised normals: the pipeline's input.
+
+    Parameters
+    ----------
+    x, y : int arrays, shape (spans,)
+        First pixel of each span, 0 to 4095, or the largest coordinate of the pipeline.
+    length : int array, shape (spans,)
+        Pixels, 0 to 4095. A span of length 0 gives no pixel; past the largest x, x goes on from 0.
+    normal_left, normal_right : int arrays, shape (spans, 3)
+        Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``; or what the method takes, in
+        its `Interpolator.END_FORMAT`.
+    material : int array, shape (spans,), optional
+        Index of the material; ``None``: 0 for all.
+    values : SpanValues, optional
+        Values of each light, for methods with `Interpolator.TAKES_VALUES`, which read no normals.
+    normal_middle : int array, shape (spans, 3), optional
+        Unit normals in the middle of each span, for methods with `Interpolator.TAKES_MIDDLE`; ``None``: the
+        bisectors of the two ends.
+    factors : int64 array, shape (spans, factors, 3), optional
+        Beside values: codes of the factors of the lights that a design has a factor for, as those of N·L.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    length: np.ndarray
+    normal_left: np.ndarray
+    normal_right: np.ndarray
+    material: np.ndarray = None  # type: ignore[assignment]  # becomes an array
+    values: SpanValues | None = None
+    normal_middle: np.ndarray | None = None
+    factors: np.ndarray | None = None
+
+    def __post_init__(self):
+        if self.material is None:
+            object.__setattr__(self, "material", np.zeros(len(self.length), dtype=np.int64))
+
+    @cached_property
+    def middle(self) -> np.ndarray:
+        """`normal_middle`, or the bisectors; of opposite ends, the left one."""
+        if self.normal_middle is not None:
+            return self.normal_middle
+        total = np.add(self.normal_left, self.normal_right)
+        return quantise(normalise(np.where(np.any(total, axis=1, keepdims=True), total, self.normal_left)))
+
+    def __len__(self):
+        return len(self.length)
+
+    def __getitem__(self, which: slice | np.ndarray) -> "Spans":
+        """Some of the spans, by a slice, indices or a mask."""
+        values = self.values if self.values is None else SpanValues(*(codes[which] for codes in self.values))
+        fields = ("x", "y", "length", "normal_left", "normal_right", "material")
+        middle = self.normal_middle if self.normal_middle is None else self.normal_middle[which]
+        chosen = {name: getattr(self, name)[which] for name in fields}
+        factors = self.factors if self.factors is None else self.factors[which]
+        return Spans(**chosen, values=values, normal_middle=middle, factors=factors)
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """Pixels: the pipeline's output.
+
+    Parameters
+    ----------
+    x, y : int arrays, shape (pixels,)
+        Column and row.
+    color : uint8 array, shape (pixels, 3)
+        Red, green, blue.
+    last : bool array, shape (pixels,)
+        Whether a pixel is the last of its span.
+    out_of_range_spans : int
+        Spans of a larger angle than the method serves, whose pixels have no error bound.
+    wide_spans : int
+        Spans of a larger angle than the method's error bound allows at the exponent; see `SpanLimit`.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    color: np.ndarray
+    last: np.ndarray
+    out_of_range_spans: int
+    wide_spans: int = 0

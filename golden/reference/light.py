@@ -1,0 +1,185 @@
+"""Directional, point and spot lights, in float64."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.reference.geometry import normalise
+
+__all__ = ["Light", "Triple", "triple"]
+
+Triple = tuple[float, float, float]
+
+
+def triple(name: str, value: Sequence[float], least: float = -math.inf, most: float = math.inf) -> Triple:
+    """Three finite floats in [least, most], or a ValueError that names the thing.
+
+    Parameters
+    ----------
+    name : str
+        What the numbers are, for the error's text.
+    value : sequence of three numbers
+        The numbers.
+    least, most : float
+        The range.
+
+    Raises
+    ------
+    ValueError
+        If there are not three numbers, or one is not finite or out of range.
+    """
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be three finite numbers, not {value!r}")
+    if (array < least).any() or (array > most).any():
+        limits = f"at least {least:g}" if math.isinf(most) else f"in {least:g} to {most:g}"
+        raise ValueError(f"{name} must be {limits}, not {value!r}")
+    return tuple(array.tolist())
+
+
+@dataclass(frozen=True)
+class Light:
+    """A directional light, or a point light, whose light may fade with the distance and outside a cone.
+
+    Parameters
+    ----------
+    direction : three floats, optional
+        Vector *to* the light, any length but 0; stored as a unit vector.
+    color : three floats
+        Intensity I_i a channel, at least 0.
+    position : three floats, optional
+        In place of the direction: where a point light is, in the mesh's units.
+    attenuation : three floats
+        ``(k_0, k_1, k_2)`` of a point light, at least 0, see `factor`; ``(1, 0, 0)``: as bright at every
+        distance.
+    spot : three floats, optional
+        Axis of a spot light's cone, from the light, any length but 0; stored as a unit vector. ``None``: the
+        light shines to all sides.
+    cone : two floats, optional
+        Angles from the axis in degrees, inner and outer: full light up to the first, none from the second on.
+        With a spot by default 20 and 30.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, a direction is 0, a channel or a coefficient is negative, there is not
+        exactly one of direction and position, or the cone's angles are not ``0 <= inner < outer <= 180``;
+        if a directional light has an attenuation or a spot, or a cone has no axis.
+
+    Source: docs/theory/models.md#lighting, docs/theory/chord.md#local-lights.
+    """
+
+    direction: Triple | None = None
+    color: Triple = (1.0, 1.0, 1.0)
+    position: Triple | None = None
+    attenuation: Triple = (1.0, 0.0, 0.0)
+    spot: Triple | None = None
+    cone: tuple[float, float] | None = None
+
+    def __post_init__(self):
+        if (self.direction is None) == (self.position is None):
+            raise ValueError("a light must have either a direction or a position")
+        if self.position is not None:
+            object.__setattr__(self, "position", triple("a light's position", self.position))
+        else:
+            direction = triple("a light's direction", self.direction)
+            if not any(direction):
+                raise ValueError("a light's direction must not be 0")
+            object.__setattr__(self, "direction", tuple(normalise(direction).tolist()))
+        object.__setattr__(self, "color", triple("a light's color", self.color, least=0))
+        attenuation = triple("a light's attenuation", self.attenuation, least=0)
+        if not any(attenuation):
+            raise ValueError("a light's attenuation must not be 0, 0, 0")
+        object.__setattr__(self, "attenuation", attenuation)
+        self._check_spot()
+        if self.position is None and self.fades:
+            raise ValueError("a directional light has no distance, attenuation or spot; give it a position")
+
+    def _check_spot(self) -> None:
+        """Axis and angles of a cone."""
+        if self.spot is None:
+            if self.cone is not None:
+                raise ValueError("a light's cone needs the direction of a spot")
+            return
+        axis = triple("a light's spot", self.spot)
+        if not any(axis):
+            raise ValueError("a light's spot must not be 0, 0, 0")
+        object.__setattr__(self, "spot", tuple(normalise(axis).tolist()))
+        inner, outer = (20.0, 30.0) if self.cone is None else map(float, self.cone)
+        if not 0 <= inner < outer <= 180:
+            raise ValueError(
+                f"a light's cone must be inner and outer degrees, 0 <= inner < outer <= 180, not "
+                f"{inner:g} and {outer:g}"
+            )
+        object.__setattr__(self, "cone", (inner, outer))
+
+    @property
+    def fades(self) -> bool:
+        """Whether its light depends on the place: its attenuation is not 1, or it is a spot."""
+        return self.spot is not None or self.attenuation != (1.0, 0.0, 0.0)
+
+    def factor(self, points: np.ndarray | None = None) -> np.ndarray:
+        """Factor a of the light that reaches points, 0 to 1: of the distance d times that of the cone.
+
+        ``min(1 / (k_0 + k_1 d + k_2 d^2), 1) s^2 (3 - 2 s)``, with s = 0 at the cone's outer angle and 1 at
+        its inner one, linear in the cosine of the angle between, and limited to 0 to 1.
+
+        Parameters
+        ----------
+        points : array, shape (..., 3), optional
+            Points; a light that does not fade does not read them.
+
+        Returns
+        -------
+        float64 array
+            Shape () of a light that does not fade, else (...).
+
+        Raises
+        ------
+        ValueError
+            If a light that fades is given no points.
+        """
+        if not self.fades:
+            return np.float64(1)
+        towards = self.towards(points)
+        # No distance that matters overflows.
+        distance = np.linalg.norm(np.clip(np.asarray(self.position) - points, -1e100, 1e100), axis=-1)
+        k_0, k_1, k_2 = self.attenuation
+        with np.errstate(over="ignore"):
+            result = 1 / np.maximum(k_0 + distance * (k_1 + distance * k_2), 1.0)
+        if self.spot is not None:
+            inner, outer = np.cos(np.radians(self.cone))
+            share = np.clip((-(towards @ np.asarray(self.spot)) - outer) / (inner - outer), 0, 1)
+            result = result * share**2 * (3 - 2 * share)
+        return result
+
+    @property
+    def is_on(self) -> bool:
+        """Whether its colour is not 0."""
+        return any(self.color)
+
+    def towards(self, points: np.ndarray | None = None) -> np.ndarray:
+        """Unit vectors L from points of the surface to the light; 0 where a point light is at the point.
+
+        Parameters
+        ----------
+        points : array, shape (..., 3), optional
+            Points; a directional light does not read them.
+
+        Returns
+        -------
+        float64 array
+            Shape (3,) of a directional light, else that of the points.
+
+        Raises
+        ------
+        ValueError
+            If a point light is given no points.
+        """
+        if self.position is None:
+            return np.array(self.direction)
+        if points is None:
+            raise ValueError("a point light needs the points that it lights")
+        return normalise(np.asarray(self.position) - points)

@@ -1,0 +1,57 @@
+"""Factor unit: the terms of a light that fades, the specular one times its factor."""
+
+from amaranth.hdl import Signal
+from amaranth.lib import data
+
+from blysk.golden.lighting.factor import Factor
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import PipelinedUnit
+
+__all__ = ["FactorUnit"]
+
+
+class FactorUnit(PipelinedUnit):
+    """``a S`` of a specular term S and a factor a; the diffuse term waits. `Factor` is the model.
+
+    Latency 2 cycles (operands, product), initiation interval 1; one multiplier of 17 by 17 bits, with
+    registers before and after. Without a factor the unit only waits as long, and has no multiplier.
+
+    Parameters
+    ----------
+    parameters : Factor
+        Bit-accurate model.
+    has_factor : bool
+        Whether there is a factor.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(StructLayout({"diffuse": ..., "specular": ..., "factor": ...})))`
+        Terms and factor, ``UQ(0, 17)`` each; the last only where there is one.
+    o : :py:`Out(stream.Signature(StructLayout({"diffuse": ..., "specular": ...})))`
+        Terms, ``UQ(0, 17)``.
+
+    Source: docs/theory/chord.md#local-lights.
+    """
+
+    def __init__(self, parameters: Factor | None = None, *, has_factor: bool = True):
+        self.parameters = parameters or Factor()
+        self.has_factor = has_factor
+        word = FixedShape(Factor.FORMAT)
+        terms = dict.fromkeys(("diffuse", "specular"), word)
+        operands = terms | ({"factor": word} if has_factor else {})
+        super().__init__(data.StructLayout(operands), data.StructLayout(terms), latency=2)
+
+    def datapath(self, m, operands):
+        """Registers of the operands and of the product, which is cut behind them."""
+        diffuse, specular = (
+            self.register(m, operands[name], f"{name}_operand") for name in ("diffuse", "specular")
+        )
+        if self.has_factor:
+            specular = specular * self.register(m, operands.factor, "factor_operand")
+        result = Signal(self.o.payload.shape())
+        product = self.register(m, specular, "product").truncate(Factor.FORMAT.fraction_bits)
+        m.d.comb += [
+            result.diffuse.eq(self.register(m, diffuse, "diffuse")),
+            result.specular.eq(product),
+        ]
+        return result
