@@ -8,6 +8,7 @@ from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.render import Renderer
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.single_register import connect_register
 from blysk.hdl.core.stream import connect, connect_fifo, moving
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.coarse_depth import CoarseDepthUnit
@@ -68,7 +69,7 @@ STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", *_SHADING)
 """Counters of `RenderUnit`."""
 
 WAITING_SPANS = 33
-"""Spans between geometry and shading: a memory of 32 words, and a register behind it."""
+"""Spans between geometry and shading: a memory of 32 words, and a register behind it; not compact."""
 
 
 class RenderUnit(wiring.Component):
@@ -167,7 +168,11 @@ class RenderUnit(wiring.Component):
             geometry.o.ready.eq(made.ready & room),
         ]
         known, drops = self._judge(m, room, made.ready, ready)
-        connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS)
+        if geometry.compact and self.coarse is None:
+            # Memories of 16 words for one span and the next would cost as much as they win.
+            connect_register(m, "waiting_span", made, ready)
+        else:
+            connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS)
         given, dropped = Signal(name="given"), Signal(name="dropped")
         count = Signal(COUNTER_BITS, name="count_spans")
         with m.If(pipeline.i.valid & pipeline.i.ready):

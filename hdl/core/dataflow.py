@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from typing import Any
 
-from amaranth.hdl import Module, ShapeLike, Signal, Value, signed
+from amaranth.hdl import Module, Mux, ShapeLike, Signal, Value, signed
 from amaranth.lib.memory import Memory
 
 from blysk.golden.number.fixed import Format
@@ -312,6 +314,7 @@ class Dataflow:
         build = _Build(self, m, unit, operands)
         for word in self._words:
             build.values[word] = {word.stage: word.make(build)}
+        build.connect()
         return build.at
 
 
@@ -395,6 +398,7 @@ class _Build:
         self.graph, self.m, self.unit, self.operands = graph, m, unit, operands
         self.values: dict[Word, dict[int, Any]] = {}
         self._instances: dict[tuple[FunctionalUnit, int], tuple[list[Signal], Any]] = {}
+        self._issued: dict[tuple[FunctionalUnit, int], list[tuple[Value | None, Sequence[Any]]]] = {}
 
     def when(self, stage: int) -> Value | None:
         """When a register of that stage is written; always where a beat may come on every cycle."""
@@ -415,15 +419,11 @@ class _Build:
         return copies[max(start for start in copies if start <= stage)]
 
     def issue(self, functional_unit: FunctionalUnit, use: Word, operands: Sequence[Any]) -> Any:
-        """Issue operands of a use to an instance of a functional unit; its result, for all uses.
-
-        Those of the first use are issued on every cycle of no other use, so that no register needs an enable.
-        """
+        """Issue operands of a use to an instance of a functional unit; its result, for all uses."""
         placement = self.graph.schedule.placements[use]
         instance, when = placement.instance, self.when(placement.read)
         key = functional_unit, instance
         if key not in self._instances:
-            when = None
             given = [
                 Signal(shape, name=f"{functional_unit.name}_{instance}_{k}", reset_less=True)
                 for k, shape in enumerate(functional_unit.shapes)
@@ -433,13 +433,20 @@ class _Build:
                 return self.unit.register(self.m, value, f"{functional_unit.name}_{instance}_{name}")
 
             self._instances[key] = given, functional_unit.make(register, *given)
-        given, result = self._instances[key]
-        assignments = [
-            Value.cast(to).eq(Value.cast(value)) for to, value in zip(given, operands, strict=True)
-        ]
-        if when is None:
-            self.m.d.sync += assignments
-        else:
-            with self.m.If(when):
-                self.m.d.sync += assignments
-        return result
+        self._issued.setdefault(key, []).append((when, operands))
+        return self._instances[key][1]
+
+    def connect(self) -> None:
+        """Connect each instance's operand registers, which have no enable.
+
+        No two uses meet, so their operands are gated and merged: a chain of multiplexers would be as long as
+        there are uses, and larger.
+        """
+        for key, uses in self._issued.items():
+            for k, to in enumerate(self._instances[key][0]):
+                values = [(when, Value.cast(operands[k])) for when, operands in uses]
+                if len(values) == 1:
+                    self.m.d.sync += Value.cast(to).eq(values[0][1])
+                    continue
+                gated = [Mux(when, value, 0) for when, value in values]
+                self.m.d.sync += Value.cast(to).eq(reduce(or_, gated))

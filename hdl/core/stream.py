@@ -17,6 +17,7 @@ __all__ = [
     "connect_fifo",
     "connect_slice",
     "count_down",
+    "hold_output",
     "moving",
     "pass_beside",
     "require_same_shape",
@@ -205,6 +206,16 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
     return ~held
 
 
+def hold_output(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
+    """Drive a stream from a register that stands until it is taken; return whether it may change.
+
+    `skid_buffer` without the spare register: what is behind sees the sink's ready on the same cycle, and
+    costs nothing. The parameters are those of `skid_buffer`.
+    """
+    m.d.comb += [output.valid.eq(valid), Value.cast(output.payload).eq(Value.cast(payload))]
+    return ~Value.cast(valid) | output.ready
+
+
 def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
     """Connect two streams through registers that hold two payloads; one takes `SLICE_LATENCY` cycles.
 
@@ -320,6 +331,9 @@ class PipelinedUnit(wiring.Component):
         Whether the next beat may come at any distance from ``initiation_interval`` on.
     ports : mapping of str to Member, optional
         Further members, by name.
+    skid : bool
+        Whether a spare register cuts the path from ``o.ready`` to ``i.ready`` and to the enable
+        (`skid_buffer`); without it the unit is disabled on the very cycle on which a beat is not accepted.
 
     Members
     -------
@@ -346,12 +360,15 @@ class PipelinedUnit(wiring.Component):
         constants: ShapeLike | None = None,
         spaced: bool = False,
         ports: Mapping[str, Member] | None = None,
+        skid: bool = True,
     ):
         if latency < 1 or initiation_interval < 1:
             raise ValueError("latency and initiation_interval must be at least 1")
         self.latency = latency
         self.initiation_interval = initiation_interval
-        self._spaced = spaced
+        self._spaced, self._skid = spaced, skid
+        if spaced and not skid:
+            raise ValueError("a spaced unit needs its skid buffer")
         members = {"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))}
         if constants is not None:
             members["constants"] = In(constants)
@@ -402,7 +419,8 @@ class PipelinedUnit(wiring.Component):
             operands = self.register(inner, operands, "operands", when=self.i.ready)
         result = self.datapath(inner, operands)
         m.submodules.datapath = EnableInserter(advance)(inner)
-        m.d.comb += advance.eq(skid_buffer(m, self.o, self._stages[-1], result))
+        drive = skid_buffer if self._skid else hold_output
+        m.d.comb += advance.eq(drive(m, self.o, self._stages[-1], result))
         return m
 
     def _wait(self, m: Module, advance: Value, accept: Value) -> Value:
@@ -434,6 +452,10 @@ class PipelinedUnit(wiring.Component):
                 stays.eq(Cat(accept, self._stages)[:-2].any()),
                 turn.eq(Mux(opens, 0, turn + 1)),
             ]
+        if not self._skid:
+            with m.If(advance):
+                m.d.sync += ready.eq(opens)
+            return ready & advance
         waits = self.o.valid & ~self.o.ready
         m.d.sync += ready.eq(~waits & Mux(advance, opens, turn == 0))
         return ready

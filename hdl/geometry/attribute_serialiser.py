@@ -9,7 +9,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.attribute_serialiser import AttributeSerialiser
 from blysk.golden.geometry.triangles import ATTRIBUTE, ATTRIBUTES, DEPTH
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.core.stream import hold_output, skid_buffer
 
 __all__ = ["AttributeSerialiserUnit", "corner_attributes_shape", "serial_attribute_shape"]
 
@@ -38,6 +38,11 @@ class AttributeSerialiserUnit(wiring.Component):
     the output waits; the next triangle is taken in with the last of them, so that one takes 7 cycles. No
     multipliers.
 
+    Parameters
+    ----------
+    skid : bool
+        Whether the output has a skid buffer; else the unit sees its ready on the same cycle.
+
     Members
     -------
     i : :py:`In(stream.Signature(corner_attributes_shape()))`
@@ -48,7 +53,8 @@ class AttributeSerialiserUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    def __init__(self):
+    def __init__(self, skid: bool = True):
+        self._drive = skid_buffer if skid else hold_output
         super().__init__(
             {
                 "i": In(stream.Signature(corner_attributes_shape())),
@@ -67,7 +73,7 @@ class AttributeSerialiserUnit(wiring.Component):
         valid, result = Signal(name="valid"), Signal(self.o.payload.shape(), name="result")
         least = self._least(m, corners)
         m.d.comb += [
-            advance.eq(skid_buffer(m, self.o, valid, result)),
+            advance.eq(self._drive(m, self.o, valid, result)),
             self.i.ready.eq((step == 0) | ((step == 7) & advance)),
         ]
         shifts = step >= 4

@@ -1,5 +1,7 @@
 """Depth test: the depth of every pixel of spans, and which of them are in front of what came before."""
 
+from itertools import pairwise
+
 from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.memory import Memory
@@ -58,8 +60,9 @@ class DepthMemory(wiring.Signature):
 class DepthTestUnit(wiring.Component):
     """Drops pixels behind what was drawn before: `DepthTest` is the bit-accurate model.
 
-    A pixel is taken in on each cycle, and leaves 3 cycles later if it is drawn. Those of the last two cycles
-    that stand at the same place count though the memory does not have them yet. No multipliers.
+    A pixel is taken in on each cycle, and leaves `latency` cycles later if it is drawn: 3, or 4 where the
+    memory is elsewhere, whose words go to a register first. Those of the last two or three cycles that stand
+    at the same place count though the memory does not have them yet. No multipliers.
 
     Parameters
     ----------
@@ -88,10 +91,9 @@ class DepthTestUnit(wiring.Component):
     Source: docs/theory/geometry.md#depth; not in the documents.
     """
 
-    latency = 3
-
     def __init__(self, x_bits: int = 12, y_bits: int = 12, size: tuple[int, int] | None = None):
         self.x_bits, self.y_bits, self.size = x_bits, y_bits, size
+        self.latency = 3 if size else 4
         members = {
             "i": In(stream.Signature(deep_pixel_shape(x_bits, y_bits))),
             "o": Out(stream.Signature(drawn_pixel_shape(x_bits, y_bits))),
@@ -111,10 +113,11 @@ class DepthTestUnit(wiring.Component):
         if self.size:
             self._remember(m)
         advance, accept = Signal(name="advance"), Signal(name="accept")
-        stages = [Signal(self.o.payload.shape(), name=f"pixel_{k}") for k in range(3)]
-        valid = [Signal(name=f"valid_{k}") for k in range(3)]
+        last = self.latency - 1
+        stages = [Signal(self.o.payload.shape(), name=f"pixel_{k}") for k in range(self.latency)]
+        valid = [Signal(name=f"valid_{k}") for k in range(self.latency)]
         m.d.comb += [
-            advance.eq(skid_buffer(m, self.o, valid[2], stages[2])),
+            advance.eq(skid_buffer(m, self.o, valid[last], stages[last])),
             self.i.ready.eq(advance),
             accept.eq(self.i.valid & advance),
         ]
@@ -132,33 +135,46 @@ class DepthTestUnit(wiring.Component):
 
         code = total.as_signed() >> SPAN_DEPTH.fraction_bits
         depth = Mux(code < 0, 0, Mux(code > DepthTest.FARTHEST, DepthTest.FARTHEST, code))
-        there, drawn = Signal(DEPTH.width, name="there"), Signal(name="drawn")
-        # Written a clock after the read, or on the clock of the read.
-        late = [(valid[2], stages[2]), (Signal(name="before_valid"), Signal.like(stages[2], name="before"))]
-        m.d.comb += [there.eq(port.read_data), drawn.eq(valid[1] & (stages[1].depth < there))]
+        nearer, drawn = Signal(name="nearer"), Signal(name="drawn")
+        # Written after the read, or on the clock of the read.
+        late = [(valid[last], stages[last])] + [
+            (Signal(name=f"before_valid_{k}"), Signal.like(stages[last], name=f"before_{k}"))
+            for k in range(last - 1)
+        ]
+        judged, there = stages[last - 1], port.read_data
+        if not self.size:
+            there = Signal.like(port.read_data, name="there")
+            with m.If(advance):
+                m.d.sync += there.eq(port.read_data)
+        # Compared before it is known which counts: the memory's word comes late.
+        m.d.comb += [nearer.eq(judged.depth < there), drawn.eq(valid[last - 1] & nearer)]
         for written, pixel in reversed(late):
-            with m.If(written & (_place(pixel) == _place(stages[1]))):
-                m.d.comb += there.eq(pixel.depth)
+            with m.If(written & (_place(pixel) == _place(judged))):
+                m.d.comb += nearer.eq(judged.depth < pixel.depth)
         with m.If(advance):
             m.d.sync += [
                 valid[0].eq(accept),
                 *(stages[0][name].eq(incoming.pixel[name]) for name in "xyrgb"),
-                valid[1].eq(valid[0]),
-                stages[1].eq(stages[0]),
+                *(to.eq(pixel) for pixel, to in pairwise(stages)),
+                *(to.eq(passes) for passes, to in pairwise(valid)),
                 stages[1].depth.eq(depth),
-                valid[2].eq(drawn),
-                stages[2].eq(stages[1]),
-                late[1][0].eq(valid[2]),
-                late[1][1].eq(stages[2]),
+                valid[last].eq(drawn),
+                *(
+                    to.eq(word)
+                    for earlier, later in pairwise(late)
+                    for word, to in zip(earlier, later, strict=True)
+                ),
             ]
         m.d.comb += [
             port.read_enable.eq(advance),
-            port.write_enable.eq(advance & valid[2]),
-            port.write_data.eq(stages[2].depth),
+            port.write_enable.eq(advance & valid[last]),
+            port.write_data.eq(stages[last].depth),
             *(port.read_place[name].eq(stages[0][name]) for name in "xy"),
-            *(port.write_place[name].eq(stages[2][name]) for name in "xy"),
+            *(port.write_place[name].eq(stages[last][name]) for name in "xy"),
         ]
-        count_events(m, self.status, pixels=advance & valid[1], hidden=advance & valid[1] & ~drawn)
+        count_events(
+            m, self.status, pixels=advance & valid[last - 1], hidden=advance & valid[last - 1] & ~drawn
+        )
         return m
 
     def _remember(self, m: Module) -> None:

@@ -11,7 +11,7 @@ from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.geometry.span_attributes import pieces_shape, span_words_shape
 from blysk.hdl.geometry.triangles import count_events, counters_shape
-from blysk.hdl.geometry.vector_normaliser import VectorNormaliserUnit
+from blysk.hdl.geometry.vector_normaliser import SharedVectorNormaliserUnit, VectorNormaliserUnit
 
 __all__ = ["EdgeNormalsUnit", "true_spans_shape"]
 
@@ -30,10 +30,15 @@ class EdgeNormalsUnit(wiring.Component):
     was taken in, and a cycle later for each further normal. Six multipliers, those of
     `VectorNormaliserUnit`.
 
+    In the *compact* style a normal takes `COMPACT_INTERVAL` cycles, by two multipliers, and the span's words
+    stay in the FIFO until it is taken.
+
     Parameters
     ----------
     parameters : EdgeNormals
         Bit-accurate model.
+    compact : bool
+        The compact style.
 
     Members
     -------
@@ -47,9 +52,17 @@ class EdgeNormalsUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
 
-    def __init__(self, parameters: EdgeNormals | None = None):
-        self.parameters = parameters or EdgeNormals()
-        self._normaliser = VectorNormaliserUnit(self.parameters.normaliser)
+    COMPACT_INTERVAL = 3
+
+    def __init__(self, parameters: EdgeNormals | None = None, compact: bool = False):
+        self.parameters, self.compact = parameters or EdgeNormals(), compact
+        given = self.parameters.normaliser
+        self._normaliser = (
+            SharedVectorNormaliserUnit(given, self.COMPACT_INTERVAL)
+            if compact
+            else VectorNormaliserUnit(given)
+        )
+        self.multipliers = self._normaliser.multipliers
         self.latency = self._normaliser.latency + 2
         super().__init__(
             {
@@ -64,11 +77,11 @@ class EdgeNormalsUnit(wiring.Component):
         m = Module()
         m.submodules.normaliser = normaliser = self._normaliser
         rest_shape = _rest_shape()
-        m.submodules.rest = rest = fifo.SyncFIFOBuffered(
-            width=rest_shape.as_shape().width, depth=normaliser.latency + 4
-        )
+        inside = normaliser.latency // normaliser.initiation_interval
+        m.submodules.rest = rest = fifo.SyncFIFOBuffered(width=rest_shape.as_shape().width, depth=inside + 4)
         self._send(m, normaliser, rest)
-        repaired = self._collect(m, normaliser, data.View(rest_shape, rest.r_data), rest)
+        collect = self._collect_in_place if self.compact else self._collect
+        repaired = collect(m, normaliser, data.View(rest_shape, rest.r_data), rest)
         count_events(m, self.status, repaired=repaired)
         return m
 
@@ -81,7 +94,7 @@ class EdgeNormalsUnit(wiring.Component):
             last.eq(turn == Mux(piece.length > 2, 2, piece.length - 1)),
             normaliser.i.valid.eq(busy & ((turn != 0) | rest.w_rdy)),
             moves.eq(normaliser.i.valid & normaliser.i.ready),
-            self.i.ready.eq(~busy | (moves & last)),
+            self.i.ready.eq(~busy if self.compact else ~busy | (moves & last)),
             rest.w_en.eq(moves & (turn == 0)),
             rest.w_data.eq(
                 Cat(*(Value.cast(piece[name]) for name in ("left", "right", *span_words_shape())))
@@ -97,6 +110,8 @@ class EdgeNormalsUnit(wiring.Component):
             m.d.sync += [busy.eq(self.i.valid), turn.eq(0), piece.eq(self.i.payload)]
         with m.Elif(moves):
             m.d.sync += turn.eq(turn + 1)
+            if self.compact:
+                m.d.sync += busy.eq(~last)
 
     def _collect(self, m: Module, normaliser, words, rest) -> Value:
         """Normals as they come, a lost one replaced by the one before; whether one was, on this cycle."""
@@ -128,6 +143,35 @@ class EdgeNormalsUnit(wiring.Component):
                 result.line_right.eq(words.right),
                 *(result[name].eq(words[name]) for name in span_words_shape()),
             ]
+        return moves & lost
+
+    def _collect_in_place(self, m: Module, normaliser, words, rest) -> Value:
+        """The same where a span leaves from the registers of its normals, and its words from the FIFO."""
+        valid, result = Signal(name="valid"), self.o.payload
+        good = Signal(normal_shape(), name="good", init=_init())
+        left, right = (Signal(normal_shape(), name=name) for name in ("left_normal", "right_normal"))
+        turn, last, moves = Signal(2, name="turn"), Signal(name="last_normal"), Signal(name="takes")
+        lost = normaliser.o.payload.lost
+        normal = Signal(normal_shape(), name="normal")
+        m.d.comb += [
+            last.eq(turn == Mux(words.length > 2, 2, words.length - 1)),
+            normaliser.o.ready.eq(~valid & rest.r_rdy),
+            moves.eq(normaliser.o.valid & normaliser.o.ready),
+            rest.r_en.eq(self.o.valid & self.o.ready),
+            Value.cast(normal).eq(Mux(lost, Value.cast(good), Value.cast(normaliser.o.payload.normal))),
+            self.o.valid.eq(valid),
+            *(result.normal_left.eq(left), result.normal_middle.eq(good), result.normal_right.eq(right)),
+            *(result.line_left.eq(words.left), result.line_right.eq(words.right)),
+            *(result[name].eq(words[name]) for name in span_words_shape()),
+        ]
+        with m.If(moves):
+            m.d.sync += [good.eq(normal), turn.eq(Mux(last, 0, turn + 1)), valid.eq(last)]
+            with m.If(turn == 0):
+                m.d.sync += left.eq(normal)
+            with m.If(~turn[1]):
+                m.d.sync += right.eq(normal)
+        with m.Elif(rest.r_en):
+            m.d.sync += valid.eq(0)
         return moves & lost
 
 

@@ -86,6 +86,8 @@ class EdgeSetupUnit(PipelinedUnit):
     initiation_interval : int or None
         Cycles from a triangle to the next at the closest; ``None``: the least, `least_interval`, which is 16
         for three dividers of two bits, 67 for one of one.
+    skid : bool
+        As `PipelinedUnit` has it.
 
     Raises
     ------
@@ -108,6 +110,7 @@ class EdgeSetupUnit(PipelinedUnit):
         dividers: int = 3,
         bits_per_cycle: int = 2,
         initiation_interval: int | None = None,
+        skid: bool = True,
     ):
         if dividers not in (1, 3):
             raise ValueError(f"dividers must be 1 or 3, not {dividers!r}")
@@ -133,6 +136,7 @@ class EdgeSetupUnit(PipelinedUnit):
             edges_shape(grid),
             latency=last + 2,
             initiation_interval=interval,
+            skid=skid,
         )
 
     def datapath(self, m, operands):

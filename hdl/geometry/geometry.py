@@ -7,13 +7,14 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.triangles import ATTRIBUTES, GRID, Grid
+from blysk.hdl.core.single_register import connect_register
 from blysk.hdl.core.stream import connect, connect_fifo, moving
 from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit, serial_attribute_shape
 from blysk.hdl.geometry.edge_normals import EdgeNormalsUnit, true_spans_shape
 from blysk.hdl.geometry.edge_setup import EdgeSetupUnit
 from blysk.hdl.geometry.edge_walk import EdgeWalkUnit, walk_shape
 from blysk.hdl.geometry.gradient_setup import GradientSetupUnit
-from blysk.hdl.geometry.plane_assembler import PlaneAssemblerUnit, planes_shape
+from blysk.hdl.geometry.plane_assembler import PlaneAssemblerUnit, plane_shape, planes_shape
 from blysk.hdl.geometry.plane_setup import PlaneSetupUnit, scales_shape
 from blysk.hdl.geometry.span_adapter import LineAdapterUnit, line_spans_shape
 from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
@@ -46,6 +47,9 @@ _SORTED = 17
 _SCALES = 4
 """Triangles whose scales wait for their attributes."""
 
+_COMPACT_GRADIENT = 12
+"""Cycles from an attribute to the next in the compact style: as many as it has products."""
+
 _INSIDE_BITS = 10
 """Bits of the difference of two counters: more than triangles are inside at most."""
 
@@ -64,18 +68,20 @@ class _TriangleSetup(wiring.Component):
     """
 
     def __init__(self, grid: Grid, compact: bool, cuts: bool):
-        self._serialiser = AttributeSerialiserUnit()
-        self._edges = EdgeSetupUnit(grid, *((1, 1) if compact else (3, 2)))
-        self.interval = interval = self._edges.initiation_interval
-        self._planes = PlaneSetupUnit(grid, interval)
-        self._gradients = GradientSetupUnit(12 if compact else interval // ATTRIBUTES)
-        self._assembler = PlaneAssemblerUnit(PlaneAssembler(cuts=cuts))
+        self._compact, skid = compact, not compact
+        self._serialiser = AttributeSerialiserUnit(skid)
+        self._edges = EdgeSetupUnit(grid, 1 if compact else 3, 2, skid=skid)
+        interval = self._edges.initiation_interval
+        self._planes = PlaneSetupUnit(grid, interval, skid)
+        self._gradients = GradientSetupUnit(_COMPACT_GRADIENT if compact else interval // ATTRIBUTES, skid)
+        self.interval = max(interval, ATTRIBUTES * self._gradients.initiation_interval)
+        self._assembler = PlaneAssemblerUnit(PlaneAssembler(cuts=cuts), serial=compact)
         self.multipliers = self._planes.multipliers + self._gradients.multipliers
         super().__init__(
             {
                 "i": In(stream.Signature(sorted_triangle_shape(grid))),
                 "walks": Out(stream.Signature(walk_shape(grid))),
-                "planes": Out(stream.Signature(planes_shape())),
+                "planes": Out(stream.Signature(plane_shape() if compact else planes_shape())),
                 "constants": In(frame_shape()),
                 "sliver": Out(1),
             }
@@ -100,13 +106,21 @@ class _TriangleSetup(wiring.Component):
         _fork(m, edges.o, corners, walks)
         for to in (corners.payload, walks.payload):
             m.d.comb += [to[name].eq(edges.o.payload[name]) for name in to.shape().members]
-        connect_fifo(m, "waiting_corners", corners, planes.i, depth=3)
-        connect_fifo(m, "waiting_walks", walks, wiring.flipped(self.walks), depth=inside)
+        if self._compact:
+            # Registers end the chain of readies from the assembler to the sort.
+            connect_register(m, "waiting_corners", corners, planes.i)
+            connect_register(m, "waiting_walk", walks, wiring.flipped(self.walks))
+        else:
+            connect_fifo(m, "waiting_corners", corners, planes.i, depth=3)
+            connect_fifo(m, "waiting_walks", walks, wiring.flipped(self.walks), depth=inside)
 
         ahead = (edges.latency + planes.latency) // self.interval + 3
         attributes, scales = _between("attribute", serialiser.o), _between("scale", planes.o)
         connect_fifo(m, "waiting_attributes", serialiser.o, attributes, depth=ATTRIBUTES * ahead)
-        connect_fifo(m, "waiting_scales", planes.o, scales, depth=_SCALES)
+        if self._compact:
+            connect(m, planes.o, scales)
+        else:
+            connect_fifo(m, "waiting_scales", planes.o, scales, depth=_SCALES)
         to, turn = self._gradients.i, Signal(range(ATTRIBUTES), name="turn")
         moves = to.valid & to.ready
         with m.If(moves):
@@ -129,17 +143,19 @@ class GeometryUnit(wiring.Component):
 
     The units of the room in a row. Corners go to the edges and, one attribute after the other, to a FIFO,
     where they meet the scales of their triangle; edges wait in a FIFO until their planes are there. In the
-    *compact* style one divider finds one quotient bit a cycle, and attributes share a multiplier.
+    *compact* style one divider finds the quotients of all edges, attributes share a multiplier, and on the
+    way along the spans attributes take turns, as do the normals of a span; no FIFO is wider than one of them.
 
     A triangle takes as long as the slowest of its units, while others work on its neighbours:
 
-    - setup: `interval` cycles where it is drawn, 16 or compact 67, with two lanes half of that; 5 to 9 where
+    - setup: `interval` cycles where it is drawn, 16 or compact 48, with two lanes half of that; 5 to 9 where
       it is dropped by the sort;
     - the walk: a cycle for a scanline without pixels in the picture;
     - a span, or a piece of it, of p pixels: as many cycles as ``p - 1`` has bits, but at least 1 for 1 pixel,
-      2 for 2 pixels and 3 for more. Never more than it has pixels.
+      2 for 2 pixels and 3 for more. Never more than it has pixels. In the compact style four for every two
+      of those bits, and for each scanline, and three for each normal.
 
-    The multipliers are `multipliers`: 10, in the compact style 8; without normals 4 and 2; a second lane
+    The multipliers are `multipliers`: 10, in the compact style 5; without normals 4 and 2; a second lane
     has 4, compact 2.
 
     Parameters
@@ -181,12 +197,16 @@ class GeometryUnit(wiring.Component):
         if setups not in (1, 2):
             raise ValueError(f"setups must be 1 or 2, not {setups!r}")
         self.grid, self.compact, self.lines = grid, compact, lines
-        self._sort = VertexSortUnit(grid)
+        self._sort = VertexSortUnit(grid, compact)
         self._lanes = [_TriangleSetup(grid, compact, not lines) for _ in range(setups)]
         self.interval = -(-self._lanes[0].interval // setups)
-        self._attributes, self._walk, self._clip = SpanAttributesUnit(), EdgeWalkUnit(grid), SpanClipUnit()
-        self._normals = LineAdapterUnit() if lines else EdgeNormalsUnit()
-        normaliser = 0 if lines else 6
+        self._attributes, self._walk, self._clip = (
+            SpanAttributesUnit(compact),
+            EdgeWalkUnit(grid),
+            SpanClipUnit(),
+        )
+        self._normals = LineAdapterUnit() if lines else EdgeNormalsUnit(compact=compact)
+        normaliser = 0 if lines else self._normals.multipliers
         self.multipliers = sum(lane.multipliers for lane in self._lanes) + normaliser
         super().__init__(
             {
@@ -221,7 +241,10 @@ class GeometryUnit(wiring.Component):
     def _set_up(self, m: Module) -> tuple[stream.Interface, stream.Interface]:
         """From the sort, through the lanes in turns, to what is walked and to planes."""
         drawn = _between("drawn", self._sort.o)
-        connect_fifo(m, "waiting_triangles", self._sort.o, drawn, depth=_SORTED)
+        if self.compact:
+            connect(m, self._sort.o, drawn)
+        else:
+            connect_fifo(m, "waiting_triangles", self._sort.o, drawn, depth=_SORTED)
         lanes = self._lanes
         if len(lanes) == 1:
             connect(m, drawn, lanes[0].i)
@@ -234,7 +257,8 @@ class GeometryUnit(wiring.Component):
         for name in ("walks", "planes"):
             sources = [getattr(lane, name) for lane in lanes]
             joined = _between(name, sources[0])
-            turn = _turns(m, name, joined, len(lanes))
+            serial = self.compact and name == "planes"
+            turn = _turns(m, name, joined, len(lanes), ATTRIBUTES if serial else 1)
             m.d.comb += [
                 joined.valid.eq(Array(source.valid for source in sources)[turn]),
                 Value.cast(joined.payload).eq(Array(Value.cast(source.payload) for source in sources)[turn]),
@@ -246,14 +270,19 @@ class GeometryUnit(wiring.Component):
     def _walk_planes(self, m: Module, planes: stream.Interface) -> None:
         """Scanlines meet their planes: the first of a triangle waits for them, the others do not."""
         rows, to = self._clip.o, self._attributes.i
-        first = Signal(name="first", init=1)
+        first, ends = Signal(name="first", init=1), 1
         with m.If(rows.valid & rows.ready):
             m.d.sync += first.eq(rows.payload.last)
+        if self.compact:
+            lane = Signal(range(ATTRIBUTES), name="lane")
+            with m.If(to.valid & to.ready):
+                m.d.sync += lane.eq(lane + 1)
+            ends = lane == ATTRIBUTES - 1
         m.d.comb += [
             to.payload.planes.eq(planes.payload),
             to.payload.row.eq(rows.payload),
             to.valid.eq(rows.valid & (planes.valid | ~first)),
-            rows.ready.eq(to.ready & (planes.valid | ~first)),
+            rows.ready.eq(to.ready & (planes.valid | ~first) & ends),
             planes.ready.eq(to.ready & rows.valid & first),
         ]
 
@@ -291,12 +320,12 @@ def _between(name: str, port: stream.Interface) -> stream.Interface:
     return stream.Signature(port.payload.shape()).create(path=(name,))
 
 
-def _turns(m: Module, name: str, moving: stream.Interface, count: int) -> Signal:
-    """Whose turn it is, the next one's with each payload."""
-    turn = Signal(range(count), name=f"turn_of_{name}")
+def _turns(m: Module, name: str, moving: stream.Interface, count: int, each: int = 1) -> Signal:
+    """Whose turn it is, the next one's when so many payloads, a power of two of them, have gone."""
+    passed = Signal(range(count * each), name=f"turn_of_{name}")
     with m.If(moving.valid & moving.ready):
-        m.d.sync += turn.eq(turn + 1)
-    return turn
+        m.d.sync += passed.eq(passed + 1)
+    return passed[each.bit_length() - 1 :]
 
 
 def _fork(m: Module, source: stream.Interface, first: stream.Interface, second: stream.Interface) -> None:

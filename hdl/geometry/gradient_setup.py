@@ -48,6 +48,8 @@ class GradientSetupUnit(PipelinedUnit):
     ----------
     initiation_interval : int
         Cycles from an attribute to the next at the closest, at least 4.
+    skid : bool
+        As `PipelinedUnit` has it.
 
     Raises
     ------
@@ -64,7 +66,7 @@ class GradientSetupUnit(PipelinedUnit):
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    def __init__(self, initiation_interval: int = 4):
+    def __init__(self, initiation_interval: int = 4, skid: bool = True):
         if initiation_interval < 4:
             raise ValueError(f"initiation_interval must be at least 4, not {initiation_interval}")
         self._graph = Dataflow(initiation_interval)
@@ -75,6 +77,7 @@ class GradientSetupUnit(PipelinedUnit):
             gradient_shape(),
             latency=max(word.stage for word in self._results.values()),
             initiation_interval=initiation_interval,
+            skid=skid,
         )
 
     def _describe(self) -> dict:

@@ -12,7 +12,7 @@ from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.geometry.gradient_setup import gradient_shape
 from blysk.hdl.geometry.triangles import frame_shape
 
-__all__ = ["PIECE_BITS", "PlaneAssemblerUnit", "planes_shape"]
+__all__ = ["PIECE_BITS", "PlaneAssemblerUnit", "plane_shape", "planes_shape"]
 
 PIECE_BITS = 4
 """Bits of a piece's exponent."""
@@ -28,6 +28,13 @@ def planes_shape() -> data.StructLayout:
     return data.StructLayout(start | four | {"piece": unsigned(PIECE_BITS)})
 
 
+def plane_shape() -> data.StructLayout:
+    """Shape of one attribute of `planes_shape`, with the exponent of a piece."""
+    words = {name: FixedShape(GradientSetup.FORMAT) for name in _WORDS[1:]}
+    start = {"start": FixedShape(GradientSetup.START_FORMAT)}
+    return data.StructLayout(start | words | {"piece": unsigned(PIECE_BITS)})
+
+
 class PlaneAssemblerUnit(wiring.Component):
     """Collects four gradients, and finds ``piece``: `PlaneAssembler` is the bit-accurate model.
 
@@ -37,29 +44,33 @@ class PlaneAssemblerUnit(wiring.Component):
     after that on; so one each four cycles never waits. No multipliers. Where spans are not cut there is
     neither product nor search.
 
+    *Serial*, it offers the attributes of a triangle one after the other.
+
     Parameters
     ----------
     parameters : PlaneAssembler
         Bit-accurate model.
+    serial : bool
+        Whether attributes are offered one by one.
 
     Members
     -------
     i : :py:`In(stream.Signature(gradient_shape()))`
         Gradients of N/W by component, then of the depth.
     o : :py:`Out(stream.Signature(planes_shape()))`
-        Triangles.
+        Triangles; serial their attributes, in `plane_shape`.
     constants : :py:`In(frame_shape())`
         The frame, of which ``limit`` is read; stays while triangles are inside.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    def __init__(self, parameters: PlaneAssembler | None = None):
-        self.parameters = parameters or PlaneAssembler()
+    def __init__(self, parameters: PlaneAssembler | None = None, serial: bool = False):
+        self.parameters, self.serial = parameters or PlaneAssembler(), serial
         super().__init__(
             {
                 "i": In(stream.Signature(gradient_shape())),
-                "o": Out(stream.Signature(planes_shape())),
+                "o": Out(stream.Signature(plane_shape() if serial else planes_shape())),
                 "constants": In(frame_shape()),
             }
         )
@@ -67,11 +78,13 @@ class PlaneAssemblerUnit(wiring.Component):
     def elaborate(self, platform):
         """Collected words; bound times limit; sum and largest of the sizes; the search."""
         m = Module()
-        gradient, result = self.i.payload, Signal(self.o.payload.shape(), name="result")
+        gradient, result = self.i.payload, Signal(planes_shape(), name="result")
         count, full, accept = Signal(2, name="count"), Signal(name="full"), Signal()
         m.d.comb += [self.i.ready.eq(~full), accept.eq(self.i.valid & ~full)]
+        moves, ends = self.o.valid & self.o.ready, 1
         with m.If(accept):
             m.d.sync += [count.eq(count + 1), full.eq(count == ATTRIBUTES - 1)]
+        with m.If((accept | moves) if self.serial else accept):
             for name in _WORDS:
                 words = [Value.cast(word) for word in result[name]]
                 m.d.sync += [
@@ -84,8 +97,17 @@ class PlaneAssemblerUnit(wiring.Component):
         else:
             found = 1
             m.d.comb += result.piece.eq(PlaneAssembler.LARGEST)
-        m.d.comb += [self.o.valid.eq(full & found), self.o.payload.eq(result)]
-        with m.If(self.o.valid & self.o.ready):
+        m.d.comb += self.o.valid.eq(full & found)
+        if self.serial:
+            m.d.comb += [self.o.payload[name].eq(result[name][0]) for name in _WORDS]
+            m.d.comb += self.o.payload.piece.eq(result.piece)
+            given = Signal(range(ATTRIBUTES), name="given")
+            with m.If(moves):
+                m.d.sync += given.eq(given + 1)
+            ends = given == ATTRIBUTES - 1
+        else:
+            m.d.comb += self.o.payload.eq(result)
+        with m.If(moves & ends):
             m.d.sync += full.eq(0)
         return m
 

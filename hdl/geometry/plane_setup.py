@@ -45,6 +45,8 @@ class PlaneSetupUnit(PipelinedUnit):
         Fraction bits of the coordinates.
     initiation_interval : int
         Cycles from a triangle to the next at the closest, at least 1.
+    skid : bool
+        As `PipelinedUnit` has it.
 
     Members
     -------
@@ -56,7 +58,7 @@ class PlaneSetupUnit(PipelinedUnit):
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    def __init__(self, grid: Grid = GRID, initiation_interval: int = 16):
+    def __init__(self, grid: Grid = GRID, initiation_interval: int = 16, skid: bool = True):
         self.grid = grid
         self._graph = Dataflow(initiation_interval)
         self._results = self._describe()
@@ -66,6 +68,7 @@ class PlaneSetupUnit(PipelinedUnit):
             data.StructLayout(scales_shape() | {"sliver": unsigned(1)}),
             latency=max(word.stage for word in self._results.values()),
             initiation_interval=initiation_interval,
+            skid=skid,
         )
 
     def _describe(self) -> dict:

@@ -1,6 +1,6 @@
 """Span attributes: N/W and depth at both ends of every span, and of every piece of a wide one."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, ValueLike, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -9,8 +9,8 @@ from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_N
 from blysk.golden.geometry.triangles import ATTRIBUTES, MATERIAL_BITS, PIXEL_BITS
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import skid_buffer
-from blysk.hdl.geometry.plane_assembler import planes_shape
+from blysk.hdl.core.stream import hold_output, skid_buffer
+from blysk.hdl.geometry.plane_assembler import plane_shape, planes_shape
 from blysk.hdl.geometry.span_clip import clipped_rows_shape
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 
@@ -18,10 +18,16 @@ __all__ = ["SpanAttributesUnit", "pieces_shape", "planes_rows_shape", "span_word
 
 _BITS = GradientSetup.FORMAT.width
 
+_WORDS = ("start", "short", "long", "inward")
 
-def planes_rows_shape() -> data.StructLayout:
-    """Shape of a scanline with its triangle's planes, which are read with the triangle's first."""
-    return data.StructLayout({"planes": planes_shape(), "row": clipped_rows_shape()})
+
+def planes_rows_shape(serial: bool = False) -> data.StructLayout:
+    """Shape of a scanline with its triangle's planes, which are read with the triangle's first.
+
+    *Serial*: with one of the planes; the scanline comes once for each.
+    """
+    planes = plane_shape() if serial else planes_shape()
+    return data.StructLayout({"planes": planes, "row": clipped_rows_shape()})
 
 
 def span_words_shape() -> dict:
@@ -47,9 +53,19 @@ class SpanAttributesUnit(wiring.Component):
     offered `latency` cycles after its scanline was taken in. No multipliers: additions of shifted steps,
     modulo 4.
 
+    *Serial*, one attribute after the other goes through the same adders, and its words through rings of
+    registers: a scanline takes four cycles, and so does a piece for every two bits of its pixels and of those
+    cut off. A scanline is given four times, each time with another attribute's plane, and the output's ready
+    goes through to the input's.
+
+    Parameters
+    ----------
+    serial : bool
+        Whether attributes take turns.
+
     Members
     -------
-    i : :py:`In(stream.Signature(planes_rows_shape()))`
+    i : :py:`In(stream.Signature(planes_rows_shape(serial)))`
         Scanlines; the planes are read with a triangle's first one, which follows another's last.
     o : :py:`Out(stream.Signature(pieces_shape()))`
         Pieces.
@@ -64,12 +80,11 @@ class SpanAttributesUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
 
-    latency = 3
-
-    def __init__(self):
+    def __init__(self, serial: bool = False):
+        self.serial, self.latency = serial, 6 if serial else 3
         super().__init__(
             {
-                "i": In(stream.Signature(planes_rows_shape())),
+                "i": In(stream.Signature(planes_rows_shape(serial))),
                 "o": Out(stream.Signature(pieces_shape())),
                 "status": Out(counters_shape("empty", "cut")),
             }
@@ -81,94 +96,92 @@ class SpanAttributesUnit(wiring.Component):
         m = Module()
         row, planes = self.i.payload.row, self.i.payload.planes
         first, drawn = Signal(name="first", init=1), Signal(name="drawn")
-        busy, free, accept, loads = (Signal(name=name) for name in ("busy", "free", "accept", "loads"))
+        busy, accept, loads = (Signal(name=name) for name in ("busy", "accept", "loads"))
         piece, tag = Signal.like(planes.piece, name="piece"), Signal(_tag_shape(), name="tag")
-        m.d.comb += [
-            self.i.ready.eq(free),
-            accept.eq(self.i.valid & free),
-            loads.eq(accept & (row.length != 0)),
-        ]
-        with m.If(accept):
+        pace = _Pace(m, self.i, busy, self.serial)
+        m.d.comb += [accept.eq(self.i.valid & self.i.ready), loads.eq(accept & (row.length != 0))]
+        with m.If(accept & pace.ends):
             m.d.sync += [first.eq(row.last), drawn.eq((row.length != 0) | (drawn & ~first))]
             with m.If(first):
                 m.d.sync += piece.eq(planes.piece)
-        with m.If(loads):
+        with m.If(loads & pace.ends):
             m.d.sync += [tag[name].eq(row[name]) for name in ("y", "right", "flip", "material")]
 
         most = Mux(first, planes.piece, piece)
-        along = _Along(m, row, tag, most, piece, loads)
-        found = Signal(self._found_shape(), name="found")
-        for k in range(ATTRIBUTES):
-            base, inward = self._down(m, k, accept, first, row, planes)
+        along = _Along(m, row, tag, most, piece, loads, busy, pace)
+        count = 1 if self.serial else ATTRIBUTES
+        found = Signal(self._found_shape(count), name="found")
+        for k in range(count):
+            plane = {name: planes[name] if self.serial else planes[name][k] for name in _WORDS}
+            base, inward = self._down(m, k, accept, first, row.carry, plane, pace)
             near, far = along.values(
-                m, f"attribute_{k}", loads, base, Mux(first, _code(planes.inward[k]), inward), inward
+                m, f"attribute_{k}", loads, base, Mux(first, _code(plane["inward"]), inward), inward
             )
-            with m.If(along.advance):
+            with m.If(pace.advance):
                 m.d.sync += [found.near[k].eq(near), found.far[k].eq(far), found.step[k].eq(inward)]
-        m.d.comb += [free.eq(~busy | along.leaves), along.busy.eq(busy)]
-        with m.If(loads):
-            m.d.sync += busy.eq(1)
-        with m.Elif(along.leaves):
-            m.d.sync += busy.eq(0)
+        with m.If(pace.ends):
+            with m.If(loads):
+                m.d.sync += busy.eq(1)
+            with m.Elif(along.leaves):
+                m.d.sync += busy.eq(0)
 
         valid, result, result_valid = (
             Signal(name="found_valid"),
             Signal(self.o.payload.shape(), name="result"),
             Signal(name="result_valid"),
         )
-        m.d.comb += along.advance.eq(skid_buffer(m, self.o, result_valid, result))
-        m.d.comb += self.idle.eq(~(busy | valid | self.o.valid))
-        with m.If(along.advance):
+        drive = hold_output if self.serial else skid_buffer
+        m.d.comb += pace.advance.eq(drive(m, self.o, result_valid, result))
+        m.d.comb += self.idle.eq(~(busy | valid | self.o.valid | pace.lane.any()))
+        with m.If(pace.advance):
             m.d.sync += [
                 valid.eq(along.emits),
                 found.x.eq(along.x),
                 found.length.eq(along.pixels + 1),
                 found.tag.eq(tag),
-                result_valid.eq(valid),
+                found.ends.eq(pace.ends),
+                result_valid.eq(valid & found.ends),
             ]
-            self._convert(m, found, result)
+            self._convert(m, valid, found, result)
         count_events(
             m,
             self.status,
-            empty=accept & row.last & (row.length == 0) & (first | ~drawn),
-            cut=along.cuts,
+            empty=accept & pace.ends & row.last & (row.length == 0) & (first | ~drawn),
+            cut=along.cuts & pace.ends,
         )
         return m
 
     @staticmethod
-    def _found_shape() -> data.StructLayout:
-        words = {name: data.ArrayLayout(unsigned(_BITS), ATTRIBUTES) for name in ("near", "far", "step")}
+    def _found_shape(count: int) -> data.StructLayout:
+        words = {name: data.ArrayLayout(unsigned(_BITS), count) for name in ("near", "far", "step")}
         places = {"x": unsigned(PIXEL_BITS), "length": unsigned(PIXEL_BITS)}
-        return data.StructLayout(words | places | {"tag": _tag_shape()})
+        return data.StructLayout(words | places | {"tag": _tag_shape(), "ends": unsigned(1)})
 
     @staticmethod
-    def _down(m: Module, k: int, accept, first, row, planes) -> tuple[Value, Signal]:
+    def _down(m: Module, k: int, accept, first, carry, plane, pace) -> tuple[Value, Value]:
         """An attribute's value at the long edge's pixel, and its step along a scanline."""
         short, long, inward, edge = (
-            Signal(_BITS, name=f"{name}_{k}") for name in ("short", "long", "inward", "edge")
+            _Kept(m, f"{name}_{k}", pace) for name in ("short", "long", "inward", "edge")
         )
         steps = [
-            Mux(first, _code(planes[name][k]), kept) for name, kept in (("short", short), ("long", long))
+            Mux(first, _code(plane[name]), kept.value) for name, kept in (("short", short), ("long", long))
         ]
         start = Cat(
             Const(0, GradientSetup.FORMAT.fraction_bits - GradientSetup.START_FORMAT.fraction_bits),
-            Value.cast(planes.start[k]),
+            Value.cast(plane["start"]),
         )
-        base = Mux(first, start, edge)
+        base = Mux(first, start, edge.value)
         with m.If(accept):
-            m.d.sync += edge.eq(base + Mux(row.carry, steps[1], steps[0]))
+            edge.becomes(m, base + Mux(carry, steps[1], steps[0]))
             with m.If(first):
-                m.d.sync += [
-                    kept.eq(_code(planes[name][k]))
-                    for name, kept in (("short", short), ("long", long), ("inward", inward))
-                ]
-        return base, inward
+                for name, kept in (("short", short), ("long", long), ("inward", inward)):
+                    kept.becomes(m, _code(plane[name]))
+        return base, inward.value
 
-    @staticmethod
-    def _convert(m: Module, found, result) -> None:
+    def _convert(self, m: Module, valid: Signal, found, result) -> None:
         """Left and right from near and far; components cut, the depth moved, all saturated."""
-        right = found.tag.right
-        for k in range(ATTRIBUTES):
+        right, components = found.tag.right, ATTRIBUTES - 1
+        for k in range(len(found.near)):
             near, far = (
                 FixedValue(GradientSetup.FORMAT, Value.cast(word[k]).as_signed())
                 for word in (found.near, found.far)
@@ -178,13 +191,20 @@ class SpanAttributesUnit(wiring.Component):
                 for a, b in ((far, near), (near, far))
             )
             for name, depth, value in (("left", "depth", left_end), ("right", "depth_last", right_end)):
-                if k < ATTRIBUTES - 1:
-                    cut = value.truncate(SPAN_NORMAL.fraction_bits).saturate(SPAN_NORMAL)
+                cut = value.truncate(SPAN_NORMAL.fraction_bits).saturate(SPAN_NORMAL)
+                if self.serial:
+                    words = [Value.cast(word) for word in result[name]]
+                    with m.If(valid & ~found.ends):
+                        m.d.sync += [
+                            word.eq(other)
+                            for word, other in zip(words, [*words[1:], Value.cast(cut)], strict=True)
+                        ]
+                elif k < components:
                     m.d.sync += result[name][k].eq(cut)
-                else:
+                if self.serial or k == components:
                     code = Value.cast(value.saturate(SQ(1, GradientSetup.FORMAT.fraction_bits)))
                     m.d.sync += Value.cast(result[depth]).eq(Cat(code[:-1], ~code[-1]))
-        step = Value.cast(found.step[ATTRIBUTES - 1])
+        step = Value.cast(found.step[len(found.step) - 1])
         m.d.sync += [
             Value.cast(result.depth_step).eq(Mux(right, -step, step)),
             *(result[name].eq(found[name]) for name in ("x", "length")),
@@ -192,33 +212,96 @@ class SpanAttributesUnit(wiring.Component):
         ]
 
 
+class _Pace:
+    """When the walk goes on, and which attribute's turn it is: all on one cycle, or *serial* on four.
+
+    What is done with the attributes in turns is settled with the first one, and the control moves on with the
+    last one, `ends`.
+    """
+
+    def __init__(self, m: Module, rows: stream.Interface, busy: Signal, serial: bool):
+        self.serial, self.given = serial, rows.valid
+        self.advance, self.leaves = Signal(name="advance"), Signal(name="would_leave")
+        self.lane, self.ends, self.steps = Signal(2, name="lane"), Signal(name="ends"), Signal(name="steps")
+        free, accepts = Signal(name="free"), Signal(name="accepts")
+        m.d.comb += free.eq((~busy | self.leaves) & (~busy | self.advance))
+        if not serial:
+            m.d.comb += [self.ends.eq(1), self.steps.eq(1), rows.ready.eq(free)]
+            return
+        taken, first = Signal(name="taken"), self.lane == 0
+        m.d.comb += [
+            rows.ready.eq((first | taken) & free),
+            accepts.eq(Mux(first, rows.valid & (~busy | self.leaves), taken)),
+            self.steps.eq((~busy | self.advance) & (busy | accepts) & (~accepts | rows.valid)),
+            self.ends.eq(self.lane == ATTRIBUTES - 1),
+        ]
+        with m.If(self.steps):
+            m.d.sync += [self.lane.eq(self.lane + 1), taken.eq(accepts)]
+
+
+class _Kept:
+    """A word of an attribute; *serial* of all of them, in a ring that turns with every step."""
+
+    def __init__(self, m: Module, name: str, pace: _Pace):
+        self.value = self._next = Signal(_BITS, name=name)
+        self._domain = "sync"
+        if pace.serial:
+            self._next, self._domain = Signal(_BITS, name=f"{name}_next"), "comb"
+            m.d.comb += self._next.eq(self.value)
+            ring = [self.value, *(Signal(_BITS, name=f"{name}_{k}") for k in range(1, ATTRIBUTES))]
+            with m.If(pace.steps):
+                m.d.sync += [
+                    word.eq(other) for word, other in zip(ring, [*ring[1:], self._next], strict=True)
+                ]
+
+    def becomes(self, m: Module, value: ValueLike) -> None:
+        """Take another value; until then it stands."""
+        m.d[self._domain] += self._next.eq(value)
+
+
 class _Along:
     """Control of the walk along a scanline: pixels to skip, then pieces, a bit of each number a cycle."""
 
-    def __init__(self, m: Module, row, tag, most: Value, piece: Signal, loads: Signal):
+    def __init__(self, m: Module, row, tag, most: Value, piece: Signal, loads: Signal, busy: Signal, pace):
         # What is left of the span less one pixel, of which a piece takes part; bits of the walk.
         left, bits = Signal(PIXEL_BITS, name="left"), Signal(PIXEL_BITS, name="bits")
         self.pixels, begin = Signal(PIXEL_BITS, name="pixels"), Signal(PIXEL_BITS, name="begin")
-        self.advance, self.busy = Signal(name="advance"), Signal(name="walks")
+        self.pace = pace
         self.emits, self.leaves, self.cuts = (Signal(name=name) for name in ("emits", "leaves", "cuts"))
         self.skipping, whole = Signal(name="skipping"), Signal(name="whole")
-        self.moves, self.ends, self.bit = (Signal(name=name) for name in ("moves", "ends", "bit"))
-        self.single = Signal(name="single")
+        self.moves, self.ends = (Signal(name=name) for name in ("moves", "ends"))
+        radix = 2 if pace.serial else 1
+        self.digit = Signal(radix, name="digit")
+        self.single, self.double = Signal(name="single"), Signal(name="double")
         m.d.comb += [
-            self.bit.eq(bits[0]),
-            self.ends.eq(~bits[1:].any()),
-            self.moves.eq(self.busy & self.advance),
+            self.digit.eq(bits[:radix]),
+            self.ends.eq(~bits[radix:].any()),
+            self.moves.eq(busy & pace.advance & pace.steps),
+            pace.leaves.eq(self.ends & ~self.skipping & ~whole),
             self.emits.eq(self.moves & self.ends & ~self.skipping),
             self.leaves.eq(self.emits & ~whole),
             self.single.eq(piece == 0),
+            # The last of a whole piece's steps is of one bit, or of two.
+            self.double.eq(~piece[0] & (piece != 0) if pace.serial else 0),
         ]
         # A piece that is whole and not the last has 2^piece pixels.
         after = (left - (1 << piece))[:PIXEL_BITS]
         count, size = row.length - 1, Mux(self.skipping, left, after)
-        mine, its = _piece(count[:PIXEL_BITS], most), _piece(size, piece)
+        its = _piece(size, piece)
+        if pace.serial:
+            # The scanline comes three times before it is taken.
+            waiting, size = Signal(PIXEL_BITS, name="waiting"), Signal(len(most), name="waiting_piece")
+            length, more = Signal(PIXEL_BITS, name="waiting_pixels"), Signal(name="waiting_more")
+            with m.If(pace.given):
+                m.d.sync += [waiting.eq(count), size.eq(most)]
+            mine = _piece(waiting, size)
+            m.d.sync += [length.eq(mine[0]), more.eq(mine[1])]
+            count, mine = waiting, (length, more)
+        else:
+            mine = _piece(count[:PIXEL_BITS], most)
         first = Signal(name="first_piece")
         m.d.comb += self.cuts.eq(self.emits & whole & first)
-        with m.If(loads):
+        with m.If(loads & pace.ends):
             m.d.sync += [
                 left.eq(count),
                 begin.eq(row.x),
@@ -228,9 +311,9 @@ class _Along:
                 whole.eq(mine[1]),
                 first.eq(1),
             ]
-        with m.Elif(self.moves):
+        with m.Elif(self.moves & pace.ends):
             with m.If(~self.ends):
-                m.d.sync += bits.eq(bits >> 1)
+                m.d.sync += bits.eq(bits >> radix)
             with m.Else():
                 m.d.sync += [bits.eq(its[0]), self.pixels.eq(its[0]), whole.eq(its[1]), self.skipping.eq(0)]
                 with m.If(~self.skipping):
@@ -241,17 +324,22 @@ class _Along:
 
     def values(self, m: Module, name: str, loads, base, inward, kept) -> tuple[Value, Value]:
         """Values of an attribute at the piece's ends; ``inward`` is its step, once loaded ``kept``."""
-        near, total, step = (Signal(_BITS, name=f"{name}_{word}") for word in ("near", "total", "step"))
-        far = (total + Mux(self.bit, step, 0))[:_BITS]
-        following = (near + Mux(self.single, step, step << 1))[:_BITS]
+        nears, totals, steps = (_Kept(m, f"{name}_{word}", self.pace) for word in ("near", "total", "step"))
+        near, total, step = nears.value, totals.value, steps.value
+        far = (total + sum(Mux(bit, step << k, 0) for k, bit in enumerate(self.digit)))[:_BITS]
+        whole = Mux(self.single, step, Mux(self.double, step << 2, step << 1))
+        following = (near + whole)[:_BITS]
         with m.If(loads):
-            m.d.sync += [near.eq(base), total.eq(base), step.eq(inward)]
+            for word, value in ((nears, base), (totals, base), (steps, inward)):
+                word.becomes(m, value)
         with m.Elif(self.moves):
             with m.If(~self.ends):
-                m.d.sync += [total.eq(far), step.eq(step << 1)]
+                totals.becomes(m, far)
+                steps.becomes(m, step << len(self.digit))
             with m.Else():
                 begin = Mux(self.skipping, far, following)
-                m.d.sync += [near.eq(begin), total.eq(begin), step.eq(kept)]
+                for word, value in ((nears, begin), (totals, begin), (steps, kept)):
+                    word.becomes(m, value)
         return near, far
 
 

@@ -1,19 +1,29 @@
 """Vector normaliser: a vector of any length brought to unit length."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data
 from amaranth.lib.memory import Memory
 
 from blysk.golden.geometry.vector_normaliser import VectorNormaliser
 from blysk.golden.number.fixed import SQ
 from blysk.golden.number.unit_vector import COMPONENT, ONE
+from blysk.hdl.core.dataflow import MULTIPLIER_BITS, Dataflow, Word
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.geometry.booth import booth_term
 from blysk.hdl.normals.dot_product import DotProductUnit
 
-__all__ = ["VectorNormaliserUnit"]
+__all__ = ["SharedVectorNormaliserUnit", "VectorNormaliserUnit", "vectors_shape"]
+
+
+def vectors_shape(parameters: VectorNormaliser) -> tuple[data.StructLayout, data.StructLayout]:
+    """Shapes of a vector with whether its unit vector is negated, and of a normal with whether it is lost."""
+    vector = data.ArrayLayout(FixedShape(parameters.format), 3)
+    return (
+        data.StructLayout({"vector": vector, "flip": unsigned(1)}),
+        data.StructLayout({"normal": normal_shape(), "lost": unsigned(1)}),
+    )
 
 
 class VectorNormaliserUnit(PipelinedUnit):
@@ -41,13 +51,8 @@ class VectorNormaliserUnit(PipelinedUnit):
 
     def __init__(self, parameters: VectorNormaliser | None = None):
         self.parameters = parameters or VectorNormaliser()
-        vector = data.ArrayLayout(FixedShape(self.parameters.format), 3)
-        self._dot = DotProductUnit()
-        super().__init__(
-            data.StructLayout({"vector": vector, "flip": unsigned(1)}),
-            data.StructLayout({"normal": normal_shape(), "lost": unsigned(1)}),
-            latency=self._dot.latency + 14,
-        )
+        self._dot, self.multipliers = DotProductUnit(), 6
+        super().__init__(*vectors_shape(self.parameters), latency=self._dot.latency + 14)
 
     def datapath(self, m, operands):
         """Shifted, squared, its factor from the table, scaled."""
@@ -63,18 +68,11 @@ class VectorNormaliserUnit(PipelinedUnit):
         flip = self._delay(m, operands.flip, "flip", at_factor + 3)
         result = Signal(self.o.payload.shape(), name="result")
         m.d.comb += result.lost.eq(self._delay(m, lost, "lost", self.latency - 4))
-        one = FixedValue.constant(SQ(2, 34), 0.5 * COMPONENT.step)
         for k, word in enumerate(late):
             product = self.register(m, self.register(m, e * word, f"product_{k}"), f"scaled_{k}")
             word = self._delay(m, word, f"late_{k}", 2)
             total = self.register(m, word + product, f"total_{k}")
-            code = Value.cast(total)
-            turned = (code[:] ^ flip.replicate(len(code))).as_signed() + flip + Value.cast(one)
-            rounded = turned >> (total.format.fraction_bits - COMPONENT.fraction_bits)
-            clipped = Mux(rounded > ONE, ONE, Mux(rounded < -ONE, -ONE, rounded))
-            m.d.comb += Value.cast(result.normal[k]).eq(
-                self.register(m, clipped[: COMPONENT.width], f"normal_{k}")
-            )
+            m.d.comb += Value.cast(result.normal[k]).eq(self.register(m, _turned(total, flip), f"normal_{k}"))
         return result
 
     def _delay(self, m: Module, value, name: str, cycles: int):
@@ -101,26 +99,21 @@ class VectorNormaliserUnit(PipelinedUnit):
         lost = self.register(m, ~ones[-1], "lost")
         words = []
         for k, code in enumerate(codes):
-            places = bits - COMPONENT.fraction_bits
-            rounded = (code + (1 << (places - 1))) >> places
-            clipped = Mux(rounded > ONE, ONE, Mux(rounded < -ONE, -ONE, rounded))
-            word = self.register(m, clipped[: COMPONENT.width], f"shifted_{k}")
+            word = self.register(m, _component(code, bits), f"shifted_{k}")
             words.append(FixedValue(COMPONENT, word.as_signed()))
         return words, lost
 
     def _factor(self, m: Module, square: FixedValue) -> FixedValue:
         """``e`` of a squared length, 6 cycles later."""
         p, register = self.parameters, self.register
-        s = Value.cast(square.truncate(22))
-        large = s[22:].any()
-        s = Mux(large, s[2:], s)[2:22]
+        s, large = _root_place(square)
         bits = p.OFFSET_FORMAT.width - 1
         segment = register(m, s[bits:], "segment")
         rest = register(m, s[:bits], "rest")
         large = self._delay(m, large, "large", 5)
         c0, c1 = self._coefficients(m, segment)
         # In halves of a step, odd: the half step that the cut leaves out.
-        u = register(m, Cat(Const(1, 1), rest[:-1], ~rest[-1]).as_signed(), "u")
+        u = register(m, _offset(rest), "u")
         # c1 has no sign: a zero above makes its last Booth digit whole.
         digits = Cat(Const(0, 1), Value.cast(c1), Const(0, 2))
         count = (len(Value.cast(c1)) + 2) // 2
@@ -128,21 +121,212 @@ class VectorNormaliserUnit(PipelinedUnit):
         pairs = [register(m, sum(terms[k : k + 2]), f"pair_{k}") for k in range(0, count, 2)]
         c0 = self._delay(m, c0, "c0", 2)
         product = register(m, sum(pairs), "product")
-        point = p.OFFSET_FORMAT.fraction_bits + p.C1_FORMAT.fraction_bits
-        width = p.C0_FORMAT.width
-        f = register(m, (Value.cast(c0) - (product >> (point - p.C0_FORMAT.fraction_bits)))[:width], "f")
-        one = 1 << p.C0_FORMAT.fraction_bits
-        # In steps of 2^-21: f is halved with all its bits.
-        e = FixedValue(SQ(3, 21), Mux(large, f - 2 * one, (f - one) << 1)[:24].as_signed())
-        return register(m, e.round_half_up(17).saturate(p.FACTOR_FORMAT), "e")
+        f = register(m, _root(p, Value.cast(c0), product), "f")
+        return register(m, _excess(p, f, large), "e")
 
     def _coefficients(self, m: Module, segment: Value) -> tuple[FixedValue, FixedValue]:
         """``c0`` and ``c1`` of the segment, a cycle later."""
-        p = self.parameters
-        layout = data.StructLayout({"c0": FixedShape(p.C0_FORMAT), "c1": FixedShape(p.C1_FORMAT)})
-        rows = zip(*(column.values.tolist() for column in p.coefficients), strict=True)
+        layout = _row_shape(self.parameters)
+        rows = zip(*(column.values.tolist() for column in self.parameters.coefficients), strict=True)
         rows = [dict(zip(("c0", "c1"), row, strict=True)) for row in rows]
         m.submodules.roots = table = Memory(shape=layout, depth=len(rows), init=rows)
         port = table.read_port()
         m.d.comb += port.addr.eq(segment)
         return port.data.c0, port.data.c1
+
+
+class SharedVectorNormaliserUnit(PipelinedUnit):
+    """`VectorNormaliserUnit` for vectors a few cycles apart: components take turns, as do the products.
+
+    One shifter and one unit for the last rounding serve the three components; seven multiplications take
+    ``ceil(7 / I)`` multipliers of 18x18 bits, I the initiation interval. The latency, `latency`, follows from
+    the turns.
+
+    Parameters
+    ----------
+    parameters : VectorNormaliser
+        Bit-accurate model.
+    initiation_interval : int
+        Cycles from a vector to the next at the closest, at least 3.
+
+    Raises
+    ------
+    ValueError
+        If the interval is too short.
+
+    Members
+    -------
+    i, o
+        As `VectorNormaliserUnit` has them.
+
+    Source: docs/theory/geometry.md#normals; not in the documents.
+    """
+
+    def __init__(self, parameters: VectorNormaliser | None = None, initiation_interval: int = 4):
+        if initiation_interval < 3:
+            raise ValueError(f"initiation_interval must be at least 3, not {initiation_interval}")
+        self.parameters = parameters or VectorNormaliser()
+        self._graph = Dataflow(initiation_interval)
+        self._results = self._describe()
+        self.multipliers = self._graph.multiplier.count
+        super().__init__(
+            *vectors_shape(self.parameters),
+            latency=max(word.stage for word in self._results.values()),
+            initiation_interval=initiation_interval,
+        )
+
+    def _describe(self) -> dict[str, Word]:
+        """Words of the results."""
+        g, p = self._graph, self.parameters
+        vector, flip = (g.input(name, lambda o, name=name: o[name]) for name in ("vector", "flip"))
+        places = self._places(vector)
+        shifter = self._shifter()
+        words = [
+            g.use(
+                shifter,
+                f"shifted_{k}",
+                (vector, places),
+                lambda v, places, k=k: (Value.cast(v[k]), places[:4]),
+                lambda code: FixedValue(COMPONENT, code[: COMPONENT.width].as_signed()),
+            )
+            for k in range(3)
+        ]
+        squares = [g.multiply(f"square_{k}", word, word) for k, word in enumerate(words)]
+        partial = g.register("partial_sum", lambda a, b: a + b, *squares[:2])
+        square = g.register("sum", lambda a, b: a + b, partial, squares[2])
+        offset_bits = p.OFFSET_FORMAT.width - 1
+        place = g.register("place", lambda s: Cat(*_root_place(s)), square)
+        segment = g.wire("segment", lambda s: s[offset_bits : offset_bits + p.SEGMENT_BITS], place)
+        c0, c1 = (column.codes.tolist() for column in p.coefficients)
+        low = p.C0_FORMAT.width
+        table = [a | b << low for a, b in zip(c0, c1, strict=True)]
+        row = g.look_up("roots", table, _row_shape(p).size, segment)
+        slope = g.multiply(
+            "slope",
+            row,
+            place,
+            lambda row: FixedValue(p.C1_FORMAT, row[low:]),
+            lambda place: FixedValue(p.OFFSET_FORMAT, _offset(place[:offset_bits])),
+        )
+        f = g.register("f", lambda row, slope: _root(p, row[:low], Value.cast(slope)), row, slope)
+        e = g.register("e", lambda f, place: _excess(p, f, place[-1]), f, place)
+        scaled = [g.multiply(f"scaled_{k}", e, word) for k, word in enumerate(words)]
+        product = p.FACTOR_FORMAT * COMPONENT
+        last = self._last(product)
+        normals = [
+            g.use(last, f"normal_{k}", (*pair, flip), lambda a, b, flip: (Value.cast(a), Value.cast(b), flip))
+            for k, pair in enumerate(zip(scaled, words, strict=True))
+        ]
+        lost = g.wire("lost", lambda places: ~places[4], places)
+        return {"lost": lost} | {f"normal_{k}": normal for k, normal in enumerate(normals)}
+
+    def _places(self, vector: Word) -> Word:
+        """Places of the shift, and whether a first bit is found with them."""
+        g, bits = self._graph, self.parameters.format.width - 1
+
+        def ones(v):
+            codes = [Value.cast(component).as_signed() for component in v]
+            found = [code[:bits] ^ code[-1].replicate(bits) for code in codes]
+            return found[0] | found[1] | found[2]
+
+        def moved(word, steps):
+            empties = []
+            for step in steps:
+                empty = ~word[-step:].any()
+                word = Mux(empty, word << step, word)[:bits]
+                empties.append(empty)
+            return word, empties
+
+        def coarse(word):
+            word, (eight, four) = moved(word, (8, 4))
+            return Cat(word, four, eight)
+
+        def fine(word):
+            word, above = word[:bits], word[bits:]
+            word, (two, one) = moved(word, (2, 1))
+            return Cat(one, two, above, word[-1])
+
+        return g.register("places", fine, g.register("coarse_ones", coarse, g.register("ones", ones, vector)))
+
+    def _shifter(self):
+        """Left by 0 to 15 places in two registers, then rounded to 18 bits in a third."""
+        width = self.parameters.format.width
+
+        def shift(register, word, amount):
+            coarse = register((word << Cat(Const(0, 2), amount[2:]))[:width].as_signed(), "coarse")
+            fine = register(amount[:2], "fine_amount")
+            shifted = register((coarse << fine)[:width].as_signed(), "shifted")
+            return register(_component(shifted, width - 1), "rounded")
+
+        return self._graph.share("shifter", (signed(width), unsigned(4)), 3, shift)
+
+    def _last(self, format):
+        """``v + e v``, negated or not, rounded: two registers."""
+
+        def last(register, product, word, flip):
+            total = register(FixedValue(COMPONENT, word) + FixedValue(format, product), "total")
+            return register(_turned(total, register(flip, "flip")), "normal")
+
+        operands = signed(format.width), signed(MULTIPLIER_BITS), unsigned(1)
+        return self._graph.share("last", operands, 2, last)
+
+    def datapath(self, m, operands):
+        """The graph, read at the age of its last words."""
+        value = self._graph.build(m, self, operands)
+        result = Signal(self.o.payload.shape(), name="result")
+        m.d.comb += [
+            result.lost.eq(value(self._results["lost"], self.latency)),
+            *(
+                Value.cast(result.normal[k]).eq(value(self._results[f"normal_{k}"], self.latency))
+                for k in range(3)
+            ),
+        ]
+        return result
+
+
+def _row_shape(p: VectorNormaliser) -> data.StructLayout:
+    return data.StructLayout({"c0": FixedShape(p.C0_FORMAT), "c1": FixedShape(p.C1_FORMAT)})
+
+
+def _clipped(code: Value) -> Value:
+    """A component from -ONE to ONE."""
+    return Mux(code > ONE, ONE, Mux(code < -ONE, -ONE, code))[: COMPONENT.width]
+
+
+def _component(code: Value, bits: int) -> Value:
+    """A shifted component, of so many bits behind its sign, rounded half up."""
+    places = bits - COMPONENT.fraction_bits
+    return _clipped((code + (1 << (places - 1))) >> places)
+
+
+def _root_place(square: FixedValue) -> tuple[Value, Value]:
+    """``s'``, 20 bits, and whether s is 1 or more."""
+    s = Value.cast(square.truncate(22))
+    large = s[22:].any()
+    return Mux(large, s[2:], s)[2:22], large
+
+
+def _offset(rest: Value) -> Value:
+    """Bits below the segment from its middle: in halves of a step, odd, the half that the cut leaves out."""
+    return Cat(Const(1, 1), rest[:-1], ~rest[-1]).as_signed()
+
+
+def _root(p: VectorNormaliser, c0: Value, product: Value) -> Value:
+    """``f = c0 - c1 u``."""
+    point = p.OFFSET_FORMAT.fraction_bits + p.C1_FORMAT.fraction_bits
+    return (c0 - (product >> (point - p.C0_FORMAT.fraction_bits)))[: p.C0_FORMAT.width]
+
+
+def _excess(p: VectorNormaliser, f: Value, large: Value) -> FixedValue:
+    """``e``, of f in steps of 2^-21: it is halved with all its bits."""
+    one = 1 << p.C0_FORMAT.fraction_bits
+    e = FixedValue(SQ(3, 21), Mux(large, f - 2 * one, (f - one) << 1)[:24].as_signed())
+    return e.round_half_up(17).saturate(p.FACTOR_FORMAT)
+
+
+def _turned(total: FixedValue, flip: Value) -> Value:
+    """A component of the result, negated where ``flip``, rounded half up."""
+    code = Value.cast(total)
+    half = Value.cast(FixedValue.constant(SQ(2, 34), 0.5 * COMPONENT.step))
+    turned = (code[:] ^ flip.replicate(len(code))).as_signed() + flip + half
+    return _clipped(turned >> (total.format.fraction_bits - COMPONENT.fraction_bits))

@@ -41,10 +41,15 @@ class VertexSortUnit(wiring.Component):
     the digits: 3 for boxes of up to 7 scanlines, 4 to 127, 5 to 2047, 6 beyond (of a grid of 8 bits).
     A drawn triangle is offered n + 6 cycles after it was taken in.
 
+    In the *compact* style one triangle is inside, whose corners stand where they were sorted: 5 cycles if its
+    box is empty, else n + 7, or n + 7 and those that it waits to be taken if it is drawn.
+
     Parameters
     ----------
     grid : Grid
         Fraction bits of the coordinates.
+    compact : bool
+        The compact style.
 
     Members
     -------
@@ -60,8 +65,8 @@ class VertexSortUnit(wiring.Component):
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """
 
-    def __init__(self, grid: Grid = GRID):
-        self.grid = grid
+    def __init__(self, grid: Grid = GRID, compact: bool = False):
+        self.grid, self.compact = grid, compact
         super().__init__(
             {
                 "i": In(stream.Signature(triangle_shape(grid))),
@@ -78,7 +83,7 @@ class VertexSortUnit(wiring.Component):
         material, odd = Signal.like(self.i.payload.material), Signal(name="odd")
         two_sided = Signal(name="two_sided")
         covered, leaves, digits = Signal(name="covered"), Signal(name="leaves"), Signal(3, name="digits")
-        free = Signal(name="area_free")
+        free, ends = Signal(name="area_free"), Signal(name="area_ends")
 
         step = Signal(3, name="sort_step")
         with m.Switch(step):
@@ -90,13 +95,15 @@ class VertexSortUnit(wiring.Component):
             with m.Case(4):
                 m.d.comb += leaves.eq(covered & free)
                 with m.If(leaves | ~covered):
-                    m.d.sync += step.eq(0)
+                    m.d.sync += step.eq(Mux(covered, 5, 0) if self.compact else 0)
+            with m.Case(5), m.If(ends):
+                m.d.sync += step.eq(0)
             with m.Default():
                 m.d.sync += step.eq(step + 1)
         m.d.comb += self.i.ready.eq(step == 0)
         self._exchange(m, corners, odd, step)
         self._box(m, corners, step, covered, digits)
-        zero, culled = self._area(m, corners, (material, two_sided), odd, digits, leaves, free)
+        zero, culled = self._area(m, corners, (material, two_sided), odd, digits, leaves, free, ends)
         count_events(m, self.status, empty=(step == 4) & ~covered, zero_area=zero, culled=culled)
         return m
 
@@ -110,7 +117,7 @@ class VertexSortUnit(wiring.Component):
             for x, corner in zip(columns, corners, strict=True)
         ]
         wrong = Mux(last, key[1], key[0]) > Mux(last, key[2], key[1])
-        turns = wrong & (step != 0) & (step != 4)
+        turns = wrong & (step != 0) & ~step[2]
         first, second, third = corners
         with m.If(turns):
             m.d.sync += odd.eq(~odd)
@@ -137,13 +144,14 @@ class VertexSortUnit(wiring.Component):
                 with m.If(rows < _rows_of(count, self.grid)):
                     m.d.sync += digits.eq(count)
 
-    def _area(self, m, corners, tag, odd, digits, leaves, free) -> tuple[Value, Value]:
+    def _area(self, m, corners, tag, odd, digits, leaves, free, ends) -> tuple[Value, Value]:
         """The second stage; whether a triangle has no area, or is culled, on this cycle.
 
         The tag is the index of the material, and whether it is two-sided.
         """
         (material, is_two_sided), two_sided = tag, Signal(name="two_sided_area")
-        grid, result = self.grid, Signal(self.o.payload.shape(), name="result")
+        grid, result = self.grid, self.o.payload
+        words = Signal(data.StructLayout(corners_shape(grid) | {"material": material.shape()}), name="sorted")
         total_bits, most = 2 * grid.bits + 1, _largest_digits(grid)
         total = Signal(signed(total_bits), name="total")
         left, busy, done, odd_area = Signal(3), Signal(name="busy"), Signal(name="done"), Signal()
@@ -169,11 +177,18 @@ class VertexSortUnit(wiring.Component):
         sums, drops = Signal(name="sums"), Signal(name="drops")
         m.d.sync += sums.eq(busy)
         with m.If(leaves):
-            m.d.sync += [busy.eq(1), left.eq(digits - 1), total.eq(0), odd_area.eq(odd)]
-            m.d.sync += [result.material.eq(material), *(self._sorted(result, corners))]
-            m.d.sync += two_sided.eq(is_two_sided)
+            m.d.sync += [busy.eq(1), left.eq(digits - 1), total.eq(0)]
         with m.Elif(busy):
             m.d.sync += [left.eq(left - 1), busy.eq(left != 0)]
+        kept = [
+            *(odd_area.eq(odd), two_sided.eq(is_two_sided), words.material.eq(material)),
+            *self._sorted(words, corners),
+        ]
+        if self.compact:
+            m.d.comb += kept
+        else:
+            with m.If(leaves):
+                m.d.sync += kept
         with m.If(sums):
             m.d.sync += total.eq((total << DIGIT_BITS) + terms[0] - terms[1])
         m.d.sync += done.eq(sums & ~busy)
@@ -184,16 +199,22 @@ class VertexSortUnit(wiring.Component):
         culled = back & culls & ~two_sided
         valid = Signal(name="valid")
         m.d.comb += [drops.eq(zero | culled), free.eq(~(busy | sums | done | valid))]
+        m.d.comb += ends.eq((done & drops) | (valid & self.o.ready))
+        area, right, flip = (Signal.like(result[name], name=name) for name in ("area", "right", "flip"))
         with m.If(done):
             m.d.sync += [
                 valid.eq(~drops),
-                result.area.eq(Mux(total < 0, -total, total)),
-                result.right.eq(total < 0),
-                result.flip.eq(back & (flips | culls)),
+                area.eq(Mux(total < 0, -total, total)),
+                right.eq(total < 0),
+                flip.eq(back & (flips | culls)),
             ]
         with m.Elif(self.o.ready):
             m.d.sync += valid.eq(0)
-        m.d.comb += [self.o.valid.eq(valid), self.o.payload.eq(result)]
+        m.d.comb += [
+            self.o.valid.eq(valid),
+            *(result[name].eq(words[name]) for name in words.shape().members),
+            *(result.area.eq(area), result.right.eq(right), result.flip.eq(flip)),
+        ]
         return done & zero, done & culled & ~zero
 
     @staticmethod

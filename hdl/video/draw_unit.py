@@ -10,6 +10,7 @@ from blysk.golden.video.controls import BUTTONS
 from blysk.golden.video.draw_commands import KINDS
 from blysk.golden.video.draw_unit import Drawing
 from blysk.golden.video.triangle_assembly import COUNTERS
+from blysk.hdl.core.single_register import connect_register
 from blysk.hdl.core.stream import connect
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 from blysk.hdl.render import STATUS as RENDERED
@@ -127,7 +128,11 @@ class DrawUnit(wiring.Component):
 
     def _band(self, m: Module) -> None:
         """One band after the other."""
-        given, command, commands = self.parameters, self.commands.o.payload, self.commands
+        given, commands = self.parameters, self.commands
+        # Behind a register: a word of the memory comes late in its cycle.
+        self._command_in = stream.Signature(commands.o.payload.shape()).create(path=("command",))
+        connect_register(m, "waiting_command", commands.o, self._command_in)
+        command = self._command_in.payload
         frame, render = given.frame, self.render
         band, first = Signal.like(self.request.payload, name="band"), Signal(name="first_band")
         begun = Signal(name="begun")
@@ -158,7 +163,8 @@ class DrawUnit(wiring.Component):
             self.done.payload.eq(band),
         ]
         idle = Signal(name="idle")
-        m.d.comb += idle.eq(self.assembly.idle & render.idle)
+        # A cycle late, which is before the command behind a draw is there.
+        m.d.sync += idle.eq(self.assembly.idle & render.idle)
         with m.FSM(name="state") as state:
             with m.State("clear"):
                 m.d.comb += self.depth.begin.eq(1)
@@ -201,7 +207,8 @@ class DrawUnit(wiring.Component):
 
     def _command(self, m: Module, idle: Signal) -> None:
         """States of the commands."""
-        kind, take, valid = self.commands.o.payload.kind, self.commands.o.ready, self.commands.o.valid
+        command = self._command_in
+        kind, take, valid = command.payload.kind, command.ready, command.valid
         left = Signal(12, name="vertices_left")
         with m.State("command"), m.Switch(kind):
             with m.Case(KINDS.index("end")):
@@ -220,7 +227,7 @@ class DrawUnit(wiring.Component):
                     take.eq(idle & self.render.write.ready),
                 ]
         with m.State("turn"):
-            m.d.sync += left.eq(self.commands.o.payload.count)
+            m.d.sync += left.eq(command.payload.count)
             # The motion waits again when its last entry was taken.
             with m.If(self.motion.i.ready):
                 m.next = "read"

@@ -44,7 +44,7 @@ class TriangleAssemblyUnit(wiring.Component):
     o : :py:`Out(stream.Signature(triangle_shape(grid)))`
         Those to be drawn.
     write : :py:`In(stream.Signature({"index", "vertex": screen_vertex_shape(grid)}))`
-        Vertices of the frame, one a cycle.
+        Vertices of the frame, one a cycle, while no triangle is read.
     constants : :py:`In(band_rows_shape())`
         The band; stays while triangles are read.
     status : :py:`Out(counters_shape(*COUNTERS))`
@@ -58,7 +58,7 @@ class TriangleAssemblyUnit(wiring.Component):
     Source: docs/theory/video.md#vertices; [T] figure 4.10.
     """
 
-    latency = 5
+    latency = 6
 
     def __init__(self, parameters: TriangleAssembly):
         self.parameters = parameters
@@ -88,7 +88,8 @@ class TriangleAssemblyUnit(wiring.Component):
         result, valid = Signal(self.o.payload.shape(), name="result"), Signal(name="valid")
         advance = Signal(name="advance")
         m.d.comb += [
-            write.addr.eq(self.write.payload.index),
+            # One address: a block RAM that reads and writes at different ones needs registers beside it.
+            write.addr.eq(read.addr),
             write.data.eq(Value.cast(self.write.payload.vertex)),
             write.en.eq(self.write.valid),
             self.write.ready.eq(1),
@@ -107,7 +108,13 @@ class TriangleAssemblyUnit(wiring.Component):
             self.i.ready.eq((left == 0) & ~walks),
             face.addr.eq(following),
             face.en.eq(advance & (~walks | last)),
-            read.addr.eq(Array(face.data.word_select(k, mesh.index_bits) for k in range(3))[corner]),
+            read.addr.eq(
+                Mux(
+                    self.write.valid,
+                    self.write.payload.index,
+                    Array(face.data.word_select(k, mesh.index_bits) for k in range(3))[corner],
+                )
+            ),
             read.en.eq(advance),
         ]
         with m.If(self.i.ready), m.If(self.i.valid):
@@ -122,7 +129,7 @@ class TriangleAssemblyUnit(wiring.Component):
                 m.d.sync += corner.eq(corner + 1)
         found = self._gather(m, advance, walks, corner, data.View(vertex, read.data), material)
         self._judge(m, advance, found, result, valid)
-        inside = walks | (left != 0) | found["inside"] | found["valid"] | valid
+        inside = walks | (left != 0) | found["inside"] | found["whole"] | found["valid"] | valid
         m.d.comb += self.idle.eq(~inside)
         return m
 
@@ -134,27 +141,38 @@ class TriangleAssemblyUnit(wiring.Component):
         low, high = (Signal(signed(X_BITS), name=name) for name in ("low", "high"))
         outside, whole = Signal(name="outside"), Signal(name="whole")
         kept = Signal.like(material, name="material_of_corners")
-        row = first_centre(word.y, grid)
-        first = arriving == 0
+        # A word of the memory comes late in its cycle: its scanline is compared on the next.
+        row, came, judged = (
+            Signal.like(first_centre(word.y, grid), name="row"),
+            Signal(name="came"),
+            Signal(name="judged"),
+        )
+        first, first_row, was_outside = arriving == 0, Signal(name="first_row"), Signal(name="was_outside")
         with m.If(advance):
             m.d.sync += [arrives.eq(walks), arriving.eq(corner), whole.eq(arrives & (arriving == 2))]
+            m.d.sync += [came.eq(arrives), first_row.eq(first), judged.eq(whole), was_outside.eq(outside)]
             with m.If(arrives):
                 m.d.sync += [
                     corners[0].eq(corners[1]),
                     corners[1].eq(corners[2]),
                     corners[2].eq(word),
-                    low.eq(Mux(first | (row < low), row, low)),
-                    high.eq(Mux(first | (row > high), row, high)),
+                    row.eq(first_centre(word.y, grid)),
                     outside.eq(word.outside | (outside & ~first)),
                 ]
                 with m.If(first):
                     m.d.sync += kept.eq(material)
+            with m.If(came):
+                m.d.sync += [
+                    low.eq(Mux(first_row | (row < low), row, low)),
+                    high.eq(Mux(first_row | (row > high), row, high)),
+                ]
         return {
             "corners": corners,
             "low": low,
             "high": high,
-            "outside": outside,
-            "valid": whole,
+            "outside": was_outside,
+            "whole": whole,
+            "valid": judged,
             "inside": arrives,
             "material": kept,
         }
@@ -165,13 +183,15 @@ class TriangleAssemblyUnit(wiring.Component):
         low = Mux(found["low"] > band.top, found["low"], band.top)
         high = Mux(found["high"] < band.bottom, found["high"], band.bottom)
         covered = low < high
-        whole, outside = found["valid"], found["outside"]
+        judged, outside = found["valid"], found["outside"]
         with m.If(advance):
-            m.d.sync += valid.eq(whole & covered & ~outside)
-            for k, corner in enumerate(found["corners"]):
-                m.d.sync += [result[name][k].eq(corner[name]) for name in ("x", "y", "depth", "normal")]
-            m.d.sync += result.material.eq(found["material"])
-        moves = advance & whole
+            m.d.sync += valid.eq(judged & covered & ~outside)
+            # The corners are whole a cycle before it is known whether they count.
+            with m.If(found["whole"]):
+                for k, corner in enumerate(found["corners"]):
+                    m.d.sync += [result[name][k].eq(corner[name]) for name in ("x", "y", "depth", "normal")]
+                m.d.sync += result.material.eq(found["material"])
+        moves = advance & judged
         count_events(
             m,
             self.status,

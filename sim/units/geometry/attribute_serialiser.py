@@ -1,5 +1,7 @@
 """Record of the attribute serialiser."""
 
+from functools import partial
+
 import numpy as np
 
 from blysk.golden.geometry.attribute_serialiser import AttributeSerialiser
@@ -40,7 +42,10 @@ RECORD = Record(
     name="attribute_serialiser",
     title="A triangle's attributes one by one, and a bound on its normals' length",
     source="docs/theory/geometry.md#normals",
-    variants={"": Variant(AttributeSerialiserUnit, note="exact")},
+    variants={
+        "": Variant(AttributeSerialiserUnit, note="exact"),
+        "without skid buffer": Variant(partial(AttributeSerialiserUnit, skid=False), note="exact"),
+    },
     expect=_expect,
     stimuli={"near": Stimulus(_near, 500), "far": Stimulus(_far, 500)},
     axis="",

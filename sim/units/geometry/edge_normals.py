@@ -1,5 +1,7 @@
 """Record of the edge normals."""
 
+from functools import partial
+
 import numpy as np
 
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_NORMAL, Pieces
@@ -61,7 +63,10 @@ RECORD = Record(
     name="edge_normals",
     title="Unit normals at both ends and in the middle of each piece of a span",
     source="[T] figure 4.10",
-    variants={"": Variant(EdgeNormalsUnit, note="see the vector normaliser")},
+    variants={
+        "": Variant(EdgeNormalsUnit, note="see the vector normaliser"),
+        "compact": Variant(partial(EdgeNormalsUnit, compact=True), note="see the vector normaliser"),
+    },
     expect=lambda unit, case: _spans(unit, case)[0].beats,
     status=lambda unit, case: {"repaired": _spans(unit, case)[1]},
     stimuli={

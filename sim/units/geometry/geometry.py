@@ -41,6 +41,8 @@ RECORD = Record(
     variants={
         "": Variant(GeometryUnit),
         "compact": Variant(partial(GeometryUnit, compact=True), long=True),
+        "compact, two lanes": Variant(partial(GeometryUnit, compact=True, setups=2), long=True),
+        "compact, true lines": Variant(partial(GeometryUnit, compact=True, lines=True), long=True),
         "true lines": Variant(partial(GeometryUnit, lines=True), long=True),
         "two lanes": Variant(partial(GeometryUnit, setups=2), long=True),
         "4 fraction bits": Variant(partial(GeometryUnit, Grid(4)), long=True),

@@ -1,5 +1,7 @@
 """Record of the plane assembler."""
 
+from functools import partial
+
 import numpy as np
 
 from blysk.golden.geometry.gradient_setup import Gradients, GradientSetup
@@ -25,7 +27,14 @@ def _expect(unit, case):
     }
     words = {name: Fixed(format, beats[name]) for name, format in _FORMATS.items()}
     gradients = Gradients(**words, size=beats["size"])
-    return PlaneAssembler().compute(gradients, beats["least"][:, 0], frame_of(case.constants)).beats
+    planes = PlaneAssembler().compute(gradients, beats["least"][:, 0], frame_of(case.constants)).beats
+    if not unit.serial:
+        return planes
+    # One attribute after the other, each with its triangle's piece.
+    return {
+        name: np.repeat(value, ATTRIBUTES) if name == "piece" else value.reshape(-1)
+        for name, value in planes.items()
+    }
 
 
 def _case(rng, count, limit):
@@ -63,7 +72,10 @@ RECORD = Record(
     name="plane_assembler",
     title="Gradients of a triangle's attributes, and the longest piece of its spans",
     source="docs/theory/geometry.md#normals",
-    variants={"": Variant(PlaneAssemblerUnit, note="exact")},
+    variants={
+        "": Variant(PlaneAssemblerUnit, note="exact"),
+        "serial": Variant(partial(PlaneAssemblerUnit, serial=True), note="exact"),
+    },
     expect=_expect,
     stimuli={
         "usual": Stimulus(_usual, 500),

@@ -53,7 +53,7 @@ RECORD = Record(
     source="docs/theory/geometry.md#normals",
     variants={
         "": Variant(PlaneSetupUnit, _measure, "triangles over 1/256 pixel wide", note="of 1/W, relative"),
-        "interval 67": Variant(partial(PlaneSetupUnit, GRID, 67)),
+        "interval 67": Variant(partial(PlaneSetupUnit, GRID, 67, skid=False)),
         "4 fraction bits": Variant(partial(PlaneSetupUnit, Grid(4)), long=True),
     },
     expect=lambda unit, case: scales_of_corners(case.beats, unit.grid).beats,

@@ -1,5 +1,7 @@
 """Record of the span attributes."""
 
+from functools import partial
+
 import numpy as np
 
 from blysk.golden.geometry.gradient_setup import Gradients, GradientSetup
@@ -30,34 +32,59 @@ def _pieces(beats):
     return SpanAttributes().compute(rows, Planes(Gradients(**words, size=np.zeros(0)), planes["piece"]))
 
 
+def _rows_of(unit, beats):
+    """Scanlines, each with its planes: what a serial unit is given one attribute after the other."""
+    if not unit.serial:
+        return beats
+    whole = len(beats["row"]["last"]) // ATTRIBUTES
+    row = {name: value[: ATTRIBUTES * whole : ATTRIBUTES] for name, value in beats["row"].items()}
+    planes = {
+        name: value[: ATTRIBUTES * whole].reshape(whole, ATTRIBUTES)
+        for name, value in beats["planes"].items()
+    }
+    return {"planes": planes | {"piece": planes["piece"][:, 0]}, "row": row}
+
+
+def _beats_of(unit, planes, row):
+    """What a unit is given: scanlines, of a serial one each with the plane of one attribute."""
+    if unit.serial:
+        row = {name: np.repeat(value, ATTRIBUTES) for name, value in row.items()}
+        planes = {
+            name: np.repeat(value, ATTRIBUTES) if name == "piece" else value.reshape(-1)
+            for name, value in planes.items()
+        }
+    return {"planes": planes, "row": row}
+
+
 def _status(unit, case):
-    counts, rows = _pieces(case.beats)[1], case.beats["row"]
+    beats = _rows_of(unit, case.beats)
+    counts, rows = _pieces(beats)[1], beats["row"]
     # A triangle whose last scanline is not there is not yet known to be empty.
     begun = np.flatnonzero(_firsts(rows["last"]))[-1]
     unknown = not rows["last"][-1] and not rows["length"][begun:].any()
     return counts | {"empty": counts["empty"] - unknown}
 
 
-def _case(triangles, frame, count):
+def _case(unit, triangles, frame, count):
     # Of high triangles a few would fill the run.
     low = np.ptp(triangles.y, axis=1) < 64 * GRID.steps
     stages = Stages(triangles[low], frame)
     rows = stages.clipped
     triangle = np.cumsum(_firsts(rows.last)) - 1
     planes = {name: value[triangle] for name, value in stages.planes.beats.items()}
-    return Case(first({"planes": planes, "row": rows.beats}, count))
+    return Case(first(_beats_of(unit, planes, rows.beats), count))
 
 
 def _rows(unit, rng, count):
     """Scanlines of triangles of all kinds, cut to a small picture, and their spans at a limit."""
     frame = Frame(-18, -22, 21, 19, limit=100)
-    return _case(random_triangles(rng, count, spread=0.1), frame, count)
+    return _case(unit, random_triangles(rng, count, spread=0.1), frame, count)
 
 
 def _narrow(unit, rng, count):
     """Nothing is cut: spans of few pixels."""
     frame = Frame(-18, -22, 21, 19, limit=1023)
-    return _case(random_triangles(rng, count, size=1.5, spread=0.0), frame, count)
+    return _case(unit, random_triangles(rng, count, size=1.5, spread=0.0), frame, count)
 
 
 def _any(unit, rng, count):
@@ -91,15 +118,18 @@ def _any(unit, rng, count):
     largest = np.zeros(count, dtype=np.int64)
     np.maximum.at(largest, at, least)
     planes["piece"] = np.minimum(largest + rng.integers(0, 4, count), 12)[at]
-    return Case({"planes": planes, "row": row})
+    return Case(_beats_of(unit, planes, row))
 
 
 RECORD = Record(
     name="span_attributes",
     title="N/W and depth at both ends of each span, and of each piece of a wide one",
     source="docs/theory/geometry.md#normals",
-    variants={"": Variant(SpanAttributesUnit, note="exact sums of the steps")},
-    expect=lambda unit, case: _pieces(case.beats)[0].beats,
+    variants={
+        "": Variant(SpanAttributesUnit, note="exact sums of the steps"),
+        "serial": Variant(partial(SpanAttributesUnit, serial=True), note="exact sums of the steps"),
+    },
+    expect=lambda unit, case: _pieces(_rows_of(unit, case.beats))[0].beats,
     status=_status,
     stimuli={
         "rows": Stimulus(_rows, 1500),

@@ -1,12 +1,14 @@
 """Record of the vector normaliser."""
 
+from functools import partial
+
 import numpy as np
 
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
 from blysk.golden.geometry.vector_normaliser import VectorNormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import ONE
-from blysk.hdl.geometry.vector_normaliser import VectorNormaliserUnit
+from blysk.hdl.geometry.vector_normaliser import SharedVectorNormaliserUnit, VectorNormaliserUnit
 from blysk.sim.units.operands import any_codes, sphere
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
@@ -57,7 +59,11 @@ RECORD = Record(
     name="vector_normaliser",
     title="Vector of any length divided by its length",
     source="docs/theory/geometry.md#normals",
-    variants={"": Variant(VectorNormaliserUnit, _measure, "lengths 2^-12 to 1", note="components over ONE")},
+    variants={
+        "": Variant(VectorNormaliserUnit, _measure, "lengths 2^-12 to 1", note="components over ONE"),
+        "interval 4": Variant(partial(SharedVectorNormaliserUnit, initiation_interval=4), long=True),
+        "interval 7": Variant(partial(SharedVectorNormaliserUnit, initiation_interval=7)),
+    },
     expect=_expect,
     stimuli={
         "vectors": Stimulus(_vectors, 1000),

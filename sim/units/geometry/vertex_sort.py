@@ -42,6 +42,7 @@ RECORD = Record(
     source="[T] figure 4.10",
     variants={
         "": Variant(VertexSortUnit, note="exact"),
+        "compact": Variant(partial(VertexSortUnit, compact=True), note="exact"),
         "4 fraction bits": Variant(partial(VertexSortUnit, Grid(4)), note="exact"),
     },
     expect=lambda unit, case: _sorted(unit, case)[0].beats,
