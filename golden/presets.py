@@ -65,7 +65,7 @@ the others; for roughness see `Lobe`)."""
 
 def preset(
     method: str = "chord",
-    model: str | ReflectionModel | None = "cosquad",
+    model: str | ReflectionModel | None = "blinn",
     lights: int = 1,
     *,
     operand: Operand | None = None,

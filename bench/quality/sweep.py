@@ -175,7 +175,7 @@ class Frame:
             Method of interpolation.
         """
         constants = FrameConstants.of(self.scene_of(exponent), 1)
-        cut, spans = self.spans_of(preset(method), exponent)
+        cut, spans = self.spans_of(preset(method, "cosquad"), exponent)
         for model in models:
             design = preset(method, model)
             color = design.compute(spans, constants).color[self._shown]

@@ -78,7 +78,7 @@ def frame(triangles: int, size: Sequence[int], methods: Sequence[str]) -> dict[s
 
 def simulated(method: str) -> dict[str, int]:
     """Cycles of a simulated frame of ``method`` with cosquad, and those of the cycle model."""
-    simulated, modelled = cycle_model.compare(preset(method), 992, (160, 120))
+    simulated, modelled = cycle_model.compare(preset(method, "cosquad"), 992, (160, 120))
     return {"simulated": simulated, "modelled": modelled}
 
 

@@ -54,7 +54,7 @@ class Candidate:
     def renderer(self) -> Renderer:
         """Its bit-accurate model, of one light and the model cosquad, for pictures of `SIZE`."""
         options = {"style": self.style, "setup_interval": self.setup_interval}
-        return Renderer(preset(self.method, x_bits=10, y_bits=9, **options))
+        return Renderer(preset(self.method, "cosquad", x_bits=10, y_bits=9, **options))
 
     @property
     def unit(self) -> RenderUnit:

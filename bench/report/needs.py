@@ -109,7 +109,9 @@ QUICK_SCENES = (
 def _specialised(name: str, size: Sequence[int]) -> tuple[Scene, Specialisation]:
     build, options = SCENES[name]
     scene = build(*size)
-    return scene, specialise(scene, options and preset(lights=len(scene.lights), **options))
+    return scene, specialise(
+        scene, options and preset(**{"model": "cosquad", "lights": len(scene.lights)} | options)
+    )
 
 
 def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:

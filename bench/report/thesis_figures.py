@@ -190,7 +190,7 @@ def frame_cycles(name: str, triangles: int, width: int, height: int) -> float:
     """
     _, method = UNITS[name]
     scene = scene_for(teapot(triangles), 50, width, height)
-    unit = ShadingPipelineUnit(preset(method))
+    unit = ShadingPipelineUnit(preset(method, "cosquad"))
     pixels, cycles = measure(unit, spans_of(scene, method), FrameConstants.of(scene, 1))
     return cycles / pixels
 
@@ -248,7 +248,7 @@ def square_errors(method: str, triangles: int, width: int, height: int) -> dict[
         one value, where it counts most and least, and ``one``: NMSE of either.
     """
     scene = scene_for(teapot(triangles), 50, width, height)
-    design = preset(method)
+    design = preset(method, "cosquad")
     prepared = prepare(scene, design)
     color = design.compute(prepared.spans, FrameConstants.of(scene, 1)).color
     exact = render(scene, raster=prepared.raster)

@@ -96,7 +96,7 @@ def measure(
     method : str
         Of the design, of one light.
     """
-    design = preset(method)
+    design = preset(method, "cosquad")
     simulator = FrameSimulator(design, "auto", pipes)
     for name in meshes:
         mesh = mesh_of(name)

@@ -128,7 +128,7 @@ class Throughput:
 
 def spans_of(scene: Scene, method: str) -> Spans:
     """Spans of a scene as a method gets them."""
-    return prepare(scene, preset(method)).spans
+    return prepare(scene, preset(method, "cosquad")).spans
 
 
 def measure(
@@ -161,7 +161,7 @@ def measure(
 
 def _intervals_of(method: str, intervals: Sequence[int]) -> list[int]:
     """Those of some setup intervals that a method can be built for."""
-    interpolator = preset(method).interpolator
+    interpolator = preset(method, "cosquad").interpolator
     return [i for i in intervals if i in unit_of(interpolator).setup_intervals(interpolator)]
 
 
@@ -170,7 +170,7 @@ def _frames(
 ) -> Iterator[tuple[Lengths, list[Throughput]]]:
     served = {method: _intervals_of(method, intervals) for method in methods}
     units = {
-        (method, interval): ShadingPipelineUnit(preset(method, setup_interval=interval))
+        (method, interval): ShadingPipelineUnit(preset(method, "cosquad", setup_interval=interval))
         for method in methods
         for interval in served[method]
     }

@@ -123,7 +123,7 @@ class Candidate:
     @property
     def command(self) -> str:
         """What prints it as Verilog, in a shell."""
-        usual = preset(self.method, operand=self.operand).interpolator
+        usual = preset(self.method, "cosquad", operand=self.operand).interpolator
         if self.method in METHODS and self.design.interpolator == usual:
             words = ["blysk", "verilog", "--method", self.method, "--model", self.model]
             words += ["--lights", str(self.lights)] if self.lights != 1 else []

@@ -316,7 +316,7 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
     found: list[str] = []
     streams: dict[str, list[int]] = {}
     for method in methods:
-        design = preset(method)
+        design = preset(method, "cosquad")
         streams[method] = []
         for exponent in BANDS:
             cut, spans = spans_of(mesh, view, exponent, design)

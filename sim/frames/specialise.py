@@ -103,7 +103,7 @@ def specialise(
     scenes = (scenes,) if isinstance(scenes, Scene) else tuple(scenes)
     if full is None:
         lights, materials = max(len(scenes[0].lights), 1), len(scenes[0].materials)
-        full = preset("chord", lights=lights, materials=materials, gate=True)
+        full = preset("chord", "cosquad", lights=lights, materials=materials, gate=True)
     scenes, unlit = _without_dark_lights(scenes, full)
     scenes, merged = _without_equal_materials(scenes, full)
     reductions = [*unlit, *merged]

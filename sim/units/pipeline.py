@@ -267,15 +267,15 @@ def _counters(unit, rng, count):
 # Variants.
 
 
-_CHORD = preset("chord")
-_FULL = preset("chord", lights=2, gate=True)
+_CHORD = preset("chord", "cosquad")
+_FULL = preset("chord", "cosquad", lights=2, gate=True)
 _BOTH = ("chord, blinn", "quadratic, cosquad")
 """Variants that get every stimulus: the default one and the documents' own."""
 _LESS = {"x_bits": 9, "y_bits": 8, "length_bits": 5}
 
 DESIGNS: dict[str, Design] = {
     "3 lights": preset(model="cosquad7", lights=3),
-    "3 materials": preset(lights=2, materials=3, operand="one_minus_cosine"),
+    "3 materials": preset(model="cosquad", lights=2, materials=3, operand="one_minus_cosine"),
     "compact": preset("chord", "lyon3", 2, style="compact"),
     "compact, normals and a power": preset("linear", "blinn_product", style="compact"),
     "gate": preset("chord", "coscos2", gate=True),
@@ -283,34 +283,34 @@ DESIGNS: dict[str, Design] = {
     "exponent": preset("chord", "coscos4", 2, exponent=60),
     "values, the second of 2 lights fades": preset("chord-local", "blinn", 2, factors=(1,)),
     "no specular light, grey, few bits": replace(_FULL, specular=None, gate=False, grey=True, **_LESS),
-    "without lights": preset(lights=0, materials=2),
+    "without lights": preset(model="cosquad", lights=0, materials=2),
 }
 """Pipelines by name that differ from those of the methods and models in what they have."""
 
 LONG_DESIGNS: dict[str, Design] = {
-    "16 lights": preset(lights=16),
+    "16 lights": preset(model="cosquad", lights=16),
     "linear of a chord": preset("linear", "lyon3", operand="one_minus_cosine"),
-    "bisection of a chord": preset("bisection", lights=2, operand="one_minus_cosine"),
+    "bisection of a chord": preset("bisection", "cosquad", lights=2, operand="one_minus_cosine"),
     "quadratic of a chord": preset("quadratic", "coscos2", 2, operand="one_minus_cosine"),
     "quadratic-eval of a chord": preset("quadratic-eval", "exp", operand="one_minus_cosine"),
-    "quadratic-horner of a chord": preset("quadratic-horner", operand="one_minus_cosine"),
-    "renormalise, N.H": preset("renormalise", lights=2, operand="cosine"),
+    "quadratic-horner of a chord": preset("quadratic-horner", "cosquad", operand="one_minus_cosine"),
+    "renormalise, N.H": preset("renormalise", "cosquad", lights=2, operand="cosine"),
     "renormalise, power, compact": preset("renormalise", "blinn_product", style="compact"),
     "quadratic, power": preset("quadratic", "blinn_product"),
-    "values, 2 lights": preset("chord-local", lights=2),
+    "values, 2 lights": preset("chord-local", "cosquad", lights=2),
     "sharp lobe": preset("chord", "ggx", 2, scale=6, gate=True),
     "values, 2 lights, one fades, compact, gate": preset(
         "chord-local", "lyon3", 2, factors=(0,), gate=True, style="compact"
     ),
-    "values, compact, 3 materials": preset("chord-local", materials=3, style="compact"),
-    "compact, chord": preset("chord", style="compact"),
+    "values, compact, 3 materials": preset("chord-local", "cosquad", materials=3, style="compact"),
+    "compact, chord": preset("chord", "cosquad", style="compact"),
     "compact, exponent": preset("quadratic", "exp", exponent=20, style="compact"),
-    "gate, 2 lights, compact": preset("chord", lights=2, gate=True, style="compact"),
-    "gate, quadratic": preset("quadratic", lights=2, gate=True),
+    "gate, 2 lights, compact": preset("chord", "cosquad", lights=2, gate=True, style="compact"),
+    "gate, quadratic": preset("quadratic", "cosquad", lights=2, gate=True),
     "gate, linear of a chord": preset("linear", "lyon3", operand="one_minus_cosine", gate=True),
     "gate, bisection": preset("bisection", "exp", gate=True),
-    "gate, angular": preset("angular", gate=True),
-    "gate, recurrence": preset("recurrence", lights=2, gate=True),
+    "gate, angular": preset("angular", "cosquad", gate=True),
+    "gate, recurrence": preset("recurrence", "cosquad", lights=2, gate=True),
     "gate, values": preset("chord-local", "blinn_product", 2, gate=True),
     "gate, compact, power": preset("quadratic-horner", "blinn_product", gate=True, style="compact"),
     "gate, exponent": replace(_FULL, build=Build(exponent=20)),
@@ -341,7 +341,7 @@ def _variants():
                 long=model not in ("blinn", "cosquad"),
             ),
         )
-    yield "chord-local", Variant(partial(ShadingPipelineUnit, preset("chord-local")))
+    yield "chord-local", Variant(partial(ShadingPipelineUnit, preset("chord-local", "cosquad")))
     for name, design in DESIGNS.items():
         yield name, Variant(partial(ShadingPipelineUnit, design))
     for name, design in LONG_DESIGNS.items():

@@ -92,10 +92,10 @@ def _counters(unit, rng, count):
 def _variants():
     few = {"x_bits": 6, "y_bits": 3, "length_bits": 4}
     for name, pipes, waiting, design in (
-        (_DEFAULT, 2, 5, preset(lights=0, materials=2, **few)),
-        ("4 pipelines, linear", 4, 9, preset("linear", y_bits=4)),
-        ("4 pipelines, chord, 3 materials", 4, 33, preset("chord", materials=3)),
-        ("8 pipelines, quadratic, compact", 8, 17, preset("quadratic", style="compact")),
+        (_DEFAULT, 2, 5, preset(model="cosquad", lights=0, materials=2, **few)),
+        ("4 pipelines, linear", 4, 9, preset("linear", "cosquad", y_bits=4)),
+        ("4 pipelines, chord, 3 materials", 4, 33, preset("chord", "cosquad", materials=3)),
+        ("8 pipelines, quadratic, compact", 8, 17, preset("quadratic", "cosquad", style="compact")),
     ):
         unit = partial(MergedPipelinesUnit, PixelPipelines(design, pipes), waiting)
         yield name, Variant(unit, long=pipes > 2)

@@ -63,7 +63,7 @@ def _variants():
         ("renormalise, 2 lights, 3 materials", {"method": "renormalise", "lights": 2, "materials": 3}),
         ("linear, coarse", {"method": "linear"}),
     ):
-        design = preset(**{"method": "chord", "x_bits": 5, "y_bits": 5} | options)
+        design = preset(**{"method": "chord", "model": "cosquad", "x_bits": 5, "y_bits": 5} | options)
         renderer = Renderer(design, coarse=CoarseDepth(*_SIZE) if "coarse" in name else None)
         yield name, Variant(partial(RenderUnit, renderer, _SIZE), long=name != "chord")
 

@@ -9,7 +9,7 @@ from blysk.sim.meshes.teapot import teapot
 
 @pytest.mark.long
 def test_measures_every_exponent():
-    rows = list(measure(teapot(500), preset(), (1, 100), 64, 48))
+    rows = list(measure(teapot(500), preset(model="cosquad"), (1, 100), 64, 48))
     assert [row[0] for row in rows] == [1, 100]
     first, second = (row[1] for row in rows)
     assert first.pixels == second.pixels > 500

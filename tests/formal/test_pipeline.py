@@ -117,7 +117,7 @@ def of_writes(parameters):
 
 def of_constants():
     """Without lights: a pixel's colour is that of the last write before its span was taken in."""
-    h = Harness(unit := ShadingPipelineUnit(preset(lights=0, grey=True, **NARROW)))
+    h = Harness(unit := ShadingPipelineUnit(preset(model="cosquad", lights=0, grey=True, **NARROW)))
     ambient, (address, _) = Signal(17), FIELDS_OF_A_FRAME["ambient"]
     write = unit.write.payload
     with h.m.If(taken(unit.write) & (write.address == address)):
@@ -163,11 +163,11 @@ def of_waiting_spans(unit, late):
     return h
 
 
-AMBIENT = preset(lights=0, grey=True, **NARROW)
+AMBIENT = preset(model="cosquad", lights=0, grey=True, **NARROW)
 LINEAR = preset(method="linear", model=None, grey=True, **NARROW)
-GATED = preset(method="linear", exponent=10, gate=True, grey=True, **NARROW)
-LIT = preset(method="linear", exponent=10, grey=True, **NARROW)
-TWO_LIGHTS = preset(method="linear", exponent=10, grey=True, lights=2, **NARROW)
+GATED = preset(method="linear", model="cosquad", exponent=10, gate=True, grey=True, **NARROW)
+LIT = preset(method="linear", model="cosquad", exponent=10, grey=True, **NARROW)
+TWO_LIGHTS = preset(method="linear", model="cosquad", exponent=10, grey=True, lights=2, **NARROW)
 
 
 @pytest.mark.parametrize("parameters", [AMBIENT, LINEAR, GATED], ids=["ambient", "linear", "gated"])

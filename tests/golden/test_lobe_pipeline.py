@@ -48,7 +48,7 @@ def test_frame_is_exact_blinn(exponent):
     product = preset("chord", "blinn_product")
     of_products = compare(given, product, model_frame(given, product))
     assert found.total_error.max_lsb < of_products.total_error.max_lsb + 0.03
-    of_squares = compare(given, preset("chord"), model_frame(given, preset("chord")))
+    of_squares = compare(given, preset("chord", "cosquad"), model_frame(given, preset("chord", "cosquad")))
     assert found.total_error.rmse_lsb < (0.5 if exponent < 1000 else 0.6) * of_squares.total_error.rmse_lsb
     # What is left is the method's: normals are linear along a span.
     assert found.method_error.max_lsb < 0.75

@@ -134,29 +134,29 @@ def test_empty_spans_give_nothing():
     zero = np.zeros(2, dtype=int)
     spans = Spans(zero, zero, zero, quantise(np.array([UP, UP])), quantise(np.array([UP, UP])))
     assert len(spans) == 2
-    pixels = preset().compute(spans, constants_of([(UP, 0.5, 0.5)]))
+    pixels = preset(model="cosquad").compute(spans, constants_of([(UP, 0.5, 0.5)]))
     assert pixels.color.shape == (0, 3)
 
 
 def test_bad_arguments_are_refused():
     with pytest.raises(ValueError, match=r"^method must be one of .*quadratic.*, not 'unknown'$"):
-        preset(method="unknown")
+        preset(model="cosquad", method="unknown")
     with pytest.raises(ValueError, match=r"^model must be one of cosquad, .*, blinn, .*, ggx, not 'phong'$"):
         preset(model="phong")
     with pytest.raises(ValueError, match=r"^operand must be 'cosine' or 'one_minus_cosine', not 'sine'$"):
-        preset("quadratic", operand="sine")
+        preset("quadratic", "cosquad", operand="sine")
     for method in ("angular", "chord"):
         with pytest.raises(ValueError, match=rf"^method {method} finds no normals, and gives 1 - cos gamma$"):
-            preset(method, operand="cosine")
+            preset(method, "cosquad", operand="cosine")
     with pytest.raises(ValueError, match=r"^lights must be 0 to 16, not -1$"):
-        preset(lights=-1)
+        preset(model="cosquad", lights=-1)
     spans = Spans(*np.zeros((3, 1), dtype=int), np.array([[0, 0, ONE]]), np.array([[0, 0, 2**17]]))
     spans.length[:] = 2
     constants = constants_of([(UP, 0.5, 0.5)])
     with pytest.raises(ValueError, match=r"exceed SQ\(1, 17\)$"):
-        preset().compute(spans, constants)
+        preset(model="cosquad").compute(spans, constants)
     with pytest.raises(ValueError, match=r"^the constants are for 1 lights, not 2$"):
-        preset(lights=2).compute(spans, constants)
+        preset(model="cosquad", lights=2).compute(spans, constants)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +177,7 @@ def test_bad_arguments_are_refused():
 )
 def test_parameters_that_no_pipeline_has(given, message):
     with pytest.raises(ValueError, match=f"^{message}$"):
-        preset(**given)
+        preset(**{"model": "cosquad"} | given)
 
 
 @pytest.mark.parametrize(
@@ -200,7 +200,7 @@ def test_spans_that_a_pipeline_does_not_take(given, changed, message):
     spans = Spans(**words, normal_left=normal, normal_right=normal)
     constants = constants_of([(UP, 0.5, 0.5)])
     with pytest.raises(ValueError, match=f"^{message}$"):
-        preset(**given).compute(spans, constants)
+        preset(**{"model": "cosquad"} | given).compute(spans, constants)
 
 
 def spans_near_a_highlight(rng, halfway, level, angle):
@@ -273,11 +273,11 @@ def test_published_methods_are_worse(published, method, degrees, factor, normal_
     length = np.full(300, 40)
     span, place = pixels_of(length)
     ends = (normalise(codes)[span] for codes in (left, right))
-    exact = preset(method).interpolator.exact_normals(*ends, place / 39)
+    exact = preset(method, "cosquad").interpolator.exact_normals(*ends, place / 39)
     exact = np.sum(exact * normalise(vector), axis=-1)
     worst = {}
     for name in (published, method):
-        design = preset(name)
+        design = preset(name, "cosquad")
         words = [Fixed(COMPONENT, codes) for codes in (left, right)]
         vectors = Fixed(COMPONENT, vector)
         found = design.interpolator.compute(*words, length, vectors, vectors).cosine.values[:, 0]
@@ -287,6 +287,6 @@ def test_published_methods_are_worse(published, method, degrees, factor, normal_
 
 def test_published_methods_serve_no_gate():
     for name in PUBLISHED:
-        assert not preset(name).interpolator.serves_gate
+        assert not preset(name, "cosquad").interpolator.serves_gate
         with pytest.raises(ValueError, match=f"^method {name} has no error bound for a gate$"):
-            preset(name, gate=True)
+            preset(name, "cosquad", gate=True)

@@ -318,7 +318,7 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method, norm
     materials the second frame writes all, and the spans come in six runs of one.
     """
     rng = np.random.default_rng(late_cycle)
-    design = preset(method, materials=materials)
+    design = preset(method, "cosquad", materials=materials)
     first, second = random_materials(rng, 1, materials), random_materials(rng, 1, materials)
     spans = random_spans(rng, rng.integers(1, 12, 60), normal_pairs)
     spans = replace(spans, material=np.arange(60) // 10 % materials)
@@ -362,7 +362,7 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method, norm
 def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, method, normal_pairs):
     """Spans in the setup, in the FIFOs and half shaded: after a reset the pipeline does as from power-up."""
     rng = np.random.default_rng(reset_at)
-    design = preset(method, materials=materials)
+    design = preset(method, "cosquad", materials=materials)
     spans = random_spans(rng, np.r_[40, rng.integers(0, 12, 11)], normal_pairs)
     spans = replace(spans, material=np.arange(12) // 4 % materials)
     constants = random_materials(rng, 1, materials)
@@ -436,7 +436,7 @@ def test_cost_of_a_material_change(normal_pairs):
     another material takes 5 cycles; one of the same takes 1.
     """
     rng = np.random.default_rng(34)
-    design = preset(method="linear", materials=3)
+    design = preset(model="cosquad", method="linear", materials=3)
     unit = ShadingPipelineUnit(design)
     lengths = np.array([20, 20, 20, 20, 0, 20, 0, 20, 20, 0, 0, 20])
     material = np.array([0, 0, 1, 2, 2, 1, 2, 1, 0, 1, 2, 0])
@@ -468,7 +468,7 @@ def test_cost_of_a_material_change(normal_pairs):
 def test_indices_of_no_material_change_nothing(normal_pairs):
     """Writes for a material past the last one are taken and lost: 3 words have indices of 2 bits."""
     rng = np.random.default_rng(35)
-    design = preset(method="linear", materials=3)
+    design = preset(model="cosquad", method="linear", materials=3)
     unit = ShadingPipelineUnit(design)
     spans = random_spans(rng, rng.integers(1, 9, 12), normal_pairs)
     spans = replace(spans, material=np.arange(12) // 4)

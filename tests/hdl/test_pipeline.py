@@ -72,7 +72,7 @@ def test_cycles(method, interval):
     The first pixel leaves `latency` cycles after an empty pipeline has accepted its span.
     """
     rng = np.random.default_rng(interval)
-    design = preset(method, setup_interval=interval)
+    design = preset(method, "cosquad", setup_interval=interval)
     unit = ShadingPipelineUnit(design)
     lengths = np.r_[5, rng.integers(1, 12, 20), np.full(12, 1), 40, 1, 1]
     found = shade(unit, *spans_in_range(rng, design, lengths), engine="pysim")
@@ -115,7 +115,7 @@ def test_cycles_of_long_spans(method, latency, interval, lights):
     """Spans that are set up while the one before is shaded cost their length alone."""
     rng = np.random.default_rng(7)
     lengths = np.r_[rng.integers(interval, 40, 300), [4095, 4095, interval]]
-    design = preset(method, lights=lights)
+    design = preset(method, "cosquad", lights=lights)
     unit = ShadingPipelineUnit(design)
     found = shade(unit, *spans_in_range(rng, design, lengths, 40.0))
     assert unit.latency == latency + math.ceil(math.log2(2 * lights + 1))
@@ -155,7 +155,9 @@ def test_setup_intervals(method):
     interpolator, choice = METHODS[method], INTERVALS[method]
     assert tuple(unit_of(interpolator).setup_intervals(interpolator)) == tuple(choice)
     if choice:
-        assert ShadingPipelineUnit(preset(method)).setup_interval == max(k for k in choice if k <= 4)
+        assert ShadingPipelineUnit(preset(method, "cosquad")).setup_interval == max(
+            k for k in choice if k <= 4
+        )
     spelled = {
         "renormalise": "1, 2, 3, 4, 5 or 9",
         "chord": "3, 9 or 18",
@@ -166,7 +168,7 @@ def test_setup_intervals(method):
     for interval in (0, between, choice[-1] + 1 if choice else 4):
         text = f"setup_interval of {method} must be {words}, not {interval}"
         with pytest.raises(ValueError, match=f"^{text}$"):
-            ShadingPipelineUnit(preset(method, setup_interval=interval))
+            ShadingPipelineUnit(preset(method, "cosquad", setup_interval=interval))
 
 
 @pytest.mark.long
@@ -174,7 +176,7 @@ def test_setup_intervals(method):
 def test_gate_costs_no_cycle(method, interval):
     """Decisions come in time for spans of every length, however many single pixels are on the way."""
     rng = np.random.default_rng(interval)
-    design = preset(method, gate=True, setup_interval=interval)
+    design = preset(method, "cosquad", gate=True, setup_interval=interval)
     lengths = np.r_[rng.integers(1, 40, 200), np.full(150, 1), np.full(60, 5)]
     found = shade(ShadingPipelineUnit(design), *spans_in_range(rng, design, lengths, 20.0))
     first = found.cycles[np.cumsum(lengths) - lengths]
@@ -185,7 +187,7 @@ def test_gate_costs_no_cycle(method, interval):
 def test_compact_style_takes_three_cycles_a_term():
     """Highlights cost cycles, and pixels without one do not."""
     rng = np.random.default_rng(1)
-    design = preset("chord", style="compact")
+    design = preset("chord", "cosquad", style="compact")
     spans, (constants,) = spans_in_range(rng, design, np.full(30, 60), 20.0)
     constants = replace(constants, exponent=3)
     cosine, highlight, dark = operands_of(design, spans, constants)
@@ -248,7 +250,7 @@ def test_every_method_with_every_model(method, model):
 )
 def test_spans_out_of_range_are_counted(method, in_range, out_of_range, flagged):
     rng = np.random.default_rng(9)
-    design = preset(method)
+    design = preset(method, "cosquad")
     left, right = pairs_at(rng, 100, np.repeat([in_range, out_of_range], 50))
     left, right = quantise(left), quantise(right)
     if out_of_range == 180.0:
@@ -265,7 +267,7 @@ def test_spans_out_of_range_are_counted(method, in_range, out_of_range, flagged)
 def test_wide_spans_of_the_chord_method_are_counted():
     """Spans of 30 degrees are wide, whatever the light, and narrower ones where they have a highlight."""
     rng = np.random.default_rng(12)
-    design = preset("chord")
+    design = preset("chord", "cosquad")
     left, right = pairs_at(rng, 100, np.repeat([9.9, 30.2], 50))
     left, right = quantise(left), quantise(right)
     spans = Spans(np.zeros(100, int), np.zeros(100, int), np.full(100, 4), left, right)
@@ -279,9 +281,9 @@ def test_wide_spans_of_the_chord_method_are_counted():
 @pytest.mark.parametrize(("x", "flagged"), [(4086, 0), (4087, 1)])
 def test_span_past_the_last_column_is_flagged(x, flagged):
     rng = np.random.default_rng(10)
-    spans, constants = spans_in_range(rng, preset("linear"), np.array([10, 10]))
+    spans, constants = spans_in_range(rng, preset("linear", "cosquad"), np.array([10, 10]))
     spans.x[:] = x
-    found = shade(ShadingPipelineUnit(preset("linear")), spans, constants, engine="pysim")
+    found = shade(ShadingPipelineUnit(preset("linear", "cosquad")), spans, constants, engine="pysim")
     assert found.status["overrun"] == flagged
 
 
@@ -302,7 +304,7 @@ LEFT_OUT = {
 def test_less_hardware_shades_the_same(part, style):
     """A scene that does not need a part has the pixels of the full pipeline without it, and it costs less."""
     rng = np.random.default_rng(5)
-    full = preset("chord", lights=2, gate=True)
+    full = preset("chord", "cosquad", lights=2, gate=True)
     design = replace(full, gate="specular" not in LEFT_OUT[part], **LEFT_OUT[part])
     small = replace(full, **LEFT_OUT["widths"])
     spans, (constants,) = spans_in_range(rng, small, rng.integers(0, 32, 30), 20.0)
@@ -328,9 +330,9 @@ def test_less_hardware_shades_the_same(part, style):
 @pytest.mark.usefixtures("never_built")
 def test_without_lights_there_is_no_setup():
     with pytest.raises(ValueError, match=r"^without lights there is no setup, and no setup_interval$"):
-        ShadingPipelineUnit(preset(lights=0, setup_interval=4))
+        ShadingPipelineUnit(preset(model="cosquad", lights=0, setup_interval=4))
 
 
 def test_unknown_style():
     with pytest.raises(ValueError, match=r"^style must be one of throughput, compact, not 'small'$"):
-        preset(style="small")
+        preset(model="cosquad", style="small")

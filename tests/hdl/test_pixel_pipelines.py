@@ -21,7 +21,7 @@ from blysk.sim.units.record import STALLS
 
 from ..checks import words_of
 
-PLAIN = preset(lights=0, x_bits=6, y_bits=4, length_bits=4)
+PLAIN = preset(model="cosquad", lights=0, x_bits=6, y_bits=4, length_bits=4)
 """The least pipelines: their pixels have the ambient colour."""
 
 
@@ -47,7 +47,7 @@ def assert_lanes(lanes, expected):
 @pytest.fixture(scope="module")
 def wide():
     """Two materials, two pipelines; FIFOs are short enough to be full."""
-    return WidePipelinesUnit(PixelPipelines(preset("linear", materials=2), 2), 5)
+    return WidePipelinesUnit(PixelPipelines(preset("linear", "cosquad", materials=2), 2), 5)
 
 
 @pytest.mark.parametrize("shares", STALLS)

@@ -133,7 +133,7 @@ SHORT = {
 )
 def test_frame(method, name, projection, exponent):
     scene = scene_of(MESHES[name], camera_of(name, projection), exponent)
-    errors, own = held(scene, preset(method))
+    errors, own = held(scene, preset(method, "cosquad"))
     assert errors.max() <= 1.0
     # What the project says of itself is what the caster finds, but for pixels in doubt.
     assert errors.max() <= own + 0.05
@@ -154,7 +154,7 @@ def test_models(model):
 def test_camera_inside(exponent):
     """In the tube of a torus, at a wall that crosses the near plane."""
     camera = Camera((1.0, 0.0, 0.05), (0.4, 0.1, 1.0), projection="perspective", field_of_view=80.0)
-    errors, _ = held(scene_of(MESHES["coarse torus"], camera, exponent), preset("chord"))
+    errors, _ = held(scene_of(MESHES["coarse torus"], camera, exponent), preset("chord", "cosquad"))
     assert errors.max() <= 1.0
 
 
@@ -168,9 +168,9 @@ def test_fresnel():
     scene = scene_of(mesh, camera, 10)
     material = replace(scene.material, fresnel=f0)
     scene = replace(scene, material=material, lights=(Light(light),))
-    errors, _ = held(scene, preset("chord"), light, f0=f0)
+    errors, _ = held(scene, preset("chord", "cosquad"), light, f0=f0)
     assert errors.max() <= 1.0
-    without, _ = held(scene, preset("chord"), light)
+    without, _ = held(scene, preset("chord", "cosquad"), light)
     assert without.max() > 20
 
 
@@ -185,17 +185,20 @@ def test_two_sided():
     camera = camera_of("coarse torus", "perspective")
     scene = Scene(mesh, camera, *SIZE, both, (Light(LIGHT),), back_faces="cull")
     one_sided = set(np.flatnonzero(mesh.material).tolist())
-    errors, _ = held(scene, preset("chord", materials=2), one_sided=one_sided)
+    errors, _ = held(scene, preset("chord", "cosquad", materials=2), one_sided=one_sided)
     assert errors.max() <= 1.0
-    flipped = model_frame(replace(scene, back_faces="flip"), preset("chord", materials=2))
+    flipped = model_frame(replace(scene, back_faces="flip"), preset("chord", "cosquad", materials=2))
     assert (
-        np.any(flipped.image != model_frame(scene, preset("chord", materials=2)).image, axis=-1).sum() > 500
+        np.any(
+            flipped.image != model_frame(scene, preset("chord", "cosquad", materials=2)).image, axis=-1
+        ).sum()
+        > 500
     )
 
 
 def test_caster_finds_a_wrong_curve():
     """Ends joined without their magnitudes, as an earlier version did, are 10 LSB and more off."""
     scene = scene_of(MESHES["triangle"], camera_of("triangle", "perspective"), 50)
-    wrong = shade_spans(scene, rasterise(scene), "normalised", preset("chord").specular.model)
-    right = compare(scene, preset("chord"), model_frame(scene, preset("chord"))).golden
+    wrong = shade_spans(scene, rasterise(scene), "normalised", preset("chord", "cosquad").specular.model)
+    right = compare(scene, preset("chord", "cosquad"), model_frame(scene, preset("chord", "cosquad"))).golden
     assert 255 * np.abs(wrong - right).max() > 10

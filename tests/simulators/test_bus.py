@@ -23,9 +23,9 @@ from .verilog_bench import SIMULATORS, missing_tool
 
 SMALL = {"x_bits": 5, "y_bits": 5}
 CORES = {
-    "shader": preset("linear"),
-    "render": Renderer(preset("chord", **SMALL)),
-    "geometry": Renderer(preset("chord", **SMALL)),
+    "shader": preset("linear", "cosquad"),
+    "render": Renderer(preset("chord", "cosquad", **SMALL)),
+    "geometry": Renderer(preset("chord", "cosquad", **SMALL)),
 }
 SIZES = {"render": {"size": (32, 24)}}
 BUSES = {"axi": "axi", "wishbone": "wishbone", "wishbone, classic": "wishbone"}

@@ -246,7 +246,7 @@ def _cuts() -> str:
         for exponent in (20, 100, 1000):
             scene = scene_for(teapot(triangles), exponent, 640, 480)
             raster = rasterise(scene)
-            cut, _ = cut_spans(scene, raster, preset("chord"))
+            cut, _ = cut_spans(scene, raster, preset("chord", "cosquad"))
             row = [f"{len(scene.mesh.faces):,}", str(exponent), f"{len(raster.length):,}"]
             found = (cut.length, pieces(scene, raster, False), pieces(scene, raster, True))
             for lengths in found:

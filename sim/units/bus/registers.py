@@ -91,7 +91,9 @@ def _decoding(unit, rng, count):
 
 
 def _map(lights):
-    return RegisterMap("core", _COUNTERS, frame_registers(), constant_registers(preset(lights=lights)))
+    return RegisterMap(
+        "core", _COUNTERS, frame_registers(), constant_registers(preset(model="cosquad", lights=lights))
+    )
 
 
 RECORD = Record(

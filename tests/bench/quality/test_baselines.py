@@ -94,7 +94,7 @@ def test_parts_are_those_of_the_cost():
 @pytest.mark.long
 def test_cycles_are_those_of_the_pixels():
     """The simulation by hand, to the last pixel; at least a clock a pixel."""
-    design = preset("linear")
+    design = preset("linear", "cosquad")
     cycles = cycles_of(design)
     scenes = baselines._scenes()
     assert set(cycles) == {f"{name}_cycles" for name in scenes}
@@ -111,7 +111,9 @@ def test_cycles_are_those_of_the_pixels():
 
 
 def test_frames_have_short_spans_and_long_ones():
-    spans = {name: prepare(scene, preset()).spans for name, scene in baselines._scenes().items()}
+    spans = {
+        name: prepare(scene, preset(model="cosquad")).spans for name, scene in baselines._scenes().items()
+    }
     assert np.median(spans["teapot"].length) < 4
     assert spans["square"].length.max() >= 16
 

@@ -42,7 +42,7 @@ def test_reference_is_the_renderer(model, exponent):
 @pytest.mark.parametrize("method", ["chord", "chord-local", "quadratic"])
 def test_spans_are_those_of_a_frame(method):
     """The raster is kept; the rest is as for a frame by itself."""
-    frame, design = Frame(load_mesh(STRESS).mesh, 64, 48), preset(method)
+    frame, design = Frame(load_mesh(STRESS).mesh, 64, 48), preset(method, "cosquad")
     for exponent in (3, 700):
         cut, spans = frame.spans_of(design, exponent)
         expected = prepare(frame.scene_of(exponent), design)
@@ -57,7 +57,7 @@ def test_spans_are_those_of_a_frame(method):
 def test_errors_are_those_of_the_simulated_frame():
     mesh = teapot(500)
     frame = Frame(mesh, 64, 48)
-    for exponent, _, result in accuracy.measure(mesh, preset("chord"), (2, 300), 64, 48):
+    for exponent, _, result in accuracy.measure(mesh, preset("chord", "cosquad"), (2, 300), 64, 48):
         (point,) = frame.points(exponent, ["cosquad"])
         assert point.max_lsb == pytest.approx(result.method_error.max_lsb, abs=1e-9)
         assert (point.model, point.exponent, point.over) == ("cosquad", exponent, 0)

@@ -79,7 +79,7 @@ def test_shares_are_those_of_the_pixels(model, exponent):
 
 
 def test_empty_spans_do_not_count():
-    design = preset("chord")
+    design = preset("chord", "cosquad")
     spans, constants = frame(design, 300, 50, 40, 30)
     longer = spans[np.repeat(np.arange(len(spans)), 2)]
     longer.length[1::2] = 0
@@ -106,7 +106,7 @@ def test_gate_saves_cycles_of_the_compact_style_and_no_pixel_changes():
 
 
 def test_a_pixel_that_differs_is_found():
-    design = preset("chord")
+    design = preset("chord", "cosquad")
     pixels = design.compute(*frame(design, 300, 50, 40, 30))
     names = ("x", "y", "r", "g", "b", "last")
     beats = np.zeros(len(pixels.x), [(name, np.int64) for name in names])
@@ -122,7 +122,7 @@ def test_a_pixel_that_differs_is_found():
 
 def test_activity_counts_every_register_once():
     """Powers of two for counts: the names of the real pipeline, each in the sum that it belongs to."""
-    unit = ToggleCounter(ShadingPipelineUnit(preset("chord", gate=True)))
+    unit = ToggleCounter(ShadingPipelineUnit(preset("chord", "cosquad", gate=True)))
     paths = list(unit.status.shape().members)
     status = np.zeros((), [(path, object) for path in paths])
     for index, path in enumerate(paths):

@@ -133,7 +133,7 @@ def test_an_error_that_nothing_tells_of_is_bad(places, monkeypatch):
 def test_error_is_that_of_the_pictures():
     """Against the golden renderer's picture of the spans, where no pixel is at the terminator."""
     [case] = [case for case in cases(1) if case.name == "exponent 100"]
-    raster, design = case.raster, preset("quadratic")
+    raster, design = case.raster, preset("quadratic", "cosquad")
     spans = Spans(
         raster.x, raster.y, raster.length, quantise(raster.normal_left), quantise(raster.normal_right)
     )

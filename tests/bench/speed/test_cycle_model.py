@@ -31,5 +31,5 @@ def test_recurrence(count, waiting):
     ("method", "share"), [("linear", 0), ("renormalise", 0), ("quadratic", 0), ("chord", 0.03)]
 )
 def test_frames(method, share):
-    simulated, modelled = compare(preset(method), 400, (64, 48))
+    simulated, modelled = compare(preset(method, "cosquad"), 400, (64, 48))
     assert abs(modelled - simulated) <= share * simulated

@@ -49,7 +49,7 @@ def test_cycles_are_those_of_the_arithmetic(method, interval, monkeypatch):
     lengths = np.repeat([12, 1, 9, 3, interval], count)
     # A long span pays for a short one after it.
     lengths = np.append(lengths, [1, 2 * interval - 1] * 8)
-    unit = ShadingPipelineUnit(preset(method, setup_interval=interval))
+    unit = ShadingPipelineUnit(preset(method, "cosquad", setup_interval=interval))
     pixels, total = measure(unit, spans(lengths), CONSTANTS, engine="pysim")
     assert pixels == lengths.sum()
     ends = runs[0].cycles[np.cumsum(lengths) - 1]

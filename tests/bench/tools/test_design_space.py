@@ -48,7 +48,7 @@ def view(width=40, height=30):
 
 
 def test_candidates_are_the_pipelines_that_they_name():
-    assert Candidate("chord", fraction_bits=40).design == preset("chord", fraction_bits=40)
+    assert Candidate("chord", fraction_bits=40).design == preset("chord", "cosquad", fraction_bits=40)
     assert Candidate("linear", "exp", 2, "one_minus_cosine").design == preset(
         "linear", "exp", 2, operand="one_minus_cosine"
     )
@@ -177,7 +177,7 @@ def test_several_lights_are_as_bright_as_one_and_all_used():
 @pytest.mark.long
 def test_costs_are_those_of_the_netlist():
     result = costs_of({"method": "linear", "model": "cosquad", "style": "compact"})
-    unit = ShadingPipelineUnit(preset("linear", style="compact"))
+    unit = ShadingPipelineUnit(preset("linear", "cosquad", style="compact"))
     cost = cost_of(unit)
     assert result == {
         "cells": cost.cells,

@@ -51,7 +51,7 @@ def unpacked(data):
 @pytest.mark.parametrize("mesh", web_data.MESHES)
 def test_spans_as_they_are_sent(mesh):
     scene = web_data.scene_of(web_data.START | {"mesh": mesh, "view": web_data.MESHES[mesh].views - 1})
-    frame = prepare(scene, preset("chord"))
+    frame = prepare(scene, preset("chord", "cosquad"))
     ratio = frame.cut_raster.magnitude_right / frame.cut_raster.magnitude_left
     codes, visible = unpacked(web_data.encode(frame.spans, frame.cut_raster.visible, ratio))
     np.testing.assert_allclose(2 ** (codes["ratio"] / 2**19), ratio, rtol=2**-19)
@@ -92,7 +92,7 @@ def test_streams_of_a_view():
         for method, numbers in found["streams"].items()
     }
     for k, exponent in enumerate(web_data.BANDS):
-        design = preset("chord")
+        design = preset("chord", "cosquad")
         frame = prepare(web_data.scene_of(web_data.START | {"exponent": exponent}), design)
         _, spans = web_data.spans_of("teapot", 0, exponent, design)
         # Those of the frame, cut further where another light may have its highlight.

@@ -144,7 +144,7 @@ def test_the_pipeline_flags_no_span_after_the_cut(normal_pairs):
     assert flagged(raster) > 30_000
     vector = np.array([[0, 0, ONE]])
     constants = FrameConstants(10, np.zeros(3, int), vector, vector, np.zeros((1, 3), int), vector * 0)
-    assert preset("quadratic").compute(quantised(cut), constants).out_of_range_spans == 0
+    assert preset("quadratic", "cosquad").compute(quantised(cut), constants).out_of_range_spans == 0
 
 
 def test_quantised_ends():

@@ -174,7 +174,7 @@ def test_cut_spans_chooses(normal_pairs):
     rng = np.random.default_rng(8)
     scene, raster = lit_spans(rng, normal_pairs, 300, rng.uniform(0, 120, 300), 30, 0.2)
     for method, interpolator in METHODS.items():
-        design = preset(method, lights=2, materials=len(EXPONENTS))
+        design = preset(method, "cosquad", lights=2, materials=len(EXPONENTS))
         found, count = cut_spans(scene, raster, design)
         widest = min(map(interpolator.widest_span, EXPONENTS))
         expected = (

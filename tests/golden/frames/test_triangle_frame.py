@@ -23,7 +23,7 @@ METHODS = "chord", "renormalise"
 def test_within_one_lsb_of_exact_normals(method, triangles, exponent):
     """At every pixel of a frame, and at the pixels of the rasteriser in float64, all and no others."""
     drawn = scene("teapot", size=(160, 120), triangles=triangles, exponent=exponent)
-    renderer = Renderer(preset(method))
+    renderer = Renderer(preset(method, "cosquad"))
     frame = triangle_frame(drawn, renderer)
     exact = render(drawn, "phong", renderer.design.specular.model)
     np.testing.assert_array_equal(frame.owner >= 0, exact.mask)
@@ -38,7 +38,7 @@ def test_within_one_lsb_of_exact_normals(method, triangles, exponent):
 def test_true_lines_are_not_cut():
     """One span a scanline and triangle, as the rasteriser's, hidden ones included; chord has more."""
     drawn = scene("teapot", size=(160, 120), triangles=220, back_faces="cull")
-    counts = {method: triangle_frame(drawn, Renderer(preset(method))).counts for method in METHODS}
+    counts = {method: triangle_frame(drawn, Renderer(preset(method, "cosquad"))).counts for method in METHODS}
     assert counts["renormalise"]["cut"] == 0 < counts["chord"]["cut"]
     raster = rasterise(drawn)
     assert counts["renormalise"]["spans"] == len(raster.length) + raster.hidden_spans
@@ -53,7 +53,7 @@ def test_two_sided_materials():
     mesh = replace(drawn.mesh, faces=faces, material=np.arange(len(faces)) // 16 % 2)
     both = replace(drawn.material[0], two_sided=True), drawn.material[0]
     drawn = replace(drawn, mesh=mesh, material=both)
-    renderer, masks = Renderer(preset("chord", materials=2)), []
+    renderer, masks = Renderer(preset("chord", "cosquad", materials=2)), []
     for back_faces in ("cull", "flip"):
         given = replace(drawn, back_faces=back_faces)
         frame, exact = triangle_frame(given, renderer), render(given, "phong", REFLECTION_MODELS["cosquad"])
@@ -69,17 +69,17 @@ def test_widest_span():
     angles = []
     for exponent in (1, 100, 1000):
         drawn = scene("teapot", size=(16, 12), triangles=200, exponent=exponent)
-        angles.append(span_angle(drawn, preset("chord")))
-        assert span_angle(drawn, preset("quadratic")) == 5
-        assert angles[-1] == preset("chord").span_limit.angle(exponent)
+        angles.append(span_angle(drawn, preset("chord", "cosquad")))
+        assert span_angle(drawn, preset("quadratic", "cosquad")) == 5
+        assert angles[-1] == preset("chord", "cosquad").span_limit.angle(exponent)
     assert 15 >= angles[0] > angles[1] > angles[2] > 5
 
 
 def test_methods_and_geometry_must_fit():
     """Values are not what triangles give, nor normals where lines are taken."""
     with pytest.raises(ValueError, match="takes no normals"):
-        Renderer(preset("chord-local"))
+        Renderer(preset("chord-local", "cosquad"))
     with pytest.raises(ValueError, match="takes unit normals, the geometry gives true lines"):
-        Renderer(preset("chord"), Geometry(lines=True))
+        Renderer(preset("chord", "cosquad"), Geometry(lines=True))
     with pytest.raises(ValueError, match="takes true lines, the geometry gives unit normals"):
-        Renderer(preset("renormalise"), Geometry())
+        Renderer(preset("renormalise", "cosquad"), Geometry())

@@ -130,7 +130,7 @@ def close_torus(exponent):
 def test_frame_in_strong_perspective(exponent):
     """Every pixel off the terminator is within 0.6 LSB of per-pixel normals, half an LSB of it rounding."""
     scene = close_torus(exponent)
-    design = preset("renormalise")
+    design = preset("renormalise", "cosquad")
     frame = model_frame(scene, design)
     assert frame.prepared.spans_cut == frame.prepared.missed_spans == 0
     assert frame.out_of_range_spans == frame.wide_spans == 0
@@ -153,7 +153,7 @@ def test_frame_in_strong_perspective(exponent):
 def test_frame_without_lengths_is_worse():
     """Ends made unit vectors are the interpolation of textbooks: bands where the perspective is strong."""
     scene = close_torus(30)
-    design = preset("renormalise")
+    design = preset("renormalise", "cosquad")
     frame = model_frame(scene, design)
     assert compare(scene, design, frame).method_error.max_lsb <= 2
     spans = frame.prepared.spans

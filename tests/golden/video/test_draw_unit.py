@@ -32,7 +32,7 @@ def scene(triangles=400, size=SIZE, back_faces="cull", distance=1.0):
 @pytest.mark.parametrize(("lines", "angle"), [(16, 8), (16, 1500), (7, 3000)])
 def test_bands_are_the_whole_frame(lines, angle):
     """To the bit; bands of 7 lines leave a last one of a line."""
-    drawing = Drawing.of([scene()], preset(), lines=lines)
+    drawing = Drawing.of([scene()], preset(model="cosquad"), lines=lines)
     whole, image = drawing.whole(angle), np.zeros((*SIZE[::-1], 3), dtype=np.uint8)
     image[whole.y, whole.x] = whole.color
     np.testing.assert_array_equal(drawing.picture(angle), image)
@@ -84,7 +84,7 @@ def test_error_against_exact_normals_of_every_pixel(angle):
 
 def test_triangles_near_the_camera_are_dropped_and_counted():
     near = scene(distance=0.3)
-    drawing = Drawing.of([near], preset())
+    drawing = Drawing.of([near], preset(model="cosquad"))
     outside = drawing.vertices(0).outside
     assert 0 < outside.sum() < len(outside)
     kept, counts = drawing.triangles(0, 0, drawing.frame)
@@ -95,7 +95,7 @@ def test_triangles_near_the_camera_are_dropped_and_counted():
 
 def test_commands_of_a_scene():
     """Constants and the transform in a frame's first band, the draw in every one."""
-    drawing = Drawing.of([scene(), replace(scene(), ambient_light=(0, 0, 0))], preset())
+    drawing = Drawing.of([scene(), replace(scene(), ambient_light=(0, 0, 0))], preset(model="cosquad"))
     assert len(drawing.commands.starts) == 2
     first, other = (drawing.commands.compute(drawing.commands.starts[1], begins) for begins in (True, False))
     assert [KINDS[kind] for kind in other[:, 0]] == ["draw", "end"]
@@ -106,7 +106,7 @@ def test_commands_of_a_scene():
 
 
 def test_what_does_not_fit_is_refused():
-    drawing = Drawing.of([scene()], preset())
+    drawing = Drawing.of([scene()], preset(model="cosquad"))
     with pytest.raises(ValueError, match="a band of 160x8 has 8 and 3"):
         replace(drawing, lines=8)
     with pytest.raises(ValueError, match="choose from 2 lists, there are 1"):

@@ -17,8 +17,8 @@ from blysk.hdl.pixel_assembler import pixel_shape
 
 SHAPES = {
     "triangle": triangle_shape(),
-    "span": span_shape(preset("chord")),
-    "values": span_shape(preset("chord-local", lights=2)),
+    "span": span_shape(preset("chord", "cosquad")),
+    "values": span_shape(preset("chord-local", "cosquad", lights=2)),
     "true span": true_spans_shape(),
     "pixel": pixel_shape(),
 }

@@ -9,7 +9,7 @@ from blysk.hdl.bus.registers import RegistersUnit
 
 def test_loads():
     """Of every constant, in the order of the writes; none of what is refused, or read, or elsewhere."""
-    map = RegisterMap("core", (), frame_registers(), constant_registers(preset(lights=2)))
+    map = RegisterMap("core", (), frame_registers(), constant_registers(preset(model="cosquad", lights=2)))
     unit = RegistersUnit(map)
     accesses, expected = [], []
     for index, register in enumerate(map.registers):

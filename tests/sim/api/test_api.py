@@ -214,8 +214,12 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
         ("no.toml", {}, "no.toml: there is no such file; "),
         ("no.obj", {"triangles": 100}, "triangles 100: only the teapot is tessellated; "),
         (SCENE_OF_ITS_OWN, {"exponent": 3}, "exponent 3: the scene has its own; "),
-        (SCENE_OF_ITS_OWN, {"design": preset(), "method": "chord"}, "method: the design has its own; "),
-        (SCENE_OF_ITS_OWN, {"design": preset(materials=2)}, "design: the "),
+        (
+            SCENE_OF_ITS_OWN,
+            {"design": preset(model="cosquad"), "method": "chord"},
+            "method: the design has its own; ",
+        ),
+        (SCENE_OF_ITS_OWN, {"design": preset(model="cosquad", materials=2)}, "design: the "),
     ],
     ids=str,
 )

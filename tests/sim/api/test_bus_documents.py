@@ -16,8 +16,8 @@ pytestmark = pytest.mark.filterwarnings("ignore::amaranth.hdl._ir.UnusedElaborat
 
 CORES = {
     "shader": preset("chord", "blinn", 2, materials=3),
-    "render": Renderer(preset("chord")),
-    "geometry": Renderer(preset("chord")),
+    "render": Renderer(preset("chord", "cosquad")),
+    "geometry": Renderer(preset("chord", "cosquad")),
 }
 
 

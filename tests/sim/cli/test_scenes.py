@@ -144,7 +144,7 @@ def test_position_of_the_camera(capsys):
             lights=[Light((-0.5, 0.8, 0.7))],
             background=(int("1a", 16) / 255, int("1c", 16) / 255, int("20", 16) / 255),
         )
-        assert np.array_equal(FrameSimulator(preset("linear")).render(scene).image, expected)
+        assert np.array_equal(FrameSimulator(preset("linear", "cosquad")).render(scene).image, expected)
     # --view takes the place of the file's position.
     options = ["--size", "64x48", "--method", "linear", "--view", "1,2,3"]
     assert main(["render", "middle.toml", "--view", "1,2,3", "-o", "again.png"]) == 0

@@ -93,7 +93,7 @@ def test_beats_are_those_without_probes(observed):
 
 def test_needs_one_light():
     with pytest.raises(ValueError, match="one light"):
-        ObservedPipeline(preset("chord", lights=2, gate=True))
+        ObservedPipeline(preset("chord", "cosquad", lights=2, gate=True))
 
 
 @pytest.mark.parametrize(

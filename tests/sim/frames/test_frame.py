@@ -27,7 +27,7 @@ from blysk.sim.frames.frame import FrameSimulator, sample_constants
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.teapot import teapot
 
-DESIGN = preset("quadratic", lights=3)
+DESIGN = preset("quadratic", "cosquad", lights=3)
 LIGHTS = (
     Light((-0.5, 0.8, 0.7)),
     Light((0.9, 0.1, 0.4), (0.2, 0.3, 0.9)),
@@ -139,7 +139,7 @@ def test_no_light_leaves_the_ambient(simulator):
 def test_unused_lights_are_black(simulator):
     # One light of three, against a simulator that has one only.
     scene = scene_of("240", (24, 18), lights=LIGHTS[:1])
-    single = FrameSimulator(preset(lights=1), "pysim").render(scene)
+    single = FrameSimulator(preset(model="cosquad", lights=1), "pysim").render(scene)
     assert np.array_equal(single.image, simulator.render(scene).image)
 
 
@@ -236,7 +236,7 @@ def changed(monkeypatch, field):
 def test_simulation_that_is_not_the_model(monkeypatch):
     changed(monkeypatch, "g")
     with pytest.raises(SimulationError, match="pixels are not those of its bit-accurate model"):
-        FrameSimulator(preset(), "pysim")
+        FrameSimulator(preset(model="cosquad"), "pysim")
 
 
 def test_pixels_that_were_not_asked_for(simulator, monkeypatch):
@@ -259,7 +259,7 @@ def test_frame_of_three_materials(engine):
 
     The materials are scattered over the triangles: the spans are in another order than without.
     """
-    several = preset(lights=1, materials=3)
+    several = preset(model="cosquad", lights=1, materials=3)
     lone = scene_of("240", (40, 30) if engine == "cxxrtl" else (20, 15), lights=LIGHTS[:1])
     faces = len(lone.mesh.faces)
     mesh = dataclasses.replace(lone.mesh, material=np.random.default_rng(3).integers(0, 3, faces))
@@ -271,7 +271,7 @@ def test_frame_of_three_materials(engine):
     owner[raster.pixel[raster.visible]] = mesh.material[raster.triangle[raster.span[raster.visible]]]
     owner = owner.reshape(scene.height, scene.width)
     assert np.bincount(owner[owner >= 0], minlength=3).min() > 20
-    one = preset(lights=1)
+    one = preset(model="cosquad", lights=1)
     for index, material in enumerate(MATERIALS):
         alone = dataclasses.replace(lone, material=material)
         # Spans are cut by the exponents of their own materials.
@@ -309,7 +309,7 @@ def test_point_light_and_near_viewer(exponent):
         [Light(position=(-2, 4, 3)), Light((0.5, 0.2, 1), (0.2, 0.3, 0.4))],
         viewer="near",
     )
-    design = preset("chord-local", lights=2)
+    design = preset("chord-local", "cosquad", lights=2)
     simulator = FrameSimulator(design)
     frame = simulator.render(scene)
     assert frame.out_of_range_spans == 0
@@ -320,7 +320,7 @@ def test_point_light_and_near_viewer(exponent):
     far = dataclasses.replace(scene, viewer="distant", lights=[Light((-2, 4, 3)), scene.lights[1]])
     assert np.abs(simulator.render(far).image.astype(int) - frame.image).max() > 20
     with pytest.raises(ValueError, match=r"^point lights and a near viewer need the method chord-local$"):
-        prepare(scene, preset("chord", lights=2))
+        prepare(scene, preset("chord", "cosquad", lights=2))
 
 
 @pytest.mark.parametrize("model", ["blinn", "cosquad"])

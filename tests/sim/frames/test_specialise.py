@@ -37,7 +37,8 @@ def scene_of(material=CLAY, lights=(KEY,), size=(600, 500), mesh=None, **options
 
 def full_of(scene, **options):
     options = {"gate": True, **options}
-    return preset("chord", lights=max(len(scene.lights), 1), materials=len(scene.materials), **options)
+    counts = {"lights": max(len(scene.lights), 1), "materials": len(scene.materials)}
+    return preset(**{"method": "chord", "model": "cosquad"} | counts | options)
 
 
 def pixels_of(scene, design):
@@ -147,7 +148,7 @@ def test_black_lights():
     assert_same_frame(scene, special)
     faint = scene_of(lights=(KEY, Light((0, 0, 1), (1e-9,) * 3), FILL))
     assert "lights" not in reasons(specialise(faint, full_of(faint)))
-    assert "lights" in reasons(specialise(faint, preset("linear", lights=3)))
+    assert "lights" in reasons(specialise(faint, preset("linear", "cosquad", lights=3)))
 
 
 def test_factors_of_lights():
@@ -183,12 +184,12 @@ def test_methods_that_no_gate_serves():
     """Spans that are cut by their error are not cut by a light that is off."""
     scene = scene_of(replace(CLAY, exponent=400), (KEY, BLACK, FILL))
     for method in ("chord-local", "quadratic-published", "renormalise"):
-        special = specialise(scene, preset(method, lights=3))
+        special = specialise(scene, preset(method, "cosquad", lights=3))
         assert "lights" in reasons(special)
         assert reasons(special)["exponent"] == "exponent fixed at 400: PROM folded"
         assert_same_frame(scene, special)
     dark = scene_of(lights=(BLACK,))
-    special = specialise(dark, preset("chord-local"))
+    special = specialise(dark, preset("chord-local", "cosquad"))
     assert reasons(special)["lights"] == "no light path: no light lights anything"
     assert_same_frame(dark, special)
 
@@ -272,7 +273,7 @@ def test_nothing_on_the_picture():
 
 def test_default_is_the_chord_method_with_a_gate():
     scene = scene_of(lights=())
-    assert specialise(scene).full == preset("chord", gate=True)
+    assert specialise(scene).full == preset("chord", "cosquad", gate=True)
 
 
 @pytest.mark.long

@@ -80,8 +80,8 @@ def rows(path):
 @pytest.mark.parametrize(
     "design",
     [
-        preset(lights=0),
-        pytest.param(preset("chord-local", lights=2, materials=3), marks=pytest.mark.long),
+        preset(model="cosquad", lights=0),
+        pytest.param(preset("chord-local", "cosquad", lights=2, materials=3), marks=pytest.mark.long),
         pytest.param(preset("linear", None, grey=True, exponent=9), marks=pytest.mark.long),
     ],
     ids=str,
@@ -101,7 +101,7 @@ def test_columns_are_the_ports(design):
 
 def test_frame_shows_every_light_and_material():
     """Pixels change with each; one span is empty."""
-    design = preset("chord", lights=3, materials=4)
+    design = preset("chord", "cosquad", lights=3, materials=4)
     spans, constants, pixels = teapot_frame(design)
     assert np.flatnonzero(spans.length == 0).tolist() == [0]
     assert set(spans.material) == set(range(4))
