@@ -271,7 +271,9 @@ class _Netlist:
 
     def absorb_words(self, cell: str) -> int:
         """Move the flip-flops behind either port of a block RAM into it; how many ports."""
-        wide = int(str(self.cells[cell]["parameters"]["DATA_WIDTH_B"]), 2) == 2 * _WORD_BITS
+        # A parameter that is left out has its default, 18.
+        bits = self.cells[cell].get("parameters", {}).get("DATA_WIDTH_B", f"{_WORD_BITS:b}")
+        wide = int(str(bits), 2) == 2 * _WORD_BITS
         return sum(self.absorb_word(cell, ports) for ports in (("AB",) if wide else "AB"))
 
     def end_carry(self, cell: str) -> bool:

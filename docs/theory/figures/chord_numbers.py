@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.cosines.chord_setup import ChordSetup, largest_span_angle
+from blysk.golden.cosines.chord_values import ChordValues
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.frame import model_frame
@@ -168,17 +169,28 @@ def _widest() -> str:
         found = (largest_fit_error(REFLECTION_MODELS[name], exponent, widest) for name in _MODELS)
         # Ends of a span that reaches into the highlight; its base is 0 where u = 2/n.
         largest_u = min((2 / math.sqrt(exponent) + math.radians(widest)) ** 2 / 2, 2.0)
-        words = 255 * exponent * float(ChordSetup().highlight_error(widest, largest_u))
+        words = 255 * exponent * word_errors(widest, largest_u)[0]
         rows.append([str(exponent), f"{widest:.2f}°", *(f"{error:.3f}" for error in found), f"{words:.3f}"])
     return table(["n", "psi_max", *(f"`{name}`" for name in _MODELS), "words"], rows, 0)
 
 
+def word_errors(degrees: float, u: float) -> tuple[float, float]:
+    """Bounds of the errors of u, up to a value, and of N·L by the words of values and setup."""
+    chord = 2 * math.sin(math.radians(degrees) / 2)
+    # |P| is the chord times the sine of the angle to H at most, and a bulge more.
+    slope, curvature = np.array(chord * min(math.sqrt(2 * u), 1) + chord**2), np.array(chord**2)
+    setup = ChordSetup()
+    highlight = 1.25 * ChordValues.highlight_error(u) + setup.highlight_error(slope, curvature)
+    diffuse = 1.25 * ChordValues.diffuse_error() + setup.diffuse_error(np.array(chord + chord**2), curvature)
+    return float(highlight), float(diffuse)
+
+
 def _arithmetic() -> str:
-    unit = ChordSetup()
     rows = []
     for degrees in (1.0, 6.32, 9.28, 15.0):
-        errors = [float(unit.highlight_error(degrees, u)) for u in (0.01, 0.1, 2.0)]
-        rows.append([f"{degrees:g}°", *(f"{e:.1e}" for e in errors), f"{unit.diffuse_error(degrees):.1e}"])
+        errors = [word_errors(degrees, u)[0] for u in (0.01, 0.1, 2.0)]
+        diffuse = word_errors(degrees, 2.0)[1]
+        rows.append([f"{degrees:g}°", *(f"{e:.1e}" for e in errors), f"{diffuse:.1e}"])
     return table(["psi", "u <= 0.01", "u <= 0.1", "any u", "N·L"], rows)
 
 

@@ -408,7 +408,7 @@ def test_an_inverter_that_does_not_invert_is_found(mapped, tmp_path):
 
 def test_a_power_up_value_that_is_lost_is_found(mapped, tmp_path):
     """The same netlist but for a register that starts at 1: what is absorbed would start at 0."""
-    before = mapped("no enable", CASES["no enable"][0])
+    before = mapped("no enable", Beside(CASES["no enable"][0]))
     after, _ = absorb_registers(before)
     for name, cell in before["modules"]["top"]["cells"].items():
         if name.startswith("a_1_TRELLIS_FF"):

@@ -77,7 +77,10 @@ def test_cost_of_coscos():
 
 @pytest.mark.parametrize("model", quick(MODELS, ("cosquad_lin", "cosquad_q", "exp")))
 def test_slopes_of_every_exponent(model):
-    """Every word that a unit needs of an exponent, two cycles after it, against the model's tables."""
+    """Every word that a unit needs of an exponent against the model's tables, two cycles after it.
+
+    The boundary comes from a memory and its register, a cycle later.
+    """
     parameters = Specular(REFLECTION_MODELS[model])
     unit = SlopeUnit(parameters)
     simulator = Simulator(unit)
@@ -85,7 +88,7 @@ def test_slopes_of_every_exponent(model):
     seen = []
 
     async def bench(context):
-        for exponent in range(1003):
+        for exponent in range(1004):
             context.set(unit.exponent, min(exponent, 1000))
             if exponent > 2:
                 slope = unit.slope
@@ -96,7 +99,9 @@ def test_slopes_of_every_exponent(model):
     simulator.run()
     scale, shift = parameters.scale(np.arange(1, 1001))
     expected = np.stack([scale.codes, shift + 1, parameters.boundaries.codes[1:1001]], axis=1)
-    np.testing.assert_array_equal(seen, expected)
+    seen = np.array(seen)
+    np.testing.assert_array_equal(seen[:-1, :2], expected[:, :2])
+    np.testing.assert_array_equal(seen[1:, 2], expected[:, 2])
 
 
 @pytest.mark.parametrize(
