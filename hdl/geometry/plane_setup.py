@@ -44,7 +44,7 @@ class PlaneSetupUnit(PipelinedUnit):
     grid : Grid
         Fraction bits of the coordinates.
     initiation_interval : int
-        Cycles from a triangle to the next at the closest, at least 1.
+        Cycles from a triangle to the next at the closest, at least 1; not more than the latency count.
     skid : bool
         As `PipelinedUnit` has it.
 
@@ -63,11 +63,13 @@ class PlaneSetupUnit(PipelinedUnit):
         self._graph = Dataflow(initiation_interval)
         self._results = self._describe()
         self.multipliers = self._graph.multiplier.count
+        latency = max(word.stage for word in self._results.values())
         super().__init__(
             data.StructLayout(plane_corners_shape(grid) | {"right": unsigned(1)}),
             data.StructLayout(scales_shape() | {"sliver": unsigned(1)}),
-            latency=max(word.stage for word in self._results.values()),
-            initiation_interval=initiation_interval,
+            latency=latency,
+            # A triangle that has left shares nothing with the next.
+            initiation_interval=min(initiation_interval, latency),
             skid=skid,
         )
 
