@@ -389,7 +389,7 @@ BUGS = {
         "length.ready.eq(gpq.o.valid & curve.i.ready)",
         "length.ready.eq(curve.i.ready)",
     ),
-    "there is no room for a length": ("quadratic", "gpq.latency + 2", "gpq.latency - 2"),
+    "there is no room for a length": ("quadratic", "gpq.latency + 2", "gpq.latency - 3"),
     "a span does not wait for its differences": (
         "chord_spans",
         "joined.valid.eq(lengths.r_rdy & known & (waits | ~is_long))",
@@ -404,14 +404,14 @@ BUGS = {
     ),
     "of two normals one is not sent": (
         "chord_interpolator",
-        "following.eq(Mux(span.length > 1, _Place.RIGHT, _Place.PIXEL))",
-        "following.eq(Mux(span.length > 2, _Place.RIGHT, _Place.PIXEL))",
+        "several = span.length[1:].any()",
+        "several = span.length.all()",
         "_send",
     ),
     "each value makes a span": (
         "chord_interpolator",
-        "spans.i.valid.eq(values.o.valid & tags.r_rdy & complete)",
-        "spans.i.valid.eq(values.o.valid & tags.r_rdy)",
+        "spans.i.valid.eq(values.o.valid & complete)",
+        "spans.i.valid.eq(values.o.valid)",
         "_collect",
     ),
     "angles are lost": ("angular", "setup.o.ready.eq(prepared.ready)", "setup.o.ready.eq(1)"),
