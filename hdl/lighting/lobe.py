@@ -244,7 +244,7 @@ class LobeUnit(PipelinedUnit):
 
         def coarse(argument, zeros):
             # By all but a few, then the rest.
-            shift = Mux(zeros == p.octaves, p.octaves - 1, zeros)
+            shift = Cat(Mux(zeros == p.octaves, p.octaves - 1, zeros), Const(0, _FINE))
             normal = (argument << Cat(Const(0, _FINE), shift[_FINE:]))[:top]
             row = (self._base + p.octaves - zeros)[: len(self._read.address) - p.step_bits]
             return Cat(normal, shift[:_FINE], row)

@@ -88,13 +88,13 @@ def of_argument(parameters):
 
 
 def of_address(parameters):
-    """Two cycles on the memory is asked for the word of the argument's octave and step; the rest is f.
+    """Three cycles on the memory is asked for the word of the argument's octave and step; the rest is f.
 
     From the definition: row r, from 1 on, has the arguments from ``2^(r-1-E)`` to twice that.
     """
     p, h = parameters, OfUnit(parameters)
     bits, width = p.fraction_bits, p.fraction_bits - 1 - p.step_bits
-    argument = h.before(h.words["argument"], 2)
+    argument = h.before(h.words["argument"], 3)
     bank = Const(0)
     if p.banks > 1:
         bank = h.unit.constants.bank
@@ -113,7 +113,7 @@ def of_address(parameters):
                 h.m.d.comb += address.eq((index * p.rows + row << p.step_bits) + step)
         fraction = (rest << width - len(rest))[width - p.fraction_format.width : width]
         right = (h.unit.table.address == address) & (h.words["memory_0_1"] == fraction)
-        h.claim(~inside | right, 4)
+        h.claim(~inside | right, 5)
     return h.harness
 
 
@@ -124,7 +124,7 @@ def of_term(parameters):
     are in range; of the product, which is cut, that f is from 0 to under 1.
     """
     h = OfUnit(parameters)
-    word, kept = h.before(h.unit.table.word), h.words["value_7"]
+    word, kept = h.before(h.unit.table.word), h.words["value_9"]
     h.harness.claim(kept == h.before(word[:17]))
     step = h.before(word[17:]).as_signed()
     h.harness.assume((kept + step >= 0) & (kept + step < 1 << 17))
@@ -135,7 +135,7 @@ def of_term(parameters):
     h.harness.claim((way >= Mux(step > 0, 0, step)) & (way <= Mux(step > 0, step, 0)))
     exact = kept + way
     h.harness.claim((exact >= 0) & (exact < 1 << 17))
-    h.harness.claim(h.words["term"] == h.before(Mux(h.words["lit_7"], exact[:17], 0)))
+    h.harness.claim(h.words["term"] == h.before(Mux(h.words["lit_9"], exact[:17], 0)))
     return h.harness
 
 
@@ -183,9 +183,16 @@ def of_memory(parameters):
         with m.If((to == own_bank) & (count == own_entry + 1) & begun & chosen):
             difference = (payload.value - previous)[:18]
             m.d.sync += [word.eq(Cat(previous, difference)), known.eq(1)]
-    asked, answer = Signal(name="asked"), Signal(35, name="answer")
-    m.d.sync += [asked.eq(unit.reads[0].enable & (unit.reads[0].address == address) & known), answer.eq(word)]
-    h.claim(~asked | (unit.reads[0].word == answer))
+    # Two clocks with enable, on neither of which a word is written.
+    asked, answer = Signal(2, name="asked"), Signal(35, name="answer")
+    read, wrote = unit.reads[0], Signal(name="wrote")
+    moves = read.enable & ~unit.write.valid & ~wrote
+    m.d.sync += [
+        wrote.eq(unit.write.valid),
+        asked.eq(Cat(moves & (read.address == address) & known, asked[0] & moves)),
+        answer.eq(Mux(asked[0], answer, word)),
+    ]
+    h.claim(~asked[1] | (read.word == answer))
     return h
 
 
