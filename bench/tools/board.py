@@ -37,9 +37,6 @@ from blysk.sim.value_types import Choice, Number, OutputFile, Whole
 
 __all__ = ["built_lines", "command", "missed", "shown_lines", "too_heavy"]
 
-CLOCK = 63.0
-"""Default of the drawing clock, MHz."""
-
 MOST_FRAMES = 60
 
 
@@ -58,9 +55,7 @@ MOST_FRAMES = 60
 @click.option(
     "--clock",
     type=Number(1, 126, "MHz"),
-    default=CLOCK,
-    show_default=True,
-    help="Drawing clock, MHz: this or a little less.",
+    help="Drawing clock, MHz: this or a little less.  [default: 57.3 for ulx3s-85f, 63 for the others]",
 )
 @click.option("--seeds", type=Whole(1, 20), default=1, show_default=True, help="Placements to try at most.")
 @click.option("--load", is_flag=True, help="Load the bitstream by openFPGALoader.")
@@ -94,6 +89,7 @@ def command(context, board_name, mesh, output, simulate, colours, clock, seeds, 
         packages_missing()
         check_writable(output)
     gpu, scenes = gpu_of(board, mesh, given, colours)
+    clock = clock or board.clock
     try:
         plan = clock_plan(board.reference, gpu.buffer.mode.pixel_rate, 1e6 * clock)
     except NoClockPlan as error:
