@@ -144,8 +144,8 @@ class Design:
         scale = getattr(self.interpolator, "scale", 0)
         if scale and not self.loads_tables:
             raise ValueError("a scale of 1 - N·H needs a lobe with a table")
-        if self.loads_tables and self.specular.scale != scale:
-            object.__setattr__(self, "specular", replace(self.specular, scale=scale))
+        if self.loads_tables and cast(Lobe, self.specular).scale != scale:
+            object.__setattr__(self, "specular", replace(cast(Lobe, self.specular), scale=scale))
 
     def _check_factors(self) -> None:
         """Refuse factors of lights that there are not, or that nothing takes."""
@@ -381,8 +381,8 @@ class Design:
             return
         if spans.values is None or spans.values.diffuse.shape != (len(spans), self.lights, 3):
             raise ValueError(f"method {self.method} takes spans with values for {self.lights} lights")
-        given = (len(spans), 0, 3) if spans.factors is None else spans.factors.shape
-        if given != (len(spans), len(self.factors), 3):
+        shape = (len(spans), 0, 3) if spans.factors is None else spans.factors.shape
+        if shape != (len(spans), len(self.factors), 3):
             raise ValueError(f"the design takes spans with factors for {len(self.factors)} lights")
 
     def operands(self, spans: Spans, constants: FrameConstants) -> Operands:

@@ -120,7 +120,7 @@ class Light:
         """Whether its light depends on the place: its attenuation is not 1, or it is a spot."""
         return self.spot is not None or self.attenuation != (1.0, 0.0, 0.0)
 
-    def factor(self, points: np.ndarray | None = None) -> np.ndarray:
+    def factor(self, points: np.ndarray | None = None) -> np.ndarray | np.float64:
         """Factor a of the light that reaches points, 0 to 1: of the distance d times that of the cone.
 
         ``min(1 / (k_0 + k_1 d + k_2 d^2), 1) s^2 (3 - 2 s)``, with s = 0 at the cone's outer angle and 1 at
@@ -149,7 +149,7 @@ class Light:
         k_0, k_1, k_2 = self.attenuation
         with np.errstate(over="ignore"):
             result = 1 / np.maximum(k_0 + distance * (k_1 + distance * k_2), 1.0)
-        if self.spot is not None:
+        if self.spot is not None and self.cone is not None:
             inner, outer = np.cos(np.radians(self.cone))
             share = np.clip((-(towards @ np.asarray(self.spot)) - outer) / (inner - outer), 0, 1)
             result = result * share**2 * (3 - 2 * share)

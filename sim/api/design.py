@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from importlib.metadata import version
-from typing import Any, Literal, Unpack
+from typing import Any, Literal, Unpack, cast
 
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.frame_constants import address_table
@@ -83,7 +83,7 @@ def design(
     settings = read_settings("", {**options, **counts}, {**DESIGN, **COUNTS})
     made = design_of(settings, settings["lights"], settings["materials"])
     try:
-        return replace(made, factors=range(settings["factors"]))
+        return replace(made, factors=tuple(range(settings["factors"])))
     except ValueError as error:
         remedy = "use chord-local, and at most as many as lights"
         raise settings.refuse("factors", str(error), remedy) from None
@@ -195,7 +195,7 @@ def header_of(unit: ShadingUnit) -> list[str]:
             f"i_values: a light's three codes of N.L, {formats[0]}, and three of 1 - N.H, {formats[1]},",
             "times (1 - 2^-17)^2: at the first pixel, the middle, the last pixel; no L and H are read",
         ]
-        if scale := made.interpolator.scale:
+        if scale := getattr(made.interpolator, "scale", 0):
             lines.append(f"1 - N.H is times {1 << scale}, and 1 at most; so it is in the table")
         if made.factors:
             lines += [
@@ -384,7 +384,7 @@ def verilog_and_unit(
         if top != "render":
             raise OptionError("coarse", "", "it is of triangles to pixels", "give --top render, too")
         size = checked({"coarse": coarse}, COARSE)["coarse"]
-        parameters = replace(parameters, coarse=CoarseDepth(*size))
+        parameters = replace(cast(Renderer, parameters), coarse=CoarseDepth(*size))
     if hardware or bus != "native":
         lanes = {"setups": setups} if hardware else {}
         unit = unit_of_top(top, bus, parameters, **lanes)

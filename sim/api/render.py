@@ -409,7 +409,7 @@ def _design(settings: Settings) -> Design:
     if local and not made.takes_values:
         reason = "point lights and a near viewer need the values of a span"
         raise settings.refuse("method", reason, "use chord-local")
-    return replace(made, factors=[index for index, light in enumerate(lights) if light.fades])
+    return replace(made, factors=tuple(index for index, light in enumerate(lights) if light.fades))
 
 
 def _specialised(scenes: Sequence[Scene], design: Design, settings: Settings) -> Specialisation:
