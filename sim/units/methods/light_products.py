@@ -71,10 +71,10 @@ RECORD = Record(
     axis="",
     still={
         CONSTANT: "multiplier_?_b[0-17] multiplier_?[0-17]",
-        "the second bit of a square is 0": "multiplier_{3-5}_product[1] highlight_0_square_2[1]",
+        "the second bit of a square is 0": "multiplier_{3-5}_product[1]",
         "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
-            "multiplier_{3-5}_product[35] highlight_0_square_2[35] highlight_0_square_partial[36] "
-            "highlight_0_square_total[36-37] highlight_0_aligned[38-39]"
+            "multiplier_{3-5}_product[35] highlight_0_square_partial[36] highlight_0_square_total[36-37] "
+            "highlight_0_aligned[38-39]"
         ),
     },
 )
