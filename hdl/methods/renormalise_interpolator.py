@@ -7,7 +7,6 @@ from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolato
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedValue
 from blysk.hdl.core.shapes import normal_shape, span_normals_shape
-from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 from blysk.hdl.normals.line_setup import LineSetupUnit, line_shape
@@ -37,11 +36,11 @@ class LineAccumulatorUnit(AccumulatorUnit):
 
     def carried(self, values):
         """The bit."""
-        yield self.i.payload.span, values.span
+        yield self.span.span, values.span
 
     def quadratics(self, values):
         """The components; of second difference 0."""
-        p, line = self.parameters.accumulator, self.i.payload.line
+        p, line = self.parameters.accumulator, self.span.line
         zero = FixedValue.constant(p.difference_format, 0)
         for c in range(3):
             yield f"vector_{c}", p, (line.start[c], line.step[c], zero), values.vector[c]
@@ -83,14 +82,14 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
         self._accumulator = LineAccumulatorUnit(parameters, self.length_bits)
         self._renormaliser = RenormaliserUnit()
         units = self._setup, self._accumulator, self._renormaliser
-        self.latency = sum(unit.latency for unit in units) + SLICE_LATENCY + self.product_latency
+        self.latency = sum(unit.latency for unit in units) + self.product_latency
 
     def source(self, m):
         """Lines, their vectors, unit vectors; spans of which a vector was too short."""
         m.submodules.line_setup = setup = self._setup
         m.submodules.line_accumulator = accumulator = self._accumulator
         m.submodules.renormaliser = renormaliser = self._renormaliser
-        line = stream.Signature(accumulator.i.payload.shape()).create(path=("line",))
+        line = accumulator.i
         parity = Signal()
         m.d.comb += [
             *(setup.i.payload[name].eq(self.i.payload[name]) for name in self.i.payload.shape().members),
@@ -104,7 +103,6 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
         ]
         with m.If(line.valid & line.ready):
             m.d.sync += parity.eq(~parity)
-        connect_slice(m, line, accumulator.i)
         normals = stream.Signature(normal_shape()).create(path=("normals",))
         result = renormaliser.o.payload
         m.d.comb += [
