@@ -4,7 +4,8 @@ from amaranth.lib import fifo, stream
 
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
-from blysk.hdl.core.stream import connect, connect_slice
+from blysk.hdl.core.memory import connect_wide_fifo
+from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
 from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
@@ -57,7 +58,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, parameters=QuadraticInte
         if differences:
             self._setup = DifferenceSetupUnit(initiation_interval=interval, length_bits=self.length_bits)
             self._accumulator = DifferenceAccumulatorUnit()
-            after = self._setup.latency + self._accumulator.latency
+            after = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
         else:
             self._evaluator = QuadraticEvaluatorUnit(QuadraticEvaluator(parameters.form))
             # With two cycles a pixel an interval of 7 ends between two pixels.
@@ -101,7 +102,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, parameters=QuadraticInte
         if differences:
             m.submodules.difference_setup = curve
             m.submodules.difference_accumulator = accumulator = self._accumulator
-            connect(m, curve.o, accumulator.i)
+            connect_wide_fifo(m, "prepared", curve.o, accumulator.i)
             normals = accumulator.o
         else:
             m.submodules.evaluator = curve

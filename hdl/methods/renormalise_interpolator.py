@@ -6,7 +6,9 @@ from amaranth.lib import data, stream
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.core.memory import connect_wide_fifo
 from blysk.hdl.core.shapes import normal_shape, span_normals_shape
+from blysk.hdl.core.stream import SLICE_LATENCY
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 from blysk.hdl.normals.line_setup import LineSetupUnit, line_shape
@@ -82,14 +84,14 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
         self._accumulator = LineAccumulatorUnit(parameters, self.length_bits)
         self._renormaliser = RenormaliserUnit()
         units = self._setup, self._accumulator, self._renormaliser
-        self.latency = sum(unit.latency for unit in units) + self.product_latency
+        self.latency = sum(unit.latency for unit in units) + SLICE_LATENCY + self.product_latency
 
     def source(self, m):
         """Lines, their vectors, unit vectors; spans of which a vector was too short."""
         m.submodules.line_setup = setup = self._setup
         m.submodules.line_accumulator = accumulator = self._accumulator
         m.submodules.renormaliser = renormaliser = self._renormaliser
-        line = accumulator.i
+        line = stream.Signature(accumulator.i.payload.shape()).create(path=("line",))
         parity = Signal()
         m.d.comb += [
             *(setup.i.payload[name].eq(self.i.payload[name]) for name in self.i.payload.shape().members),
@@ -103,6 +105,7 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
         ]
         with m.If(line.valid & line.ready):
             m.d.sync += parity.eq(~parity)
+        connect_wide_fifo(m, "prepared", line, accumulator.i)
         normals = stream.Signature(normal_shape()).create(path=("normals",))
         result = renormaliser.o.payload
         m.d.comb += [
