@@ -59,7 +59,7 @@ def registered_read(
 
 def connect_late_fifo(
     m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int
-) -> None:
+) -> Value:
     """Connect two streams through a FIFO in a memory, between registers.
 
     One is before the memory, so that the source's handshake ends there; behind it is that of
@@ -73,6 +73,11 @@ def connect_late_fifo(
         As for `connect_fifo`.
     depth : int
         Payloads that the memory holds, at least 3; two more wait behind it.
+
+    Returns
+    -------
+    Value
+        Whether no payload is inside.
 
     Raises
     ------
@@ -113,6 +118,7 @@ def connect_late_fifo(
         m.d.sync += [read.eq(reads), there.eq(read)]
     with m.Elif(sink.ready):
         m.d.sync += there.eq(0)
+    return ~(written | some | read | there)
 
 
 def connect_wide_fifo(
