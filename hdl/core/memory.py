@@ -146,6 +146,7 @@ def connect_wide_fifo(
     bits = (depth - 1).bit_length()
     m.submodules[name] = memory = Memory(shape=width, depth=1 << bits, init=[])
     write, read = memory.write_port(), memory.read_port(domain="comb")
+    first, free = (Signal(bits, name=f"{name}_{word}") for word in ("first", "free"))
     room, some = Signal(name=f"{name}_room", init=1), Signal(name=f"{name}_some")
     level, following = (Signal(range(depth + 1), name=f"{name}_{word}") for word in ("level", "following"))
     comes, goes = source.valid & room, some & sink.ready
@@ -153,14 +154,16 @@ def connect_wide_fifo(
         source.ready.eq(room),
         sink.valid.eq(some),
         write.data.eq(source.payload),
+        write.addr.eq(free),
+        read.addr.eq(first),
         # What is written without a payload is written again.
         write.en.eq(room),
         Value.cast(sink.payload).eq(read.data),
         following.eq(level + comes - goes),
     ]
     m.d.sync += [
-        write.addr.eq(write.addr + comes),
-        read.addr.eq(read.addr + goes),
+        free.eq(free + comes),
+        first.eq(first + goes),
         level.eq(following),
         room.eq(following != depth),
         some.eq(following != 0),
