@@ -197,9 +197,9 @@ _STRUCTURE_NOTE = (
     "it; orange: a multiplier, yellow: an adder or a product by a constant, green: a memory, blue: a unit of "
     "its own, white: a port. A dashed arrow chooses, a red one leads back. A wide drawing is in bands: an "
     "arrow that ends at a numbered tag goes on at the tags of that number. Left out: the control by valid "
-    "and ready, enables, saturation, constants; in a large unit choices and comparisons too, then plain "
-    "registers, then adders. Variants that differ in words and constants alone share a drawing, of the "
-    "first."
+    "and ready, enables, saturation, constants; in a large unit comparisons and choices too, then plain "
+    "registers. A formula in bold is what a register holds, several are what a shared one holds in turns; "
+    "its name is below. Variants that differ in words and constants alone share a drawing, of the first."
 )
 
 _TIMING_NOTE = (
