@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import numpy as np
 from amaranth.hdl import Const
 
 from blysk.hdl.core.fixed import FixedValue
@@ -180,6 +181,11 @@ def _cast(value: Any) -> Formula:
         return value
     if isinstance(value, int):
         return Formula(f"{value}")
-    if isinstance(value, FixedValue) and isinstance(value.as_value(), Const):
-        return Formula(f"{value.as_value().value / 2**value.format.fraction_bits:.5g}")
+    if isinstance(value, FixedValue):
+        code = value.as_value()
+        # A constant that is read as signed, or as not.
+        code = code.operands[0] if getattr(code, "operator", "") in ("s", "u") else code
+        if isinstance(code, Const):
+            number = int(value.format.wrap(np.array(code.value))) * value.format.step
+            return Formula(f"{number:.5g}" if number >= 0 else f"(−{-number:.5g})")
     raise TypeError(f"{value!r} has no formula")

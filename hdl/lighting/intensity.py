@@ -156,6 +156,11 @@ class CompactIntensityUnit(wiring.Component):
     Source: docs/theory/units.md#intensity; [T] figure 4.10; [B] 4 and 5.
     """
 
+    FORMULAS: ClassVar[dict[str, str]] = {
+        "product": "k·D or k·S",
+        "total": "Σ of terms",
+    }
+
     def __init__(self, parameters: Intensity | None = None):
         self.parameters = p = parameters or Intensity()
         self.kinds = _kinds(p)
