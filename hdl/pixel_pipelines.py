@@ -1,9 +1,10 @@
 """Several shading pipelines that take spans of different scanlines: more than one pixel a cycle."""
 
+from collections.abc import Callable
 from functools import reduce
 from operator import and_
 
-from amaranth.hdl import Module, Signal, Value
+from amaranth.hdl import Module, ShapeLike, Signal, Value
 from amaranth.lib import fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -169,7 +170,31 @@ class PixelPipelinesUnit(wiring.Component):
             m.d.comb += self.status[name].eq(counts[0])
 
 
-class WidePipelinesUnit(wiring.Component):
+class _JoinedPipelines(wiring.Component):
+    """`PixelPipelinesUnit` with one stream of what a unit makes of the pipelines' pixels.
+
+    Parameters
+    ----------
+    parameters, waiting
+        Those of `PixelPipelinesUnit`.
+    joins : type
+        That unit, which takes the number of pipelines and the bits of x and of y.
+    shape : callable
+        Payload of the stream; takes the same.
+    """
+
+    def __init__(self, parameters, waiting: int, joins: type, shape: Callable[[int, int, int], ShapeLike]):
+        self.pipelines = PixelPipelinesUnit(parameters, waiting)
+        self.parameters = p = self.pipelines.parameters
+        size = p.pipes, p.design.x_bits, p.design.y_bits
+        self._join = joins(*size)
+        # Of a merger: a turn is in its FIFO before the first pixel of its span is there.
+        self.latency = self.pipelines.latency + self._join.latency
+        members = dict(self.pipelines.signature.members)
+        super().__init__(members | {"o": Out(stream.Signature(shape(*size)))})
+
+
+class WidePipelinesUnit(_JoinedPipelines):
     """`PixelPipelinesUnit` with one wide stream of pixels, a lane for each pipeline: for simulation.
 
     A pipeline waits for no other; the first pixel leaves an idle unit `latency` cycles after its span was
@@ -191,18 +216,12 @@ class WidePipelinesUnit(wiring.Component):
     """
 
     def __init__(self, parameters: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
-        self.pipelines = PixelPipelinesUnit(parameters, waiting)
-        self.parameters = p = self.pipelines.parameters
-        self._lanes = PixelLanesUnit(p.pipes, p.design.x_bits, p.design.y_bits)
-        self.latency = self.pipelines.latency + self._lanes.latency
-        members = dict(self.pipelines.signature.members)
-        wide = lanes_shape(p.pipes, p.design.x_bits, p.design.y_bits)
-        super().__init__(members | {"o": Out(stream.Signature(wide))})
+        super().__init__(parameters, waiting, PixelLanesUnit, lanes_shape)
 
     def elaborate(self, platform):
         """The pipelines, and their pixels on a cycle as one beat."""
         m = Module()
-        m.submodules.pipelines, m.submodules.lanes = pipelines, lanes = self.pipelines, self._lanes
+        m.submodules.pipelines, m.submodules.lanes = pipelines, lanes = self.pipelines, self._join
         connect(m, wiring.flipped(self.i), pipelines.i)
         connect(m, wiring.flipped(self.write), pipelines.write)
         m.d.comb += self.status.eq(pipelines.status)
@@ -212,7 +231,7 @@ class WidePipelinesUnit(wiring.Component):
         return m
 
 
-class MergedPipelinesUnit(wiring.Component):
+class MergedPipelinesUnit(_JoinedPipelines):
     """`PixelPipelinesUnit` with one stream of pixels, in the order of the spans: that of one pipeline.
 
     It gives a pixel a cycle at most. Of pipelines that take several cycles a pixel, as those of the compact
@@ -234,23 +253,14 @@ class MergedPipelinesUnit(wiring.Component):
     """
 
     def __init__(self, parameters: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
-        self.pipelines = PixelPipelinesUnit(parameters, waiting)
-        self.parameters = p = self.pipelines.parameters
-        self._merger = PixelMergerUnit(p.pipes, p.design.x_bits, p.design.y_bits)
-        # A turn is in its FIFO before the first pixel of its span is there.
-        self.latency = self.pipelines.latency + self._merger.latency
-        self.cycles_per_pixel, self.setup_interval = (
-            self.pipelines.cycles_per_pixel,
-            self.pipelines.setup_interval,
-        )
-        members = dict(self.pipelines.signature.members)
-        pixels = stream.Signature(pixel_shape(p.design.x_bits, p.design.y_bits))
-        super().__init__(members | {"o": Out(pixels)})
+        super().__init__(parameters, waiting, PixelMergerUnit, lambda pipes, *bits: pixel_shape(*bits))
+        self.cycles_per_pixel = self.pipelines.cycles_per_pixel
+        self.setup_interval = self.pipelines.setup_interval
 
     def elaborate(self, platform):
         """The pipelines, a FIFO of the pipelines that the spans went to, and the merger."""
         m = Module()
-        m.submodules.pipelines, m.submodules.merger = pipelines, merger = self.pipelines, self._merger
+        m.submodules.pipelines, m.submodules.merger = pipelines, merger = self.pipelines, self._join
         turn = merger.turns.payload
         m.submodules.turns = turns = fifo.SyncFIFOBuffered(width=len(turn), depth=pipelines.spans_inside)
         m.d.comb += [

@@ -67,22 +67,12 @@ def connect_late_fifo(
     payloads of the depth are for those that the level does not have yet. A payload takes `LATE_FIFO_LATENCY`
     cycles through the empty FIFO.
 
-    Parameters
-    ----------
-    m, name, source, sink
-        As for `connect_fifo`.
-    depth : int
-        Payloads that the memory holds, at least 3; two more wait behind it.
+    What it takes and refuses is as for `connect_fifo`; two payloads more than its depth wait behind it.
 
     Returns
     -------
     Value
         Whether no payload is inside.
-
-    Raises
-    ------
-    TypeError
-        If the payloads differ in a field or in a fixed-point format.
     """
     require_same_shape(source.payload.shape(), sink.payload.shape())
     width = Shape.cast(source.payload.shape()).width

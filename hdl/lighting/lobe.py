@@ -9,10 +9,11 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.lighting.lobe import Lobe, LobeTable
-from blysk.hdl.core.dataflow import Dataflow, Word
+from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.memory import registered_read
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word
 from blysk.hdl.lighting.specular import highlight_shape, one_minus
 
 __all__ = ["LobeMemory", "LobeUnit", "lobe_read_signature", "lobe_write_shape"]
@@ -263,10 +264,12 @@ class LobeUnit(PipelinedUnit):
             return Cat(step, row), rest[len(rest) - p.fraction_format.width :]
 
         lit = g.register("lit", is_lit, operand, dark)
-        argument = g.register("one_minus_cosine", lambda x: one_minus(p, x).truncate(bits), operand)
-        argument = g.register("argument", limited, argument, lit)
+        argument = g.register(
+            "one_minus_cosine", lambda x: one_minus(p, x).truncate(bits), operand, formula="u"
+        )
+        argument = g.register("argument", limited, argument, lit, formula="u")
         zeros = g.register("zeros", lambda code: _leading_zeros(code[bits - p.octaves :]), argument)
-        shifted = g.register("shifted", coarse, argument, zeros)
+        shifted = g.register("shifted", coarse, argument, zeros, formula="2^zeros·u")
         shapes = unsigned(len(self._read.address)), unsigned(p.fraction_format.width)
         memory = g.share("memory", shapes, 2, self._look_up)
         return self._interpolate(g.use(memory, "word", (shifted,), place), lit)
@@ -281,11 +284,13 @@ class LobeUnit(PipelinedUnit):
         p, g = self.parameters, self._graph
         formats = {"value": p.VALUE_FORMAT, "difference": p.DIFFERENCE_FORMAT, "fraction": p.fraction_format}
         parts, first = [], 0
-        for name, format in formats.items():
+        for (name, format), symbol in zip(formats.items(), "vDf", strict=True):
             bits = slice(first, first + format.width)
-            parts.append(
-                g.wire(name, lambda code, format=format, bits=bits: FixedValue(format, code[bits]), word)
-            )
+
+            def part(code, format=format, bits=bits):
+                return FixedValue(format, code[bits])
+
+            parts.append(g.wire(name, part, word, symbol))
             first += format.width
         value, difference, fraction = parts
         if g.interval == 1:
@@ -301,7 +306,7 @@ class LobeUnit(PipelinedUnit):
             total = (value + product.truncate(17)).wrap(p.RESULT_FORMAT)
             return FixedValue(p.RESULT_FORMAT, Mux(lit, Value.cast(total), 0))
 
-        return g.register("term", term, value, product, lit)
+        return g.register("term", term, value, product, lit, formula="v + D·f")
 
 
 def _leading_zeros(code: Value) -> Value:
