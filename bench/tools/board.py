@@ -10,7 +10,7 @@ those of the bit-accurate model.
 import json
 import shutil
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
@@ -32,6 +32,7 @@ from blysk.golden.video.draw_unit import turned
 from blysk.hdl.gpu import GpuUnit
 from blysk.sim.cli.options import given_options, lights_of, options_of
 from blysk.sim.engines.engine import SimulationError
+from blysk.sim.engines.toggles import ToggleCounter
 from blysk.sim.errors import InputError
 from blysk.sim.frames.display import OneClock, Shown, show
 from blysk.sim.frames.picture import check_image_path, write_image
@@ -60,6 +61,9 @@ MOST_FRAMES = 60
     type=Number(1, 126, "MHz"),
     help="Drawing clock, MHz: this or a little less.  [default: 57.3 for ulx3s-85f, 63 for the others]",
 )
+@click.option(
+    "--toggles", is_flag=True, help="With --simulate: count register bits that toggle, a proxy of energy."
+)
 @click.option("--seeds", type=Whole(1, 20), default=1, show_default=True, help="Placements to try at most.")
 @click.option(
     "--record", type=OutputFile(), help="JSON file of figures, to which those of this run are added."
@@ -67,7 +71,9 @@ MOST_FRAMES = 60
 @click.option("--load", is_flag=True, help="Load the bitstream by openFPGALoader.")
 @options_of(OPTIONS)
 @click.pass_context
-def command(context, board_name, mesh, output, simulate, colours, clock, seeds, record, load, **options):
+def command(
+    context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, record, load, **options
+):
     """A turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
 
     Without --simulate a bitstream is made; parts and clock rates are printed against what the board has and
@@ -89,6 +95,8 @@ def command(context, board_name, mesh, output, simulate, colours, clock, seeds, 
     if lights := lights_of(options):
         given["lights"] = lights
     loader = _loader() if load else ""
+    if toggles and not simulate:
+        raise InputError("--toggles", "counts bits of a simulation", "give --simulate N with it")
     if simulate and load:
         raise InputError("--load", "there is no bitstream of a simulation", "leave out --simulate or --load")
     if not simulate:
@@ -107,6 +115,10 @@ def command(context, board_name, mesh, output, simulate, colours, clock, seeds, 
     figures = recorded.setdefault(entry, {})
     if simulate:
         figures["simulated"] = _simulate(board, gpu, scenes, plan, simulate, Path(output))
+        if toggles:
+            counted = _toggles(board, gpu, plan, simulate)
+            click.echo(_toggles_line(counted))
+            figures["toggles"] = counted
         if record:
             write_json(record, recorded)
         return
@@ -230,6 +242,24 @@ def _simulate(
         "cycles": round(_busy(gpu, shown)),
         "late_bands": shown.status["late_bands"],
     }
+
+
+def _toggles(board: Board, gpu: Gpu, plan: ClockPlan, count: int) -> dict[str, int]:
+    """Register bits that toggle in a frame, those of the drawing and of the display."""
+    rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
+    top = ToggleCounter(OneClock(GpuUnit(gpu, compact=board.compact), rate))
+    counts = show(top, gpu.buffer.mode, count).status
+    return {
+        part: round(
+            sum(bits for path, bits in counts.items() if path.startswith(f"inner.top.{name}")) / count
+        )
+        for part, name in (("drawing", "draw"), ("display", "display"))
+    }
+
+
+def _toggles_line(counted: Mapping[str, int]) -> str:
+    parts = ", ".join(f"{part} {bits / 1e6:.1f}" for part, bits in counted.items())
+    return f"{'toggles':<12}{sum(counted.values()) / 1e6:.1f} million register bits a frame: {parts}"
 
 
 def _busy(gpu: Gpu, shown: Shown) -> float:
