@@ -59,7 +59,7 @@ MOST_FRAMES = 60
 @click.option(
     "--clock",
     type=Number(1, 126, "MHz"),
-    help="Drawing clock, MHz: this or a little less.  [default: 57.3 for ulx3s-85f, 63 for the others]",
+    help="Drawing clock, MHz: this or a little less.  [default: 57.3 for ulx3s-85f, 52.5 for the others]",
 )
 @click.option(
     "--toggles", is_flag=True, help="With --simulate: count register bits that toggle, a proxy of energy."

@@ -134,7 +134,7 @@ BOARDS = {
             lines=8,
             loader="ulx3s",
             compact=True,
-            clock=63,
+            clock=52.5,
         ),
         Board(
             *("ulx3s-85f", "ulx3s", "ULX3S_85F_Platform"),
@@ -160,7 +160,7 @@ BOARDS = {
             lines=8,
             loader="icepi-zero",
             compact=True,
-            clock=63,
+            clock=52.5,
         ),
     )
 }
