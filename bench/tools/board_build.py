@@ -49,8 +49,8 @@ read_verilog -lib +/lattice/cells_bb_ecp5.v
 """
 
 _LAYOUT = ("--placer", "static", "--router", "router2")
-"""Of nextpnr. The placer makes the shortest wires. Where they are scarce, the other router takes up as many as
-it lays, and does not end on a 25F."""
+"""Of nextpnr. The placer makes the shortest wires. Where they are scarce, the other router takes up as many
+as it lays, and does not end on a 25F."""
 
 _PARTS = {
     "look-up tables": "TRELLIS_COMB",
