@@ -44,7 +44,7 @@ class VectorNormaliser:
     and so does the rounding of the shifted components, whose length is 1/2 at least: by at most
     `DIRECTION_ERROR`, 2^-15.6.
 
-    Six multiplications, and one of 12 by 12 bits that is made of adders.
+    Six multiplications, and one of 12 by 11 bits that is made of adders.
 
     Parameters
     ----------
@@ -60,8 +60,8 @@ class VectorNormaliser:
     SEGMENT_BITS = 9
     SQUARE_FORMAT = UQ(0, 20)
     OFFSET_FORMAT = SQ(-9, 21)
-    C0_FORMAT = UQ(2, 20)
-    C1_FORMAT = UQ(3, 9)
+    C0_FORMAT = UQ(1, 20)
+    C1_FORMAT = UQ(2, 9)
     FACTOR_FORMAT = SQ(1, 17)
     FIT = 24 * 2.0**-18 / 16 / 2 + 2.0**-22 + 2.0**-21
     LENGTH_ERROR = FIT + 2.0**-19 + 1.74 * 2.0**-18 + np.sqrt(3) * 2.0**-18

@@ -13,8 +13,8 @@ from blysk.hdl.geometry.triangles import first_centre, tag_shape
 
 __all__ = ["EdgeSetupUnit", "edge_corners_shape", "edges_shape", "plane_corners_shape"]
 
-ALONG_BITS = 11
-"""Bits of `Edges.along`, with its sign."""
+ALONG_BITS = 9
+"""Bits of `Edges.along`, from 0 to 511: columns to the first centre are 2 only with a fraction."""
 
 
 def edge_corners_shape(grid: Grid = GRID) -> data.StructLayout:
@@ -33,7 +33,7 @@ def plane_corners_shape(grid: Grid = GRID) -> dict:
         "area": unsigned(2 * grid.bits),
         "fraction": unsigned(FRACTION_BITS),
         "down": unsigned(8),
-        "along": signed(ALONG_BITS),
+        "along": unsigned(ALONG_BITS),
     }
 
 
@@ -277,7 +277,7 @@ class EdgeSetupUnit(PipelinedUnit):
                 if k == 0 and name == "height":
                     m.d.comb += result.long_height.eq(value)
             if k == 0:
-                along = keep(along[:ALONG_BITS].as_signed(), "along", age.done - 1)
+                along = keep(along[:ALONG_BITS], "along", age.done - 1)
                 m.d.comb += result.along.eq(along)
 
     def _fraction(self, m: Module, error_step: Value, height: Value) -> Value:

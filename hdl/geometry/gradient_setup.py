@@ -174,7 +174,7 @@ class GradientSetupUnit(PipelinedUnit):
         point = p.START_FORMAT.fraction_bits
         down, along = (g.input(name, lambda o, name=name: o[name]) for name in ("down", "along"))
         n = g.register(
-            "n", lambda along, right: Mux(right, 256 - along, along)[:11].as_signed(), along, right
+            "n", lambda along, right: Mux(right, 256 - along, along)[:10].as_signed(), along, right
         )
         wide = signed(SQ(11, point).width)
 

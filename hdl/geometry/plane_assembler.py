@@ -133,7 +133,7 @@ class PlaneAssemblerUnit(wiring.Component):
         """The largest exponent, from its first bit on; whether it is found."""
         bits = GradientSetup.SIZE_BITS
         largest, total = Signal(bits, name="largest"), Signal(bits + 2, name="total")
-        norm, step = Signal(bits + 2 + (1 << PIECE_BITS), name="norm"), Signal(3, name="search_step")
+        norm, step = Signal(max(bits + 2, len(allowed)), name="norm"), Signal(3, name="search_step")
         found, exponent = Signal(name="found"), Signal(PIECE_BITS, name="exponent")
         with m.If(accept & (count < 3)):
             first = count == 0

@@ -32,7 +32,7 @@ class VectorNormaliserUnit(PipelinedUnit):
     The latency is `DotProductUnit`'s and 14 cycles: four for shift and rounding; segment, table, three for
     ``c0 - c1 u``, one for e; four for ``v + e v``. The initiation interval is 1. Six multipliers of 18x18
     bits: three squares and three scalings; ``c1 u`` is a sum of Booth digits. The table holds 512 words of
-    34 bits.
+    32 bits.
 
     Parameters
     ----------
@@ -320,7 +320,7 @@ def _root(p: VectorNormaliser, c0: Value, product: Value) -> Value:
 def _excess(p: VectorNormaliser, f: Value, large: Value) -> FixedValue:
     """``e``, of f in steps of 2^-21: it is halved with all its bits."""
     one = 1 << p.C0_FORMAT.fraction_bits
-    e = FixedValue(SQ(3, 21), Mux(large, f - 2 * one, (f - one) << 1)[:24].as_signed())
+    e = FixedValue(SQ(2, 21), Mux(large, f - 2 * one, (f - one) << 1)[:23].as_signed())
     return e.round_half_up(17).saturate(p.FACTOR_FORMAT)
 
 

@@ -276,6 +276,8 @@ def setup_spans(
     left = sphere(rng, len(angles))
     left, right = quantise(left), quantise(turned(rng, left, angles))
     left, right = np.vstack([left, word_ends(rng, 40, 3)]), np.vstack([right, word_ends(rng, 40, 3)])
+    # The longest chord.
+    left[-1], right[-1] = COMPONENT.max_code, COMPONENT.min_code
     length = rng.integers(1, 4096, len(left))
     length[::2] = rng.integers(1, 20, len(length[::2]))
     length[:12] = [1, 2, 3, 4, 5, 16, 17, 2048, 2049, 2050, 4094, 4095]

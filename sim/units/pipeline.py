@@ -371,39 +371,7 @@ RECORD = Record(
         "a counter stops at its largest value, and a flag that is set stays": (
             "top.status[15] top.status[31] top.status[47-48]"
         ),
-        "three terms of 8 times the full channel are 6120, less than 2^13": "rounded_{r,g,b}[13]",
-        "under 64 spans are inside": "top.inside[6]",
         "a table of the only bank ends at one address": "tables.last[0-8]",
-        "a threshold has 15 of the level's 26 fraction bits, and is at most 4": (
-            "interpolator.level[0-10] interpolator.level[29]"
-        ),
-        "what the limits of the ten octaves of exponents have in common": (
-            "span_limit.datapath.limit[7] span_limit.datapath.limit[28] span_limit.datapath.limit[31-36]"
-        ),
-        "the second bit of a square is 0; one of 18 bits is 2^34 at one code, and no larger": (
-            "chord_values.datapath.multiplier_{3-5}_product[1] "
-            "chord_values.datapath.multiplier_{3-5}_product[34-35] "
-            "span_limit.datapath.multiplier_0_product[1] span_limit.datapath.multiplier_0_product[34-35] "
-            "u_0_exact_square_2[1] u_0_exact_square_2[34-35] chord_square_0[1] chord_square_0[34-35]"
-        ),
-        "half the squared chord of unit vectors is at most 2": (
-            "u_0_exact_square_partial[35-36] u_0_exact_square_total[36-37] u_0_exact_aligned[36-39] "
-            "u_0_exact[36] chord_square_partial[35-36] chord_square_total[36-37] chord_aligned[36-39] "
-            "span_limit.datapath.chord[36]"
-        ),
-        "a reciprocal is normalised, and so is its square: 17 bits without a sign, the first of them 1": (
-            "chord_setup.datapath.multiplier_{0-2}_b[16-17] chord_setup.datapath.multiplier_{0-2}[16-17] "
-            "reciprocal[16] reciprocals.port__data[16] square[16] square_rounded[16]"
-        ),
-        "the largest square in the table is under 1 by 62 steps": "square_rounded[17]",
-        "products have fewer fraction bits than what is shifted": "shifter_0_0[0-4] shifter_1_0[0-11]",
-        "a length of 12 bits takes shifts up to 12, and its square up to 25": (
-            "shift[4] square_shift[5] shifter_0_1[4]"
-        ),
-        "twice a number is even": (
-            "{highlight,diffuse}_0_second[0] *_second_difference[0] "
-            "chord_setup.spare[47] chord_setup.spare[141] "
-            "chord_spans.{spare,payload}[100] chord_spans.{spare,payload}[194]"
-        ),
+        "the coordinates of all spans inside have room": "coordinates_room[0]",
     },
 )

@@ -117,13 +117,11 @@ RECORD = Record(
     axis="",
     still={
         "without an interpolator no span is out of range, or wide": (
-            "pipelines.sum_out_of_range_spans[0-15] pipelines.sum_wide_spans[0-15] seen[0] status[0-31]"
+            "pipelines.sum_out_of_range_spans[0-15] pipelines.sum_wide_spans[0-15]"
         ),
         "a counter stops at its largest value, and a flag that is set stays": (
-            "sum_empty_spans[15] sum_overrun[0] status[47-48]"
+            "sum_empty_spans[15] sum_overrun[0]"
         ),
-        "a pipeline has scanlines of one remainder": (
-            "assembler.{y[0],spare[6],payload[6],$signal[6]} r_port__data[6] pipelines.{payload,spare}[6]"
-        ),
+        "a pipeline has scanlines of one remainder": "r_port__data[6] pipelines.{payload,spare}[6]",
     },
 )

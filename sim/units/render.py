@@ -56,6 +56,11 @@ def _tiny(unit, rng, count):
     return _triangles(unit, rng, count, 1.0)
 
 
+def _wide(unit, rng, count):
+    """Triangles larger than the picture, of normals near to each other."""
+    return _triangles(unit, rng, count, 400.0, 0.02)
+
+
 def _variants():
     for name, options in (
         ("chord", {}),
@@ -75,7 +80,15 @@ RECORD = Record(
     variants=dict(_variants()),
     expect=lambda unit, case: _made(unit, case).beats,
     status=_status,
-    stimuli={"triangles": Stimulus(_triangles, 200), "tiny": Stimulus(_tiny, 200)},
+    stimuli={
+        "triangles": Stimulus(_triangles, 200),
+        "tiny": Stimulus(_tiny, 200),
+        "wide": Stimulus(_wide, 60),
+    },
     axis="",
+    still={
+        "a counter counts more than a run has": "count_spans[9-31] spans_inside[7-9]",
+        "a line of the picture has fewer than 64 pixels": "spans.storage.r_port__data[16-21]",
+    },
     remembers=True,
 )

@@ -241,7 +241,8 @@ def replace_parts(monkeypatch) -> None:
         (blysk.hdl.methods.quadratic_interpolator, "GPQUnit", coefficients, 1),
         (blysk.hdl.methods.quadratic_interpolator, "DifferenceSetupUnit", difference_setup, 3),
         (blysk.hdl.methods.chord_spans, "ChordSetupUnit", chord_setup, 3),
-        (blysk.hdl.methods.chord_interpolator, "ChordValuesUnit", chord_values, 2),
+        # A tag takes three cycles beside it.
+        (blysk.hdl.methods.chord_interpolator, "ChordValuesUnit", chord_values, 3),
         (blysk.hdl.methods.chord_interpolator, "SpanLimitUnit", nothing, 2),
         (blysk.hdl.methods.angular_interpolator, "AngularSetupUnit", angular_setup, 3),
         (blysk.hdl.methods.recurrence_interpolator, "RecurrenceSetupUnit", recurrence_setup, 3),

@@ -1,4 +1,7 @@
-"""Toggle coverage: under its record's vectors every register bit of a unit rises and falls, or is waived."""
+"""Toggle coverage: under its record's vectors every register bit of a unit rises and falls, or is waived.
+
+Parts of a unit that have a record of their own are covered by their own vectors.
+"""
 
 import re
 import sys
@@ -15,6 +18,17 @@ from blysk.sim.engines.cxxrtl import Model
 from blysk.sim.engines.toggles import _registers, _words
 from blysk.sim.units.registry import RECORDS
 
+KINDS = {record.kind for record in RECORDS.values()}
+
+
+def units_inside(fragment, path=""):
+    """Paths of the parts that have a record."""
+    for inner, name, *_ in fragment.subfragments:
+        if any(type(origin) in KINDS for origin in inner.origins or ()):
+            yield f"{path}{name}"
+        else:
+            yield from units_inside(inner, f"{path}{name}.")
+
 
 class Edges(Wrapped):
     """A unit, and of each bit of its registers whether it has risen and fallen.
@@ -30,9 +44,11 @@ class Edges(Wrapped):
 
     def registers(self, fragment):
         """Path and signal of each, in a fixed order."""
+        others = tuple(f"{path}." for path in units_inside(fragment))
         return [
             (f"{path}.{getattr(signal, 'name', 'data')}", signal)
             for path, signals in _registers(fragment).items()
+            if not f"{path}.".startswith(others)
             for signal in signals
         ]
 

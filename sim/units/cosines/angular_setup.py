@@ -160,7 +160,9 @@ RECORD = Record(
         ),
         "half an angle of 36 bits has 37": "phase[0-2] top.spare[36-38]",
         "an angle is half a turn at most, and a step is less": "psi_rounded[18] step[39] top.spare[115]",
-        "a reciprocal is normalised, so that its first bit is 1": "reciprocals.port__data[16] reciprocal[16]",
+        "a reciprocal is normalised, so that its first bit is 1": (
+            "reciprocals.port__data[16] reciprocals_word[16]"
+        ),
         "a length of 12 bits takes shifts up to 12": "shift[4]",
     },
 )

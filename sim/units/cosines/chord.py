@@ -71,10 +71,9 @@ RECORD = Record(
         "u": "The value of the saturation is the inverted sign, and a sum of squares is not negative.",
     },
     still={
-        "the second bit of a square is 0": "multiplier_*_product*[1] u_square_2[1]",
+        "the second bit of a square is 0": "multiplier_*_product*[1]",
         "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
-            "multiplier_*_product*[35] u_square_2[35] u_square_partial[36] u_square_total[36-37] "
-            "u_aligned[38-39]"
+            "multiplier_*_product*[35] u_square_partial[36] u_square_total[36-37] u_aligned[38-39]"
         ),
     },
 )

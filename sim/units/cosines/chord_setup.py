@@ -231,6 +231,15 @@ RECORD = Record(
     },
     axis="pixel of the span",
     logarithmic=True,
-    waivers={},
-    still={},
+    still={
+        "twice a number is even": "{diffuse,highlight}_0_second[0] top.spare[47] top.spare[141]",
+        "a reciprocal is normalised, and so is its square, so that the first bit is 1": (
+            "reciprocals_word[16] reciprocals.port__data[16] reciprocal[16] square[16] square_rounded[16]"
+        ),
+        "the largest square in the table is under 1 by 62 steps": "square_rounded[17]",
+        "a length of 12 bits takes shifts up to 12, and its square up to 25": "shift[4] square_shift[5]",
+        "a reciprocal or its square, of 17 bits, is not negative": "multiplier_{0,1}_{1,b}[17]",
+        "the slope of u times 1/(m - 1) has five fraction bits less than what is shifted": "shifter_0_0[0-4]",
+        "the other products have twelve or thirteen less": "shifter_1_0[0-11]",
+    },
 )

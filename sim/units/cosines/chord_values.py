@@ -73,7 +73,9 @@ def _normals(unit, rng, count):
 
 def _corners(unit, rng, count):
     """Vectors and normals of ends of words: every difference and product at its largest."""
-    vectors = (word_ends(rng, unit.lights, 3) for _ in range(2))
+    vectors = word_ends(rng, 2, unit.lights, 3)
+    # Of equal components all differences are at their largest together, and so is the sum of their squares.
+    vectors[:, rng.random(unit.lights) < 0.5] = vectors[:, :1, :1]
     return Case(word_ends(rng, count, 3), light_constants(unit, *vectors))
 
 
@@ -94,9 +96,17 @@ RECORD = Record(
     expect=_expect,
     stimuli={
         "normals": Stimulus(_normals, 2000),
-        "corners": Stimulus(_corners, 300, repeats=4),
+        "corners": Stimulus(_corners, 300, repeats=10),
         "last bits": Stimulus(_normals, 50_000, stalled=False),
     },
     axis="1 - N·H",
     logarithmic=True,
+    still={
+        "L is constant during a run": "multiplier_{0-2}_{1,b}[0-17]",
+        "the second bit of a square is 0": "multiplier_{3-5}_product[1]",
+        "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
+            "multiplier_{3-5}_product[35] square_partial[36] square_total[36-37] aligned[38-39]"
+        ),
+        "u is 6 at most": "u_0_rounded[29-31]",
+    },
 )

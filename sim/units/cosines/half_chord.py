@@ -101,9 +101,7 @@ RECORD = Record(
         "multiplier_0_?_0": "The operands that share the multiplier are not negative.",
     },
     still={
-        "operands are not negative, and less than 1": (
-            "multiplier_0_?_?[17] multiplier_0_?[17] multiplier_0_product*[34-35]"
-        ),
+        "operands are not negative, and less than 1": ("multiplier_0_?[17] multiplier_0_product*[34-35]"),
         "from 0 to 90 degrees the factor is 0.636 to 0.708": "total[14-18] factor[14-16]",
         "inner sums of the polynomial are smaller still": "total_3[15-16] total_2[16]",
         "a root is 1 at most, and only by rounding": "root_sum[21] root_rounded[18]",

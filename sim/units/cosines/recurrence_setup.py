@@ -124,9 +124,8 @@ RECORD = Record(
         "rho_rounded": "A word under 1 is rounded to 1 at most, and the bit stands for 2: it is 0.",
     },
     still={
-        "the second bit of a square is 0": "span_square_2[1]",
         "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
-            "span_square_partial[36] span_square_2[35] span_square_total[36-37] span_aligned[38-39]"
+            "span_square_partial[36] span_square_total[36-37] span_aligned[38-39]"
         ),
         "all words that are read of a table have the same bit there": (
             "chord_entry[12-13] chord_entry[34-35] chord_entry[49] "
@@ -148,7 +147,7 @@ RECORD = Record(
             "reciprocal_entry[16] reciprocal_entry[33] reciprocal[16] reciprocal_square[16] "
             "reciprocals.port__data[16] reciprocals.port__data[33]"
         ),
-        "a square rounds up to 1 in one span in 2^17 only": "psi_square_rounded[17] q_square_rounded[17]",
+        "a square rounds up to 1 in one span in 2^17 only": "psi_square_rounded[17]",
         "an eighth of Q is at most 0.31, so that its word, which is 1/2 or more, is shifted": "step_fine[27]",
         "K is not negative, and less than 1, to which it is not rounded up": (
             "*_coefficient_exact[34] *_coefficient_rounded[17-18]"
@@ -162,5 +161,8 @@ RECORD = Record(
         ),
         "a value that is shifted ends in zeros": "shifter_{2-4}_0[0-12]",
         "a cosine and twice a difference are even": "*_0_sum_1[0]",
+        "rho, coefficients and fractions, the only second operands of these multipliers, are not negative": (
+            "multiplier_{8-11}_{1,b}[17]"
+        ),
     },
 )

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from blysk.golden.cosines.span_limit import SpanLimit
-from blysk.golden.number.unit_vector import quantise
+from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.hdl.cosines.span_limit import SpanLimitUnit
 from blysk.sim.units.operands import (
     any_pairs,
@@ -57,6 +57,8 @@ def _spans(unit, rng, count, exponent=EXPONENT):
     left, right = any_pairs(rng, count)
     for ends in (left, right):
         ends[7::32] = word_ends(rng, len(ends[7::32]), 3)
+    # The longest chord.
+    left[7], right[7] = COMPONENT.max_code, COMPONENT.min_code
     return _case(unit, exponent, left, right)
 
 
@@ -113,5 +115,16 @@ RECORD = Record(
         "spans": Stimulus(_spans, 600),
         "limits": Stimulus(_limits, 600, stalled=False, repeats=30),
         "last bits": Stimulus(_last_bits, 2000, stalled=False, repeats=20),
+    },
+    still={
+        "the exponent stays for a run: only bits of the word that is read after a reset fall": (
+            "limit_octave[0-3] datapath.limit[{0,4,6-8,12,14,16-18,21,25,27-29}]"
+        ),
+        "half the squared chord of the widest lit span is less than 2^-4": "datapath.limit[31-36]",
+        "the second bit of a square is 0": "multiplier_0_product[1] chord_square_0[1]",
+        "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
+            "multiplier_0_product[35] chord_square_0[35] square_partial[36] square_total[36-37] "
+            "aligned[38-39]"
+        ),
     },
 )

@@ -49,4 +49,5 @@ RECORD = Record(
     expect=_expect,
     stimuli={"near": Stimulus(_near, 500), "far": Stimulus(_far, 500)},
     axis="",
+    still={"the signs of the first corner are turned to positive": "total_0[13]"},
 )

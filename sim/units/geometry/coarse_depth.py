@@ -11,7 +11,7 @@ from blysk.sim.units.record import Case, Record, Stimulus, Variant
 __all__ = ["RECORD"]
 
 
-def _spans(unit, rng, count, longest=24, most=1 << 24, lines=None):
+def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
     """Spans of a small picture, one over the other, with depths from 0 to ``most`` at both ends."""
     given = unit.parameters
     longest = min(longest, given.width)
@@ -58,5 +58,9 @@ RECORD = Record(
         "near": Stimulus(_near, 600),
     },
     axis="",
+    still={
+        "what a reset finds is swept": "fresh[0] used[0]",
+        "only after a reset all words are swept": "left[4]",
+    },
     remembers=True,
 )

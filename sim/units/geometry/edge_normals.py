@@ -75,4 +75,5 @@ RECORD = Record(
         "long": Stimulus(_long, 500),
     },
     axis="",
+    still={"a counter counts more events than a run has": "count_repaired[7-31]"},
 )

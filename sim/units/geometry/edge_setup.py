@@ -61,9 +61,4 @@ RECORD = Record(
     expect=_expect,
     stimuli={"triangles": Stimulus(_triangles, 800), "large": Stimulus(_large, 800)},
     axis="",
-    still={
-        "columns to the first centre are 0 only where the fraction is 0, 2 only where it is not: 0 to 511": (
-            "along_23[9-10] spare[438-439]"
-        ),
-    },
 )

@@ -2,6 +2,8 @@
 
 from functools import partial
 
+import numpy as np
+
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.triangles import Frame, Grid, Triangles
 from blysk.hdl.geometry.geometry import GeometryUnit
@@ -34,6 +36,16 @@ def _large(unit, rng, count):
     return Case(ended(random_triangles(rng, count, unit.grid, 80.0, 0.05), unit.grid).beats, frame.codes)
 
 
+def _largest(unit, rng, count):
+    """Triangles larger than a picture can be, flat ones, and ones with two long edges."""
+    triangles = random_triangles(rng, count, unit.grid, 1900.0, 0.05)
+    triangles.normal[::2] = triangles.normal[::2, :1]
+    low, high = unit.grid.coordinate.min_code, unit.grid.coordinate.max_code
+    inwards = rng.integers(0, 100, (len(triangles.y[1::4]), 3)) * [1, 1, -1]
+    triangles.y[1::4] = np.array([low, low + 99, high]) + inwards
+    return Case(ended(triangles, unit.grid).beats, small_frame(rng).codes)
+
+
 RECORD = Record(
     name="geometry",
     title="Triangles to spans with unit normals and depth",
@@ -53,6 +65,11 @@ RECORD = Record(
         "small": Stimulus(_small, 300),
         "tiny": Stimulus(_tiny, 300),
         "large": Stimulus(_large, 40),
+        "largest": Stimulus(_largest, 60),
     },
     axis="",
+    still={
+        "a counter counts more than a run has": "slivers[2-31] taken[8-9] walked[7-9] pieces_inside[5-9]",
+        "an upper edge has fewer than 4096 scanlines": "waiting_walks.storage.r_port__data[283]",
+    },
 )

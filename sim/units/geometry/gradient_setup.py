@@ -69,4 +69,11 @@ RECORD = Record(
     expect=_expect,
     stimuli={"attributes": Stimulus(_attributes, 2000), "large": Stimulus(_large, 1000)},
     axis="width of the triangle, log2 of pixels",
+    still={
+        "lower halves of words are narrower than a multiplier": "multiplier_1_{b,1}[9-17] "
+        "multiplier_2_{a,0}[16-17]",
+        "an attribute has a fraction bit less than a product": "rise[0]",
+        "half a step is added to what was cut": "fraction_word[0]",
+        "a bit for the rounding is shifted in": "shifter_0_0[0]",
+    },
 )

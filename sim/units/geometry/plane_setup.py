@@ -59,4 +59,12 @@ RECORD = Record(
     expect=lambda unit, case: scales_of_corners(case.beats, unit.grid).beats,
     stimuli={"triangles": Stimulus(_triangles, 800), "large": Stimulus(_large, 800)},
     axis="width of the triangle, log2 of pixels",
+    still={
+        "words begin with their first 1": "{height,area}_moved_kept[39]",
+        "a height has 20 bits, and zeros behind them": "height_moved_kept[0-19] height_moved_kept[45]",
+        "a reciprocal is 1/2 or more": "table_0_row[27] {height,area}_reciprocal_row[27] "
+        "reciprocals.port__data[27]",
+        "second factors have no sign": "multiplier_0_{b,1}[17]",
+        "a ratio is less than 2": "ratio_cut[29]",
+    },
 )

@@ -71,4 +71,8 @@ RECORD = Record(
         "last bits": Stimulus(_vectors, 100_000, stalled=False),
     },
     axis="log2 of the vector's length",
+    still={
+        "u is in halves of a step, odd": "u[0]",
+        "pairs of Booth digits weigh 16 and 256 times as much": "pair_2[0-3] pair_4[0-7]",
+    },
 )

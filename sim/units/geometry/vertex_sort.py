@@ -57,6 +57,7 @@ RECORD = Record(
     waivers={"status": "A counter of 32 bits counts more events than a run has."},
     still={
         "the first digit looks back to nothing": "rest_{0,1}[0]",
-        "a counter counts more events than a run has": "count_{empty,culled}[8-31] count_zero_area[6-31]",
+        "a counter counts more events than a run has": "count_empty[8-31] "
+        "count_culled[7-31] count_zero_area[6-31]",
     },
 )

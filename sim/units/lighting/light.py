@@ -147,14 +147,4 @@ RECORD = Record(
             "not read."
         ),
     },
-    still={
-        "a slope is n / 2, and n of 10 bits, normalised to 17, ends in seven zeros": (
-            "slope.slope_word[0-16] slope.scale[0-6] datapath.product[0-6]"
-        ),
-        "the exponent stays for a run, so that what follows from it does not fall": (
-            "slope_word[17-26] slope.scale[7-16] slope.shift[0-3] slope.boundary[0-16] "
-            "boundaries.port__data[0-16]"
-        ),
-        "the second bit of a square is 0": "specular.datapath.square[1]",
-    },
 )

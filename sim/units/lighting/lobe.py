@@ -88,7 +88,7 @@ def _highlights(unit, rng, count):
 
 
 def _tables(unit, rng, count):
-    """The same with tables of any curve, of each run others, and values past their ends, which are lost."""
+    """Tables of any curve, of each run others, one of them replaced; values past their ends are lost."""
     p = unit.parameters
     tables = []
     for _ in range(p.banks):
@@ -104,9 +104,11 @@ def _tables(unit, rng, count):
     case = _case(unit, rng, count, tables)
     if case.write is None:
         return case
+    # A table is replaced by one that is written later.
+    before = tables[0].writes()
     # Values past the end of a table are lost, however many.
     beyond = {"value": rng.integers(0, 1 << Lobe.VALUE_FORMAT.width, 700), "begins": np.zeros(700, np.int64)}
-    return replace(case, write={name: np.r_[case.write[name], beyond[name]] for name in beyond})
+    return replace(case, write={name: np.r_[before[name], case.write[name], beyond[name]] for name in beyond})
 
 
 def _loaded(unit, case):
@@ -187,5 +189,5 @@ RECORD = Record(
     axis="1 - cos γ",
     logarithmic=True,
     waivers={"last": "Of one bank, a table that ends later only writes past the end of the memory."},
-    still={},
+    still={"with one bank the last address is the same for every table": "memory.last[0-8]"},
 )

@@ -202,7 +202,7 @@ RECORD = Record(
             "datapath.slope.slope_word[0-16] datapath.slope.scale[0-6] datapath.product[0-6]"
         ),
         "the exponent stays for a run, so that what follows from it does not fall": (
-            "slope_word[17-26] slope.scale[7-16] slope.shift[0-3] slope.boundary[0-16] "
+            "slope_word[17-26] slope.scale[7-16] slope.shift[0-3] slope.{read,boundary}[0-16] "
             "boundaries.port__data[0-16]"
         ),
         "the second bit of a square is 0": "datapath.square[1]",

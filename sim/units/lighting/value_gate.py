@@ -174,4 +174,10 @@ RECORD = Record(
     },
     axis="n u in the middle of the span",
     logarithmic=True,
+    still={
+        "the exponent stays for a run, so that what follows from it does not fall": (
+            "threshold[0-16] thresholds.port__data[0-16]"
+        ),
+        "an exponent of 1 or more has a threshold under 4": "threshold[17] thresholds.port__data[17]",
+    },
 )

@@ -2,7 +2,6 @@
 
 from blysk.golden.methods.bisection_interpolator import PUBLISHED, BisectionInterpolator
 from blysk.sim.units.methods.interpolator import STIMULI, expect, measured, options, status
-from blysk.sim.units.methods.light_products import COSINES
 from blysk.sim.units.record import Record
 
 __all__ = ["RECORD"]
@@ -26,20 +25,5 @@ RECORD = Record(
         "middle_0": "Inverted every second cycle, and read in those cycles only.",
         "half_sum_1": "Inverted every second cycle, and read in those cycles only.",
         "span": "Inverted every second cycle, and the right normal is read two cycles after it comes.",
-    },
-    still=COSINES
-    | {
-        "half of 128 segments is the most that ends are apart or written last": "half[7] write_index[7]",
-        "fewer than 32 spans fit into the normaliser": "ready_spans[5-8]",
-        "a reciprocal is normalised and not negative, so that its first bits are 01": (
-            "reciprocal[16-17] reciprocals.table_port__data[16]"
-        ),
-        "a segment has at most 4095 pixels, and they take 4094 steps and 127": (
-            "available[13] advance[13-23]"
-        ),
-        "a segment of 4096 steps is divided": "adaptive_normaliser.count[12]",
-        "a fraction is not negative": "phi[17]",
-        "the bisection's results are taken at once": "bisection.held[0]",
-        "the first sum of its polynomials is 0.056, or 0.136 to 0.303": "bisection.datapath.total_2[17]",
     },
 )

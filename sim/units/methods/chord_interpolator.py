@@ -17,7 +17,7 @@ from blysk.golden.reference.geometry import normalise
 from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit
 from blysk.sim.units.lighting.specular import any_exponent
-from blysk.sim.units.methods.interpolator import SPAN, operand_beats
+from blysk.sim.units.methods.interpolator import SPAN, long_lengths, operand_beats
 from blysk.sim.units.operands import (
     any_pairs,
     component_words,
@@ -34,10 +34,18 @@ from blysk.sim.units.operands import (
 )
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
-__all__ = ["EXPONENT", "RECORD", "gated", "gated_beats", "mixed_lengths"]
+__all__ = ["EXPONENT", "RECORD", "STILL_SPANS", "gated", "gated_beats", "mixed_lengths"]
 
 EXPONENT = 60
 """Exponent of a run that needs but one."""
+
+STILL_SPANS = {
+    "twice a number is even": "{diffuse,highlight}_0_second_difference[0]",
+    "spans come while under 28 are counted inside, under 12 long ones, and three more before they count": (
+        "spans_inside[5] lengths.inner_level[5] long_inside[4] behind[4]"
+    ),
+}
+"""Register bits that cannot toggle, of the spans of both chord interpolators."""
 
 _CHORD = ChordInterpolator()
 _GROUPS = 32
@@ -244,9 +252,8 @@ def _limits(unit, rng, count):
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels in range, where the last bits of the differences count."""
-    length = rng.integers(3000, 4096, count // 3500)
-    length[:2] = 4095
+    """Spans of 3000 to 4095 pixels in range, where the last bits of the differences count; shorter ones."""
+    length = long_lengths(rng, count)
     left = sphere(rng, len(length))
     right = turned(rng, left, 15 * 10.0 ** rng.uniform(-3, 0, len(length)))
     return _case(unit, rng, quantise(left), quantise(right), length)
@@ -288,5 +295,12 @@ RECORD = Record(
         "limits": Stimulus(_limits, 500, stalled=False, repeats=30),
         "long spans": Stimulus(_long_spans, 60_000, stalled=False),
         "last bits": Stimulus(_last_bits, 4000, stalled=False),
+    },
+    still=STILL_SPANS
+    | {
+        "the exponent stays for a run: only bits of the level that is read after a reset fall": (
+            "level_octave[0-3] top.level[{0-25,27}] excess_0[0]"
+        ),
+        "levels are 4, 2 or less than 1, and not negative": "top.level[26] top.level[29]",
     },
 )

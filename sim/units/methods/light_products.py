@@ -11,13 +11,7 @@ from blysk.sim.engines.beats import dtype_of
 from blysk.sim.units.operands import component_words, light_constants, unit_codes, word_ends
 from blysk.sim.units.record import Case, Record, Stimulus, Variant
 
-__all__ = ["CONSTANT", "COSINES", "RECORD"]
-
-CONSTANT = "L and H stay for a run, so that what follows from them does not fall"
-"""Reason for registers that hold parts of L and H."""
-
-COSINES = {CONSTANT: "products.datapath.multiplier_?_b[0-17] products.datapath.multiplier_?[0-17]"}
-"""Register bits of the products of a method that finds normals, which do not toggle."""
+__all__ = ["RECORD"]
 
 
 def _expect(unit, case):
@@ -70,11 +64,13 @@ RECORD = Record(
     stimuli={"normals": Stimulus(_normals, 1000, repeats=2), "corners": Stimulus(_corners, 300, repeats=16)},
     axis="",
     still={
-        CONSTANT: "multiplier_?_b[0-17] multiplier_?[0-17]",
-        "the second bit of a square is 0": "multiplier_{3-5}_product[1] highlight_0_square_2[1]",
+        "L and H stay for a run, so that what follows from them does not fall": (
+            "multiplier_?_b[0-17] multiplier_?[0-17]"
+        ),
+        "the second bit of a square is 0": "multiplier_{3-5}_product[1]",
         "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
-            "multiplier_{3-5}_product[35] highlight_0_square_2[35] highlight_0_square_partial[36] "
-            "highlight_0_square_total[36-37] highlight_0_aligned[38-39]"
+            "multiplier_{3-5}_product[35] highlight_0_square_partial[36] highlight_0_square_total[36-37] "
+            "highlight_0_aligned[38-39]"
         ),
     },
 )

@@ -5,7 +5,6 @@ import numpy as np
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.number.unit_vector import ONE
 from blysk.sim.units.methods.interpolator import STIMULI, case_of, expect, measured, options, status
-from blysk.sim.units.methods.light_products import COSINES
 from blysk.sim.units.operands import code_pairs_at, component_words
 from blysk.sim.units.record import Record, Stimulus
 
@@ -47,15 +46,5 @@ RECORD = Record(
         "*_second_difference": "A straight line has no second difference: the bit is 0 already.",
         "values": "It is for the saturation below -1, which no component reaches, as normals are not longer.",
     },
-    still=COSINES
-    | {
-        "a straight line has no second difference": (
-            "{top,difference_setup}.spare[186-317] top.payload[186-317] *_second_difference[0-43]"
-        ),
-        "a reciprocal is normalised, so that its first bit is 1": (
-            "reciprocal[16] reciprocals.port__data[16] multiplier_0_a[16] multiplier_0[16]"
-        ),
-        "a length of 12 bits takes shifts up to 12": "shift[4] multiplier_0_amount[4] multiplier_0[4]",
-        "of the 11 zeros that end a product a shift by 8 leaves 3": "multiplier_0_coarse[0-2]",
-    },
+    still={"a straight line has no second difference": "top.{spare,payload}[186-317]"},
 )

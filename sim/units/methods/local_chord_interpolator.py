@@ -23,8 +23,14 @@ from blysk.sim.units.cosines.chord_setup import (
 from blysk.sim.units.cosines.chord_setup import RECORD as SETUP
 from blysk.sim.units.lighting.specular import any_exponent
 from blysk.sim.units.lighting.value_gate import parabolas_near
-from blysk.sim.units.methods.chord_interpolator import EXPONENT, gated, gated_beats, mixed_lengths
-from blysk.sim.units.methods.interpolator import of_setup, options
+from blysk.sim.units.methods.chord_interpolator import (
+    EXPONENT,
+    STILL_SPANS,
+    gated,
+    gated_beats,
+    mixed_lengths,
+)
+from blysk.sim.units.methods.interpolator import long_lengths, of_setup, options
 from blysk.sim.units.operands import any_codes, short_lengths, span_lengths
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
@@ -94,10 +100,8 @@ def _gate(unit, rng, count):
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels, where the last bits of the differences count."""
-    length = rng.integers(3000, 4096, count // 3500)
-    length[:2] = 4095
-    return _case(unit, rng, length)
+    """Spans of 3000 to 4095 pixels, where the last bits of the differences count; shorter ones."""
+    return _case(unit, rng, long_lengths(rng, count))
 
 
 def _last_bits(unit, rng, count):
@@ -154,4 +158,5 @@ RECORD = Record(
     },
     axis="pixel of the span",
     logarithmic=True,
+    still=STILL_SPANS,
 )

@@ -4,29 +4,12 @@ from dataclasses import replace
 
 from blysk.golden.methods.quadratic_interpolator import METHODS, PUBLISHED, QuadraticInterpolator
 from blysk.sim.units.methods.interpolator import STIMULI, expect, measured, options, status
-from blysk.sim.units.methods.light_products import COSINES
 from blysk.sim.units.record import Record
 
-__all__ = ["RECORD", "STILL"]
+__all__ = ["RECORD"]
 
 _CURVE = QuadraticInterpolator()
 _OF_CHORD = QuadraticInterpolator("one_minus_cosine")
-
-STILL = {
-    "the polynomial's products are at most 0.0127 and 0.0293": "rounded_2[13-16] rounded_1[14-16]",
-    "its inner sums are 0.0458 to 0.0586 and 0.1250 to 0.1544": "middle_normal.datapath.total[14-16]",
-    "twice a number is even": (
-        "{spare,payload,difference_setup.spare}[186] {spare,payload,difference_setup.spare}[230] "
-        "{spare,payload,difference_setup.spare}[274] second_{0-2}[0] *_second_difference[0]"
-    ),
-    "a reciprocal is normalised, and so is its square, so that the first bit is 1": (
-        "reciprocal[16] reciprocals.port__data[16] square[16] square_rounded[16] "
-        "difference_setup.datapath.multiplier_?_a[16] difference_setup.datapath.multiplier_?[16]"
-    ),
-    "the largest square in the table is under 1 by 62 steps": "square_rounded[17]",
-    "a length of 12 bits takes shifts up to 12, and its square up to 25": "shift[4] square_shift[5]",
-}
-"""Register bits of the method's setup, which do not toggle, by reason."""
 
 
 def _variants():
@@ -59,5 +42,10 @@ RECORD = Record(
         "first_order_0": "While the output is stalled, the register holds no word that is still read.",
         "middle_2": "It counts at 2 and more, and a middle normal is at most 1 and a rounding long.",
     },
-    still=COSINES | STILL,
+    still={
+        "twice a number is even": "top.{spare,payload}[{186,230,274}]",
+        "8 spans are in the middle normal and 2 in GPQ at most, 3 of them outside the inner FIFO": (
+            "lengths.inner_level[3]"
+        ),
+    },
 )

@@ -53,12 +53,7 @@ RECORD = Record(
         "phase_entry": "While the output is stalled, all but the value in the register has been read.",
         "recurrence_0.*": "It tells the last pixel of a span, which nothing reads.",
     },
-    still=SETUP.still
-    | {
-        "a square rounds up to 1 in one span in 2^17 only": "psi_square_rounded[17]",
-        "a cosine has ten bits less than x": (
-            "{top,recurrence_setup}.spare[0-9] {top,recurrence_setup}.spare[368-377] "
-            "top.payload[0-9] top.payload[368-377] {diffuse,highlight}_0_x_0[0-9] *_0_start_0_first[0-9]"
-        ),
+    still={
+        "a cosine has ten bits less than x": "top.{spare,payload}[0-9] top.{spare,payload}[368-377]",
     },
 )

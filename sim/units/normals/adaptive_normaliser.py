@@ -161,7 +161,5 @@ RECORD = Record(
         "a segment has at most 4095 pixels, and they take 4094 steps and 31": "available[13] advance[13-23]",
         "a segment of 4096 steps is divided": "top.count[12]",
         "a fraction is not negative": "phi[17]",
-        "the bisection's results are accepted at once": "bisection.held[0]",
-        "the first sum of its polynomials is 0.056, or 0.136 to 0.303": "bisection.datapath.total_2[17]",
     },
 )

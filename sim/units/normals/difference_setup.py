@@ -119,8 +119,7 @@ RECORD = Record(
     still={
         "twice a number is even": "top.spare[186] top.spare[230] top.spare[274] second_{0-2}[0]",
         "a reciprocal is normalised, and so is its square, so that the first bit is 1": (
-            "reciprocal[16] reciprocals.port__data[16] square[16] square_rounded[16] multiplier_?_a[16] "
-            "multiplier_?[16]"
+            "reciprocals_word[16] reciprocals.port__data[16] square[16] square_rounded[16]"
         ),
         "the largest square in the table is under 1 by 62 steps": "square_rounded[17]",
         "a length of 12 bits takes shifts up to 12, and its square up to 25": "shift[4] square_shift[5]",

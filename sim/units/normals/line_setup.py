@@ -86,4 +86,16 @@ RECORD = Record(
     },
     axis="pixel of the span",
     logarithmic=True,
+    still={
+        "a reciprocal is normalised, so that its first bit is 1": (
+            "reciprocals_word[23] reciprocals.port__data[23]"
+        ),
+        "a length of 12 bits takes shifts up to 12": "shift[4]",
+        "a reciprocal's upper word, of 17 bits, is not negative": "multiplier_{0,2}_{1,b}[17]",
+        "a lower word, of P or of the reciprocal, has 7 bits": (
+            "multiplier_1_{1,b}[7-17] multiplier_2_{0,a}[7-17]"
+        ),
+        "a product of 7 by 17 bits has 24": "multiplier_2_product[24-35]",
+        "twice P r has three fraction bits less than what is shifted": "shifter_0_0[0-2]",
+    },
 )

@@ -96,4 +96,12 @@ RECORD = Record(
     axis="pixel of the span",
     logarithmic=True,
     waivers={"reciprocal": "A reciprocal is normalised: its first bit is 1 already."},
+    still={
+        "a reciprocal is normalised, so that its first bit is 1": (
+            "reciprocals_word[17] reciprocals.port__data[17]"
+        ),
+        "a length of 12 bits takes shifts up to 12": "shift[4]",
+        "the second bit of a square is 0": "square[1]",
+        "the square of t is 1 at most, and not negative": "square[35]",
+    },
 )

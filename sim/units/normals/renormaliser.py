@@ -94,4 +94,10 @@ RECORD = Record(
     waivers={
         "dot_product.*": "The dot product inside is accepted at once, so that its skid buffer never shows.",
     },
+    still={
+        "c2 is at most 0.695, c1 0.9988, and what is subtracted from it is not negative": (
+            "coefficients.port__data[35] coefficients.port__data[47] c1_10[16] slope[16]"
+        ),
+        "a product of two numbers less than 1/16 and 1 is less than 1/16": "square_term[28] linear_term[33]",
+    },
 )

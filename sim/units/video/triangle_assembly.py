@@ -62,6 +62,9 @@ RECORD = Record(
     status=lambda unit, case: _made(unit, case)[1],
     stimuli={"around": Stimulus(_around, 60), "within": Stimulus(_within, 60)},
     axis="",
-    still={"counters go on to 2^32": "count_sent[9-31] count_rejected[7-31] count_outside[7-31]"},
+    still={
+        "counters go on to 2^32": "count_sent[9-31] count_rejected[7-31] count_outside[7-31]",
+        "triangles in the memory are not two-sided": "result[418]",
+    },
     remembers=True,
 )

@@ -5,7 +5,7 @@ import pytest
 
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
 from blysk.golden.geometry.vector_normaliser import VectorNormaliser
-from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.fixed import UQ, Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 
 
@@ -42,6 +42,15 @@ def test_fit_of_the_table():
     u = s - (np.floor(s * 512) + 0.5) / 512
     error = np.abs((c0 - c1 * u) * np.sqrt(s) / (ONE * COMPONENT.step) - 1).max()
     assert 0.5 * p.FIT < error < p.FIT
+
+
+def test_factor_of_every_square():
+    """No word of the factor wraps: of all squared lengths from 1/4 to 1 it is off by its roundings."""
+    p = VectorNormaliser()
+    s = np.arange(1 << 18, 1 << 20)
+    e = p.factor(Fixed(UQ(0, 22), s << 2)).values
+    exact = ONE * COMPONENT.step / np.sqrt((s + 0.5) * 2.0**-20) - 1
+    assert np.abs(e - exact).max() < 2 * p.FIT + 2.0**-20 + 2.0**-18
 
 
 def test_lost_and_flipped():
