@@ -61,6 +61,8 @@ def _named(entry: str) -> tuple[str, str]:
 def _parts(entries: dict) -> Iterator[str]:
     """Parts and clocks of the bitstreams."""
     built = {_named(entry)[0]: values["built"] for entry, values in entries.items() if "built" in values}
+    if not built:
+        return iter(["(no bitstream is recorded)"])
     names = {"sync": "drawing clock", "serial": "serial clock", "pixel": "pixel clock"}
     rows = [
         [part, *(f"{used:,} of {most:,}" for used, most in (each["parts"][part] for each in built.values()))]
