@@ -7,12 +7,15 @@ cells are our models; the bits of the four lanes are decoded as a monitor does, 
 those of the bit-accurate model.
 """
 
+import json
 import shutil
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import click
 import numpy as np
@@ -29,10 +32,11 @@ from blysk.golden.video.draw_unit import turned
 from blysk.hdl.gpu import GpuUnit
 from blysk.sim.cli.options import given_options, lights_of, options_of
 from blysk.sim.engines.engine import SimulationError
+from blysk.sim.engines.toggles import ToggleCounter
 from blysk.sim.errors import InputError
 from blysk.sim.frames.display import OneClock, Shown, show
 from blysk.sim.frames.picture import check_image_path, write_image
-from blysk.sim.output import atomic_writer, check_writable
+from blysk.sim.output import atomic_writer, check_writable, write_json
 from blysk.sim.value_types import Choice, Number, OutputFile, Whole
 
 __all__ = ["built_lines", "command", "missed", "shown_lines", "too_heavy"]
@@ -55,13 +59,21 @@ MOST_FRAMES = 60
 @click.option(
     "--clock",
     type=Number(1, 126, "MHz"),
-    help="Drawing clock, MHz: this or a little less.  [default: 57.3 for ulx3s-85f, 63 for the others]",
+    help="Drawing clock, MHz: this or a little less.  [default: 57.3 for ulx3s-85f, 52.5 for the others]",
+)
+@click.option(
+    "--toggles", is_flag=True, help="With --simulate: count register bits that toggle, a proxy of energy."
 )
 @click.option("--seeds", type=Whole(1, 20), default=1, show_default=True, help="Placements to try at most.")
+@click.option(
+    "--record", type=OutputFile(), help="JSON file of figures, to which those of this run are added."
+)
 @click.option("--load", is_flag=True, help="Load the bitstream by openFPGALoader.")
 @options_of(OPTIONS)
 @click.pass_context
-def command(context, board_name, mesh, output, simulate, colours, clock, seeds, load, **options):
+def command(
+    context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, record, load, **options
+):
     """A turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
 
     Without --simulate a bitstream is made; parts and clock rates are printed against what the board has and
@@ -83,11 +95,14 @@ def command(context, board_name, mesh, output, simulate, colours, clock, seeds, 
     if lights := lights_of(options):
         given["lights"] = lights
     loader = _loader() if load else ""
+    if toggles and not simulate:
+        raise InputError("--toggles", "counts bits of a simulation", "give --simulate N with it")
     if simulate and load:
         raise InputError("--load", "there is no bitstream of a simulation", "leave out --simulate or --load")
     if not simulate:
         packages_missing()
         check_writable(output)
+    recorded = _recorded(record)
     gpu, scenes = gpu_of(board, mesh, given, colours)
     clock = clock or board.clock
     try:
@@ -96,8 +111,16 @@ def command(context, board_name, mesh, output, simulate, colours, clock, seeds, 
         raise InputError(f"--clock {clock:g}", str(error), "give another rate") from error
     _check_load(gpu, plan)
     click.echo("\n".join(_design_lines(board, mesh, gpu, plan)))
+    entry = f"{board.name}, {mesh}, {gpu.drawing.mesh.triangles:,} triangles"
+    figures = recorded.setdefault(entry, {})
     if simulate:
-        _simulate(board, gpu, scenes, plan, simulate, Path(output))
+        figures["simulated"] = _simulate(board, gpu, scenes, plan, simulate, Path(output))
+        if toggles:
+            counted = _toggles(board, gpu, plan, simulate)
+            click.echo(_toggles_line(counted))
+            figures["toggles"] = counted
+        if record:
+            write_json(record, recorded)
         return
     with tqdm(bar_format="{desc}", leave=False, disable=None) as bar:
         rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
@@ -109,6 +132,9 @@ def command(context, board_name, mesh, output, simulate, colours, clock, seeds, 
             bar.set_description_str,
         )
     click.echo("\n".join(built_lines(built)))
+    figures["built"] = _figures(built)
+    if record:
+        write_json(record, recorded)
     if missed(built):
         raise ToolError(missed(built))
     with atomic_writer(output) as path:
@@ -116,6 +142,26 @@ def command(context, board_name, mesh, output, simulate, colours, clock, seeds, 
     click.echo(f"{'bitstream':<12}{output}, {len(built.bitstream):,} bytes, read back and equal")
     if load:
         _load(loader, board, output)
+
+
+def _figures(built: Built) -> dict[str, Any]:
+    """What is recorded of a bitstream."""
+    clocks = {clock.name: asdict(clock) for clock in built.clocks}
+    return {"seed": built.seed, "bytes": len(built.bitstream), "parts": built.parts, "clocks": clocks}
+
+
+def _recorded(path: str | None) -> dict[str, Any]:
+    """What a JSON file of figures has, which may not be there yet; checked before long work."""
+    if path is None:
+        return {}
+    check_writable(path)
+    try:
+        known = json.loads(Path(path).read_text(encoding="utf-8"))
+        return {entry: dict(figures) for entry, figures in known.items()}
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, TypeError, AttributeError) as error:
+        raise InputError(path, "is no JSON file of figures", "give --record another name") from error
 
 
 def _design_lines(board: Board, mesh: str, gpu: Gpu, plan: ClockPlan) -> Iterator[str]:
@@ -154,8 +200,8 @@ def _check_load(gpu: Gpu, plan: ClockPlan) -> None:
 
 def _simulate(
     board: Board, gpu: Gpu, scenes: Sequence[Scene], plan: ClockPlan, count: int, folder: Path
-) -> None:
-    """Frames through the lanes, written, and held against the model and the exact frame."""
+) -> dict[str, Any]:
+    """Frames through the lanes, written, and held against the model and the exact frame; their figures."""
     paths = [folder / f"frame-{number:04}.png" for number in range(1, count + 1)]
     made = not folder.exists()
     try:
@@ -190,6 +236,30 @@ def _simulate(
     ]
     if differing:
         raise SimulationError(f"frame {differing[0]} is not the bit-accurate model's")
+    return {
+        "frames": count,
+        "clock": float(plan.rates["sync"]) / 1e6,
+        "cycles": round(_busy(gpu, shown)),
+        "late_bands": shown.status["late_bands"],
+    }
+
+
+def _toggles(board: Board, gpu: Gpu, plan: ClockPlan, count: int) -> dict[str, int]:
+    """Register bits that toggle in a frame, those of the drawing and of the display."""
+    rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
+    top = ToggleCounter(OneClock(GpuUnit(gpu, compact=board.compact), rate))
+    counts = show(top, gpu.buffer.mode, count).status
+    return {
+        part: round(
+            sum(bits for path, bits in counts.items() if path.startswith(f"inner.top.{name}")) / count
+        )
+        for part, name in (("drawing", "draw"), ("display", "display"))
+    }
+
+
+def _toggles_line(counted: Mapping[str, int]) -> str:
+    parts = ", ".join(f"{part} {bits / 1e6:.1f}" for part, bits in counted.items())
+    return f"{'toggles':<12}{sum(counted.values()) / 1e6:.1f} million register bits a frame: {parts}"
 
 
 def _busy(gpu: Gpu, shown: Shown) -> float:
@@ -258,7 +328,7 @@ def missed(built: Built) -> str:
         return ""
     return (
         f"clock {clock.name} is not met: {clock.reached:.1f} MHz of {clock.needed:.1f} needed, by "
-        f"{clock.path}; give a lower --clock, or more --seeds"
+        f"{clock.path}; give {'a lower --clock, or ' if clock.name == 'sync' else ''}more --seeds"
     )
 
 

@@ -163,7 +163,7 @@ class BoardTop(Elaboratable):
         clock = platform.request(platform.default_clk, dir="-")
         m.submodules.clock = buffer = io.Buffer("i", clock)
         m.submodules.clocks = clocks = ClockUnit(self.plan)
-        m.domains += [ClockDomain(name) for name in clocks.clocks]
+        m.domains += [ClockDomain(name, reset_less=True) for name in clocks.clocks]
         m.d.comb += clocks.reference.eq(buffer.i)
         names = [pin.name for pin in platform.lookup("hdmi", 0).ios if hasattr(pin, "ios")]
         connector = platform.request("hdmi", 0, dir=dict.fromkeys(names, "-"))

@@ -69,8 +69,8 @@ class Drawing:
         Of a design whose ``x_bits`` and ``y_bits`` hold a band.
     size : (int, int)
         Width and height of the picture.
-    frame : Frame
-        The whole picture.
+    frames : tuple of Frame
+        The whole picture by preset: a highlight that is steeper cuts spans shorter.
     controls : Controls
         Angle and preset of each frame.
     lines : int
@@ -92,7 +92,7 @@ class Drawing:
     presets: tuple[tuple[FrameConstants, ...], ...]
     renderer: Renderer
     size: tuple[int, int]
-    frame: Frame
+    frames: tuple[Frame, ...]
     controls: Controls = field(default_factory=Controls)
     lines: int = 16
     transform: VertexTransform = field(default_factory=VertexTransform)
@@ -105,7 +105,7 @@ class Drawing:
                 f"{self.size[0]}x{self.lines} has {bits[0]} and {bits[1]}"
             )
         wanted = self.controls.materials * self.controls.lights
-        if len(self.commands.starts) != wanted or len(self.presets) != wanted:
+        if {len(self.commands.starts), len(self.presets), len(self.frames)} != {wanted}:
             raise ValueError(f"the controls choose from {wanted} lists, there are {len(self.presets)}")
         if self.motion.slots != len(self.mesh.parts):
             raise ValueError(f"{len(self.mesh.parts)} meshes need as many slots, not {self.motion.slots}")
@@ -159,7 +159,7 @@ class Drawing:
         design = replace(design, x_bits=x_bits, y_bits=y_bits)
         mesh = MeshMemory.of([scene.mesh])
         presets = tuple(tuple(constants_of(each, design)) for each in scenes)
-        widest = min(span_angle(each, design) for each in scenes) if angle is None else angle
+        widest = [span_angle(each, design) if angle is None else angle for each in scenes]
         return cls(
             mesh=mesh,
             motion=Motion.of(mesh, scene.camera, size, axis, transform),
@@ -167,7 +167,10 @@ class Drawing:
             presets=presets,
             renderer=Renderer(design),
             size=size,
-            frame=Frame.centred(*size, back_faces=scene.back_faces, limit=Frame.limit_of(widest)),
+            frames=tuple(
+                Frame.centred(*size, back_faces=scene.back_faces, limit=Frame.limit_of(each))
+                for each in widest
+            ),
             controls=controls or Controls(materials=len(scenes)),
             lines=lines,
             transform=transform,
@@ -183,10 +186,11 @@ class Drawing:
         """Assembly of its triangles."""
         return TriangleAssembly(self.mesh, self.transform.grid)
 
-    def rows(self, band: int) -> Frame:
+    def rows(self, band: int, preset: int = 0) -> Frame:
         """The frame of a band."""
-        top = self.frame.top + band * self.lines
-        return replace(self.frame, top=top, bottom=min(top + self.lines, self.frame.bottom))
+        frame = self.frames[preset]
+        top = frame.top + band * self.lines
+        return replace(frame, top=top, bottom=min(top + self.lines, frame.bottom))
 
     def vertices(self, angle: int) -> ScreenVertices:
         """All vertices at an angle's code."""
@@ -221,7 +225,7 @@ class Drawing:
         preset : int
             Index of the list.
         """
-        rows = self.rows(band)
+        rows = self.rows(band, preset)
         triangles, counts = self.triangles(angle, preset, rows)
         drawn = self.renderer.compute(triangles, rows, self.presets[preset])
         return BandPixels(band, drawn.x, drawn.y, drawn.color, counts | drawn.counts)
@@ -231,8 +235,8 @@ class Drawing:
         design = self.renderer.design
         y_bits = max((self.size[1] - 1).bit_length(), 1)
         renderer = Renderer(replace(design, y_bits=y_bits), self.renderer.geometry)
-        triangles, _ = self.triangles(angle, preset, self.frame)
-        return renderer.compute(triangles, self.frame, self.presets[preset])
+        triangles, _ = self.triangles(angle, preset, self.frames[preset])
+        return renderer.compute(triangles, self.frames[preset], self.presets[preset])
 
     def picture(self, angle: int, preset: int = 0, background: Sequence[int] = (0, 0, 0)) -> np.ndarray:
         """Frame buffer of all bands, uint8, shape (height, width, 3)."""

@@ -90,8 +90,6 @@ class VertexSortUnit(wiring.Component):
             with m.Case(0):
                 m.d.sync += [step.eq(self.i.valid), material.eq(self.i.payload.material), odd.eq(0)]
                 m.d.sync += two_sided.eq(self.i.payload.two_sided)
-                for k, corner in enumerate(corners):
-                    m.d.sync += [corner[name].eq(self.i.payload[name][k]) for name in corner.shape().members]
             with m.Case(4):
                 m.d.comb += leaves.eq(covered & free)
                 with m.If(leaves | ~covered):
@@ -108,8 +106,12 @@ class VertexSortUnit(wiring.Component):
         return m
 
     def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal) -> None:
-        """Exchange the first two corners, the last two, the first two, where they are the wrong way round."""
-        last = step == 2
+        """Take corners in, and exchange neighbours where they are the wrong way round.
+
+        The first two, the last two, the first two. The comparison, which is late, enables the registers; what
+        they take follows from the step alone.
+        """
+        last, takes = step == 2, step == 0
         # x counts from the lowest one, so that y and x are one signed number.
         columns = [Value.cast(corner.x) for corner in corners]
         key = [
@@ -118,13 +120,16 @@ class VertexSortUnit(wiring.Component):
         ]
         wrong = Mux(last, key[1], key[0]) > Mux(last, key[2], key[1])
         turns = wrong & (step != 0) & ~step[2]
-        first, second, third = corners
         with m.If(turns):
             m.d.sync += odd.eq(~odd)
-            with m.If(last):
-                m.d.sync += [second.eq(third), third.eq(second)]
-            with m.Else():
-                m.d.sync += [first.eq(second), second.eq(first)]
+        first, second, third = (Value.cast(corner) for corner in corners)
+        following = second, Mux(last, third, first), second
+        given = self.i.payload
+        moving = ~last, 1, last
+        for k, (corner, neighbour, moves) in enumerate(zip(corners, following, moving, strict=True)):
+            taken = Cat(Value.cast(given[name][k]) for name in corner.shape().members)
+            with m.If(takes | (turns & moves)):
+                m.d.sync += Value.cast(corner).eq(Mux(takes, taken, neighbour))
 
     def _box(self, m: Module, corners: list, step: Signal, covered: Signal, digits: Signal) -> None:
         """Whether the box and the picture have a pixel's centre in common, and the digits of the height."""

@@ -49,10 +49,10 @@ class LobeMemory(wiring.Component):
     are fixed at build time need none: up to 1024 words take two block RAMs of 1024 by 18 for both ports.
 
     A write is taken on every clock. The first write of a table, with ``begins``, tells its bank. The values
-    follow in order: each but the first makes the word of the value before it, which is in the memory a cycle
-    after the write was taken. Values beyond the end of a table are lost, and so are all those of a bank that
-    does not exist. A table that is not completed keeps the other words of the one before. Reset ends a table,
-    and clears no word. A bank must not be written while a unit reads it.
+    follow in order: each but the first makes the word of the value before it, which is in the memory two
+    cycles after the write was taken. Values beyond the end of a table are lost, and so are all those of a
+    bank that does not exist. A table that is not completed keeps the other words of the one before. Reset
+    ends a table, and clears no word. A bank must not be written while a unit reads it.
 
     Parameters
     ----------
@@ -105,23 +105,30 @@ class LobeMemory(wiring.Component):
     def _write(self, m: Module, port: Any) -> None:
         """Word by word behind the values."""
         p, write = self.parameters, self.write.payload
-        previous, holds = Signal.like(write.value, name="previous"), Signal(name="holds")
+        value, previous = (Signal.like(write.value, name=name) for name in ("value", "previous"))
         address, last = (Signal.like(port.addr, name=name) for name in ("address", "last"))
-        active = Signal(name="active")
-        follows = self.write.valid & ~write.begins
+        follows, begins, holds, active = (
+            Signal(name=name) for name in ("follows", "begins", "holds", "active")
+        )
+        # A register beside the memory: whether it is written decides whether it is read.
+        m.d.sync += [
+            value.eq(write.value),
+            follows.eq(self.write.valid & ~write.begins),
+            begins.eq(self.write.valid & write.begins),
+        ]
         m.d.comb += [
             self.write.ready.eq(1),
             port.en.eq(follows & holds & active),
             port.addr.eq(address),
-            port.data.eq(Cat(previous, (write.value - previous)[: Lobe.DIFFERENCE_FORMAT.width])),
+            port.data.eq(Cat(previous, (value - previous)[: Lobe.DIFFERENCE_FORMAT.width])),
         ]
         with m.If(follows):
-            m.d.sync += [previous.eq(write.value), holds.eq(1)]
+            m.d.sync += [previous.eq(value), holds.eq(1)]
             with m.If(holds):
                 m.d.sync += [address.eq(address + 1), active.eq(active & (address != last))]
-        with m.If(self.write.valid & write.begins):
+        with m.If(begins):
             m.d.sync += [holds.eq(0), active.eq(0)]
-            with m.Switch(write.value):
+            with m.Switch(value):
                 for bank in range(p.banks):
                     with m.Case(bank):
                         first = bank * p.entries

@@ -29,17 +29,19 @@ def shown_shape(parameters: BandBuffer) -> data.StructLayout:
 class BandBufferUnit(wiring.Component):
     """Two bands in a memory with two clocks: `BandBuffer` is the bit-accurate model.
 
-    The domain ``sync`` draws, the domain ``pixel`` shows. A buffer that is free is cleared, a word a cycle,
-    while its band is already asked for; then pixels are written as they come, one a cycle. With ``done`` it
-    goes to the display, which gives it back after its last line, or at the beginning of the next slot if it
-    came too late. The display takes no notice of how long drawing takes: its addresses follow from the
-    timing alone. What is shown leaves a cycle after its timing. No multipliers.
+    The domain ``sync`` draws, the domain ``pixel`` shows. Pixels of a free buffer are written as they come,
+    one a cycle. With ``done`` it goes to the display, which clears each word as it reads it, on the same port
+    (the memory reads before it writes), and gives it back after its last line; or at the beginning of the
+    next slot, as it is, if it came too late. Such a buffer, and each after a reset, the drawing side clears
+    itself, a word a cycle, while its band is already asked for. The display takes no notice of how long
+    drawing takes: its addresses follow from the timing alone. What is shown leaves a cycle after its timing.
+    No multipliers.
 
     Between the clocks go four toggles (a buffer is filled; it is free), one of a slot that begins, and one of
-    a late band, each through two flip-flops; and the numbers of bands and of the slot, each written a cycle
-    before its toggle or with it and read two cycles of the reader's clock later or more: constraint: their
-    paths take less than one period of the reader's clock. A slot lasts longer than any of this takes: its
-    lines have 800 pixels each by default.
+    a late band, each through two flip-flops; and the numbers of bands and of the slot, and whether a buffer
+    that is free was not shown, each written a cycle before its toggle or with it and read two cycles of the
+    reader's clock later or more: constraint: their paths take less than one period of the reader's clock. A
+    slot lasts longer than any of this takes: its lines have 800 pixels each by default.
 
     Parameters
     ----------
@@ -85,13 +87,15 @@ class BandBufferUnit(wiring.Component):
         m = Module()
         given, width = self.parameters, sum(self.parameters.colour_bits)
         m.submodules.colours = memory = Memory(shape=width, depth=2 * given.pixels, init=[])
-        # Written by `sync`: a buffer is filled, its band. By `pixel`: it is free, the slot, its beginning.
+        # Written by `sync`: a buffer is filled, its band. By `pixel`: it is free; it was not shown; the slot,
+        # that it begins.
         self._filled, self._bands = Signal(2, name="filled"), [self._number(f"band_{k}") for k in range(2)]
         self._freed, self._slot = Signal(2, name="freed"), self._number("slot", given.bands - 1)
+        self._unseen = Signal(2, name="unseen", init=0b11)
         self._begun = Signal(name="begun")
         m.submodules.late = self._late = PulseSynchronizer("pixel", "sync")
         self._draw(m, memory.write_port())
-        self._show(m, memory.read_port(domain="pixel"))
+        self._show(m, memory.read_port(domain="pixel"), memory.write_port(domain="pixel"))
         return m
 
     def _number(self, name: str, init: int = 0) -> Signal:
@@ -109,7 +113,7 @@ class BandBufferUnit(wiring.Component):
         )
 
     def _draw(self, m: Module, write) -> None:
-        """Clear a free buffer, ask for its band, write its pixels, hand it over."""
+        """Clear a free buffer that was not shown, ask for its band, write its pixels, hand it over."""
         given = self.parameters
         freed, begun = Signal(2, name="freed_seen"), Signal(name="begun_seen")
         m.submodules += [FFSynchronizer(self._freed, freed), FFSynchronizer(self._begun, begun)]
@@ -131,7 +135,9 @@ class BandBufferUnit(wiring.Component):
         with m.FSM(name="draw"):
             with m.State("wait"), m.If(~Array(busy)[which]):
                 m.d.sync += [last.eq(Mux(worth, coming, after_slot)), address.eq(0), asked.eq(0)]
-                m.next = "clear"
+                m.next = "draw"
+                with m.If(Array(self._unseen)[which]):
+                    m.next = "clear"
             with m.State("clear"):
                 m.d.comb += [place.eq(address), write.en.eq(1), self.request.valid.eq(~asked)]
                 m.d.sync += [address.eq(address + 1), asked.eq(asked | self.request.ready)]
@@ -157,8 +163,8 @@ class BandBufferUnit(wiring.Component):
         first = (begun != before) & (self._slot == 0)
         count_events(m, self.status, late_bands=self._late.o, frames=first)
 
-    def _show(self, m: Module, read) -> None:
-        """Choose the buffer of each slot, read it along with the timing, and give it back."""
+    def _show(self, m: Module, read, clear) -> None:
+        """Choose the buffer of each slot, read and clear it along with the timing, and give it back."""
         given, timing = self.parameters, self.timing
         line, frame = given.mode.horizontal, given.mode.vertical
         filled = Signal(2, name="filled_seen")
@@ -177,11 +183,14 @@ class BandBufferUnit(wiring.Component):
         with m.If(timing.active):
             m.d.pixel += place.eq(place + 1)
         with m.If(last_line & (timing.x == line.visible)):
+            shown = Cat(is_shown & ~which, is_shown & which)
             m.d.pixel += [
                 is_shown.eq(0),
-                self._freed.eq(self._freed ^ Cat(is_shown & ~which, is_shown & which)),
+                self._freed.eq(self._freed ^ shown),
+                self._unseen.eq(self._unseen & ~shown),
             ]
         begins = (timing.y == frame.total - 1) | (last_line & (timing.y != frame.visible - 1))
+        missed = full & ~fits & ~stays
         with m.If(begins & (timing.x == line.total - 1)):
             m.d.pixel += [
                 self._slot.eq(coming),
@@ -189,10 +198,12 @@ class BandBufferUnit(wiring.Component):
                 is_shown.eq(fits.any()),
                 which.eq(fits[1]),
                 place.eq(Mux(fits[1], given.pixels, 0)),
-                self._freed.eq(self._freed ^ (full & ~fits & ~stays)),
+                self._freed.eq(self._freed ^ missed),
+                self._unseen.eq(self._unseen | missed),
             ]
             m.d.comb += self._late.i.eq(~fits.any())
         m.d.comb += [read.addr.eq(place), read.en.eq(1)]
+        m.d.comb += [clear.addr.eq(place), clear.en.eq(timing.active & is_shown), clear.data.eq(0)]
 
         later = Signal.like(timing, name="timing_shown")
         coloured = Signal(name="coloured")

@@ -2,7 +2,6 @@
 
 from amaranth.hdl import ClockSignal, Const, Instance, Module, Signal
 from amaranth.lib import wiring
-from amaranth.lib.cdc import ResetSynchronizer
 from amaranth.lib.wiring import In
 
 from blysk.golden.video.clock_plan import ClockPlan
@@ -13,7 +12,9 @@ __all__ = ["ClockUnit"]
 class ClockUnit(wiring.Component):
     """ECP5's PLL, ``EHXPLLL``, which drives the domains ``sync``, ``pixel``, ``serial``.
 
-    They are in reset until it is locked. Who uses it defines them.
+    Their clocks stand still until it is locked, behind a gate each, ``DCCA``, which lets only whole pulses
+    through. So every register starts as the configuration set it, and none needs a reset, whose net would go
+    to half of them. Who uses it defines the domains, without reset.
 
     Parameters
     ----------
@@ -39,14 +40,15 @@ class ClockUnit(wiring.Component):
         super().__init__({"reference": In(1)})
 
     def elaborate(self, platform):
-        """The PLL; a reset synchroniser a domain."""
+        """The PLL; a gate a clock."""
         m = Module()
         plan, locked, loop = self.parameters, Signal(name="locked"), Signal(name="loop")
+        always = {name: Signal(name=f"{name}_always") for name in self.clocks}
         outputs = {
             "OP": (plan.loop, loop),
-            "OS": (plan.serial, self.clocks["serial"]),
-            "OS2": (plan.pixel, self.clocks["pixel"]),
-            "OS3": (plan.draw, self.clocks["sync"]),
+            "OS": (plan.serial, always["serial"]),
+            "OS2": (plan.pixel, always["pixel"]),
+            "OS3": (plan.draw, always["sync"]),
         }
         arguments = {}
         for (name, (divider, signal)), letter in zip(outputs.items(), "ABCD", strict=True):
@@ -82,5 +84,5 @@ class ClockUnit(wiring.Component):
         )
         for name, clock in self.clocks.items():
             m.d.comb += ClockSignal(name).eq(clock)
-            m.submodules[f"reset_{name}"] = ResetSynchronizer(~locked, domain=name)
+            m.submodules[f"gate_{name}"] = Instance("DCCA", i_CLKI=always[name], i_CE=locked, o_CLKO=clock)
         return m

@@ -14,10 +14,9 @@ __all__ = ["ControlsUnit"]
 class ControlsUnit(wiring.Component):
     """Angle and list of each frame: `Controls` is the bit-accurate model.
 
-    Buttons go through two flip-flops, then each through a counter that moves to one end while it is down and
-    to the other while it is up; a press is the moment at which it gets to the upper end after the lower. On
-    the cycle after ``frame`` the next frame's angle and list are there, and stay until the next one, but for
-    presses. No multipliers.
+    Buttons go through two flip-flops, and are sampled when a counter of all of them is full; a press is a
+    sample that is down after one that is up. On the cycle after ``frame`` the next frame's angle and list are
+    there, and stay until the next one, but for presses. No multipliers.
 
     Parameters
     ----------
@@ -54,7 +53,7 @@ class ControlsUnit(wiring.Component):
         """Buttons, then the state."""
         m = Module()
         given = self.parameters
-        pressed = dict(zip(BUTTONS, (self._pressed(m, k) for k in range(len(BUTTONS))), strict=True))
+        pressed = dict(zip(BUTTONS, self._pressed(m), strict=True))
         angle = Signal(ANGLE_BITS, name="angle_now", init=given.first)
         running, backwards = Signal(name="running", init=1), Signal(name="backwards")
         chosen = [Signal(range(count), name=name) for name, count in self._counts()]
@@ -74,20 +73,14 @@ class ControlsUnit(wiring.Component):
     def _counts(self):
         return ("material", self.parameters.materials), ("light", self.parameters.lights)
 
-    def _pressed(self, m: Module, k: int) -> Signal:
-        """Whether a button gets down on this cycle, without its bounces."""
-        down, count = Signal(name=f"down_{k}"), Signal(self.parameters.debounce_bits, name=f"count_{k}")
-        state, before = Signal(name=f"state_{k}"), Signal(name=f"before_{k}")
-        m.submodules[f"button_{k}"] = FFSynchronizer(self.buttons[k], down)
-        with m.If(down & ~count.all()):
-            m.d.sync += count.eq(count + 1)
-        with m.Elif(~down & count.any()):
-            m.d.sync += count.eq(count - 1)
+    def _pressed(self, m: Module) -> Signal:
+        """Whether each button gets down on this cycle, without its bounces."""
+        down = Signal(len(BUTTONS), name="down")
+        count = Signal(self.parameters.debounce_bits, name="count")
+        state, pressed = Signal.like(down, name="state"), Signal.like(down, name="pressed")
+        m.submodules.down = FFSynchronizer(self.buttons, down)
+        m.d.sync += count.eq(count + 1)
         with m.If(count.all()):
-            m.d.sync += state.eq(1)
-        with m.Elif(~count.any()):
-            m.d.sync += state.eq(0)
-        m.d.sync += before.eq(state)
-        pressed = Signal(name=f"pressed_{k}")
-        m.d.comb += pressed.eq(state & ~before)
+            m.d.sync += state.eq(down)
+            m.d.comb += pressed.eq(down & ~state)
         return pressed

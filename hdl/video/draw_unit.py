@@ -133,7 +133,7 @@ class DrawUnit(wiring.Component):
         self._command_in = stream.Signature(commands.o.payload.shape()).create(path=("command",))
         connect_register(m, "waiting_command", commands.o, self._command_in)
         command = self._command_in.payload
-        frame, render = given.frame, self.render
+        frame, render = given.frames[0], self.render
         band, first = Signal.like(self.request.payload, name="band"), Signal(name="first_band")
         begun = Signal(name="begun")
         angle, index = (
@@ -145,8 +145,9 @@ class DrawUnit(wiring.Component):
         m.d.comb += [
             *(
                 render.constants[name].eq(Const(frame.codes[name], render.constants[name].shape()))
-                for name in ("left", "right", "back_faces", "limit")
+                for name in ("left", "right", "back_faces")
             ),
+            render.constants.limit.eq(Array(each.codes["limit"] for each in given.frames)[index]),
             render.constants.top.eq(rows[0]),
             render.constants.bottom.eq(rows[1]),
             self.assembly.constants.top.eq(rows[0]),

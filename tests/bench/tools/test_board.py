@@ -1,7 +1,10 @@
 # amaranth: UnusedElaboratable=no
 """``blysk board``: bad input in one line, the pins of each board, what is said of clocks, a bitstream."""
 
+import subprocess
+import sys
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 
@@ -44,6 +47,14 @@ def pattern_on(board):
             ["ulx3s-85f", "--triangles", "3000", "--clock", "5", "--simulate", "1", "-o", "x"],
             "--mesh: a frame of 3,080 triangles takes 325,140 cycles or more, and 60 Hz leaves 83,333: too "
             "heavy by a factor of 3.90; use fewer triangles, or a faster --clock",
+        ),
+        (
+            ["ulx3s-25f", "--toggles", "-o", "x"],
+            "--toggles: counts bits of a simulation; give --simulate N with it",
+        ),
+        (
+            ["ulx3s-25f", "--simulate", "1", "-o", "x", "--record", "no/x.json"],
+            "no/x.json: cannot be written, there is no folder no; make the folder first",
         ),
         (
             ["ulx3s-25f", "--projection", "orthographic", "-o", "x"],
@@ -121,6 +132,23 @@ def test_too_large_is_told_before_placement():
     with pytest.raises(TooLarge, match=r"ulx3s-25f: 24,290 look-up tables of 24,288, 29 multipliers of 28$"):
         refuse_too_large(BOARDS["ulx3s-25f"], netlist)
     refuse_too_large(BOARDS["ulx3s-85f"], netlist)
+
+
+def test_figures_are_no_json(capsys, tmp_path):
+    """Told before the work, and left as it is."""
+    path = tmp_path / "x.json"
+    path.write_text("[1]")
+    assert main(["board", "ulx3s-25f", "--simulate", "1", "-o", "x", "--record", str(path)]) == 2
+    assert capsys.readouterr().err.endswith(
+        "x.json: is no JSON file of figures; give --record another name\n"
+    )
+    assert path.read_text() == "[1]"
+
+
+def test_tables_of_the_page_are_the_figures():
+    """As ``board_tables.py`` makes them of ``board.json``."""
+    guide = Path(__file__).parents[3] / "docs" / "guide"
+    subprocess.run([sys.executable, guide / "board_tables.py", "--check"], check=True)
 
 
 @pytest.mark.long

@@ -87,7 +87,7 @@ def test_triangles_near_the_camera_are_dropped_and_counted():
     drawing = Drawing.of([near], preset(model="cosquad"))
     outside = drawing.vertices(0).outside
     assert 0 < outside.sum() < len(outside)
-    kept, counts = drawing.triangles(0, 0, drawing.frame)
+    kept, counts = drawing.triangles(0, 0, drawing.frames[0])
     touched = outside[drawing.mesh.faces].any(axis=1)
     assert counts["outside"] == touched.sum()
     assert len(kept) + counts["rejected"] == (~touched).sum()

@@ -4,10 +4,12 @@
 import numpy as np
 import pytest
 from amaranth.hdl import Signal
+from amaranth.lib.memory import Memory
 from amaranth.sim import Simulator
 
 from blysk.golden.video.band_buffer import RGB565, RGB888, BandBuffer
 from blysk.golden.video.display_timing import Axis, DisplayMode, DisplayTiming
+from blysk.hdl.video import band_buffer
 from blysk.hdl.video.band_buffer import BandBufferUnit
 
 MODE = DisplayMode(Axis(12, 2, 3, 3), Axis(16, 1, 2, 3))
@@ -114,6 +116,18 @@ def test_every_frame_in_time(parameters, periods):
     frames, status, _ = show(parameters, lambda count: count % 7, periods)
     np.testing.assert_array_equal(frames[:FRAMES], pictures(parameters, FRAMES))
     assert status == {"late_bands": 0, "frames": FRAMES + 1}
+
+
+def test_what_a_reset_finds_is_never_shown(monkeypatch):
+    """Both buffers are cleared before their first bands, whatever they hold."""
+    parameters = BandBuffer(MODE, 4)
+    full = [0x5A5A5A] * (2 * parameters.pixels)
+    monkeypatch.setattr(
+        band_buffer, "Memory", lambda shape, depth, init: Memory(shape=shape, depth=depth, init=full)
+    )
+    frames, status, _ = show(parameters, lambda count: 0, (1.0, 4.0), frames=1)
+    np.testing.assert_array_equal(frames[:1], pictures(parameters, 1))
+    assert status["late_bands"] == 0
 
 
 def is_background(parameters, frames):

@@ -1,0 +1,127 @@
+"""Fill in the tables of ``board.md`` from ``board.json``, which ``blysk board --record`` writes.
+
+python docs/guide/board_tables.py            # write the tables
+python docs/guide/board_tables.py --check    # change nothing; fail where the page is not what comes out
+"""
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+GUIDE = Path(__file__).parent
+PAGE, FIGURES = GUIDE / "board.md", GUIDE / "board.json"
+_TABLE = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+_LIGHT = "normal, Blinn's highlight of every pixel"
+_OTHERS = (
+    ("pico-gs", "ECP5-25K, 100 MHz", "640 to 960", "60, by its SPI port", "by the host, at vertices"),
+    (
+        "Raster I",
+        "Artix-7 100T, 100 MHz",
+        "3,000",
+        "about 30 at 1024x768",
+        "Phong of every pixel, deferred",
+    ),
+    ("PixelForge", "Cyclone V", "not stated", "not stated", "at vertices, no highlight"),
+)
+"""As they state it: theory/references.md#other-hardware."""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Write the tables, or check them."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--check", action="store_true")
+    check = parser.parse_args(arguments).check
+    entries = json.loads(FIGURES.read_text(encoding="utf-8"))
+    tables = {"board-parts": _parts, "board-frames": _frames, "board-others": _others}
+    text = PAGE.read_text(encoding="utf-8")
+    made = _TABLE.sub(lambda m: "".join((m[1], "\n".join(tables[m[2]](entries)), "\n", m[3])), text)
+    if check:
+        return int(made != text)
+    PAGE.write_text(made, encoding="utf-8")
+    return 0
+
+
+def _rows(head: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1) -> Iterator[str]:
+    """A table in Markdown, its columns to the right but for the first ones."""
+    yield f"| {' | '.join(head)} |"
+    yield f"| {' | '.join('---' if k < left else '---:' for k in range(len(head)))} |"
+    yield from (f"| {' | '.join(row)} |" for row in rows)
+
+
+def _named(entry: str) -> tuple[str, str]:
+    """Board and triangles of an entry's name."""
+    board, _, triangles = entry.split(", ")
+    return board, triangles.removesuffix(" triangles")
+
+
+def _parts(entries: dict) -> Iterator[str]:
+    """Parts and clocks of the bitstreams."""
+    built = {_named(entry)[0]: values["built"] for entry, values in entries.items() if "built" in values}
+    if not built:
+        return iter(["(no bitstream is recorded)"])
+    names = {"sync": "drawing clock", "serial": "serial clock", "pixel": "pixel clock"}
+    rows = [
+        [part, *(f"{used:,} of {most:,}" for used, most in (each["parts"][part] for each in built.values()))]
+        for part in next(iter(built.values()))["parts"]
+    ]
+    rows += [
+        [told, *(f"{clock['reached']:.1f} of {clock['needed']:.1f} MHz" for clock in clocks)]
+        for name, told in names.items()
+        for clocks in [[each["clocks"][name] for each in built.values()]]
+    ]
+    rows.append(["bitstream, bytes", *(f"{each['bytes']:,}" for each in built.values())])
+    rows.append(["placement, of those tried", *(f"{each['seed']}" for each in built.values())])
+    return _rows(["", *built], rows)
+
+
+def _simulated(entries: dict) -> Iterator[tuple[str, str, dict, float]]:
+    """Board, triangles, figures and cycles of a frame at 60 Hz of what was simulated."""
+    for entry, values in entries.items():
+        if "simulated" in values:
+            figures = values["simulated"]
+            # 800 x 525 pixels at 25.2 MHz.
+            yield *_named(entry), figures, figures["clock"] / 25.2 * 800 * 525
+
+
+def _frames(entries: dict) -> Iterator[str]:
+    """Cycles and frames a second."""
+    rows = [
+        [
+            *(board, triangles, f"{figures['clock']:.1f} MHz", f"{figures['cycles']:,}"),
+            *(f"{figures['cycles'] / most:.0%}".replace("%", " %"), str(figures["late_bands"])),
+            f"{1e6 * figures['clock'] / figures['cycles']:.0f}",
+        ]
+        for board, triangles, figures, most in _simulated(entries)
+    ]
+    head = [
+        "board",
+        "triangles",
+        "drawing clock",
+        "cycles a frame",
+        "of 60 Hz",
+        "late bands",
+        "frames a second",
+    ]
+    return _rows(head, rows)
+
+
+def _others(entries: dict) -> Iterator[str]:
+    """The same beside others."""
+    rows = [
+        [
+            *("this design", f"{board}, {figures['clock']:.1f} MHz", triangles),
+            f"{1e6 * figures['clock'] / figures['cycles']:.0f} at 640x480",
+            _LIGHT,
+        ]
+        for board, triangles, figures, _ in _simulated(entries)
+        if board != "icepi-zero"
+    ]
+    return _rows(["", "device", "triangles", "frames a second", "light"], [*rows, *_OTHERS], left=2)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
