@@ -1,14 +1,16 @@
 """Several shading pipelines that take spans of different scanlines: more than one pixel a cycle."""
 
+from collections.abc import Callable
 from functools import reduce
 from operator import and_
 
-from amaranth.hdl import Module, Shape, Signal, Value
+from amaranth.hdl import Module, ShapeLike, Signal, Value
 from amaranth.lib import fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.pixel_pipelines import PixelPipelines
-from blysk.hdl.core.stream import FIFO_LATENCY, SLICE_LATENCY, connect, connect_slice
+from blysk.hdl.core.memory import LATE_FIFO_LATENCY, connect_late_fifo
+from blysk.hdl.core.stream import connect
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit, span_shape, status_shape
 from blysk.hdl.pixel_assembler import pixel_shape
@@ -23,8 +25,8 @@ __all__ = [
     "port_descriptions",
 ]
 
-WAITING_SPANS = 513
-"""Spans that wait before a pipeline: a memory of 512 words, and a register behind it.
+WAITING_SPANS = 512
+"""Spans that wait before a pipeline in a memory.
 
 Block RAMs hold 512 words, and a memory in look-up tables of 32 words takes more logic than the block RAMs'
 ports. A mesh whose spans have about as many pixels as there are pipelines leaves the span port no cycle to
@@ -50,8 +52,8 @@ def port_descriptions(pipes: int) -> dict[str, str]:
     return texts
 
 
-_IN_SLICE = 2
-"""Spans in the registers of a slice."""
+_BEHIND = 2
+"""Spans in the registers behind the memory."""
 
 
 class PixelPipelinesUnit(wiring.Component):
@@ -113,39 +115,33 @@ class PixelPipelinesUnit(wiring.Component):
         )
         self.pipelines = tuple(ShadingPipelineUnit(p.design) for _ in range(p.pipes))
         first = self.pipelines[0]
-        self.latency = FIFO_LATENCY + SLICE_LATENCY + first.latency
+        self.latency = LATE_FIFO_LATENCY + first.latency
         self.cycles_per_pixel, self.setup_interval = first.cycles_per_pixel, first.setup_interval
 
     @property
     def spans_inside(self) -> int:
         """Spans that are inside one pipeline and its FIFO at most."""
-        return self.pipelines[0].spans_inside + self._waiting + _IN_SLICE
+        return self.pipelines[0].spans_inside + self._waiting + _BEHIND
 
     def elaborate(self, platform):
         """A FIFO and a pipeline for each remainder of y; writes to all; sums of the counters."""
         m = Module()
         span, write = self.i, self.write
-        width = Shape.cast(span.payload.shape()).width
         pipe = span.payload.y[: (len(self.pipelines) - 1).bit_length()]
         drained, idle, room = Signal(), [], []
         for k, pipeline in enumerate(self.pipelines):
             m.submodules[f"pipeline_{k}"] = pipeline
-            m.submodules[f"spans_{k}"] = spans = fifo.SyncFIFOBuffered(width=width, depth=self._waiting)
-            first = pipeline.i.signature.flip().create(path=(f"first_{k}",))
+            given = span.signature.create(path=(f"given_{k}",))
             m.d.comb += [
-                spans.w_data.eq(span.payload),
-                spans.w_en.eq(span.valid & ~write.valid & (pipe == k)),
-                Value.cast(first.payload).eq(spans.r_data),
-                first.valid.eq(spans.r_rdy),
-                spans.r_en.eq(first.ready),
+                given.payload.eq(span.payload),
+                given.valid.eq(span.valid & ~write.valid & (pipe == k)),
                 Value.cast(pipeline.write.payload).eq(write.payload.as_value()),
                 pipeline.write.valid.eq(write.valid & drained),
             ]
-            # A block RAM gives its word late in the cycle: no logic before the next register.
-            connect_slice(m, first, pipeline.i)
+            empty = connect_late_fifo(m, f"spans_{k}", given, pipeline.i, self._waiting)
             connect(m, pipeline.o, wiring.flipped(self.o[k]))
-            idle.append((spans.level == 0) & ~pipeline.i.valid & pipeline.write.ready)
-            room.append(spans.w_rdy | (pipe != k))
+            idle.append(empty & pipeline.write.ready)
+            room.append(given.ready | (pipe != k))
         m.d.comb += [
             # Of no payload that is not valid: its bits may be unknown.
             span.ready.eq(~write.valid & (~span.valid | reduce(and_, room))),
@@ -174,7 +170,31 @@ class PixelPipelinesUnit(wiring.Component):
             m.d.comb += self.status[name].eq(counts[0])
 
 
-class WidePipelinesUnit(wiring.Component):
+class _JoinedPipelines(wiring.Component):
+    """`PixelPipelinesUnit` with one stream of what a unit makes of the pipelines' pixels.
+
+    Parameters
+    ----------
+    parameters, waiting
+        Those of `PixelPipelinesUnit`.
+    joins : type
+        That unit, which takes the number of pipelines and the bits of x and of y.
+    shape : callable
+        Payload of the stream; takes the same.
+    """
+
+    def __init__(self, parameters, waiting: int, joins: type, shape: Callable[[int, int, int], ShapeLike]):
+        self.pipelines = PixelPipelinesUnit(parameters, waiting)
+        self.parameters = p = self.pipelines.parameters
+        size = p.pipes, p.design.x_bits, p.design.y_bits
+        self._join = joins(*size)
+        # Of a merger: a turn is in its FIFO before the first pixel of its span is there.
+        self.latency = self.pipelines.latency + self._join.latency
+        members = dict(self.pipelines.signature.members)
+        super().__init__(members | {"o": Out(stream.Signature(shape(*size)))})
+
+
+class WidePipelinesUnit(_JoinedPipelines):
     """`PixelPipelinesUnit` with one wide stream of pixels, a lane for each pipeline: for simulation.
 
     A pipeline waits for no other; the first pixel leaves an idle unit `latency` cycles after its span was
@@ -196,18 +216,12 @@ class WidePipelinesUnit(wiring.Component):
     """
 
     def __init__(self, parameters: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
-        self.pipelines = PixelPipelinesUnit(parameters, waiting)
-        self.parameters = p = self.pipelines.parameters
-        self._lanes = PixelLanesUnit(p.pipes, p.design.x_bits, p.design.y_bits)
-        self.latency = self.pipelines.latency + self._lanes.latency
-        members = dict(self.pipelines.signature.members)
-        wide = lanes_shape(p.pipes, p.design.x_bits, p.design.y_bits)
-        super().__init__(members | {"o": Out(stream.Signature(wide))})
+        super().__init__(parameters, waiting, PixelLanesUnit, lanes_shape)
 
     def elaborate(self, platform):
         """The pipelines, and their pixels on a cycle as one beat."""
         m = Module()
-        m.submodules.pipelines, m.submodules.lanes = pipelines, lanes = self.pipelines, self._lanes
+        m.submodules.pipelines, m.submodules.lanes = pipelines, lanes = self.pipelines, self._join
         connect(m, wiring.flipped(self.i), pipelines.i)
         connect(m, wiring.flipped(self.write), pipelines.write)
         m.d.comb += self.status.eq(pipelines.status)
@@ -217,7 +231,7 @@ class WidePipelinesUnit(wiring.Component):
         return m
 
 
-class MergedPipelinesUnit(wiring.Component):
+class MergedPipelinesUnit(_JoinedPipelines):
     """`PixelPipelinesUnit` with one stream of pixels, in the order of the spans: that of one pipeline.
 
     It gives a pixel a cycle at most. Of pipelines that take several cycles a pixel, as those of the compact
@@ -239,23 +253,14 @@ class MergedPipelinesUnit(wiring.Component):
     """
 
     def __init__(self, parameters: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
-        self.pipelines = PixelPipelinesUnit(parameters, waiting)
-        self.parameters = p = self.pipelines.parameters
-        self._merger = PixelMergerUnit(p.pipes, p.design.x_bits, p.design.y_bits)
-        # A turn is in its FIFO before the first pixel of its span is there.
-        self.latency = self.pipelines.latency + self._merger.latency
-        self.cycles_per_pixel, self.setup_interval = (
-            self.pipelines.cycles_per_pixel,
-            self.pipelines.setup_interval,
-        )
-        members = dict(self.pipelines.signature.members)
-        pixels = stream.Signature(pixel_shape(p.design.x_bits, p.design.y_bits))
-        super().__init__(members | {"o": Out(pixels)})
+        super().__init__(parameters, waiting, PixelMergerUnit, lambda pipes, *bits: pixel_shape(*bits))
+        self.cycles_per_pixel = self.pipelines.cycles_per_pixel
+        self.setup_interval = self.pipelines.setup_interval
 
     def elaborate(self, platform):
         """The pipelines, a FIFO of the pipelines that the spans went to, and the merger."""
         m = Module()
-        m.submodules.pipelines, m.submodules.merger = pipelines, merger = self.pipelines, self._merger
+        m.submodules.pipelines, m.submodules.merger = pipelines, merger = self.pipelines, self._join
         turn = merger.turns.payload
         m.submodules.turns = turns = fifo.SyncFIFOBuffered(width=len(turn), depth=pipelines.spans_inside)
         m.d.comb += [

@@ -161,16 +161,17 @@ def check_folder(folder: Path) -> None:
         If it is a file, holds anything else, or may not be written.
     """
     names = files_within(folder, _PAGE)
-    others = [name for name in names if name not in (_PAGE, _JSON) and not name.endswith(".csv")]
+    others = [name for name in names if name not in (_PAGE, _JSON) and not name.endswith((".csv", ".svg"))]
     if others or (names and not _earlier(folder)):
         reason = f"holds {(others or names)[0]}, which is of no report"
         raise InputError(str(folder), reason, "give a new or empty folder, or that of an earlier report")
 
 
 def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, Any]) -> None:
-    """Write the page, a CSV a table, and every figure as ``report.json``. Each file is whole or not there.
+    """Write the page, a CSV a table, an SVG a conclusion, and every figure as ``report.json``.
 
-    Tables of an earlier report in the folder go, if this one has not got them.
+    Each file is whole or not there. Tables and drawings of an earlier report in the folder go, if this one
+    has not got them.
 
     Parameters
     ----------
@@ -184,7 +185,9 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
     InputError
         If a file cannot be written, or a library is missing.
     """
-    tables = {f"{table.name}.csv": _as_csv(table) for table in _tables(sections)}
+    files = {f"{table.name}.csv": _as_csv(table) for table in _tables(sections)}
+    drawings = [section.conclusion.drawing for section in sections if section.conclusion]
+    files |= {f"{drawing.name}.svg": drawing.svg for drawing in drawings}
     text = page(sections, about)
     check_folder(folder)
     earlier = _earlier(folder) or {}
@@ -204,11 +207,11 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
         for section in sections
     }
     # First: it tells that the folder is ours.
-    write_json(folder / _JSON, {**about, "files": [_PAGE, _JSON, *tables], "sections": figures})
-    for name, table in tables.items():
-        write_text(folder / name, table)
+    write_json(folder / _JSON, {**about, "files": [_PAGE, _JSON, *files], "sections": figures})
+    for name, content in files.items():
+        write_text(folder / name, content)
     for name in earlier.get("files", ()):
-        if name.endswith(".csv") and name not in tables and Path(name).name == name:
+        if name.endswith((".csv", ".svg")) and name not in files and Path(name).name == name:
             (folder / name).unlink(missing_ok=True)
     write_text(folder / _PAGE, text)
 
@@ -351,9 +354,9 @@ def command(folder, quick, meshes, names, jobs, address):
     """Measure error against run time, and all else there is to say, and write a report into FOLDER.
 
     FOLDER is report if left out; it is made, or an earlier report in it replaced. The page index.html is one
-    file that any browser opens from disk; each table is also a CSV file, and report.json has every figure.
-    Measurements are kept in the cache as they are done: a report that was stopped goes on where it was, if
-    the code is the same.
+    file that any browser opens from disk; each table is also a CSV file, each conclusion's drawing an SVG
+    file, and report.json has every figure. Measurements are kept in the cache as they are done: a report that
+    was stopped goes on where it was, if the code is the same.
 
     \b
     Example:

@@ -154,16 +154,22 @@ class Row:
         }
 
 
-def _times(variant: Variant, unit: Component) -> tuple[int, int]:
+def _times(entry: Entry, unit: Component) -> tuple[int, int]:
     """Latency, and cycles from a result to the next: stated by the unit, else found by simulation."""
-    latency = getattr(unit, "latency", None)
+    variant, latency = entry.variant, getattr(unit, "latency", None)
     interval = getattr(unit, "initiation_interval", getattr(unit, "cycles_per_pixel", None))
     if isinstance(latency, int) and isinstance(interval, int):
         return latency, interval
-    beats = np.zeros(3, dtype_of(unit.i.payload.shape()))
-    for name, value in variant.beat.items():
-        beats[name] = value
-    run = simulate(unit, beats, count=3 * variant.beat.get("length", 1), engine="pysim")
+    if variant.beat:
+        beats = np.zeros(3, dtype_of(unit.i.payload.shape()))
+        for name, value in variant.beat.items():
+            beats[name] = value
+        run = simulate(unit, beats, count=3 * variant.beat.get("length", 1), engine="pysim")
+    else:
+        given = entry.record.example(entry.name, unit)
+        case = given.case
+        options = {"constants": case.constants, "write": case.write, "engine": "pysim"}
+        run = simulate(unit, case.beats, count=given.count, **options)
     return int(run.cycles[0] - run.input_cycles[0]), int(np.median(np.diff(run.cycles)))
 
 
@@ -226,7 +232,7 @@ def row_of(entry: Entry, sample: Sample | None) -> Row:
     """Row of an entry whose errors have been measured; `None`: they have not."""
     count, errors = (0, (None, None, None)) if sample is None else (np.size(sample.found), sample.errors)
     unit = entry.variant.unit()
-    return Row(entry, count, errors, *_times(entry.variant, unit), cost_of(unit))
+    return Row(entry, count, errors, *_times(entry, unit), cost_of(unit))
 
 
 _HEAD = (

@@ -25,6 +25,8 @@ _WIDEST = 860.0
 """Width above which a drawing is folded."""
 _BETWEEN = 30.0
 """Width between columns, about."""
+_FORMULAS, _LONGEST, _SHORT = 4, 40, 20
+"""Formulas in a box, and characters of one in a box and in a tag; in place of a longer one is the name."""
 _TAGS = 70.0
 """Width that tags take on a side of a band, about."""
 _BAND = 6
@@ -85,6 +87,11 @@ def _shown(operations: Counter[str]) -> Counter[str]:
     return shown
 
 
+def _called(node: Node) -> str:
+    """What a tag calls a box: its only formula, or its name."""
+    return node.formulas[0] if len(node.formulas) == 1 and len(node.formulas[0]) <= _SHORT else node.name
+
+
 def _lines(node: Node) -> list[tuple[str, str]]:
     """Style and text of the lines in a box."""
     lines = []
@@ -95,8 +102,12 @@ def _lines(node: Node) -> list[tuple[str, str]]:
             if count
         ]
         lines.append(("operation", "  ".join(parts)))
-    if node.name:
-        lines.append(("name", node.name))
+    shown = [text for text in node.formulas if len(text) <= _LONGEST]
+    lines += [("name", text) for text in shown[:_FORMULAS]]
+    if len(node.formulas) > len(shown[:_FORMULAS]) > 0:
+        lines.append(("detail", f"and {len(node.formulas) - len(shown[:_FORMULAS])} more"))
+    if node.name and node.name not in shown:
+        lines.append(("detail" if shown else "name", node.name))
     detail = node.detail
     if node.kind == "register":
         detail = f"{detail} bit{'s' * (detail != '1')}"
@@ -296,7 +307,7 @@ def _bands(graph: Graph) -> list[_Band]:
         if key not in known:
             known[key] = number = next(fresh)
             node = graph.nodes[source]
-            text = tags.setdefault(source, f"{len(tags) + 1} {node.name}".strip())
+            text = tags.setdefault(source, f"{len(tags) + 1} {_called(node)}".strip())
             bands[band].graph.nodes[number] = Node("tag", text)
             bands[band].columns[number] = column
             bands[band].sources[number] = source

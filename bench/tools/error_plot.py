@@ -166,7 +166,7 @@ def _label(figure: Figure, axes: np.ndarray, record: Record, scale: str, decides
             panel.yaxis.set_major_locator(LogLocator(numticks=5))
             panel.yaxis.set_major_formatter(lambda value, _: re.sub("e([+-])0", r"e\1", f"{value:.0e}"))
     figure.supxlabel(record.axis, fontsize=8)
-    label = f"largest error{', ' + scale if scale else ''}"
+    label = f"largest error, {scale}" if scale else "largest error; 1: a full term, or a unit vector"
     figure.supylabel("share of all results" if decides else label, fontsize=8)
 
 

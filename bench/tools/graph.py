@@ -31,6 +31,8 @@ class Node:
         Equal boxes that this one stands for.
     stages : int
         Registers of a plain delay that the box stands for.
+    formulas : tuple of str
+        What the register holds, each in its turn.
     """
 
     kind: str
@@ -39,6 +41,7 @@ class Node:
     operations: Counter[str] = field(default_factory=Counter)
     copies: int = 1
     stages: int = 1
+    formulas: tuple[str, ...] = ()
 
 
 @dataclass

@@ -14,6 +14,7 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.data import ArrayLayout, StructLayout
 from amaranth.lib.fifo import FIFOInterface
 
+from blysk.bench.tools.formulas import Formulas
 from blysk.bench.tools.graph import Graph, Node
 from blysk.hdl.emit.yosys import cells_and_ports
 
@@ -128,7 +129,7 @@ class Netlist:
         self._read(module)
 
     def _read(self, module) -> None:
-        graph, ports = self.graph, module["ports"]
+        graph, ports, formulas = self.graph, module["ports"], Formulas(self.component)
         names = defaultdict(list)
         for name, net in module["netnames"].items():
             if not net["hide_name"]:
@@ -152,7 +153,7 @@ class Netlist:
             if "dff" in kind:
                 word, taken = tuple(cell["connections"]["Q"]), cell["connections"]["D"]
                 for part, start, width in _parts(word, names):
-                    number = graph.add(Node("register", part, f"{width}"))
+                    number = graph.add(Node("register", part, f"{width}", formulas=formulas.of(part)))
                     self.owner |= dict.fromkeys(word[start : start + width], number)
                     operands = taken[start : start + width]
                     inputs.append((number, [(bit, True) for bit in operands if isinstance(bit, int)]))
@@ -162,7 +163,7 @@ class Netlist:
                 rom = not int(cell["parameters"]["WR_PORTS"], 2)
                 memory_name = _short([cell["parameters"]["MEMID"].lstrip("\\").removesuffix(".memory")])
                 detail = f"{'ROM' if rom else 'RAM'} {depth} × {width}"
-                number = graph.add(Node("memory", memory_name, detail))
+                number = graph.add(Node("memory", memory_name, detail, formulas=formulas.of(memory_name)))
             elif kind in self.units:
                 title = (
                     re.sub(r"(?<=[a-z])(?=[A-Z])", " ", self.units[kind].removesuffix("Unit"))

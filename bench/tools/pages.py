@@ -27,6 +27,7 @@ from blysk.bench.tools.graph import Graph, likeness
 from blysk.bench.tools.netlist import describe_shape
 from blysk.bench.tools.structure import graph_of
 from blysk.bench.tools.timing import draw_timing, waves_of
+from blysk.hdl.core.stream import PipelinedUnit
 from blysk.sim.output import check_writable, write_text
 from blysk.sim.units.record import Record, Sample
 from blysk.sim.units.registry import RECORDS, ROOMS
@@ -197,16 +198,16 @@ _STRUCTURE_NOTE = (
     "it; orange: a multiplier, yellow: an adder or a product by a constant, green: a memory, blue: a unit of "
     "its own, white: a port. A dashed arrow chooses, a red one leads back. A wide drawing is in bands: an "
     "arrow that ends at a numbered tag goes on at the tags of that number. Left out: the control by valid "
-    "and ready, enables, saturation, constants; in a large unit choices and comparisons too, then plain "
-    "registers, then adders. Variants that differ in words and constants alone share a drawing, of the "
-    "first."
+    "and ready, enables, saturation, constants; in a large unit comparisons and choices too, then plain "
+    "registers. A formula in bold is what a register holds, several are what a shared one holds in turns; "
+    "its name is below. Variants that differ in words and constants alone share a drawing, of the first."
 )
 
 _TIMING_NOTE = (
     "From a simulation, cycle by cycle as read just before the rising edge. A, B, C are the input beats, A0, "
-    "A1 the results of A where it has several; the source pauses before the last beat, the sink stalls at a "
-    "first result. Dots stand for cycles without a change. A drawing for each interval; the latencies of all "
-    "variants are in the table above."
+    "A1 the results of A where it has several, 1, 2, 3 those of all where their numbers differ; the source "
+    "pauses before the last beat, the sink stalls at a first result. Dots stand for cycles without a change. "
+    "A drawing for each interval; the latencies of all variants are in the table above."
 )
 
 
@@ -321,8 +322,12 @@ def pictures(unit: str, rows: Sequence[Row], samples: Sequence[Sample | None]) -
         for suffix, numbers in _structures(unit):
             yield f"{unit}-structure{suffix}.svg", svg(draw_structure(_graph(unit, numbers[0])))
         for suffix, (row, *_) in _timings(rows):
-            variant = row.entry.variant
-            yield f"{unit}-timing{suffix}.svg", svg(draw_timing(waves_of(variant.unit(), variant.beat)))
+            entry, component = row.entry, row.entry.variant.unit()
+            # A unit of one result a beat needs no operands to show its times.
+            alone = entry.variant.beat or isinstance(component, PipelinedUnit)
+            example = None if alone else entry.record.example(entry.name, component)
+            waves = waves_of(component, entry.variant.beat, example)
+            yield f"{unit}-timing{suffix}.svg", svg(draw_timing(waves))
         if any(sample is not None and sample.errors[2] for sample in samples):
             yield f"{unit}-errors.svg", svg(draw_errors([row.entry for row in rows], samples))
 

@@ -182,6 +182,7 @@ def _join_copies(graph: Graph) -> None:
         if len(group) > 1:
             node = graph.nodes[group[0]]
             node.copies = len(group)
+            node.formulas = tuple(dict.fromkeys(f for other in group for f in graph.nodes[other].formulas))
             if node.name:
                 node.name = _INDEX.sub("", node.name)
             looped = any((number, number) in graph.edges for number in group)
@@ -198,8 +199,8 @@ def graph_of(component: wiring.Component, most: int = MOST_BOXES) -> Graph:
     component : Component
         Unit.
     most : int
-        Boxes above which choices, then comparisons and roundings, then plain registers and at last all but
-        memories, multipliers, submodules and ports are left out.
+        Boxes above which comparisons and roundings, then choices, then all but memories, multipliers, adders,
+        submodules and ports are left out.
 
     Returns
     -------
@@ -226,14 +227,8 @@ def graph_of(component: wiring.Component, most: int = MOST_BOXES) -> Graph:
     whole = Netlist(component).graph
     light = _COMPARISONS | {"round"}
     choices = light | {"mux", "shift"}
-    products, sums = {"×", "×c"}, {"+", "+c", "−", "−c"}
-    for dropped, kept in (
-        (set(), None),
-        (light, None),
-        (choices, None),
-        (choices, products | sums),
-        (choices | sums, products),
-    ):
+    arithmetic = {"×", "×c", "+", "+c", "−", "−c"}
+    for dropped, kept in ((set(), None), (light, None), (choices, None), (choices, arithmetic)):
         graph = simplified(dropped, kept)
         if len(graph.nodes) <= most:
             break

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import groupby
+from string import ascii_uppercase
 
 import numpy as np
 from amaranth.hdl import Value
@@ -10,10 +11,15 @@ from amaranth.sim import Simulator
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from blysk.sim.engines.beats import dtype_of, pack
+from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.engine import Ports
+from blysk.sim.engines.simulate import stimulus_of
+from blysk.sim.units.record import Case, UnitRun
 
 __all__ = ["Waves", "draw_timing", "waves_of"]
+
+_BEATS, _MOST_RESULTS, _MOST_COLUMNS = 3, 6, 44
+"""Input beats, where none are given; results that a diagram has, and its cycles, at most."""
 
 PIXELS = 3
 """Pixels of a span in a diagram, where a unit makes pixels of spans."""
@@ -52,58 +58,60 @@ class Waves:
         return len(self.inputs)
 
 
-def waves_of(unit: Component, beat: dict | None = None, beats: int = 3) -> Waves:
+def waves_of(unit: Component, beat: dict | None = None, example: UnitRun | None = None) -> Waves:
     """Simulate a unit with a pause of the source and a stall of the sink.
 
     The source pauses for two cycles before its last beat; the sink is not ready for two cycles when the first
-    result is there, or the second where a beat has several. Constants are 0, and where nothing is offered
-    every bit of the payload is 1.
+    result is there, or the second where a beat has several. Where nothing is offered every bit of the payload
+    is 1.
 
     Parameters
     ----------
     unit : Component
         Unit.
     beat : dict, optional
-        Fields of every input beat; others are 0. ``length`` is made `PIXELS`: a beat is then a span, with as
-        many results.
-    beats : int
-        Input beats.
+        Fields of three input beats; others and the constants are 0. ``length`` is made `PIXELS`: a beat is
+        then a span, with as many results.
+    example : UnitRun, optional
+        In place of that: beats, constants, and the writes before them. It ends with the first few results.
 
     Raises
     ------
     RuntimeError
         If the results do not come.
     """
-    beat = dict(beat or {})
-    results = 1
-    if "length" in beat:
-        beat["length"] = results = PIXELS
-    ports = Ports(unit)
-    operands = np.zeros(1, dtype_of(ports.i))
-    for name, value in beat.items():
-        operands[name] = value
-    code = int.from_bytes(pack(ports.i, operands).astype("<u4").tobytes(), "little")
+    case, results = _case_of(unit, beat or {}) if example is None else (example.case, example.count)
+    sent = stimulus_of(unit, case.beats, count=None, constants=case.constants, write=case.write)
+    codes, constants, writes = (_codes(words) for words in (sent.input, sent.constants, sent.write))
+    several, shown = results > len(codes), min(results, _MOST_RESULTS if example else results)
     input_payload = Value.cast(unit.i.payload).as_unsigned()
     history: list[tuple[bool, ...]] = []
 
     async def bench(ctx):
+        for code in constants:
+            ctx.set(Value.cast(unit.constants).as_unsigned(), code)
+        for code in writes:
+            ctx.set(Value.cast(unit.write.payload).as_unsigned(), code)
+            ctx.set(unit.write.valid, 1)
+            await ctx.tick().until(unit.write.ready)
+            ctx.set(unit.write.valid, 0)
         taken, given, pause, stall, after = 0, 0, 2, 2, 2
         ctx.set(input_payload, -1)
         while after:
-            offered = taken < beats and (taken < beats - 1 or not pause)
-            pause -= taken == beats - 1 and pause > 0
+            offered = taken < len(codes) and (taken < len(codes) - 1 or not pause)
+            pause -= taken == len(codes) - 1 and pause > 0
             ctx.set(unit.i.valid, offered)
-            ctx.set(input_payload, code if offered else -1)
-            stalled = stall > 0 and given == (1 if results > 1 else 0) and ctx.get(unit.o.valid)
+            ctx.set(input_payload, codes[taken] if offered else -1)
+            stalled = stall > 0 and given == several and ctx.get(unit.o.valid)
             stall -= stalled
             ctx.set(unit.o.ready, not stalled)
             levels = tuple(bool(ctx.get(getattr(getattr(unit, n[0]), n[2:]))) for n in _HANDSHAKES)
             history.append(levels)
             taken += levels[0] and levels[1]
             given += levels[2] and levels[3]
-            after -= given == beats * results
+            after -= given >= shown
             if len(history) > _IDLE_TIMEOUT:
-                raise RuntimeError(f"{type(unit).__name__} gave {given} of {beats * results} results")
+                raise RuntimeError(f"{type(unit).__name__} gave {given} of {results} results")
             await ctx.tick()
 
     simulator = Simulator(unit)
@@ -111,17 +119,37 @@ def waves_of(unit: Component, beat: dict | None = None, beats: int = 3) -> Waves
     simulator.add_testbench(bench)
     simulator.run()
     levels = dict(zip(_HANDSHAKES, np.array(history).T, strict=True))
-    spans = [_letter(k) for k in range(beats)]
-    pixels = [letter + str(k) * (results > 1) for letter in spans for k in range(results)]
+    beats = [_letter(k) for k in range(len(codes))]
+    if results == len(codes):
+        made = beats
+    elif example is None:
+        made = [f"{letter}{k}" for letter in beats for k in range(PIXELS)]
+    else:
+        made = [str(k + 1) for k in range(results)]
     return Waves(
         levels,
-        _offered(levels["i.valid"], levels["i.ready"], spans),
-        _offered(levels["o.valid"], levels["o.ready"], pixels),
+        _offered(levels["i.valid"], levels["i.ready"], beats),
+        _offered(levels["o.valid"], levels["o.ready"], made),
     )
 
 
+def _case_of(unit: Component, beat: dict) -> tuple[Case, int]:
+    """Three beats of some fields, and the number of their results."""
+    ports = Ports(unit)
+    beats = np.zeros(_BEATS, dtype_of(ports.i))
+    for name, value in beat.items():
+        beats[name] = PIXELS if name == "length" else value
+    constants = None if ports.constants is None else np.zeros((), dtype_of(ports.constants))
+    return Case(beats, constants), _BEATS * (PIXELS if "length" in beat else 1)
+
+
+def _codes(words: np.ndarray) -> list[int]:
+    """Beats as the simulator takes them."""
+    return [int.from_bytes(row.astype("<u4").tobytes(), "little") for row in words]
+
+
 def _letter(k: int) -> str:
-    return "ABCDEFGH"[k]
+    return ascii_uppercase[k % 26] + str(k // 26) * (k >= 26)
 
 
 def _offered(valid: np.ndarray, ready: np.ndarray, names: list[str]) -> list[str | None]:
@@ -151,7 +179,7 @@ def _shown(waves: Waves) -> list[int | None]:
         cycles = list(range(start, start + length))
         shown += [*cycles[:2], None, *cycles[-2:]] if length > QUIET else cycles
         start += length
-    return shown
+    return shown if len(shown) <= _MOST_COLUMNS else [*shown[:_MOST_COLUMNS], None]
 
 
 def draw_timing(waves: Waves) -> Figure:

@@ -1,6 +1,7 @@
 """Edge normals ([T] figure 4.10): unit normals at both ends and in the middle of every piece of a span."""
 
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 
@@ -9,25 +10,17 @@ from blysk.golden.geometry.vector_normaliser import VectorNormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import ONE
 
-__all__ = ["EdgeNormals", "TrueSpans"]
+__all__ = ["EdgeNormals", "PlacedSpans", "TrueSpans"]
 
 
 @dataclass(frozen=True)
-class TrueSpans:
-    """Spans with three unit normals each.
+class PlacedSpans:
+    """Where spans are on the screen, how deep, and of what: without normals.
 
     Parameters
     ----------
     x, y, length : int64 arrays, shape (S,)
         First pixel, and pixels from there on, 1 or more.
-    normal_left, normal_middle, normal_right : int64 arrays, shape (S, 3)
-        Unit normals, SQ(1, 17), at the first pixel's centre, half-way to the last, and at the last. Of 1
-        pixel all are the left one, of 2 the middle one is the right one.
-    line_left, line_right : int64 arrays, shape (S, 3)
-        N/W at the first and at the last pixel, `SPAN_NORMAL`: the normals' magnitudes, whose line on the
-        screen is exact in perspective. Where ``flip`` is set they point against the unit normals.
-    flip : bool array, shape (S,)
-        The unit normals are negated.
     depth : int64 array, shape (S,)
         At the first pixel, UQ(24, 9).
     depth_last : int64 array, shape (S,)
@@ -43,12 +36,6 @@ class TrueSpans:
     x: np.ndarray
     y: np.ndarray
     length: np.ndarray
-    normal_left: np.ndarray
-    normal_middle: np.ndarray
-    normal_right: np.ndarray
-    line_left: np.ndarray
-    line_right: np.ndarray
-    flip: np.ndarray
     depth: np.ndarray
     depth_last: np.ndarray
     depth_step: np.ndarray
@@ -62,6 +49,39 @@ class TrueSpans:
     def beats(self) -> dict:
         """What the hardware gives."""
         return {name: value for name, value in vars(self).items() if name != "triangle"}
+
+    @classmethod
+    def of(cls, pieces: Pieces, **normals: np.ndarray) -> Self:
+        """Spans of pieces, with what this class has besides."""
+        placed = {name: getattr(pieces, name) for name in ("x", "y", "length", "material", "triangle")}
+        depths = {name: getattr(pieces, name).codes for name in ("depth", "depth_last", "depth_step")}
+        return cls(**placed, **depths, **normals)
+
+
+@dataclass(frozen=True)
+class TrueSpans(PlacedSpans):
+    """Spans with three unit normals each.
+
+    Parameters
+    ----------
+    x, y, length, depth, depth_last, depth_step, material, triangle
+        As `PlacedSpans` has them.
+    normal_left, normal_middle, normal_right : int64 arrays, shape (S, 3)
+        Unit normals, SQ(1, 17), at the first pixel's centre, half-way to the last, and at the last. Of 1
+        pixel all are the left one, of 2 the middle one is the right one.
+    line_left, line_right : int64 arrays, shape (S, 3)
+        N/W at the first and at the last pixel, `SPAN_NORMAL`: the normals' magnitudes, whose line on the
+        screen is exact in perspective. Where ``flip`` is set they point against the unit normals.
+    flip : bool array, shape (S,)
+        The unit normals are negated.
+    """
+
+    normal_left: np.ndarray
+    normal_middle: np.ndarray
+    normal_right: np.ndarray
+    line_left: np.ndarray
+    line_right: np.ndarray
+    flip: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -106,20 +126,13 @@ class EdgeNormals:
         good = np.r_[True, (made & ~lost).ravel()]
         codes = np.vstack([self.FIRST, normals.codes.reshape(-1, 3)])
         codes = codes[np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))][1:].reshape(-1, 3, 3)
-        spans = TrueSpans(
-            x=pieces.x,
-            y=pieces.y,
-            length=pieces.length,
+        spans = TrueSpans.of(
+            pieces,
             normal_left=codes[:, 0],
             normal_middle=codes[:, 2],
             normal_right=codes[:, 1],
             line_left=pieces.left.codes,
             line_right=pieces.right.codes,
             flip=pieces.flip,
-            depth=pieces.depth.codes,
-            depth_last=pieces.depth_last.codes,
-            depth_step=pieces.depth_step.codes,
-            material=pieces.material,
-            triangle=pieces.triangle,
         )
         return spans, repaired

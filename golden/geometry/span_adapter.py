@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blysk.golden.geometry.edge_normals import TrueSpans
+from blysk.golden.geometry.edge_normals import PlacedSpans, TrueSpans
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL, Pieces
 from blysk.golden.normals.line_setup import LineSetup
 from blysk.golden.number.fixed import SQ, Fixed
@@ -14,37 +14,19 @@ __all__ = ["LineAdapter", "LineSpans", "shading_spans"]
 
 
 @dataclass(frozen=True)
-class LineSpans:
+class LineSpans(PlacedSpans):
     """Spans with the ends of their true lines.
 
     Parameters
     ----------
-    x, y, length : int64 arrays, shape (S,)
-        First pixel, and pixels from there on, 1 or more.
+    x, y, length, depth, depth_last, depth_step, material, triangle
+        As `PlacedSpans` has them.
     normal_left, normal_right : int64 arrays, shape (S, 3)
         Ends of the line at the first and at the last pixel's centre, SQ(1, 22).
-    depth, depth_last, depth_step, material, triangle : int64 arrays, shape (S,)
-        As `TrueSpans` has them.
     """
 
-    x: np.ndarray
-    y: np.ndarray
-    length: np.ndarray
     normal_left: np.ndarray
     normal_right: np.ndarray
-    depth: np.ndarray
-    depth_last: np.ndarray
-    depth_step: np.ndarray
-    material: np.ndarray
-    triangle: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.x)
-
-    @property
-    def beats(self) -> dict:
-        """What the hardware gives."""
-        return {name: value for name, value in vars(self).items() if name != "triangle"}
 
 
 @dataclass(frozen=True)
@@ -80,18 +62,7 @@ class LineAdapter:
             From `SpanAttributes`.
         """
         left, right = self.ends(pieces.left, pieces.right, pieces.flip)
-        return LineSpans(
-            x=pieces.x,
-            y=pieces.y,
-            length=pieces.length,
-            normal_left=left,
-            normal_right=right,
-            depth=pieces.depth.codes,
-            depth_last=pieces.depth_last.codes,
-            depth_step=pieces.depth_step.codes,
-            material=pieces.material,
-            triangle=pieces.triangle,
-        )
+        return LineSpans.of(pieces, normal_left=left, normal_right=right)
 
     def ends(self, left: Fixed, right: Fixed, flip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Bit-accurate codes of both ends, SQ(1, 22).

@@ -394,7 +394,7 @@ class Lobe(HighlightOperand):
         return Fixed(self.RESULT_FORMAT, np.where(lit, term, 0))
 
     def check(self, table: "LobeTable") -> None:
-        """Refuse what is no table, or a table of another size.
+        """Refuse what is no table, or a table of another size or scale.
 
         Raises
         ------
@@ -403,11 +403,11 @@ class Lobe(HighlightOperand):
         """
         if not isinstance(table, LobeTable):
             raise ValueError("a lobe needs a table; constants_of gives the constants of a scene theirs")
-        if (table.lobe.octaves, table.lobe.steps) != (self.octaves, self.steps):
-            raise ValueError(
-                f"the table has {table.lobe.octaves} octaves of {table.lobe.steps} steps, the unit "
-                f"{self.octaves} of {self.steps}"
-            )
+        given, own = ((lobe.octaves, lobe.steps) for lobe in (table.lobe, self))
+        if given != own:
+            raise ValueError("the table has {} octaves of {} steps, the unit {} of {}".format(*given, *own))
+        if table.lobe.scale != self.scale:
+            raise ValueError(f"the table is of 2^{table.lobe.scale} u, the unit of 2^{self.scale} u")
 
 
 @dataclass(frozen=True, eq=False)

@@ -81,21 +81,7 @@ def quantise_direction(vectors: np.ndarray) -> np.ndarray:
 
     Of the 27 codes about the nearest one, that of the least error of direction, with a length within
     `CODE_LENGTH_ERROR`. It is for squared chords with sharp lobes: they feel the length at second order only.
-
-    Parameters
-    ----------
-    vectors : float64 array, shape (..., 3)
-        Unit vectors, of length 1 within 1e-6.
-
-    Returns
-    -------
-    int64 array, same shape
-        Codes from ``-ONE`` to ``ONE``.
-
-    Raises
-    ------
-    ValueError
-        If a vector is not of unit length.
+    What it takes, gives and refuses is as for `quantise`.
     """
     best = quantise(vectors)
     scaled = np.asarray(vectors, dtype=np.float64) * ONE

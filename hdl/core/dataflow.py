@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from operator import or_
+from operator import mul, or_
 from typing import Any
 
 from amaranth.hdl import Module, Mux, ShapeLike, Signal, Value, signed
@@ -11,15 +11,16 @@ from amaranth.lib.memory import Memory
 
 from blysk.golden.number.fixed import Format
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.schedule import Operation, Schedule, place
+from blysk.hdl.core.formula import SYMBOLS, Formula, component, formula_of
+from blysk.hdl.core.schedule import Schedule, place
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word, traced
 
 __all__ = [
     "MULTIPLIER_BITS",
     "MULTIPLIER_LATENCY",
     "Dataflow",
     "FunctionalUnit",
-    "Word",
     "checked_interval",
     "dot",
     "registered_product",
@@ -31,34 +32,6 @@ MULTIPLIER_BITS = 18
 
 MULTIPLIER_LATENCY = 2
 """Cycles of `registered_product`."""
-
-
-@dataclass(eq=False)
-class Word(Operation):
-    """A word of a data flow, and the operation that makes it.
-
-    Parameters
-    ----------
-    name, operands, latency, lifetime, unit, since
-        As for `Operation`.
-    graph : Dataflow
-        That it is a word of.
-    make : callable
-        Makes its hardware.
-    """
-
-    graph: "Dataflow | None" = None
-    make: "Callable[[_Build], Any] | None" = None
-
-    @property
-    def stage(self) -> int:
-        """Enabled cycles from the input of a beat to the first on which the word can be read."""
-        return self.graph.schedule.stage(self)
-
-    @property
-    def read(self) -> int:
-        """Enabled cycles from the input of a beat to that on which its operands are read."""
-        return self.graph.schedule.placements[self].read
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +102,11 @@ class Dataflow:
         self.multiplier = self.share("multiplier", (operand, operand), latency, product)
 
     @property
+    def words(self) -> tuple[Word, ...]:
+        """The words, each after those that it is made from."""
+        return tuple(self._words)
+
+    @property
     def schedule(self) -> Schedule:
         """The words in time and on instances; from now on no word can be added."""
         if self._schedule is None:
@@ -142,20 +120,27 @@ class Dataflow:
         self._words.append(word)
         return word
 
-    def input(self, name: str, read: Callable[[Any], Any]) -> Word:
-        """A word of the beat: ``read(operands)``."""
+    def input(self, name: str, read: Callable[[Any], Any], formula: str | None = None) -> Word:
+        """A word of the beat: ``read(operands)``; formulas call it as given, by `SYMBOLS` or its name."""
         first = 0 if self.interval == 1 else 1
-        word = Word(name, (), 0, self.interval, since=first)
+        word = Word(name, (), 0, self.interval, since=first, text=formula or SYMBOLS.get(name, name))
         word.make = lambda build: read(build.operands)
         return self._add(word)
 
-    def wire(self, name: str, function: Callable[[Any], Any], word: Word) -> Word:
+    def wire(self, name: str, function: Callable[[Any], Any], word: Word, formula: str | None = None) -> Word:
         """Wiring from a word's value; read after the word's lifetime, the wire is copied, not the word."""
-        wire = Word(name, (word,), 0, word.lifetime)
+        wire = Word(name, (word,), 0, word.lifetime, text=formula, trace=traced(function))
         wire.make = lambda build: function(build.at(word, wire.read))
         return self._add(wire)
 
-    def register(self, name: str, function: Callable[..., Any], *words: Word, since: int | Word = 0) -> Word:
+    def register(
+        self,
+        name: str,
+        function: Callable[..., Any],
+        *words: Word,
+        since: int | Word = 0,
+        formula: str | None = None,
+    ) -> Word:
         """A register of ``function`` of the words' values: one cycle.
 
         Parameters
@@ -169,8 +154,10 @@ class Dataflow:
         since : int or Word
             Earliest stage of the word, or the word that it comes with: a word that is read late needs no
             copies before.
+        formula : str or None
+            What drawings call it; ``None``: what ``function`` tells.
         """
-        register = Word(name, words, 1, self.interval, since=since)
+        register = Word(name, words, 1, self.interval, since=since, text=formula, trace=traced(function))
 
         def make(build):
             value = function(*(build.at(word, register.read) for word in words))
@@ -194,6 +181,7 @@ class Dataflow:
         result: Callable[[Any], Any] = lambda value: value,
         latency: int | None = None,
         since: int | Word = 0,
+        formula: str | None = None,
     ) -> Word:
         """Result of a functional unit; its lifetime is one cycle.
 
@@ -213,9 +201,12 @@ class Dataflow:
             Registers from the operands to that value, where ``result`` takes one on the way; ``None``: all.
         since : int or Word
             Earliest stage of the word, as for `register`.
+        formula : str or None
+            What drawings call it; ``None``: its name.
         """
         latency = functional_unit.latency if latency is None else latency
-        use = Word(name, tuple(words), 1 + latency, 1, functional_unit, since)
+        use = Word(name, tuple(words), 1 + latency, 1, functional_unit, since, text=formula)
+        use.trace = lambda *symbols: (None, formula_of(operands, symbols) or ())
 
         def make(build):
             given = operands(*(build.at(word, use.read) for word in words))
@@ -232,6 +223,7 @@ class Dataflow:
         left: Callable[[Any], FixedValue] = lambda value: value,
         right: Callable[[Any], FixedValue] = lambda value: value,
         since: int | Word = 0,
+        formula: str | None = None,
     ) -> Word:
         """Exact product of two words on a shared multiplier.
 
@@ -247,6 +239,8 @@ class Dataflow:
             Wiring from the value of a word to the operand: `MULTIPLIER_BITS` bits if signed, one less if not.
         since : int
             As for `use`.
+        formula : str or None
+            What drawings call it; ``None``: the product of its operands' formulas.
 
         Raises
         ------
@@ -266,10 +260,26 @@ class Dataflow:
         def product(code):
             return FixedValue(format[-1], code[: format[-1].width])
 
-        return self.use(self.multiplier, name, (a, b), operands, product, since=since)
+        word = self.use(self.multiplier, name, (a, b), operands, product, since=since, formula=formula)
+
+        def trace(x, y):
+            factors = [formula_of(side, (symbol,)) for side, symbol in ((left, x), (right, y))]
+            if a is not b:
+                # Some bits of a word are called as it is.
+                factors = [own or symbol for own, symbol in zip(factors, (x, y), strict=True)]
+            return formula_of(mul, factors), factors
+
+        word.trace = trace
+        return word
 
     def look_up(
-        self, name: str, words: Sequence[int], width: int, address: Word, registered: bool = False
+        self,
+        name: str,
+        words: Sequence[int],
+        width: int,
+        address: Word,
+        registered: bool = False,
+        formula: str | None = None,
     ) -> Word:
         """Word of a table at an address: one cycle, or two with a register, which an FPGA's memories have.
 
@@ -285,9 +295,11 @@ class Dataflow:
             As many bits as needed, unsigned.
         registered : bool
             Whether there is a register behind the memory, enabled with it.
+        formula : str or None
+            What drawings call a word of it; ``None``: the name.
         """
         # The word that is read has the lifetime of the address.
-        word = Word(name, (address,), 1 + registered, address.lifetime)
+        word = Word(name, (address,), 1 + registered, address.lifetime, text=formula)
 
         def make(build):
             memory = Memory(shape=width, depth=len(words), init=words)
@@ -343,7 +355,12 @@ def shared_sums(graph: Dataflow, product: Format) -> FunctionalUnit:
 
 
 def dot(
-    graph: Dataflow, name: str, a: Word, b: Word | Callable[[Any], Any], sums: FunctionalUnit | None = None
+    graph: Dataflow,
+    name: str,
+    a: Word,
+    b: Word | Callable[[Any], Any],
+    sums: FunctionalUnit | None = None,
+    symbol: str | None = None,
 ) -> Word:
     """Exact dot product of two vectors: three multiplications of the graph, and two sums.
 
@@ -359,21 +376,30 @@ def dot(
         The other; or what makes it from the value of ``a``.
     sums : FunctionalUnit or None
         From `shared_sums`; ``None``: the sums have registers of their own.
+    symbol : str or None
+        What formulas call the other vector; ``None``: as its word, or as ``a``.
     """
+    left = a.symbol
+    right = Formula(symbol) if symbol else b.symbol if isinstance(b, Word) else left
 
     def factors(c):
         if isinstance(b, Word):
             return a, b, lambda v: v[c], lambda v: v[c]
         return a, a, lambda v: v[c], lambda v: b(v)[c]
 
-    products = [graph.multiply(f"{name}_{c}", *factors(c)) for c in range(2)]
+    def product(c, since=0):
+        formula = (component(left, c) * component(right, c)).text
+        return graph.multiply(f"{name}_{c}", *factors(c), since=since, formula=formula)
+
+    total = f"{left.within(2)}·{right.within(2)}" if left is not right else f"|{left.text}|²"
+    products = [product(c) for c in range(2)]
     if sums is not None:
-        products.append(graph.multiply(f"{name}_2", *factors(2)))
-        return graph.use(sums, f"{name}_total", products, lambda x, y, z: (x + y, z))
+        products.append(product(2))
+        return graph.use(sums, f"{name}_total", products, lambda x, y, z: (x + y, z), formula=total)
     partial = graph.register(f"{name}_partial", lambda x, y: x + y, *products)
     # An operand that waits takes fewer registers than a product.
-    last = graph.multiply(f"{name}_2", *factors(2), since=partial)
-    return graph.register(f"{name}_total", lambda x, y: x + y, partial, last)
+    last = product(2, since=partial)
+    return graph.register(f"{name}_total", lambda x, y: x + y, partial, last, formula=total)
 
 
 def checked_interval(interval: int | None, longest: int, default: int | None = None) -> int:

@@ -6,7 +6,7 @@ from amaranth.lib.memory import Memory, WritePort
 
 from blysk.hdl.core.stream import require_same_shape
 
-__all__ = ["LATE_FIFO_LATENCY", "UNCOUNTED", "connect_late_fifo", "registered_read"]
+__all__ = ["LATE_FIFO_LATENCY", "UNCOUNTED", "connect_late_fifo", "connect_wide_fifo", "registered_read"]
 
 LATE_FIFO_LATENCY = 4
 """Clocks that a payload takes through the empty FIFO of `connect_late_fifo`."""
@@ -59,7 +59,7 @@ def registered_read(
 
 def connect_late_fifo(
     m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int
-) -> None:
+) -> Value:
     """Connect two streams through a FIFO in a memory, between registers.
 
     One is before the memory, so that the source's handshake ends there; behind it is that of
@@ -67,17 +67,12 @@ def connect_late_fifo(
     payloads of the depth are for those that the level does not have yet. A payload takes `LATE_FIFO_LATENCY`
     cycles through the empty FIFO.
 
-    Parameters
-    ----------
-    m, name, source, sink
-        As for `connect_fifo`.
-    depth : int
-        Payloads that the memory holds, at least 3; two more wait behind it.
+    What it takes and refuses is as for `connect_fifo`; two payloads more than its depth wait behind it.
 
-    Raises
-    ------
-    TypeError
-        If the payloads differ in a field or in a fixed-point format.
+    Returns
+    -------
+    Value
+        Whether no payload is inside.
     """
     require_same_shape(source.payload.shape(), sink.payload.shape())
     width = Shape.cast(source.payload.shape()).width
@@ -113,3 +108,53 @@ def connect_late_fifo(
         m.d.sync += [read.eq(reads), there.eq(read)]
     with m.Elif(sink.ready):
         m.d.sync += there.eq(0)
+    return ~(written | some | read | there)
+
+
+def connect_wide_fifo(
+    m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int = 2
+) -> None:
+    """Connect two streams through a FIFO whose payloads have no register: a wide payload costs memory alone.
+
+    For a sink that takes payloads straight into registers. A payload takes `SLICE_LATENCY` cycles through the
+    empty FIFO. The source's ready and the sink's valid are registers.
+
+    Parameters
+    ----------
+    m, name, source, sink
+        As for `connect_fifo`.
+    depth : int
+        Payloads that it holds, at least 2: as many as a register slice.
+
+    Raises
+    ------
+    TypeError
+        If the payloads differ in a field or in a fixed-point format.
+    """
+    require_same_shape(source.payload.shape(), sink.payload.shape())
+    width = Shape.cast(source.payload.shape()).width
+    bits = (depth - 1).bit_length()
+    m.submodules[name] = memory = Memory(shape=width, depth=1 << bits, init=[])
+    write, read = memory.write_port(), memory.read_port(domain="comb")
+    first, free = (Signal(bits, name=f"{name}_{word}") for word in ("first", "free"))
+    room, some = Signal(name=f"{name}_room", init=1), Signal(name=f"{name}_some")
+    level, following = (Signal(range(depth + 1), name=f"{name}_{word}") for word in ("level", "following"))
+    comes, goes = source.valid & room, some & sink.ready
+    m.d.comb += [
+        source.ready.eq(room),
+        sink.valid.eq(some),
+        write.data.eq(source.payload),
+        write.addr.eq(free),
+        read.addr.eq(first),
+        # What is written without a payload is written again.
+        write.en.eq(room),
+        Value.cast(sink.payload).eq(read.data),
+        following.eq(level + comes - goes),
+    ]
+    m.d.sync += [
+        free.eq(free + comes),
+        first.eq(first + goes),
+        level.eq(following),
+        room.eq(following != depth),
+        some.eq(following != 0),
+    ]

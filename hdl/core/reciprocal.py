@@ -5,8 +5,9 @@ from amaranth.hdl import Cat, Const, Mux, Value
 from blysk.golden.number.fixed import UQ, Fixed
 from blysk.golden.number.reciprocal import RECIPROCAL_FORMAT, reciprocal_table
 from blysk.golden.number.spans import LENGTH_BITS
-from blysk.hdl.core.dataflow import Dataflow, Word
+from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.core.word import Word
 
 __all__ = ["checked_length_bits", "reciprocal_codes", "reciprocal_words", "square_words"]
 
@@ -85,12 +86,16 @@ def reciprocal_words(
         return Cat(position, below_top)
 
     half = len(Const(0, range(length_bits)))
-    steps = graph.register("steps", lambda length: (length - 1)[:length_bits], length, since=since)
+    steps = graph.register(
+        "steps", lambda length: (length - 1)[:length_bits], length, since=since, formula="m − 1"
+    )
     positions = graph.register("positions", leading, steps)
     address = graph.register("address", lambda steps, both: (steps << both[half:])[:top], steps, positions)
     codes = reciprocal_codes(length_bits, table)
-    word = graph.look_up("reciprocals", codes, table.format.width, address, registered=True)
-    reciprocal = graph.wire("reciprocal", lambda word: FixedValue(table.format, word), word)
+    word = graph.look_up(
+        "reciprocals", codes, table.format.width, address, registered=True, formula="1/(m − 1)"
+    )
+    reciprocal = graph.wire("reciprocal", lambda word: FixedValue(table.format, word), word, "dt")
     ragged = graph.register("ragged", lambda address: address.any(), address)
     shift = graph.register("shift", lambda both, ragged: both[:half] + ragged, positions, ragged)
     return reciprocal, shift
@@ -121,6 +126,6 @@ def square_words(graph: Dataflow, product: Word, shift: Word) -> tuple[Word, Wor
         return FixedValue(exact, code).round_half_up(RECIPROCAL_FORMAT.fraction_bits)
 
     small = graph.register("square_small", lambda product: ~Value.cast(product)[exact.width - 1], product)
-    rounded = graph.register("square_rounded", normalised, product)
-    square = graph.register("square", lambda x: x.saturate(RECIPROCAL_FORMAT), rounded)
+    rounded = graph.register("square_rounded", normalised, product, formula="dt²")
+    square = graph.register("square", lambda x: x.saturate(RECIPROCAL_FORMAT), rounded, formula="dt²")
     return square, graph.register("square_shift", lambda small, shift: Cat(small, shift), small, shift)

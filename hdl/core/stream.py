@@ -194,16 +194,18 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
     Value
         ``advance``, one bit.
     """
-    held = Signal(name="held")
+    held, moves = Signal(name="held"), Signal(name="moves", init=1)
     spare = Signal(len(Value.cast(payload)), name="spare", reset_less=True)
     m.d.comb += [
         output.valid.eq(held | valid),
         Value.cast(output.payload).eq(Mux(held, spare, Value.cast(payload))),
     ]
-    m.d.sync += held.eq(output.valid & ~output.ready)
-    with m.If(~held):
+    waits = output.valid & ~output.ready
+    # Two registers, so that what drives all enables is not what chooses the payload.
+    m.d.sync += [held.eq(waits), moves.eq(~waits)]
+    with m.If(moves):
         m.d.sync += spare.eq(Value.cast(payload))
-    return ~held
+    return moves
 
 
 def hold_output(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:

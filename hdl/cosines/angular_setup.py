@@ -11,11 +11,12 @@ from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.hdl.core.dataflow import Dataflow, Word, checked_interval, dot, shared_sums
+from blysk.hdl.core.dataflow import Dataflow, checked_interval, dot, shared_sums
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.reciprocal import reciprocal_words
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word
 from blysk.hdl.cosines.arccos import ArccosUnit
 from blysk.hdl.cosines.half_chord import half_chord_words, normalised_words
 

@@ -1,6 +1,6 @@
 """Arccos unit ([T] 3.3, table 3.1)."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from amaranth.hdl import Array, Cat, Const, Mux, Signal, Value, signed, unsigned
@@ -46,6 +46,19 @@ class ArccosUnit(PipelinedUnit):
 
     Source: docs/theory/interpolation.md#arccos; [T] 3.3, table 3.1.
     """
+
+    FORMULAS: ClassVar[dict[str, str]] = {
+        "product_5": "c_2·x",
+        "scaled_6": "c_2·x",
+        "slope_7": "c_1 + c_2·x",
+        "product_8": "x·(c_1 + c_2·x)",
+        "aligned_9": "x·(c_1 + c_2·x)",
+        r"total_1\d": "c_0 + x·(c_1 + c_2·x)",
+        "magnitude": "|x|",
+        r"x_\d+": "|x|",
+        r"c(\d)_\d+": r"c_\1",
+        r"angle\w*": "arccos x",
+    }
 
     def __init__(
         self, parameters: Arccos | None = None, *, form: Literal["pipelined", "sequential"] = "pipelined"

@@ -8,21 +8,26 @@ from amaranth.lib import data
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.number.fixed import SQ
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.hdl.core.dataflow import Dataflow, Word, dot
+from blysk.hdl.core.dataflow import Dataflow, dot
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word
 
 __all__ = ["ChordUnit", "chord", "chord_exact"]
 
 
-def chord(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]) -> Word:
+def chord(
+    graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View], symbol: str | None = None
+) -> Word:
     """Word of ``|a - b|^2 / 2`` in ``UQ(2, 35)``; the parameters are those of `chord_exact`."""
-    square = chord_exact(graph, name, a, b)
+    square = chord_exact(graph, name, a, b, symbol)
     return graph.register(name, lambda square: square.saturate(Chord.FORMAT), square)
 
 
-def chord_exact(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View]) -> Word:
+def chord_exact(
+    graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View], symbol: str | None = None
+) -> Word:
     """Word of ``|a - b|^2 / 2``, exact for one of 34 fraction bits: three multiplications of the graph.
 
     Parameters
@@ -35,6 +40,8 @@ def chord_exact(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data
         A unit vector.
     b : Word or callable
         The other unit vector; or a function that gives one that is constant while beats are inside.
+    symbol : str or None
+        What formulas call the other vector; ``None``: as its word.
     """
     differences = data.ArrayLayout(FixedShape(COMPONENT - COMPONENT), 3)
 
@@ -54,14 +61,15 @@ def chord_exact(graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data
         code = Value.cast(total)
         return FixedValue(SQ(6, 34), Mux(far, Cat(Const(0, 2), code), Cat(code, code[-1], code[-1])))
 
+    formula = f"{a.symbol.text} − {symbol or (b.symbol.text if isinstance(b, Word) else 'B')}"
     if isinstance(b, Word):
-        difference = graph.register(f"{name}_difference", subtract, a, b)
+        difference = graph.register(f"{name}_difference", subtract, a, b, formula=formula)
     else:
-        difference = graph.register(f"{name}_difference", lambda a: subtract(a, b()), a)
+        difference = graph.register(f"{name}_difference", lambda a: subtract(a, b()), a, formula=formula)
     far = graph.register(f"{name}_far", is_far, difference)
-    operand = graph.wire(f"{name}_operand", halved, difference)
+    operand = graph.wire(f"{name}_operand", halved, difference, formula="Δ")
     square = dot(graph, f"{name}_square", operand, lambda v: v)
-    square = graph.register(f"{name}_aligned", aligned, square, far)
+    square = graph.register(f"{name}_aligned", aligned, square, far, formula=f"|{formula}|²")
     return graph.wire(f"{name}_half", lambda square: square.scale(-1), square)
 
 

@@ -6,10 +6,11 @@ from amaranth.lib import data
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.number.fixed import SQ, Format
 from blysk.golden.number.spans import LENGTH_BITS
-from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit, Word
+from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.reciprocal import checked_length_bits, reciprocal_words, square_words
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word
 
 __all__ = [
     "ChordSetupUnit",
@@ -158,6 +159,7 @@ class ChordSetupUnit(PipelinedUnit):
         values = g.input(
             name,
             lambda operands: operands.factors[i] if function == "factor" else operands["values"][i][function],
+            {"diffuse": "f", "highlight": "u", "factor": "a"}[function],
         )
         ends = g.register(f"{name}_ends", lambda v: v[0] + v[2], values)
         rise = g.register(f"{name}_rise", lambda v: v[2] - v[0], values)
@@ -167,13 +169,15 @@ class ChordSetupUnit(PipelinedUnit):
         exact = g.register(
             f"{name}_curvature_rounded", lambda x: x.round_half_up(p.CURVATURE_FORMAT.fraction_bits), exact
         )
-        curvature = g.register(f"{name}_curvature", lambda x: x.saturate(p.CURVATURE_FORMAT), exact)
+        curvature = g.register(
+            f"{name}_curvature", lambda x: x.saturate(p.CURVATURE_FORMAT), exact, formula="G"
+        )
         flags.append(self._flag(f"{name}_curvature", exact, p.CURVATURE_FORMAT))
         exact = g.register(f"{name}_slope_exact", lambda a, b: a - b, rise, curvature)
         exact = g.register(
             f"{name}_slope_rounded", lambda x: x.round_half_up(slope_format.fraction_bits), exact
         )
-        slope = g.register(f"{name}_slope", lambda x: x.saturate(slope_format), exact)
+        slope = g.register(f"{name}_slope", lambda x: x.saturate(slope_format), exact, formula="P")
         flags.append(self._flag(f"{name}_slope", exact, slope_format))
         return slope, curvature
 
@@ -237,7 +241,7 @@ def step_words(
         As `ChordSetup.steps` gives them.
     """
     reciprocal, shift = reciprocal_words(graph, length, length_bits=length_bits)
-    square = graph.multiply("square_exact", reciprocal, reciprocal)
+    square = graph.multiply("square_exact", reciprocal, reciprocal, formula="dt²")
     return reciprocal, shift, *square_words(graph, square, shift)
 
 
@@ -280,7 +284,7 @@ def difference_words(
     p = parameters
     reciprocal, shift, square, square_shift = steps
 
-    def shifted(name, value, shift, scale):
+    def shifted(name, value, shift, scale, formula):
         # value 2^(scale - shift), rounded half up to the fraction bits of the differences.
         def operands(value, shift):
             value, format = value.scale(scale), p.shifted_format
@@ -288,21 +292,25 @@ def difference_words(
                 value = value.truncate(format.fraction_bits)
             return value.extend(format), shift
 
-        return graph.use(shifters, name, (value, shift), operands)
+        return graph.use(shifters, name, (value, shift), operands, formula=formula)
 
     def half(format, bits):
         return lambda slope: FixedValue(format, Value.cast(slope)[bits])
 
     if has_low:
         width = p.LOW_FORMAT.fraction_bits - p.HIGH_FORMAT.fraction_bits
-        high = graph.multiply(f"{name}_high", slope, reciprocal, half(p.HIGH_FORMAT, slice(width, None)))
-        low = graph.multiply(f"{name}_low", slope, reciprocal, half(p.LOW_FORMAT, slice(width)))
+        high = graph.multiply(
+            f"{name}_high", slope, reciprocal, half(p.HIGH_FORMAT, slice(width, None)), formula="P_high·dt"
+        )
+        low = graph.multiply(
+            f"{name}_low", slope, reciprocal, half(p.LOW_FORMAT, slice(width)), formula="P_low·dt"
+        )
         product = graph.register(f"{name}_slope_product", lambda a, b: a + b, high, low)
     else:
         product = graph.multiply(f"{name}_slope_product", slope, reciprocal)
-    first = shifted(f"{name}_first_order", product, shift, 1)
+    first = shifted(f"{name}_first_order", product, shift, 1, "P·dt")
     product = graph.multiply(f"{name}_curvature_product", curvature, square)
-    second = shifted(f"{name}_second_order", product, square_shift, 2)
+    second = shifted(f"{name}_second_order", product, square_shift, 2, "G·dt²")
     return {
         "first": graph.register(f"{name}_first", lambda a, b: (a + b).wrap(p.format), first, second),
         "second": graph.register(

@@ -74,10 +74,12 @@ class ChordValuesUnit(PipelinedUnit):
         normal = g.input("normal", lambda operands: operands)
         self._words = []
         for i in range(lights):
-            cosine = dot(g, f"f_{i}_exact", normal, lambda _, i=i: self.constants[i].direction)
+            cosine = dot(
+                g, f"f_{i}_exact", normal, lambda _, i=i: self.constants[i].direction, symbol=f"L_{i}"
+            )
             words = {"diffuse": self._rounded(f"f_{i}", cosine, p.DIFFUSE_FORMAT)}
             if highlights:
-                u = chord_exact(g, f"u_{i}_exact", normal, lambda i=i: self.constants[i].halfway)
+                u = chord_exact(g, f"u_{i}_exact", normal, lambda i=i: self.constants[i].halfway, f"H_{i}")
                 words["highlight"] = self._rounded(f"u_{i}", u, p.HIGHLIGHT_FORMAT, p.scale)
             self._words.append(words)
         self.multipliers = g.multiplier.count

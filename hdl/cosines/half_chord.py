@@ -6,9 +6,10 @@ from amaranth.lib import data
 from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.number.fixed import UQ
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.hdl.core.dataflow import Dataflow, Word, checked_interval
+from blysk.hdl.core.dataflow import Dataflow, checked_interval
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word
 
 __all__ = ["HalfChordUnit", "half_chord_words", "normalised_words"]
 

@@ -1,5 +1,7 @@
 """Highlight-cosine unit ([T] 3.2): an angle accumulator, a quarter-wave table and a multiplier."""
 
+from typing import ClassVar
+
 from amaranth.hdl import Cat, EnableInserter, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.memory import Memory
@@ -52,6 +54,11 @@ class HighlightCosineUnit(wiring.Component):
     """
 
     latency = 12
+
+    FORMULAS: ClassVar[dict[str, str]] = {
+        "product_8": "v·β",
+        "term_10": "v·β",
+    }
 
     def __init__(self, parameters: HighlightCosine | None = None):
         self.parameters = parameters or HighlightCosine()

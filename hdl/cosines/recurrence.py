@@ -1,5 +1,7 @@
 """Recurrence unit ([T] figure 3.5): two cosines of equally spaced angles, by one product a pixel each."""
 
+from typing import ClassVar
+
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
@@ -50,6 +52,14 @@ class RecurrenceUnit(wiring.Component):
     """
 
     latency = 3
+
+    FORMULAS: ClassVar[dict[str, str]] = {
+        r"\w+_product": "K·x",
+        r"\w+_(coarse|fine)": "K·2^(2 − s)·x",
+        r"\w+_sum": "x + D",
+        r"\w+_difference": "D",
+        r"(\w+)_x": "x",
+    }
 
     def __init__(self, parameters: Recurrence | None = None):
         self.parameters = p = parameters or Recurrence()

@@ -16,7 +16,7 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.hdl.emit.yosys import run_yosys
 
-__all__ = ["emit"]
+__all__ = ["check_name", "emit"]
 
 # What `verilator -Wall` would say about any generated netlist, and why it is right as it is. The names are
 # the ones that old releases know too: UNUSED covers UNUSEDSIGNAL, WIDTH covers WIDTHEXPAND and WIDTHTRUNC.
@@ -114,8 +114,7 @@ def emit(
     """
     if not isinstance(component, wiring.Component):
         raise TypeError(f"component must be a wiring.Component, not {component!r}")
-    if not _IDENTIFIER.fullmatch(name):
-        raise ValueError(f"name must be letters, digits and underscores, not {name!r}")
+    _check_identifier(name)
     descriptions = dict(descriptions or {})
     for line in [*header, *descriptions.values()]:
         if not (line.isascii() and line.isprintable()):
@@ -123,9 +122,7 @@ def emit(
 
     bits = _ports(component)
     text = _plain_identifiers(_yosys(rtlil.convert(_Flat(component, bits), name=name, emit_src=False)))
-    declared = re.search(rf"^module {name}\(([^)]*)\);", text, re.MULTILINE)
-    if declared is None:
-        raise ValueError(f"name must not be a keyword of Verilog, not {name!r}")
+    declared = _declared(name, text)
     declared_names = re.findall(r"\w+", declared[1])
     cycles = [key for key in ("clk", "rst") if key in declared_names]
     if others := set(declared_names) - set(cycles) - {port.name for port in bits}:
@@ -134,6 +131,31 @@ def emit(
     order = f"module {name} (\n  " + ",\n  ".join(port.name for port in ports) + "\n);"
     text = text[: declared.start()] + order + text[declared.end() :]
     return _comment(name, header, _table(ports, descriptions)) + text + "\n/* verilator lint_restore */\n"
+
+
+def check_name(name: str) -> None:
+    """Refuse what cannot name a module, before there is a component: Yosys is asked by one that is empty.
+
+    Raises
+    ------
+    ValueError
+        If it is no identifier, or a keyword.
+    """
+    _check_identifier(name)
+    _declared(name, _yosys(f"module \\{name}\nend\n"))
+
+
+def _check_identifier(name: str) -> None:
+    if not _IDENTIFIER.fullmatch(name):
+        raise ValueError(f"name must be letters, digits and underscores, not {name!r}")
+
+
+def _declared(name: str, text: str) -> re.Match:
+    """Beginning of a module, whose name Yosys has changed or escaped if it is a keyword."""
+    declared = re.search(rf"^module {name}\(([^)]*)\);", text, re.MULTILINE)
+    if declared is None:
+        raise ValueError(f"name must not be a keyword of Verilog, not {name!r}")
+    return declared
 
 
 def _leaves(shape: ShapeLike, offset: int = 0) -> Iterator[tuple[tuple, ShapeLike, int]]:

@@ -7,8 +7,9 @@ from amaranth.lib import data
 from amaranth.lib.memory import Memory
 
 from blysk.golden.geometry.reciprocal import Reciprocal
-from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit, Word
+from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.word import Word
 
 __all__ = ["reciprocal_word", "shared_table"]
 

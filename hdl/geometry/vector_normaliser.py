@@ -1,5 +1,7 @@
 """Vector normaliser: a vector of any length brought to unit length."""
 
+from typing import ClassVar
+
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data
 from amaranth.lib.memory import Memory
@@ -7,10 +9,11 @@ from amaranth.lib.memory import Memory
 from blysk.golden.geometry.vector_normaliser import VectorNormaliser
 from blysk.golden.number.fixed import SQ
 from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.hdl.core.dataflow import MULTIPLIER_BITS, Dataflow, Word
+from blysk.hdl.core.dataflow import MULTIPLIER_BITS, Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word
 from blysk.hdl.geometry.booth import booth_term
 from blysk.hdl.normals.dot_product import DotProductUnit
 
@@ -48,6 +51,14 @@ class VectorNormaliserUnit(PipelinedUnit):
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
+
+    FORMULAS: ClassVar[dict[str, str]] = {
+        r"(product|scaled)_(\d)": r"e·w_\2",
+        r"total_(\d)": r"w_\1 + e·w_\1",
+        r"normal_(\d)": r"N_\1",
+        "product": "c_1·u",
+        "f": "c_0 − c_1·u",
+    }
 
     def __init__(self, parameters: VectorNormaliser | None = None):
         self.parameters = parameters or VectorNormaliser()

@@ -7,8 +7,9 @@ from amaranth.hdl import Value
 
 from blysk.golden.geometry.wide_product import GUARD_BITS, low_format
 from blysk.golden.number.fixed import Format
-from blysk.hdl.core.dataflow import Dataflow, Word
+from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.core.word import Word
 
 __all__ = ["halves", "three_products", "wide_product"]
 

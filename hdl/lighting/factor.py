@@ -1,5 +1,7 @@
 """Factor unit: the terms of a light that fades, the specular one times its factor."""
 
+from typing import ClassVar
+
 from amaranth.hdl import Signal
 from amaranth.lib import data
 
@@ -32,6 +34,13 @@ class FactorUnit(PipelinedUnit):
 
     Source: docs/theory/chord.md#local-lights.
     """
+
+    FORMULAS: ClassVar[dict[str, str]] = {
+        "factor_operand": "a",
+        "diffuse(_operand)?": "D",
+        "specular_operand": "S",
+        "product": "a·S",
+    }
 
     def __init__(self, parameters: Factor | None = None, *, has_factor: bool = True):
         self.parameters = parameters or Factor()

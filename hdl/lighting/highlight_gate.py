@@ -7,9 +7,10 @@ from amaranth.lib.memory import Memory
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.fixed import UQ
-from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit, Word, checked_interval, dot, shared_sums
+from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit, checked_interval, dot, shared_sums
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word
 
 __all__ = ["HighlightGateUnit"]
 
@@ -145,7 +146,9 @@ class HighlightGateUnit(PipelinedUnit):
         step = FixedValue.constant(p.level_format, p.level_format.step)
         levels = []
         for name, normal in (("a", left), ("b", right)):
-            level = dot(g, f"dot_{name}_{index}", normal, lambda _: self.constants.halfway[index], sums)
+            level = dot(
+                g, f"dot_{name}_{index}", normal, lambda _: self.constants.halfway[index], sums, f"H_{index}"
+            )
             level = g.register(f"level_{name}_{index}", lambda dot: dot.truncate(f) + step, level)
             level = g.register(
                 f"{name}_{index}", lambda level: Value.cast(level.saturate(p.level_format)), level

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from functools import reduce
 from operator import add, or_
+from typing import ClassVar
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
@@ -74,6 +75,16 @@ class IntensityUnit(PipelinedUnit):
     Source: docs/theory/units.md#intensity; [T] figure 4.10; [B] 4 and 5.
     """
 
+    FORMULAS: ClassVar[dict[str, str]] = {
+        r"factor_diffuse_(\d+)_(\w)": r"D_\1",
+        r"factor_specular_(\d+)_(\w)": r"S_\1",
+        r"diffuse_(\d+)_(\w)": r"k_d,\2·D_\1",
+        r"specular_(\d+)_(\w)": r"k_s,\2·S_\1",
+        r"sum_\d+_\d+_(\w)": r"Σ of terms, \1",
+        r"rounded_(\w)": r"I_\1",
+        "([rgb])": r"I_\1",
+    }
+
     def __init__(self, parameters: Intensity | None = None):
         self.parameters = p = parameters or Intensity()
         self.kinds = _kinds(p)
@@ -144,6 +155,11 @@ class CompactIntensityUnit(wiring.Component):
 
     Source: docs/theory/units.md#intensity; [T] figure 4.10; [B] 4 and 5.
     """
+
+    FORMULAS: ClassVar[dict[str, str]] = {
+        "product": "k·D or k·S",
+        "total": "Σ of terms",
+    }
 
     def __init__(self, parameters: Intensity | None = None):
         self.parameters = p = parameters or Intensity()

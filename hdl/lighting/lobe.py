@@ -9,10 +9,11 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.lighting.lobe import Lobe, LobeTable
-from blysk.hdl.core.dataflow import Dataflow, Word
+from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.memory import registered_read
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word
 from blysk.hdl.lighting.specular import highlight_shape, one_minus
 
 __all__ = ["LobeMemory", "LobeUnit", "lobe_read_signature", "lobe_write_shape"]
@@ -48,10 +49,10 @@ class LobeMemory(wiring.Component):
     are fixed at build time need none: up to 1024 words take two block RAMs of 1024 by 18 for both ports.
 
     A write is taken on every clock. The first write of a table, with ``begins``, tells its bank. The values
-    follow in order: each but the first makes the word of the value before it, which is in the memory a cycle
-    after the write was taken. Values beyond the end of a table are lost, and so are all those of a bank that
-    does not exist. A table that is not completed keeps the other words of the one before. Reset ends a table,
-    and clears no word. A bank must not be written while a unit reads it.
+    follow in order: each but the first makes the word of the value before it, which is in the memory two
+    cycles after the write was taken. Values beyond the end of a table are lost, and so are all those of a
+    bank that does not exist. A table that is not completed keeps the other words of the one before. Reset
+    ends a table, and clears no word. A bank must not be written while a unit reads it.
 
     Parameters
     ----------
@@ -104,23 +105,30 @@ class LobeMemory(wiring.Component):
     def _write(self, m: Module, port: Any) -> None:
         """Word by word behind the values."""
         p, write = self.parameters, self.write.payload
-        previous, holds = Signal.like(write.value, name="previous"), Signal(name="holds")
+        value, previous = (Signal.like(write.value, name=name) for name in ("value", "previous"))
         address, last = (Signal.like(port.addr, name=name) for name in ("address", "last"))
-        active = Signal(name="active")
-        follows = self.write.valid & ~write.begins
+        follows, begins, holds, active = (
+            Signal(name=name) for name in ("follows", "begins", "holds", "active")
+        )
+        # A register beside the memory: whether it is written decides whether it is read.
+        m.d.sync += [
+            value.eq(write.value),
+            follows.eq(self.write.valid & ~write.begins),
+            begins.eq(self.write.valid & write.begins),
+        ]
         m.d.comb += [
             self.write.ready.eq(1),
             port.en.eq(follows & holds & active),
             port.addr.eq(address),
-            port.data.eq(Cat(previous, (write.value - previous)[: Lobe.DIFFERENCE_FORMAT.width])),
+            port.data.eq(Cat(previous, (value - previous)[: Lobe.DIFFERENCE_FORMAT.width])),
         ]
         with m.If(follows):
-            m.d.sync += [previous.eq(write.value), holds.eq(1)]
+            m.d.sync += [previous.eq(value), holds.eq(1)]
             with m.If(holds):
                 m.d.sync += [address.eq(address + 1), active.eq(active & (address != last))]
-        with m.If(self.write.valid & write.begins):
+        with m.If(begins):
             m.d.sync += [holds.eq(0), active.eq(0)]
-            with m.Switch(write.value):
+            with m.Switch(value):
                 for bank in range(p.banks):
                     with m.Case(bank):
                         first = bank * p.entries
@@ -256,10 +264,12 @@ class LobeUnit(PipelinedUnit):
             return Cat(step, row), rest[len(rest) - p.fraction_format.width :]
 
         lit = g.register("lit", is_lit, operand, dark)
-        argument = g.register("one_minus_cosine", lambda x: one_minus(p, x).truncate(bits), operand)
-        argument = g.register("argument", limited, argument, lit)
+        argument = g.register(
+            "one_minus_cosine", lambda x: one_minus(p, x).truncate(bits), operand, formula="u"
+        )
+        argument = g.register("argument", limited, argument, lit, formula="u")
         zeros = g.register("zeros", lambda code: _leading_zeros(code[bits - p.octaves :]), argument)
-        shifted = g.register("shifted", coarse, argument, zeros)
+        shifted = g.register("shifted", coarse, argument, zeros, formula="2^zeros·u")
         shapes = unsigned(len(self._read.address)), unsigned(p.fraction_format.width)
         memory = g.share("memory", shapes, 2, self._look_up)
         return self._interpolate(g.use(memory, "word", (shifted,), place), lit)
@@ -274,11 +284,13 @@ class LobeUnit(PipelinedUnit):
         p, g = self.parameters, self._graph
         formats = {"value": p.VALUE_FORMAT, "difference": p.DIFFERENCE_FORMAT, "fraction": p.fraction_format}
         parts, first = [], 0
-        for name, format in formats.items():
+        for (name, format), symbol in zip(formats.items(), "vDf", strict=True):
             bits = slice(first, first + format.width)
-            parts.append(
-                g.wire(name, lambda code, format=format, bits=bits: FixedValue(format, code[bits]), word)
-            )
+
+            def part(code, format=format, bits=bits):
+                return FixedValue(format, code[bits])
+
+            parts.append(g.wire(name, part, word, symbol))
             first += format.width
         value, difference, fraction = parts
         if g.interval == 1:
@@ -294,7 +306,7 @@ class LobeUnit(PipelinedUnit):
             total = (value + product.truncate(17)).wrap(p.RESULT_FORMAT)
             return FixedValue(p.RESULT_FORMAT, Mux(lit, Value.cast(total), 0))
 
-        return g.register("term", term, value, product, lit)
+        return g.register("term", term, value, product, lit, formula="v + D·f")
 
 
 def _leading_zeros(code: Value) -> Value:

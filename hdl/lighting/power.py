@@ -2,7 +2,7 @@
 
 from functools import reduce
 from operator import or_
-from typing import Literal
+from typing import ClassVar, Literal
 
 from amaranth.hdl import Mux, Signal, Value, unsigned
 from amaranth.lib import data
@@ -48,6 +48,26 @@ class PowerUnit(PipelinedUnit):
 
     Source: docs/theory/units.md#exact-power; [B] 3.
     """
+
+    FORMULAS: ClassVar[dict[str, str]] = {
+        "one_minus_cosine": "u",
+        "x_0": "u",
+        r"x_(\d+)": r"x_\1 = 1 − (1 − u)^(2^\1)",
+        "s_1": "s_1 = n_0·x_0",
+        r"s_(\d+)": r"s_\1, of \1 bits of n",
+        r"x_(\d+)_product": r"x_\1²",
+        r"x_(\d+)_sum": r"2·x_\1",
+        r"x_(\d+)_difference": r"2·x_\1 − x_\1²",
+        r"s_(\d+)_product": r"s_\1·x_\1",
+        r"s_(\d+)_sum": r"s_\1 + x_\1",
+        r"s_(\d+)_difference": r"s_\1 + x_\1 − s_\1·x_\1",
+        "s_(kept|late)_0": "x_0",
+        r"([xs])_(\d+)_(kept|late)": r"\1_\2",
+        "factor_0": "s or x",
+        "factor_1": "x",
+        "product": "s·x or x²",
+        "total": "s + x − s·x",
+    }
 
     def __init__(
         self, parameters: Power | None = None, *, form: Literal["pipelined", "sequential"] = "pipelined"

@@ -11,9 +11,10 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.lighting.specular import MAX_EXPONENT, Chords, HighlightOperand, Specular
 from blysk.golden.number.fixed import UQ, Format
 from blysk.golden.number.unit_vector import ONE_SQUARED
-from blysk.hdl.core.dataflow import Dataflow, Word
+from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word
 
 __all__ = ["SlopeUnit", "SpecularUnit", "highlight_shape", "one_minus", "slope_shape"]
 
@@ -248,15 +249,19 @@ class SpecularUnit(PipelinedUnit):
             boundary = self._slope[2]
             return ((wide <= boundary) | Value.cast(boundary).all()) & ~dark
 
-        argument = g.register("one_minus_cosine", lambda x: one_minus(p, x).truncate(25), operand)
-        argument = g.register("argument", saturated, argument, dark)
-        wide = g.register("shifted_wide", shifted, argument)
+        argument = g.register(
+            "one_minus_cosine", lambda x: one_minus(p, x).truncate(25), operand, formula="u"
+        )
+        argument = g.register("argument", saturated, argument, dark, formula="u")
+        wide = g.register("shifted_wide", shifted, argument, formula="2^k·u")
         format = p.PUBLISHED_FORMAT if p.as_published else p.SHIFTED_FORMAT
         operand = g.register("shifted", lambda wide: wide.saturate(format), wide)
         if self._multiplies_slope:
-            product = self._multiply("product", operand, operand, right=lambda _: self._slope[0])
+            product = self._multiply(
+                "product", operand, operand, right=lambda _: self._slope[0], formula="n·u"
+            )
         else:
-            product = g.register("product", lambda x: x * self._slope[0], operand)
+            product = g.register("product", lambda x: x * self._slope[0], operand, formula="n·u")
         if p.as_published:
             return self._as_published(product)
         lit = g.register("lit", is_lit, wide, dark)
@@ -276,9 +281,11 @@ class SpecularUnit(PipelinedUnit):
                 lambda product, lit: FixedValue(p.BASE_FORMAT, Mux(lit, ~below_one(product), 0)[:17]),
                 product,
                 lit,
+                formula="1 − n·u",
             )
-        for name in ("square", "square_2", "square_3")[: p.squarings]:
-            base = self._multiply(name, base, base, _cut, _cut)
+        root = base.symbol.within(2)
+        for name, power in tuple(zip(("square", "square_2", "square_3"), "²⁴⁸", strict=True))[: p.squarings]:
+            base = self._multiply(name, base, base, _cut, _cut, root + power)
         return g.wire("result", _cut, base)
 
     def _multiply(
@@ -288,11 +295,12 @@ class SpecularUnit(PipelinedUnit):
         b: Word,
         left: Callable[[Any], FixedValue] = lambda value: value,
         right: Callable[[Any], FixedValue] = lambda value: value,
+        formula: str | None = None,
     ) -> Word:
         """Exact product: one cycle with a multiplier of its own, else issued to a shared one."""
         g = self._graph
         if g.interval == 1:
-            return g.register(name, lambda x, y: left(x) * right(y), a, b)
+            return g.register(name, lambda x, y: left(x) * right(y), a, b, formula=formula)
         format: list[Format] = []
 
         def operands(x, y, dark):
@@ -303,7 +311,7 @@ class SpecularUnit(PipelinedUnit):
         def product(code):
             return FixedValue(format[-1], code[: format[-1].width])
 
-        return g.use(g.multiplier, name, (a, b, self._dark), operands, product)
+        return g.use(g.multiplier, name, (a, b, self._dark), operands, product, formula=formula)
 
     def _as_published(self, product: Word) -> Word:
         """Base of either sign, its square, and the comparator on the square."""
@@ -319,7 +327,7 @@ class SpecularUnit(PipelinedUnit):
             bright = square >= FixedValue.constant(p.RESULT_FORMAT, p.CUTOFF**2)
             return FixedValue(p.RESULT_FORMAT, Mux(bright, Value.cast(square), 0))
 
-        base = g.register("base", base, product, self._dark)
+        base = g.register("base", base, product, self._dark, formula="1 − n·u")
         return g.register("result", result, self._multiply("square", base, base))
 
     def _cosine(self, argument: Word, product: Word, below_one: Callable, lit: Word) -> Word:
@@ -349,7 +357,7 @@ class SpecularUnit(PipelinedUnit):
         value = self._interpolate(
             "chords", p.chords, g.wire("f", lambda product: power(product)[:17], product)
         )
-        return g.register("result", result, value, whole, lit)
+        return g.register("result", result, value, whole, lit, formula="2^−(n·u)")
 
     def _interpolate(self, name: str, chords: Chords, code: Word, lit: Word | None = None) -> Word:
         """`Chords.compute`: table, product, sum; 0 where not ``lit``."""
@@ -363,7 +371,11 @@ class SpecularUnit(PipelinedUnit):
             f"{name}_within", lambda code: FixedValue(chords.INTERPOLATION_FORMAT, code[:bits]), code
         )
         way = self._multiply(
-            f"{name}_way", word, within, lambda word: FixedValue(step_format, word[format.width :])
+            f"{name}_way",
+            word,
+            within,
+            lambda word: FixedValue(step_format, word[format.width :]),
+            formula="step·t",
         )
         start = g.wire(f"{name}_start", lambda word: FixedValue(format, word[: format.width]), word)
 
@@ -372,7 +384,9 @@ class SpecularUnit(PipelinedUnit):
             value = (start + way if chords.rising else start - way).wrap(format)
             return value if lit is None else FixedValue(format, Mux(lit, Value.cast(value), 0))
 
-        return g.register(f"{name}_value", value, start, way, *([] if lit is None else [lit]))
+        formula = "start + step·t" if chords.rising else "start − step·t"
+        given = [start, way, *([] if lit is None else [lit])]
+        return g.register(f"{name}_value", value, *given, formula=formula)
 
 
 def _cut(value: FixedValue) -> FixedValue:

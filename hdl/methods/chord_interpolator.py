@@ -23,12 +23,15 @@ __all__ = ["ChordInterpolatorUnit"]
 
 
 class _Place(enum.IntEnum):
-    """What a normal is to its span: the normal of a pixel, or one of the three of a longer span."""
+    """What a normal is to its span: the normal of a pixel, or one of the three of a longer span.
+
+    The upper bit: the span is not complete with it; the lower one, of a complete span: it is long.
+    """
 
     PIXEL = 0
-    LEFT = 1
-    RIGHT = 2
-    MIDDLE = 3
+    MIDDLE = 1
+    LEFT = 2
+    RIGHT = 3
 
 
 class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
@@ -153,6 +156,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         )
         length, following = Signal.like(span.length, name="length"), Signal(2, name="following")
         long, idle, last = Signal(), Signal(name="idle", init=1), Signal(name="last")
+        is_long = Signal(name="is_long", reset_less=True)
         m.d.comb += [
             # By bits: a comparison is a chain of carries.
             long.eq(span.length[2:].any() | span.length[:2].all()),
@@ -173,8 +177,8 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         with m.Else():
             m.d.comb += [
                 Value.cast(values.i.payload).eq(Mux(last, Value.cast(middle), Value.cast(right))),
-                word.place.eq(Mux((length == 2) & ~last, _Place.PIXEL, following)),
-                word.length.eq(Mux(length == 2, 1, length)),
+                word.place.eq(Mux(is_long, following, _Place.PIXEL)),
+                word.length.eq(Mux(is_long, length, 1)),
             ]
         with m.If(idle):
             # Of the span that is accepted, and of any before it.
@@ -182,12 +186,13 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
                 Value.cast(right).eq(Value.cast(span.normal_right)),
                 Value.cast(middle).eq(Value.cast(span.normal_middle)),
                 length.eq(span.length),
+                is_long.eq(long),
             ]
         with m.If(values.i.valid & values.i.ready):
             with m.If(idle):
                 several = span.length[1:].any()
                 m.d.sync += [following.eq(Mux(several, _Place.RIGHT, _Place.PIXEL)), idle.eq(~several)]
-            with m.Elif((following == _Place.RIGHT) & (length > 2)):
+            with m.Elif((following == _Place.RIGHT) & is_long):
                 m.d.sync += [following.eq(_Place.MIDDLE), last.eq(1)]
             with m.Else():
                 m.d.sync += [following.eq(_Place.PIXEL), idle.eq(1), last.eq(0)]
@@ -195,11 +200,12 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
     def _collect(self, m: Module, values, limit, word, spans) -> None:
         """Values of a pixel, or of three places, as a span; and the flag of wide spans."""
         left, right = (Signal.like(values.o.payload, name=f"values_{side}") for side in ("left", "right"))
-        is_pixel, is_middle = word.place == _Place.PIXEL, word.place == _Place.MIDDLE
-        complete = is_pixel | is_middle
+        is_middle = word.place[0]
+        complete = ~word.place[1]
         m.d.comb += [
             spans.i.valid.eq(values.o.valid & complete),
             spans.i.payload.length.eq(word.length),
+            # Read only of a complete span.
             spans.long.eq(is_middle),
             values.o.ready.eq(spans.i.ready | ~complete),
         ]
@@ -209,7 +215,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         given = spans.i.payload["values"]
         for i, light in enumerate(values.o.payload):
             for name in light.shape().members:
-                three = Mux(is_pixel, light[name].as_value(), left[i][name].as_value())
+                three = Mux(is_middle, left[i][name].as_value(), light[name].as_value())
                 m.d.comb += [
                     given[i][name][0].as_value().eq(three),
                     given[i][name][1].eq(light[name]),
@@ -234,7 +240,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         p = self._limit.parameters
         # A result can be read two cycles after it is there.
         first = 2 * (self.setup_interval // 3) + self._values.latency
-        wait = max(2, limit.latency + 2 - first)
+        wait = max(3, limit.latency + 2 - first)
         complete, flagged = Signal(wait, name="complete"), Signal(wait, name="flagged")
         fires = spans.i.valid & spans.i.ready & spans.long
         shown = fires & (spans.i.payload.length >= p.SHORTEST)
@@ -253,7 +259,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
                 self._is_lit(m, f"{i}", values, word, first, light, level.as_value())
                 for i, (first, light) in enumerate(zip(left, values.payload, strict=True))
             ).any()
-            for k in range(wait - 2):
+            for k in range(wait - 3):
                 later = Signal(name=f"lit_{k}")
                 m.d.sync += later.eq(lit)
                 lit = later
@@ -265,13 +271,19 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
     """Results of the limit that wait at most for the values of their spans."""
 
     def _is_lit(self, m: Module, name: str, values: stream.Interface, word, first, light, level) -> Value:
-        """Whether a light is not behind a span and may have a highlight there, two cycles after it.
+        """Whether a light is not behind a span and may have a highlight there, three cycles after it.
 
         `SpanLimit.least` is the least of ``2 l``, ``2 r`` and ``2 m - |l - r|``, where l, r and m are u at
         the first pixel, the last and in the middle, which come in this order.
         """
-        taken = values.valid & values.ready
-        now, first = light.highlight.as_value(), first.highlight.as_value()
+        taken, right = Signal(name=f"taken_{name}"), Signal(name=f"right_{name}")
+        held = Signal.like(light, name=f"light_{name}", reset_less=True)
+        m.d.sync += [
+            taken.eq(values.valid & values.ready),
+            right.eq(values.valid & (word.place == _Place.RIGHT)),
+            held.eq(light),
+        ]
+        now, first = held.highlight.as_value(), first.highlight.as_value()
         behind = self._limit.parameters.BEHIND.codes.item()
         fronts, unders = (Signal(3, name=f"{kind}_{name}") for kind in ("fronts", "unders"))
         slope = Signal(signed(len(now) + 1), name=f"slope_{name}", reset_less=True)
@@ -279,11 +291,11 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         lit, front = Signal(name=f"bright_{name}"), Signal(name=f"front_{name}")
         with m.If(taken):
             m.d.sync += [
-                fronts.eq(Cat(light.diffuse.as_value() >= behind, fronts)),
+                fronts.eq(Cat(held.diffuse.as_value() >= behind, fronts)),
                 unders.eq(Cat((now << 1) < level, unders)),
                 excess.eq((now << 1) - level),
             ]
-        with m.If(values.valid & (word.place == _Place.RIGHT)):
+        with m.If(right):
             m.d.sync += slope.eq(first - now)
         m.d.sync += [
             front.eq(fronts.any()),

@@ -27,8 +27,7 @@ _LONG = 3
 class ChordAccumulatorUnit(AccumulatorUnit):
     """``N . L`` and u of each light, and factors, a quadratic each; see `AccumulatorUnit`.
 
-    The words of a span are taken in later than its length, so that a register drives all that take them in.
-    A span of m pixels gives its first values 3 cycles after it was accepted.
+    The words of a span come a cycle after it was accepted.
 
     Parameters
     ----------
@@ -57,8 +56,6 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
     Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.10.
     """
-
-    latency = 3
 
     def __init__(
         self,
@@ -114,17 +111,13 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         """Words of the span that is taken in."""
         return self.words
 
-    def load(self, m, advance, active):
-        """A cycle after the span was accepted."""
-        load, present = Signal(name="load"), Signal(name="present")
+    def hold(self, m, load):
+        """The decision alone: the words come when they are taken in."""
         if self.gated:
             self._lit = Signal.like(self.i.payload.lit, name="lit", reset_less=True)
-        with m.If(advance):
-            m.d.sync += [load.eq(self.i.valid & self.i.ready), present.eq(active)]
-            if self.gated:
+            with m.If(self.i.ready):
                 m.d.sync += self._lit.eq(self.i.payload.lit)
-        m.d.comb += self.taken.eq(load & advance)
-        return self.taken, present
+        m.d.comb += self.taken.eq(load)
 
     def carried(self, values):
         """The decision of each light."""
@@ -291,10 +284,13 @@ class ChordSpansUnit(wiring.Component):
             went.append(left)
             is_room.append(inside < depth - self._LATE)
         behind = Signal(range(self.differences_inside + 1), name="behind")
-        following, waits = Signal.like(behind, name="following"), Signal(name="waits")
-        room = Signal(name="room", init=1)
-        m.d.comb += following.eq(behind + setup.o.valid - went[1])
-        m.d.sync += [behind.eq(following), waits.eq(following.any()), room.eq(Cat(is_room).all())]
+        waits, room = Signal(name="waits"), Signal(name="room", init=1)
+        m.d.sync += [
+            behind.eq(behind + setup.o.valid - went[1]),
+            # What went is among those behind, so that the sum need not be known.
+            waits.eq(setup.o.valid | behind[1:].any() | (behind[0] & ~went[1])),
+            room.eq(Cat(is_room).all()),
+        ]
         return room, waits
 
     def _keep_words(self, m: Module, lengths: fifo.SyncFIFOBuffered, accepted: Value) -> None:

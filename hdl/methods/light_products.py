@@ -94,11 +94,15 @@ class LightProductsUnit(PipelinedUnit):
         normal = graph.input("normal", lambda operands: operands)
         self._words = []
         for i in range(lights):
-            words = {"cosine": dot(graph, f"cosine_{i}", normal, lambda _, i=i: self.constants[i].direction)}
+            words = {
+                "cosine": dot(
+                    graph, f"cosine_{i}", normal, lambda _, i=i: self.constants[i].direction, symbol=f"L_{i}"
+                )
+            }
             if highlights:
                 product = chord if parameters.uses_chord else dot
                 vector = lambda *_, i=i: self.constants[i].halfway  # noqa: E731
-                words["highlight"] = product(graph, f"highlight_{i}", normal, vector)
+                words["highlight"] = product(graph, f"highlight_{i}", normal, vector, symbol=f"H_{i}")
             self._words.append(words)
         super().__init__(
             normal_shape(),

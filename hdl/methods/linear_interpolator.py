@@ -4,7 +4,8 @@ from amaranth.hdl import Cat, Signal, Value
 
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.normals.gpq import GPQ
-from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
+from blysk.hdl.core.memory import connect_wide_fifo
+from blysk.hdl.core.stream import SLICE_LATENCY
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
 from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
@@ -59,7 +60,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit, parameters=LinearInterpolat
         ]
         tops = (Value.cast(difference)[-2:] for difference in differences)
         far = Cat(top[0] ^ top[1] for top in tops).any()
-        connect_slice(m, setup.o, accumulator.i)
+        connect_wide_fifo(m, "prepared", setup.o, accumulator.i)
         out_of_range = Signal()
         m.d.sync += out_of_range.eq(self.i.valid & self.i.ready & far)
         return accumulator.o, out_of_range

@@ -4,6 +4,7 @@ from amaranth.lib import fifo, stream
 
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
+from blysk.hdl.core.memory import connect_wide_fifo
 from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
@@ -78,13 +79,13 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, parameters=QuadraticInte
         differences = self.parameters.form == "differences"
         curve = self._setup if differences else self._evaluator
         span = self.i.payload
+        # Written a cycle late, as what is accepted is known late.
+        m.d.sync += [lengths.w_en.eq(self.i.valid & self.i.ready), lengths.w_data.eq(span.length)]
         m.d.comb += [
             self.i.ready.eq(middle.i.ready),
             middle.i.valid.eq(self.i.valid),
             middle.i.payload.normal_left.eq(span.normal_left),
             middle.i.payload.normal_right.eq(span.normal_right),
-            lengths.w_en.eq(self.i.valid & middle.i.ready),
-            lengths.w_data.eq(span.length),
             *(
                 gpq.i.payload[name].eq(middle.o.payload[name])
                 for name in ("normal_left", "normal_middle", "normal_right")
@@ -101,7 +102,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, parameters=QuadraticInte
         if differences:
             m.submodules.difference_setup = curve
             m.submodules.difference_accumulator = accumulator = self._accumulator
-            connect_slice(m, curve.o, accumulator.i)
+            connect_wide_fifo(m, "prepared", curve.o, accumulator.i)
             normals = accumulator.o
         else:
             m.submodules.evaluator = curve

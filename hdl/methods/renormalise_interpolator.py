@@ -6,8 +6,9 @@ from amaranth.lib import data, stream
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.core.memory import connect_wide_fifo
 from blysk.hdl.core.shapes import normal_shape, span_normals_shape
-from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
+from blysk.hdl.core.stream import SLICE_LATENCY
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 from blysk.hdl.normals.line_setup import LineSetupUnit, line_shape
@@ -37,11 +38,11 @@ class LineAccumulatorUnit(AccumulatorUnit):
 
     def carried(self, values):
         """The bit."""
-        yield self.i.payload.span, values.span
+        yield self.span.span, values.span
 
     def quadratics(self, values):
         """The components; of second difference 0."""
-        p, line = self.parameters.accumulator, self.i.payload.line
+        p, line = self.parameters.accumulator, self.span.line
         zero = FixedValue.constant(p.difference_format, 0)
         for c in range(3):
             yield f"vector_{c}", p, (line.start[c], line.step[c], zero), values.vector[c]
@@ -104,7 +105,7 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
         ]
         with m.If(line.valid & line.ready):
             m.d.sync += parity.eq(~parity)
-        connect_slice(m, line, accumulator.i)
+        connect_wide_fifo(m, "prepared", line, accumulator.i)
         normals = stream.Signature(normal_shape()).create(path=("normals",))
         result = renormaliser.o.payload
         m.d.comb += [

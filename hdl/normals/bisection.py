@@ -119,7 +119,7 @@ class BisectionUnit(PipelinedUnit):
         squared = FixedValue.constant(ONE_SQUARED.format, ONE_SQUARED.values.item())
         difference = g.register("difference", lambda cosine: squared - cosine, dot(g, "dot", a, b))
         rounded = g.register("difference_rounded", lambda x: x.round_half_up(17), difference)
-        u = g.register("u", lambda x: x.saturate(p.ANGLE_FORMAT), rounded)
+        u = g.register("u", lambda x: x.saturate(p.ANGLE_FORMAT), rounded, formula="u = 1 − N_a·N_b")
         limits = [FixedValue.constant(p.ANGLE_FORMAT, w.values.item()) for w in (p.widest_narrow, p.widest)]
         first_step = g.register("first_step", lambda u: u > limits[0], u)
         words = {
@@ -141,7 +141,11 @@ class BisectionUnit(PipelinedUnit):
         x = g.register("x", operand, first_step, cosine, angle)
         # A multiplier has two signed operands of 18 bits; wired shifts align them.
         product = g.multiply(
-            "product_top", x, first_step, right=lambda first: coefficient(p, p.steps, first).scale(1)
+            "product_top",
+            x,
+            first_step,
+            right=lambda first: coefficient(p, p.steps, first).scale(1),
+            formula=f"c_{p.steps}·x",
         )
         for power in range(p.steps - 1, 0, -1):
 
@@ -149,14 +153,16 @@ class BisectionUnit(PipelinedUnit):
                 added = coefficient(p, power, first)
                 return (product.scale(-1).round_half_up(18) + added).wrap(p.SUM_FORMAT)
 
-            word = g.register(f"total_{power}", total, product, first_step)
+            word = g.register(
+                f"total_{power}", total, product, first_step, formula=f"c_{power} + {product.symbol.text}"
+            )
             product = g.multiply(f"product_{power}", x, word, right=lambda total: total.scale(1))
 
         def factor(product, first):
             added = coefficient(p, 0, first)
             return (product.scale(-1).round_half_up(19) + added).wrap(p.FACTOR_FORMAT)
 
-        e = g.register("e", factor, product, first_step)
+        e = g.register("e", factor, product, first_step, formula=f"c_0 + {product.symbol.text}")
         for c in range(3):
             half_sum = g.register(f"half_sum_{c}", lambda a, b, c=c: (a[c] + b[c]).scale(-1), a, b)
             product = g.multiply(

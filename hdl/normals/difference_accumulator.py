@@ -20,9 +20,12 @@ class AccumulatorUnit(wiring.Component):
 
     `DifferenceAccumulator`, the bit-accurate model of each quadratic, has formats, rounding and bounds.
 
-    A span of m pixels gives its first values 2 cycles after it was taken in and others in each of the m - 1
-    cycles that follow, unless the output waits. The next span is taken in early enough to leave no gap. A
+    A span of m pixels gives its first values 3 cycles after it was accepted and others in each of the m - 1
+    cycles that follow, unless the output waits. The next span is accepted early enough to leave no gap. A
     span of length 0 takes one cycle and gives nothing. No multipliers.
+
+    The accumulators take the words of a span in a cycle after it was accepted, so that a register drives all
+    that take them in.
 
     Parameters
     ----------
@@ -33,8 +36,8 @@ class AccumulatorUnit(wiring.Component):
     ports : mapping of str to Member, optional
         Further members, by name.
 
-    A subclass may carry further words of a span to its pixels; see `carried`. It may take the words of a span
-    in later than its length; see `load`.
+    A subclass may carry further words of a span to its pixels; see `carried`. Its words may come from
+    elsewhere, a cycle after the length; see `hold`.
 
     Members
     -------
@@ -46,7 +49,7 @@ class AccumulatorUnit(wiring.Component):
     Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.10.
     """
 
-    latency = 2
+    latency = 3
 
     def __init__(
         self,
@@ -70,21 +73,21 @@ class AccumulatorUnit(wiring.Component):
     @property
     def span(self) -> data.View:
         """Words of the span that is taken in."""
-        return self.i.payload
+        return self._span
 
-    def load(self, m: Module, advance: Value, active: Value) -> tuple[Value, Value]:
-        """Whether the words of a span are taken in on this cycle, and whether the accumulators have a pixel.
+    def hold(self, m: Module, load: Value) -> None:
+        """Keep the words of a span that is accepted, for the cycle on which they are taken in.
 
         Parameters
         ----------
         m : Module
-            Module that gets the logic.
-        advance : Value
-            Whether the accumulators move.
-        active : Value
-            Whether there is a pixel, a cycle after a span was accepted and on those that follow.
+            Module that gets the register.
+        load : Value
+            Whether they are taken in on this cycle.
         """
-        return self.i.valid & self.i.ready, active
+        self._span = Signal(self.i.payload.shape(), name="span", reset_less=True)
+        with m.If(self.i.ready):
+            m.d.sync += self._span.eq(self.i.payload)
 
     @classmethod
     def begin(cls, parameters: DifferenceAccumulator, start: FixedValue) -> FixedValue:
@@ -106,9 +109,15 @@ class AccumulatorUnit(wiring.Component):
             advance.eq(skid_buffer(m, self.o, valid, values)),
             self.i.ready.eq(advance & ends),
         ]
-        load, present = self.load(m, advance, active)
+        accepted, present, load = Signal(name="accepted"), Signal(name="present"), Signal()
         with m.If(advance):
-            m.d.sync += valid.eq(present)
+            m.d.sync += [
+                accepted.eq(self.i.valid & self.i.ready),
+                present.eq(active),
+                valid.eq(present),
+            ]
+        m.d.comb += load.eq(accepted & advance)
+        self.hold(m, load)
         for index, (word, result) in enumerate(self.carried(values)):
             of_span = Signal(len(word), name=f"carried_{index}")
             with m.If(load):
@@ -157,7 +166,7 @@ class DifferenceAccumulatorUnit(AccumulatorUnit):
 
     def quadratics(self, values):
         """The components of the normal."""
-        span = self.i.payload
+        span = self.span
         for c in range(3):
             operands = span.start[c], span.first[c], span.second[c]
             yield f"normal_{c}", self.parameters, operands, values[c]

@@ -1,5 +1,7 @@
 """Dot-product unit ([T] figure 2.5): three multipliers and an adder tree."""
 
+from typing import ClassVar
+
 from amaranth.lib import data
 
 from blysk.golden.normals.dot_product import DotProduct
@@ -30,6 +32,13 @@ class DotProductUnit(PipelinedUnit):
 
     Source: docs/theory/interpolation.md#dot-product; [T] figure 2.5.
     """
+
+    FORMULAS: ClassVar[dict[str, str]] = {
+        r"product_(\d)": r"a_\1·b_\1",
+        "partial_sum": "a_0·b_0 + a_1·b_1",
+        "last_product": "a_2·b_2",
+        "sum": "a·b",
+    }
 
     def __init__(self, parameters: DotProduct | None = None):
         self.parameters = parameters or DotProduct()

@@ -1,5 +1,7 @@
 """G/P/Q unit ([T] figure 2.8): adders and wired shifts."""
 
+from typing import ClassVar
+
 from amaranth.hdl import Signal
 from amaranth.lib import data
 
@@ -43,6 +45,16 @@ class GPQUnit(PipelinedUnit):
 
     Source: docs/theory/interpolation.md#quadratic-normals; [T] figure 2.8.
     """
+
+    FORMULAS: ClassVar[dict[str, str]] = {
+        r"ends_(\d)": r"2·(N_l + N_r)_\1",
+        r"four_middle_(\d)": r"4·N_m_\1",
+        r"rise_(\d)": r"4·N_m_\1 − N_r_\1",
+        r"three_left_(\d)": r"3·N_l_\1",
+        r"g_sum_(\d)|g_(\d)": "G = 2·(N_l + N_r) − 4·N_m",
+        r"p_sum_(\d)|p_(\d)": "P = 4·N_m − N_r − 3·N_l",
+        "q_.*": "Q = N_l",
+    }
 
     def __init__(self, parameters: GPQ | None = None):
         self.parameters = parameters or GPQ()

@@ -115,7 +115,7 @@ class MiddleNormalUnit(PipelinedUnit):
                 e = e + FixedValue.constant(p.factor_format, constant)
             return e.saturate(p.factor_format)
 
-        e = g.register("e", factor, product)
+        e = g.register("e", factor, product, formula=f"c_0 + {product.symbol.text}")
         words = {"normal_left": left, "normal_right": right, "out_of_range": out_of_range}
         for c in range(3):
             half_sum = g.register(

@@ -1,5 +1,7 @@
 """Renormaliser: a vector of any length divided by its length, one in every cycle."""
 
+from typing import ClassVar
+
 from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
 from amaranth.lib import data
 from amaranth.lib.memory import Memory
@@ -42,6 +44,18 @@ class RenormaliserUnit(PipelinedUnit):
 
     Source: docs/theory/interpolation.md#renormaliser.
     """
+
+    FORMULAS: ClassVar[dict[str, str]] = {
+        "square_term": "c_2·x",
+        "slope": "c_1 − c_2·x",
+        "linear_term": "x·(c_1 − c_2·x)",
+        "r": "r = c_0 − x·(c_1 − c_2·x)",
+        r"x_\d+": "x",
+        r"c(\d)_\d+": r"c_\1",
+        r"product_(\d)": r"r·w_\1",
+        r"(rounded|normal)_(\d)": r"N_\2",
+        r"word_(\d)_\d+": r"w_\1",
+    }
 
     def __init__(self, parameters: Renormaliser | None = None):
         self.parameters = parameters or Renormaliser()

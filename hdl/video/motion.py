@@ -1,5 +1,7 @@
 """Motion: the matrices of meshes that turn, by a table of sines."""
 
+from typing import ClassVar
+
 from amaranth.hdl import Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.memory import Memory
@@ -50,6 +52,11 @@ class MotionUnit(wiring.Component):
     """
 
     multipliers = 1
+
+    FORMULAS: ClassVar[dict[str, str]] = {
+        "product": "a·b",
+        "total": "Σ a·b",
+    }
 
     def __init__(self, parameters: Motion):
         self.parameters = parameters

@@ -7,10 +7,11 @@ from blysk.golden.geometry.reciprocal import Reciprocal
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, Grid
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.video.vertex_unit import ENTRY, OFFSET, VertexTransform
-from blysk.hdl.core.dataflow import Dataflow, Word
+from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word
 from blysk.hdl.geometry.reciprocal import reciprocal_word, shared_table
 from blysk.hdl.geometry.wide_product import wide_product
 

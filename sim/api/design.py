@@ -19,7 +19,7 @@ from blysk.golden.reference.scene import BACK_FACES
 from blysk.golden.render import Renderer
 from blysk.hdl.bus.bus import BusUnit
 from blysk.hdl.bus.tops import TOPS
-from blysk.hdl.emit.verilog import emit
+from blysk.hdl.emit.verilog import check_name, emit
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.methods.interpolator import spelled
 from blysk.hdl.methods.registry import unit_of
@@ -368,6 +368,10 @@ def verilog_and_unit(
     top, bus = _top_and_bus(chosen, top, bus)
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise OptionError("name", name, "no Verilog name", "use letters, digits and underscores")
+    try:
+        check_name(name)
+    except ValueError as error:
+        raise OptionError("name", name, str(error), "choose another name") from None
     hardware = TOPS[top].takes_triangles
     checked({"pipes": pipes, "setups": setups}, PIPES | SETUPS)
     if setups > 1 and not hardware:
@@ -408,7 +412,4 @@ def verilog_and_unit(
     else:
         header = [*lines, "", "Frame constants, through the write port:", *words]
         descriptions = _descriptions(unit, pipes)
-    try:
-        return emit(unit, name, header=header, descriptions=descriptions), unit
-    except ValueError as error:
-        raise OptionError("name", name, str(error), "choose another name") from None
+    return emit(unit, name, header=header, descriptions=descriptions), unit

@@ -314,6 +314,27 @@ class Record:
             if not stimulus.variants or variant in stimulus.variants
         }
 
+    def example(self, variant: str, unit: Component, results: int = 3) -> UnitRun:
+        """As few beats of a variant's first stimulus as have some results: what shows the unit's times.
+
+        Parameters
+        ----------
+        variant : str
+            Its name.
+        unit : Component
+            Of that variant.
+        results : int
+            Output beats, at least, if `PAUSED` beats have so many.
+        """
+        make = next(iter(self.stimuli_of(variant).values())).make
+        case = make(unit, np.random.default_rng(2026), 200)
+        for count in (results, 2 * results, 4 * results, 8 * results, PAUSED):
+            few = Case(first(case.beats, count), case.constants, case.write)
+            expected = self.expect(unit, few)
+            if length_of(expected) >= results:
+                break
+        return UnitRun(few, expected, None, {})
+
     def runs(self, unit: Component, stimulus: str, seed: int = 2026) -> Iterator[UnitRun]:
         """The runs of a stimulus, always the same ones: without stalls, with them, and with pauses.
 

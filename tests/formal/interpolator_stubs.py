@@ -16,6 +16,7 @@ import blysk.hdl.normals.difference_accumulator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.core.stream import connect_slice
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.lighting.value_gate import ValueGateUnit
@@ -248,6 +249,12 @@ def replace_parts(monkeypatch) -> None:
         (blysk.hdl.methods.recurrence_interpolator, "RecurrenceSetupUnit", recurrence_setup, 3),
     ):
         monkeypatch.setattr(module, name, short(getattr(module, name), hand_on, latency))
+    # Of the same capacity and latency, by the same claims of a stream: proofs of a wide memory take long.
+    for module in ("linear", "quadratic", "renormalise"):
+        monkeypatch.setattr(
+            f"blysk.hdl.methods.{module}_interpolator.connect_wide_fifo",
+            lambda m, name, source, sink: connect_slice(m, source, sink),
+        )
     monkeypatch.setattr(DifferenceAccumulatorUnit, "quadratics", walk(start, normal))
     monkeypatch.setattr(LineAccumulatorUnit, "quadratics", walk(line_start, line_vector))
     monkeypatch.setattr(ChordAccumulatorUnit, "quadratics", walk(light_start, cosine))

@@ -31,7 +31,7 @@ class Narrow(AccumulatorUnit):
         super().__init__(data.StructLayout(start | words), FixedShape(FORMATS.result_format))
 
     def quadratics(self, values):
-        span = self.i.payload
+        span = self.span
         yield "value", FORMATS, (span.start, span.first, span.second), values
 
 
@@ -41,8 +41,8 @@ def of_pixels():
     h = Harness(unit)
     span = unit.i.payload
     stays(h, unit.o)
-    # Two spans inside at most: what waits, the values, and what the sums stand at.
-    owed = pixels_follow(h, unit.i, unit.o, span.length, 2 + (1 << LENGTH_BITS) - 1)
+    # Three spans inside at most: what waits, the values, what the sums stand at, and what they take in.
+    owed = pixels_follow(h, unit.i, unit.o, span.length, 3 + (1 << LENGTH_BITS) - 1)
     answers(h, owed.any(), taken(unit.o), unit.latency - 1, unit.o.ready)
     answers(h, unit.i.valid, unit.i.ready, (1 << LENGTH_BITS) - 1, unit.o.ready)
     return h
@@ -51,7 +51,7 @@ def of_pixels():
 def test_pixels_are_as_many_as_asked_for(prove):
     """Inductive, lengths 0 to 7: what waits stays, as many values leave as the lengths say, no deadlock.
 
-    While the output is ready, the first value leaves 2 cycles after its span was taken, then one every clock,
+    While the output is ready, the first value leaves 3 cycles after its span was taken, then one every clock,
     and a span is taken at the latest when the one before it has had a clock for each pixel.
     """
     prove(of_pixels())
@@ -69,45 +69,56 @@ def of_sums(unit):
     have fewer bits, every one from a pixel to the next is in theirs.
     """
     h = Harness(unit)
-    m, span = h.m, unit.i.payload
-    waits, active, valid = stays(h, unit.o), Signal(), Signal()
-    left = Signal(len(span.length))
-    load = taken(unit.i)
+    m, length, comes = h.m, unit.i.payload.length, taken(unit.i)
+    waits, entered, active, present, valid = stays(h, unit.o), Signal(), Signal(), Signal(), Signal()
+    # Pixels left of the span that was accepted last, and of that whose words the sums have.
+    left, at = Signal(len(length)), Signal(len(length))
     m.d.comb += active.eq(left.any())
-    with m.If(load):
-        m.d.sync += left.eq(span.length)
+    with m.If(comes):
+        m.d.sync += left.eq(length)
     with m.Elif(~waits & active):
         m.d.sync += left.eq(left - 1)
     with m.If(~waits):
-        m.d.sync += valid.eq(active)
+        m.d.sync += [entered.eq(comes), at.eq(left), present.eq(active), valid.eq(present)]
+    load = entered & ~waits
     h.claim(unit.o.valid == (valid | waits))
-    h.claim(h.register("active") == active)
+    h.claim((h.register("active") == active) & (h.register("present") == present))
+    h.claim(present == at.any())
+    h.claim(h.register("accepted") == entered)
     h.claim(~active | (h.register("remaining") == left))
     h.claim(h.register("ends") == (left <= 1))
+    if "words" not in unit.signature.members:
+        kept = Signal.like(Value.cast(unit.i.payload), name="kept")
+        with m.If(comes):
+            m.d.sync += kept.eq(Value.cast(unit.i.payload))
+        h.claim(~entered | (Value.cast(unit.span) == kept))
     for name, p, operands, found in unit.quadratics(unit.o.payload):
-        width = p.format.width + 2 * len(span.length)
+        width = p.format.width + 2 * len(length)
         exact, change, bend = (
             Signal(signed(width), name=f"{name}_{word}") for word in ("exact", "change", "bend")
         )
         start, first, second = (Value.cast(operand) for operand in operands)
         shift = p.format.fraction_bits - p.start_format.fraction_bits
         cut = p.format.fraction_bits - p.result_format.fraction_bits
+        # The chord method adds the half of a step, where it would take a sum to begin with, to the result.
+        half = 1 << (cut - 1)
+        late = half if "words" in unit.signature.members and shift < cut else 0
         with m.If(load):
             m.d.sync += [
-                exact.eq((start << shift) + (1 << (cut - 1))),
+                exact.eq((start << shift) + half - late),
                 change.eq(first),
                 bend.eq(second),
             ]
         with m.Elif(~waits):
             m.d.sync += [exact.eq(exact + change), change.eq(change + bend)]
-        h.assume(~active | fits(exact, p.format))
+        h.assume(~present | fits(exact, p.format))
         if p.difference_format.width < p.format.width:
-            h.assume((left <= 1) | fits(change, p.difference_format))
+            h.assume((at <= 1) | fits(change, p.difference_format))
         words = (name, exact), (f"{name}_difference", change), (f"{name}_second_difference", bend)
         for register, model in words:
             code = Value.cast(h.register(register))
-            h.claim(~active | (code.as_unsigned() == model[: len(code)]))
-        rounded, result = exact >> cut, p.result_format
+            h.claim(~present | (code.as_unsigned() == model[: len(code)]))
+        rounded, result = (exact + late) >> cut, p.result_format
         value = Signal(signed(width), name=f"{name}_value")
         with m.If(~waits):
             raised = Mux(rounded < result.min_code, result.min_code, rounded)
@@ -138,10 +149,10 @@ BUGS = {
         "difference + second_difference).wrap(p.difference_format)",
         "difference).wrap(p.difference_format)",
     ),
-    "no half step": ("(start + half_step).wrap(p.format)", "start.extend(p.format)"),
+    "no half step": ("self.begin(p, start).wrap(p.format)", "start.extend(p.format)"),
     "wraps": (".saturate(p.result_format)", ".wrap(p.result_format)"),
     "sums while it is stalled": ("m.Elif(advance)", "m.Else()"),
-    "a cycle late": ("valid.eq(active)", "valid.eq(active & ~ends)"),
+    "a cycle late": ("valid.eq(present)", "valid.eq(present & ~ends)"),
 }
 
 

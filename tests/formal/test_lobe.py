@@ -139,13 +139,30 @@ def of_term(parameters):
     return h.harness
 
 
+def written(h):
+    """Whether there was a write on the clock before, its value, and whether a bank began with it."""
+    offered = h.unit.write
+    write, value, begins = (
+        Signal(bits, name=name) for bits, name in ((1, "write"), (17, "came"), (1, "new"))
+    )
+    h.m.d.sync += [
+        write.eq(offered.valid & offered.ready),
+        value.eq(offered.payload.value),
+        begins.eq(offered.payload.begins),
+    ]
+    h.claim(h.register("follows") == (write & ~begins))
+    h.claim(h.register("begins") == (write & begins))
+    h.claim(~write | (h.register("value") == value))
+    return write, value, begins
+
+
 def of_banks(parameters):
     """A word that is written is of the bank whose table began last."""
     p, unit = parameters, LobeMemory(parameters)
     h = Harness(unit)
-    bank = Signal(17, name="bank")
-    with h.m.If(unit.write.valid & unit.write.payload.begins):
-        h.m.d.sync += bank.eq(unit.write.payload.value)
+    bank, (write, value, begins) = Signal(17, name="bank"), written(h)
+    with h.m.If(write & begins):
+        h.m.d.sync += bank.eq(value)
     address, last = h.register("address"), h.register("last")
     within = Const(0)
     for index in range(p.banks):
@@ -172,23 +189,23 @@ def of_memory(parameters):
     for index in range(p.banks):
         with m.If(own_bank == index):
             m.d.comb += address.eq(index * p.entries + own_entry)
-    write, payload = unit.write.valid & unit.write.ready, unit.write.payload
+    write, value, begins = written(h)
     to, count, previous = Signal(17, name="to"), Signal(range(p.entries + 2)), Signal(17, name="before")
     word, known, begun = Signal(35, name="own_word"), Signal(name="known"), Signal(name="begun")
-    with m.If(write & payload.begins):
-        m.d.sync += [to.eq(payload.value), count.eq(0), begun.eq(1)]
+    with m.If(write & begins):
+        m.d.sync += [to.eq(value), count.eq(0), begun.eq(1)]
     with m.Elif(write):
-        m.d.sync += [previous.eq(payload.value), count.eq(Mux(count > p.entries, count, count + 1))]
+        m.d.sync += [previous.eq(value), count.eq(Mux(count > p.entries, count, count + 1))]
         # Nothing is known of a table that has not begun; at power-up none has.
         with m.If((to == own_bank) & (count == own_entry + 1) & begun & chosen):
-            difference = (payload.value - previous)[:18]
+            difference = (value - previous)[:18]
             m.d.sync += [word.eq(Cat(previous, difference)), known.eq(1)]
     # Two clocks with enable, on neither of which a word is written.
     asked, answer = Signal(2, name="asked"), Signal(35, name="answer")
     read, wrote = unit.reads[0], Signal(name="wrote")
-    moves = read.enable & ~unit.write.valid & ~wrote
+    moves = read.enable & ~write & ~wrote
     m.d.sync += [
-        wrote.eq(unit.write.valid),
+        wrote.eq(write),
         asked.eq(Cat(moves & (read.address == address) & known, asked[0] & moves)),
         answer.eq(Mux(asked[0], answer, word)),
     ]
@@ -360,8 +377,8 @@ BUGS = {
         of_memory,
         LobeMemory,
         "_write",
-        "write.value - previous",
-        "previous - write.value",
+        "(value - previous)",
+        "(previous - value)",
     ),
 }
 

@@ -7,6 +7,7 @@ from amaranth.hdl import Cat, Module, Mux, Signal, unsigned
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
+import blysk.hdl.core.memory
 import blysk.hdl.core.stream
 from blysk.hdl.core.stream import PipelinedUnit, connect_slice
 
@@ -60,6 +61,12 @@ def registered(m, number, source, sink):
 def buffered(depth):
     return lambda m, number, source, sink: blysk.hdl.core.stream.connect_fifo(
         m, f"buffer_{number}", source, sink, depth
+    )
+
+
+def kept(depth):
+    return lambda m, number, source, sink: blysk.hdl.core.memory.connect_wide_fifo(
+        m, f"kept_{number}", source, sink, depth
     )
 
 
@@ -147,6 +154,27 @@ def test_bugs_of_a_buffer_are_found(refute, inject, bug):
     refute(of_stream(Chain(buffered(3)), 3, 1, 1))
 
 
+@pytest.mark.parametrize("depth", [2, 3, 4])
+def test_wide_buffer(prove, depth):
+    """Inductive: the claims of a stream; ``depth`` beats inside, a cycle through."""
+    prove(of_stream(Chain(kept(depth)), depth, 0, 1))
+
+
+WIDE_BUFFER_BUGS = {
+    "what waits is dropped": ("some & sink.ready", "some"),
+    "it takes in what it has no room for": ("room.eq(following != depth)", "room.eq(1)"),
+    "what waits is written over": ("write.en.eq(room)", "write.en.eq(1)"),
+    "a beat is given that was not taken in": ("source.valid & room", "room"),
+}
+
+
+@pytest.mark.parametrize("bug", WIDE_BUFFER_BUGS)
+def test_bugs_of_a_wide_buffer_are_found(refute, inject, bug):
+    """Injected in `connect_wide_fifo`, each refutes the claims of a stream."""
+    inject(blysk.hdl.core.memory, "connect_wide_fifo", *WIDE_BUFFER_BUGS[bug])
+    refute(of_stream(Chain(kept(2)), 2, 0, 1))
+
+
 def test_a_proof_of_too_few_cycles_is_found(prove):
     """Nothing that waited leaves in 6 cycles of a unit of 4: what is lost then is not seen."""
     with pytest.raises(AssertionError, match="nothing moves on in 6 cycles"):
@@ -155,9 +183,9 @@ def test_a_proof_of_too_few_cycles_is_found(prove):
 
 SKID_BUFFER_BUGS = {
     "drops what it holds": ("Mux(held, spare, Value.cast(payload))", "payload"),
-    "moves while it holds": ("return ~held", "return Value.cast(1)"),
+    "moves while it holds": ("return moves", "return Value.cast(1)"),
     "forgets that it holds": ("held | valid", "valid"),
-    "takes in while it holds": ("m.If(~held)", "m.If(1)"),
+    "takes in while it holds": ("m.If(moves)", "m.If(1)"),
     "holds what was taken": ("output.valid & ~output.ready", "output.valid"),
     "holds through a reset": ('name="held"', 'name="held", reset_less=True'),
 }
@@ -220,11 +248,11 @@ def test_pixel_counter(prove):
 
 
 COUNTER_BUGS = {
-    "a span of no pixels ends never": ("length <= 1", "length == 1"),
-    "a span of no pixels has one": ("length != 0", "1"),
+    "a span of no pixels ends never": ("~(valid & length[1:].any())", "(length == 1)"),
+    "a span of no pixels has one": ("valid & length.any()", "valid"),
     "it counts while it is stalled": ("m.If(advance)", "m.If(1)"),
     "it ends a pixel early": ("remaining == 2", "remaining == 3"),
-    "it never stops": ("active.eq(valid & (length != 0))", "active.eq(active | valid)"),
+    "it never stops": ("active.eq(valid & length.any())", "active.eq(active | valid)"),
 }
 
 

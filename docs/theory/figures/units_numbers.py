@@ -3,22 +3,32 @@
 import math
 from collections.abc import Callable
 from itertools import chain
+from typing import cast
 
 import numpy as np
 from markdown import table
 
 from blysk.bench.accuracy import scene_for
+from blysk.bench.report.cosine_quadratic_figures import sphere
 from blysk.bench.report.errata import ERRATA
 from blysk.bench.report.lobe import CASES, errors_of_size
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.compare import compare_image
+from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import MAX_INTENSITY, Intensity
+from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.presets import METHODS, MODELS, preset
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.light import Light
+from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.reflection import COSQUAD
+from blysk.golden.reference.scene import Scene
 from blysk.sim.meshes.teapot import teapot
 
 
@@ -45,10 +55,14 @@ def _errors() -> str:
     arguments = _arguments()
     nothing = np.zeros(arguments.codes.shape, dtype=bool)
     rows = []
-    for name in ("cosquad", "lyon2", "lyon3", "exp", "coscos2", "coscos4", "blinn"):
+    for name in ("cosquad", "lyon2", "lyon3", "exp", "coscos2", "coscos4", "blinn_product"):
         model = MODELS[name]
-        unit = Power("one_minus_cosine") if name == "blinn" else Specular(model.model, "one_minus_cosine")
-        bound = unit.ERROR if name == "blinn" else unit.error
+        unit = (
+            Power("one_minus_cosine")
+            if name == "blinn_product"
+            else Specular(model.model, "one_minus_cosine")
+        )
+        bound = unit.ERROR if name == "blinn_product" else unit.error
         worst = 0.0
         for n in (1, 2, 3, 10, 100, 513, 1000):
             found = unit.compute(arguments, nothing, n).values
@@ -63,7 +77,7 @@ def _errors() -> str:
 def _thresholds() -> str:
     exponents = (1, 2, 3, 10, 100, 1000)
     rows = []
-    for name in ("cosquad", "lyon3_refitted", "exp", "blinn"):
+    for name in ("cosquad", "lyon3_refitted", "exp", "blinn_product"):
         gate = HighlightGate(MODELS[name], interpolator=METHODS["quadratic"])
         level = np.sqrt(gate.thresholds.values[list(exponents)])
         angle = np.degrees(np.arccos(np.minimum(level, 1)))
@@ -81,13 +95,13 @@ def _lit() -> str:
     for exponent in (2, 10, 50, 200, 1000):
         scene = scene_for(teapot(10_000), exponent, 320, 240)
         row = [str(exponent)]
-        for name in ("cosquad", "blinn"):
+        for name in ("cosquad", "blinn_product"):
             design = preset("chord", name, gate=True)
             spans = prepare(scene, design).spans
             lit = design.lit_spans(spans, FrameConstants.of(scene))
             row.append(f"{lit.mean():.1%}")
         rows.append(row)
-    return table(["n", "spans let through, `cosquad`", "`blinn`"], rows, 0)
+    return table(["n", "spans let through, `cosquad`", "`blinn_product`"], rows, 0)
 
 
 def arc_maximum_error(count: int = 2000) -> float:
@@ -178,6 +192,44 @@ def _lobe_unit() -> str:
     return table(["E, M", "words", *heads], rows)
 
 
+_SHARP = (0.05, 0.07, 0.1)
+"""Roughnesses of lobes that are sharp."""
+
+_LIGHTS = 10
+"""Frames of a cell in the table of sharp lobes, one light each."""
+
+
+def _sharp_lobes() -> str:
+    """Largest method error, and pieces a span, without and with the scale of a sharp lobe."""
+    rows = []
+    triangle = Mesh(
+        np.array([(-1, -0.8, 0), (1.1, -0.6, 0.1), (-0.1, 1, 0)]),
+        np.array([(0, 1, 2)]),
+        normalise(np.array([(-0.35, -0.3, 1), (0.4, -0.2, 1), (0, 0.45, 1)])),
+    )
+    meshes = {"sphere": sphere(16), "teapot": teapot(1000), "one triangle": triangle}
+    towards = np.random.default_rng(2026).normal((0, 0, 1), 1, (_LIGHTS, 3))
+    for name, mesh in meshes.items():
+        count = len(mesh.faces)
+        camera = Camera.framing(mesh.vertices, (0.2, 0.3, 1), "orthographic", 4 / 3)
+        for roughness in _SHARP:
+            material = Material((0.05,) * 3, (0.4, 0.3, 0.2), (0.55, 0.5, 0.6), 50, roughness)
+            scaled = [preset(method, "ggx").for_materials([material]) for method in ("chord", "chord-local")]
+            cells = []
+            for design in (preset("chord", "ggx"), *scaled):
+                errors, pieces = [], []
+                for light in towards:
+                    scene = Scene(mesh, camera, 160, 120, material, (Light(tuple(light)),))
+                    frame = model_frame(scene, design)
+                    errors.append(compare_image(scene, design, frame.image).method_error.max_lsb)
+                    pieces.append(frame.spans / len(frame.raster.length))
+                cells.append(f"{max(errors):.2f}, {np.mean(pieces):.2f}")
+            scale = cast(Lobe, scaled[0].specular).scale
+            title = name if count == 1 else f"{name}, {count:,}"
+            rows.append([title, f"{roughness:g}", *cells, str(scale)])
+    return table(["mesh, triangles", "r", "`chord`, s = 0", "`chord`, s", "`chord-local`, s", "s"], rows)
+
+
 def _sentences() -> list[str]:
     squared = 20 / 2 * (math.cos(math.radians(60)) - 1) + 1
     assert squared**2 == ERRATA["second-lobe"].evidence()[0]
@@ -185,10 +237,7 @@ def _sentences() -> list[str]:
     largest = Intensity.COLOR_FORMAT.max_code * Intensity.COLOR_FORMAT.step
     difference = arc_maximum_error()
     assert difference < 1e-6
-    found = [
-        HighlightGate(Specular(), interpolator=METHODS[name]).margin * 2**17
-        for name in ("quadratic", "chord")
-    ]
+    margin = HighlightGate(Specular(), interpolator=METHODS["quadratic"]).margin * 2**17
     entries = _largest_amplification()
     return [
         f"n = 20 and gamma = 60° the square is {squared**2:.0f}",
@@ -196,7 +245,7 @@ def _sentences() -> list[str]:
         f"`CUTOFF^2 = 2^-14`, {255 * 2.0**-14:.3f} LSB at intensity 1 and "
         f"{MAX_INTENSITY * 255 * 2.0**-14:.3f} LSB at the largest, {MAX_INTENSITY}",
         f"up to {largest:.2f} LSB",
-        f"{found[0]:.0f} steps of 2^-17 for `quadratic`",
+        f"{margin:.0f} steps of 2^-17 for `quadratic`",
         f"`{entries[1]:.2f} * 2^-17`, at n = {entries[0]}",
         f"at most `6 * 2^-17`, {255 * 6 * 2.0**-17:.3f} LSB at intensity 1",
     ]
@@ -234,5 +283,6 @@ TABLES: dict[str, Callable[[], str]] = {
     "gate-shares": _lit,
     "lobes": _lobes,
     "lobe-unit": _lobe_unit,
+    "sharp-lobes": _sharp_lobes,
 }
 SENTENCES: dict[str, Callable[[], list[str]]] = {"units.md": _sentences}

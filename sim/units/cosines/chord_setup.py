@@ -231,6 +231,25 @@ RECORD = Record(
     },
     axis="pixel of the span",
     logarithmic=True,
+    waivers=dict.fromkeys(
+        (
+            "diffuse_0_first_order",
+            "diffuse_0_rise",
+            "diffuse_0_slope",
+            "highlight_0_first",
+            "highlight_0_second",
+            "shift",
+        ),
+        "Inverted every second cycle, and read in those cycles only.",
+    )
+    | dict.fromkeys(
+        ("highlight_0_slope_out_of_range", "out_of_range"),
+        "Written too often, but read only on the cycle after that on which it is to be written.",
+    )
+    | {
+        "multiplier_1_1": "A reciprocal and its square are normalised: the first bit is 1 already.",
+        "o__payload": "A second difference is twice a number: its last bit is 0 already.",
+    },
     still={
         "twice a number is even": "{diffuse,highlight}_0_second[0] top.spare[47] top.spare[141]",
         "a reciprocal is normalised, and so is its square, so that the first bit is 1": (

@@ -116,10 +116,10 @@ def _last_bits(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """Far from every highlight, with a bulge or a rise a few codes about the largest that is held."""
+    """Far from every highlight, with a bulge or a rise off the largest that is held by up to 3 of any bit."""
     p, shape = unit.parameters, (count, unit.lights)
     left = rng.integers(FORMAT.max_code // 2, FORMAT.max_code // 4 * 3, shape)
-    off = rng.integers(-3, 4, (2, *shape)) << rng.integers(0, 12, (2, *shape))
+    off = rng.integers(-3, 4, (2, *shape)) << rng.integers(0, 22, (2, *shape))
     bulge = rng.choice([-1, 1], shape) * (p.LARGEST_BULGE + off[0])
     rise = rng.choice([-1, 1], shape) * (p.LARGEST_RISE + off[1])
     which = rng.integers(0, 3, shape)
@@ -174,6 +174,9 @@ RECORD = Record(
     },
     axis="n u in the middle of the span",
     logarithmic=True,
+    waivers={
+        "threshold": "Inverted by its first bit, which no exponent sets: its threshold would be 4 or more."
+    },
     still={
         "the exponent stays for a run, so that what follows from it does not fall": (
             "threshold[0-16] thresholds.port__data[0-16]"

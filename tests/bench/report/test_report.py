@@ -135,7 +135,8 @@ def test_every_axis_is_explained():
 def test_files(tmp_path, points_section, plain_section):
     folder = tmp_path / "report"
     write_report(folder, [points_section, plain_section], ABOUT)
-    names = {"index.html", "report.json", "points.csv", "front.csv", "fronts.csv", "graded.csv", "long.csv"}
+    tables = {"points.csv", "front.csv", "fronts.csv", "graded.csv", "long.csv"}
+    names = {"index.html", "report.json", "front.svg", *tables}
     assert {path.name for path in folder.iterdir()} == names
     with (folder / "graded.csv").open(newline="") as file:
         assert list(csv.reader(file)) == [

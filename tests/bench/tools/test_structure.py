@@ -11,12 +11,15 @@ from amaranth.lib.wiring import Component, In, Out
 
 from blysk.bench.tools.drawing import _WIDEST, _bands, _Layout, draw_structure
 from blysk.bench.tools.graph import Graph, Node, layers
-from blysk.bench.tools.netlist import describe_shape
+from blysk.bench.tools.netlist import Netlist, describe_shape
 from blysk.bench.tools.structure import graph_of
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
 from blysk.hdl.core.fixed import SQ
+from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.geometry.edge_setup import EdgeSetupUnit
 from blysk.hdl.lighting.light import LightUnit
+from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SpecularUnit
 from blysk.hdl.normals.bisection import BisectionUnit
 from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
@@ -207,7 +210,37 @@ def test_large_structures_are_cut_down():
     few = graph_of(BisectionUnit(), most=1)
     assert len(few.nodes) < len(structure_of(BisectionUnit).nodes)
     assert {node.name for node in few.nodes.values()} >= {"normal_a", "normal_b", "out_of_range"}
-    assert all(node.kind != "register" or node.operations["×"] for node in few.nodes.values())
+    assert all(node.kind != "register" or +node.operations for node in few.nodes.values())
+
+
+ADDERS = [
+    PowerUnit,
+    *(pytest.param(unit, marks=pytest.mark.long) for unit in (AngularSetupUnit, EdgeSetupUnit)),
+]
+
+
+@pytest.mark.parametrize("unit", ADDERS)
+def test_every_adder_is_drawn(unit):
+    """Those that count the cycles of a unit are control."""
+
+    def adders(graph):
+        return sum(node.copies * node.operations[s] for node in graph.nodes.values() for s in ("+", "−"))
+
+    assert adders(structure_of(unit)) >= 0.9 * adders(Netlist(unit()).graph)
+
+
+def test_boxes_have_formulas():
+    nodes = structure_of(BisectionUnit).nodes.values()
+    shown = {node.name: node.formulas for node in nodes if node.formulas}
+    assert shown["dot_total"] == ("N_a·N_b",)
+    assert {"N_a,x·N_b,x", "N_a,z·N_b,z"} <= set(shown["multiplier_0_product"])
+    assert shown["half_sum_0"] == ("(N_a,x + N_b,x)/2",)
+    assert shown["u"] == ("u = 1 − N_a·N_b",)
+    # A multiplier that is shared has all its uses; none has the name of its instance alone.
+    assert all(node.formulas for node in nodes if node.operations["×"])
+    assert [node.formulas for node in structure_of(DotProductUnit).nodes.values() if node.name == "sum"] == [
+        ("a·b",)
+    ]
 
 
 def test_loop_leads_back():

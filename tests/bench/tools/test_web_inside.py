@@ -341,6 +341,13 @@ def test_page_fits_its_window(open_page, width, scheme):
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= WIDTHS[width][0]
         assert name == "exponent" or box["height"] >= 24
+    if width == "desktop":
+        # As it opens, its picture, divider and three controls are in sight.
+        page.locator("#close").click()
+        page.evaluate("() => scrollTo(0, 0)")
+        for name in ("frame", "split", "compare", "method", "exponent"):
+            box = page.locator(f"#{name}").bounding_box()
+            assert box["y"] + box["height"] <= WIDTHS[width][1], name
     background = page.evaluate("() => getComputedStyle(document.body).backgroundColor")
     dark = sum(map(int, background[4:-1].split(","))) < 3 * 128
     assert dark == (scheme == "dark")

@@ -135,6 +135,10 @@ def test_frames(method, model, roughness):
         (lambda: preset("chord", "ggx", scale=7), r"^scale must be 0 to 6, not 7$"),
         (lambda: preset("chord", "cosquad", scale=3), r"^a scale of 1 - N·H needs a lobe with a table$"),
         (lambda: Lobe(scale=2), r"^scale must be 0, or more of the operand one_minus_cosine, not 2$"),
+        (
+            lambda: replace(GGX, scale=6).check(GGX.table(0.05)),
+            r"^the table is of 2\^0 u, the unit of 2\^6 u$",
+        ),
         (lambda: ChordValues(-1), r"^scale must be 0 to 6, not -1$"),
     ],
 )
