@@ -48,7 +48,7 @@ read_verilog -lib -specify +/lattice/cells_sim_ecp5.v
 read_verilog -lib +/lattice/cells_bb_ecp5.v
 """
 
-_LAYOUT = ("--placer", "static", "--router", "router2")
+_LAYOUT = ("--placer", "static", "--router", "router2", "--router2-alt-weights")
 """Of nextpnr. The placer makes the shortest wires. Where they are scarce, the other router takes up as many
 as it lays, and does not end on a 25F."""
 

@@ -62,6 +62,8 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
             body = _HEADING.sub(lambda m: f'<{m[1]} id="{slug(m[2])}">{m[2]}</{m[1]}>', body)
             body = _IMAGE.sub(lambda match, at=(name, folder): _image(match, *at, pictures), body)
             body = body.replace("<img ", '<img loading="lazy" ')
+            # The page's rules let no element have a style of its own.
+            body = re.sub(r' style="text-align:(left|center|right)"', r' class="\1"', body)
             body = body.replace("<table>", '<div class="scroll"><table>').replace(
                 "</table>", "</table></div>"
             )

@@ -310,13 +310,16 @@ def highlight_codes(
 ) -> np.ndarray:
     """Operands of a specular unit: most where the term is not 0 or near its end, some at any 1 - cos gamma.
 
-    Of every fourth 1 - cos gamma is drawn by its logarithm, every third is any code, every sixteenth the code
-    of cos gamma = 1, 0 or -1, or one next to it.
+    Of every fourth 1 - cos gamma is drawn by its logarithm, every third is any code, every twelfth off the
+    last lit one by up to 3 of any bit, every sixteenth the code of cos gamma = 1, 0 or -1, or one next to it.
     """
     format = parameters.operand_format
     reach = 1.25 * parameters.last_lit_arguments[exponent] * 2.0**-25
     distance = rng.uniform(0, min(reach, 2), count)
     distance[1::4] = 10.0 ** rng.uniform(-9, 0.3, len(distance[1::4]))
+    border = rng.integers(-3, 4, len(distance[3::12])) << rng.integers(0, 12, len(distance[3::12]))
+    # In the middle of a step, of which the cosine has the more bits.
+    distance[3::12] = (parameters.last_lit_arguments[exponent] + border + 0.5) * 2.0**-25
     if parameters.operand == "cosine":
         one = ONE_SQUARED.codes.item()
         codes = one - np.floor(distance * 2.0**34).astype(np.int64)

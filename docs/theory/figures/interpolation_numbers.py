@@ -8,7 +8,7 @@ import numpy as np
 from markdown import table
 from numpy.polynomial.polynomial import polyval
 
-from blysk.bench.report.errata import FACTOR_PRINTED, ROOT_PRINTED
+from blysk.bench.report.errata_evidence import FACTOR_PUBLISHED, ROOT_PUBLISHED
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.cosines.arccos import SEGMENT_BOUNDS, Arccos
 from blysk.golden.cosines.half_chord import HalfChord
@@ -74,12 +74,12 @@ _ROOT, _FACTOR = (math.sqrt(2), 2.0), (0.0, 1.0)
 
 def _fits() -> str:
     cases = [
-        ("`1/sqrt(2+z)`, z in [sqrt 2, 2]", "printed", reciprocal_root, ROOT_PRINTED[1], _ROOT, "z", 2),
+        ("`1/sqrt(2+z)`, z in [sqrt 2, 2]", "printed", reciprocal_root, ROOT_PUBLISHED[1], _ROOT, "z", 2),
         ("", "least error", reciprocal_root, minimax(reciprocal_root, *_ROOT, 1), _ROOT, "z", 2),
-        ("", "printed", reciprocal_root, ROOT_PRINTED[2], _ROOT, "z", 2),
+        ("", "printed", reciprocal_root, ROOT_PUBLISHED[2], _ROOT, "z", 2),
         ("", "least error", reciprocal_root, minimax(reciprocal_root, *_ROOT, 2), _ROOT, "z", 2),
         ("`h(r)`, r in [0, 1]", "least error", _by_cosine, minimax(_by_cosine, *_FACTOR, 2), _FACTOR, "r", 1),
-        ("", "printed", _by_cosine, FACTOR_PRINTED, _FACTOR, "r", 1),
+        ("", "printed", _by_cosine, FACTOR_PUBLISHED, _FACTOR, "r", 1),
         ("", "least error", _by_cosine, minimax(_by_cosine, *_FACTOR, 3), _FACTOR, "r", 1),
     ]
     for most, terms in ((1.0, 3), (0.5, 2), (0.5, 3)):
@@ -256,7 +256,8 @@ def _sentences() -> list[str]:
         f"too small by {shortcut[0]:.1%} at psi = 10° and by {shortcut[1]:.1%} at 60°",
         f"about {bits[0]:.0f} fraction bits for the first difference and {bits[1]:.0f} for the second",
         f"{2.0**-42 * (4094 + 4094**2 / 2):.1e} after 4,095 pixels with the 42 fraction bits",
-        f"off by at most {Renormaliser.ERROR:.1e}, 2^{math.log2(Renormaliser.ERROR):.1f}",
+        f"off by at most {Renormaliser.LENGTH_ERROR:.1e}, 2^{math.log2(Renormaliser.LENGTH_ERROR):.1f}",
+        f"its direction by at most 2^{math.log2(Renormaliser.DIRECTION_ERROR):.1f}",
         f"at most {turn:.3f} psi^3 up to 60°",
         f"(sqrt 1.1 - 1)/(sqrt 1.1 + 1) = {(math.sqrt(1.1) - 1) / (math.sqrt(1.1) + 1):.4f}",
     ]

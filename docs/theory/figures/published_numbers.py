@@ -26,7 +26,7 @@ def _errata(document: str) -> Callable[[], str]:
             if erratum.place.startswith(f"[{document}]"):
                 place = erratum.place.removeprefix(f"[{document}]").lstrip(", ")
                 numbers = (_number(value) for value in found[name])
-                rows.append([place, erratum.printed, erratum.right, erratum.quantity, *numbers])
+                rows.append([place, erratum.published, erratum.right, erratum.quantity, *numbers])
         head = ["place", "printed", "right", "computed quantity", "as printed", "as it should be"]
         return table(head, rows, 4)
 
@@ -39,9 +39,9 @@ def _cosine_quadratic() -> str:
     rows = []
     for figure in PUBLISHED:
         value = found[figure.key[0]][figure.key[1]] * (100 if figure.percent else 1)
-        digits = len(figure.printed.partition(".")[2])
-        same = "yes" if f"{value:.{digits}f}" == figure.printed else "no"
-        rows.append([figure.what, figure.printed, f"{value:.{digits + 1}f}", same])
+        digits = len(figure.published.partition(".")[2])
+        same = "yes" if f"{value:.{digits}f}" == figure.published else "no"
+        rows.append([figure.what, figure.published, f"{value:.{digits + 1}f}", same])
     return table(["figure", "printed", "computed", "to the digits printed"], rows)
 
 
@@ -60,13 +60,13 @@ def _operations() -> str:
     """Operations of a normal or of a pixel's N·L and N·H, counted while the ways of [T] run."""
     rows = []
     for claim in CLAIMS:
-        for rival in claim.rivals:
+        for rival in claim.baselines:
             for way in claim.ways:
                 counted = software(way, rival, 32, 1)
-                totals = [sum(counted[of].values()) for of in ("operations", "rival_operations")]
-                dear = [_dear(counted[of]) for of in ("operations", "rival_operations")]
+                totals = [sum(counted[of].values()) for of in ("operations", "baseline_operations")]
+                dear = [_dear(counted[of]) for of in ("operations", "baseline_operations")]
                 shown = (f"{total:.1f} ({cost:.1f})" for total, cost in zip(totals, dear, strict=True))
-                rows.append([claim.name, f"{claim.printed}", way, rival, *shown])
+                rows.append([claim.name, f"{claim.published}", way, rival, *shown])
     return table(
         ["claim", "printed", "way", "compared with", "operations of the way", "of the other"], rows, 4
     )
@@ -98,7 +98,7 @@ def _errata_sentences() -> list[str]:
 def _figure_sentences() -> list[str]:
     found = [errors(model) for model in ("cosquad", "cosquad_q", "cosquad_lin")]
     values = dict(zip(("f2", "fQ", "fQ2"), found, strict=True))
-    ratios = {claim.name: claim.printed for claim in CLAIMS}
+    ratios = {claim.name: claim.published for claim in CLAIMS}
     return [
         f"f2 is off by {values['f2']['absolute']:.4f} at most, fQ2 by {values['fQ2']['absolute']:.4f}",
         ", ".join(f"{name}: {value} times" for name, value in ratios.items()),

@@ -130,13 +130,14 @@ RECORD = Record(
     expect=_expect,
     stimuli={
         "operands": Stimulus(_operands, 600),
-        "exponents": Stimulus(_exponents, 4000, stalled=False, repeats=40),
+        "exponents": Stimulus(_exponents, 1500, stalled=False, repeats=110),
         "terminator": Stimulus(_terminator, 70),
         "black": Stimulus(_black, 100),
     },
     axis="n (1 - cos γ)",
     logarithmic=True,
     waivers={
+        "lit": "No exponent's boundary is the largest code, of which all bits are 1.",
         "product": "The slope, n of 10 bits normalised to 17, ends in seven zeros, and so does its product.",
         "argument": "It is for the saturation at 2, which is dark at every exponent.",
         "stages": (

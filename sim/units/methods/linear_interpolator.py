@@ -46,5 +46,4 @@ RECORD = Record(
         "*_second_difference": "A straight line has no second difference: the bit is 0 already.",
         "values": "It is for the saturation below -1, which no component reaches, as normals are not longer.",
     },
-    still={"a straight line has no second difference": "top.{spare,payload}[186-317]"},
 )

@@ -43,7 +43,6 @@ RECORD = Record(
         "middle_2": "It counts at 2 and more, and a middle normal is at most 1 and a rounding long.",
     },
     still={
-        "twice a number is even": "top.{spare,payload}[{186,230,274}]",
         "8 spans are in the middle normal and 2 in GPQ at most, 3 of them outside the inner FIFO": (
             "lengths.inner_level[3]"
         ),

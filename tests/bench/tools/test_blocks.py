@@ -59,7 +59,7 @@ STATED = {
     ("dot_product", ""): (3, 1, {"18x18": 3}, 0),
     ("gpq", ""): (3, 1, {}, 0),
     ("middle_normal", "exact"): (40, 6, {"18x18": 2}, 0),
-    ("difference_accumulator", ""): (2, 1, {}, 0),
+    ("difference_accumulator", ""): (3, 1, {}, 0),
     ("quadratic_evaluator", "horner"): (17, 2, {"18x18": 3}, 2048 * 18),
     ("bisection", "1, 45"): (21, 4, {"18x18": 2}, 0),
     ("bisection_chain", ""): (17 + 3 * 3 + 8, 17 + 3 * 3 + 8 + 1, {"18x18": 4}, 0),

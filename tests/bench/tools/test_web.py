@@ -352,6 +352,8 @@ def test_every_link_of_the_site_leads_somewhere(tmp_path, work, results):
     assert "<strong>This</strong> much." in (site / "index.html").read_text()
     pages = {path: path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
     assert len(pages) > 15
+    assert not any(' style="' in text for text in pages.values())
+    assert '<td class="right">' in pages[site / "theory" / "units.html"]
     for path, text in pages.items():
         for address in Addresses(text).found:
             if re.match(r"[a-z]+:", address):
