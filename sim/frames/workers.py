@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import re
 import signal
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor
@@ -75,6 +76,9 @@ def local_executor(
         for child in set(multiprocessing.active_children()) - before:
             child.terminate()
             child.join()
+            # The executor's own thread may have seen the end first, and not written it down yet.
+            while child.is_alive():
+                time.sleep(0.01)
 
 
 class _Pool(ProcessPoolExecutor):

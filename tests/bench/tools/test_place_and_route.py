@@ -385,6 +385,6 @@ def test_a_multiplier_with_an_adder_is_refused(cache):
 
 @tools
 def test_what_the_tools_refuse_is_one_line(cache, monkeypatch):
-    monkeypatch.setattr(place_and_route, "_BEFORE", "read_rtlil nothing.il\n")
+    monkeypatch.setattr(place_and_route, "MAP_BEFORE", "read_rtlil nothing.il\n")
     with pytest.raises(ToolError, match=r"^Yosys ends with status .*nothing\.il"):
         lay_out("none", Counter(), 1)
