@@ -119,17 +119,7 @@ def connect_wide_fifo(
     For a sink that takes payloads straight into registers. A payload takes `SLICE_LATENCY` cycles through the
     empty FIFO. The source's ready and the sink's valid are registers.
 
-    Parameters
-    ----------
-    m, name, source, sink
-        As for `connect_fifo`.
-    depth : int
-        Payloads that it holds, at least 2: as many as a register slice.
-
-    Raises
-    ------
-    TypeError
-        If the payloads differ in a field or in a fixed-point format.
+    What it takes and refuses is as for `connect_fifo`; its depth is 2 or more, as that of a register slice.
     """
     require_same_shape(source.payload.shape(), sink.payload.shape())
     width = Shape.cast(source.payload.shape()).width
