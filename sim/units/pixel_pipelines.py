@@ -122,6 +122,6 @@ RECORD = Record(
         "a counter stops at its largest value, and a flag that is set stays": (
             "sum_empty_spans[15] sum_overrun[0]"
         ),
-        "a pipeline has scanlines of one remainder": "r_port__data[6] pipelines.{payload,spare}[6]",
+        "a pipeline has scanlines of one remainder": "pipelines.{read,word}[6]",
     },
 )
