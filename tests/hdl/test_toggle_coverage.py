@@ -66,6 +66,8 @@ class Edges(Wrapped):
 def still_bits(unit, vectors):
     """Names of the register bits that do not rise, or do not fall."""
     edges = Edges(unit)
+    if not edges.names:
+        pytest.skip("all its registers are in parts that have a record")
     model = Model(edges)
     seen = np.bitwise_or.reduce([model.run(stimulus, None).status[0] for stimulus, _ in vectors])
     toggled = np.unpackbits(seen.astype("<u4").view(np.uint8), bitorder="little")
