@@ -341,11 +341,14 @@ class Design:
         )
 
     def _values(self, spans: Spans, constants: FrameConstants) -> SpanValues:
-        """Values of spans for a chord method."""
+        """Values of spans for a chord method; u is 0 where there is no specular light to be out of range."""
         if self.takes_values:
-            return cast(SpanValues, spans.values)
-        words = spans.normal_left, spans.middle, spans.normal_right, constants.direction, constants.halfway
-        return cast(Any, self.interpolator).values(*(Fixed(COMPONENT, codes) for codes in words))
+            values = cast(SpanValues, spans.values)
+        else:
+            words = (spans.normal_left, spans.middle, spans.normal_right)
+            words = (*words, constants.direction, constants.halfway)
+            values = cast(Any, self.interpolator).values(*(Fixed(COMPONENT, codes) for codes in words))
+        return values if self.specular else values._replace(highlight=np.zeros_like(values.highlight))
 
     def _wide_spans(self, spans: Spans, constants: Sequence[FrameConstants]) -> int:
         """How many spans the span limit flags."""
@@ -402,10 +405,9 @@ class Design:
         self, spans: Spans, kept: np.ndarray, length: np.ndarray, constants: FrameConstants
     ) -> Callable[[slice], Operands]:
         """Function from a part of the kept spans to the operands of its pixels."""
-        if self.takes_values:
-            interpolator, values = cast(ChordInterpolator, self.interpolator), spans[kept].values
-            assert values is not None
-            factors = spans[kept].factors
+        if isinstance(self.interpolator, ChordInterpolator):
+            interpolator, values = self.interpolator, self._values(spans[kept], constants)
+            factors = spans[kept].factors if self.takes_values else None
             return lambda part: interpolator.compute_values(
                 SpanValues(*(codes[part] for codes in values)),
                 length[part],

@@ -1,7 +1,8 @@
 """The interpreted engine: Amaranth's own simulator. Always there, slow, and writes waveforms."""
 
-from collections.abc import Callable
-from contextlib import nullcontext
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 
 import numpy as np
 from amaranth.hdl import Value
@@ -16,6 +17,9 @@ __all__ = ["Model"]
 _BATCH = 1000
 _PERIOD = 1e-8
 
+_RECURSION = 20_000
+"""Depth of an expression for Python: the simulator writes a memory's enable as a term for every bit."""
+
 
 def _codes(words: np.ndarray) -> list[int]:
     """One integer a beat; the engine's own integers have no width."""
@@ -25,6 +29,16 @@ def _codes(words: np.ndarray) -> list[int]:
 def _words(codes: list[int], width: int) -> np.ndarray:
     raw = b"".join(code.to_bytes(4 * width, "little") for code in codes)
     return np.frombuffer(raw, dtype="<u4").astype(np.uint32).reshape(len(codes), width)
+
+
+@contextmanager
+def _deep_expressions() -> Iterator[None]:
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(limit, _RECURSION))
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(limit)
 
 
 class Model:
@@ -50,7 +64,8 @@ class Model:
         async def bench(ctx):
             result.append(await self._drive(ctx, stimulus, progress))
 
-        simulator = Simulator(self.component)
+        with _deep_expressions():
+            simulator = Simulator(self.component)
         try:
             simulator.add_clock(_PERIOD)
         except NameError:

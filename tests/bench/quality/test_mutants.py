@@ -53,10 +53,10 @@ def test_proofs_tell_faults_from_the_unit(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("unit", RECORDS)
-def test_mutants_are_killed(unit):
-    with local_executor(2) as executor:
-        (row,) = scores([unit], executor=executor)
+def test_mutants_are_killed():
+    """Of a small unit; ``make mutants`` takes all."""
+    with local_executor(1) as executor:
+        (row,) = scores(["diffuse"], executor=executor)
     assert row.score >= LEAST
     assert not row.open
 

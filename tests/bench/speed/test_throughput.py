@@ -30,15 +30,9 @@ def spans(lengths):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("method", "interval"), [("chord", 9), pytest.param("quadratic", 7, marks=pytest.mark.long)]
-)
-def test_cycles_are_those_of_the_arithmetic(method, interval, monkeypatch):
-    """A span takes the larger of its pixels and the setup interval, one pixel a cycle.
-
-    Of the chord method a span of one pixel has one normal of three, and takes a third of the interval.
-    """
-    runs = []
+def test_cycles_are_those_of_the_arithmetic(monkeypatch):
+    """A span takes the larger of its pixels and the setup interval, one pixel a cycle."""
+    runs, interval = [], 7
 
     def simulated(*arguments, **options):
         runs.append(simulate(*arguments, **options))
@@ -49,7 +43,7 @@ def test_cycles_are_those_of_the_arithmetic(method, interval, monkeypatch):
     lengths = np.repeat([12, 1, 9, 3, interval], count)
     # A long span pays for a short one after it.
     lengths = np.append(lengths, [1, 2 * interval - 1] * 8)
-    unit = ShadingPipelineUnit(preset(method, "cosquad", setup_interval=interval))
+    unit = ShadingPipelineUnit(preset("quadratic", "cosquad", setup_interval=interval))
     pixels, total = measure(unit, spans(lengths), CONSTANTS, engine="pysim")
     assert pixels == lengths.sum()
     ends = runs[0].cycles[np.cumsum(lengths) - 1]
@@ -57,9 +51,7 @@ def test_cycles_are_those_of_the_arithmetic(method, interval, monkeypatch):
     # By then those of the lengths before are paid for, and FIFOs are empty.
     for group in range(5):
         last = ends[count * group + count - 5 : count * (group + 1)]
-        length = lengths[count * group]
-        setup = interval // 3 if (method, length) == ("chord", 1) else interval
-        assert np.diff(last).tolist() == [max(length, setup)] * 4
+        assert np.diff(last).tolist() == [max(lengths[count * group], interval)] * 4
     assert np.diff(ends[-7::2]).tolist() == [2 * interval] * 3
 
 
