@@ -268,12 +268,10 @@ def test_every_curve_and_model_in_float64(open_page):
         const reflect = blysk.core.reflection(table, exponent);
         return cosine.map(reflect);
     }"""
-    for model in MODELS:
+    for name, unit in MODELS.items():
         for exponent in (1, 7, 100, 1000):
-            found = page.evaluate(script, [web_data.model_table(model), cosine.tolist(), exponent])
-            np.testing.assert_allclose(
-                found, REFLECTION_MODELS[model].reflect(cosine, exponent), atol=1e-9, err_msg=model
-            )
+            found = page.evaluate(script, [web_data.model_table(name), cosine.tolist(), exponent])
+            np.testing.assert_allclose(found, unit.model.reflect(cosine, exponent), atol=1e-9, err_msg=name)
 
 
 def test_error_figures_of_few_and_equal_values(open_page):
