@@ -24,7 +24,7 @@ __all__ = [
 
 _COMPARISONS = {"<", "≤", ">", "≥", "=", "≠"}
 
-_CONTROL = re.compile(r"(^|_)(ready|valid|ages)$")
+_CONTROL = re.compile(r"(^|_)(ready|valid|ages)$|^(held|moves)$")
 
 MOST_BOXES = 48
 """Boxes of a drawing above which it leaves out more."""
