@@ -48,6 +48,19 @@ read_verilog -lib -specify +/lattice/cells_sim_ecp5.v
 read_verilog -lib +/lattice/cells_bb_ecp5.v
 """
 
+_FEWEST = 16
+"""Registers of an enable, or of a reset: one with fewer becomes logic in front of them.
+
+The wires of enables are few in each tile. On a nearly full 25F the router does not end with all of them.
+"""
+
+_LEGALISE = f"""\
+opt_clean
+dfflegalize -cell $_DFF_?_ 01 -cell $_DFF_?P?_ r -cell $_SDFF_?P?_ r -cell $_DFFE_??_ 01 \
+-cell $_DFFE_?P??_ r -cell $_SDFFE_?P??_ r -mince {_FEWEST} -minsrst {_FEWEST}
+"""
+"""What Yosys does in the step ``map_ffs``, with that limit."""
+
 _LAYOUT = ("--placer", "static", "--router", "router2", "--router2-alt-weights")
 """Of nextpnr. The placer makes the shortest wires. Where they are scarce, the other router takes up as many
 as it lays, and does not end on a 25F."""
@@ -255,11 +268,15 @@ class Built:
 def _script(draw: float) -> str:
     """Yosys's commands: as for a unit, with the cells of pins and PLL known, for a drawing clock in MHz.
 
+    Small enables become logic.
+
     The mapper saves look-up tables where paths take less than a third of the clock's period by its estimate,
     whose wires are a third as long as those of a device that is nearly full.
     """
     mapped = re.sub(r"(?<=abc9\.D )\d+", str(round(1e6 / draw / 3)), ECP5.synthesis)
-    return _LIBRARY + MAP_BEFORE + mapped + MAP_AFTER
+    *before, synthesis = mapped.splitlines(keepends=True)
+    halves = f"{synthesis} -run begin:map_ffs\n{_LEGALISE}{synthesis} -run map_ffs:"
+    return "".join((_LIBRARY, MAP_BEFORE, *before, halves, MAP_AFTER))
 
 
 def _nextpnr(name: str) -> str:

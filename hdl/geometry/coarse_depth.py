@@ -1,5 +1,7 @@
 """Coarse depth test: spans that are hidden for their whole length, by a bound of the depths of each block."""
 
+from operator import and_
+
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, ValueLike, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.memory import Memory
@@ -246,10 +248,13 @@ class CoarseDepthUnit(wiring.Component):
         bound = Signal(data.StructLayout(common | bounds), name="bound")
         slope = block.step.as_signed()
         marked = Mux(block.ends & ~block.border, block.last, last)
+        # The first is never beyond the last place, and the last never before place 0.
+        begun = [block.first <= k for k in range(last)] + [Const(1)]
+        not_over = [Const(1)] + [marked >= k for k in range(1, given.block)]
         with m.If(advance):
             m.d.sync += [
                 *(steps[name].eq(block[name]) for name in ("valid", "begins", "ends", "place", "depth")),
-                steps.mask.eq(Cat((block.first <= k) & (marked >= k) for k in range(given.block))),
+                steps.mask.eq(Cat(map(and_, begun, not_over))),
                 steps.falls.eq(slope < 0),
                 steps.near.eq(_times(slope, block.first)),
                 steps.far.eq(_times(slope, Mux(block.ends, block.last, last))),

@@ -306,7 +306,8 @@ def _steps(rest: Value, word: Value, divisor: Value, count: int) -> tuple[Value,
     """So many steps of a division: ``rest`` takes a bit of ``word``, less or more the divisor by its sign."""
     bits = len(divisor)
     for _ in range(count):
-        subtract = rest >= 0
+        # Of a number without a sign a comparison with 0 would be constant.
+        subtract = rest >= 0 if rest.shape().signed else Const(1)
         doubled = Cat(word[-1], rest)[: bits + 1]
         # One adder: the 1 of a subtraction comes in by a bit below.
         turned = Cat(divisor, Const(0, 1)) ^ subtract.replicate(bits + 1)
