@@ -108,8 +108,8 @@ def test_cycles(method, interval):
 @pytest.mark.parametrize(
     ("method", "latency", "interval"),
     [
-        pytest.param("quadratic", 72, 4, marks=pytest.mark.long),
-        pytest.param("renormalise", 57, 4, marks=pytest.mark.long),
+        pytest.param("quadratic", 73, 4, marks=pytest.mark.long),
+        pytest.param("renormalise", 58, 4, marks=pytest.mark.long),
         ("chord", 49, 3),
     ],
 )

@@ -10,13 +10,13 @@ from blysk.hdl.lighting.diffuse import DiffuseUnit
 
 @pytest.mark.long
 def test_delay_costs_a_register_for_each_interval():
-    """Stages; operand, slot and ready where the interval is over 1; rounded, result; a copy an interval."""
+    """Stages; a skid buffer's; operand, slot and ready where the interval is over 1; rounded, result; a copy an interval."""
     assert DiffuseUnit().latency == 2
     assert DiffuseUnit(initiation_interval=4).latency == 3
     width, rounded = Diffuse().operand_format.width, 22
     for latency, interval, copies in ((7, 1, 5), (11, 2, 4), (11, 3, 2), (11, 6, 1)):
         cost = cost_of(DiffuseUnit(latency=latency, initiation_interval=interval))
-        control = latency + 1 + (0 if interval == 1 else width + 2 + (interval - 1).bit_length())
+        control = latency + 2 + (0 if interval == 1 else width + 2 + (interval - 1).bit_length())
         assert cost.register_bits == control + rounded + 17 * (2 + copies)
         assert cost.multiplier_count == 0
 

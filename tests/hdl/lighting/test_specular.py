@@ -127,8 +127,8 @@ def test_fixed_exponent_costs_less(model):
     cost, full = cost_of(fixed), cost_of(unit)
     assert cost.multiplier_count == full.multiplier_count - 1
     assert (cost.constant_multipliers, cost.rom_bits) == (1, 64 * 32 if model == "exp" else 0)
-    # Slope, its normal form, and the boundary.
-    assert full.register_bits - cost.register_bits == 17 + 4 + 17 + (0 if model == "cosquad_q" else 27)
+    # What the PROM gives, twice; the slope's normal form, and the boundary.
+    assert full.register_bits - cost.register_bits == 2 * 17 + 4 + 17 + (0 if model == "cosquad_q" else 27)
 
 
 def test_bad_options_are_refused():
