@@ -101,7 +101,7 @@ class MotionUnit(wiring.Component):
         ]
         m.d.sync += negative.eq(code[-1])
 
-        a, b = (Signal(signed(ENTRY.width), name=name) for name in "ab")
+        a, b = (Signal(signed(ENTRY.width), name=f"factor_{name}") for name in "ab")
         product = Signal(signed(2 * ENTRY.width), name="product")
         total = Signal(signed(_TOTAL.width), name="total")
         c0, c1, c2 = (
