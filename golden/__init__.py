@@ -1,1 +1,1 @@
-"""Golden layer: float64 reference, tables and polynomial fits, bit-true twins. NumPy only."""
+"""Golden layer: float64 reference, tables and polynomial fits, bit-accurate models. NumPy only."""

@@ -52,7 +52,7 @@ def teapot_frame(
     constants : list of FrameConstants
         Those of each material.
     pixels : Pixels
-        What must come out, by the bit-true twin.
+        What must come out, by the bit-accurate model.
     """
     mesh = load_mesh("teapot", triangles=triangles).mesh
     width, height = size

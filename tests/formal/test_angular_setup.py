@@ -298,7 +298,7 @@ def test_bounds_hold(monkeypatch, normal_pairs):
     assert all(0.98 < share <= 1 for share in shares.values())
 
 
-def test_adders_of_cordic_are_those_of_the_twin(prove):
+def test_adders_of_cordic_are_those_of_the_model(prove):
     """By SAT; one adder does for the sum and for the difference."""
     prove(of_adders())
 

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Words that are watched: they are those of the twin, at their ages, and the pipeline stays as it is."""
+"""Words that are watched: they are those of the bit-accurate model, at their ages, and the pipeline stays as it is."""
 
 import numpy as np
 import pytest
@@ -115,7 +115,7 @@ def test_formats_fit(method, model):
     assert ("square_3" in probes) == (model == "lyon3_refitted")
 
 
-def test_words_are_those_of_the_twin(observed):
+def test_words_are_those_of_the_model(observed):
     """Every word of every pixel, at its age behind the clock on which the lights take the pixel."""
     spans, constants = spans_near(np.random.default_rng(5), 5), constants_of(4)
     count = int(spans.length.sum())
