@@ -65,6 +65,12 @@ _LAYOUT = ("--placer", "static", "--router", "router2", "--router2-alt-weights")
 """Of nextpnr. The placer makes the shortest wires. Where they are scarce, the other router takes up as many
 as it lays, and does not end on a 25F."""
 
+_SETTINGS = {"router2/currCongWeightMult": "0.1"}
+"""Settings of nextpnr, from the netlist: by how much a wire that is used twice costs more in each round.
+
+By default it costs the same for ever, and where wires are scarce some hundred stay in use twice.
+"""
+
 _PARTS = {
     "look-up tables": "TRELLIS_COMB",
     "flip-flops": "TRELLIS_FF",
@@ -329,6 +335,7 @@ def build(
         runner.run("Yosys", YOSYS, [], folder, _script(rates["sync"]))
         mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
         mapped, absorbed = absorb_registers(mapped)
+        mapped["modules"]["top"]["settings"] = _SETTINGS
         (folder / "top.json").write_text(json.dumps(mapped), encoding="utf-8")
         refuse_too_large(board, mapped)
         best = None

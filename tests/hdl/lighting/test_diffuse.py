@@ -10,7 +10,7 @@ from blysk.hdl.lighting.diffuse import DiffuseUnit
 
 @pytest.mark.long
 def test_delay_costs_a_register_for_each_interval():
-    """Stages; two of a skid buffer; operand, slot and ready if the interval is over 1; rounded, result; copies."""
+    """Stages; two of a skid buffer; operand, slot and ready over interval 1; rounded, result; copies."""
     assert DiffuseUnit().latency == 2
     assert DiffuseUnit(initiation_interval=4).latency == 3
     width, rounded = Diffuse().operand_format.width, 22

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Words that are watched: they are those of the bit-accurate model, at their ages, and the pipeline stays as it is."""
+"""Words that are watched: those of the bit-accurate model, at their ages; the pipeline stays as it is."""
 
 import numpy as np
 import pytest
