@@ -65,7 +65,7 @@ _LAYOUT = ("--placer", "static", "--router", "router2", "--router2-alt-weights")
 """Of nextpnr. The placer makes the shortest wires. Where they are scarce, the other router takes up as many
 as it lays, and does not end on a 25F."""
 
-_SETTINGS = {"router2/currCongWeightMult": "0.1"}
+_SETTINGS = {"router2/currCongWeightMult": "0.2"}
 """Settings of nextpnr, from the netlist: by how much a wire that is used twice costs more in each round.
 
 By default it costs the same for ever, and where wires are scarce some hundred stay in use twice.
