@@ -345,9 +345,9 @@ class Design:
         if self.takes_values:
             values = cast(SpanValues, spans.values)
         else:
-            words = (spans.normal_left, spans.middle, spans.normal_right)
-            words = (*words, constants.direction, constants.halfway)
-            values = cast(Any, self.interpolator).values(*(Fixed(COMPONENT, codes) for codes in words))
+            normals = spans.normal_left, spans.middle, spans.normal_right
+            words = (Fixed(COMPONENT, codes) for codes in (*normals, constants.direction, constants.halfway))
+            values = cast(Any, self.interpolator).values(*words)
         return values if self.specular else values._replace(highlight=np.zeros_like(values.highlight))
 
     def _wide_spans(self, spans: Spans, constants: Sequence[FrameConstants]) -> int:
@@ -406,22 +406,17 @@ class Design:
     ) -> Callable[[slice], Operands]:
         """Function from a part of the kept spans to the operands of its pixels."""
         if isinstance(self.interpolator, ChordInterpolator):
-            interpolator, values = self.interpolator, self._values(spans[kept], constants)
-            factors = spans[kept].factors if self.takes_values else None
+            interpolator, given = self.interpolator, spans[kept]
+            factors = given.factors if self.takes_values else None
             return lambda part: interpolator.compute_values(
-                SpanValues(*(codes[part] for codes in values)),
+                self._values(given[part], constants),
                 length[part],
                 None if factors is None else factors[part],
             )
         format = self.interpolator.END_FORMAT
         left, right = (Fixed(format, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
         vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]
-        middle = []
-        if self.interpolator.TAKES_MIDDLE:
-            middle = [Fixed(COMPONENT, spans.middle[kept])]
-        return lambda part: self.interpolator.compute(
-            left[part], right[part], length[part], *vectors, *(normal[part] for normal in middle)
-        )
+        return lambda part: self.interpolator.compute(left[part], right[part], length[part], *vectors)
 
     def _shade(
         self,

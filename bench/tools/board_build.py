@@ -51,7 +51,8 @@ read_verilog -lib +/lattice/cells_bb_ecp5.v
 _FEWEST = 16
 """Registers of an enable, or of a reset: one with fewer becomes logic in front of them.
 
-The wires of enables are few in each tile. On a nearly full 25F the router does not end with all of them.
+The wires of enables are few in each tile. On a nearly full 25F 865 wires were used twice at best with all of
+them, and 7 with this limit, both without `_SETTINGS`.
 """
 
 _LEGALISE = f"""\

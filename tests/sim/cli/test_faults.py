@@ -345,16 +345,8 @@ def test_termination_of_a_turntable(cache, temporary, tmp_path):
 
 
 SWEEP = ["explore", "--size", "24x18", "--methods", "linear,renormalise,chord", "--models", "cosquad"]
-SWEEP += [
-    "--degrees",
-    "3",
-    "--fraction-bits",
-    "46",
-    "--operands",
-    "one_minus_cosine",
-    "--largest-error",
-    "255",
-]
+SWEEP += ["--degrees", "3", "--fraction-bits", "46", "--operands", "one_minus_cosine"]
+SWEEP += ["--largest-error", "255"]
 
 
 @pytest.mark.long
