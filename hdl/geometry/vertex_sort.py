@@ -32,17 +32,17 @@ def sorted_triangle_shape(grid: Grid = GRID) -> data.StructLayout:
 class VertexSortUnit(wiring.Component):
     """Sorts corners, finds the area, and drops what `VertexSort`, the bit-accurate model, drops.
 
-    Two stages, each with a triangle inside. The first exchanges neighbouring corners in three cycles and
-    compares the triangle's box with the picture. The second sums
+    Two stages, each with a triangle inside. The first compares neighbouring corners in three cycles,
+    exchanges them a cycle later, and compares the triangle's box with the picture. The second sums
     ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` in digits of four bits of the heights, from the first on,
     with two Booth digits of each product a cycle; flat triangles have fewer digits. Exact; no multipliers.
 
-    Cycles a triangle: 5 if its box is empty; else the larger of 5 and of n + 2, or n + 3 if it is drawn, n
+    Cycles a triangle: 5 if its box is empty; else the larger of 6 and of n + 2, or n + 3 if it is drawn, n
     the digits: 3 for boxes of up to 7 scanlines, 4 to 127, 5 to 2047, 6 beyond (of a grid of 8 bits).
-    A drawn triangle is offered n + 6 cycles after it was taken in.
+    A drawn triangle is offered n + 7 cycles after it was taken in.
 
     In the *compact* style one triangle is inside, whose corners stand where they were sorted: 5 cycles if its
-    box is empty, else n + 7, or n + 7 and those that it waits to be taken if it is drawn.
+    box is empty, else n + 8, or n + 8 and those that it waits to be taken if it is drawn.
 
     Parameters
     ----------
@@ -91,10 +91,12 @@ class VertexSortUnit(wiring.Component):
                 m.d.sync += [step.eq(self.i.valid), material.eq(self.i.payload.material), odd.eq(0)]
                 m.d.sync += two_sided.eq(self.i.payload.two_sided)
             with m.Case(4):
-                m.d.comb += leaves.eq(covered & free)
-                with m.If(leaves | ~covered):
-                    m.d.sync += step.eq(Mux(covered, 5, 0) if self.compact else 0)
-            with m.Case(5), m.If(ends):
+                m.d.sync += step.eq(Mux(covered, 5, 0))
+            with m.Case(5):
+                m.d.comb += leaves.eq(free)
+                with m.If(leaves):
+                    m.d.sync += step.eq(6 if self.compact else 0)
+            with m.Case(6), m.If(ends):
                 m.d.sync += step.eq(0)
             with m.Default():
                 m.d.sync += step.eq(step + 1)
@@ -108,27 +110,29 @@ class VertexSortUnit(wiring.Component):
     def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal) -> None:
         """Take corners in, and exchange neighbours where they are the wrong way round.
 
-        The first two, the last two, the first two. The comparison, which is late, enables the registers; what
-        they take follows from the step alone.
+        The first two, the last two, the first two. A comparison is a register, and its exchange takes
+        place on the next cycle; the comparison of that cycle takes corners from where they are before it.
         """
-        last, takes = step == 2, step == 0
+        takes, turn = step == 0, Signal(name="turn")
         # x counts from the lowest one, so that y and x are one signed number.
         columns = [Value.cast(corner.x) for corner in corners]
         key = [
             Cat(x[:-1], ~x[-1], Value.cast(corner.y)).as_signed()
             for x, corner in zip(columns, corners, strict=True)
         ]
-        wrong = Mux(last, key[1], key[0]) > Mux(last, key[2], key[1])
-        turns = wrong & (step != 0) & ~step[2]
-        with m.If(turns):
+        upper = Mux((step == 2) & ~turn, key[1], key[0])
+        lower = Mux((step == 2) | ((step == 3) & turn), key[2], key[1])
+        m.d.sync += turn.eq(upper > lower)
+        outer, inner = (step == 2) | (step == 4), step == 3
+        with m.If(turn & (outer | inner)):
             m.d.sync += odd.eq(~odd)
         first, second, third = (Value.cast(corner) for corner in corners)
-        following = second, Mux(last, third, first), second
+        following = second, Mux(inner, third, first), second
         given = self.i.payload
-        moving = ~last, 1, last
+        moving = outer, outer | inner, inner
         for k, (corner, neighbour, moves) in enumerate(zip(corners, following, moving, strict=True)):
             taken = Cat(Value.cast(given[name][k]) for name in corner.shape().members)
-            with m.If(takes | (turns & moves)):
+            with m.If(takes | (turn & moves)):
                 m.d.sync += Value.cast(corner).eq(Mux(takes, taken, neighbour))
 
     def _box(self, m: Module, corners: list, step: Signal, covered: Signal, digits: Signal) -> None:
