@@ -81,6 +81,9 @@ _OF_NAME = {
     "name": split("| |\n|a\nb|ż🫖|\udcff|\x1b[31m|--|1a|a b|a-b"),
 }
 
+# An intensity may be more than 1, as that of a light; an axis has a name.
+_GOOD = {"ambient_light": "1.1", "up": "x"}
+
 _SUFFIXES = {"output": ".png", "comparison": ".png", "figures": ".json", "vcd": ".vcd"}
 
 
@@ -88,7 +91,8 @@ def _bad_values(option: click.Parameter) -> list[str]:
     if option.name in _SUFFIXES:
         values = [value.format(_SUFFIXES[option.name]) for value in _BAD_FILES]
         return ["", *values] if isinstance(option.type, OutputFile) else values
-    return _OF_NAME.get(option.name) or _OF_TYPE.get(type(option.type).__name__, _ODD)
+    values = _OF_NAME.get(option.name) or _OF_TYPE.get(type(option.type).__name__, _ODD)
+    return [value for value in values if value != _GOOD.get(option.name)]
 
 
 def option_cases() -> Iterator[Case]:
