@@ -45,7 +45,7 @@ def register_writes(map, case):
 def case_of(unit, pipelined, seed=2026):
     """What is sent, and what is to come, as arrays."""
     framing, map = unit.framing, unit.map
-    case = RECORD.stimuli["frames"].make(framing, np.random.default_rng(seed), 60)
+    case = RECORD.stimuli["frames"].make(framing, np.random.default_rng(seed), 80)
     run = RECORD.expect(framing, case)
     status = RECORD.status(framing, case)
     found = {f"given{'' if name == 'data' else '_last'}": case.beats[name] for name in ("data", "last")}

@@ -58,4 +58,7 @@ def test_pipeline(check, name, simulator):
 @pytest.mark.parametrize("simulator", SIMULATORS)
 @pytest.mark.parametrize("name", PIPELINES)
 def test_a_frame_of_every_pipeline(check, name, simulator):
-    check(name, simulator, *FRAMES[simulator], optimise=True)
+    (width, height), triangles = FRAMES[simulator]
+    design = PIPELINES[name]().parameters
+    size = min(width, 1 << design.x_bits), min(height, 1 << design.y_bits)
+    check(name, simulator, size, triangles, optimise=True)
