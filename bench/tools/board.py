@@ -64,7 +64,7 @@ MOST_FRAMES = 60
 @click.option(
     "--toggles", is_flag=True, help="With --simulate: count register bits that toggle, a proxy of energy."
 )
-@click.option("--seeds", type=Whole(1, 20), default=1, show_default=True, help="Placements to try at most.")
+@click.option("--seeds", type=Whole(1, 20), default=4, show_default=True, help="Placements to try at most.")
 @click.option(
     "--record", type=OutputFile(), help="JSON file of figures, to which those of this run are added."
 )

@@ -37,6 +37,7 @@ __all__ = [
     "MOUNT",
     "SEEDS",
     "YOSYS",
+    "GivenUp",
     "Layout",
     "Registered",
     "TooLarge",
@@ -51,6 +52,9 @@ __all__ = [
 
 
 SEEDS = 5
+
+_SECONDS = 5
+"""Between two looks at what a tool says."""
 
 _REMEDY = "pip install 'blysk[fpga]'"
 
@@ -84,6 +88,10 @@ class ToolError(SimulationError):
 
 class TooLarge(ToolError):
     """A design takes more than the FPGA has."""
+
+
+class GivenUp(ToolError):
+    """A tool was ended that would not have come to an end."""
 
 
 @dataclass(frozen=True)
@@ -195,11 +203,21 @@ class ToolRunner:
         self._running: set[subprocess.Popen] = set()
         self._stopped = False
 
-    def run(self, name: str, code: str, arguments: Sequence[str], folder: Path, text: str = "") -> None:
-        """Run Python code in a folder."""
+    def run(
+        self,
+        name: str,
+        code: str,
+        arguments: Sequence[str],
+        folder: Path,
+        text: str = "",
+        given_up: Callable[[str], str] = lambda said: "",
+    ) -> None:
+        """Run Python code in a folder, until `given_up` has a reason in what the tool has said so far."""
         # Python's own warnings are none of the tool's.
         command = [sys.executable, "-W", "ignore", "-c", code, *arguments]
-        with tempfile.TemporaryFile(dir=folder) as log:
+        with tempfile.TemporaryFile(dir=folder) as given, tempfile.TemporaryFile(dir=folder) as log:
+            given.write(text.encode())
+            given.seek(0)
             with self._lock:
                 if self._stopped:
                     raise ToolError(f"{name} was stopped")
@@ -207,13 +225,20 @@ class ToolRunner:
                     command,
                     cwd=folder,
                     env={**os.environ, "YOWASP_MOUNT": f"{MOUNT}=."},
-                    stdin=subprocess.PIPE,
+                    stdin=given,
                     stdout=log,
                     stderr=subprocess.STDOUT,
                 )
                 self._running.add(process)
             try:
-                process.communicate(text.encode())
+                while process.returncode is None:
+                    try:
+                        process.wait(_SECONDS)
+                    except subprocess.TimeoutExpired:
+                        # The tool writes from where the file's one position is.
+                        size = os.fstat(log.fileno()).st_size
+                        if reason := given_up(os.pread(log.fileno(), size, 0).decode(errors="replace")):
+                            raise GivenUp(reason) from None
             finally:
                 process.kill()
                 process.wait()

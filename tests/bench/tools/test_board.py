@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from blysk.bench.tools.board import built_lines, missed
-from blysk.bench.tools.board_build import BOARDS, Built, Clock, build, refuse_too_large
+from blysk.bench.tools.board_build import BOARDS, Built, Clock, _stuck, build, refuse_too_large
 from blysk.bench.tools.board_design import BoardTop
 from blysk.bench.tools.place_and_route import TooLarge, ToolError, tool_versions
 from blysk.golden.video.band_buffer import BandBuffer
@@ -132,6 +132,31 @@ def test_too_large_is_told_before_placement():
     with pytest.raises(TooLarge, match=r"ulx3s-25f: 24,290 look-up tables of 24,288, 29 multipliers of 28$"):
         refuse_too_large(BOARDS["ulx3s-25f"], netlist)
     refuse_too_large(BOARDS["ulx3s-85f"], netlist)
+
+
+def rounds(twice):
+    """What the router says of wires that are used twice."""
+    return "".join(
+        f"Info:     iter={k} wires=422169 overused={n} overuse={n} archfail=NA\n" for k, n in twice
+    )
+
+
+@pytest.mark.parametrize(
+    ("twice", "says"),
+    [
+        (lambda k: 12_000 // k**1.5, ""),
+        (lambda k: 400 + 10_000 // k**2, "400 wires are used twice at best in 129 rounds"),
+        (lambda k: 300 + abs(k - 50), "300 wires are used twice at best in 129 rounds"),
+        (lambda k: 9, ""),
+        (lambda k: 400 if k < 99 else None, ""),
+    ],
+    ids=["falls", "levels off", "rises", "few", "early"],
+)
+def test_a_router_that_will_not_end_is_given_up(twice, says):
+    said = rounds((k, int(twice(k))) for k in range(1, 130) if twice(k) is not None)
+    # What the placer says of its own rounds, and a line that has just begun.
+    assert _stuck(f"Info: iter=595 steplen=1.296256 a=299.9\n{said}Info:     iter=") == says
+    assert _stuck("") == ""
 
 
 def test_figures_are_no_json(capsys, tmp_path):

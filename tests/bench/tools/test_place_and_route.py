@@ -12,10 +12,12 @@ from amaranth.lib.wiring import In
 from blysk.bench.tools import place_and_route
 from blysk.bench.tools.families import ECP5, FAMILIES, NEXUS, Parts, Place
 from blysk.bench.tools.place_and_route import (
+    GivenUp,
     Layout,
     Registered,
     TooLarge,
     ToolError,
+    ToolRunner,
     lay_out,
     parts_of,
     read_report,
@@ -388,3 +390,32 @@ def test_what_the_tools_refuse_is_one_line(cache, monkeypatch):
     monkeypatch.setattr(place_and_route, "MAP_BEFORE", "read_rtlil nothing.il\n")
     with pytest.raises(ToolError, match=r"^Yosys ends with status .*nothing\.il"):
         lay_out("none", Counter(), 1)
+
+
+def test_a_tool_is_ended_by_what_it_says(tmp_path, monkeypatch):
+    """It writes on meanwhile: a look at what it has said does not move where it writes."""
+    monkeypatch.setattr(place_and_route, "_SECONDS", 0.05)
+    seen = []
+
+    def given_up(said):
+        seen.append(said)
+        return "enough" if said.count("line") > 40 else ""
+
+    code = (
+        "import time, sys\nfor k in range(9000): print('line', k, sys.argv[1], flush=True); time.sleep(0.01)"
+    )
+    with pytest.raises(GivenUp, match=r"^enough$"):
+        ToolRunner().run("talker", code, ["a"], tmp_path, given_up=given_up)
+    assert len(seen) > 1
+    lines = seen[-1].splitlines()
+    assert lines == [f"line {k} a" for k in range(len(lines))]
+    assert not list(tmp_path.iterdir())
+
+
+def test_text_reaches_a_tool_that_takes_its_time(tmp_path, monkeypatch):
+    """Longer than the time between two looks."""
+    monkeypatch.setattr(place_and_route, "_SECONDS", 0.05)
+    code = "import time, sys, pathlib; time.sleep(1); pathlib.Path('x').write_text(sys.stdin.read())"
+    text = "word " * 100_000
+    ToolRunner().run("slow", code, [], tmp_path, text)
+    assert (tmp_path / "x").read_text() == text
