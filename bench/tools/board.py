@@ -54,7 +54,9 @@ MOST_FRAMES = 60
 )
 @click.option("--simulate", type=Whole(1, MOST_FRAMES), help="So many frames, simulated down to the lanes.")
 @click.option(
-    "--colours", type=Choice("colours", COLOURS), default="rgb888", help="Of the bands.  [default: rgb888]"
+    "--colours",
+    type=Choice("colours", COLOURS),
+    help="Of the bands.  [default: rgb888 for ulx3s-85f, rgb565 for the others]",
 )
 @click.option(
     "--clock",
@@ -80,6 +82,8 @@ def command(
     the design needs, and the exit status is 1 if a clock is not met. With it, frames are decoded from the
     simulated lanes and compared with those of the bit-accurate model; the exit status is 1 if one differs, or
     if the frames are too heavy for 60 Hz.
+
+    On a 25F the default model is cosquad: with blinn no placement of its design has been routed so far.
 
     The buttons of the board stop the motion, turn it round, and change the material and the light.
 

@@ -41,8 +41,8 @@ OPTIONS = {name: option for name, option in {**SCENE, **DESIGN}.items() if name 
 
 _DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
 
-COMPACT_INTERVAL = 9
-"""Cycles from a span to the next on a small device."""
+_COMPACT = {"setup_interval": 9, "model": "cosquad"}
+"""Defaults on a small device: cycles from a span to the next, and the model with the shortest wires."""
 
 MAX_LIGHTS = 4
 """Lights of a board's scene."""
@@ -55,7 +55,7 @@ _RENDERER_BLOCKS = 16
 
 
 def gpu_of(
-    board: Board, mesh: str, given: Mapping[str, Any], colours: str = "rgb888"
+    board: Board, mesh: str, given: Mapping[str, Any], colours: str | None = None
 ) -> tuple[Gpu, list[Scene]]:
     """The drawing of a mesh on a board, and the scenes of its presets.
 
@@ -70,16 +70,17 @@ def gpu_of(
         File, scene file, or ``teapot``.
     given : dict
         Options of `OPTIONS`.
-    colours : str
-        Of `COLOURS`.
+    colours : str, optional
+        Of `COLOURS`; by default the larger ones, or on a small device the smaller ones.
 
     Raises
     ------
     InputError
         If the mesh cannot be read, or does not fit, or an option is not accepted.
     """
-    interval = {"setup_interval": COMPACT_INTERVAL} if board.compact else {}
-    settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **_DEFAULTS, **interval)
+    defaults = _DEFAULTS | (_COMPACT if board.compact else {})
+    colours = colours or ("rgb565" if board.compact else "rgb888")
+    settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **defaults)
     if settings["size"] != VGA.size:
         raise settings.refuse("size", "the display has 640x480 pixels", "leave it out", "")
     loaded = load(settings)

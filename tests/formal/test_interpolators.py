@@ -385,7 +385,7 @@ BUGS = {
     "coefficients are lost": ("quadratic", "gpq.o.ready.eq(curve.i.ready)", "gpq.o.ready.eq(1)"),
     "middle normals are lost": ("quadratic", "middle.o.ready.eq(gpq.i.ready)", "middle.o.ready.eq(1)"),
     "a length goes before its span": (
-        "quadratic",
+        "quadratic-eval",
         "length.ready.eq(gpq.o.valid & curve.i.ready)",
         "length.ready.eq(curve.i.ready)",
     ),

@@ -183,9 +183,9 @@ def test_constants_stay(prove):
 
 # Cycles that the output, ready, waits at most, and cycles of the proof.
 PIPELINES = {
-    "ambient": (AMBIENT, "throughput", 4, 12),
-    "diffuse": (LINEAR, "throughput", 4, 14),
-    "lit": (LIT, "throughput", 5, 13),
+    "ambient": (AMBIENT, "throughput", 6, 14),
+    "diffuse": (LINEAR, "throughput", 6, 16),
+    "lit": (LIT, "throughput", 6, 14),
     "gated": (GATED, "throughput", 10, 20),
     "compact": (TWO_LIGHTS, "compact", 8, 16),
     "compact-gated": (GATED, "compact", 12, 24),
@@ -205,8 +205,8 @@ BUGS = {
     "coordinates of another row": (
         "diffuse",
         "_carry_coordinates",
-        "assembler.coordinates.payload.eq(coordinates.r_data)",
-        "assembler.coordinates.payload.eq(coordinates.r_data ^ (1 << p.x_bits))",
+        "eq(self.i.payload[name])",
+        "eq(self.i.payload[name] ^ (name == 'y'))",
     ),
     "the interpolator takes what waits": (
         "diffuse",
@@ -217,8 +217,8 @@ BUGS = {
     "coordinates are lost": (
         "diffuse",
         "_carry_coordinates",
-        "coordinates.r_en.eq(assembler.coordinates.ready)",
-        "coordinates.r_en.eq(1)",
+        "return source.valid, source.ready",
+        "return source.valid, 1",
     ),
     "spans overtake a write": ("ambient", "_admit", "unlocked.eq(~self.write.valid & ", "unlocked.eq("),
     "a light takes what the other does not": (
@@ -272,8 +272,8 @@ CONSTANT_BUGS = {
     "a write is kept before it is taken": (
         FrameConstantsUnit,
         "elaborate",
-        "written.eq(accepted & ",
-        "written.eq(self.write.valid & ",
+        "accepted if kind",
+        "self.write.valid if kind",
     ),
 }
 

@@ -89,12 +89,12 @@ BUGS = {
     "a pixel needs another span": (
         of_progress,
         "position.valid & self.colors.valid",
-        "following.valid & self.colors.valid",
+        "self.coordinates.valid & self.colors.valid",
     ),
     "a span that waits stops the one before it": (
         of_progress,
         "moves.eq(skid_buffer(m, position, active, Cat(x, y, ends)))",
-        "moves.eq(skid_buffer(m, position, active, Cat(x, y, ends)) & ~following.valid)",
+        "moves.eq(skid_buffer(m, position, active, Cat(x, y, ends)) & ~self.coordinates.valid)",
     ),
     "a pixel is overwritten": (of_colors, "m.If(advance)", "m.If(1)"),
 }

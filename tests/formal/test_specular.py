@@ -173,8 +173,8 @@ def test_bugs_of_the_argument_are_found(refute, inject, bug):
 
 def test_bug_of_another_word_is_found(inject):
     """What is shifted is made of the argument and the operand, injected in the unit."""
-    text = 'g.register("shifted_wide", shifted, argument)'
-    bug = 'g.register("shifted_wide", lambda x, _: shifted(x), argument, operand)'
+    text = 'g.register("shifted_wide", shifted, argument'
+    bug = 'g.register("shifted_wide", lambda x, _: shifted(x), argument, operand'
     inject(SpecularUnit, "_describe", text, bug)
     with pytest.raises(AssertionError, match=r"^more is made of the operand"):
         reads_one_word(SpecularUnit(), "argument")
