@@ -61,7 +61,9 @@ MOST_FRAMES = 60
 @click.option(
     "--clock",
     type=Number(1, 126, "MHz"),
-    help="Drawing clock, MHz: this or a little less.  [default: 57.3 for ulx3s-85f, 52.5 for the others]",
+    default=52.5,
+    show_default=True,
+    help="Drawing clock, MHz: this or a little less.",
 )
 @click.option(
     "--toggles", is_flag=True, help="With --simulate: count register bits that toggle, a proxy of energy."
@@ -108,7 +110,6 @@ def command(
         check_writable(output)
     recorded = _recorded(record)
     gpu, scenes = gpu_of(board, mesh, given, colours)
-    clock = clock or board.clock
     try:
         plan = clock_plan(board.reference, gpu.buffer.mode.pixel_rate, 1e6 * clock)
     except NoClockPlan as error:

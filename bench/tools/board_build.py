@@ -110,8 +110,6 @@ class Board:
         What openFPGALoader calls it.
     compact : bool
         Whether the device is small: compact geometry, shading that takes a span each 9 cycles.
-    clock : float
-        Drawing clock where none is given, MHz; with the teapot no band is late.
     """
 
     name: str
@@ -126,7 +124,6 @@ class Board:
     lines: int
     loader: str
     compact: bool
-    clock: float
 
     def make(self) -> Any:
         """The platform of amaranth-boards.
@@ -162,7 +159,6 @@ BOARDS = {
             lines=8,
             loader="ulx3s",
             compact=True,
-            clock=52.5,
         ),
         Board(
             *("ulx3s-85f", "ulx3s", "ULX3S_85F_Platform"),
@@ -175,7 +171,6 @@ BOARDS = {
             lines=16,
             loader="ulx3s",
             compact=False,
-            clock=57.3,
         ),
         Board(
             *("icepi-zero", "icepi_zero", "IcepiZero1_3Platform"),
@@ -188,7 +183,6 @@ BOARDS = {
             lines=8,
             loader="icepi-zero",
             compact=True,
-            clock=52.5,
         ),
     )
 }

@@ -15,7 +15,7 @@ GUIDE = Path(__file__).parent
 PAGE, FIGURES = GUIDE / "board.md", GUIDE / "board.json"
 _TABLE = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
-_LIGHT = "normal, Blinn's highlight of every pixel"
+_LIGHT = "normal and highlight of every pixel"
 _OTHERS = (
     ("pico-gs", "ECP5-25K, 100 MHz", "640 to 960", "60, by its SPI port", "by the host, at vertices"),
     (

@@ -37,7 +37,7 @@ class VertexSortUnit(wiring.Component):
     ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` in digits of four bits of the heights, from the first on,
     with two Booth digits of each product a cycle; flat triangles have fewer digits. Exact; no multipliers.
 
-    Cycles a triangle: 5 if its box is empty; else the larger of 6 and of n + 2, or n + 3 if it is drawn, n
+    Cycles a triangle: 4 if its box is empty; else the larger of 5 and of n + 2, or n + 3 if it is drawn, n
     the digits: 3 for boxes of up to 7 scanlines, 4 to 127, 5 to 2047, 6 beyond (of a grid of 8 bits).
     A drawn triangle is offered n + 7 cycles after it was taken in.
 
@@ -86,10 +86,16 @@ class VertexSortUnit(wiring.Component):
         free, ends = Signal(name="area_free"), Signal(name="area_ends")
 
         step = Signal(3, name="sort_step")
+        given = self.i.payload
+        enters = [
+            step.eq(self.i.valid),
+            material.eq(given.material),
+            odd.eq(0),
+            two_sided.eq(given.two_sided),
+        ]
         with m.Switch(step):
             with m.Case(0):
-                m.d.sync += [step.eq(self.i.valid), material.eq(self.i.payload.material), odd.eq(0)]
-                m.d.sync += two_sided.eq(self.i.payload.two_sided)
+                m.d.sync += enters
             with m.Case(4):
                 m.d.sync += step.eq(Mux(covered, 5, 0))
             with m.Case(5):
@@ -100,20 +106,27 @@ class VertexSortUnit(wiring.Component):
                 m.d.sync += step.eq(0)
             with m.Default():
                 m.d.sync += step.eq(step + 1)
-        m.d.comb += self.i.ready.eq(step == 0)
-        self._exchange(m, corners, odd, step)
+        takes = step == 0
+        if not self.compact:
+            # The next one comes as one leaves.
+            takes |= leaves | ((step == 4) & ~covered)
+        m.d.comb += self.i.ready.eq(takes)
+        self._exchange(m, corners, odd, step, takes)
+        if not self.compact:
+            with m.If(takes):
+                m.d.sync += enters
         self._box(m, corners, step, covered, digits)
         zero, culled = self._area(m, corners, (material, two_sided), odd, digits, leaves, free, ends)
         count_events(m, self.status, empty=(step == 4) & ~covered, zero_area=zero, culled=culled)
         return m
 
-    def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal) -> None:
+    def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal, takes: Value) -> None:
         """Take corners in, and exchange neighbours where they are the wrong way round.
 
         The first two, the last two, the first two. A comparison is a register, and its exchange takes
         place on the next cycle; the comparison of that cycle takes corners from where they are before it.
         """
-        takes, turn = step == 0, Signal(name="turn")
+        turn = Signal(name="turn")
         # x counts from the lowest one, so that y and x are one signed number.
         columns = [Value.cast(corner.x) for corner in corners]
         key = [
