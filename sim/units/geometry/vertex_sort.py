@@ -2,6 +2,8 @@
 
 from functools import partial
 
+import numpy as np
+
 from blysk.golden.geometry.triangles import Grid, Triangles
 from blysk.golden.geometry.vertex_sort import VertexSort
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit
@@ -36,6 +38,18 @@ def _whole(unit, rng, count):
     return Case(random_triangles(rng, count, unit.grid, 500.0).beats, WHOLE.codes)
 
 
+def _near(unit, rng, count):
+    """Two corners on one height, some steps of the grid apart: their order is in the lowest bits."""
+    triangles = random_triangles(rng, count, unit.grid, 500.0)
+    rows, first = np.arange(count), rng.integers(0, 3, count)
+    second = (first + rng.integers(1, 3, count)) % 3
+    apart = rng.integers(-7, 8, count)
+    inside = abs(triangles.x[rows, first]) < unit.grid.coordinate.max_code - 8
+    triangles.x[rows, second] = np.where(inside, triangles.x[rows, first] + apart, triangles.x[rows, second])
+    triangles.y[rows, second] = triangles.y[rows, first]
+    return Case(triangles.beats, WHOLE.codes)
+
+
 RECORD = Record(
     name="vertex_sort",
     title="Corners of triangles from top to bottom, orientation, and what is not drawn",
@@ -52,6 +66,7 @@ RECORD = Record(
         "culled": Stimulus(_culled, 1000),
         "shown": Stimulus(_shown, 1000),
         "whole": Stimulus(_whole, 1000),
+        "near": Stimulus(_near, 1000),
     },
     axis="",
     waivers={"status": "A counter of 32 bits counts more events than a run has."},
