@@ -32,7 +32,7 @@ def _case(rng, count, size, longest, most):
     length = rng.integers(1, longest + 1, count)
     span, k = pixels_of(length)
     span, k = span[:count], k[:count]
-    left, right = rng.integers(0, most + 1, (2, count)) << 9
+    left, right = (rng.integers(0, most + 1, (2, count)) << 9) + rng.integers(0, 1 << 9, (2, count))
     left[::5], right[::7] = rng.choice([0, (1 << 33) - 1], len(left[::5])), 0
     step = (right - left) // np.maximum(length - 1, 1)
     begin, line = rng.integers(0, width - length + 1), rng.integers(0, height, count)
@@ -65,7 +65,7 @@ def _far(unit, rng, count):
 
 
 def _again(unit, rng, count):
-    """A pixel, one at a place a bit off, and one of them again at a depth a bit off."""
+    """A pixel, one at a place a bit off, and one of them again at a depth a bit off, in any order."""
     count = -(-count // 3)
     bits = (unit.x_bits, unit.y_bits)
     first = rng.integers(0, 1 << sum(bits), count)
@@ -73,10 +73,12 @@ def _again(unit, rng, count):
     place = np.stack([first, other, np.where(rng.random(count) < 0.7, first, other)], axis=1).ravel()
     depth = rng.integers(0, 1 << 24, (count, 3))
     depth[:, 2] = depth[:, 0] ^ 1 << rng.integers(0, 24, count)
+    order = rng.permuted(np.arange(3 * count).reshape(count, 3), axis=1).ravel()
+    place, depth = place[order], depth.ravel()[order]
     nothing = np.zeros(3 * count, dtype=np.int64)
     pixel = {"x": place % (1 << bits[0]), "y": place >> bits[0], "last": nothing == 0}
     pixel |= {channel: rng.integers(0, 256, 3 * count) for channel in "rgb"}
-    return Case({"pixel": pixel, "depth": depth.ravel() << 9, "depth_step": nothing})
+    return Case({"pixel": pixel, "depth": depth << 9, "depth_step": nothing})
 
 
 RECORD = Record(
