@@ -4,14 +4,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from amaranth.hdl import Cat, ClockDomain, Elaboratable, Module
 from amaranth.lib import io
 from amaranth.lib.wiring import Component
+from scipy.spatial.transform import Rotation
 
 from blysk.bench.tools.board_build import Board
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID
 from blysk.golden.gpu import Gpu
 from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.scene import Scene
 from blysk.golden.video.band_buffer import RGB565, RGB888, BandBuffer
 from blysk.golden.video.clock_plan import ClockPlan
@@ -27,7 +30,6 @@ from blysk.sim.api.options import DESIGN, SCENE
 from blysk.sim.api.scene import load, scenes_of
 from blysk.sim.api.settings import read_settings
 from blysk.sim.errors import InputError
-from blysk.sim.frames.animation import turned as turned_views
 
 __all__ = ["COLOURS", "OPTIONS", "BoardTop", "gpu_of", "least_cycles"]
 
@@ -107,8 +109,10 @@ def _presets(scene: Scene, up: Any) -> list[Scene]:
         replace(material, exponent=min(_SHINIER * material.exponent, MAX_EXPONENT))
         for material in scene.materials
     )
+    # A light may lie along the upright, which turns into itself.
+    quarter = Rotation.from_rotvec(np.pi / 2 * normalise(up))
     lights = tuple(
-        replace(light, direction=tuple(turned_views(light.direction, up, 4)[1].tolist()))
+        replace(light, direction=tuple(quarter.apply(light.direction).tolist()))
         if light.position is None
         else light
         for light in scene.lights

@@ -6,12 +6,14 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from blysk.bench.tools.board import built_lines, missed
 from blysk.bench.tools.board_build import BOARDS, Built, Clock, _stuck, build, refuse_too_large
-from blysk.bench.tools.board_design import BoardTop
+from blysk.bench.tools.board_design import BoardTop, gpu_of
 from blysk.bench.tools.place_and_route import TooLarge, ToolError, tool_versions
+from blysk.golden.reference.light import Light
 from blysk.golden.video.band_buffer import BandBuffer
 from blysk.golden.video.clock_plan import clock_plan
 from blysk.golden.video.display_timing import VGA
@@ -100,6 +102,18 @@ def test_pins_of_the_board(name):
     assert sites == PINS[name]
     assert sum("LVCMOS33D" in line for line in lines) == 4
     assert any(line.startswith("FREQUENCY PORT") and str(board.reference) in line for line in lines)
+
+
+def test_lights_of_the_presets():
+    """The other presets' are turned by a quarter round the upright; one along it stays."""
+    lights = [Light(direction) for direction in ((0, 0, 1), (0, 2, 0), (3, 4, 0))]
+    _, scenes = gpu_of(BOARDS["ulx3s-85f"], "teapot", {"lights": lights})
+    given, turned = (np.array([light.direction for light in scenes[k].lights]) for k in (0, 2))
+    expected = [[1, 0, 0], [0, 1, 0], [0, 0.8, -0.6]]
+    np.testing.assert_allclose(turned / np.linalg.norm(turned, axis=1)[:, None], expected, rtol=0, atol=1e-15)
+    assert given.tolist() == [list(light.direction) for light in lights]
+    assert scenes[1].lights == scenes[0].lights
+    assert scenes[3].lights == scenes[2].lights
 
 
 BUILT = Built(
