@@ -44,7 +44,7 @@ OPTIONS = {name: option for name, option in {**SCENE, **DESIGN}.items() if name 
 _DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
 
 _COMPACT = {"setup_interval": 9, "model": "cosquad"}
-"""Defaults on a small device: cycles from a span to the next, and the model with the shortest wires."""
+"""Defaults on a small device: cycles from a span to the next, and a model with which it has been routed."""
 
 MAX_LIGHTS = 4
 """Lights of a board's scene."""

@@ -210,9 +210,13 @@ class ToolRunner:
         arguments: Sequence[str],
         folder: Path,
         text: str = "",
-        given_up: Callable[[str], str] = lambda said: "",
+        given_up: Callable[[str], str] | None = None,
     ) -> None:
-        """Run Python code in a folder, until `given_up` has a reason in what the tool has said so far."""
+        """Run Python code in a folder, with a text as its standard input.
+
+        `given_up` is called every few seconds with what the tool has said so far; a reason that it returns
+        ends the tool, with `GivenUp`. `ToolError` is raised if it fails, or was stopped.
+        """
         # Python's own warnings are none of the tool's.
         command = [sys.executable, "-W", "ignore", "-c", code, *arguments]
         with tempfile.TemporaryFile(dir=folder) as given, tempfile.TemporaryFile(dir=folder) as log:
@@ -233,7 +237,7 @@ class ToolRunner:
             try:
                 while process.returncode is None:
                     try:
-                        process.wait(_SECONDS)
+                        process.wait(_SECONDS if given_up else None)
                     except subprocess.TimeoutExpired:
                         # The tool writes from where the file's one position is.
                         size = os.fstat(log.fileno()).st_size

@@ -358,6 +358,7 @@ def test_quick_report(quick_report):
     assert list(figures["sections"]) == list(SECTIONS)
     assert {path.name for path in quick_report.iterdir()} == set(figures["files"])
     tables = [name for section in figures["sections"].values() for name in section["tables"]]
+    assert len(tables) == len(set(tables))
     assert sorted(f"{name}.csv" for name in tables) == sorted(
         f for f in figures["files"] if f.endswith(".csv")
     )

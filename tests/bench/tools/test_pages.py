@@ -11,7 +11,7 @@ from blysk.bench.tools.blocks import ENTRIES, Entry, sample_of
 from blysk.bench.tools.docstrings import markdown
 from blysk.bench.tools.error_plot import draw_errors
 from blysk.bench.tools.graph import Graph, Node, likeness
-from blysk.bench.tools.pages import entries_shown, write_pages
+from blysk.bench.tools.pages import PROJECT, entries_shown, write_pages
 from blysk.sim.units.record import Decisions, Record, Sample, Variant
 from blysk.sim.units.registry import RECORDS
 
@@ -199,3 +199,4 @@ def test_every_unit_has_a_page(tmp_path):
         drawings = re.findall(rf"\]\(({unit}-[^)]+)\)", text)
         assert f"{unit}-structure.svg" in drawings
         assert all((tmp_path / name).is_file() for name in drawings)
+        assert (PROJECT / "docs").is_dir()
