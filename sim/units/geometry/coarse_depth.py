@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 
 from blysk.golden.geometry.coarse_depth import CoarseDepth
+from blysk.golden.geometry.span_attributes import SPAN_DEPTH
 from blysk.hdl.geometry.coarse_depth import CoarseDepthUnit
 from blysk.sim.units.record import Case, Record, Stimulus, Variant
 
@@ -41,12 +42,69 @@ def _near(unit, rng, count):
     return _spans(unit, rng, count, 12, 1 << 15, lines=1)
 
 
+def _edges(unit, rng, count):
+    """Three spans a picture: the last is hidden, or is not, by the last bit of a depth.
+
+    The first marks pixels of a block; the second fills it, and may go on to blocks where it is nearer. The
+    deepest ends of both in that block are steps of the bound, or the codes before them, and near each other.
+    The nearest end of the third, which is in that block, is the step behind both, or the code before it.
+    """
+    given, groups = unit.parameters, -(-count // 3)
+    shift, size, columns = SPAN_DEPTH.width - given.depth_bits, given.block, given.blocks_per_line
+    block, falls = rng.integers(0, columns, groups), rng.random(groups) < 0.5
+    first, end = block * size, np.minimum(block * size + size, given.width) - 1
+
+    def line(edge, at, other, falls):
+        """Step of a line of any slope that is ``edge`` at a pixel and in range at another."""
+        room = np.where(falls == (at < other), edge, (1 << SPAN_DEPTH.width) - 1 - edge)
+        step = (
+            room // np.maximum(abs(at - other), 1) * rng.random(groups) * 2.0 ** rng.integers(-30, 1, groups)
+        )
+        return np.where(falls, -1, 1) * step.astype(np.int64)
+
+    def span(begin, last, edge, falls, deepest):
+        """The span from a pixel to another, whose deepest or nearest end is ``edge``."""
+        at, other = np.where(falls == deepest, (begin, last), (last, begin))
+        step = line(edge, at, other, falls)
+        return begin, last - begin + 1, edge - step * (at - begin), step
+
+    def code(upper):
+        """A step of the bound, or the code before it."""
+        return (upper << shift) - rng.integers(0, 2, groups)
+
+    # Some fill the block twice, the second time at depth 0 or a step behind it.
+    twice = rng.random(groups) < 0.125
+    upper = np.where(twice, 1, rng.integers(2, (1 << given.depth_bits) - 3, groups))
+    marked, filled = code(upper + np.where(twice, 2, rng.integers(-1, 2, groups))), code(upper)
+    begin = np.where(twice, first, rng.integers(first, end + 1))
+    last = np.where(twice, end, rng.integers(begin, end + 1))
+    marks = span(begin, last, marked, rng.random(groups) < 0.5, True)
+    # A line that falls goes on to the right, where it is nearer, one that rises comes from the left.
+    limits = (
+        np.where(falls, first, size * rng.integers(0, block + 1)),
+        np.where(falls, np.minimum(size * rng.integers(block + 1, columns + 1), given.width) - 1, end),
+    )
+    fills = span(*limits, filled, falls, True)
+    nearest = code((np.where(twice, filled, np.maximum(marked, filled)) >> shift) + 1)
+    begin = rng.integers(np.where(falls, first, limits[0]), end + 1)
+    last = rng.integers(np.maximum(begin, first), np.where(falls, limits[1], end) + 1)
+    inside = (begin >= first) & (last <= end)
+    covered = span(begin, last, nearest, np.where(inside, rng.random(groups) < 0.5, ~falls), False)
+    names = ("x", "length", "depth", "depth_step")
+    beats = {
+        name: np.stack(values, axis=1).ravel()[:count]
+        for name, *values in zip(names, marks, fills, covered, strict=True)
+    }
+    places = {"y": rng.integers(0, given.height, groups), "picture": np.arange(groups) % 2}
+    return Case(beats | {name: np.repeat(values, 3)[:count] for name, values in places.items()})
+
+
 RECORD = Record(
     name="coarse_depth",
     title="Spans that are hidden for their whole length",
     source="docs/theory/geometry.md#depth",
     variants={
-        "": Variant(partial(CoarseDepthUnit, CoarseDepth(37, 5, tag_bits=2), 6, 3), note="exact"),
+        "": Variant(partial(CoarseDepthUnit, CoarseDepth(46, 5, tag_bits=3), 6, 3), note="exact"),
         "16 pixels": Variant(
             partial(CoarseDepthUnit, CoarseDepth(40, 3, 16, 24), 6, 2), note="exact", long=True
         ),
@@ -56,6 +114,7 @@ RECORD = Record(
         "spans": Stimulus(_spans, 600),
         "short": Stimulus(_short, 900),
         "near": Stimulus(_near, 600),
+        "edges": Stimulus(_edges, 2000),
     },
     axis="",
     still={
