@@ -1,9 +1,9 @@
 """The compiled engine: a component through CXXRTL to C++, compiled, cached, and driven by compiled code.
 
-Amaranth gives RTLIL, Yosys' CXXRTL a C++ class that `guards` and `words` rewrite, and `cxxrtl_driver.cc`
-the loop over the cycles; Python is called once in a million cycles. The first run of a newly built model is
-compared with pysim over its first cycles, and the first and last 1024 writes, before the model
-goes into the cache.
+Amaranth gives RTLIL, Yosys' CXXRTL a C++ class that `parts`, `guards` and `words` rewrite, and
+`cxxrtl_driver.cc` the loop over the cycles; Python is called once in a million cycles. The first run of a
+newly built model is compared with pysim over its first cycles, and the first and last 1024 writes, before the
+model goes into the cache.
 """
 
 import contextlib
@@ -34,6 +34,7 @@ from blysk.sim.engines.cache import cache_folder, private_folder, warn_of_cache
 from blysk.sim.engines.compilers import Compiler, compiler_missing, find_compilers
 from blysk.sim.engines.engine import Ports, SimulationError, Stimulus, StopReason, Trace
 from blysk.sim.engines.guards import group_registers
+from blysk.sim.engines.parts import read_parts
 from blysk.sim.engines.pysim import Model as Interpreted
 from blysk.sim.engines.words import plain_words
 from blysk.sim.errors import InputError
@@ -159,7 +160,7 @@ def _generate(netlist: str) -> str:
                 f"Yosys: {str(warning.message).strip()} A combinational signal depends on itself, "
                 "or one field of a structure on another: give each its own signal, or use the engine pysim"
             )
-    return plain_words(group_registers(text))
+    return plain_words(group_registers(read_parts(text)))
 
 
 def _netlist_of(component: Component) -> str:
@@ -263,9 +264,9 @@ class Model:
     """A component compiled to machine code.
 
     The library comes from the cache, or is built; a built one is compared with pysim on its first run and
-    only then put into the cache. Entries are named by the hash of netlist, Yosys script, `guards`, `words`,
-    driver, compiler and flags and by that of their own content, and appear whole (written aside, then
-    renamed). A cache without room costs a warning, and the next process a build.
+    only then put into the cache. Entries are named by the hash of netlist, Yosys script, `parts`, `guards`,
+    `words`, driver, compiler and flags and by that of their own content, and appear whole (written aside,
+    then renamed). A cache without room costs a warning, and the next process a build.
 
     Parameters
     ----------
@@ -296,6 +297,7 @@ class Model:
             parts = (
                 netlist,
                 _SCRIPT,
+                _source("parts.py"),
                 _source("guards.py"),
                 _source("words.py"),
                 driver,

@@ -1,23 +1,24 @@
-"""CXXRTL's C++ with the registers put under what lets them change.
+"""CXXRTL's C++ with the registers put under what lets them change, and written in place.
 
 CXXRTL gives every register a statement of its own, ``r.next = (rst ? 0 : (advance ? d : r.curr))``, and
 copies every register on every clock. Most of a pipeline stands still most of the time, and most registers ask
-the same question. `group_registers` asks each question once, and copies on the next edge only what was under
-a question that was answered with yes. The chord pipeline of one light becomes 1.7 times as fast.
+the same question. `group_registers` asks each question once, and orders the statements so that all who read a
+register come before the one who writes it: then it needs no copy.
 """
 
 import re
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 __all__ = ["group_registers"]
 
 _CLOCK = "\tif (posedge_p_clk) {"
 _RESET = "p_rst"
 _NAME = r"\b[pi]_\w+"
-
-LEAST = 4
-"""Registers under a question that get a copy of their own."""
+_READ = re.compile(rf"({_NAME})\.curr\b")
+_OUTPUT = re.compile(r"^\t/\*output\*/ wire<\d+> (\w+)", re.MULTILINE)
 
 
 def _choice(text: str) -> tuple[str, str, str] | None:
@@ -43,88 +44,116 @@ def _choice(text: str) -> tuple[str, str, str] | None:
 
 
 @dataclass
-class _Block:
-    """What is done under the same answers: assignments, and further questions with two blocks each."""
+class _Item:
+    """A statement: a register's value, or a question, without a register, and a block for each answer."""
 
-    assignments: list[tuple[str, str]] = field(default_factory=list)
-    questions: dict[str, tuple[str, "_Block", "_Block"]] = field(default_factory=dict)
+    text: str
+    register: str = ""
+    answers: tuple["_Block", ...] = ()
+
+    @cached_property
+    def reads(self) -> set[str]:
+        """Registers that it reads."""
+        inner = (item.reads for block in self.answers for item in block.items)
+        return set(_READ.findall(self.text)).union(*inner)
+
+    @cached_property
+    def writes(self) -> set[str]:
+        """Registers that it writes."""
+        inner = (item.writes for block in self.answers for item in block.items)
+        return ({self.register} if self.register else set()).union(*inner)
+
+
+@dataclass
+class _Block:
+    """What is done under the same answers."""
+
+    items: list[_Item] = field(default_factory=list)
+    questions: dict[str, _Item] = field(default_factory=dict)
 
     def add(self, register: str, value: str, root: Callable[[str], str]) -> None:
         choice = _choice(value)
         if choice is None:
             if value != f"{register}.curr":
-                self.assignments.append((register, value))
+                self.items.append(_Item(value, register))
             return
         question, yes, no = choice
         key = re.sub(_NAME, lambda match: root(match[0]), question)
         if key == _RESET:
             self.add(register, no, root)
             return
-        _, if_yes, if_no = self.questions.setdefault(key, (question, _Block(), _Block()))
-        if_yes.add(register, yes, root)
-        if_no.add(register, no, root)
+        if key not in self.questions:
+            self.questions[key] = _Item(question, answers=(_Block(), _Block()))
+            self.items.append(self.questions[key])
+        for answer, text in zip(self.questions[key].answers, (yes, no), strict=True):
+            answer.add(register, text, root)
 
-    def registers(self) -> set[str]:
-        below = (block.registers() for _, *blocks in self.questions.values() for block in blocks)
-        return {register for register, _ in self.assignments}.union(*below)
+    def order(self, buffered: set[str]) -> None:
+        """Put those who read a register before the one who writes it.
 
+        Where they go round in a circle, registers of the statement that needs the fewest are ``buffered``.
+        """
+        readers = defaultdict(set)
+        for k, item in enumerate(self.items):
+            for register in item.reads:
+                readers[register].add(k)
+        # Of each statement, the registers that it writes and others still read.
+        waits = {
+            k: {name for name in item.writes if name not in buffered and readers[name] - {k}}
+            for k, item in enumerate(self.items)
+        }
+        writers = defaultdict(set)
+        for k, names in waits.items():
+            for name in names:
+                writers[name].add(k)
+        ready = [k for k, names in waits.items() if not names]
+        order = []
+        while waits:
+            if not ready:
+                fewest = min(waits, key=lambda k: len(waits[k]))
+                buffered |= waits[fewest]
+                waits[fewest].clear()
+                ready.append(fewest)
+            k = ready.pop()
+            del waits[k]
+            order.append(self.items[k])
+            for name in self.items[k].reads:
+                readers[name].discard(k)
+                for writer in writers[name] & waits.keys():
+                    if name in waits[writer] and not readers[name] - {writer}:
+                        waits[writer].remove(name)
+                        if not waits[writer]:
+                            ready.append(writer)
+        self.items = order
+        for item in order:
+            for block in item.answers:
+                block.order(buffered)
 
-class _Writer:
-    """C++ of a tree of blocks, and under which flag each register is written."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self.above: list[int | None] = []
-        self.flags: dict[str, set[int | None]] = {}
-
-    def write(self, block: _Block, indent: str, flag: int | None) -> None:
-        for register, value in block.assignments:
-            self.lines.append(f"{indent}{register}.next = {value};")
-            self.flags.setdefault(register, set()).add(flag)
-        for question, *answers in block.questions.values():
-            for test, part in zip((f"bool({question})", f"!bool({question})"), answers, strict=True):
-                count = len(part.registers())
-                if not count:
-                    continue
-                self.lines.append(f"{indent}if ({test}) {{")
-                inner = flag
-                if count >= LEAST:
-                    inner = len(self.above)
-                    self.above.append(flag)
-                    self.lines.append(f"{indent}\tchanged_{inner} = true;")
-                self.write(part, indent + "\t", inner)
-                self.lines.append(f"{indent}}}")
-
-    def groups(self) -> list[list[str]]:
-        """For each flag, the registers that need be copied only when it is set."""
-        groups: list[list[str]] = [[] for _ in self.above]
-        for register, flags in self.flags.items():
-            chains = [self._chain(flag) for flag in flags]
-            common = None
-            for level in zip(*chains, strict=False):
-                if len(set(level)) > 1:
-                    break
-                common = level[0]
-            if common is not None:
-                groups[common].append(register)
-        return groups
-
-    def _chain(self, flag: int | None) -> list[int]:
-        chain = []
-        while flag is not None:
-            chain.append(flag)
-            flag = self.above[flag]
-        return chain[::-1]
+    def lines(self, indent: str, buffered: set[str]) -> Iterator[str]:
+        """C++ of the statements."""
+        for item in self.items:
+            if item.register:
+                place = "next" if item.register in buffered else "curr"
+                yield f"{indent}{item.register}.{place} = {item.text};"
+                continue
+            yes, no = (list(block.lines(indent + "\t", buffered)) for block in item.answers)
+            if yes:
+                yield from (f"{indent}if (bool({item.text})) {{", *yes)
+                yield from (f"{indent}}} else {{", *no) if no else ()
+                yield f"{indent}}}"
+            elif no:
+                yield from (f"{indent}if (!bool({item.text})) {{", *no, f"{indent}}}")
 
 
 def group_registers(text: str) -> str:
-    """Rewrite the C++ of `write_cxxrtl` so that registers which share a question are written together.
+    """Rewrite the C++ of `write_cxxrtl`: registers that share a question together, and in place.
 
-    Three things make it the same machine. Before every evaluation ``next`` of a register equals its ``curr``,
-    so ``r.next = r.curr`` may be left out, and so may the copy of a register whose ``next`` was not written.
-    The statements at the edge read registers as they were (``curr``) and combinational values that are
-    complete before the first of them, so their order is free. The reset is an input that the driver never
-    sets, so the answer to it is no. A text, or a statement, in which this cannot be seen stays as it is.
+    Four things make it the same machine. The statements at the edge read registers as they were and
+    combinational values that are complete before the first of them, so that their order is free, and a
+    register that nobody reads any more may take its next value. Before every evaluation ``next`` of one that
+    is copied equals its ``curr``, so that ``r.next = r.curr`` may be left out. The driver reads outputs
+    before the copies: those that are registers are copied. The reset is an input that the driver never sets,
+    so that the answer to it is no. A text, or a statement, in which this cannot be seen stays as it is.
 
     Parameters
     ----------
@@ -154,29 +183,25 @@ def group_registers(text: str) -> str:
     writes: dict[str, int] = {}
     for name in re.findall(rf"({_NAME})\.next\b", text[start:end]):
         writes[name] = writes.get(name, 0) + 1
-    tree, others = _Block(), []
+    tree, registers, others = _Block(), set(), []
     for block in blocks:
         match = re.fullmatch(rf"\t\t({_NAME})\.next = (.*);", block) if "\n" not in block else None
-        line = f"\t\tif ({match[1]}.commit(observer)) changed = true;\n" if match else ""
-        if match and writes[match[1]] == 1 and text.count(line) == 1:
+        if match and writes[match[1]] == 1 and text.count(_copy(match[1])) == 1:
             tree.add(match[1], match[2], root)
+            registers.add(match[1])
         else:
             others.append(f"{_CLOCK}\n{block}\n\t}}\n")
-    writer = _Writer()
-    writer.write(tree, "\t\t", None)
-    edge = "\n".join([_CLOCK, *writer.lines, "\t}\n"]) + "".join(others)
+    buffered = set(_OUTPUT.findall(text))
+    tree.order(buffered)
+    edge = "".join(others) + "\n".join([_CLOCK, *tree.lines("\t\t", buffered), "\t}\n"])
     text = text[:first] + edge + text[end:]
+    for name in registers - buffered:
+        text = text.replace(_copy(name), "", 1)
+    return text
 
-    copies = ""
-    for flag, registers in enumerate(writer.groups()):
-        lines = [f"\t\tif ({register}.commit(observer)) changed = true;\n" for register in registers]
-        for line in lines:
-            text = text.replace(line, "", 1)
-        body = "".join(f"\t{line}" for line in lines)
-        copies += f"\t\tif (changed_{flag}) {{\n\t\t\tchanged_{flag} = false;\n{body}\t\t}}\n"
-    flags = "".join(f"\tbool changed_{flag} = false;\n" for flag in range(len(writer.above)))
-    text = text.replace("\t\treturn changed;\n", f"{copies}\t\treturn changed;\n", 1)
-    return text.replace("\tbool eval(performer *performer", f"{flags}\n\tbool eval(performer *performer", 1)
+
+def _copy(register: str) -> str:
+    return f"\t\tif ({register}.commit(observer)) changed = true;\n"
 
 
 def _edge_blocks(text: str) -> list[str] | None:

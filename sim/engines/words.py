@@ -14,7 +14,7 @@ __all__ = ["plain_words"]
 
 _TOKEN = re.compile(r"0x[0-9a-f]+u|\d+u?|\w+|\S")
 _DECLARED = re.compile(r"^\t+(?:/\*\w+\*/ )?(value|wire)<(\d+)> (\w+)(?=;| \{| =)", re.MULTILINE)
-_ASSIGNMENT = re.compile(r"^(\t+)([pi]_\w+(?:\.next)?)(?:\.slice<(\d+)(?:,(\d+))?>\(\))? = (.*);$")
+_ASSIGNMENT = re.compile(r"^(\t+)([pi]_\w+(?:\.(?:next|curr))?)(?:\.slice<(\d+)(?:,(\d+))?>\(\))? = (.*);$")
 _CONDITION = re.compile(r"^(\t+if \()(!?)(bool)?(\(.*\)|\w+<.*)(\) \{)$")
 _INDEX = re.compile(r"^(\t+auto \w+ = memory_index\()(.*)(, \d+, \d+\);)$")
 _UPDATE = re.compile(r"^(\t+\w+\.update\(\w+\.index, )(.*)(, \d+\);)$")
@@ -26,6 +26,7 @@ _TABLE = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 _LIBRARY = re.compile(r"\b(?:[a-z]+_(?:u|s|uu|ss|su|us)|reduce_\w+|logic_\w+)<\d+>\(|std::copy")
+_NUMBER = re.compile(r"0x[0-9a-f]+ull")
 _HEADER = "#include <cxxrtl/cxxrtl.h>\n"
 
 _ARITHMETIC = {"add": "+", "sub": "-", "mul": "*", "and": "&", "or": "|", "xor": "^"}
@@ -55,13 +56,15 @@ class _Left(Exception):
 class _Expression(NamedTuple):
     """C++ of an expression: up to 64 bits a word below 2^width, above a ``value``; or any variable.
 
-    ``low`` is a word with the lowest 64 bits, where it is simpler.
+    ``low`` is a word with the lowest 64 bits, where it is simpler. ``among`` is for one that is not 0 when a
+    word is one of some constants: the word, and a mask with their bits.
     """
 
     code: str
     width: int
     variable: bool = False
     low: str = ""
+    among: tuple[str, int] | None = None
 
     @property
     def word(self) -> str:
@@ -220,7 +223,9 @@ class _Parser:
             width = of.width + low.width
             if width > 64:
                 return _Expression(f"{of.value}.concat({low.value}).val()", width)
-            return _Expression(f"({of.word} << {low.width} | {low.word})", width)
+            same = of.among and low.among and of.among[0] == low.among[0]
+            among = (of.among[0], of.among[1] | low.among[1]) if same else None
+            return _Expression(f"({of.word} << {low.width} | {low.word})", width, among=among)
         if method == "repeat" and of.width == 1:
             (width,) = self.numbers()
             self.take("(", ")")
@@ -252,9 +257,13 @@ def _slice(of: _Expression, last: int, first: int) -> _Expression:
 
 
 def _unary(name: str, width: int, a: _Expression) -> _Expression:
-    code = None
+    code, among = None, None
     if name == "logic_not" and width <= 64:
         code = f"word({a.word} == 0)" if a.width <= 64 else f"word(!bool({a.value}))"
+        among = (a.word, 1) if a.width <= 6 else None
+    elif name in ("reduce_or", "reduce_bool") and a.among and a.width > 1 and width == 1:
+        # A table, instead of a comparison with each.
+        code = f"(({a.among[1]:#x}ull >> {a.among[0]}) & 0x1ull)"
     elif name in ("reduce_or", "reduce_bool") and width <= 64:
         code = f"word({a.word} != 0)" if a.width <= 64 else f"word(bool({a.value}))"
     elif name == "reduce_and" and max(width, a.width) <= 64:
@@ -264,7 +273,9 @@ def _unary(name: str, width: int, a: _Expression) -> _Expression:
     elif name in ("not_u", "not_s", "pos_u", "pos_s", "neg_u", "neg_s") and max(width, a.width) <= 64:
         operand = a.word if name.endswith("_u") else a.signed
         code = _cut({"not": "~", "pos": "", "neg": "-"}[name[:3]] + operand, width)
-    return _of_value(f"{name}<{width}>({a.value})", width) if code is None else _Expression(code, width)
+    if code is None:
+        return _of_value(f"{name}<{width}>({a.value})", width)
+    return _Expression(code, width, among=among)
 
 
 def _binary(name: str, width: int, a: _Expression, b: _Expression) -> _Expression:
@@ -283,6 +294,9 @@ def _binary(name: str, width: int, a: _Expression, b: _Expression) -> _Expressio
             code = f"({code})" if fits else _cut(code, width)
         elif signs in ("uu", "ss") and operation in _EQUALITY:
             code = f"word({left} {_EQUALITY[operation]} {right})"
+            if signs == "uu" and _EQUALITY[operation] == "==" and a.width <= 6 and _NUMBER.fullmatch(right):
+                constant = int(right.rstrip("ul"), 0)
+                return _Expression(code, width, among=(left, 1 << constant if constant < 64 else 0))
         elif signs in ("uu", "ss") and operation in _ORDER:
             if signs == "ss":
                 left, right = f"int64_t({left})", f"int64_t({right})"
@@ -333,7 +347,7 @@ def _statement(line: str, variables: dict[str, tuple[str, int]]) -> str:
     indent, target, last, first, text = match.groups()
     name, _, following = target.partition(".")
     kind, width = variables.get(name, ("", 0))
-    if (kind == "wire") != (following == "next"):
+    if (kind == "wire") != bool(following):
         raise _Left
     stop = width - 1 if last is None else int(last)
     start = 0 if last is None else int(first or last)

@@ -1,0 +1,153 @@
+"""CXXRTL's C++ with the fields of combinational words read where they come from.
+
+Amaranth puts the fields of a structure together, passes the word on from unit to unit under new names, and
+takes it apart where a field is used: frame constants of 271 bits, on every clock. `read_parts` follows each
+field to the word or register that it was, and drops the words that nobody reads any more.
+"""
+
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+__all__ = ["read_parts"]
+
+_NAME = r"\b[pi]_\w+"
+_DECLARED = re.compile(rf"^\t+(?:/\*\w+\*/ )?(value|wire)<(\d+)> ({_NAME})(?=;| \{{| =)", re.MULTILINE)
+_LOCAL = re.compile(rf"\tvalue<\d+> ({_NAME});")
+_SLICE = r"\.slice<(\d+)(?:,(\d+))?>\(\)"
+_ASSIGNMENT = re.compile(rf"\t({_NAME})(?:{_SLICE})? = (.*);")
+_COPY = re.compile(rf"({_NAME}(?:\.curr)?)(?:{_SLICE}\.val\(\))?")
+_READ = re.compile(rf"({_NAME})(?:{_SLICE})?(?!\w)")
+
+
+class _Part(NamedTuple):
+    """Bits ``low`` to ``high`` of a word are those of ``source`` from ``start`` on."""
+
+    low: int
+    high: int
+    source: str
+    start: int
+
+
+class _Reader:
+    """What is known of the words above a line."""
+
+    def __init__(self, text: str):
+        self.widths = {name: (kind, int(width)) for kind, width, name in _DECLARED.findall(text)}
+        self.parts: dict[str, list[_Part]] = {}
+
+    def width(self, source: str) -> int:
+        return self.widths[source.removesuffix(".curr")][1]
+
+    def found(self, name: str, low: int, high: int) -> _Part | None:
+        """What bits of a word are, if they are bits of one source."""
+        for part in self.parts.get(name, ()):
+            if part.low <= low and high <= part.high:
+                return _Part(low, high, part.source, part.start + low - part.low)
+        return None
+
+    def read(self, text: str) -> str:
+        """An expression, with parts as what they are."""
+        return _READ.sub(self._replaced, text)
+
+    def _replaced(self, match: re.Match) -> str:
+        name, last, first = match.groups()
+        if name not in self.parts:
+            return match[0]
+        high = self.width(name) - 1 if last is None else int(last)
+        low = 0 if last is None else int(first or last)
+        part = self.found(name, low, high)
+        if part is None:
+            return match[0]
+        stop = part.start + high - low
+        if (part.start, stop) == (0, self.width(part.source) - 1):
+            return part.source
+        # A word by itself may stand where a slice of another must be made a value.
+        return f"{part.source}.slice<{stop},{part.start}>()" + (".val()" if last is None else "")
+
+    def statements(self, line: str) -> Iterator[str]:
+        """A statement of `eval`, rewritten; what a word becomes is known from then on."""
+        match = _ASSIGNMENT.fullmatch(line)
+        kind, width = self.widths.get(match[1], ("", 0)) if match else ("", 0)
+        if kind != "value":
+            target, equals, value = line.rpartition(" = ") if line.endswith(";") else ("", "", line)
+            yield target + equals + self.read(value)
+            return
+        name, last, first, value = match.groups()
+        high, low = (width - 1, 0) if last is None else (int(last), int(first or last))
+        value = self.read(value)
+        copy = _COPY.fullmatch(value)
+        if copy is None or copy[1].removesuffix(".curr") not in self.widths:
+            if last is None:
+                yield f"\t{name} = {value};"
+                return
+            # A word of its own, by a name that CXXRTL does not give.
+            source = f"{name}_at_{low}"
+            self.widths[source] = ("value", high - low + 1)
+            yield f"\tvalue<{high - low + 1}> {source};"
+            yield f"\t{source} = {value};"
+            value, sources = source, [_Part(low, high, source, 0)]
+        else:
+            start = int(copy[3] or copy[2] or 0)
+            sources = list(self._sources(copy[1], start, low, high))
+        self.parts.setdefault(name, []).extend(sources)
+        place = "" if last is None else f".slice<{high},{low}>()"
+        yield f"\t{name}{place} = {value};"
+
+    def _sources(self, source: str, start: int, low: int, high: int) -> Iterator[_Part]:
+        """Parts of a word that bits of a source become."""
+        known = self.parts.get(source, ())
+        stop = start + high - low
+        inside = [part for part in known if part.high >= start and part.low <= stop]
+        if sum(min(part.high, stop) - max(part.low, start) + 1 for part in inside) != high - low + 1:
+            yield _Part(low, high, source, start)
+            return
+        for part in inside:
+            first, last = max(part.low, start), min(part.high, stop)
+            shift = low - start
+            yield _Part(first + shift, last + shift, part.source, part.start + first - part.low)
+
+
+def read_parts(text: str) -> str:
+    """Rewrite the C++ of `write_cxxrtl` so that fields are read where they come from.
+
+    It is the same machine, as a combinational word is written once, before it is read, and registers change
+    only when the clock's edge is committed. What is written under a condition stays as it is.
+
+    Parameters
+    ----------
+    text : str
+        C++ with one clock and one evaluation a clock, without debug information.
+
+    Returns
+    -------
+    str
+        C++ with the same class.
+    """
+    start = text.find("bool p_top::eval(")
+    end = text.find("\treturn converged;", start)
+    if start < 0 or end < 0:
+        return text
+    reader = _Reader(text)
+    lines = [new for line in text[start:end].split("\n") for new in reader.statements(line)]
+    return text[:start] + "\n".join(_used(lines)) + text[end:]
+
+
+def _used(lines: list[str]) -> list[str]:
+    """Without the local words that are written but not read."""
+    local = {match[1] for line in lines if (match := _LOCAL.fullmatch(line))}
+    while True:
+        read = set()
+        for line in lines:
+            match = _ASSIGNMENT.fullmatch(line)
+            if not _LOCAL.fullmatch(line):
+                read.update(re.findall(_NAME, match[4] if match and match[1] in local else line))
+        unread = local - read
+        if not unread:
+            return lines
+        local -= unread
+        lines = [
+            line
+            for line in lines
+            if not ((match := _LOCAL.fullmatch(line) or _ASSIGNMENT.fullmatch(line)) and match[1] in unread)
+        ]

@@ -1,0 +1,100 @@
+"""Fields read where they come from: the text, and that the machine is the same."""
+
+import re
+
+import numpy as np
+import pytest
+from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.lib import data, stream
+from amaranth.lib.wiring import Component, In, Out
+
+from blysk.sim.engines.parts import read_parts
+from blysk.sim.engines.simulate import simulate
+
+from .test_guards import generated
+
+INNER = data.StructLayout({"a": 5, "b": 60})
+WORD = data.StructLayout({"low": 9, "inner": INNER, "on": 1, "high": 40})
+BITS = WORD.size
+
+
+class Fields(Component):
+    """Words put together, passed on, taken apart at other places, and fields across their borders."""
+
+    i: In(stream.Signature(data.StructLayout({"low": 9, "a": 5, "b": 60, "on": 1, "high": 40})))
+    o: Out(stream.Signature(data.ArrayLayout(60, 4)))
+
+    def elaborate(self, platform):
+        m = Module()
+        x = data.View(WORD, self.i.payload.as_value())
+        advance = Signal()
+        m.d.comb += [advance.eq(~self.o.valid | self.o.ready), self.i.ready.eq(advance)]
+        kept, swapped, again = (Signal(WORD, name=name) for name in ("kept", "swapped", "again"))
+        # A signal with the name that a part of another might get.
+        swapped_0 = Signal(9, name="swapped_0")
+        m.d.comb += [
+            swapped_0.eq(x.low ^ 0x155),
+            swapped.low.eq(x.inner.a),
+            swapped.inner.b.eq(Cat(x.high, x.inner.b[:30])),
+            swapped.inner.a.eq(x.low[2:7] + 1),
+            swapped.on.eq(x.on),
+            swapped.high.eq(kept.inner.b[20:60]),
+            again.eq(swapped),
+        ]
+        apart = Signal(WORD, name="apart")
+        m.d.comb += [apart.low.eq(x.low + 3), apart.high.eq(kept.high), apart.inner.b.eq(~x.inner.b)]
+        m.d.comb += [apart.on.eq(x.on), apart.inner.a.eq(kept.inner.a)]
+        both = Signal(2 * BITS, name="both")
+        m.d.comb += both.eq(Cat(again, kept))
+        with m.If(advance):
+            m.d.sync += [self.o.valid.eq(self.i.valid), kept.eq(Mux(again.on, again, x))]
+            m.d.sync += [
+                self.o.payload[0].eq(again.inner.b ^ apart.low ^ apart.high ^ apart.inner.b[3:]),
+                self.o.payload[1].eq(both[60:130]),
+                self.o.payload[2].eq(again.high + again.inner.a + kept.low + swapped_0),
+                # Across the border of two fields.
+                self.o.payload[3].eq(again.as_value()[5:40] ^ both[BITS + 3 :][:50]),
+            ]
+        return m
+
+
+@pytest.fixture(autouse=True)
+def _cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
+
+
+def test_the_machine_is_the_same():
+    """Against pysim, with every bit of every field at random."""
+    rng = np.random.default_rng(8)
+    beats = {
+        "low": rng.integers(0, 1 << 9, 1500),
+        "a": rng.integers(0, 32, 1500),
+        "b": rng.integers(0, 1 << 60, 1500),
+        "on": rng.integers(0, 2, 1500),
+        "high": rng.integers(0, 1 << 40, 1500),
+    }
+    component = Fields()
+    fast, slow = (simulate(component, beats, count=1500, engine=name) for name in ("cxxrtl", "pysim"))
+    assert np.array_equal(fast.beats, slow.beats)
+    assert len(np.unique(fast.beats)) > 4000
+
+
+def test_a_field_is_read_where_it_comes_from(monkeypatch):
+    before, after = (
+        text[text.index("bool p_top::eval(") :]
+        for plain in [generated(Fields(), monkeypatch)]
+        for text in (plain, read_parts(plain))
+    )
+    # A field that is one of a register, or has a word of its own; across a border the word itself is read.
+    assert "add_uu<41>(p_swapped.slice<114,75>().val(), p_swapped.slice<13,9>().val())" in before
+    assert "add_uu<41>(p_kept.curr.slice<73,34>().val(), p_swapped_at_9.val())" in after
+    assert "p_swapped.slice<114,60>()" in after
+    # What nobody reads any more is gone, what the driver reads is not.
+    assert "p_apart.slice<8,0>() = " in before
+    assert not re.search(r"p_apart\b(?!_at)", after)
+    assert "p_i____ready = " in after
+
+
+def test_other_text_stays():
+    for text in ("", "bool p_top::eval(performer *performer) {", "struct p_top {};"):
+        assert read_parts(text) == text
