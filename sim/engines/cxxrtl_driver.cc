@@ -564,7 +564,7 @@ int32_t blysk_run(void *handle, Job *job, int64_t cycles) {
 
 #ifdef BLYSK_HAS_STATUS
 	if (end == DONE || end == LIMIT) {
-		// Without an edge: combinational outputs only.
+		// Without an edge: combinational outputs only. `parts.py` has the status put together only here.
 		model.prev_p_clk.set(true);
 		model.eval();
 		store(job->status, model.p_status);

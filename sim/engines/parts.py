@@ -2,10 +2,12 @@
 
 Amaranth puts the fields of a structure together, passes the word on from unit to unit under new names, and
 takes it apart where a field is used: frame constants of 271 bits, on every clock. `read_parts` follows each
-field to the word or register that it was, and drops the words that nobody reads any more.
+field to the word or register that it was, and drops the words that nobody reads any more. The status, which
+the driver reads when there is no edge, is put together only then.
 """
 
 import re
+from collections import defaultdict
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -130,7 +132,28 @@ def read_parts(text: str) -> str:
         return text
     reader = _Reader(text)
     lines = [new for line in text[start:end].split("\n") for new in reader.statements(line)]
-    return text[:start] + "\n".join(_used(lines)) + text[end:]
+    return text[:start] + "\n".join(_late(_used(lines))) + text[end:]
+
+
+def _late(lines: list[str]) -> list[str]:
+    """With the status, and local words that only it needs, under a question for no edge."""
+    local = {match[1] for line in lines if (match := _LOCAL.fullmatch(line))}
+    assignments = {k: match for k, line in enumerate(lines) if (match := _ASSIGNMENT.fullmatch(line))}
+    late, readers = {"p_status"}, defaultdict(set)
+    for k, line in enumerate(lines):
+        match = assignments.get(k)
+        for name in re.findall(_NAME, match[4] if match else "" if _LOCAL.fullmatch(line) else line):
+            readers[name].add(match[1] if match else "")
+    while more := {name for name in local - late if readers[name] and readers[name] <= late}:
+        late |= more
+    first = next((k for k, line in enumerate(lines) if line.startswith("\tif (posedge_p_clk)")), len(lines))
+    moved = [f"\t{lines[k]}" for k, match in assignments.items() if match[1] in late]
+    if not moved:
+        return lines
+    kept = [
+        line for k, line in enumerate(lines[:first]) if k not in assignments or assignments[k][1] not in late
+    ]
+    return [*kept, "\tif (!posedge_p_clk) {", *moved, "\t}", *lines[first:]]
 
 
 def _used(lines: list[str]) -> list[str]:

@@ -98,3 +98,39 @@ def test_a_field_is_read_where_it_comes_from(monkeypatch):
 def test_other_text_stays():
     for text in ("", "bool p_top::eval(performer *performer) {", "struct p_top {};"):
         assert read_parts(text) == text
+
+
+class Counted(Component):
+    """A status that is combinational, from a register and from words that nothing else reads."""
+
+    i: In(stream.Signature(16))
+    o: Out(stream.Signature(16))
+    status: Out(data.StructLayout({"sum": 24, "last": 16, "twice": 17}))
+
+    def elaborate(self, platform):
+        m = Module()
+        total, twice = Signal(24), Signal(17)
+        m.d.comb += [
+            self.o.payload.eq(self.i.payload ^ 0xA5),
+            self.o.valid.eq(self.i.valid),
+            self.i.ready.eq(self.o.ready),
+            twice.eq(total[:16] << 1),
+            self.status.sum.eq(total + 1),
+            self.status.last.eq(self.i.payload),
+            self.status.twice.eq(twice),
+        ]
+        with m.If(self.i.valid & self.o.ready):
+            m.d.sync += total.eq(total + self.i.payload)
+        return m
+
+
+def test_the_status_is_put_together_without_an_edge(monkeypatch):
+    text = read_parts(generated(Counted(), monkeypatch))
+    _, _, late = text.partition("\tif (!posedge_p_clk) {\n")
+    late, _, edge = late.partition("\n\t}\n")
+    assert late.count("p_status.slice<") == 3
+    assert "p_status" not in edge
+    values = np.arange(3000) * 7 % (1 << 16)
+    fast, slow = (simulate(Counted(), values, count=3000, engine=name) for name in ("cxxrtl", "pysim"))
+    assert fast.status == slow.status
+    assert fast.status["sum"] == (values.sum() + 1) % (1 << 24)
