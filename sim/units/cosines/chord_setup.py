@@ -237,6 +237,7 @@ RECORD = Record(
             "diffuse_0_rise",
             "diffuse_0_slope",
             "highlight_0_first",
+            "highlight_0_first_order",
             "highlight_0_second",
             "shift",
         ),
@@ -245,6 +246,10 @@ RECORD = Record(
     | dict.fromkeys(
         ("highlight_0_slope_out_of_range", "out_of_range"),
         "Written too often, but read only on the cycle after that on which it is to be written.",
+    )
+    | dict.fromkeys(
+        ("diffuse_0_curvature_exact", "highlight_0_ends"),
+        "Held wrong, but read only on the cycle after that on which it is written.",
     )
     | {
         "multiplier_1_1": "A reciprocal and its square are normalised: the first bit is 1 already.",

@@ -66,14 +66,22 @@ const blyskWorker = (core) => {
     for (let n = 0; n < order.length; n++) {
       const place = order[n];
       if (place < 0) continue;
-      for (let c = 0; c < 3; c++) {
-        const value = exact[3 * shown + c];
-        if (golden) golden[place + c] = (value + 0.5) | 0;
-        const error = Math.abs(frame[place + c] - value);
-        errors[3 * shown + c] = error;
-        if (error > worst[shown]) worst[shown] = error;
+      const at = 3 * shown;
+      const red = exact[at];
+      const green = exact[at + 1];
+      const blue = exact[at + 2];
+      if (golden) {
+        golden[place] = (red + 0.5) | 0;
+        golden[place + 1] = (green + 0.5) | 0;
+        golden[place + 2] = (blue + 0.5) | 0;
       }
-      shown++;
+      const r = Math.abs(frame[place] - red);
+      const g = Math.abs(frame[place + 1] - green);
+      const b = Math.abs(frame[place + 2] - blue);
+      errors[at] = r;
+      errors[at + 1] = g;
+      errors[at + 2] = b;
+      worst[shown++] = Math.max(r, g, b);
     }
     return { errors, worst };
   };
