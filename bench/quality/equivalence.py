@@ -1,9 +1,11 @@
 """Equivalent mutants: those that no stimulus could tell from the unit, as ABC proves."""
 
 import itertools
+import math
 import re
 import subprocess
 import sys
+import time
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Set
 from importlib.util import find_spec
@@ -13,8 +15,8 @@ from blysk.bench.tools.place_and_route import YOSYS, ToolError
 
 __all__ = ["Miter", "yosys"]
 
-_SECONDS = 10
-"""After which a proof that a mutant is equivalent is given up."""
+_SECONDS = 20
+"""After which a proof that a mutant is equivalent is given up; most that succeed take 3 at most."""
 
 
 def yosys(script: str, folder: Path) -> None:
@@ -47,7 +49,6 @@ techmap
 aigmap
 write_aiger -zinit -map unit.map unit.aig"""
 
-_ROUNDS = 20
 _NARROW = 12
 
 
@@ -117,19 +118,20 @@ class Miter:
         if register:
             whole = re.compile(re.escape(register) + r"(\W|$)")
             shared = {latch for latch in shared if not any(map(whole.match, self._names[latch]))}
-        for _ in range(_ROUNDS):
-            proved, differing = self._prove(mutant, shared)
+        end = time.monotonic() + _SECONDS
+        while (left := end - time.monotonic()) > 0:
+            proved, differing = self._prove(mutant, shared, left)
             if proved or not differing:
                 return proved
             shared -= differing
         return False
 
-    def _prove(self, mutant: int, shared: Set[int]) -> tuple[bool, set[int]]:
+    def _prove(self, mutant: int, shared: Set[int], seconds: float) -> tuple[bool, set[int]]:
         """Whether nothing differs while registers are ``shared``, and which of them do."""
         compared = self._write(mutant, shared)
         if not compared:
             return True, set()
-        script = f"read_aiger mutant.aig; strash; scleanup; scorr; pdr -a -v -T {_SECONDS}"
+        script = f"read_aiger mutant.aig; strash; scleanup; scorr; pdr -a -v -T {math.ceil(seconds)}"
         abc = Path(find_spec("pyosys").origin).parent / "yosys-abc"
         try:
             done = subprocess.run(
@@ -137,7 +139,7 @@ class Miter:
                 capture_output=True,
                 encoding="utf-8",
                 cwd=self._folder,
-                timeout=6 * _SECONDS,
+                timeout=seconds + 1,
             )
         except subprocess.TimeoutExpired:
             return False, set()
