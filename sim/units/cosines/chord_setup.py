@@ -253,6 +253,7 @@ RECORD = Record(
     )
     | {
         "multiplier_1_1": "A reciprocal and its square are normalised: the first bit is 1 already.",
+        "reciprocals_word": "A reciprocal is normalised: the first bit is 1 already.",
         "o__payload": "A second difference is twice a number: its last bit is 0 already.",
     },
     still={
