@@ -123,7 +123,7 @@ def test_a_register_is_copied_or_written_in_place(monkeypatch):
 
 
 def test_readers_come_before_the_writer(monkeypatch):
-    """Line by line, in the text: who reads a register that was written in place reads the new value."""
+    """Line by line, in the text: no statement reads a register that one above it wrote in place."""
     grouped = group_registers(generated(Tangle(), monkeypatch))
     lines = grouped[grouped.index("bool p_top::eval(") :].splitlines()
     written, branches = set(), []
