@@ -8,16 +8,17 @@ register come before the one who writes it: then it needs no copy.
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+
+from blysk.sim.engines.parts import NAME
 
 __all__ = ["group_registers"]
 
 _CLOCK = "\tif (posedge_p_clk) {"
 _RESET = "p_rst"
-_NAME = r"\b[pi]_\w+"
-_READ = re.compile(rf"({_NAME})\.curr\b")
+_READ = re.compile(rf"({NAME})\.curr\b")
 _OUTPUT = re.compile(r"^\t/\*output\*/ wire<\d+> (\w+)", re.MULTILINE)
 
 
@@ -71,22 +72,21 @@ class _Block:
     items: list[_Item] = field(default_factory=list)
     questions: dict[str, _Item] = field(default_factory=dict)
 
-    def add(self, register: str, value: str, root: Callable[[str], str]) -> None:
+    def add(self, register: str, value: str) -> None:
         choice = _choice(value)
         if choice is None:
             if value != f"{register}.curr":
                 self.items.append(_Item(value, register))
             return
         question, yes, no = choice
-        key = re.sub(_NAME, lambda match: root(match[0]), question)
-        if key == _RESET:
-            self.add(register, no, root)
+        if question == _RESET:
+            self.add(register, no)
             return
-        if key not in self.questions:
-            self.questions[key] = _Item(question, answers=(_Block(), _Block()))
-            self.items.append(self.questions[key])
-        for answer, text in zip(self.questions[key].answers, (yes, no), strict=True):
-            answer.add(register, text, root)
+        if question not in self.questions:
+            self.questions[question] = _Item(question, answers=(_Block(), _Block()))
+            self.items.append(self.questions[question])
+        for answer, text in zip(self.questions[question].answers, (yes, no), strict=True):
+            answer.add(register, text)
 
     def order(self, buffered: set[str]) -> None:
         """Put those who read a register before the one who writes it.
@@ -117,9 +117,9 @@ class _Block:
             k = ready.pop()
             del waits[k]
             order.append(self.items[k])
-            for name in self.items[k].reads:
+            for name in sorted(self.items[k].reads):
                 readers[name].discard(k)
-                for writer in writers[name] & waits.keys():
+                for writer in sorted(writers[name] & waits.keys()):
                     if name in waits[writer] and not readers[name] - {writer}:
                         waits[writer].remove(name)
                         if not waits[writer]:
@@ -173,21 +173,14 @@ def group_registers(text: str) -> str:
     blocks = _edge_blocks(text[first:end])
     if blocks is None:
         return text
-    aliases = dict(re.findall(rf"^\t({_NAME}) = ({_NAME});$", text[start:first], re.MULTILINE))
-
-    def root(name: str) -> str:
-        while name in aliases:
-            name = aliases[name]
-        return name
-
     writes: dict[str, int] = {}
-    for name in re.findall(rf"({_NAME})\.next\b", text[start:end]):
+    for name in re.findall(rf"({NAME})\.next\b", text[start:end]):
         writes[name] = writes.get(name, 0) + 1
     tree, registers, others = _Block(), set(), []
     for block in blocks:
-        match = re.fullmatch(rf"\t\t({_NAME})\.next = (.*);", block) if "\n" not in block else None
+        match = re.fullmatch(rf"\t\t({NAME})\.next = (.*);", block) if "\n" not in block else None
         if match and writes[match[1]] == 1 and text.count(_copy(match[1])) == 1:
-            tree.add(match[1], match[2], root)
+            tree.add(match[1], match[2])
             registers.add(match[1])
         else:
             others.append(f"{_CLOCK}\n{block}\n\t}}\n")

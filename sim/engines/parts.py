@@ -11,15 +11,17 @@ from collections import defaultdict
 from collections.abc import Iterator
 from typing import NamedTuple
 
-__all__ = ["read_parts"]
+__all__ = ["NAME", "read_parts"]
 
-_NAME = r"\b[pi]_\w+"
-_DECLARED = re.compile(rf"^\t+(?:/\*\w+\*/ )?(value|wire)<(\d+)> ({_NAME})(?=;| \{{| =)", re.MULTILINE)
-_LOCAL = re.compile(rf"\tvalue<\d+> ({_NAME});")
+NAME = r"\b[pi]_\w+"
+"""A name that CXXRTL gives: of a port or of something inside."""
+
+_DECLARED = re.compile(rf"^\t+(?:/\*\w+\*/ )?(value|wire)<(\d+)> ({NAME})(?=;| \{{| =)", re.MULTILINE)
+_LOCAL = re.compile(rf"\tvalue<\d+> ({NAME});")
 _SLICE = r"\.slice<(\d+)(?:,(\d+))?>\(\)"
-_ASSIGNMENT = re.compile(rf"\t({_NAME})(?:{_SLICE})? = (.*);")
-_COPY = re.compile(rf"({_NAME}(?:\.curr)?)(?:{_SLICE}\.val\(\))?")
-_READ = re.compile(rf"({_NAME})(?:{_SLICE})?(?!\w)")
+_ASSIGNMENT = re.compile(rf"\t({NAME})(?:{_SLICE})? = (.*);")
+_COPY = re.compile(rf"({NAME}(?:\.curr)?)(?:{_SLICE}\.val\(\))?")
+_READ = re.compile(rf"({NAME})(?:{_SLICE})?(?!\w)")
 
 
 class _Part(NamedTuple):
@@ -142,7 +144,7 @@ def _late(lines: list[str]) -> list[str]:
     late, readers = {"p_status"}, defaultdict(set)
     for k, line in enumerate(lines):
         match = assignments.get(k)
-        for name in re.findall(_NAME, match[4] if match else "" if _LOCAL.fullmatch(line) else line):
+        for name in re.findall(NAME, match[4] if match else "" if _LOCAL.fullmatch(line) else line):
             readers[name].add(match[1] if match else "")
     while more := {name for name in local - late if readers[name] and readers[name] <= late}:
         late |= more
@@ -164,7 +166,7 @@ def _used(lines: list[str]) -> list[str]:
         for line in lines:
             match = _ASSIGNMENT.fullmatch(line)
             if not _LOCAL.fullmatch(line):
-                read.update(re.findall(_NAME, match[4] if match and match[1] in local else line))
+                read.update(re.findall(NAME, match[4] if match and match[1] in local else line))
         unread = local - read
         if not unread:
             return lines
