@@ -35,6 +35,33 @@ def test_within_one_lsb_of_exact_normals(method, triangles, exponent):
     assert np.isnan(compared.arithmetic_error.max_lsb)
 
 
+def test_another_surface_only_within_the_depths_rounding():
+    """Sheets folded flat at their edge: where the other one shows, depths in float64 are nearly equal."""
+    drawn = scene("teapot", size=(640, 480), triangles=64)
+    frame = triangle_frame(drawn, Renderer(preset("renormalise", x_bits=10, y_bits=9)))
+    raster = rasterise(drawn)
+    owner = np.full(frame.owner.size, -1)
+    owner[raster.pixel[raster.visible]] = raster.triangle[raster.span[raster.visible]]
+    owner = owner.reshape(frame.owner.shape)
+    np.testing.assert_array_equal(frame.owner >= 0, owner >= 0)
+    y, x = np.nonzero(owner != frame.owner)
+    assert 100 < len(x) < 250
+
+    corner = drawn.camera.homogeneous(drawn.mesh.vertices, drawn.width, drawn.height)[drawn.mesh.faces]
+    steps = (2.0**24 - 2) / np.ptp(1 / corner[..., 2])
+    ones = np.ones((len(x), 3))
+    target = np.stack([x + 0.5, y + 0.5, ones[:, 0]], axis=-1)[..., np.newaxis]
+
+    def nearness(faces):
+        place = np.rint(corner[faces, :, :2] / corner[faces, :, 2:3] * 256) / 256
+        weight = np.linalg.solve(np.stack([*np.moveaxis(place, -1, 0), ones], axis=1), target)[..., 0]
+        return steps * (weight / corner[faces, :, 2]).sum(axis=1)
+
+    apart = nearness(owner[y, x]) - nearness(frame.owner[y, x])
+    assert apart.min() >= 0
+    assert 1 < apart.max() < 2
+
+
 def test_true_lines_are_not_cut():
     """One span a scanline and triangle, as the rasteriser's, hidden ones included; chord has more."""
     drawn = scene("teapot", size=(160, 120), triangles=220, back_faces="cull")
