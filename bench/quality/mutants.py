@@ -28,7 +28,8 @@ from tqdm import tqdm
 from blysk.bench.command import run
 from blysk.bench.quality.equivalence import Miter
 from blysk.bench.quality.mutation import Mutants, killed, mutate, vectors_of
-from blysk.bench.store import Task, results_of, version_of
+from blysk.bench.store import Task, results_of
+from blysk.sim.engines.cache import version_of
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.output import check_writable, write_json

@@ -22,7 +22,7 @@ from tqdm import tqdm
 
 from blysk.bench.command import run
 from blysk.bench.speed.verilator import Verilated, free_stimulus
-from blysk.bench.store import Task, results_of, version_of
+from blysk.bench.store import Task, results_of
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -32,6 +32,7 @@ from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import unpack
+from blysk.sim.engines.cache import version_of
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.errors import InputError

@@ -37,8 +37,9 @@ from blysk.bench.report import (
 )
 from blysk.bench.report.page import environment, page, without_pictures
 from blysk.bench.report.section import Section, Table
-from blysk.bench.store import Task, results_of, version_of
+from blysk.bench.store import Task, results_of
 from blysk.bench.tools import explore
+from blysk.sim.engines.cache import version_of
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import check_address, cluster_executor, local_executor, processors
 from blysk.sim.output import files_within, write_json, write_text

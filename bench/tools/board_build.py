@@ -13,7 +13,6 @@ from typing import Any
 
 from amaranth.hdl import Elaboratable
 
-from blysk.bench.store import version_of
 from blysk.bench.tools.absorb_registers import absorb_registers
 from blysk.bench.tools.families import ECP5, signal_name
 from blysk.bench.tools.place_and_route import (
@@ -26,6 +25,7 @@ from blysk.bench.tools.place_and_route import (
     ToolError,
     ToolRunner,
 )
+from blysk.sim.engines.cache import version_of
 from blysk.sim.errors import InputError
 
 __all__ = [

@@ -22,11 +22,10 @@ from amaranth.hdl import Const, Module, Shape, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
-from blysk.bench.store import version_of
 from blysk.bench.tools import absorb_registers as absorbing
 from blysk.bench.tools.absorb_registers import Absorbed, absorb_registers
 from blysk.bench.tools.families import ECP5, Family, Parts, Place, kind_of_cell, signal_name
-from blysk.sim.engines.cache import cache_folder
+from blysk.sim.engines.cache import cache_folder, version_of
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.errors import InputError
 from blysk.sim.output import write_json

@@ -20,7 +20,7 @@ from blysk.bench.command import resumable
 from blysk.bench.report.frames import map_colors
 from blysk.bench.report.page import embedded, environment
 from blysk.bench.report.report import SECTIONS, about, chosen_tasks, measure_all, measured, write_report
-from blysk.bench.store import Task, version_of
+from blysk.bench.store import Task
 from blysk.bench.tools.documents import DOCUMENTS, documents
 from blysk.bench.tools.pages import PROJECT
 from blysk.bench.tools.web_data import (
@@ -43,6 +43,7 @@ from blysk.bench.tools.web_data import (
 )
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.presets import LOBES, MODELS
+from blysk.sim.engines.cache import version_of
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import processors
 from blysk.sim.output import atomic_writer, files_within, write_json, write_text

@@ -1,18 +1,27 @@
-"""The folder of compiled models, and those where other tools keep what they compile."""
+"""The folder of compiled models, and those where other tools keep what they compile; the code's version."""
 
 import atexit
 import functools
+import hashlib
 import os
 import shutil
 import tempfile
 import warnings
+from importlib import import_module, metadata
 from pathlib import Path
 
 import platformdirs
 
 from blysk.sim.errors import InputError
 
-__all__ = ["cache_folder", "private_folder", "provide_caches", "warn_of_cache"]
+__all__ = [
+    "cache_folder",
+    "code_version",
+    "private_folder",
+    "provide_caches",
+    "version_of",
+    "warn_of_cache",
+]
 
 
 def _unsafe(folder: Path) -> str | None:
@@ -122,3 +131,23 @@ def warn_of_cache(folder: Path, reason: str) -> None:
     """Warn that a cache folder is not used."""
     text = f"cache folder {folder} {reason}: compiled models are kept for this run only"
     warnings.warn(text, RuntimeWarning, stacklevel=3)
+
+
+def version_of(package: str) -> str | None:
+    """Version of an installed package, ``None`` where it is not; nothing is imported."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+@functools.cache
+def code_version(*libraries: str) -> str:
+    """Hash of the files of `golden`, `hdl` and `sim`, and of the versions of libraries that are installed."""
+    installed = {name: version for name in libraries if (version := version_of(name))}
+    digest = hashlib.sha256(repr(installed).encode())
+    for package in ("golden", "hdl", "sim"):
+        for path in sorted(Path(import_module(f"blysk.{package}").__path__[0]).rglob("*.*")):
+            if "__pycache__" not in path.parts:
+                digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()

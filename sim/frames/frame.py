@@ -136,6 +136,7 @@ class FrameSimulator:
             beats_of(self._unit, spans),
             write=writes_of(constants),
             engine=self.engine,
+            origin=(self.design, self.pipes),
             **ends,
             **options,
         )

@@ -105,7 +105,8 @@ class TriangleSimulator:
     ):
         self.renderer, self.size, self.engine, self.angle = renderer, size, engine, angle
         self.setups = setups
-        self._unit = RenderUnit(renderer, size, setups)
+        self._origin = renderer, size, setups
+        self._unit = RenderUnit(*self._origin)
         self._check()
 
     def _check(self) -> None:
@@ -133,6 +134,7 @@ class TriangleSimulator:
             constants=self._constants(frame),
             write=writes_of(constants),
             engine=self.engine,
+            origin=self._origin,
         )
         # What "auto" stands for: its warning comes once.
         self.engine = run.engine
@@ -189,6 +191,7 @@ class TriangleSimulator:
             constants=self._constants(sent.frame),
             write=writes_of(constants_of(scene, self.renderer.design)),
             engine=self.engine,
+            origin=self._origin,
             progress=None if progress is None else lambda done: progress(done, done),
             vcd=vcd,
             idle_timeout=self._longest_silence(sent),

@@ -69,7 +69,7 @@ def test_what_is_asked_for_twice_is_measured_once(tmp_path, threads):
 def test_what_changes_a_result_changes_its_key(monkeypatch):
     keys = {Task(square, {"number": 1}).key, Task(square, {"number": 2}).key}
     keys |= {Task(square, {"number": 1, "offset": 0}).key, Task(process, {"number": 1}).key}
-    monkeypatch.setattr(store, "_code", lambda: "other code")
+    monkeypatch.setattr(store, "code_version", lambda *libraries: "other code")
     keys.add(Task(square, {"number": 1}).key)
     monkeypatch.setattr(store, "_bench", lambda file: "other file")
     keys.add(Task(square, {"number": 1}).key)

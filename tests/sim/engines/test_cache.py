@@ -5,8 +5,10 @@ import re
 import stat
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.sim.engines import cache as cache_module
 from blysk.sim.engines import cxxrtl
 from blysk.sim.engines.simulate import simulate
@@ -183,3 +185,65 @@ def test_two_processes_at_once(builds, cache):
     process = start(program, PYTHONHASHSEED="3")
     assert process.communicate(timeout=60)[0] == "[0, 3, 6, 9, 12]\n"
     assert builds() == count
+
+
+class Elsewhere:
+    """Of a module whose version nobody knows."""
+
+
+def diffuse(latency, origin):
+    """Cycles that a beat takes, which are the latency."""
+    run = simulate(DiffuseUnit(latency=latency), np.arange(3), count=3, origin=origin)
+    return int(run.cycles[0] - run.input_cycles[0])
+
+
+@pytest.fixture
+def netlists(monkeypatch):
+    """Components that were made to netlists."""
+    found, netlist_of = [], cxxrtl._netlist_of
+    monkeypatch.setattr(cxxrtl, "_netlist_of", lambda unit: found.append(unit) or netlist_of(unit))
+    return found
+
+
+def test_an_origin_spares_the_netlist(builds, netlists, cache):
+    assert [diffuse(latency, latency) for latency in (4, 4, 5, 4)] == [4, 4, 5, 4]
+    assert (builds(), len(netlists)) == (2, 2)
+    assert diffuse(4, None) == 4
+    assert (builds(), len(netlists)) == (2, 3)
+    # Another origin of the same netlist has its own note, and the same model.
+    assert diffuse(4, "another") == 4
+    assert (builds(), len(netlists), len(entries(cache))) == (2, 4, 2)
+
+
+@pytest.mark.parametrize("text", [b"", b"0" * 64, b"\xff", None])
+def test_what_an_origin_names_may_be_gone(builds, netlists, cache, text):
+    assert diffuse(4, 4) == 4
+    (note,) = entries(cache, ".origin")
+    if text is None:
+        entries(cache)[0].unlink()
+    else:
+        note.write_bytes(text)
+    assert [diffuse(4, 4), diffuse(4, 4)] == [4, 4]
+    assert (builds(), len(netlists)) == (2 if text is None else 1, 2)
+
+
+@pytest.mark.parametrize("origin", [Elsewhere, Elsewhere(), [Elsewhere], lambda: 0, diffuse, os.getpid])
+def test_what_may_change_unseen_is_no_origin(builds, netlists, cache, origin):
+    assert [diffuse(4, origin), diffuse(4, origin)] == [4, 4]
+    assert (builds(), len(netlists), entries(cache, ".origin")) == (1, 2, [])
+
+
+def test_other_code_is_another_origin(builds, netlists, cache, monkeypatch):
+    assert diffuse(4, 4) == 4
+    monkeypatch.setattr(cxxrtl, "code_version", lambda *libraries: "other")
+    assert diffuse(4, 4) == 4
+    assert (builds(), len(netlists), len(entries(cache, ".origin"))) == (1, 2, 2)
+
+
+def test_code_version_tells_libraries_apart(monkeypatch):
+    known = cache_module.code_version("numpy")
+    assert known == cache_module.code_version("numpy")
+    assert known != cache_module.code_version("amaranth")
+    assert known == cache_module.code_version.__wrapped__("numpy", "not-installed")
+    monkeypatch.setattr(cache_module, "version_of", lambda package: "another")
+    assert known != cache_module.code_version.__wrapped__("numpy")
