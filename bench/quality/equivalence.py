@@ -76,8 +76,8 @@ class Miter:
 
     Products are too much for a proof. So first, the two share their registers, and what either would put into
     them must be the same: if so, they stay the same by induction. Those that are narrow, or tell where beats
-    are, go on as in the unit, for these control; the others are inputs: whatever they hold. Not shared are
-    the mutant's own, and those bits that do differ.
+    are, go on as in the unit, for these control; the others are inputs: whatever they hold, unless the unit
+    never puts anything but 0 into them. Not shared are the mutant's own, and those bits that do differ.
 
     Parameters
     ----------
@@ -108,6 +108,28 @@ class Miter:
                 self._names[int(index)].add(name)
                 if widths[name] > _NARROW and not re.search(r"\b(ages|valid)$", name):
                     self._free.add(int(index))
+        self._zero = self._constant()
+
+    def _constant(self) -> set[int]:
+        """Registers of the unit that are always 0: as long as they all are, none becomes anything else."""
+        zero = set(range(len(self._next)))
+        while True:
+            # Of each node what it is for certain: 0, 1, or not known.
+            nodes = [0] + [None] * self._inputs + [0 if k in zero else None for k in range(len(self._next))]
+            for place in self._mutant:
+                nodes[1 + place] = 0
+
+            def known(literal: int, nodes=nodes) -> int | None:
+                value = nodes[literal >> 1]
+                return value if value is None else value ^ literal & 1
+
+            for a, b in self._gates:
+                a, b = known(a), known(b)
+                nodes.append(0 if a == 0 or b == 0 else 1 if a == b == 1 else None)
+            changed = {k for k in zero if known(self._next[k]) != 0}
+            if not changed:
+                return zero
+            zero -= changed
 
     def is_equivalent(self, mutant: int, register: str = "") -> bool:
         """Whether a mutant, of whatever comes to a register, is proved to do what the unit does."""
@@ -155,7 +177,7 @@ class Miter:
         places = itertools.count(1 + self._inputs)
         units = [[0, *range(2, 2 * self._inputs + 2, 2)] for _ in range(2)]
         for latch in range(len(self._next)):
-            literal = 2 * next(places)
+            literal = 0 if latch in self._zero else 2 * next(places)
             units[0].append(literal)
             units[1].append(literal if latch in shared else 2 * next(places))
         first = next(places)
@@ -180,7 +202,8 @@ class Miter:
             if latch >= 0 and not (latch in shared and latch in self._free):
                 now = (unit[1 + self._inputs + latch] >> 1 for unit in units)
                 # Of a register that is shared the unit's comes last.
-                following |= dict(zip(now, (a, a if latch in shared else b), strict=True))
+                ends = zip(now, (a, a if latch in shared else b), strict=True)
+                following |= {node: end for node, end in ends if node}
             if a != b and (latch < 0 or latch in shared):
                 outputs.append(both(both(a, b) ^ 1, both(a ^ 1, b ^ 1) ^ 1))
                 compared.append(latch)

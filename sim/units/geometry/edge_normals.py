@@ -7,6 +7,7 @@ import numpy as np
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_NORMAL, Pieces
 from blysk.golden.number.fixed import Fixed
 from blysk.hdl.geometry.edge_normals import EdgeNormalsUnit
+from blysk.sim.units.geometry.vector_normaliser import deciding_vectors
 from blysk.sim.units.operands import any_codes, sphere
 from blysk.sim.units.record import Case, Record, Stimulus, Variant
 
@@ -59,6 +60,15 @@ def _long(unit, rng, count):
     return _case(rng, count, 4095)
 
 
+def _deciding(unit, rng, count):
+    """Pieces of a pixel, whose normal's last bits decide."""
+    vector = deciding_vectors(rng, count)
+    beats = _single(unit, rng, len(vector)).beats
+    return Case(
+        beats | {"left": vector, "right": vector.copy(), "flip": np.ones(len(vector), dtype=np.int64)}
+    )
+
+
 RECORD = Record(
     name="edge_normals",
     title="Unit normals at both ends and in the middle of each piece of a span",
@@ -73,7 +83,13 @@ RECORD = Record(
         "short": Stimulus(_short, 1000),
         "single": Stimulus(_single, 500),
         "long": Stimulus(_long, 500),
+        "last bits": Stimulus(_short, 50_000, stalled=False),
+        "ties": Stimulus(_deciding, 2_000_000, stalled=False),
     },
     axis="",
+    waivers={
+        "dot_product.datapath.last_product": "One more or less in a sum of three squares is cut off. To "
+        "carry into what is kept, it must be 7 modulo 8, which none is, or 0 modulo 4, and then all are even."
+    },
     still={"a counter counts more events than a run has": "count_repaired[7-31]"},
 )

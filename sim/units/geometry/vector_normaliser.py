@@ -6,13 +6,14 @@ import numpy as np
 
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
 from blysk.golden.geometry.vector_normaliser import VectorNormaliser
+from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import Fixed
-from blysk.golden.number.unit_vector import ONE
+from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.hdl.geometry.vector_normaliser import SharedVectorNormaliserUnit, VectorNormaliserUnit
 from blysk.sim.units.operands import any_codes, sphere
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
-__all__ = ["RECORD"]
+__all__ = ["RECORD", "deciding_vectors"]
 
 
 def _expect(unit, case):
@@ -47,6 +48,35 @@ def _corners(unit, rng, count):
     return Case({"vector": vector, "flip": rng.integers(0, 2, len(vector))})
 
 
+def deciding_vectors(rng: np.random.Generator, draws: int) -> np.ndarray:
+    """Of so many vectors those in which a bit decides how something is rounded: about one of 3,000.
+
+    A step of the squared length changes the factor, or the result, which is negated, is a tie, or would be
+    one but for a bit.
+
+    Returns
+    -------
+    int64 array, shape (V, 3), SQ(1, 26)
+    """
+    model = VectorNormaliser()
+    vector = _codes(sphere(rng, draws) * 2.0**26)
+    v, _ = model.shifted(Fixed(SPAN_NORMAL, vector))
+    square = DotProduct().compute(v, v)
+    e = model.factor(square)
+    steps = (model.factor(Fixed(square.format, square.codes + step)) for step in (-1, 1))
+    decides = np.any([e.codes != other.codes for other in steps], axis=0)
+    total = v + Fixed(e.format, e.codes[:, np.newaxis]) * v
+    cut = total.format.fraction_bits - COMPONENT.fraction_bits
+    from_tie = (total.codes + (1 << (cut - 1))) & ((1 << cut) - 1)
+    return vector[decides | (from_tie & (from_tie - 1) == 0).any(axis=1)]
+
+
+def _deciding(unit, rng, count):
+    """Vectors in which a bit decides, most of them negated."""
+    vector = deciding_vectors(rng, count)
+    return Case({"vector": vector, "flip": (rng.random(len(vector)) < 0.9).astype(np.int64)})
+
+
 def _measure(rng, count):
     vector = _codes(sphere(rng, count) * 2.0 ** rng.uniform(14, 26, (count, 1)))
     length = np.linalg.norm(vector, axis=1)
@@ -69,8 +99,10 @@ RECORD = Record(
         "vectors": Stimulus(_vectors, 1000),
         "corners": Stimulus(_corners, 500),
         "last bits": Stimulus(_vectors, 100_000, stalled=False),
+        "ties": Stimulus(_deciding, 2_000_000, stalled=False),
     },
     axis="log2 of the vector's length",
+    waivers={"e": "No squared length has a factor that its word cannot hold."},
     still={
         "u is in halves of a step, odd": "u[0]",
         "pairs of Booth digits weigh 16 and 256 times as much": "pair_2[0-3] pair_4[0-7]",

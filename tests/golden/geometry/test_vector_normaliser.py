@@ -45,12 +45,14 @@ def test_fit_of_the_table():
 
 
 def test_factor_of_every_square():
-    """No word of the factor wraps: of all squared lengths from 1/4 to 1 it is off by its roundings."""
+    """No word of the factor wraps or saturates: of all squared lengths from 1/4 to 1, as rounded."""
     p = VectorNormaliser()
     s = np.arange(1 << 18, 1 << 20)
-    e = p.factor(Fixed(UQ(0, 22), s << 2)).values
+    e = p.factor(Fixed(UQ(0, 22), s << 2))
+    assert e.codes.min() > p.FACTOR_FORMAT.min_code
+    assert e.codes.max() < p.FACTOR_FORMAT.max_code
     exact = ONE * COMPONENT.step / np.sqrt((s + 0.5) * 2.0**-20) - 1
-    assert np.abs(e - exact).max() < 2 * p.FIT + 2.0**-20 + 2.0**-18
+    assert np.abs(e.values - exact).max() < 2 * p.FIT + 2.0**-20 + 2.0**-18
 
 
 def test_lost_and_flipped():
