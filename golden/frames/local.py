@@ -31,15 +31,15 @@ def along_spans(raster: Raster, span: np.ndarray, t: np.ndarray) -> tuple[np.nda
     """Weights and normals, not of unit length, at t of each span; both are linear along a span."""
     t = t[:, np.newaxis]
     weights = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
-    left, right = line_ends(raster)
-    return weights, (1 - t) * left[span] + t * right[span]
+    left, right = line_ends(raster, span)
+    return weights, (1 - t) * left + t * right
 
 
-def line_ends(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
-    """Normals at the ends of spans with the lengths that they have there, shape (spans, 3)."""
+def line_ends(raster: Raster, span: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
+    """Normals at the ends of spans, by default all, with the lengths that they have there, shape (spans, 3)."""
     return (
-        raster.magnitude_left[:, np.newaxis] * raster.normal_left,
-        raster.magnitude_right[:, np.newaxis] * raster.normal_right,
+        raster.magnitude_left[span, np.newaxis] * raster.normal_left[span],
+        raster.magnitude_right[span, np.newaxis] * raster.normal_right[span],
     )
 
 
