@@ -36,7 +36,7 @@ def along_spans(raster: Raster, span: np.ndarray, t: np.ndarray) -> tuple[np.nda
 
 
 def line_ends(raster: Raster, span: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
-    """Normals at the ends of spans, by default all, with the lengths that they have there, shape (spans, 3)."""
+    """Normals at the ends of spans, of all or some, with the lengths that they have there, (spans, 3)."""
     return (
         raster.magnitude_left[span, np.newaxis] * raster.normal_left[span],
         raster.magnitude_right[span, np.newaxis] * raster.normal_right[span],
