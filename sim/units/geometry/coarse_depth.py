@@ -122,7 +122,8 @@ RECORD = Record(
     waivers={"place": "Words are swept in another order, every one in its turn."},
     still={
         "what a reset finds is swept": "fresh[0] used[0]",
-        "only after a reset all words are swept": "left[4]",
+        "only after a reset all words are swept, and 5 of 30 else": "left[3-4]",
+        "a scanline has six words, and begins with an even one": "span[12]",
     },
     remembers=True,
 )
