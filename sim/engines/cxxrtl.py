@@ -177,9 +177,9 @@ class _Origin(pickle.Pickler):
     """What is told by a name must be of a package whose version is told, too."""
 
     def reducer_override(self, value: Any) -> Any:
-        package, _, _ = (getattr(value, "__module__", None) or "").partition(".")
-        if callable(value) and package not in ("blysk", "builtins", "numpy"):
-            raise pickle.PicklingError(f"{value!r} is of {package}")
+        module = getattr(value, "__module__", None) or ""
+        if callable(value) and not re.match(r"(blysk\.(golden|hdl|sim)|builtins|numpy)(\.|$)", module):
+            raise pickle.PicklingError(f"{value!r} is of {module or 'no module'}")
         return NotImplemented
 
 
@@ -319,7 +319,7 @@ class Model:
         Component to be simulated.
     origin : optional
         All that the component is made from, its type aside: with it the cache is asked without a netlist.
-        One that is not of plain values and of what `blysk` defines is left aside.
+        One that is not of plain values and of what `golden`, `hdl` and `sim` define is left aside.
 
     Raises
     ------
