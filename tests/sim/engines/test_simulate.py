@@ -282,7 +282,7 @@ def test_arguments():
 def test_auto_falls_back_to_pysim(monkeypatch):
     assert simulate(Register(), pairs(3), count=3, engine="auto").engine == "cxxrtl"
 
-    def broken(component):
+    def broken(component, origin):
         raise CompilerMissing("no compiler")
 
     monkeypatch.setattr("blysk.sim.engines.cxxrtl.Model", broken)
