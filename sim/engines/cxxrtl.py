@@ -311,7 +311,8 @@ class Model:
     The library comes from the cache, or is built; a built one is compared with pysim on its first run and
     only then put into the cache. Entries are named by the hash of netlist, Yosys script, `parts`, `guards`,
     `words`, driver, compiler and flags and by that of their own content, and appear whole (written aside,
-    then renamed). A cache without room costs a warning, and the next process a build.
+    then renamed). A cache without room costs a warning, and the next process a build. What an origin has for
+    a netlist is kept beside them as a note: the netlist's hash, by that of origin, code and libraries.
 
     Parameters
     ----------

@@ -61,12 +61,10 @@ def _long(unit, rng, count):
 
 
 def _deciding(unit, rng, count):
-    """Pieces of a pixel, whose normal's last bits decide."""
+    """Pieces of a pixel, for whose normal a bit decides how it is rounded."""
     vector = deciding_vectors(rng, count)
     beats = _single(unit, rng, len(vector)).beats
-    return Case(
-        beats | {"left": vector, "right": vector.copy(), "flip": np.ones(len(vector), dtype=np.int64)}
-    )
+    return Case(beats | {"left": vector, "right": vector, "flip": np.ones(len(vector), dtype=np.int64)})
 
 
 RECORD = Record(
