@@ -8,7 +8,7 @@ import numpy as np
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frames.highlight_limits import HighlightLimits
-from blysk.golden.frames.local import CHUNK, SurfacePoints, along_spans, chunks
+from blysk.golden.frames.local import CHUNK, SurfacePoints, chunks, lines_along, weights_along
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.number.spans import pixels_of, runs_of
@@ -76,7 +76,7 @@ def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
 
 def _normals(raster: Raster, span: np.ndarray, place: np.ndarray) -> np.ndarray:
     """True unit normals at pixels of spans, which need not be whole."""
-    _, line = along_spans(raster, span, place / np.maximum(raster.length[span] - 1, 1))
+    line = lines_along(raster, span, place / np.maximum(raster.length[span] - 1, 1))
     # Between opposite normals the line passes through 0, where any normal is as good.
     return np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left[span])
 
@@ -108,19 +108,18 @@ def _parts(raster, origin, first, last) -> Raster:
     origin, first, last = (field[order] for field in (origin, first, last))
     length = (last - first + 1).astype(np.int32)
     start = np.cumsum(length) - length
-    span = np.repeat(np.arange(len(length), dtype=np.int32), length)
-    steps = np.maximum(raster.length[origin] - 1, 1)
+    steps = raster.length[origin] - 1
     ends = {}
     for side, place in (("left", first), ("right", last)):
-        weights, line = along_spans(raster, origin, place / steps)
-        # The rasteriser's own normals stay as they are, to the bit.
-        own = place == (0 if side == "left" else raster.length[origin] - 1)
-        given = getattr(raster, f"normal_{side}")[origin]
-        ends |= {
-            f"normal_{side}": np.where(own[:, np.newaxis], given, _normals(raster, origin, place)),
-            f"weights_{side}": weights,
-            f"magnitude_{side}": np.linalg.norm(line, axis=1),
-        }
+        for name in ("normal", "weights", "magnitude"):
+            ends[f"{name}_{side}"] = getattr(raster, f"{name}_{side}")[origin]
+        # The rasteriser's own ends stay as they are, to the bit.
+        inner = np.flatnonzero(place != (0 if side == "left" else steps))
+        span, t = origin[inner], place[inner] / steps[inner]
+        ends[f"normal_{side}"][inner] = _normals(raster, span, place[inner])
+        ends[f"weights_{side}"][inner] = weights_along(raster, span, t)
+        ends[f"magnitude_{side}"][inner] = np.linalg.norm(lines_along(raster, span, t), axis=1)
+    span = np.repeat(np.arange(len(length), dtype=np.int32), length)
     return replace(
         raster,
         x=(raster.x[origin] + first).astype(np.int32),
@@ -319,10 +318,8 @@ class _Pieces:
         """
         ends = []
         for place in (self.first, self.last):
-            weights, line = along_spans(
-                self.raster, self.origin, place / (self.raster.length[self.origin] - 1)
-            )
-            ends.append([np.linalg.norm(line, axis=1), weights.sum(axis=1)])
+            at = self.raster, self.origin, place / (self.raster.length[self.origin] - 1)
+            ends.append([np.linalg.norm(lines_along(*at), axis=1), weights_along(*at).sum(axis=1)])
         smaller, larger = np.sort(ends, axis=0)
         ratio = np.divide(larger, smaller, out=np.full_like(larger, 1e9), where=smaller > 0).max(axis=0)
         return np.maximum(ratio, ChordInterpolator.MARGIN)

@@ -15,24 +15,30 @@ from blysk.golden.reference.scene import Scene
 __all__ = [
     "CHUNK",
     "SurfacePoints",
-    "along_spans",
     "chunks",
     "line_ends",
+    "lines_along",
     "local_operands",
     "local_values",
     "middle_normals",
+    "weights_along",
 ]
 
 CHUNK = 1 << 16
 """Spans worked on at once; bounds the memory, changes no result."""
 
 
-def along_spans(raster: Raster, span: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weights and normals, not of unit length, at t of each span; both are linear along a span."""
+def weights_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Weights of the triangle's corners at t of each span, where they are linear, (spans, 3)."""
     t = t[:, np.newaxis]
-    weights = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
+    return (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
+
+
+def lines_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Normals, not of unit length, at t of each span, where they are linear, (spans, 3)."""
+    t = t[:, np.newaxis]
     left, right = line_ends(raster, span)
-    return weights, (1 - t) * left + t * right
+    return (1 - t) * left + t * right
 
 
 def line_ends(raster: Raster, span: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
@@ -46,7 +52,7 @@ def line_ends(raster: Raster, span: np.ndarray | slice = slice(None)) -> tuple[n
 def middle_normals(raster: Raster) -> np.ndarray:
     """True unit normals in the middle of spans, shape (spans, 3); between opposite ones, the left one."""
     spans = np.arange(len(raster.length))
-    _, line = along_spans(raster, spans, np.full(len(spans), 0.5))
+    line = lines_along(raster, spans, np.full(len(spans), 0.5))
     return np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left)
 
 
@@ -67,22 +73,28 @@ class SurfacePoints:
     @classmethod
     def at(cls, scene: Scene, raster: Raster, span: np.ndarray, t: np.ndarray) -> "SurfacePoints":
         """Those of spans, at t of each."""
-        weights, line = along_spans(raster, span, t)
+        line = lines_along(raster, span, t)
         # Between opposite normals the line passes through 0, where any normal is as good.
         normal = np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left[span])
-        share = weights / weights.sum(axis=1, keepdims=True)
-        corners = scene.mesh.vertices[scene.mesh.faces[raster.triangle[span]]]
-        points = np.einsum("sn,snk->sk", share, corners)
-        viewer = np.broadcast_to(scene.view_vectors(points), points.shape)
-        direction = np.empty((len(scene.lights), *points.shape))
-        factor = np.ones((len(points), len(scene.lights)))
+        points = None
+        if scene.local:
+            weights = weights_along(raster, span, t)
+            share = weights / weights.sum(axis=1, keepdims=True)
+            corners = scene.mesh.vertices[scene.mesh.faces[raster.triangle[span]]]
+            points = np.einsum("sn,snk->sk", share, corners)
+        viewer = scene.view_vectors(points)
+        direction = np.empty((len(scene.lights), *normal.shape))
+        halfway = np.empty_like(direction)
+        factor = np.ones((len(normal), len(scene.lights)))
         for index, light in enumerate(scene.lights):
-            direction[index] = light.towards(points)
+            towards = light.towards(points)
+            direction[index] = towards
+            halfway[index] = halfway_vector(towards, viewer)
             factor[:, index] = light.factor(points)
-        halfway = halfway_vector(direction, viewer)
         diffuse = np.einsum("sk,lsk->sl", normal, direction) * factor
         highlight = np.square(normal - halfway).sum(axis=2).T / 2
         highlight = np.where(halfway.any(axis=2).T, highlight, 2.0)
+        viewer = np.broadcast_to(viewer, normal.shape)
         return cls(normal, viewer, direction, np.clip(diffuse, -1, 1), np.clip(highlight, 0, 2), factor)
 
     def scaled(self, scale: int) -> "SurfacePoints":

@@ -65,15 +65,17 @@ def quantise(vectors: np.ndarray) -> np.ndarray:
     low = np.floor(scaled).astype(np.int64)
     # Both neighbours of a component that is a whole code are that code.
     high = np.ceil(scaled).astype(np.int64)
-    best = np.empty_like(low)
+    squares = [np.moveaxis(codes * codes, -1, 0) for codes in (low, high)]
     smallest = np.full(low.shape[:-1], np.iinfo(np.int64).max)
+    best = np.zeros(low.shape[:-1], dtype=np.uint8)
+    # Bit i of a corner: component i is the higher of its two neighbours.
     for corner in range(8):
-        candidate = np.where([corner & 1, corner & 2, corner & 4], high, low)
-        miss = np.abs(np.einsum("...i,...i->...", candidate, candidate) - ONE * ONE)
-        better = miss < smallest
-        best[better] = candidate[better]
-        smallest = np.minimum(smallest, miss)
-    return np.clip(best, -ONE, ONE)
+        total = sum(squares[corner >> axis & 1][axis] for axis in range(3))
+        miss = np.abs(total - ONE * ONE)
+        best[miss < smallest] = corner
+        np.minimum(smallest, miss, out=smallest)
+    upper = (best[..., np.newaxis] >> np.arange(3, dtype=np.uint8) & 1).astype(bool)
+    return np.clip(np.where(upper, high, low), -ONE, ONE)
 
 
 def quantise_direction(vectors: np.ndarray) -> np.ndarray:

@@ -460,12 +460,13 @@ def fragment_normals(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndar
     span, t = _position(raster, which)
     left = (1 - t) * raster.magnitude_left[span][:, np.newaxis]
     right = t * raster.magnitude_right[span][:, np.newaxis]
-    normal = left * raster.normal_left[span]
-    normal += right * raster.normal_right[span]
-    length = np.sqrt((normal * normal).sum(axis=1, keepdims=True))
-    weight = (1 - t) * raster.weights_left[span].sum(axis=1, keepdims=True)
-    weight += t * raster.weights_right[span].sum(axis=1, keepdims=True)
-    lost = np.flatnonzero((length <= 1e-12 * weight)[:, 0])
+    # `take` and `einsum` take half the time of an index and a sum along a short axis.
+    normal = left * raster.normal_left.take(span, axis=0)
+    normal += right * raster.normal_right.take(span, axis=0)
+    length = np.sqrt(np.einsum("ij,ij->i", normal, normal))[:, np.newaxis]
+    weight = (1 - t[:, 0]) * np.einsum("ij->i", raster.weights_left.take(span, axis=0))
+    weight += t[:, 0] * np.einsum("ij->i", raster.weights_right.take(span, axis=0))
+    lost = np.flatnonzero(length[:, 0] <= 1e-12 * weight)
     if len(lost):
         triangle = raster.triangle[span[lost]]
         face = face_normals(scene.mesh)[triangle]

@@ -50,7 +50,7 @@ Curve = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """A function of the normals at a span's ends and the place t between them."""
 
 # Fragments shaded at once; bounds the memory, changes no result.
-_CHUNK = 1 << 18
+_CHUNK = 1 << 15
 
 
 @dataclass(frozen=True)

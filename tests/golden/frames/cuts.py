@@ -15,13 +15,14 @@ ONE_VALUE = (ONE / 2**17) ** 2
 
 
 def raster_of(rng, left, right, length, spread=0.3):
-    """Spans of these normals and lengths anywhere on a picture; a span of one pixel has one normal.
+    """Spans of these normals and lengths anywhere on a picture; one pixel has one normal, of one length.
 
     Of the normals at the ends each is up to ``10^spread`` times as long, or as short, as 1.
     """
     length = np.broadcast_to(length, len(left)).astype(np.int32)
     right = np.where(length[:, np.newaxis] == 1, left, right)
     count, fragments = len(length), int(length.sum())
+    magnitude_left, magnitude_right = 10.0 ** rng.uniform(-spread, spread, (2, count))
     x = rng.integers(0, WIDTH - length, endpoint=True).astype(np.int32)
     y = rng.integers(0, 4095, count).astype(np.int32)
     span = np.repeat(np.arange(count, dtype=np.int32), length)
@@ -33,8 +34,8 @@ def raster_of(rng, left, right, length, spread=0.3):
         triangle=rng.integers(0, 1000, count).astype(np.int32),
         normal_left=left,
         normal_right=right,
-        magnitude_left=10.0 ** rng.uniform(-spread, spread, count),
-        magnitude_right=10.0 ** rng.uniform(-spread, spread, count),
+        magnitude_left=magnitude_left,
+        magnitude_right=np.where(length == 1, magnitude_left, magnitude_right),
         weights_left=np.ones((count, 3)),
         weights_right=np.ones((count, 3)),
         back=rng.random(count) < 0.5,
