@@ -133,7 +133,7 @@ def flags_of(unit: Component) -> list[str]:
     return [name for name in ("out_of_range", "wide") if name in unit.signature.members]
 
 
-# Reset is held low, so that it goes.
+# Reset is held low, so that it goes. A wire whose register `zinit` inverts would keep its own initial value.
 _LIST = """\
 read_rtlil top.il
 hierarchy -auto-top
@@ -144,6 +144,8 @@ setundef -undriven -zero
 opt_expr
 opt_merge
 zinit -all
+setattr -unset init w:*
+setundef -zero -init
 opt_clean
 write_rtlil flat.il
 write_json flat.json
@@ -153,7 +155,6 @@ mutate -list {count} -seed {seed} -ctrl mutant {width} 1 -o list.txt c:*unit.*""
 _MUTATE = """\
 read_rtlil flat.il
 script mutants.txt
-setundef -zero -init
 opt_clean
 write_rtlil whole.il
 splitnets -driver

@@ -53,6 +53,14 @@ def test_proofs_tell_faults_from_the_unit(tmp_path):
 
 
 @pytest.mark.long
+def test_a_register_that_starts_at_1_and_stays_may_be_left_out(tmp_path):
+    """That of the dot product's ready, with a fault that nobody reads: its initial value goes, too."""
+    record = RECORDS["bisection_chain"]
+    mutate(record.variants[record.default].unit(), 200, 7, tmp_path)
+    assert Miter(tmp_path).is_equivalent(0)
+
+
+@pytest.mark.long
 def test_mutants_are_killed():
     """Of a small unit; ``make mutants`` takes all."""
     with local_executor(1) as executor:
