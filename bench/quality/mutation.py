@@ -134,6 +134,8 @@ def flags_of(unit: Component) -> list[str]:
 
 
 # Reset is held low, so that it goes. A wire whose register `zinit` inverts would keep its own initial value.
+# A register that holds its word does so by an enable of its own: else a fault at what it gives comes back to
+# it while it holds, and goes and comes by turns, unseen where a word is held for an even number of cycles.
 _LIST = """\
 read_rtlil top.il
 hierarchy -auto-top
@@ -146,6 +148,8 @@ opt_merge
 zinit -all
 setattr -unset init w:*
 setundef -zero -init
+opt_clean
+opt_dff -nosdff
 opt_clean
 write_rtlil flat.il
 write_json flat.json
@@ -212,7 +216,7 @@ def _registers_behind(module: Mapping[str, Any]) -> Callable[[str], str]:
             cell = cells[name]
             outputs = [p for p, direction in cell["port_directions"].items() if direction == "output"]
             bits = [bit for port in outputs for bit in cell["connections"][port]]
-            shown = bits if cell["type"] == "$dff" else [bit for bit in bits if bit in ports]
+            shown = bits if cell["type"] in ("$dff", "$dffe") else [bit for bit in bits if bit in ports]
             if shown:
                 return names[shown[0]]
             following = [reader for bit in bits for reader in readers[bit] if reader not in seen]
