@@ -29,7 +29,9 @@ from blysk.bench.command import run
 from blysk.bench.quality.equivalence import Miter
 from blysk.bench.quality.mutation import Mutants, killed, mutate, vectors_of
 from blysk.bench.store import Task, results_of
+from blysk.bench.tools.place_and_route import ToolError
 from blysk.sim.engines.cache import version_of
+from blysk.sim.engines.engine import SimulationError
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.output import check_writable, write_json
@@ -105,7 +107,7 @@ class Score:
 
 
 def measure(unit: str, count: int, seed: int) -> dict[str, Any]:
-    """Make mutants of a unit and run its record's vectors on them.
+    """Make mutants of a unit, run its record's vectors on them, and prove what is left.
 
     Parameters
     ----------
@@ -122,8 +124,15 @@ def measure(unit: str, count: int, seed: int) -> dict[str, Any]:
     Raises
     ------
     ToolError
-        If a tool fails, or the unit among its mutants is not the unit.
+        If a tool fails, or the unit among its mutants is not the unit; with the unit's name.
     """
+    try:
+        return _measured(unit, count, seed)
+    except SimulationError as error:
+        raise ToolError(f"{unit}: {error}") from error
+
+
+def _measured(unit: str, count: int, seed: int) -> dict[str, Any]:
     record = RECORDS[unit]
     vectors = vectors_of(record)
     with tempfile.TemporaryDirectory(prefix="blysk-") as name:

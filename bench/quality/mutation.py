@@ -179,8 +179,9 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
     kept, known = [], {}
     for number, text in enumerate((folder / "list.txt").read_text().splitlines(), 1):
         mutant = _described(text, top["cells"], behind)
-        # Another clock is no small fault, and a table's words must be constant.
-        if not re.search(r"^\w+ (\$meminit|\S+ [A-Z_]*CLK\[)", mutant):
+        # Another clock is no small fault, a table's words must be constant, and a result that another of the
+        # same cell inverts may come to depend on itself.
+        if not re.search(r"^\w+ (\$meminit|\S+ [A-Z_]*CLK\[)|^cnot\d \S+ Y\[", mutant):
             kept.append(text)
             known[number] = mutant
     (folder / "mutants.txt").write_text("\n".join(kept))

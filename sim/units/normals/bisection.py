@@ -70,7 +70,7 @@ def _pairs(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Angles 0, 45, 90 and 180, small ones, to 90 degrees and beyond; ends of words; a tie of u."""
+    """Angles 0, 45, 90 and 180, small ones, to 90 degrees and beyond; word ends; u on a tie, its least."""
     angles = np.r_[np.zeros(20), np.full(20, 45), np.full(20, 90), 10.0 ** rng.uniform(-4, 0, 100)]
     angles = np.r_[angles, rng.uniform(0, 90, count), rng.uniform(90, 180, 60), 180]
     a, b = (np.vstack([end, word_ends(rng, 100, 3)]) for end in code_pairs_at(rng, len(angles), angles))
@@ -78,15 +78,19 @@ def _corners(unit, rng, count):
     a, b = a[order], b[order]
     # The code of 1 - cosine with 17 fraction bits is 180994.5.
     a[0], b[0] = (35421, 119829, 39572), (-5993, -85566, 99107)
+    a[1] = b[1] = COMPONENT.min_code
     return _case(a, b)
 
 
 def _last_bits(unit, rng, count):
-    """The last bits of products and sums, which are rounded off; u at the border of its rounding."""
+    """The last bits of products and sums, which are rounded off; u at the border of its rounding.
+
+    Of the first pairs any, of the others the nearer to the border the later: some are on it.
+    """
     a, b = code_pairs_at(rng, count, rng.uniform(0, 100, count))
     border = (ONE_SQUARED.codes - dot(a, b)) % (1 << 17) - (1 << 16)
-    few = count // 15
-    chosen = np.r_[:few, few + np.flatnonzero(abs(border[few:]) < 1 << 13)]
+    few = count // 50
+    chosen = np.flatnonzero(abs(border) * np.arange(-few, count - few) < 1 << 28)
     return _case(a[chosen], b[chosen])
 
 
@@ -128,7 +132,7 @@ RECORD = Record(
     stimuli={
         "pairs": Stimulus(_pairs, 500),
         "corners": Stimulus(_corners, 500),
-        "last bits": Stimulus(_last_bits, 300_000, stalled=False),
+        "last bits": Stimulus(_last_bits, 1_000_000, stalled=False),
     },
     waivers={
         "operands": (
