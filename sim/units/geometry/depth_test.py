@@ -81,6 +81,17 @@ def _again(unit, rng, count):
     return Case({"pixel": pixel, "depth": depth << 9, "depth_step": nothing})
 
 
+def _nearer(unit, rng, count):
+    """Each span in front of those before; depths within some steps of a whole code."""
+    case = _case(rng, count, unit.size, min(8, unit.size[0]), 0)
+    last = case.beats["pixel"]["last"]
+    span = np.cumsum(last) - last
+    whole = np.sort(rng.integers(1, (1 << 24) - 1, span[-1] + 1))[::-1]
+    depth = (whole << 9) + rng.integers(-8, 8, len(whole))
+    case.beats.update(depth=depth[span], depth_step=rng.integers(-2, 3, len(whole))[span])
+    return case
+
+
 RECORD = Record(
     name="depth_test",
     title="Depth of each pixel of a span, and whether it is in front",
@@ -93,6 +104,7 @@ RECORD = Record(
         "same": Stimulus(_same, 500),
         "far": Stimulus(_far, 300),
         "again": Stimulus(_again, 900),
+        "nearer": Stimulus(_nearer, 2000),
     },
     axis="",
     waivers={"status": "A counter of 32 bits counts more events than a run has."},

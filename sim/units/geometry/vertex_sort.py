@@ -1,10 +1,11 @@
 """Record of the vertex sort."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from blysk.golden.geometry.triangles import Grid, Triangles
+from blysk.golden.geometry.triangles import Frame, Grid, Triangles
 from blysk.golden.geometry.vertex_sort import VertexSort
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit
 from blysk.sim.units.record import Case, Record, Stimulus, Variant
@@ -50,6 +51,28 @@ def _near(unit, rng, count):
     return Case(triangles.beats, WHOLE.codes)
 
 
+def _borders(unit, rng, count):
+    """A picture anywhere; boxes that begin and end at its borders or 2^k from them, or are so high."""
+    grid, first = unit.grid, rng.integers(-2048, 2047, 2)
+    end = np.minimum(first + 2 ** rng.integers(0, 11, 2), 2048)
+    frame = Frame(*(int(end) for end in (*first, *end)))
+
+    def often(share, values):
+        return np.where(rng.random((count, 2)) < share, values, 0)
+
+    powers = 2 ** rng.integers(0, 12, (2, count, 2))
+    low = first + often(0.5, end - first) + often(0.4, powers[0] * rng.choice([-1, 1], (count, 2)))
+    high = low + often(0.7, powers[1]) + rng.integers(-1, 2, (count, 2))
+    pixels = np.stack([low, high, rng.integers(np.minimum(low, high), np.maximum(low, high) + 1)], axis=1)
+    pixels = rng.permuted(pixels, axis=1)
+    # Anywhere from a pixel's centre to the one before.
+    codes = pixels * grid.steps - grid.half + 1 + rng.integers(0, grid.steps, pixels.shape)
+    codes = codes.clip(grid.coordinate.min_code, grid.coordinate.max_code)
+    return Case(
+        replace(random_triangles(rng, count, grid), x=codes[..., 0], y=codes[..., 1]).beats, frame.codes
+    )
+
+
 RECORD = Record(
     name="vertex_sort",
     title="Corners of triangles from top to bottom, orientation, and what is not drawn",
@@ -67,6 +90,7 @@ RECORD = Record(
         "shown": Stimulus(_shown, 1000),
         "whole": Stimulus(_whole, 1000),
         "near": Stimulus(_near, 1000),
+        "borders": Stimulus(_borders, 300, repeats=8, stalled=False),
     },
     axis="",
     waivers={"status": "A counter of 32 bits counts more events than a run has."},
