@@ -232,18 +232,6 @@ RECORD = Record(
     axis="pixel of the span",
     logarithmic=True,
     waivers=dict.fromkeys(
-        (
-            "diffuse_0_first_order",
-            "diffuse_0_rise",
-            "diffuse_0_slope",
-            "highlight_0_first",
-            "highlight_0_first_order",
-            "highlight_0_second",
-            "shift",
-        ),
-        "Inverted every second cycle, and read in those cycles only.",
-    )
-    | dict.fromkeys(
         ("highlight_0_slope_out_of_range", "out_of_range"),
         "Written too often, but read only on the cycle after that on which it is to be written.",
     )

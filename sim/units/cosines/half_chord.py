@@ -96,7 +96,6 @@ RECORD = Record(
     },
     axis="angle, degrees",
     waivers={
-        "shift": "Inverted every second cycle, and read in those cycles only.",
         "operands": "While the output is stalled, the operands are those of an earlier beat, already read.",
         "multiplier_0_?_0": "The operands that share the multiplier are not negative.",
     },

@@ -164,7 +164,6 @@ RECORD = Record(
         "result": "A state is not less than -2: beside the sign one of the other two leading bits is set.",
         "*_coarse": "While the output is stalled, the register holds a word that has been read, or 0.",
         "*_product": "While the output is stalled, the register holds a word that has been read, or 0.",
-        "is_first": "Inverted every second cycle from the start of a pixel on, and read in the third only.",
     },
     still={},
 )

@@ -118,7 +118,6 @@ RECORD = Record(
         "*_first": "The bit is below those of a cosine, where the word has zeros; or has been read before.",
         "*_x_0": "The controlling bit is below those of a cosine, where x has zeros.",
         "reciprocal_square": "While the output is stalled, the register holds a word that has been read.",
-        "step_shift": "Inverted every second cycle, and read in those cycles only.",
         "span_aligned": "Three squares, each up to 2^34, by 4 at most, are less than 2^38: the bit is 0.",
         "span_square_total": "While the output is stalled, the register holds a word that has been read.",
         "rho_rounded": "A word under 1 is rounded to 1 at most, and the bit stands for 2: it is 0.",

@@ -77,7 +77,6 @@ RECORD = Record(
     waivers={
         "cordic_*": "The controlling bit, of 1 and more, is 0: the axes are at most 0.71 and the root of 2.",
         "minor_operand": "While the output is stalled, the register holds a word that has been read.",
-        "phase": "Inverted every second cycle, and read in those cycles only.",
     },
     still={
         "half an angle of 36 bits has 37": "top.{spare,payload}[0-2]",

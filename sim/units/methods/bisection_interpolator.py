@@ -21,9 +21,4 @@ RECORD = Record(
     expect=expect,
     status=status,
     stimuli=STIMULI,
-    waivers={
-        "middle_0": "Inverted every second cycle, and read in those cycles only.",
-        "half_sum_1": "Inverted every second cycle, and read in those cycles only.",
-        "span": "Inverted every second cycle, and the right normal is read two cycles after it comes.",
-    },
 )

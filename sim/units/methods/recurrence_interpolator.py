@@ -49,7 +49,6 @@ RECORD = Record(
     },
     waivers=SETUP.waivers
     | {
-        "step_entry": "Inverted every second cycle, and read in those cycles only.",
         "phase_entry": "While the output is stalled, all but the value in the register has been read.",
         "recurrence_0.*": "It tells the last pixel of a span, which nothing reads.",
     },

@@ -146,11 +146,7 @@ RECORD = Record(
         ),
         "write_index": "Ends are 16 of 32 segments apart at most: the bit, 32, is 0 already.",
         "inner_level": "The level falls from 1 on only, so that the controlling bit, the borrow, is not set.",
-        "i__payload": (
-            "Inverted every second cycle; a pair of ends is read on the second or fourth cycle after it came."
-        ),
         "angle": "It is for u of 1 or more, and from 45 degrees on the cosine is read in its place.",
-        "total_2": "Inverted every second cycle, and read in those cycles only.",
     },
     still={
         "half of 32 segments is the most that ends are apart or written last": "half[5] write_index[5]",

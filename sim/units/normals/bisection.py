@@ -138,7 +138,6 @@ RECORD = Record(
         "operands": (
             "While the output is stalled, the operands of a beat four cycles before are read no more."
         ),
-        "total_2": "Inverted every second cycle, and read in those cycles only.",
     },
     still={"the first sum of the polynomials is 0.056, or 0.136 to 0.303": "total_2[17]"},
 )
