@@ -1,6 +1,7 @@
 """Errors of a frame against its method in float64, exact interpolation and exact shading."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from time import perf_counter
 from typing import Any
@@ -14,7 +15,7 @@ from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
-from blysk.golden.reference.renderer import render, shade_operands, shade_spans
+from blysk.golden.reference.renderer import render, shade_operands, shade_spans, visible_mask
 from blysk.golden.reference.scene import Scene
 
 __all__ = ["Comparison", "compare", "compare_image", "method_in_float64"]
@@ -133,38 +134,46 @@ def compare_image(scene: Scene, design: Design, image: np.ndarray) -> Comparison
 def _compare(
     scene: Scene, design: Design, image: np.ndarray, raster: Raster, cut_raster: Raster | None
 ) -> Comparison:
-    """One float64 frame after the other, as the largest have 400 MB; without spans only two of three."""
+    """One float64 frame after the other, as the largest have 400 MB; without spans one less."""
     nothing = ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))
-    start = perf_counter()
-    target = _model_of(design) if design.loads_tables else BLINN
-    exact = render(scene, "phong", target, raster=raster)
-    seconds = perf_counter() - start
-    mask = exact.mask
+    mask, model = visible_mask(scene, raster), _model_of(design)
+    target = model if design.loads_tables else BLINN
     figures: dict[str, Any] = {"visible_pixels": int(mask.sum()), "arithmetic_error": nothing}
-    if mask.any():
-        figures["total_error"] = error_figures(image, exact.image, mask, scale=255)
-        shown, reference = image[mask], exact.image[mask]
-        reference *= 255
-        figures["nmse"] = nmse(shown, reference)
-        figures["mnse_published"], figures["mnse_published_share"] = mnse_published(shown, reference)
-        del shown, reference
-    # With the table lobe the model is the target itself.
-    golden = exact.image if target == _model_of(design) else None
-    del exact
-    if cut_raster is not None:
+    seconds = 0.0
+
+    def timed(made: Callable[..., Any], *settings: Any) -> Any:
+        nonlocal seconds
         start = perf_counter()
-        same_method = method_in_float64(scene, design, cut_raster)
+        result = made(*settings)
         seconds += perf_counter() - start
-        if mask.any():
-            figures["arithmetic_error"] = error_figures(image, same_method, mask, scale=255)
+        return result
+
+    if cut_raster is not None and mask.any():
+        same_method = timed(method_in_float64, scene, design, cut_raster)
+        figures["arithmetic_error"] = error_figures(image, same_method, mask, scale=255)
         del same_method
-    if golden is None:
-        start = perf_counter()
-        golden = render(scene, "phong", _model_of(design), raster=raster).image
-        seconds += perf_counter() - start
-        if mask.any():
-            figures["method_error"] = error_figures(image, golden, mask, scale=255)
+    if target != model and mask.any():
+        exact = timed(render, scene, "phong", target, raster).image
+        figures["total_error"] = error_figures(image, exact, mask, scale=255)
+        figures |= _mean_squares(image, exact, mask)
+        del exact
+    golden = timed(render, scene, "phong", model, raster).image
     if not mask.any():
         return Comparison(golden, nothing, nothing, nothing, 0, math.nan, math.nan, math.nan, seconds)
-    figures.setdefault("method_error", figures["total_error"])
+    figures["method_error"] = error_figures(image, golden, mask, scale=255)
+    if target == model:
+        figures["total_error"] = figures["method_error"]
+        figures |= _mean_squares(image, golden, mask)
     return Comparison(golden=golden, seconds=seconds, **figures)
+
+
+def _mean_squares(image: np.ndarray, exact: np.ndarray, mask: np.ndarray) -> dict[str, float]:
+    """Normalised squared errors against the frame of the model that is aimed at."""
+    shown, reference = image[mask], exact[mask]
+    reference *= 255
+    published, share = mnse_published(shown, reference)
+    return {
+        "nmse": nmse(shown, reference),
+        "mnse_published": published,
+        "mnse_published_share": share,
+    }

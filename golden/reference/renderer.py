@@ -32,6 +32,7 @@ __all__ = [
     "render",
     "shade_operands",
     "shade_spans",
+    "visible_mask",
 ]
 
 SHADINGS = ("flat", "gouraud", "quadratic_gouraud", "adaptive", "phong", "slerp")
@@ -220,9 +221,14 @@ def render(
                         points=_points(scene, raster, by_normals),
                     )
                 )
+    return Frame(image=image, mask=visible_mask(scene, raster))
+
+
+def visible_mask(scene: Scene, raster: Raster) -> np.ndarray:
+    """Which pixels show a surface: bool array, shape (height, width)."""
     mask = np.zeros((scene.height, scene.width), dtype=bool)
     mask.reshape(-1)[raster.pixel[raster.visible]] = True
-    return Frame(image=image, mask=mask)
+    return mask
 
 
 class _NodeColors:

@@ -14,7 +14,7 @@ from blysk.golden.number.unit_vector import ONE
 from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.metrics import error_figures
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.golden.reference.renderer import render, shade_operands, shade_spans
+from blysk.golden.reference.renderer import render, shade_operands, shade_spans, visible_mask
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.probes import ObservedPipeline
 
@@ -214,8 +214,7 @@ def test_reference_is_that_of_golden(open_page, reference):
             golden = by_three_normals(scene, raster, frame.spans.normal_middle / ONE, reflection)
         else:
             golden = shade_spans(scene, raster, design.interpolator.exact_normals, reflection)
-        mask = np.zeros((web_data.HEIGHT, web_data.WIDTH), dtype=bool)
-        mask.reshape(-1)[raster.pixel[raster.visible]] = True
+        mask = visible_mask(scene, raster)
         figures = error_figures(picture_of(page), golden * 255, mask)
         # The lengths of exact normals are sent to 19 bits of their logarithm.
         assert figure(page, "largest") == pytest.approx(figures.max_lsb, abs=2e-4)
