@@ -19,6 +19,10 @@ __all__ = ["group_registers"]
 _CLOCK = "\tif (posedge_p_clk) {"
 _RESET = "p_rst"
 _READ = re.compile(rf"({NAME})\.curr\b")
+_WRITE = re.compile(
+    rf"^(\t+)(\w+\.update\(\w+\.index, (.*), ({NAME}(?:\.curr)?)\.repeat<\d+>\(\)\.val\(\), \d+\);)$",
+    re.MULTILINE,
+)
 _OUTPUT = re.compile(r"^\t/\*output\*/ wire<\d+> (\w+)", re.MULTILINE)
 
 
@@ -46,10 +50,11 @@ def _choice(text: str) -> tuple[str, str, str] | None:
 
 @dataclass
 class _Item:
-    """A statement: a register's value, or a question, without a register, and a block for each answer."""
+    """A statement: the value of a register or of its ``field``, or a question and a block for each answer."""
 
     text: str
     register: str = ""
+    field: str = ""
     answers: tuple["_Block", ...] = ()
 
     @cached_property
@@ -72,21 +77,21 @@ class _Block:
     items: list[_Item] = field(default_factory=list)
     questions: dict[str, _Item] = field(default_factory=dict)
 
-    def add(self, register: str, value: str) -> None:
+    def add(self, register: str, value: str, field: str = "") -> None:
         choice = _choice(value)
         if choice is None:
-            if value != f"{register}.curr":
-                self.items.append(_Item(value, register))
+            if value != f"{register}.curr" + (f"{field}.val()" if field else ""):
+                self.items.append(_Item(value, register, field))
             return
         question, yes, no = choice
         if question == _RESET:
-            self.add(register, no)
+            self.add(register, no, field)
             return
         if question not in self.questions:
             self.questions[question] = _Item(question, answers=(_Block(), _Block()))
             self.items.append(self.questions[question])
         for answer, text in zip(self.questions[question].answers, (yes, no), strict=True):
-            answer.add(register, text)
+            answer.add(register, text, field)
 
     def order(self, buffered: set[str]) -> None:
         """Put those who read a register before the one who writes it.
@@ -134,7 +139,7 @@ class _Block:
         for item in self.items:
             if item.register:
                 place = "next" if item.register in buffered else "curr"
-                yield f"{indent}{item.register}.{place} = {item.text};"
+                yield f"{indent}{item.register}.{place}{item.field} = {item.text};"
                 continue
             yes, no = (list(block.lines(indent + "\t", buffered)) for block in item.answers)
             if yes:
@@ -145,10 +150,68 @@ class _Block:
                 yield from (f"{indent}if (!bool({item.text})) {{", *no, f"{indent}}}")
 
 
+def _guard_writes(text: str) -> str:
+    """An evaluation that puts a memory's word together only where it is written.
+
+    CXXRTL gives a write all bits of its enable as a mask, on every clock. What only the word is made of goes
+    with it: at the edge the memories come before the registers, which are then as they were.
+    """
+
+    def guarded(match: re.Match) -> str:
+        indent, write, word, enable = match.groups()
+        parts = [line for name in sorted(set(re.findall(NAME, word))) for line in alone.get(name, ())]
+        lines = (f"{indent}\t{line.strip()}\n" for line in [*parts, write])
+        moved.update(parts)
+        return f"{indent}if (bool({enable})) {{\n{''.join(lines)}{indent}}}"
+
+    alone, moved = {}, set()
+    for name in re.findall(rf"^\tvalue<\d+> ({NAME});", text, re.MULTILINE):
+        lines = re.findall(rf"^\t{name}(?:\.slice<\S+>\(\))? = .*;$", text, re.MULTILINE)
+        # Its declaration, and one reader.
+        if len(re.findall(rf"\b{name}\b", text)) == len(lines) + 2:
+            alone[name] = lines
+    text = _WRITE.sub(guarded, text)
+    return "\n".join(line for line in text.split("\n") if line not in moved)
+
+
+class _Fields:
+    """Words that an evaluation puts together of fields, each with a value of its own, for one register."""
+
+    def __init__(self, text: str):
+        self._text = text
+        self._lines: dict[str, list[str]] = {}
+        for line in text.split("\n"):
+            if match := re.match(rf"\t(?:value<\d+> )?({NAME})[.; ]", line):
+                self._lines.setdefault(match[1], []).append(line)
+
+    def _count(self, name: str) -> int:
+        return len(re.findall(rf"\b{name}\b", self._text))
+
+    def of(self, word: str) -> tuple[list[tuple[str, str]], set[str]]:
+        """Fields of a word that nobody else reads, and their values; the lines that made it, or nothing."""
+        declared, *stores = self._lines.get(word, [""])
+        width = re.fullmatch(rf"\tvalue<(\d+)> {word};", declared)
+        if not width or self._count(word) != len(stores) + 2:
+            return [], set()
+        found, lines, bits = [], {declared, *stores}, 0
+        for line in stores:
+            store = re.fullmatch(rf"\t{word}\.slice<(\d+),(\d+)>\(\) = ({NAME});", line)
+            piece = self._lines.get(store[3], []) if store else []
+            if len(piece) != 2 or self._count(store[3]) != 3 or not piece[1].startswith(f"\t{store[3]} = "):
+                return [], set()
+            high, low = int(store[1]), int(store[2])
+            bits += high - low + 1
+            place = f"{high},{low}" if high > low else f"{high}"
+            found.append((f".slice<{place}>()", piece[1].partition(" = ")[2].removesuffix(";")))
+            lines.update(piece)
+        return (found, lines) if bits == int(width[1]) else ([], set())
+
+
 def group_registers(text: str) -> str:
     """Rewrite the C++ of `write_cxxrtl`: registers that share a question together, and in place.
 
-    Four things make it the same machine. The statements at the edge read registers as they were and
+    So are its fields, where each has a value of its own; and a memory's word is put together where it is
+    written. Four things make it the same machine. The statements at the edge read registers as they were and
     combinational values that are complete before the first of them, so that their order is free, and a
     register that nobody reads any more may take its next value. Before every evaluation ``next`` of one that
     is copied equals its ``curr``, so that ``r.next = r.curr`` may be left out. The driver reads outputs
@@ -170,24 +233,32 @@ def group_registers(text: str) -> str:
     end = text.find("\treturn converged;", first)
     if start < 0 or first < 0 or end < 0:
         return text
-    blocks = _edge_blocks(text[first:end])
-    if blocks is None:
+    if _edge_blocks(text[first:end]) is None:
         return text
+    text = text[:start] + _guard_writes(text[start:end]) + text[end:]
+    first = text.find(_CLOCK, start)
+    end = text.find("\treturn converged;", first)
+    blocks = _edge_blocks(text[first:end])
     writes: dict[str, int] = {}
     for name in re.findall(rf"({NAME})\.next\b", text[start:end]):
         writes[name] = writes.get(name, 0) + 1
     tree, registers, others = _Block(), set(), []
+    fields, gone = _Fields(text[start:end]), set()
     for block in blocks:
         match = re.fullmatch(rf"\t\t({NAME})\.next = (.*);", block) if "\n" not in block else None
         if match and writes[match[1]] == 1 and text.count(_copy(match[1])) == 1:
-            tree.add(match[1], match[2])
+            found, lines = fields.of(match[2]) if re.fullmatch(NAME, match[2]) else ([], set())
+            for place, value in found or [("", match[2])]:
+                tree.add(match[1], value, place)
+            gone |= lines
             registers.add(match[1])
         else:
             others.append(f"{_CLOCK}\n{block}\n\t}}\n")
     buffered = set(_OUTPUT.findall(text))
     tree.order(buffered)
     edge = "".join(others) + "\n".join([_CLOCK, *tree.lines("\t\t", buffered), "\t}\n"])
-    text = text[:first] + edge + text[end:]
+    values = "\n".join(line for line in text[start:first].split("\n") if line not in gone)
+    text = text[:start] + values + edge + text[end:]
     for name in registers - buffered:
         text = text.replace(_copy(name), "", 1)
     return text

@@ -12,6 +12,7 @@ from amaranth.lib.wiring import Component, In, Out
 
 from blysk.sim.engines import cxxrtl
 from blysk.sim.engines.guards import _choice, group_registers
+from blysk.sim.engines.parts import read_parts
 from blysk.sim.engines.simulate import simulate
 
 
@@ -30,20 +31,24 @@ class Tangle(Component):
         ring = [Signal(32, init=3 * k + 1, name=f"ring_{k}") for k in range(6)]
         out_of_range = Signal(100, init=1)
         free = Signal(8)
-        m.submodules.memory = memory = Memory(shape=16, depth=8, init=range(8))
+        pair = data.StructLayout({"a": 16, "b": 20})
+        m.submodules.memory = memory = Memory(shape=pair, depth=8, init=[{"a": k} for k in range(8)])
         read, write = memory.read_port(), memory.write_port()
+        kept = Signal(data.StructLayout({"low": 16, "one": 1, "high": 47}))
         m.d.comb += [
             read.addr.eq(ring[0]),
             read.en.eq(advance),
             write.addr.eq(swap[1]),
-            write.data.eq(x),
+            write.data.a.eq(x),
+            write.data.b.eq(swap[3] + x),
             write.en.eq(advance & on[1]),
         ]
         # In the middle of the rest, and free of every question.
         m.d.sync += free.eq(free + 1)
         with m.If(advance):
-            m.d.sync += self.o.valid.eq(self.i.valid)
+            m.d.sync += [self.o.valid.eq(self.i.valid), kept.low.eq(kept.high)]
             with m.If(self.i.valid & on[0]):
+                m.d.sync += [kept.one.eq(~kept.one), kept.high.eq(kept.low * x + kept.one)]
                 m.d.sync += [to.eq(source) for to, source in zip(swap, reversed(swap), strict=True)]
                 m.d.sync += swap[2].eq(x)
                 with m.If(on[1]):
@@ -69,7 +74,7 @@ class Tangle(Component):
                 self.o.payload[0].eq(ring[0] ^ ring[4]),
                 self.o.payload[1].eq(sum(ring)),
                 self.o.payload[2].eq(out_of_range >> 50),
-                self.o.payload[3].eq(sum(swap) + read.data),
+                self.o.payload[3].eq(sum(swap) + read.data.a + read.data.b + kept.high + kept.one),
             ]
         return m
 
@@ -144,6 +149,26 @@ def test_readers_come_before_the_writer(monkeypatch):
         if equals and (match := re.match(r"(\w+)\.curr = ", code)):
             written.add(match[1])
     assert written
+
+
+def test_fields_are_written_under_their_own_questions(monkeypatch):
+    plain = read_parts(generated(Tangle(), monkeypatch))
+    (word,) = re.findall(r"p_kept\.next = (\w+);", plain)
+    grouped = group_registers(plain)
+    stores = [re.match(r"(\t+)p_kept\.\w+(?:\.(\S+))? =", line) for line in grouped.splitlines()]
+    depth = {store[2]: len(store[1]) for store in stores if store}
+    assert depth == {"slice<15,0>()": 3, "slice<16>()": 4, "slice<63,17>()": 4}
+    assert not re.search(rf"\b{word}\b", grouped)
+
+
+def test_a_word_is_put_together_where_it_is_written(monkeypatch):
+    plain = read_parts(generated(Tangle(), monkeypatch))
+    part = re.compile(r"^(\t+)p_write____data\.slice<\d+,\d+>\(\) = ", re.MULTILINE)
+    assert part.findall(plain) == ["\t", "\t"]
+    grouped = group_registers(plain)
+    assert part.findall(grouped) == ["\t\t\t\t"] * 2
+    (question,) = re.findall(r"^(.*)\n.*\n.*\n\t{4}memory_p_memory\.update", grouped, re.MULTILINE)
+    assert question == "\t\t\tif (bool(p_write____en)) {"
 
 
 class Few(Component):
