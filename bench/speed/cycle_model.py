@@ -101,14 +101,17 @@ def intervals_of(unit: ShadingPipelineUnit, spans: Spans) -> np.ndarray:
 
 
 def _bisected(normaliser: AdaptiveNormaliser, spans: Spans) -> np.ndarray:
-    """Intervals of ``bisection``: of the preparation of as many segments as a span has pixels in."""
+    """Intervals of ``bisection``: a span's levels are counted while the one before it is divided."""
     unit = AdaptiveNormaliserUnit(normaliser)
+    steps = np.asarray(spans.length) - 1
     cosine = np.einsum("ij,ij->i", spans.normal_left / ONE, spans.normal_right / ONE)
     q = (1 - cosine) / 4
     levels = ((q + q * q)[:, np.newaxis] > normaliser.limits.values).sum(axis=1)
-    table = np.array([unit.preparation(level) - 2 for level in range(normaliser.depth + 1)])
-    empty = np.maximum((1 << levels) + 1 - np.asarray(spans.length), 0)
-    return table[levels] - (SEGMENT_CYCLES - EMPTY_SEGMENT_CYCLES) * empty
+    levels = np.minimum(levels, np.where(steps < 3, np.maximum(steps - 1, 0), normaliser.depth))
+    counting = np.array([unit.counting(level) for level in range(normaliser.depth + 1)])
+    empty = np.maximum((1 << levels) - steps, 0)
+    segments = SEGMENT_CYCLES * ((1 << levels) + 1) - (SEGMENT_CYCLES - EMPTY_SEGMENT_CYCLES) * empty
+    return np.maximum(counting[levels], np.r_[0, segments[:-1]])
 
 
 def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:

@@ -1,6 +1,6 @@
 """A multiplier that the steps of a sequential unit share."""
 
-from amaranth.hdl import Module, Signal, Value
+from amaranth.hdl import Cat, Module, Signal, Value
 
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.fixed import FixedShape, FixedValue
@@ -25,6 +25,7 @@ class SteppedMultiplier:
 
     def __init__(self, m: Module, step: Value):
         self._m, self._step = m, step
+        self._taken: list[int] = []
         self._factor = Signal(FixedShape(COMPONENT), name="factor")
         self._operand = Signal(FixedShape(COMPONENT), name="operand")
         exact = self._factor * self._operand
@@ -33,5 +34,15 @@ class SteppedMultiplier:
 
     def issue(self, at: int, factor: FixedValue, operand: FixedValue) -> None:
         """Give two operands at a step, in the state or condition that is open in the module."""
+        self._taken.append(at)
         with self._m.If(self._step == at):
-            self._m.d.sync += [self._factor.eq(factor), self._operand.eq(operand)]
+            self.load(factor, operand)
+
+    def load(self, factor: FixedValue, operand: FixedValue) -> None:
+        """Give two operands at no step, in the state or condition that is open in the module."""
+        self._m.d.sync += [self._factor.eq(factor), self._operand.eq(operand)]
+
+    @property
+    def free(self) -> Value:
+        """Whether the present step gives no operands: who else gives some may read their product on time."""
+        return ~Cat(self._step == at for at in self._taken).any()

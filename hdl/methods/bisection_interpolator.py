@@ -31,9 +31,8 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit, parameters=BisectionInte
     def __init__(self, parameters: BisectionInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
         self._normaliser = AdaptiveNormaliserUnit(parameters.normaliser)
-        preparation = self._normaliser.preparation(0)
-        self.latency = preparation + self.product_latency
-        self.setup_interval = preparation - 2
+        self.latency = self._normaliser.preparation(0) + self.product_latency
+        self.setup_interval = self._normaliser.interval(0)
 
     def source(self, m):
         """The normaliser; its flag, of the last pixel of a span."""

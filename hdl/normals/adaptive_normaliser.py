@@ -28,17 +28,18 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     `AdaptiveNormaliser`, the bit-accurate model, has formats, choice of k and error bounds.
 
-    Two halves work at once. The front prepares a span: it bisects, level by level (`BisectionUnit`), then
-    computes start, step and length of every segment, one in 14 cycles (3 for a segment without a pixel), and
-    puts them into a FIFO. The back gives a normal in every cycle, from a span's first to its last, unless the
-    output waits; it begins a span when the FIFO has all of its segments. `preparation` is the number of
-    cycles from a span to its first normal, if the back is free by then: 69 for k = 0, 83 for k = 1, 148 for
-    k = 2. The next span is taken in two cycles before that, so spans with that many pixels follow each other
-    without a gap. A span of length 0 takes one cycle and gives nothing.
+    Three parts work at once, each on a span of its own. The first bisects, level by level (`BisectionUnit`),
+    and counts the levels. The second computes start, step and length of every segment, one in 14 cycles (3
+    for a segment without a pixel), and puts them into a FIFO. The last gives a normal in every cycle, from a
+    span's first to its last, unless the output waits; it begins a span when the FIFO has all of its segments.
+    `preparation` is the number of cycles from a span to its first normal, if all parts are free: 63 for k =
+    0, 77 for k = 1, 142 for k = 2. Spans follow each other in `interval` cycles, if they have that many
+    pixels or fewer: 33 for k = 0, 42 for k = 1, 70 for k = 2. Spans of one pixel and of two count as of k =
+    0, those of three as of k = 1 at most. A span of length 0 takes one cycle and gives nothing.
 
     Three multipliers: two in the bisection unit, and one for the square of q and for the segments. A memory
-    of ``2^(depth + 1)`` words of 54 bits holds the segment ends, a FIFO of as many the segments, and a table
-    of 2048 words of 17 bits the reciprocals.
+    of ``2^(depth + 2)`` words of 54 bits holds the segment ends of two spans, a FIFO of ``2^(depth + 1)`` the
+    segments, and a table of 2048 words of 17 bits the reciprocals.
 
     Parameters
     ----------
@@ -75,14 +76,26 @@ class AdaptiveNormaliserUnit(wiring.Component):
     def preparation(self, levels: int) -> int:
         """Cycles from a span to its first normal, if it has at least ``2^levels + 1`` pixels.
 
-        A span of one pixel has a single segment, which takes one cycle more through the FIFO: 56.
+        A span of one pixel has a single segment, which takes one cycle more through the FIFO: 50.
         """
+        return self.counting(levels) + 2 + SEGMENT_CYCLES * ((1 << levels) + 1)
+
+    def interval(self, levels: int) -> int:
+        """Cycles from a span to the next, if both have so many levels and ``2^levels + 1`` pixels.
+
+        The longer one of the first two parts. Between spans of different levels the first part may wait up to
+        6 cycles for the multiplier.
+        """
+        return max(self.counting(levels), SEGMENT_CYCLES * ((1 << levels) + 1))
+
+    def counting(self, levels: int) -> int:
+        """Cycles of a span in the first part, which counts its levels."""
         latency, interval = self._bisection.latency, self._bisection.initiation_interval
         further = sum(latency + 4 + interval * ((1 << level) - 1) for level in range(1, levels))
-        return latency + 14 + further + SEGMENT_CYCLES * ((1 << levels) + 1)
+        return latency + 6 + further
 
     def elaborate(self, platform):
-        """Front, FIFO, back."""
+        """Levels, segments, FIFO, normals."""
         p = self.parameters
         m = Module()
         segment_shape = data.StructLayout(
@@ -96,57 +109,45 @@ class AdaptiveNormaliserUnit(wiring.Component):
         )
         depth = 1 << (p.depth + 1)
         m.submodules.segments = fifo = SyncFIFOBuffered(width=segment_shape.as_shape().width, depth=depth)
-        complete, begun = Signal(name="complete"), Signal(name="begun")
+        begun = Signal(name="begun")
+        r, s = _Levels(p, self.i.payload.shape()), _Segments(p)
         ready_spans = Signal(range(depth + 1))
-        m.d.sync += ready_spans.eq(ready_spans + complete - begun)
-        self._front(m, fifo, segment_shape, complete)
+        m.d.sync += ready_spans.eq(ready_spans + s.through - begun)
+        m.submodules.ends = ends = Memory(shape=normal_shape(), depth=4 << p.depth, init=[])
+        multiplier = SteppedMultiplier(m, s.step)
+        # Before the levels, which take the multiplier at other steps than the segments.
+        self._divide(m, r, s, ends, multiplier, fifo, segment_shape)
+        self._count(m, r, s, ends, multiplier)
         self._back(m, fifo, segment_shape, ready_spans, begun)
         return m
 
-    def _front(self, m, fifo, segment_shape, complete):
-        """Bisect, count the levels, prepare the segments."""
-        p = self.parameters
-        whole = 1 << p.depth
-        r = _Front(p, self.i.payload.shape())
-        m.submodules.ends = ends = Memory(shape=normal_shape(), depth=2 * whole, init=[])
+    def _count(self, m, r, s, ends, multiplier):
+        """Bisect, count the levels, hand the span over."""
         read, write = ends.read_port(), ends.write_port()
+        address = Signal(self.parameters.depth + 1, name="write_address")
+        m.d.comb += write.addr.eq(Cat(address, r.bank))
         self._reciprocal(m, r)
-        multiplier = SteppedMultiplier(m, r.step)
         m.submodules.bisection = self._bisection
-        self._store_ends(m, r, write)
-        self._hand_over(m, r, fifo, segment_shape)
+        self._store_ends(m, r, address, write)
         with m.FSM():
             with m.State("idle"):
-                m.d.comb += self.i.ready.eq(1)
-                m.d.sync += [
-                    r.span.eq(self.i.payload),
-                    r.half.eq(whole >> 1),
-                    r.index.eq(0),
-                    r.write_index.eq(whole >> 1),
-                    r.level.eq(1),
-                    r.step.eq(0),
-                ]
-                with m.If(self.i.valid & (self.i.payload.length != 0)):
-                    m.next = "load left"
-            with m.State("load left"):
+                self._begin(m, r)
+            with m.State("store left"):
                 m.d.comb += write.en.eq(1)
-                m.next = "load right"
-            with m.State("load right"):
-                m.d.comb += [write.en.eq(1), r.loading_right.eq(1)]
-                m.next = "bisect"
+                m.next = "store right"
+            with m.State("store right"):
+                m.d.comb += [write.en.eq(1), r.right_end.eq(1)]
+                m.next = "drain"
             with m.State("bisect"):
                 self._bisect(m, r, read)
             with m.State("drain"), m.If(r.level_done):
-                self._next_level(m, r)
+                self._next_level(m, r, s)
             with m.State("error"):
-                m.d.sync += r.step.eq(r.step + 1)
-                self._count_levels(m, r, multiplier)
-            with m.State("segment"):
-                m.d.sync += r.step.eq(r.step + 1)
-                self._prepare_segment(m, r, multiplier)
-                self._end_segment(m, r, read, fifo, complete)
+                self._count_levels(m, r, s, multiplier)
+            with m.State("counted"):
+                self._hand_on(m, r, s)
 
-    def _reciprocal(self, m, r: "_Front") -> None:
+    def _reciprocal(self, m, r: "_Levels") -> None:
         """Reciprocal of m - 1 and its shift, long before the first bisection is done."""
         bits = self.parameters.LENGTH_BITS
         position = Signal(range(bits))
@@ -171,18 +172,16 @@ class AdaptiveNormaliserUnit(wiring.Component):
             r.shift.eq(position + address.any()),
         ]
 
-    def _store_ends(self, m, r: "_Front", write) -> None:
+    def _store_ends(self, m, r: "_Levels", address, write) -> None:
         """Ends of segments into their memory: those of the span, then the bisection's results."""
         whole, bisection = 1 << self.parameters.depth, self._bisection
         m.d.comb += [
-            bisection.i.payload.normal_a.eq(r.end_a),
-            bisection.i.payload.normal_b.eq(r.end_b),
             bisection.o.ready.eq(1),
             r.next_index.eq(r.index + (r.half << 1)),
         ]
         with m.If(bisection.o.valid):
             m.d.comb += [
-                write.addr.eq(r.write_index),
+                address.eq(r.write_index),
                 write.data.eq(bisection.o.payload.normal_middle),
                 write.en.eq(1),
                 r.level_done.eq(r.write_index + r.half == whole),
@@ -191,14 +190,36 @@ class AdaptiveNormaliserUnit(wiring.Component):
         with m.Else():
             left, right = (Value.cast(end) for end in (r.span.normal_left, r.span.normal_right))
             m.d.comb += [
-                write.addr.eq(Mux(r.loading_right, whole, 0)),
-                write.data.eq(Mux(r.loading_right, right, left)),
+                address.eq(Mux(r.right_end, whole, 0)),
+                write.data.eq(Mux(r.right_end, right, left)),
             ]
 
-    def _bisect(self, m, r: "_Front", read) -> None:
-        """Pairs of neighbouring ends of a level into the bisection."""
-        bisection = self._bisection
-        m.d.comb += read.addr.eq(Mux(r.step == 0, r.index, r.next_index))
+    def _begin(self, m, r: "_Levels") -> None:
+        """A span is taken, and its ends go into the bisection at once."""
+        whole, bisection = 1 << self.parameters.depth, self._bisection
+        m.d.comb += [
+            self.i.ready.eq(bisection.i.ready),
+            bisection.i.payload.normal_a.eq(self.i.payload.normal_left),
+            bisection.i.payload.normal_b.eq(self.i.payload.normal_right),
+            bisection.i.valid.eq(self.i.valid & (self.i.payload.length != 0)),
+        ]
+        m.d.sync += [
+            r.span.eq(self.i.payload),
+            r.half.eq(whole >> 1),
+            r.write_index.eq(whole >> 1),
+            r.level.eq(1),
+        ]
+        with m.If(bisection.i.valid & bisection.i.ready):
+            m.next = "store left"
+
+    def _bisect(self, m, r: "_Levels", read) -> None:
+        """Pairs of neighbouring ends of a level, from the second on, into the bisection."""
+        bisection, bits = self._bisection, self.parameters.depth + 1
+        m.d.comb += [
+            read.addr.eq(Cat(Mux(r.step == 0, r.index, r.next_index)[:bits], r.bank)),
+            bisection.i.payload.normal_a.eq(r.end_a),
+            bisection.i.payload.normal_b.eq(r.end_b),
+        ]
         with m.If(r.step != 3):
             m.d.sync += r.step.eq(r.step + 1)
         with m.If(r.step == 1):
@@ -212,7 +233,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 with m.If(r.next_index == 1 << self.parameters.depth):
                     m.next = "drain"
 
-    def _next_level(self, m, r: "_Front") -> None:
+    def _next_level(self, m, r: "_Levels", s: "_Segments") -> None:
         """The results of a level are stored: go on."""
         result = self._bisection.o.payload
         m.d.sync += [
@@ -229,15 +250,19 @@ class AdaptiveNormaliserUnit(wiring.Component):
             ]
             m.next = "error"
         with m.Elif(r.level == r.levels):
-            m.next = "segment"
+            self._hand_on(m, r, s)
         with m.Else():
             m.next = "bisect"
 
-    def _count_levels(self, m, r: "_Front", multiplier: SteppedMultiplier) -> None:
+    def _count_levels(self, m, r: "_Levels", s: "_Segments", multiplier: SteppedMultiplier) -> None:
         """Number of levels, by ``q + q^2`` and its limits."""
         p = self.parameters
-        operand = r.one_minus_cosine.saturate(COMPONENT)
-        multiplier.issue(0, operand, operand)
+        with m.If(r.step != 0):
+            m.d.sync += r.step.eq(r.step + 1)
+        with m.Elif(multiplier.free):
+            operand = r.one_minus_cosine.saturate(COMPONENT)
+            multiplier.load(operand, operand)
+            m.d.sync += r.step.eq(1)
         sagitta = Signal(FixedShape(p.SAGITTA_FORMAT))
         quarter = r.one_minus_cosine.scale(-2).extend(SQ(1, 20))
         square = multiplier.product.scale(-4).truncate(20)
@@ -245,82 +270,112 @@ class AdaptiveNormaliserUnit(wiring.Component):
         with m.If(r.step == 3):
             m.d.sync += r.levels.eq(0)
             for k, code in enumerate(p.limits.codes.tolist()):
-                with m.If((sagitta.as_value() > code) & ~r.out_of_range):
+                # One pixel or two are the ends, and the middle one of three is the first level's.
+                with m.If((sagitta.as_value() > code) & ~r.out_of_range & (r.steps > min(k + 1, 2))):
                     m.d.sync += r.levels.eq(k + 1)
         with m.If(r.step == 4):
-            m.d.sync += [
-                r.step.eq(0),
-                r.spacing.eq((1 << p.depth) >> r.levels),
-                r.left.eq(r.span.normal_left),
-                r.offset.eq(0),
-                r.remaining.eq(r.span.length),
-                r.amount.eq(Mux(r.shift > r.levels, r.shift - 1 - r.levels, 0)),
-            ]
-            m.next = "segment"
+            m.d.sync += r.step.eq(0)
             with m.If(r.levels > 1):
                 m.next = "bisect"
+            with m.Else():
+                self._hand_on(m, r, s)
 
-    def _prepare_segment(self, m, r: "_Front", multiplier: SteppedMultiplier) -> None:
+    @staticmethod
+    def _hand_on(m, r: "_Levels", s: "_Segments") -> None:
+        """A span whose ends are stored goes on to its segments, as soon as the one before is through."""
+        m.d.comb += r.counted.eq(1)
+        m.next = "counted"
+        with m.If(s.free):
+            m.next = "idle"
+
+    def _divide(self, m, r, s, ends, multiplier, fifo, segment_shape):
+        """The segments of a span, one after the other, into the FIFO."""
+        read = ends.read_port()
+        m.d.comb += s.free.eq(~s.busy | s.through)
+        with m.If(s.busy):
+            m.d.sync += s.step.eq(s.step + 1)
+        self._prepare_segment(m, s, multiplier)
+        self._end_segment(m, s, read, fifo)
+        self._hand_over(m, s, fifo, segment_shape)
+        with m.If(r.counted & s.free):
+            m.d.sync += [
+                s.busy.eq(1),
+                s.index.eq(0),
+                s.offset.eq(0),
+                s.bank.eq(r.bank),
+                s.steps.eq(r.steps),
+                s.reciprocal.eq(r.reciprocal),
+                s.shift.eq(r.shift),
+                s.levels.eq(r.levels),
+                s.spacing.eq((1 << self.parameters.depth) >> r.levels),
+                s.amount.eq(Mux(r.shift > r.levels, r.shift - 1 - r.levels, 0)),
+                s.left.eq(r.span.normal_left),
+                s.remaining.eq(r.span.length),
+                s.out_of_range.eq(r.out_of_range),
+                r.bank.eq(~r.bank),
+            ]
+
+    def _prepare_segment(self, m, s: "_Segments", multiplier: SteppedMultiplier) -> None:
         """Pixels, start and step of a segment."""
         p, product = self.parameters, multiplier.product
-        multiplier.issue(2, FixedValue(COMPONENT, Cat(r.offset, Const(0, 18 - len(r.offset)))), r.reciprocal)
-        whole_pixels = r.available >> r.levels
+        multiplier.issue(2, FixedValue(COMPONENT, Cat(s.offset, Const(0, 18 - len(s.offset)))), s.reciprocal)
+        whole_pixels = s.available >> s.levels
         # 2^levels - 1 more, so that the shift rounds up.
         m.d.sync += [
-            r.available.eq(r.steps - r.offset + (((1 << r.levels) - 1)[: p.depth + 1])),
-            r.count.eq(Mux(whole_pixels < r.remaining, whole_pixels, r.remaining)),
-            r.last.eq(whole_pixels >= r.remaining),
-            r.advance.eq(r.count << r.levels),
-            r.next_offset.eq(r.offset + r.advance - r.steps),
+            s.available.eq(s.steps - s.offset + (((1 << s.levels) - 1)[: p.depth + 1])),
+            s.count.eq(Mux(whole_pixels < s.remaining, whole_pixels, s.remaining)),
+            s.last.eq(whole_pixels >= s.remaining),
+            s.advance.eq(s.count << s.levels),
+            s.next_offset.eq(s.offset + s.advance - s.steps),
         ]
-        with m.If(r.step == 4):
-            m.d.sync += r.phi.as_value().eq(Cat(Const(0, 1), Value.cast(product)) >> r.shift)
+        with m.If(s.step == 4):
+            m.d.sync += s.phi.as_value().eq(Cat(Const(0, 1), Value.cast(product)) >> s.shift)
         half_step = FixedValue.constant(p.ACCUMULATOR_FORMAT, p.half_step.values.item())
         for c in range(3):
-            with m.If(r.step == 2):
-                m.d.sync += r.difference[c].eq((r.right[c] - r.left[c]).saturate(COMPONENT))
-            multiplier.issue(5 + c, r.difference[c], r.phi)
-            multiplier.issue(8 + c, r.difference[c], r.reciprocal)
-            with m.If(r.step == 7 + c):
-                total = r.left[c] + product.truncate(32) + half_step
-                m.d.sync += r.start[c].eq(total.wrap(p.ACCUMULATOR_FORMAT))
-            with m.If(r.step == 10 + c):
-                shifted = FixedValue(SQ(2, 34), Value.cast(product) >> r.amount)
-                m.d.sync += r.slope[c].eq(shifted.truncate(32).wrap(p.STEP_FORMAT))
+            with m.If(s.step == 2):
+                m.d.sync += s.difference[c].eq((s.right[c] - s.left[c]).saturate(COMPONENT))
+            multiplier.issue(5 + c, s.difference[c], s.phi)
+            multiplier.issue(8 + c, s.difference[c], s.reciprocal)
+            with m.If(s.step == 7 + c):
+                total = s.left[c] + product.truncate(32) + half_step
+                m.d.sync += s.start[c].eq(total.wrap(p.ACCUMULATOR_FORMAT))
+            with m.If(s.step == 10 + c):
+                shifted = FixedValue(SQ(2, 34), Value.cast(product) >> s.amount)
+                m.d.sync += s.slope[c].eq(shifted.truncate(32).wrap(p.STEP_FORMAT))
 
-    def _end_segment(self, m, r: "_Front", read, fifo, complete) -> None:
+    def _end_segment(self, m, s: "_Segments", read, fifo) -> None:
         """Right end of a segment; the segment into the FIFO, or none without a pixel; on to the next."""
         whole = 1 << self.parameters.depth
         following = Signal(self.parameters.depth + 2)
         m.d.comb += [
-            following.eq(r.index + r.spacing),
-            read.addr.eq(Mux(r.index == whole, r.index, following)),
+            following.eq(s.index + s.spacing),
+            read.addr.eq(Cat(Mux(s.index == whole, s.index, following)[: len(s.index)], s.bank)),
         ]
-        with m.If(r.step == 1):
-            m.d.sync += r.right.eq(read.data)
-        moved = [r.left.eq(r.right), r.index.eq(following), r.step.eq(0)]
-        with m.If((r.step == 2) & (r.offset >= r.steps)):
+        with m.If(s.step == 1):
+            m.d.sync += s.right.eq(read.data)
+        moved = [s.left.eq(s.right), s.index.eq(following), s.step.eq(0)]
+        with m.If((s.step == 2) & (s.offset >= s.steps)):
             # No pixel lies in this segment.
-            m.d.sync += [r.offset.eq(r.offset - r.steps), *moved]
-        with m.If(r.step == SEGMENT_CYCLES - 1):
-            m.d.sync += r.step.eq(r.step)
+            m.d.sync += [s.offset.eq(s.offset - s.steps), *moved]
+        with m.If(s.step == SEGMENT_CYCLES - 1):
+            m.d.sync += s.step.eq(s.step)
             m.d.comb += fifo.w_en.eq(1)
             with m.If(fifo.w_rdy):
-                m.d.sync += [r.remaining.eq(r.remaining - r.count), r.offset.eq(r.next_offset), *moved]
-                with m.If(r.last):
-                    m.d.comb += complete.eq(1)
-                    m.next = "idle"
+                m.d.sync += [s.remaining.eq(s.remaining - s.count), s.offset.eq(s.next_offset), *moved]
+                with m.If(s.last):
+                    m.d.comb += s.through.eq(1)
+                    m.d.sync += s.busy.eq(0)
 
     @staticmethod
-    def _hand_over(m, r: "_Front", fifo, segment_shape) -> None:
+    def _hand_over(m, s: "_Segments", fifo, segment_shape) -> None:
         """Fields of a segment at the input of the FIFO."""
         segment = Signal(segment_shape)
         m.d.comb += [
-            segment.count.eq(r.count),
-            segment.last.eq(r.last),
-            segment.out_of_range.eq(r.out_of_range),
-            *(segment.start[c].eq(r.start[c]) for c in range(3)),
-            *(segment.step[c].eq(r.slope[c]) for c in range(3)),
+            segment.count.eq(s.count),
+            segment.last.eq(s.last),
+            segment.out_of_range.eq(s.out_of_range),
+            *(segment.start[c].eq(s.start[c]) for c in range(3)),
+            *(segment.step[c].eq(s.slope[c]) for c in range(3)),
             fifo.w_data.eq(segment.as_value()),
         ]
 
@@ -334,7 +389,10 @@ class AdaptiveNormaliserUnit(wiring.Component):
         given = fifo.r_rdy & (inside | (ready_spans != 0))
         active, ends = count_down(m, given, segment.count, advance)
         pixel = Signal(self.o.payload.shape())
+        last, wide = Signal(name="pixel_last"), Signal(name="pixel_out_of_range")
         m.d.comb += [
+            pixel.last.eq(last),
+            pixel.out_of_range.eq(wide),
             advance.eq(skid_buffer(m, self.o, valid, pixel)),
             load.eq(advance & ends & given),
             begun.eq(load & ~inside),
@@ -343,8 +401,8 @@ class AdaptiveNormaliserUnit(wiring.Component):
         with m.If(advance):
             m.d.sync += [
                 valid.eq(active),
-                pixel.out_of_range.eq(out_of_range),
-                pixel.last.eq(active & ends & ~inside),
+                wide.eq(out_of_range),
+                last.eq(active & ends & ~inside),
             ]
         with m.If(load):
             m.d.sync += [inside.eq(~segment.last), out_of_range.eq(segment.out_of_range)]
@@ -355,22 +413,24 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 m.d.sync += [normal.eq(segment.start[c]), slope.eq(segment.step[c])]
             with m.Elif(advance):
                 m.d.sync += normal.eq((normal + slope).wrap(p.ACCUMULATOR_FORMAT))
+            result = Signal(FixedShape(COMPONENT), name=f"pixel_{c}")
             with m.If(advance):
-                result = normal.truncate(COMPONENT.fraction_bits).saturate(COMPONENT)
-                m.d.sync += pixel.normal[c].eq(result)
+                m.d.sync += result.eq(normal.truncate(COMPONENT.fraction_bits).saturate(COMPONENT))
+            m.d.comb += pixel.normal[c].eq(result)
 
 
-class _Front:
-    """Registers of the front of an `AdaptiveNormaliserUnit`, and its wires, which its states share."""
+class _Levels:
+    """Registers and wires of the part that counts a span's levels."""
 
     def __init__(self, parameters: AdaptiveNormaliser, span_shape: data.StructLayout):
         p, bits, depth = parameters, parameters.LENGTH_BITS, parameters.depth
-        component = FixedShape(COMPONENT)
         self.span = Signal(span_shape)
-        self.step = Signal(range(SEGMENT_CYCLES))
+        self.step = Signal(3)
+        # Half of the memory of ends.
+        self.bank = Signal()
         # Of the reciprocal of m - 1.
         self.steps = Signal(bits)
-        self.reciprocal = Signal(component)
+        self.reciprocal = Signal(FixedShape(COMPONENT))
         self.shift = Signal(range(bits + 1))
         # Of the bisection: ``half`` is the distance of a middle from its two ends.
         self.half = Signal(depth + 1)
@@ -383,12 +443,33 @@ class _Front:
         self.one_minus_cosine = Signal(FixedShape(p.bisection.ANGLE_FORMAT))
         self.end_a = Signal(normal_shape())
         self.end_b = Signal(normal_shape())
-        self.loading_right = Signal()
+        self.right_end = Signal()
         self.level_done = Signal()
-        # Of segments: ``offset`` is phi (m - 1) of the first pixel.
+        self.counted = Signal()
+
+
+class _Segments:
+    """Registers and wires of the part that prepares segments: what the levels told, and its own."""
+
+    def __init__(self, parameters: AdaptiveNormaliser):
+        p, bits, depth = parameters, parameters.LENGTH_BITS, parameters.depth
+        component = FixedShape(COMPONENT)
+        self.busy = Signal()
+        # The last segment goes; the next span may come.
+        self.through = Signal()
+        self.free = Signal()
+        self.step = Signal(range(SEGMENT_CYCLES), name="segment_step")
+        self.bank = Signal(name="segment_bank")
+        self.steps = Signal(bits, name="segment_steps")
+        self.reciprocal = Signal(component, name="segment_reciprocal")
+        self.shift = Signal(range(bits + 1), name="segment_shift")
+        self.levels = Signal(range(depth + 1), name="segment_levels")
+        self.out_of_range = Signal(name="segment_out_of_range")
+        self.index = Signal(depth + 1, name="segment_index")
+        # ``offset`` is phi (m - 1) of the first pixel.
         self.left = Signal(normal_shape())
         self.right = Signal(normal_shape())
-        self.difference = Signal(normal_shape())
+        self.difference = [Signal(component, name=f"difference_{c}") for c in range(3)]
         self.spacing = Signal(depth + 1)
         self.remaining = Signal(bits)
         self.offset = Signal(bits + 1)

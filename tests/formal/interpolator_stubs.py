@@ -209,13 +209,16 @@ class Line(AccumulatorUnit):
 
 
 class Normaliser(Line):
-    """Of a span that is not divided; the unit itself takes 69 cycles to its first pixel."""
+    """Of a span that is not divided; the unit itself takes 63 cycles to its first pixel."""
 
     OF = AdaptiveNormaliserUnit
     quadratics = walk(left, lambda values: values.normal[0])
 
     def preparation(self, levels):
         return self.latency
+
+    def interval(self, levels):
+        return self.latency - 2
 
 
 class Evaluator(Line):

@@ -2,8 +2,8 @@
 """Proofs of the adaptive normaliser: its segments have the pixels of their span, and each pixel leaves once.
 
 Between its two halves is a queue of segments, `amaranth.lib.fifo.SyncFIFOBuffered`, which hands on what it
-takes. In its place is one that takes segments on any cycles and gives any: what is claimed of either half
-holds whatever the other does. The bisection is a stand-in of 3 cycles whose results are free; products are,
+takes. In its place is one that takes segments on any cycles and gives any: what is claimed on either side of
+it holds whatever the other does. Before it one span's levels are counted while the one before is divided. The bisection is a stand-in of 3 cycles whose results are free; products are,
 too, and thus the number of levels. Lengths have 3 bits, and a segment is prepared in 6 cycles instead of 14,
 of which the others are for its start and step.
 """
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.prove
 
 LENGTH_BITS = 3
 PROGRESS_CLOCKS = 25
-THRESHOLDS = {1: 1 / 8, 3: 2.0**-6}
+THRESHOLDS = {1: 1 / 8, 2: 1 / 16}
 """By the levels that they lead to, at most."""
 
 SEGMENT = data.StructLayout({"count": LENGTH_BITS, "last": 1, "out_of_range": 1})
@@ -72,33 +72,38 @@ def segment_of(port):
 
 
 def pixels_left(h, queue):
-    """Whether the front gives a segment, and how many pixels of its span are to come."""
-    left, gives = Signal(LENGTH_BITS), queue.w_en & queue.w_rdy
-    with h.m.If(taken(h.unit.i)):
-        h.m.d.sync += left.eq(h.unit.i.payload.length)
-    with h.m.Elif(gives):
-        h.m.d.sync += left.eq(left - segment_of(queue.w_data).count)
-    return gives, left
+    """Whether a segment is given, how many pixels of its span are to come, and the span that follows."""
+    left, following = (Signal(LENGTH_BITS, name=name) for name in ("left", "following"))
+    gives, came = queue.w_en & queue.w_rdy, Signal(LENGTH_BITS)
+    h.m.d.comb += came.eq(Mux(taken(h.unit.i), h.unit.i.payload.length, 0))
+    rest = (left - segment_of(queue.w_data).count)[:LENGTH_BITS]
+    with h.m.If(gives & (rest != 0)):
+        h.m.d.sync += left.eq(rest)
+    with h.m.Elif(gives | ~left.any()):
+        h.m.d.sync += [left.eq(Mux(following.any(), following, came)), following.eq(0)]
+    with h.m.If(came.any() & left.any() & ~(gives & (rest == 0) & ~following.any())):
+        h.m.d.sync += following.eq(came)
+    return gives, left, following
 
 
 def of_segments(h, queue):
-    """A span's segments have its pixels, one or more each; the last is marked; then the next span comes."""
-    segment, (gives, left) = segment_of(queue.w_data), pixels_left(h, queue)
+    """A span's segments have its pixels, one or more each; the last is marked; two spans are in at most."""
+    segment, (gives, left, following) = segment_of(queue.w_data), pixels_left(h, queue)
     h.claim(~queue.w_en | (segment.count.any() & (segment.count <= left)))
     h.claim(~queue.w_en | (segment.last == (segment.count == left)))
-    h.claim(~(taken(h.unit.i) & left.any()))
+    h.claim(~(taken(h.unit.i) & following.any()))
     # The queue has room for all of a span's.
     count = Signal(range(queue.depth + 2))
-    h.m.d.sync += count.eq(Mux(taken(h.unit.i), 0, count + gives))
+    h.m.d.sync += count.eq(Mux(gives & segment.last, 0, count + gives))
     h.claim(count <= queue.depth)
     return h
 
 
 def of_progress(h, queue):
     """A segment comes in so many cycles; a span is taken when there are no more."""
-    gives, left = pixels_left(h, queue)
+    gives, left, following = pixels_left(h, queue)
     answers(h, left.any(), gives, PROGRESS_CLOCKS, queue.w_rdy)
-    answers(h, h.unit.i.valid & ~left.any(), h.unit.i.ready, 1, 1)
+    answers(h, h.unit.i.valid & ~left.any() & ~following.any(), h.unit.i.ready, 1, 1)
     return h
 
 
@@ -151,8 +156,8 @@ def test_pixels(prove, harness):
 
 
 BUGS = {
-    "a segment is not taken off": (of_segments, "_end_segment", "r.remaining - r.count", "r.remaining"),
-    "the last is not marked": (of_segments, "_prepare_segment", ">= r.remaining)", "> r.remaining)"),
+    "a segment is not taken off": (of_segments, "_end_segment", "s.remaining - s.count", "s.remaining"),
+    "the last is not marked": (of_segments, "_prepare_segment", ">= s.remaining)", "> s.remaining)"),
     "a segment that finds no room is lost": (of_segments, "_end_segment", "m.If(fifo.w_rdy)", "m.If(1)"),
     "segments are not given": (of_progress, "_end_segment", "fifo.w_en.eq(1)", "fifo.w_en.eq(0)"),
     "a pixel that waits is lost": (of_pixels, "_back", "skid_buffer(m, self.o, valid, pixel)", "1"),

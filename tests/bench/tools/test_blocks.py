@@ -63,7 +63,7 @@ STATED = {
     ("quadratic_evaluator", "horner"): (17, 2, {"18x18": 3}, 2048 * 18),
     ("bisection", "1, 45"): (21, 4, {"18x18": 2}, 0),
     ("bisection_chain", ""): (17 + 3 * 3 + 8, 17 + 3 * 3 + 8 + 1, {"18x18": 4}, 0),
-    ("adaptive_normaliser", "threshold 2^-10"): (69, 1, {"18x18": 3}, 2048 * 17),
+    ("adaptive_normaliser", "threshold 2^-10"): (63, 1, {"18x18": 3}, 2048 * 17),
     ("highlight_cosine", "interpolated"): (12, 1, {"17x17": 1, "14x14": 1}, 512 * 36),
     ("recurrence", "reinsch"): (3, 4, {"18x18": 2}, 0),
     ("recurrence", "direct"): (3, 3, {"18x18": 2}, 0),

@@ -36,18 +36,29 @@ def test_one_normal_in_every_cycle_of_a_span(variant):
 
 
 def test_preparation_as_stated():
+    """Of spans that find all parts free."""
     unit = AdaptiveNormaliserUnit()
-    angles = np.r_[1.0, 0.0, 8, 16, 32, 44, 80, 120, 3, 3, 4]
-    # As few pixels as there are segments: the back is free before the front is ready again.
-    lengths = np.r_[2, 60, 3, 5, 9, 17, 17, 30, 1, 1, 2]
-    run, levels = run_of(unit, angles, lengths)
-    np.testing.assert_array_equal(levels, [0, 0, 1, 2, 3, 4, 4, 0, 0, 0, 0])
+    angles = np.r_[1.0, 0.0, 8, 16, 32, 44, 80, 120, 3, 3, 4, 80, 80, 80]
+    lengths = np.r_[2, 60, 5, 5, 9, 17, 17, 30, 1, 1, 2, 1, 2, 3]
+    run, levels = run_of(unit, angles, lengths, input_stalls=np.arange(700) != 0)
+    np.testing.assert_array_equal(levels, [0, 0, 1, 2, 3, 4, 4, 0, 0, 0, 0, 4, 4, 4])
     first = run.cycles[np.cumsum(lengths) - lengths] - run.input_cycles
-    stated = np.array([unit.preparation(k) for k in levels.tolist()])
-    np.testing.assert_array_equal(first, np.where(lengths == 1, 56, stated))
-    assert [unit.preparation(k) for k in range(3)] == [69, 83, 148]
-    taken = np.diff(run.input_cycles)[lengths[:-1] > 1]
-    np.testing.assert_array_equal(taken, (stated[:-1] - 2)[lengths[:-1] > 1])
+    # One pixel, or two, are the ends, and the middle one of three is the first level's.
+    stated = np.array([unit.preparation(k) for k in [*levels[:-3].tolist(), 0, 0, 1]])
+    np.testing.assert_array_equal(first, np.where(lengths == 1, 50, stated))
+    assert [unit.preparation(k) for k in range(3)] == [63, 77, 142]
+
+
+def test_intervals_as_stated():
+    unit = AdaptiveNormaliserUnit()
+    for level, angle in enumerate([3.0, 8, 16, 32, 44]):
+        lengths = np.full(12, (1 << level) + 1)
+        run, levels = run_of(unit, np.full(12, angle), lengths)
+        assert set(levels.tolist()) == {level}
+        # The first two find the segments' part free.
+        assert set(np.diff(run.input_cycles)[1:].tolist()) == {unit.interval(level)}
+        assert set(np.diff(run.cycles[lengths[0] :: lengths[0]]).tolist()) == {unit.interval(level)}
+    assert [unit.interval(k) for k in range(3)] == [33, 42, 70]
 
 
 def test_long_spans_follow_without_a_gap():
@@ -60,8 +71,8 @@ def test_front_runs_ahead_until_the_fifo_is_full():
     unit, wait = AdaptiveNormaliserUnit(), 6000
     stalls = np.arange(2 * wait) < wait
     run, _ = run_of(unit, np.linspace(0, 3, 100), np.ones(100, dtype=np.int64), output_stalls=stalls)
-    # One span more is in the front, and one in the back.
-    assert (run.input_cycles < wait).sum() == (2 << unit.parameters.depth) + 2
+    # One span more is in each of the three parts.
+    assert (run.input_cycles < wait).sum() == (2 << unit.parameters.depth) + 3
 
 
 @pytest.mark.long
@@ -72,7 +83,7 @@ def test_parts():
 
 
 def test_reset_in_every_state():
-    """Two levels: bisection to 80, segments to 150, pixels to 170."""
+    """Two levels: bisection to 70, segments to 140, pixels to 160."""
     unit = AdaptiveNormaliserUnit()
     case = spans_of(code_pairs_at(np.random.default_rng(9), 2, np.array([1.0, 16])), np.array([7, 20]))
     found, *others = resets(unit, case, [1, 20, 60, 120, 148, 152, 160, 168, 200], 100, 1)
