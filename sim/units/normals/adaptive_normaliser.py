@@ -149,6 +149,7 @@ RECORD = Record(
         "angle": "It is for u of 1 or more, and from 45 degrees on the cosine is read in its place.",
     },
     still={
+        "ends that are bisected are two of 32 segments apart at least": "top.index[0]",
         "half of 32 segments is the most that ends are apart or written last": "half[5] write_index[5]",
         "the unit has 16 spans inside at most": "ready_spans[4-6]",
         "a reciprocal is normalised and not negative, so that its first bits are 01": (
