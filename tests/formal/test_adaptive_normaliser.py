@@ -1,11 +1,12 @@
 # amaranth: UnusedElaboratable=no
 """Proofs of the adaptive normaliser: its segments have the pixels of their span, and each pixel leaves once.
 
-Between its two halves is a queue of segments, `amaranth.lib.fifo.SyncFIFOBuffered`, which hands on what it
-takes. In its place is one that takes segments on any cycles and gives any: what is claimed on either side of
-it holds whatever the other does. Before it one span's levels are counted while the one before is divided. The bisection is a stand-in of 3 cycles whose results are free; products are,
-too, and thus the number of levels. Lengths have 3 bits, and a segment is prepared in 6 cycles instead of 14,
-of which the others are for its start and step.
+Between its second part and its third is a queue of segments, `amaranth.lib.fifo.SyncFIFOBuffered`, which
+hands on what it takes. In its place is one that takes segments on any cycles and gives any: what is claimed
+on one side of it holds whatever the other does. Before it one span's levels are counted while the one
+before is divided. The bisection is a stand-in of 3 cycles whose results are free; products are, too, and
+thus the number of levels. Lengths have 3 bits, and a segment is prepared in 6 cycles instead of 14, of
+which the others are for its start and step.
 """
 
 from types import SimpleNamespace
