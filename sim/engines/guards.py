@@ -7,7 +7,7 @@ register come before the one who writes it: then it needs no copy.
 """
 
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -159,58 +159,55 @@ def _guard_writes(text: str) -> str:
 
     def guarded(match: re.Match) -> str:
         indent, write, word, enable = match.groups()
-        parts = [line for name in sorted(set(re.findall(NAME, word))) for line in alone.get(name, ())]
+        parts = [line for name in sorted(set(re.findall(NAME, word))) for line in made.lines(name)[1:]]
         lines = (f"{indent}\t{line.strip()}\n" for line in [*parts, write])
         moved.update(parts)
         return f"{indent}if (bool({enable})) {{\n{''.join(lines)}{indent}}}"
 
-    alone, moved = {}, set()
-    for name in re.findall(rf"^\tvalue<\d+> ({NAME});", text, re.MULTILINE):
-        lines = re.findall(rf"^\t{name}(?:\.slice<\S+>\(\))? = .*;$", text, re.MULTILINE)
-        # Its declaration, and one reader.
-        if len(re.findall(rf"\b{name}\b", text)) == len(lines) + 2:
-            alone[name] = lines
+    made, moved = _Made(text), set()
     text = _WRITE.sub(guarded, text)
     return "\n".join(line for line in text.split("\n") if line not in moved)
 
 
-class _Fields:
-    """Words that an evaluation puts together of fields, each with a value of its own, for one register."""
+class _Made:
+    """How the words of an evaluation are made."""
 
     def __init__(self, text: str):
-        self._text = text
+        self._counts = Counter(re.findall(NAME, text))
         self._lines: dict[str, list[str]] = {}
         for line in text.split("\n"):
             if match := re.match(rf"\t(?:value<\d+> )?({NAME})[.; ]", line):
                 self._lines.setdefault(match[1], []).append(line)
 
-    def _count(self, name: str) -> int:
-        return len(re.findall(rf"\b{name}\b", self._text))
+    def lines(self, word: str) -> list[str]:
+        """Declaration and assignments of a word that has one reader; of others nothing."""
+        lines = self._lines.get(word, [])
+        if not lines or not re.fullmatch(rf"\tvalue<\d+> {word};", lines[0]):
+            return []
+        return lines if self._counts[word] == len(lines) + 1 else []
 
-    def of(self, word: str) -> tuple[list[tuple[str, str]], set[str]]:
-        """Fields of a word that nobody else reads, and their values; the lines that made it, or nothing."""
-        declared, *stores = self._lines.get(word, [""])
-        width = re.fullmatch(rf"\tvalue<(\d+)> {word};", declared)
-        if not width or self._count(word) != len(stores) + 2:
+    def fields(self, word: str) -> tuple[list[tuple[str, str]], set[str]]:
+        """Fields of a word with one reader, and the value of each; the lines that made them; or nothing."""
+        if not (lines := self.lines(word)):
             return [], set()
-        found, lines, bits = [], {declared, *stores}, 0
-        for line in stores:
+        found, made, bits = [], set(lines), 0
+        for line in lines[1:]:
             store = re.fullmatch(rf"\t{word}\.slice<(\d+),(\d+)>\(\) = ({NAME});", line)
-            piece = self._lines.get(store[3], []) if store else []
-            if len(piece) != 2 or self._count(store[3]) != 3 or not piece[1].startswith(f"\t{store[3]} = "):
+            piece = self.lines(store[3]) if store else []
+            if len(piece) != 2 or not piece[1].startswith(f"\t{store[3]} = "):
                 return [], set()
             high, low = int(store[1]), int(store[2])
             bits += high - low + 1
             place = f"{high},{low}" if high > low else f"{high}"
             found.append((f".slice<{place}>()", piece[1].partition(" = ")[2].removesuffix(";")))
-            lines.update(piece)
-        return (found, lines) if bits == int(width[1]) else ([], set())
+            made.update(piece)
+        return (found, made) if lines[0] == f"\tvalue<{bits}> {word};" else ([], set())
 
 
 def group_registers(text: str) -> str:
     """Rewrite the C++ of `write_cxxrtl`: registers that share a question together, and in place.
 
-    So are its fields, where each has a value of its own; and a memory's word is put together where it is
+    So are a register's fields, where each has a value of its own; a memory's word is put together where it is
     written. Four things make it the same machine. The statements at the edge read registers as they were and
     combinational values that are complete before the first of them, so that their order is free, and a
     register that nobody reads any more may take its next value. Before every evaluation ``next`` of one that
@@ -243,11 +240,11 @@ def group_registers(text: str) -> str:
     for name in re.findall(rf"({NAME})\.next\b", text[start:end]):
         writes[name] = writes.get(name, 0) + 1
     tree, registers, others = _Block(), set(), []
-    fields, gone = _Fields(text[start:end]), set()
+    made, gone = _Made(text[start:end]), set()
     for block in blocks:
         match = re.fullmatch(rf"\t\t({NAME})\.next = (.*);", block) if "\n" not in block else None
         if match and writes[match[1]] == 1 and text.count(_copy(match[1])) == 1:
-            found, lines = fields.of(match[2]) if re.fullmatch(NAME, match[2]) else ([], set())
+            found, lines = made.fields(match[2]) if re.fullmatch(NAME, match[2]) else ([], set())
             for place, value in found or [("", match[2])]:
                 tree.add(match[1], value, place)
             gone |= lines
