@@ -40,6 +40,7 @@ from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.output import check_writable, write_json
+from blysk.sim.units.pipeline_spans import tabled
 from blysk.sim.units.record import Beats, length_of
 from blysk.sim.units.registry import RECORDS
 from blysk.sim.value_types import Whole
@@ -75,9 +76,11 @@ DESIGNS = (
     ),
     ("chord", "cosquad", True),
     ("chord", "cosquad_q", False),
+    ("chord", "blinn", False),
+    ("chord", "blinn", True),
 )
-"""Method, model and whether there is a highlight gate: every method of a pixel a cycle that takes normals and
-every kind of specular unit."""
+"""Method, model and whether there is a highlight gate: every method of a pixel a cycle that takes normals,
+every kind of specular unit, and the default design, whose lobe is another table in each run."""
 
 PIXELS = 10**9
 BEATS = 10**6
@@ -196,7 +199,7 @@ def measure(
     rng = np.random.default_rng([seed, part])
     totals = dict.fromkeys(("pixels", "spans", "cycles", "stalled", "baseline_pixels"), 0)
     while totals["pixels"] < pixels:
-        constants = random_constants(rng)
+        constants = tabled(design, random_constants(rng))
         spans = random_spans(rng, min(_BATCH, pixels - totals["pixels"]), constants.halfway[0] / ONE)
         if design.interpolator.takes_line:
             # Unit vectors, in the format of a line's ends.
