@@ -12,6 +12,8 @@ import pytest
 from blysk.bench.tools.absorb_registers import absorb_registers
 from blysk.bench.tools.place_and_route import tool_versions
 from blysk.golden.frame_constants import writes_of
+from blysk.golden.presets import METHODS, preset
+from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats, teapot_frame
 from blysk.sim.units.record import length_of
@@ -40,7 +42,12 @@ UNITS = (
 READS = {"name": "lobe", "variant": "blinn", "beats": 1300}
 """A unit that writes a block RAM and reads it through the register inside; more beats than table ends."""
 
-PIPELINES = ("chord, cosquad", "chord, blinn", "linear, cosquad")
+DESIGNS = [preset("chord", "blinn")]
+DESIGNS += [
+    preset(method, "cosquad", **({"setup_interval": 46} if method == "recurrence" else {}))
+    for method in METHODS
+]
+"""The default design, and one of every method; the recurrence with an interval with which it fits a 25F."""
 
 
 @pytest.fixture(scope="module")
@@ -154,11 +161,13 @@ def test_faults_injected_in_a_memory_are_found(check, inject):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", PIPELINES)
-def test_a_frame_of_a_pipeline(name, tmp_path):
+@pytest.mark.parametrize(
+    "design", [pytest.param(of, id=f"{of.interpolator.name}-{of.specular.model.name}") for of in DESIGNS]
+)
+def test_a_frame_of_a_pipeline(design, tmp_path):
     """Pixel by pixel under stalls; and the netlist before the step does the same, by proof."""
-    unit = RECORDS["pipeline"].variants[name].unit()
-    spans, constants, pixels = teapot_frame(unit.parameters)
+    unit = ShadingPipelineUnit(design)
+    spans, constants, pixels = teapot_frame(design)
     before = map_component(unit, tmp_path)
     netlist, absorbed = absorb_registers(before)
     assert absorbed.closed
