@@ -80,8 +80,8 @@ def _summary(label: str, point: Mapping[str, Any], samples: Sequence[tuple]) -> 
     }
 
 
-_ALIKE_LSB, _ALIKE_CYCLES = 0.15, 1.05
-"""Errors, and cycles as a factor, that are not told apart."""
+_ALIKE_LSB, _ALIKE_TIMES = 0.15, 1.05
+"""Errors, and times as a factor, that are not told apart."""
 
 
 def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
@@ -129,26 +129,26 @@ def _cheapest_first(found: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any
     return sorted(found, key=lambda of: of["multipliers"] or np.inf)
 
 
-def _front(found: Sequence[Mapping[str, Any]], kind: str) -> list[Mapping[str, Any]]:
-    """Those that no other beats, fastest first, but for those whose dot products come from outside.
+def _front(found: Sequence[Mapping[str, Any]], kind: str, time: str = "cycles") -> list[Mapping[str, Any]]:
+    """Designs that no other beats, fastest first; without those whose dot products come from outside.
 
-    One beats another when it is no worse in error (by `_ALIKE_LSB`) and cycles (by `_ALIKE_CYCLES`), and is
-    better than that in one of them, or has fewer multipliers.
+    One beats another when it is no worse in error (by `_ALIKE_LSB`) and time (by `_ALIKE_TIMES`), and is
+    better than that in one of them, or has fewer multipliers. `time` is a key of `summaries`, cycles or ns.
     """
     found = [of for of in found if not of["is_prepared"]]
     if not found:
         return []
-    error, cycles = np.array([(of[kind][1], of["cycles"][1]) for of in found]).T
+    error, times = np.array([(of[kind][1], of[time][1]) for of in found]).T
     multipliers = np.array([of["multipliers"] or np.inf for of in found])
     # [i, j]: whether j is better than i.
     less_error = error < error[:, np.newaxis] - _ALIKE_LSB
-    less_cycles = cycles * _ALIKE_CYCLES < cycles[:, np.newaxis]
+    less_time = times * _ALIKE_TIMES < times[:, np.newaxis]
     fewer = multipliers < multipliers[:, np.newaxis]
-    no_worse = ~(less_error | less_cycles).T
-    beaten = (no_worse & (less_error | less_cycles | fewer)).any(axis=1)
+    no_worse = ~(less_error | less_time).T
+    beaten = (no_worse & (less_error | less_time | fewer)).any(axis=1)
     return sorted(
         (of for of, is_beaten in zip(found, beaten, strict=True) if not is_beaten),
-        key=lambda of: of["cycles"][1],
+        key=lambda of: of[time][1],
     )
 
 
@@ -193,9 +193,9 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
                 linewidth=0.6,
                 alpha=0.9,
             )
-        on = {of["label"] for of in _front(drawn, kind)}
+        on = {of["label"] for of in _front(drawn, kind, key)}
         corners = sorted((of[key][1], of[kind][1]) for of in drawn if of["label"] in on)
-        if corners and not in_ns:
+        if corners:
             xs = [corners[0][0], *(x for x, _ in corners), max(of[key][1] for of in drawn)]
             ys = [max(of[kind][1] for of in drawn), *(y for _, y in corners), corners[-1][1]]
             panel.step(xs, ys, where="post", color="#1c2126", linewidth=1.2, zorder=0)
@@ -229,7 +229,10 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
         "the host, or by "
         "the hardware of `blysk verilog --geometry`); each part of a cut span counts with its cycles."
     )
-    if not in_ns:
+    if in_ns and len(placed) < len(found):
+        without = ", ".join(of["label"] for of in found if not of["ns"])
+        note += f" Not drawn, as they have no clock rate (not placed, or too large for the FPGA): {without}."
+    elif not in_ns:
         note += (
             f" {len(placed)} of {len(found)} designs have committed clock rates; "
             "the others await `blysk fpga`."
