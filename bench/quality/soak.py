@@ -91,8 +91,8 @@ _PART, _BATCH = 10**7, 250_000
 
 _IDLE_TIMEOUT = 10_000
 
-# Beats of a task of a unit, and how often those of a test are in a run.
-_UNIT_PART, _LONGER = 10**5, 20
+# Beats of a task of a unit, and clocks of a run, about.
+_UNIT_PART, _CLOCKS = 10**5, 500_000
 # A compact geometry walks over 4096 scanlines without pixels in 16384 cycles.
 _UNIT_IDLE_TIMEOUT = 20_000
 
@@ -238,6 +238,8 @@ def measure(
 def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
     """Send beats of every stimulus of a unit's record, drawn anew, and hold every answer against the model.
 
+    Every stimulus has the same share of the clocks: of small triangles there are many, of large ones few.
+
     Parameters
     ----------
     unit : str
@@ -262,9 +264,11 @@ def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
     component = _unit(unit)
     rng = np.random.default_rng([seed, part])
     totals = dict.fromkeys(("beats", "outputs", "cycles", "stalled"), 0)
+    shares_of = _beats_of_runs(unit)
     while totals["beats"] < beats:
+        share = min(1, (beats - totals["beats"]) / sum(shares_of.values()))
         for name, stimulus in record.stimuli_of(record.default).items():
-            case = stimulus.make(component, rng, _LONGER * stimulus.count)
+            case = stimulus.make(component, rng, max(stimulus.count, round(share * shares_of[name])))
             expected = dict(_fields(record.expect(component, case), "beat"))
             count = len(next(iter(expected.values())))
             shares = rng.choice([0.0, 0.5], 2) * rng.random(2) * stimulus.stalled
@@ -289,6 +293,25 @@ def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
             totals["cycles"] += int(found.total_cycles)
             totals["stalled"] += count * int(shares.any())
     return totals
+
+
+@functools.cache
+def _beats_of_runs(unit: str) -> dict[str, int]:
+    """Beats of a run of each stimulus of a unit, by what those of a test take."""
+    record, component = RECORDS[unit], _unit(unit)
+    beats = {}
+    for name, stimulus in record.stimuli_of(record.default).items():
+        case = stimulus.make(component, np.random.default_rng(SEED), stimulus.count)
+        found = simulate(
+            component,
+            case.beats,
+            count=length_of(record.expect(component, case)),
+            constants=case.constants,
+            write=case.write,
+            idle_timeout=_UNIT_IDLE_TIMEOUT,
+        )
+        beats[name] = max(stimulus.count, _CLOCKS * stimulus.count // max(1, found.total_cycles))
+    return beats
 
 
 @functools.cache
