@@ -93,8 +93,9 @@ _IDLE_TIMEOUT = 10_000
 
 # Beats of a task of a unit, and clocks of a run, about.
 _UNIT_PART, _CLOCKS = 10**5, 500_000
-# A compact geometry walks over 4096 scanlines without pixels in 16384 cycles.
-_UNIT_IDLE_TIMEOUT = 20_000
+# A geometry walks over 4096 scanlines without pixels in as many cycles, a compact one in 16384; eight or more such
+# triangles may follow each other.
+_UNIT_IDLE_TIMEOUT = 200_000
 
 
 def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> Spans:
