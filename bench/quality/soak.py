@@ -93,8 +93,8 @@ _IDLE_TIMEOUT = 10_000
 
 # Beats of a task of a unit, and clocks of a run, about.
 _UNIT_PART, _CLOCKS = 10**5, 500_000
-# A geometry walks over 4096 scanlines without pixels in as many cycles, a compact one in 16384; eight or more such
-# triangles may follow each other.
+# A geometry walks over 4096 scanlines without pixels in as many cycles, a compact one in 16384; some such
+# triangles may follow each other: the longest pause of 800,000 triangles was 28,724 cycles.
 _UNIT_IDLE_TIMEOUT = 200_000
 
 
