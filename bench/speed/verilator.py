@@ -48,6 +48,7 @@ static inline void place(uint32_t *words, int offset, int width, uint64_t value)
 
 // Cycles up to the last beat out, or -1.
 extern "C" int64_t run(
+		const uint32_t *constants,
 		const uint32_t *write, int64_t writes, const uint32_t *input, int64_t inputs,
 		uint32_t *output, int64_t *cycles, int64_t outputs, int64_t idle_timeout) {{
 	VerilatedContext context;
@@ -55,6 +56,11 @@ extern "C" int64_t run(
 	core->rst = 0;
 	core->o_ready = 1;
 	core->i_valid = 0;
+	{{
+		const uint32_t *const words = constants;
+		(void)words;
+{constants}
+	}}
 	int64_t written = 0, taken = 0, given = 0, clock = 0, last = 0;
 	for (; given < outputs && clock - last <= idle_timeout; clock++) {{
 		if (written < writes) {{
@@ -120,6 +126,7 @@ def _driver(ports: Ports) -> str:
         for port, offset, width in _fields(ports.o, "o")
     )
     text = _DRIVER.format(
+        constants="" if ports.constants is None else assign(ports.constants, "constants"),
         write=write,
         input=assign(ports.i, "i"),
         output=output,
@@ -184,7 +191,7 @@ class Verilated:
     Parameters
     ----------
     component : Component
-        Component that `simulate` takes, without ``constants``.
+        Component that `simulate` takes.
     folder : Path
         Empty folder for what is made on the way; must stay while the model is used.
 
@@ -197,8 +204,6 @@ class Verilated:
     ------
     SimulationError
         If there is no Verilator or no compiler, or one of them fails.
-    ValueError
-        If the component has ``constants``.
     """
 
     def __init__(self, component: Component, folder: Path):
@@ -210,8 +215,6 @@ class Verilated:
             raise SimulationError("no C++ compiler of this machine for Verilator's model")
         self.compiler = compiler.name
         self.ports = Ports(component)
-        if self.ports.constants is not None:
-            raise ValueError("a component with constants has no Verilated model")
         (folder / "core.v").write_text(emit(component, "core"))
         (folder / "driver.cpp").write_text(_driver(self.ports))
         verilator = package / "bin" / "verilator_bin"
@@ -229,7 +232,10 @@ class Verilated:
         )
         self._run = ctypes.CDLL(str(folder / "core.so")).run
         self._run.argtypes = (
-            [ctypes.c_void_p, ctypes.c_int64] * 2 + [ctypes.c_void_p] * 2 + [ctypes.c_int64] * 2
+            [ctypes.c_void_p]
+            + [ctypes.c_void_p, ctypes.c_int64] * 2
+            + [ctypes.c_void_p] * 2
+            + [ctypes.c_int64] * 2
         )
         self._run.restype = ctypes.c_int64
 
@@ -252,11 +258,13 @@ class Verilated:
         """
         if stimulus.count is None or stimulus.input_stalls.any() or stimulus.output_stalls.any():
             raise ValueError("a stimulus with a count and without stalls is needed")
-        write, beats = (np.ascontiguousarray(words) for words in (stimulus.write, stimulus.input))
+        constants, write, beats = (
+            np.ascontiguousarray(words) for words in (stimulus.constants, stimulus.write, stimulus.input)
+        )
         output = np.empty((stimulus.count, word_count(self.ports.o)), dtype=np.uint32)
         cycles = np.empty(stimulus.count, dtype=np.int64)
         end = self._run(
-            *(write.ctypes.data, len(write), beats.ctypes.data, len(beats)),
+            *(constants.ctypes.data, write.ctypes.data, len(write), beats.ctypes.data, len(beats)),
             *(output.ctypes.data, cycles.ctypes.data, stimulus.count, stimulus.idle_timeout),
         )
         if end < 0:

@@ -140,6 +140,8 @@ def _compare(
     target = model if design.loads_tables else BLINN
     figures: dict[str, Any] = {"visible_pixels": int(mask.sum()), "arithmetic_error": nothing}
     seconds = 0.0
+    pixels = np.flatnonzero(mask)
+    image = image.reshape(-1, 3)[pixels]
 
     def timed(made: Callable[..., Any], *settings: Any) -> Any:
         nonlocal seconds
@@ -150,30 +152,30 @@ def _compare(
 
     if cut_raster is not None and mask.any():
         same_method = timed(method_in_float64, scene, design, cut_raster)
-        figures["arithmetic_error"] = error_figures(image, same_method, mask, scale=255)
+        figures["arithmetic_error"] = error_figures(image, same_method.reshape(-1, 3)[pixels], scale=255)
         del same_method
     if target != model and mask.any():
-        exact = timed(render, scene, "phong", target, raster).image
-        figures["total_error"] = error_figures(image, exact, mask, scale=255)
-        figures |= _mean_squares(image, exact, mask)
+        exact = timed(render, scene, "phong", target, raster).image.reshape(-1, 3)[pixels]
+        figures["total_error"] = error_figures(image, exact, scale=255)
+        figures |= _mean_squares(image, exact)
         del exact
     golden = timed(render, scene, "phong", model, raster).image
     if not mask.any():
         return Comparison(golden, nothing, nothing, nothing, 0, math.nan, math.nan, math.nan, seconds)
-    figures["method_error"] = error_figures(image, golden, mask, scale=255)
+    exact = golden.reshape(-1, 3)[pixels]
+    figures["method_error"] = error_figures(image, exact, scale=255)
     if target == model:
         figures["total_error"] = figures["method_error"]
-        figures |= _mean_squares(image, golden, mask)
+        figures |= _mean_squares(image, exact)
     return Comparison(golden=golden, seconds=seconds, **figures)
 
 
-def _mean_squares(image: np.ndarray, exact: np.ndarray, mask: np.ndarray) -> dict[str, float]:
-    """Normalised squared errors against the frame of the model that is aimed at."""
-    shown, reference = image[mask], exact[mask]
-    reference *= 255
-    published, share = mnse_published(shown, reference)
+def _mean_squares(image: np.ndarray, exact: np.ndarray) -> dict[str, float]:
+    """Normalised squared errors against pixels of the frame that is aimed at, which are used up."""
+    exact *= 255
+    published, share = mnse_published(image, exact)
     return {
-        "nmse": nmse(shown, reference),
+        "nmse": nmse(image, exact),
         "mnse_published": published,
         "mnse_published_share": share,
     }

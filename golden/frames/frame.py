@@ -75,7 +75,8 @@ def frame_buffer(scene: Scene, raster: Raster, colors: np.ndarray) -> np.ndarray
     uint8 array, shape (height, width, 3)
     """
     image = np.empty((scene.height, scene.width, 3), dtype=np.uint8)
-    image[...] = np.floor(np.multiply(scene.background, 255) + 0.5)
+    image[0] = np.floor(np.multiply(scene.background, 255) + 0.5)
+    image[1:] = image[0]
     image.reshape(-1, 3)[raster.pixel[raster.visible]] = colors[raster.visible]
     return image
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
-from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.geometry import any_component, normalise, sum_of_components
 from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
@@ -53,7 +53,7 @@ def middle_normals(raster: Raster) -> np.ndarray:
     """True unit normals in the middle of spans, shape (spans, 3); between opposite ones, the left one."""
     spans = np.arange(len(raster.length))
     line = lines_along(raster, spans, np.full(len(spans), 0.5))
-    return np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left)
+    return np.where(any_component(line)[:, np.newaxis], normalise(line), raster.normal_left)
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class SurfacePoints:
         """Those of spans, at t of each."""
         line = lines_along(raster, span, t)
         # Between opposite normals the line passes through 0, where any normal is as good.
-        normal = np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left[span])
+        normal = np.where(any_component(line)[:, np.newaxis], normalise(line), raster.normal_left[span])
         points = None
         if scene.local:
             weights = weights_along(raster, span, t)
@@ -92,8 +92,8 @@ class SurfacePoints:
             halfway[index] = halfway_vector(towards, viewer)
             factor[:, index] = light.factor(points)
         diffuse = np.einsum("sk,lsk->sl", normal, direction) * factor
-        highlight = np.square(normal - halfway).sum(axis=2).T / 2
-        highlight = np.where(halfway.any(axis=2).T, highlight, 2.0)
+        highlight = sum_of_components(np.square(normal - halfway)).T / 2
+        highlight = np.where(any_component(halfway).T, highlight, 2.0)
         viewer = np.broadcast_to(viewer, normal.shape)
         return cls(normal, viewer, direction, np.clip(diffuse, -1, 1), np.clip(highlight, 0, 2), factor)
 
@@ -106,10 +106,10 @@ class SurfacePoints:
         diffuse = np.einsum("sk,lsk->sl", normal, self.direction) * self.factor
         halfway = halfway_vector(self.direction, self.viewer)
         if chord:
-            highlight = np.square(normal - halfway).sum(axis=2).T / 2
+            highlight = sum_of_components(np.square(normal - halfway)).T / 2
         else:
             highlight = 1 - np.einsum("sk,lsk->sl", normal, halfway)
-        highlight = np.where(halfway.any(axis=2).T, highlight, 2.0)
+        highlight = np.where(any_component(halfway).T, highlight, 2.0)
         return replace(self, normal=normal, diffuse=diffuse, highlight=highlight)
 
     def turned(self, other: "SurfacePoints", method: ChordInterpolator) -> np.ndarray:

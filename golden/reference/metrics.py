@@ -73,24 +73,22 @@ def error_figures(
         If the shapes differ or no pixel counts.
     """
     image, reference = _pair(image, reference)
-    if mask is None:
-        mask = np.ones(image.shape[:2], dtype=bool)
-    mask = np.asarray(mask, dtype=bool)
-    if mask.shape != image.shape[:2]:
-        raise ValueError(f"the mask must have shape {image.shape[:2]}, not {mask.shape}")
-    count = int(mask.sum())
-    if not count:
-        raise ValueError("the mask must hold at least one pixel")
-    error = np.empty((count, *image.shape[2:]))
-    rows, done = max(1, _CHUNK // max(1, image[0].size)), 0
-    for start in range(0, len(image), rows):
-        part = slice(start, start + rows)
-        shown = mask[part]
-        difference = reference[part][shown] * scale
-        difference -= image[part][shown]
-        error[done : done + len(difference)] = np.abs(difference)
-        done += len(difference)
-    rmse = math.sqrt(sum(float((part * part).sum()) for (part,) in _chunks(error)) / error.size)
+    if mask is not None:
+        mask = np.asarray(mask, dtype=bool)
+        if mask.shape != image.shape[:2]:
+            raise ValueError(f"the mask must have shape {image.shape[:2]}, not {mask.shape}")
+        pixels = np.flatnonzero(mask)
+        if not len(pixels):
+            raise ValueError("the mask must hold at least one pixel")
+        image, reference = (array.reshape(mask.size, -1)[pixels] for array in (image, reference))
+    error, total, done = np.empty(image.size), 0.0, 0
+    for shown, exact in _chunks(image, reference):
+        part = np.multiply(exact, scale, out=error[done : done + len(exact)])
+        part -= shown
+        np.abs(part, out=part)
+        total += float((part * part).sum())
+        done += len(part)
+    rmse = math.sqrt(total / error.size)
     return ErrorFigures(
         max_lsb=float(error.max()),
         p999_lsb=float(np.percentile(error, 99.9, overwrite_input=True)),

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from blysk.golden.number.spans import runs_of
-from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.geometry import Mesh, any_component, normalise, sum_of_components
 from blysk.golden.reference.scene import Scene
 
 __all__ = ["SUBPIXELS", "Raster", "face_normals", "fragment_barycentrics", "fragment_normals", "rasterise"]
@@ -180,7 +180,7 @@ def _assemble(scene: Scene, candidates: np.ndarray, corners: np.ndarray) -> tupl
     near = scene.camera.near
     x, y, w, depth = np.moveaxis(corners, -1, 0)
     beyond = (np.maximum(np.abs(x), np.abs(y)) > _GUARD * w) | (depth < near)
-    crossing = beyond.any(axis=1)
+    crossing = any_component(beyond)
     whole = ~crossing
     corner = np.broadcast_to(np.eye(3), (len(corners), 3, 3))
     triangle = candidates
@@ -234,7 +234,7 @@ def _spans(
     # E >= 0 on those edges, E >= 1 on the others.
     biased = c - ~top_left
     scaled = pieces.nearness / pieces.area[:, np.newaxis]
-    step = (a * scaled).sum(axis=1)
+    step = sum_of_components(a * scaled)
     half = SUBPIXELS // 2
     low = np.maximum(-((half - pieces.points[..., 1].min(axis=1)) // SUBPIXELS), 0)
     high = np.minimum((pieces.points[..., 1].max(axis=1) - half) // SUBPIXELS, height - 1)
@@ -282,11 +282,11 @@ def rasterise(scene: Scene) -> Raster:
     mesh, width, height = scene.mesh, scene.width, scene.height
     faces = mesh.faces
     plane = face_normals(mesh)
-    degenerate = ~plane.any(axis=1)
+    degenerate = ~any_component(plane)
     homogeneous = scene.camera.homogeneous(mesh.vertices, width, height)
     if scene.camera.projection == "perspective":
         towards = scene.camera.position - mesh.vertices[faces[:, 0]]
-        back = (plane * towards).sum(axis=1) < 0
+        back = sum_of_components(plane * towards) < 0
     else:
         back = plane @ scene.camera.viewer < 0
     culled = back & ~degenerate & scene.culls
@@ -294,7 +294,7 @@ def rasterise(scene: Scene) -> Raster:
     x, y, w, depth = homogeneous.T
     outside = np.zeros(len(faces), dtype=bool)
     for beyond in (x < 0, x > width * w, y < 0, y > height * w, depth < scene.camera.near):
-        outside |= beyond[faces].all(axis=1)
+        outside |= beyond[faces[:, 0]] & beyond[faces[:, 1]] & beyond[faces[:, 2]]
     candidates = np.flatnonzero(~(degenerate | culled | outside))
     outside &= ~(degenerate | culled)
     pieces, left_over = _assemble(scene, candidates, homogeneous[faces[candidates]])
@@ -393,9 +393,9 @@ def _end(corners: np.ndarray, fallback: np.ndarray, weights: np.ndarray) -> _End
     normal = np.zeros((len(weights), 3))
     for corner in range(3):
         normal += weights[:, corner, np.newaxis] * corners[:, corner]
-    magnitude = np.sqrt((normal * normal).sum(axis=1))
+    magnitude = np.sqrt(sum_of_components(normal * normal))
     # Opposite unit normals leave a remainder of about 1e-16 where they should cancel.
-    lost = magnitude <= 1e-12 * weights.sum(axis=1)
+    lost = magnitude <= 1e-12 * sum_of_components(weights)
     magnitude[lost] = 0.0
     normal[lost] = fallback[lost]
     return _End(weights, normalise(normal), magnitude, lost)
@@ -436,7 +436,7 @@ def fragment_barycentrics(raster: Raster, which: np.ndarray) -> np.ndarray:
     """
     span, t = _position(raster, which)
     weights = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
-    return weights / weights.sum(axis=1, keepdims=True)
+    return weights / sum_of_components(weights)[:, np.newaxis]
 
 
 def fragment_normals(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray:

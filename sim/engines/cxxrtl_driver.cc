@@ -244,19 +244,28 @@ struct wire {
 
 template<size_t Width>
 struct memory {
-	struct write {
+	struct later {
 		size_t index;
 		value<Width> data, mask;
 		int priority;
 	};
 
 	std::vector<value<Width>> data;
-	std::vector<write> writes;
+	std::vector<later> writes;
 
 	explicit memory(size_t depth) : data(depth) {}
 	memory &operator=(memory &&) = default;
 
 	const value<Width> &operator[](size_t index) const { return data[index]; }
+
+	// Of a memory that nobody reads any more before the next clock.
+	CXXRTL_ALWAYS_INLINE void write(size_t index, const value<Width> &from) { data[index] = from; }
+
+	CXXRTL_ALWAYS_INLINE void write(size_t index, const value<Width> &from, const value<Width> &mask) {
+		value<Width> &target = data[index];
+		for (size_t n = 0; n < value<Width>::words; n++)
+			target.data[n] = (target.data[n] & ~mask.data[n]) | (from.data[n] & mask.data[n]);
+	}
 
 	// The writes of a clock take place at its edge, those of higher priority later.
 	CXXRTL_ALWAYS_INLINE void update(size_t index, const value<Width> &from, const value<Width> &mask, int priority) {
@@ -270,7 +279,7 @@ struct memory {
 	template<class Observer>
 	CXXRTL_ALWAYS_INLINE bool commit(Observer &) {
 		if (!writes.empty()) {
-			for (const write &each : writes)
+			for (const later &each : writes)
 				for (size_t n = 0; n < value<Width>::words; n++) {
 					word &target = data[each.index].data[n];
 					target = (target & ~each.mask.data[n]) | (each.data.data[n] & each.mask.data[n]);
@@ -287,13 +296,14 @@ struct memory_index {
 
 	template<size_t Bits>
 	CXXRTL_ALWAYS_INLINE memory_index(const value<Bits> &address, size_t offset, size_t depth) :
-		valid(address.data[0] - offset < depth), index(address.data[0] - offset) {}
+		valid((offset == 0 && Bits < 64 && depth >> Bits) || address.data[0] - offset < depth), index(address.data[0] - offset) {}
 };
 
-// What `words.py` writes shifts with.
+// What `words.py` writes shifts and counts with.
 CXXRTL_ALWAYS_INLINE word shifted_left(word a, word b) { return b < 64 ? a << b : 0; }
 CXXRTL_ALWAYS_INLINE word shifted_right(word a, word b) { return b < 64 ? a >> b : 0; }
 CXXRTL_ALWAYS_INLINE word shifted_signed(word a, word b) { return int64_t(a) >> (b < 63 ? b : 63); }
+CXXRTL_ALWAYS_INLINE word leading_zeros(word a, word width) { return a ? __builtin_clzll(a) + width - 64 : width; }
 
 #ifndef BLYSK_WORDS
 #define UNARY(name, condition, result) \

@@ -23,6 +23,9 @@ _WRITE = re.compile(
     rf"^(\t+)(\w+\.update\(\w+\.index, (.*), ({NAME}(?:\.curr)?)\.repeat<\d+>\(\)\.val\(\), \d+\);)$",
     re.MULTILINE,
 )
+_UPDATE = re.compile(
+    rf"\b(memory_\w+)\.update\((\w+\.index, .*?)(?:, {NAME}(?:\.curr)?\.repeat<\d+>\(\)\.val\(\))?, \d+\);"
+)
 _OUTPUT = re.compile(r"^\t/\*output\*/ wire<\d+> (\w+)", re.MULTILINE)
 
 
@@ -169,6 +172,17 @@ def _guard_writes(text: str) -> str:
     return "\n".join(line for line in text.split("\n") if line not in moved)
 
 
+def _write_at_once(text: str) -> tuple[str, set[str]]:
+    """Statements at the edge with each memory of one write port written there, and the memories' names.
+
+    The statements that read a memory come before: nobody reads it any more then. One bit that enables a
+    whole word has been asked for already, by `_guard_writes`.
+    """
+    counts = Counter(match[1] for match in _UPDATE.finditer(text))
+    memories = {name for name, count in counts.items() if count == 1}
+    return _UPDATE.sub(lambda m: f"{m[1]}.write({m[2]});" if m[1] in memories else m[0], text), memories
+
+
 class _Made:
     """How the words of an evaluation are made."""
 
@@ -207,13 +221,14 @@ class _Made:
 def group_registers(text: str) -> str:
     """Rewrite the C++ of `write_cxxrtl`: registers that share a question together, and in place.
 
-    So are a register's fields, where each has a value of its own; a memory's word is put together where it is
-    written. Four things make it the same machine. The statements at the edge read registers as they were and
-    combinational values that are complete before the first of them, so that their order is free, and a
-    register that nobody reads any more may take its next value. Before every evaluation ``next`` of one that
-    is copied equals its ``curr``, so that ``r.next = r.curr`` may be left out. The driver reads outputs
-    before the copies: those that are registers are copied. The reset is an input that the driver never sets,
-    so that the answer to it is no. A text, or a statement, in which this cannot be seen stays as it is.
+    So are a register's fields, where each has a value of its own; a memory's word is put together where it
+    is written, and a memory with one write port is written in place, too, after all who read it. Four things
+    make it the same machine. The statements at the edge read registers as they were and combinational values
+    that are complete before the first of them, so that their order is free, and a register that nobody reads
+    any more may take its next value. Before every evaluation ``next`` of one that is copied equals its
+    ``curr``, so that ``r.next = r.curr`` may be left out. The driver reads outputs before the copies: those
+    that are registers are copied. The reset is an input that the driver never sets, so that the answer to it
+    is no. A text, or a statement, in which this cannot be seen stays as it is.
 
     Parameters
     ----------
@@ -253,10 +268,12 @@ def group_registers(text: str) -> str:
             others.append(f"{_CLOCK}\n{block}\n\t}}\n")
     buffered = set(_OUTPUT.findall(text))
     tree.order(buffered)
-    edge = "".join(others) + "\n".join([_CLOCK, *tree.lines("\t\t", buffered), "\t}\n"])
+    others.sort(key=lambda block: ".update(" in block)
+    before, memories = _write_at_once("".join(others))
+    edge = before + "\n".join([_CLOCK, *tree.lines("\t\t", buffered), "\t}\n"])
     values = "\n".join(line for line in text[start:first].split("\n") if line not in gone)
     text = text[:start] + values + edge + text[end:]
-    for name in registers - buffered:
+    for name in (registers - buffered) | memories:
         text = text.replace(_copy(name), "", 1)
     return text
 

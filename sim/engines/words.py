@@ -17,7 +17,7 @@ _DECLARED = re.compile(r"^\t+(?:/\*\w+\*/ )?(value|wire)<(\d+)> (\w+)(?=;| \{| =
 _ASSIGNMENT = re.compile(r"^(\t+)([pi]_\w+(?:\.(?:next|curr))?)(?:\.slice<(\d+)(?:,(\d+))?>\(\))? = (.*);$")
 _CONDITION = re.compile(r"^(\t+if \()(!?)(bool)?(\(.*\)|\w+<.*)(\) \{)$")
 _INDEX = re.compile(r"^(\t+auto \w+ = memory_index\()(.*)(, \d+, \d+\);)$")
-_UPDATE = re.compile(r"^(\t+\w+\.update\(\w+\.index, )(.*)(, \d+\);)$")
+_UPDATE = re.compile(r"^(\t+\w+\.(?:update|write)\(\w+\.index, )(.*?)((?:, \d+)?\);)$")
 _COMMIT = re.compile(r"^(\t+)if \(([pi]_\w+)\.commit\(observer\)\) changed = true;$", re.MULTILINE)
 _RESET = re.compile(r"^(\t)([pi]_\w+) = (?:wire|value)<(\d+)>\{(.*)\};$")
 _TABLE = re.compile(
@@ -57,7 +57,9 @@ class _Expression(NamedTuple):
     """C++ of an expression: up to 64 bits a word below 2^width, above a ``value``; or any variable.
 
     ``low`` is a word with the lowest 64 bits, where it is simpler. ``among`` is for one that is not 0 when a
-    word is one of some constants: the word, and a mask with their bits.
+    word is one of some constants: the word, and a mask with their bits. ``bits`` are those of a
+    variable, by their last and first, that it is, or, of a narrower one, is not 0 with. ``zeros`` are such
+    bits, too, whose leading zeros it counts, and what is added.
     """
 
     code: str
@@ -65,6 +67,8 @@ class _Expression(NamedTuple):
     variable: bool = False
     low: str = ""
     among: tuple[str, int] | None = None
+    bits: "tuple[_Expression, int, int] | None" = None
+    zeros: "tuple[_Expression, int, int, int] | None" = None
 
     @property
     def word(self) -> str:
@@ -182,7 +186,7 @@ class _Parser:
             self.take(".")
             result = self.method(result)
         if self.named and len(result.code) > 64 and not result.variable and 0 < result.width <= 64:
-            result = _Expression(self.names.setdefault(result.code, f"n_{len(self.names)}"), result.width)
+            result = result._replace(code=self.names.setdefault(result.code, f"n_{len(self.names)}"))
         return result
 
     def choice(self) -> _Expression:
@@ -195,6 +199,8 @@ class _Parser:
         if yes.width != no.width:
             raise _Left
         parts = (yes.word, no.word) if yes.width <= 64 else (yes.value, no.value)
+        if zeros := _zeros(question, yes, no):
+            return _Expression(_leading_zeros(*zeros[:3]), yes.width, zeros=zeros)
         return _Expression(f"({question.word} ? {parts[0]} : {parts[1]})", yes.width)
 
     def constant(self) -> _Expression:
@@ -225,7 +231,8 @@ class _Parser:
                 return _Expression(f"{of.value}.concat({low.value}).val()", width)
             same = of.among and low.among and of.among[0] == low.among[0]
             among = (of.among[0], of.among[1] | low.among[1]) if same else None
-            return _Expression(f"({of.word} << {low.width} | {low.word})", width, among=among)
+            code = f"({of.word} << {low.width} | {low.word})"
+            return _Expression(code, width, among=among, zeros=low.zeros if of.word == "0x0ull" else None)
         if method == "repeat" and of.width == 1:
             (width,) = self.numbers()
             self.take("(", ")")
@@ -244,7 +251,10 @@ def _slice(of: _Expression, last: int, first: int) -> _Expression:
     if width > 64 or not (of.variable or of.width <= 64):
         return _of_value(f"{of.value}.slice<{last},{first}>().val()", width)
     if not of.variable:
-        return _Expression(_cut(f"{of.word} >> {first}", width), width)
+        bits = _bits(of)
+        bits = bits and (bits[0], bits[2] + last, bits[2] + first)
+        return _Expression(_cut(f"{of.word} >> {first}", width), width, bits=bits)
+    bits = (of, last, first)
     start, shift = divmod(first, 64)
     code = f"{of.code}.data[{start}]"
     if shift:
@@ -252,12 +262,39 @@ def _slice(of: _Expression, last: int, first: int) -> _Expression:
     if last // 64 != start:
         code = f"{code} | {of.code}.data[{start + 1}] << {64 - shift}"
     elif last == of.width - 1:
-        return _Expression(f"({code})", width)
-    return _Expression(_cut(code, width), width)
+        return _Expression(f"({code})", width, bits=bits)
+    return _Expression(_cut(code, width), width, bits=bits)
+
+
+def _bits(of: _Expression) -> tuple[_Expression, int, int] | None:
+    """Bits that an expression is."""
+    if of.variable:
+        return of, of.width - 1, 0
+    return of.bits if of.bits and of.width == of.bits[1] - of.bits[2] + 1 else None
+
+
+def _zeros(
+    question: _Expression, yes: _Expression, no: _Expression
+) -> tuple[_Expression, int, int, int] | None:
+    """Bits whose leading zeros a choice counts: those of an upper half that is not 0, or of both."""
+    if not (yes.zeros and no.zeros and question.bits):
+        return None
+    of, last, middle = question.bits
+    of_no, below, first, more = no.zeros
+    halves = yes.zeros == (of, last, middle, 0) and (of_no, below, more) == (
+        of,
+        middle - 1,
+        last - middle + 1,
+    )
+    return (of, last, first, 0) if halves and (last - first + 1) >> yes.width == 0 else None
+
+
+def _leading_zeros(of: _Expression, last: int, first: int) -> str:
+    return f"leading_zeros({_slice(of, last, first).word}, {last - first + 1})"
 
 
 def _unary(name: str, width: int, a: _Expression) -> _Expression:
-    code, among = None, None
+    code, among, bits, zeros = None, None, None, None
     if name == "logic_not" and width <= 64:
         code = f"word({a.word} == 0)" if a.width <= 64 else f"word(!bool({a.value}))"
         among = (a.word, 1) if a.width <= 6 else None
@@ -266,6 +303,7 @@ def _unary(name: str, width: int, a: _Expression) -> _Expression:
         code = f"(({a.among[1]:#x}ull >> {a.among[0]}) & 0x1ull)"
     elif name in ("reduce_or", "reduce_bool") and width <= 64:
         code = f"word({a.word} != 0)" if a.width <= 64 else f"word(bool({a.value}))"
+        bits = _bits(a) if width == 1 else None
     elif name == "reduce_and" and max(width, a.width) <= 64:
         code = f"word({a.word} == {_mask(a.width)})"
     elif name == "not_u" and a.width == width > 64:
@@ -273,9 +311,11 @@ def _unary(name: str, width: int, a: _Expression) -> _Expression:
     elif name in ("not_u", "not_s", "pos_u", "pos_s", "neg_u", "neg_s") and max(width, a.width) <= 64:
         operand = a.word if name.endswith("_u") else a.signed
         code = _cut({"not": "~", "pos": "", "neg": "-"}[name[:3]] + operand, width)
+        if name == "not_u" and a.width == width == 1 and _bits(a):
+            zeros = (*_bits(a), 0)
     if code is None:
         return _of_value(f"{name}<{width}>({a.value})", width)
-    return _Expression(code, width, among=among)
+    return _Expression(code, width, among=among, bits=bits, zeros=zeros)
 
 
 def _binary(name: str, width: int, a: _Expression, b: _Expression) -> _Expression:
@@ -292,6 +332,11 @@ def _binary(name: str, width: int, a: _Expression, b: _Expression) -> _Expressio
             # Nothing to cut off: bit by bit, of operands no wider than the result.
             fits = signs == "uu" and operation in ("and", "or", "xor") and max(a.width, b.width) <= width
             code = f"({code})" if fits else _cut(code, width)
+            if operation == "add" and b.zeros and _NUMBER.fullmatch(left):
+                of, last, first, more = b.zeros
+                more += int(left.rstrip("ul"), 0)
+                if (more + last - first + 1) >> width == 0:
+                    return _Expression(code, width, zeros=(of, last, first, more))
         elif signs in ("uu", "ss") and operation in _EQUALITY:
             code = f"word({left} {_EQUALITY[operation]} {right})"
             if signs == "uu" and _EQUALITY[operation] == "==" and a.width <= 6 and _NUMBER.fullmatch(right):

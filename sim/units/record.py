@@ -8,8 +8,9 @@ special about it.
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, wraps
 from typing import Any
+from weakref import ref
 
 import numpy as np
 from amaranth.lib.wiring import Component
@@ -27,6 +28,7 @@ __all__ = [
     "Variant",
     "first",
     "length_of",
+    "once",
 ]
 
 Beats = np.ndarray | Mapping[str, Any]
@@ -381,3 +383,19 @@ def first(beats: Beats, count: int) -> Beats:
 def length_of(beats: Beats) -> int:
     """Number of beats."""
     return length_of(next(iter(beats.values()))) if isinstance(beats, Mapping) else len(beats)
+
+
+def once(compute: Callable[[Component, Case], Any]) -> Callable[[Component, Case], Any]:
+    """A function of a unit and a case that keeps its last result, as long as the case is there.
+
+    What comes of a case and its status are often asked for one after the other, and made by the same model.
+    """
+    kept: dict[str, Any] = {}
+
+    @wraps(compute)
+    def computed(unit: Component, case: Case) -> Any:
+        if not kept or kept["case"]() is not case or kept["unit"]() is not unit:
+            kept.update(result=compute(unit, case), case=ref(case), unit=ref(unit))
+        return kept["result"]
+
+    return computed

@@ -1,5 +1,6 @@
 """Record of geometry, triangles to spans."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -7,12 +8,13 @@ import numpy as np
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.triangles import Frame, Grid, Triangles
 from blysk.hdl.geometry.geometry import GeometryUnit
-from blysk.sim.units.record import Case, Record, Stimulus, Variant
+from blysk.sim.units.record import Case, Record, Stimulus, Variant, once
 from blysk.sim.units.triangles import ended, frame_of, random_triangles, small_frame
 
 __all__ = ["RECORD"]
 
 
+@once
 def _spans(unit, case):
     return Geometry(unit.grid, unit.lines).compute(Triangles(**case.beats), frame_of(case.constants))
 
@@ -28,6 +30,26 @@ def _tiny(unit, rng, count):
     """Triangles of a pixel or so, back faces left out."""
     frame = Frame(-20, -20, 20, 20, "cull", 200)
     return Case(ended(random_triangles(rng, count, unit.grid, 1.0, 0.1), unit.grid).beats, frame.codes)
+
+
+def _mesh(unit, rng, count):
+    """Fine meshes that share corners and edges, on pixel centres too, with slivers and folds."""
+    side, step = 8, unit.grid.steps
+    layers = -(-count // (2 * side * side))
+    pitch = rng.integers(step // 8, 2 * step, (layers, 1, 1, 1))
+    nodes = np.stack(np.meshgrid(*2 * [np.arange(side + 1)]), axis=-1) * pitch
+    nodes = nodes + rng.integers(-20 * step, 20 * step, (layers, 1, 1, 2))
+    # Moved by less than a cell, by more, or not at all; a third of the meshes lie on centres and borders.
+    jitter = rng.integers(-step, step + 1, nodes.shape) * rng.integers(0, 3, (layers, 1, 1, 1))
+    nodes += jitter * pitch // (2 * step)
+    nodes[::3] = nodes[::3] // unit.grid.half * unit.grid.half
+    a, b, c, d = nodes[:, :-1, :-1], nodes[:, :-1, 1:], nodes[:, 1:, :-1], nodes[:, 1:, 1:]
+    points = np.stack([np.stack([a, b, c], axis=3), np.stack([d, c, b], axis=3)], axis=3)
+    points = points.reshape(-1, 3, 2)[:count]
+    triangles = replace(
+        random_triangles(rng, count, unit.grid, 1.0, 0.1), x=points[..., 0].copy(), y=points[..., 1].copy()
+    )
+    return Case(ended(triangles, unit.grid).beats, Frame(-24, -24, 24, 24, "flip", 200).codes)
 
 
 def _large(unit, rng, count):
@@ -64,6 +86,7 @@ RECORD = Record(
     stimuli={
         "small": Stimulus(_small, 300),
         "tiny": Stimulus(_tiny, 300),
+        "mesh": Stimulus(_mesh, 300),
         "large": Stimulus(_large, 40),
         "largest": Stimulus(_largest, 60),
     },

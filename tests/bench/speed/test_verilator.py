@@ -16,7 +16,7 @@ from blysk.hdl.core.fixed import FixedShape
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.engine import SimulationError, Stimulus
-from blysk.sim.engines.simulate import simulate
+from blysk.sim.engines.simulate import simulate, stimulus_of
 
 needed = pytest.mark.skipif(
     blysk.bench.speed.verilator.verilator_folder() is None,
@@ -109,21 +109,23 @@ def test_equal_to_the_engine(tmp_path):
 class Constant(Component):
     i: In(stream.Signature(8))
     o: Out(stream.Signature(8))
-    constants: In(8)
+    constants: In(data.StructLayout({"a": 40, "b": signed(5)}))
 
     def elaborate(self, platform):
         m = Module()
         m.d.comb += [self.o.valid.eq(self.i.valid), self.i.ready.eq(self.o.ready)]
-        m.d.sync += self.o.payload.eq(self.i.payload + self.constants)
+        m.d.sync += self.o.payload.eq(self.i.payload * self.constants.a + self.constants.b)
         return m
 
 
+@pytest.mark.long
 @needed
-def test_refuses_constants(tmp_path):
-    component = Constant()
-    with pytest.raises(ValueError, match=r"^a component with constants has no Verilated model$"):
-        Verilated(component, tmp_path)
-    simulate(component, np.arange(2), count=2, constants=1, engine="pysim")
+def test_constants_are_held(tmp_path):
+    component, beats = Constant(), np.arange(256)
+    run = simulate(component, beats, count=256, constants={"a": 3, "b": -7})
+    model = Verilated(component, tmp_path)
+    output, _ = model.run(stimulus_of(component, beats, count=256, constants={"a": 3, "b": -7}))
+    assert np.array_equal(output, pack(model.ports.o, run.beats))
 
 
 def test_says_what_is_missing(tmp_path, monkeypatch):

@@ -116,7 +116,10 @@ def test_a_register_is_copied_or_written_in_place(monkeypatch):
     copied, edge = set(COPY.findall(grouped)), grouped[grouped.index("bool p_top::eval(") :]
     in_place = {name for name, place, _ in WRITTEN.findall(edge) if place == "curr"}
     aside = {name for name, place, _ in WRITTEN.findall(edge) if place == "next"}
-    assert in_place | copied == set(COPY.findall(plain))
+    at_once = set(re.findall(r"(memory_\w+)\.write\(", edge))
+    assert in_place | copied | at_once == set(COPY.findall(plain))
+    assert at_once == {"memory_p_memory"}
+    assert not at_once & copied
     assert not in_place & (copied | aside)
     assert aside <= copied
     # What goes round in a circle needs one place more, no more; free of it nothing is copied.
@@ -128,7 +131,7 @@ def test_a_register_is_copied_or_written_in_place(monkeypatch):
 
 
 def test_readers_come_before_the_writer(monkeypatch):
-    """Line by line, in the text: no statement reads a register that one above it wrote in place."""
+    """Line by line, in the text: none reads a register, or a memory, that one above it wrote in place."""
     grouped = group_registers(generated(Tangle(), monkeypatch))
     lines = grouped[grouped.index("bool p_top::eval(") :].splitlines()
     written, branches = set(), []
@@ -149,6 +152,12 @@ def test_readers_come_before_the_writer(monkeypatch):
         if equals and (match := re.match(r"(\w+)\.curr = ", code)):
             written.add(match[1])
     assert written
+    assert edge_reads(grouped)[-1] < grouped.index("memory_p_memory.write(")
+
+
+def edge_reads(text):
+    """Places at which the memory is read."""
+    return [match.start() for match in re.finditer(r"memory_p_memory\[", text)]
 
 
 def test_fields_are_written_under_their_own_questions(monkeypatch):
@@ -167,7 +176,7 @@ def test_a_word_is_put_together_where_it_is_written(monkeypatch):
     assert part.findall(plain) == ["\t", "\t"]
     grouped = group_registers(plain)
     assert part.findall(grouped) == ["\t\t\t\t"] * 2
-    (question,) = re.findall(r"^(.*)\n.*\n.*\n\t{4}memory_p_memory\.update", grouped, re.MULTILINE)
+    (question,) = re.findall(r"^(.*)\n.*\n.*\n\t{4}memory_p_memory\.write", grouped, re.MULTILINE)
     assert question == "\t\t\tif (bool(p_write____en)) {"
 
 

@@ -15,11 +15,20 @@ from blysk.sim.engines.words import plain_words
 from .test_guards import Few, generated
 
 
+def leading_zeros(word):
+    """Counted by halves, the upper one a power of two."""
+    if len(word) == 1:
+        return ~word
+    upper = 1 << (len(word) - 1).bit_length() - 1
+    high, low = word[-upper:], word[:-upper]
+    return Mux(high.any(), leading_zeros(high), upper + leading_zeros(low))
+
+
 class Operations(Component):
     """What Amaranth has, of a and b of a width and an amount c, signed and not; fields lie across words."""
 
     i: In(stream.Signature(data.StructLayout({"a": 64, "b": 64, "c": 7})))
-    o: Out(stream.Signature(data.ArrayLayout(64, 24)))
+    o: Out(stream.Signature(data.ArrayLayout(64, 26)))
 
     def __init__(self, width):
         self.width = width
@@ -59,6 +68,10 @@ class Operations(Component):
             m.d.sync += self.o.valid.eq(self.i.valid)
             m.d.sync += wide[60 - width // 2 :][:width].eq(a)
             m.d.sync += [place.eq(result) for place, result in zip(self.o.payload, results, strict=False)]
+            # Of a word, and of bits across words; the second one's halves are not the same word's.
+            m.d.sync += self.o.payload[24].eq(Cat(leading_zeros(a), leading_zeros((a >> c)[:width])))
+            mixed = Mux(a[-1:].any(), leading_zeros(a[-1:]), 1 + leading_zeros(b[:1]))
+            m.d.sync += self.o.payload[25].eq(Cat(leading_zeros(wide[50:107]), mixed))
             m.d.sync += self.o.payload[20].eq(wide[50:114])
             m.d.sync += self.o.payload[21].eq(wide[60 - width // 2 :][:width])
             with m.If(wide[:100].any() & (wide[1:101] != wide[:100])):
@@ -96,6 +109,13 @@ def test_templates_are_gone(monkeypatch):
     narrow = plain_words(generated(Few(), monkeypatch))
     assert not operation.search(narrow)
     assert header not in narrow
+
+
+def test_leading_zeros_are_one_operation(monkeypatch):
+    """Of one word; a choice between halves of two words stays a choice."""
+    text = plain_words(generated(Operations(24), monkeypatch))
+    assert re.search(r"leading_zeros\(\(p_\w+\.data\[0\]\), 24\)|leading_zeros\(.*, 24\)", text)
+    assert re.search(r"leading_zeros\(.*, 57\)", text)
 
 
 def test_text_that_is_not_understood_stays():
