@@ -104,7 +104,7 @@ class VectorNormaliser:
         one = 1 << 20
         # In steps of 2^-21: f is halved with all its bits.
         e = Fixed(SQ(2, 21), np.where(large, f - 2 * one, 2 * (f - one)))
-        return e.round_half_up(17).saturate(self.FACTOR_FORMAT)
+        return e.round_half_up(17).wrap(self.FACTOR_FORMAT)
 
     def compute(self, vector: Fixed, flip: np.ndarray) -> tuple[Fixed, np.ndarray]:
         """Bit-accurate unit vectors.
