@@ -77,11 +77,12 @@ class LightUnit(wiring.Component):
 
     With an initiation interval of 1 the diffuse and the specular unit run in lockstep: their latencies are
     equal, and they accept and give the same beats on the same cycles, so that one handshake serves both. With
-    a longer one, dark beats bypass the specular unit: they wait beside it in order, and take a cycle each.
+    a longer one, dark beats bypass the specular unit: they wait beside it in order, and take two cycles
+    each, of which the first tells that they are dark.
 
     The latency, the initiation interval and the multipliers are those of the specular unit, for beats that
-    are not dark. Of a light that fades a `FactorUnit` follows, two cycles and a multiplier more; the factor
-    passes beside the units before it.
+    are not dark; with a longer interval there is a cycle of latency more. Of a light that fades a
+    `FactorUnit` follows, two cycles and a multiplier more; the factor passes beside the units before it.
 
     Parameters
     ----------
@@ -137,6 +138,7 @@ class LightUnit(wiring.Component):
         self.latency = self._specular.latency + (self._factor.latency if self._factor else 0)
         self.initiation_interval = self._specular.initiation_interval
         self.skips_dark = self.initiation_interval > 1
+        self.latency += self.skips_dark
         self._diffuse = DiffuseUnit(diffuse, latency=2 if self.skips_dark else self._specular.latency)
         operands = {
             "cosine": FixedShape(self._diffuse.parameters.operand_format),
@@ -231,11 +233,15 @@ class LightUnit(wiring.Component):
         terms = diffuse.o.signature.create(path=("terms",))
         connect_fifo(m, "waiting", diffuse.o, terms, depth)
         takes, gives, skip = Signal(), Signal(), skips.r_data
+        # Whether a beat is dark is found on the first of its cycles, and a register on the others.
+        known, was_dark = Signal(name="known"), Signal(name="was_dark")
+        m.d.sync += [known.eq(self.i.valid & ~self.i.ready), was_dark.eq(dark)]
+        dark = was_dark
         m.d.comb += [
-            takes.eq(diffuse.i.ready & skips.w_rdy),
+            takes.eq(diffuse.i.ready & skips.w_rdy & known),
             self.i.ready.eq(takes & (dark | specular.i.ready)),
             specular.i.valid.eq(self.i.valid & takes & ~dark),
-            diffuse.i.valid.eq(self.i.valid & skips.w_rdy & (dark | specular.i.ready)),
+            diffuse.i.valid.eq(self.i.valid & skips.w_rdy & known & (dark | specular.i.ready)),
             skips.w_en.eq(self.i.valid & self.i.ready),
             skips.w_data.eq(dark),
             o.valid.eq(terms.valid & skips.r_rdy & (skip | specular.o.valid)),

@@ -78,6 +78,7 @@ BUGS = {
         "specular.o.ready.eq(1)",
     ),
     "what waits beside it is lost": ("terms.ready.eq(gives)", "terms.ready.eq(1)"),
+    "the darkness of the beat before counts": ("known.eq(self.i.valid & ~self.i.ready)", "known.eq(1)"),
     "the term of a dark beat is kept": ("Mux(skip, 0, ", "Mux(0, 0, "),
 }
 
