@@ -17,7 +17,6 @@ __all__ = [
     "connect_fifo",
     "connect_slice",
     "count_down",
-    "hold_output",
     "moving",
     "pass_beside",
     "require_same_shape",
@@ -210,16 +209,6 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
     with m.If(moves):
         m.d.sync += spare.eq(Value.cast(payload))
     return moves
-
-
-def hold_output(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
-    """Drive a stream from a register that stands until it is taken; return whether it may change.
-
-    `skid_buffer` without the spare register: what is behind sees the sink's ready on the same cycle, and
-    costs nothing. The parameters are those of `skid_buffer`.
-    """
-    m.d.comb += [output.valid.eq(valid), Value.cast(output.payload).eq(Value.cast(payload))]
-    return ~Value.cast(valid) | output.ready
 
 
 def stop_output(m: Module, output: stream.Interface, coming: ValueLike, payload: ValueLike) -> Value:
