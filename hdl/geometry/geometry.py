@@ -118,7 +118,8 @@ class _TriangleSetup(wiring.Component):
         attributes, scales = _between("attribute", serialiser.o), _between("scale", planes.o)
         connect_fifo(m, "waiting_attributes", serialiser.o, attributes, depth=ATTRIBUTES * ahead)
         if self._compact:
-            connect(m, planes.o, scales)
+            # The planes go on with the next triangle while the attributes of this one are set up.
+            connect_register(m, "waiting_scale", planes.o, scales)
         else:
             connect_fifo(m, "waiting_scales", planes.o, scales, depth=_SCALES)
         to, turn = self._gradients.i, Signal(range(ATTRIBUTES), name="turn")
