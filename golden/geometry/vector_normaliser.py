@@ -31,7 +31,7 @@ class VectorNormaliser:
     u            SQ(-9, 21)   the others from the segment's middle, with the half step that the cut leaves out
     f            UQ(2, 20)    ``c0 - c1 u``
     c1           UQ(3, 9)     its error counts 2^-10
-    e            SQ(1, 17)    18 bits for the multipliers; rounded, saturates
+    e            SQ(1, 17)    18 bits for the multipliers; rounded, which no factor is too large for
     v / |v|      SQ(1, 17)    rounded half up; saturates to ONE
     ============ ============ =====================================================================
 

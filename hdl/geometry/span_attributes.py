@@ -55,8 +55,8 @@ class SpanAttributesUnit(wiring.Component):
 
     *Serial*, one attribute after the other goes through the same adders, and its words through rings of
     registers: a scanline takes four cycles, and so does a piece for every two bits of its pixels and of those
-    cut off. A scanline is given four times, each time with another attribute's plane, and the output's ready
-    goes through to the input's.
+    cut off, or one more if the piece before it has not gone. A scanline is given four times, each time with
+    another attribute's plane.
 
     Parameters
     ----------
