@@ -180,7 +180,7 @@ class RenderUnit(wiring.Component):
         shape = data.StructLayout(deep)
         spans = moving(m, "spans", made, depth.i, pixel_last := Signal(name="pixel_last"), dropped)
         m.d.comb += [
-            pixel_last.eq(pipeline.o.payload.last),
+            pixel_last.eq(depth.i.payload.pixel.last),
             self.idle.eq(geometry.idle & depth.idle & ~spans),
         ]
         m.submodules.depths = depths = fifo.SyncFIFOBuffered(
@@ -188,7 +188,16 @@ class RenderUnit(wiring.Component):
         )
         word = Signal(shape, name="depth_word")
         waiting, pixel = data.View(shape, depths.r_data), pipeline.o
+        if compact := self.parameters.design.build.style == "compact":
+            pixel = stream.Signature(pipeline.o.payload.shape()).create(path=("pixel",))
+            connect_register(m, "waiting_pixel", pipeline.o, pixel)
         moves = depth.i.valid & depth.i.ready
+        taken, there = moves & pixel.payload.last, depths.r_rdy
+        if compact:
+            # Pixels are some cycles apart: a span's depth goes on the cycle after its last.
+            goes = Signal(name="depth_goes")
+            m.d.sync += goes.eq(taken)
+            taken, there = goes, there & ~goes
         m.d.comb += [
             pipeline.i.payload.eq(ready.payload.span),
             *(word[name].eq(ready.payload[name]) for name in deep),
@@ -200,9 +209,9 @@ class RenderUnit(wiring.Component):
             ready.ready.eq(known & (drops | (pipeline.i.ready & depths.w_rdy))),
             depth.i.payload.pixel.eq(pixel.payload),
             *(depth.i.payload[name].eq(waiting[name]) for name in deep),
-            depth.i.valid.eq(pixel.valid & depths.r_rdy),
-            pixel.ready.eq(depth.i.ready & depths.r_rdy),
-            depths.r_en.eq(moves & pixel.payload.last),
+            depth.i.valid.eq(pixel.valid & there),
+            pixel.ready.eq(depth.i.ready & there),
+            depths.r_en.eq(taken),
             *(self.status[name].eq(geometry.status[name]) for name in COUNTERS),
             self.status.spans.eq(count),
             *(self.status[name].eq(depth.status[name]) for name in ("pixels", "hidden")),

@@ -65,7 +65,7 @@ class Edges:
     @property
     def beats(self) -> dict:
         """What the hardware gives."""
-        return dict(vars(self))
+        return vars(self) | {"flat": self.upper == 0}
 
 
 def wrap(codes: np.ndarray, bits: int) -> np.ndarray:

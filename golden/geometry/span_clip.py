@@ -43,7 +43,7 @@ class ClippedRows:
     @property
     def beats(self) -> dict:
         """What the hardware gives."""
-        return dict(vars(self))
+        return vars(self) | {"covered": self.length > 0, "skips": self.skip > 0}
 
 
 @dataclass(frozen=True)

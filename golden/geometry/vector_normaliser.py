@@ -31,7 +31,7 @@ class VectorNormaliser:
     u            SQ(-9, 21)   the others from the segment's middle, with the half step that the cut leaves out
     f            UQ(2, 20)    ``c0 - c1 u``
     c1           UQ(3, 9)     its error counts 2^-10
-    e            SQ(1, 17)    18 bits for the multipliers; rounded, saturates
+    e            SQ(1, 17)    18 bits for the multipliers; rounded, which no factor is too large for
     v / |v|      SQ(1, 17)    rounded half up; saturates to ONE
     ============ ============ =====================================================================
 
@@ -104,7 +104,7 @@ class VectorNormaliser:
         one = 1 << 20
         # In steps of 2^-21: f is halved with all its bits.
         e = Fixed(SQ(2, 21), np.where(large, f - 2 * one, 2 * (f - one)))
-        return e.round_half_up(17).saturate(self.FACTOR_FORMAT)
+        return e.round_half_up(17).wrap(self.FACTOR_FORMAT)
 
     def compute(self, vector: Fixed, flip: np.ndarray) -> tuple[Fixed, np.ndarray]:
         """Bit-accurate unit vectors.

@@ -1,11 +1,11 @@
-"""Connection of two streams by one register: half the rate of a register slice, and half its registers."""
+"""Streams behind one register: half the registers of a slice, for half its rate or a path of readies."""
 
-from amaranth.hdl import Module, Shape, Signal, Value
+from amaranth.hdl import Module, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
 
 from blysk.hdl.core.stream import require_same_shape
 
-__all__ = ["connect_register"]
+__all__ = ["connect_register", "hold_output"]
 
 
 def connect_register(m: Module, name: str, source: stream.Interface, sink: stream.Interface) -> None:
@@ -37,3 +37,13 @@ def connect_register(m: Module, name: str, source: stream.Interface, sink: strea
         m.d.sync += [full.eq(source.valid), payload.eq(source.payload)]
     with m.Elif(sink.ready):
         m.d.sync += full.eq(0)
+
+
+def hold_output(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
+    """Drive a stream from a register that stands until it is taken; return whether it may change.
+
+    `skid_buffer` without the spare register: what is behind sees the sink's ready on the same cycle, and
+    costs nothing. The parameters are those of `skid_buffer`.
+    """
+    m.d.comb += [output.valid.eq(valid), Value.cast(output.payload).eq(Value.cast(payload))]
+    return ~Value.cast(valid) | output.ready

@@ -17,15 +17,18 @@ __all__ = [
     "connect_fifo",
     "connect_slice",
     "count_down",
-    "hold_output",
     "moving",
     "pass_beside",
     "require_same_shape",
     "skid_buffer",
+    "stop_output",
 ]
 
 FIFO_LATENCY = 2
 """Clocks that a payload takes through an empty buffer."""
+
+_MANY, _PART = 36, 12
+"""Stages from which on they are looked at by parts, and those of a part."""
 
 SLICE_LATENCY = 1
 """Clocks that a payload takes through the register of `connect_slice`."""
@@ -208,14 +211,31 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
     return moves
 
 
-def hold_output(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
-    """Drive a stream from a register that stands until it is taken; return whether it may change.
+def stop_output(m: Module, output: stream.Interface, coming: ValueLike, payload: ValueLike) -> Value:
+    """Drive a stream from registers that stop with every beat until it is accepted, for one cycle at least.
 
-    `skid_buffer` without the spare register: what is behind sees the sink's ready on the same cycle, and
-    costs nothing. The parameters are those of `skid_buffer`.
+    For units whose beats are some cycles apart: `skid_buffer` without the spare register and its multiplexer.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the register.
+    output : stream.Interface
+        Stream to drive.
+    coming : ValueLike
+        Whether there is a payload after this cycle, if it is one on which registers take their next values.
+    payload : ValueLike
+        The payload; a register that changes only while the result is high.
+
+    Returns
+    -------
+    Value
+        Whether registers take their next values: itself a register.
     """
-    m.d.comb += [output.valid.eq(valid), Value.cast(output.payload).eq(Value.cast(payload))]
-    return ~Value.cast(valid) | output.ready
+    moves = Signal(name="moves", init=1)
+    m.d.sync += moves.eq(Mux(moves, ~Value.cast(coming), output.ready))
+    m.d.comb += [output.valid.eq(~moves), Value.cast(output.payload).eq(Value.cast(payload))]
+    return moves
 
 
 def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
@@ -334,8 +354,8 @@ class PipelinedUnit(wiring.Component):
     ports : mapping of str to Member, optional
         Further members, by name.
     skid : bool
-        Whether a spare register cuts the path from ``o.ready`` to ``i.ready`` and to the enable
-        (`skid_buffer`); without it the unit is disabled on the very cycle on which a beat is not accepted.
+        Whether a spare register holds a beat that is not accepted (`skid_buffer`); without it the unit is
+        disabled while a beat is on the output, for one cycle at least (`stop_output`).
 
     Members
     -------
@@ -421,8 +441,11 @@ class PipelinedUnit(wiring.Component):
             operands = self.register(inner, operands, "operands", when=self.i.ready)
         result = self.datapath(inner, operands)
         m.submodules.datapath = EnableInserter(advance)(inner)
-        drive = skid_buffer if self._skid else hold_output
-        m.d.comb += advance.eq(drive(m, self.o, self._stages[-1], result))
+        if self._skid:
+            m.d.comb += advance.eq(skid_buffer(m, self.o, self._stages[-1], result))
+        else:
+            before = self._stages[-2] if self.latency > 1 else accept
+            m.d.comb += advance.eq(stop_output(m, self.o, before, result))
         return m
 
     def _wait(self, m: Module, advance: Value, accept: Value) -> Value:
@@ -448,10 +471,19 @@ class PipelinedUnit(wiring.Component):
         ready, turn = Signal(name="ready", init=1), Signal(range(self.initiation_interval))
         # Whether a beat will be inside on the next cycle even if none comes on this one.
         stays, opens = Signal(name="stays"), Signal(name="opens")
+        inside = Cat(accept, self._stages)[: self.latency - 1]
+        if self.latency > _MANY:
+            # By parts, each of which is worked out from the stages before its own.
+            parts = [Signal(name=f"inside_{k}") for k in range(-(-(self.latency - 3) // _PART))]
+            with m.If(advance):
+                m.d.sync += [
+                    part.eq(inside[1 + k * _PART : 1 + (k + 1) * _PART].any()) for k, part in enumerate(parts)
+                ]
+            inside = Cat(inside[:2], *parts)
         m.d.comb += opens.eq((turn == self.initiation_interval - 1) | ~(accept | stays))
         with m.If(advance):
             m.d.sync += [
-                stays.eq(Cat(accept, self._stages)[:-2].any()),
+                stays.eq(inside.any()),
                 turn.eq(Mux(opens, 0, turn + 1)),
             ]
         if not self._skid:

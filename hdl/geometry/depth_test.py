@@ -121,7 +121,8 @@ class DepthTestUnit(wiring.Component):
             self.i.ready.eq(advance),
             accept.eq(self.i.valid & advance),
         ]
-        m.d.comb += self.idle.eq(~(Cat(valid).any() | self.o.valid))
+        missed = Signal(name="missed")
+        m.d.comb += self.idle.eq(~(Cat(valid).any() | self.o.valid | missed))
 
         # The sum has a sign, and a bit more than any step of a span can add.
         first, total = Signal(name="first", init=1), Signal(37, name="total")
@@ -148,8 +149,11 @@ class DepthTestUnit(wiring.Component):
                 m.d.sync += there.eq(port.read_data)
         # Compared before it is known which counts: the memory's word comes late.
         m.d.comb += [nearer.eq(judged.depth < there), drawn.eq(valid[last - 1] & nearer)]
-        for written, pixel in reversed(late):
-            with m.If(written & (_place(pixel) == _place(judged))):
+        # Whether places are the same is known a cycle before.
+        nexts = [judged, *(pixel for _, pixel in late[:-1])]
+        same = [Signal(name=f"same_{k}") for k in range(last)]
+        for (written, pixel), flag in reversed(list(zip(late, same, strict=True))):
+            with m.If(written & flag):
                 m.d.comb += nearer.eq(judged.depth < pixel.depth)
         with m.If(advance):
             m.d.sync += [
@@ -159,6 +163,10 @@ class DepthTestUnit(wiring.Component):
                 *(to.eq(passes) for passes, to in pairwise(valid)),
                 stages[1].depth.eq(depth),
                 valid[last].eq(drawn),
+                *(
+                    flag.eq(_place(pixel) == _place(stages[last - 2]))
+                    for flag, pixel in zip(same, nexts, strict=True)
+                ),
                 *(
                     to.eq(word)
                     for earlier, later in pairwise(late)
@@ -172,9 +180,8 @@ class DepthTestUnit(wiring.Component):
             *(port.read_place[name].eq(stages[0][name]) for name in "xy"),
             *(port.write_place[name].eq(stages[last][name]) for name in "xy"),
         ]
-        count_events(
-            m, self.status, pixels=advance & valid[last - 1], hidden=advance & valid[last - 1] & ~drawn
-        )
+        m.d.sync += missed.eq(advance & valid[last - 1] & ~drawn)
+        count_events(m, self.status, pixels=advance & valid[last - 1], hidden=missed)
         return m
 
     def _remember(self, m: Module) -> None:

@@ -151,13 +151,16 @@ class EdgeNormalsUnit(wiring.Component):
         good = Signal(normal_shape(), name="good", init=_init())
         left, right = (Signal(normal_shape(), name=name) for name in ("left_normal", "right_normal"))
         turn, last, moves = Signal(2, name="turn"), Signal(name="last_normal"), Signal(name="takes")
+        # The words go on the cycle after the span.
+        gone = Signal(name="gone")
+        m.d.sync += gone.eq(self.o.valid & self.o.ready)
         lost = normaliser.o.payload.lost
         normal = Signal(normal_shape(), name="normal")
         m.d.comb += [
             last.eq(turn == Mux(words.length > 2, 2, words.length - 1)),
-            normaliser.o.ready.eq(~valid & rest.r_rdy),
+            normaliser.o.ready.eq(~valid & ~gone & rest.r_rdy),
             moves.eq(normaliser.o.valid & normaliser.o.ready),
-            rest.r_en.eq(self.o.valid & self.o.ready),
+            rest.r_en.eq(gone),
             Value.cast(normal).eq(Mux(lost, Value.cast(good), Value.cast(normaliser.o.payload.normal))),
             self.o.valid.eq(valid),
             *(result.normal_left.eq(left), result.normal_middle.eq(good), result.normal_right.eq(right)),
@@ -170,7 +173,7 @@ class EdgeNormalsUnit(wiring.Component):
                 m.d.sync += left.eq(normal)
             with m.If(~turn[1]):
                 m.d.sync += right.eq(normal)
-        with m.Elif(rest.r_en):
+        with m.Elif(self.o.ready):
             m.d.sync += valid.eq(0)
         return moves & lost
 

@@ -13,6 +13,9 @@ from blysk.hdl.geometry.triangles import first_centre, tag_shape
 
 __all__ = ["EdgeSetupUnit", "edge_corners_shape", "edges_shape", "plane_corners_shape"]
 
+_DIVISORS = (0, "divisor"), (1, "triple")
+"""Names of a divisor and of three times it, with half the bits that they have more."""
+
 ALONG_BITS = 9
 """Bits of `Edges.along`, from 0 to 511: columns to the first centre are 2 only with a fraction."""
 
@@ -53,6 +56,7 @@ def edges_shape(grid: Grid = GRID) -> data.StructLayout:
             "first": signed(X_BITS),
             "upper": unsigned(X_BITS),
             "lower": unsigned(X_BITS),
+            "flat": unsigned(1),
         }
         | tag_shape()
         | plane_corners_shape(grid)
@@ -173,6 +177,7 @@ class EdgeSetupUnit(PipelinedUnit):
         for name, value in (
             ("first", rows[0]),
             ("upper", (rows[1] - rows[0])[:X_BITS]),
+            ("flat", rows[1] == rows[0]),
             ("lower", (rows[2] - rows[1])[:X_BITS]),
             ("knee", (y[1] - y[0])[: grid.bits]),
             ("area", operands.area),
@@ -198,30 +203,34 @@ class EdgeSetupUnit(PipelinedUnit):
         # The division: remainder from -d to d - 1, and the bits still to come, from below filled by quotient.
         load = [age.divide for age in ages]
         rest, word = Signal(signed(bits + 1), name=f"rest_{number}"), Signal(bits, name=f"word_{number}")
-        divisor, negative = Signal(bits, name=f"divisor_{number}"), Signal(name=f"negative_{number}")
-        width = chosen([edges[k][0] for k in members], load)
-        with m.If(_any(self.at(age) for age in load)):
+        negative = Signal(name=f"negative_{number}")
+        divisor, triple = (Signal(bits + 2 * k, name=f"{name}_{number}") for k, name in _DIVISORS)
+        width, height = (chosen([edges[k][part] for k in members], load) for part in range(2))
+        loads = self.register(m, _any(self.at(age - 1) for age in load), f"loads_{number}")
+        with m.If(loads):
             m.d.sync += [
                 rest.eq(width[-1].replicate(bits + 1)),
                 word.eq(width),
                 negative.eq(width[-1]),
-                divisor.eq(chosen([edges[k][1] for k in members], load)),
+                divisor.eq(height),
+                triple.eq(height + (height << 1)),
             ]
         with m.Else():
-            after, quotient = _steps(rest, word, divisor, self.bits_per_cycle)
+            after, quotient = self._steps(rest, word, divisor, triple)
             m.d.sync += [rest.eq(after), word.eq(quotient)]
 
         # Its remainder put right; the start from it.
         corrected = Mux(rest < 0, rest + divisor, rest)[:bits]
         quotient = Cat(word, negative).as_signed()
         read = [age.start - 1 for age in ages]
-        found = _any(self.at(age) for age in read)
+        found = self.register(m, _any(self.at(age - 1) for age in read), f"found_{number}")
         step = self.register(m, quotient, f"step_{number}", when=found)
         error_step = self.register(m, corrected, f"error_step_{number}", when=found)
         height = self.register(m, divisor, f"height_of_{number}", when=found)
         self._start(m, number, members, edges, (step, error_step, height), result, keep)
         if 0 in members:
-            fraction = self._fraction(m, error_step, height)
+            triple = self.register(m, triple, f"triple_of_{number}", when=found)
+            fraction = self._fraction(m, error_step, height, triple)
             m.d.comb += result.fraction.eq(keep(fraction, "fraction", self._fraction_read))
 
     def _start(self, m, number, members, edges, division, result, keep) -> None:
@@ -239,30 +248,39 @@ class EdgeSetupUnit(PipelinedUnit):
         s = grid.subpixel_bits
         total = Signal(signed(grid.bits + 1), name=f"total_{number}")
         carried = Signal(signed(grid.bits + 2), name=f"carried_{number}")
+        both = self.register(m, error_step + height, f"both_{number}")
         below, low = Signal(s, name=f"below_of_{number}"), Signal(s, name=f"low_{number}")
         begin = Signal(signed(grid.bits + 1), name=f"begin_of_{number}")
         of_edge = [edges[k] for k in members]
+        # Whether the next bit of the sum is 1.
+        odd = Signal(name=f"odd_{number}")
         sum_ = total + Mux(below[0], step, 0)
-        more = carried + Mux(below[0], error_step, 0) + Mux(sum_[0], height, 0)
-        with m.If(_any(self.at(age) for age in load)):
+        more = carried + Mux(below[0], Mux(odd, both, error_step), Mux(odd, height, 0))
+        loads = self.register(m, _any(self.at(age - 1) for age in load), f"starts_{number}")
+        with m.If(loads):
             first = chosen([edge[2] for edge in of_edge])
             m.d.sync += [
                 begin.eq(first),
                 total.eq(first[:s]),
                 carried.eq(-1),
-                below.eq(chosen([edge[3] for edge in of_edge])),
+                below.eq(begin_below := chosen([edge[3] for edge in of_edge])),
+                odd.eq(first[0] ^ (begin_below[0] & step[0])),
             ]
         with m.Else():
             m.d.sync += [
                 total.eq(sum_ >> 1),
                 carried.eq(more >> 1),
                 below.eq(below >> 1),
+                odd.eq(sum_[1] ^ (below[1] & step[0])),
                 low.eq(Cat(low[1:], sum_[0])),
             ]
-        over = carried >= height
-        places = Mux(carried < 0, 0, Mux(over, 2, 1))
-        error = (carried + Mux(carried < 0, height, Mux(over, -height, 0)))[: grid.bits]
-        column = ((begin >> s) + total + places)[:X_BITS].as_signed()
+        more, less = carried + height, carried - height
+        under, over = carried < 0, less >= 0
+        places = Mux(under, 0, Mux(over, 2, 1))
+        error = Mux(under, more, Mux(over, less, carried))[: grid.bits]
+        # The column has another cycle.
+        whole = self.register(m, ((begin >> s) + total)[:X_BITS], f"whole_{number}")
+        column = (whole + self.register(m, places, f"places_{number}"))[:X_BITS].as_signed()
         along = ((places << s) - low).as_signed() << (8 - s)
         for k, age in zip(members, ages, strict=True):
             for name, value in (
@@ -272,7 +290,7 @@ class EdgeSetupUnit(PipelinedUnit):
                 ("error_step", error_step),
                 ("height", height),
             ):
-                value = keep(value, f"{name}_{k}", age.done - 1)
+                value = keep(value, f"{name}_{k}", age.done - (name != "x"))
                 m.d.comb += result[name][k].eq(value)
                 if k == 0 and name == "height":
                     m.d.comb += result.long_height.eq(value)
@@ -280,37 +298,49 @@ class EdgeSetupUnit(PipelinedUnit):
                 along = keep(along[:ALONG_BITS], "along", age.done - 1)
                 m.d.comb += result.along.eq(along)
 
-    def _fraction(self, m: Module, error_step: Value, height: Value) -> Value:
+    def _fraction(self, m: Module, error_step: Value, height: Value, triple: Value) -> Value:
         """The division goes on: ``floor(2^32 error_step / height)``."""
         bits = self.grid.bits
         rest, word = (
             Signal(signed(bits + 1), name="fraction_rest"),
             Signal(FRACTION_BITS, name="fraction_word"),
         )
-        divisor = Signal(bits, name="fraction_divisor")
+        divisors = [Signal(bits + 2 * k, name=f"fraction_{name}") for k, name in _DIVISORS]
         nothing = Const(0, FRACTION_BITS)
-        after, quotient = _steps(error_step, nothing, height, self.bits_per_cycle)
+        after, quotient = self._steps(error_step, nothing, height, triple)
         with m.If(self.at(self._ages[0].start)):
-            m.d.sync += [rest.eq(after), word.eq(quotient), divisor.eq(height)]
+            m.d.sync += [rest.eq(after), word.eq(quotient), divisors[0].eq(height), divisors[1].eq(triple)]
         with m.Else():
-            after, quotient = _steps(rest, word, divisor, self.bits_per_cycle)
+            after, quotient = self._steps(rest, word, *divisors)
             m.d.sync += [rest.eq(after), word.eq(quotient)]
         return word
+
+    def _steps(self, rest: Value, word: Value, divisor: Value, triple: Value) -> tuple[Value, Value]:
+        """Steps of a division: ``rest`` takes bits of ``word``, less or more the divisor by its sign.
+
+        Of two steps the second is made for both signs of the first, with one or three times the divisor.
+        """
+        # Of a number without a sign a comparison with 0 would be constant.
+        subtract = rest >= 0 if rest.shape().signed else Const(1)
+
+        size = len(divisor) + 1
+
+        def added(bits, less, more):
+            # One adder: the 1 of a subtraction comes in by a bit below.
+            number = Cat(bits, rest)[:size]
+            less, more = (Cat(other, Const(0, 1))[:size] for other in (less, more))
+            turned = Mux(subtract, ~less, more)
+            return (Cat(Const(1, 1), number) + Cat(subtract, turned))[1 : size + 1].as_signed()
+
+        first = added(word[-1:], divisor, divisor)
+        positive = first >= 0
+        if self.bits_per_cycle == 1:
+            return first, Cat(positive, word[:-1])
+        # Less three times the divisor, or more the divisor; less it, or more three times.
+        down, up = added(word[-2:], triple, divisor), added(word[-2:], divisor, triple)
+        second = Mux(positive, down, up).as_signed()
+        return second, Cat(Mux(positive, down >= 0, up >= 0), positive, word[:-2])
 
 
 def _any(values) -> Value:
     return Cat(*values).any()
-
-
-def _steps(rest: Value, word: Value, divisor: Value, count: int) -> tuple[Value, Value]:
-    """So many steps of a division: ``rest`` takes a bit of ``word``, less or more the divisor by its sign."""
-    bits = len(divisor)
-    for _ in range(count):
-        # Of a number without a sign a comparison with 0 would be constant.
-        subtract = rest >= 0 if rest.shape().signed else Const(1)
-        doubled = Cat(word[-1], rest)[: bits + 1]
-        # One adder: the 1 of a subtraction comes in by a bit below.
-        turned = Cat(divisor, Const(0, 1)) ^ subtract.replicate(bits + 1)
-        rest = (Cat(Const(1, 1), doubled) + Cat(subtract, turned))[1 : bits + 2].as_signed()
-        word = Cat(rest >= 0, word[:-1])
-    return rest, word

@@ -1,12 +1,12 @@
 """Edge walk ([T] figure 4.10, rasteriser): the first and the last covered pixel of each scanline, exactly."""
 
-from amaranth.hdl import Module, Mux, Signal, signed, unsigned
+from amaranth.hdl import Const, Module, Mux, Signal, signed, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import GRID, Grid
-from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.core.stream import skid_buffer, stop_output
 from blysk.hdl.geometry.triangles import frame_shape, tag_shape
 
 __all__ = ["EdgeWalkUnit", "rows_shape", "walk_shape"]
@@ -28,6 +28,7 @@ def walk_shape(grid: Grid = GRID) -> data.StructLayout:
             "first": signed(X_BITS),
             "upper": unsigned(X_BITS),
             "lower": unsigned(X_BITS),
+            "flat": unsigned(1),
         }
         | tag_shape()
     )
@@ -58,6 +59,8 @@ class EdgeWalkUnit(wiring.Component):
     ----------
     grid : Grid
         Fraction bits of the coordinates.
+    skid : bool
+        Whether the output has a skid buffer; else a scanline takes two cycles.
 
     Members
     -------
@@ -73,8 +76,8 @@ class EdgeWalkUnit(wiring.Component):
 
     latency = 2
 
-    def __init__(self, grid: Grid = GRID):
-        self.grid = grid
+    def __init__(self, grid: Grid = GRID, skid: bool = True):
+        self.grid, self._skid = grid, skid
         super().__init__(
             {
                 "i": In(stream.Signature(walk_shape(grid))),
@@ -88,35 +91,39 @@ class EdgeWalkUnit(wiring.Component):
         m = Module()
         triangle, advance, load = self.i.payload, Signal(), Signal()
         active, last = Signal(name="active"), Signal(name="last_row", init=1)
-        left, upper = Signal(signed(X_BITS + 1), name="left"), Signal(X_BITS, name="upper")
+        left, seen = (Signal(signed(X_BITS + 1), name=name) for name in ("left", "seen"))
+        upper = Signal(X_BITS, name="upper")
         y, valid = Signal(signed(X_BITS), name="y"), Signal(name="valid")
         tag = Signal(data.StructLayout(tag_shape()), name="tag")
         row = Signal(self.o.payload.shape(), name="row")
         m.d.comb += [
-            advance.eq(skid_buffer(m, self.o, valid, row)),
+            advance.eq(
+                skid_buffer(m, self.o, valid, row) if self._skid else stop_output(m, self.o, active, row)
+            ),
             self.i.ready.eq(advance & last),
-            load.eq(self.i.valid & self.i.ready),
+            # What is not valid is not active.
+            load.eq(self.i.ready),
         ]
 
         low_is_next = Signal(name="low_is_next")
-        lower = self._edge(m, "lower", load, [(load, 2)], None)
-        long = self._edge(m, "long", load, [(load, 0)], advance)
-        flat = triangle.upper == 0
-        short = self._edge(
-            m, "short", load, [(load & flat, 2), (load & ~flat, 1)], advance, low_is_next, lower
-        )
+        lower = self._edge(m, "lower", load, [(Const(1), 2)], None)
+        long = self._edge(m, "long", last, [(Const(1), 0)], advance)
+        flat = triangle.flat
+        short = self._edge(m, "short", last, [(flat, 2), (~flat, 1)], advance, low_is_next, lower)
 
-        total = triangle.upper + triangle.lower
-        seen = self.constants.bottom - triangle.first
-        rows = Mux(seen < total, seen, total)
+        # Scanlines of the triangle, and those down to the picture's border: what is first at its end.
+        total = (triangle.upper + triangle.lower - 2).as_signed()
+        inside = self.constants.bottom - triangle.first - 2
         with m.If(advance):
             m.d.sync += valid.eq(active)
             with m.If(last):
-                m.d.sync += [active.eq(self.i.valid), left.eq(rows - 2), last.eq(~self.i.valid | (rows <= 1))]
+                m.d.sync += [active.eq(self.i.valid), left.eq(total), seen.eq(inside)]
+                m.d.sync += last.eq(~self.i.valid | total[-1] | inside[-1])
                 m.d.sync += [upper.eq(triangle.upper - 1), low_is_next.eq(triangle.upper == 1)]
                 m.d.sync += [y.eq(triangle.first), *(tag[name].eq(triangle[name]) for name in tag_shape())]
             with m.Else():
-                m.d.sync += [left.eq(left - 1), last.eq(left <= 0), y.eq(y + 1)]
+                m.d.sync += [left.eq(left - 1), seen.eq(seen - 1), y.eq(y + 1)]
+                m.d.sync += last.eq((left - 1)[-1] | (seen - 1)[-1])
                 m.d.sync += [upper.eq(upper - 1), low_is_next.eq(upper == 1)]
             m.d.sync += [
                 row.y.eq(y),
@@ -128,15 +135,16 @@ class EdgeWalkUnit(wiring.Component):
             ]
         return m
 
-    def _edge(self, m: Module, name: str, load, sources, advance, turns=None, lower=None):
-        """Registers of an edge, loaded from the input, and stepped while ``advance``."""
+    def _edge(self, m: Module, name: str, last, sources, advance, turns=None, lower=None):
+        """Registers of an edge: loaded after a triangle's last scanline, and stepped while ``advance``."""
         triangle, bits = self.i.payload, self.grid.bits
         edge = _Edge(name, bits)
         # The remainder is compared before it is reduced: both sums are there.
         more = edge.error + edge.error_step
         less = (edge.error - edge.lack).as_signed()
         m.d.comb += edge.carry.eq(less >= 0)
-        with m.If(load):
+
+        def loads():
             for when, k in sources:
                 with m.If(when):
                     m.d.sync += [
@@ -146,23 +154,26 @@ class EdgeWalkUnit(wiring.Component):
                         edge.error_step.eq(triangle.error_step[k]),
                         edge.lack.eq(triangle.height[k] - triangle.error_step[k]),
                     ]
+
         if advance is None:
+            with m.If(last):
+                loads()
             return edge
 
         def walk():
             m.d.sync += [
-                edge.x.eq(edge.x + edge.step + edge.carry),
+                edge.x.eq(Mux(edge.carry, edge.x + edge.step + 1, edge.x + edge.step)),
                 edge.error.eq(Mux(edge.carry, less, more)),
             ]
 
-        with m.Elif(advance):
-            if turns is None:
-                walk()
-            else:
-                with m.If(turns):
+        with m.If(advance):
+            with m.If(last):
+                loads()
+            if turns is not None:
+                with m.Elif(turns):
                     m.d.sync += [mine.eq(its) for mine, its in zip(edge.words, lower.words, strict=True)]
-                with m.Else():
-                    walk()
+            with m.Else():
+                walk()
         return edge
 
 

@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.triangles import ATTRIBUTES, GRID, Grid
-from blysk.hdl.core.single_register import connect_register
+from blysk.hdl.core.single_register import connect_register, hold_output
 from blysk.hdl.core.stream import connect, connect_fifo, moving
 from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit, serial_attribute_shape
 from blysk.hdl.geometry.edge_normals import EdgeNormalsUnit, true_spans_shape
@@ -73,7 +73,7 @@ class _TriangleSetup(wiring.Component):
         self._edges = EdgeSetupUnit(grid, 1 if compact else 3, 2, skid=skid)
         interval = self._edges.initiation_interval
         self._planes = PlaneSetupUnit(grid, interval, skid)
-        self._gradients = GradientSetupUnit(_COMPACT_GRADIENT if compact else interval // ATTRIBUTES, skid)
+        self._gradients = GradientSetupUnit(_COMPACT_GRADIENT if compact else interval // ATTRIBUTES)
         self.interval = max(interval, ATTRIBUTES * self._gradients.initiation_interval)
         self._assembler = PlaneAssemblerUnit(PlaneAssembler(cuts=cuts), serial=compact)
         self.multipliers = self._planes.multipliers + self._gradients.multipliers
@@ -118,7 +118,8 @@ class _TriangleSetup(wiring.Component):
         attributes, scales = _between("attribute", serialiser.o), _between("scale", planes.o)
         connect_fifo(m, "waiting_attributes", serialiser.o, attributes, depth=ATTRIBUTES * ahead)
         if self._compact:
-            connect(m, planes.o, scales)
+            # The planes go on with the next triangle while the attributes of this one are set up.
+            connect_register(m, "waiting_scale", planes.o, scales)
         else:
             connect_fifo(m, "waiting_scales", planes.o, scales, depth=_SCALES)
         to, turn = self._gradients.i, Signal(range(ATTRIBUTES), name="turn")
@@ -131,8 +132,8 @@ class _TriangleSetup(wiring.Component):
             scales.ready.eq(moves & (turn == ATTRIBUTES - 1)),
             *(to.payload[name].eq(attributes.payload[name]) for name in serial_attribute_shape().members),
             *(to.payload[name].eq(scales.payload[name]) for name in scales_shape()),
-            self.sliver.eq(scales.ready & scales.payload.sliver),
         ]
+        m.d.sync += self.sliver.eq(scales.ready & scales.payload.sliver)
         connect(m, self._gradients.o, self._assembler.i)
         connect(m, self._assembler.o, wiring.flipped(self.planes))
         return m
@@ -202,8 +203,8 @@ class GeometryUnit(wiring.Component):
         self.interval = -(-self._lanes[0].interval // setups)
         self._attributes, self._walk, self._clip = (
             SpanAttributesUnit(compact),
-            EdgeWalkUnit(grid),
-            SpanClipUnit(),
+            EdgeWalkUnit(grid, skid=not compact),
+            SpanClipUnit(skid=not compact),
         )
         self._normals = LineAdapterUnit() if lines else EdgeNormalsUnit(compact=compact)
         normaliser = 0 if lines else self._normals.multipliers
@@ -271,6 +272,13 @@ class GeometryUnit(wiring.Component):
         """Scanlines meet their planes: the first of a triangle waits for them, the others do not."""
         rows, to = self._clip.o, self._attributes.i
         first, ends = Signal(name="first", init=1), 1
+        if self.compact:
+            clipped, rows = rows, _between("row", rows)
+            full, row = Signal(name="row_full"), Signal.like(clipped.payload, name="row", reset_less=True)
+            free = hold_output(m, rows, full, row)
+            m.d.comb += clipped.ready.eq(free)
+            with m.If(free):
+                m.d.sync += [full.eq(clipped.valid), row.eq(clipped.payload)]
         with m.If(rows.valid & rows.ready):
             m.d.sync += first.eq(rows.payload.last)
         if self.compact:

@@ -48,8 +48,6 @@ class GradientSetupUnit(PipelinedUnit):
     ----------
     initiation_interval : int
         Cycles from an attribute to the next at the closest, at least 4.
-    skid : bool
-        As `PipelinedUnit` has it.
 
     Raises
     ------
@@ -66,7 +64,7 @@ class GradientSetupUnit(PipelinedUnit):
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    def __init__(self, initiation_interval: int = 4, skid: bool = True):
+    def __init__(self, initiation_interval: int = 4):
         if initiation_interval < 4:
             raise ValueError(f"initiation_interval must be at least 4, not {initiation_interval}")
         self._graph = Dataflow(initiation_interval)
@@ -77,7 +75,6 @@ class GradientSetupUnit(PipelinedUnit):
             gradient_shape(),
             latency=max(word.stage for word in self._results.values()),
             initiation_interval=initiation_interval,
-            skid=skid,
         )
 
     def _describe(self) -> dict:
@@ -126,19 +123,21 @@ class GradientSetupUnit(PipelinedUnit):
         long = g.register("long", lambda a, b, right: _either(right, a - b, a + b), short, step, right)
         start = self._start(first, short, step, right)
 
-        def size(step):
+        def cut_size(step):
             code = Value.cast(step).as_unsigned()
             kept = (code ^ code[-1].replicate(len(code)))[p.FORMAT.fraction_bits - p.SIZE_BITS :]
-            return Mux(
-                kept[p.SIZE_BITS :].any() | kept[: p.SIZE_BITS].all(), (1 << p.SIZE_BITS) - 1, kept + 1
-            )[: p.SIZE_BITS]
+            return Cat(kept[: p.SIZE_BITS], kept[p.SIZE_BITS :].any())
+
+        def size(kept):
+            kept, large = kept[:-1], kept[-1]
+            return Mux(large | kept.all(), (1 << p.SIZE_BITS) - 1, kept + 1)[: p.SIZE_BITS]
 
         return {
             "start": start,
             "short": g.wire("short_word", lambda v: v.wrap(p.FORMAT), short),
             "long": g.wire("long_word", lambda v: v.wrap(p.FORMAT), long),
             "inward": g.register("inward", lambda v: v.wrap(p.FORMAT), step),
-            "size": g.register("size", size, step),
+            "size": g.register("size", size, g.register("cut_size", cut_size, step)),
             "least": least,
         }
 
@@ -182,14 +181,13 @@ class GradientSetupUnit(PipelinedUnit):
             return Value.cast(value.truncate(point)).as_signed()
 
         def digit(register, short, step, of_short, of_step):
-            total = sum(
-                Mux(bit, word << place, 0)
-                for word, digit in ((short, of_short), (step, of_step))
-                for place, bit in enumerate(digit)
-            )
-            return register(total, "digit")
+            terms = [
+                register(sum(Mux(bit, word << place, 0) for place, bit in enumerate(digit)), f"of_{name}")
+                for name, word, digit in (("short", short, of_short), ("step", step, of_step))
+            ]
+            return register(sum(terms), "digit")
 
-        digits = g.share("digit", (wide, wide, unsigned(2), unsigned(2)), 1, digit)
+        digits = g.share("digit", (wide, wide, unsigned(2), unsigned(2)), 2, digit)
         total = None
         for k in range(4):
             low = slice(2 * k, 2 * k + 2)

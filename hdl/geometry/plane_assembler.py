@@ -1,6 +1,6 @@
 """Plane assembler: the gradients of a triangle's attributes, and the longest piece of its spans."""
 
-from amaranth.hdl import Module, Mux, Signal, Value, unsigned
+from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -39,8 +39,8 @@ class PlaneAssemblerUnit(wiring.Component):
     """Collects four gradients, and finds ``piece``: `PlaneAssembler` is the bit-accurate model.
 
     With the first gradient the product of bound and limit begins, two bits of the limit a cycle; after the
-    third ``piece`` is searched for, a bit a cycle. If gradients are at least 3 cycles apart a triangle is
-    offered 2 cycles after its fourth one at the earliest, and the next one's first is taken in from 2 cycles
+    third ``piece`` is searched for, a bit a cycle. If gradients are at least 4 cycles apart a triangle is
+    offered 3 cycles after its fourth one at the earliest, and the next one's first is taken in from the cycle
     after that on; so one each four cycles never waits. No multipliers. Where spans are not cut there is
     neither product nor search.
 
@@ -97,7 +97,8 @@ class PlaneAssemblerUnit(wiring.Component):
         else:
             found = 1
             m.d.comb += result.piece.eq(PlaneAssembler.LARGEST)
-        m.d.comb += self.o.valid.eq(full & found)
+        offers = Signal(name="offers")
+        m.d.comb += self.o.valid.eq(offers)
         if self.serial:
             m.d.comb += [self.o.payload[name].eq(result[name][0]) for name in _WORDS]
             m.d.comb += self.o.payload.piece.eq(result.piece)
@@ -107,6 +108,7 @@ class PlaneAssemblerUnit(wiring.Component):
             ends = given == ATTRIBUTES - 1
         else:
             m.d.comb += self.o.payload.eq(result)
+        m.d.sync += offers.eq(full & found & ~(moves & ends))
         with m.If(moves & ends):
             m.d.sync += full.eq(0)
         return m
@@ -138,22 +140,26 @@ class PlaneAssemblerUnit(wiring.Component):
         with m.If(accept & (count < 3)):
             first = count == 0
             m.d.sync += [
-                largest.eq(Mux(first | (size > largest), size, largest)),
+                largest.eq(Mux(first | (largest - size)[-1], size, largest)),
                 total.eq(Mux(first, 0, total) + size),
                 step.eq(count == 2),
                 found.eq(0),
             ]
         with m.Elif((step == 1) & multiplied):
-            m.d.sync += [norm.eq(largest + total), exponent.eq(0), step.eq(2)]
+            m.d.sync += step.eq(2)
         with m.Elif(step >= 2):
-            with m.Switch(step):
-                for k in range(PIECE_BITS):
-                    bit = PIECE_BITS - 1 - k
-                    with m.Case(2 + k):
-                        more = norm << (1 << bit)
-                        with m.If(more <= allowed):
-                            m.d.sync += [norm.eq(more), exponent[bit].eq(1)]
             last = step == 1 + PIECE_BITS
             m.d.sync += [step.eq(Mux(last, 0, step + 1)), found.eq(last)]
+        with m.If(step == 1):
+            m.d.sync += [norm.eq(largest + total), exponent.eq(0)]
+        with m.Elif(step != 0):
+            # By 8, 4, 2 and 1 places: the exponent takes the answers in, its first bit first.
+            turn = (step - 2)[:2]
+            more = Mux(turn[1], Mux(turn[0], norm << 1, norm << 2), Mux(turn[0], norm << 4, norm << 8))
+            # By a carry: of a comparison the mapper makes look-up tables.
+            fits = ~(allowed - more)[-1]
+            m.d.sync += exponent.eq(Cat(fits, exponent))
+            with m.If(fits):
+                m.d.sync += norm.eq(more)
         m.d.comb += piece.eq(Mux(exponent > PlaneAssembler.LARGEST, PlaneAssembler.LARGEST, exponent))
         return found

@@ -86,21 +86,21 @@ class PlaneSetupUnit(PipelinedUnit):
             name: g.input(name, lambda o, name=name: o[name]) for name in ("fraction", "down", "along")
         }
 
-        # A word to its first 1, and the places it moved by: two registers.
+        # A word to its first 1, and the places it moved by: bytes with a 1, whole bytes, the rest.
         def normalise(register, word):
-            moved = []
-            for step in (32, 16, 8):
-                word, moved = _move(word, step, moved)
-            word, moved = (
-                register(word, "coarse"),
-                [register(bit, f"moved_{k}") for k, bit in enumerate(moved)],
-            )
+            used = register(Cat(byte.any() for byte in _bytes(word)), "used")
+            word = register(word, "given")
+            place = Const(0, 3)
+            for k in range(len(used)):
+                place = Mux(used[k], len(used) - 1 - k, place)[:3]
+            word = register((word << Cat(Const(0, 3), place))[:bits], "coarse")
+            place, moved = register(place, "place"), []
             for step in (4, 2, 1):
                 word, moved = _move(word, step, moved)
-            return data.View(shifted, register(Cat(word, *reversed(moved)), "shifted"))
+            return data.View(shifted, register(Cat(word, *reversed(moved), place), "shifted"))
 
         shifted = data.StructLayout({"word": unsigned(bits), "places": unsigned(6)})
-        shifter = g.share("shifter", (unsigned(bits),), 2, normalise)
+        shifter = g.share("shifter", (unsigned(bits),), 3, normalise)
         top = g.use(shifter, "height_moved", (height,), lambda h: (Cat(Const(0, grid.bits), h),))
         wide = g.use(shifter, "area_moved", (area,), lambda a: (a,))
         # Both stand for one cycle, and are needed for longer.
@@ -172,10 +172,12 @@ class PlaneSetupUnit(PipelinedUnit):
         return result
 
 
+def _bytes(word: Value) -> list[Value]:
+    return [word[k : k + 8] for k in range(0, len(word), 8)]
+
+
 def _move(word: Value, step: int, moved: list) -> tuple[Value, list]:
-    """Left by so many places if as many first bits are 0; beyond the word never."""
-    if step >= len(word):
-        return word, [*moved, Const(0, 1)]
+    """Left by so many places if as many first bits are 0."""
     empty = ~word[-step:].any()
     return Mux(empty, (word << step)[: len(word)], word), [*moved, empty]
 

@@ -9,7 +9,7 @@ from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_N
 from blysk.golden.geometry.triangles import ATTRIBUTES, MATERIAL_BITS, PIXEL_BITS
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import hold_output, skid_buffer
+from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.geometry.plane_assembler import plane_shape, planes_shape
 from blysk.hdl.geometry.span_clip import clipped_rows_shape
 from blysk.hdl.geometry.triangles import count_events, counters_shape
@@ -55,8 +55,8 @@ class SpanAttributesUnit(wiring.Component):
 
     *Serial*, one attribute after the other goes through the same adders, and its words through rings of
     registers: a scanline takes four cycles, and so does a piece for every two bits of its pixels and of those
-    cut off. A scanline is given four times, each time with another attribute's plane, and the output's ready
-    goes through to the input's.
+    cut off, or one more if the piece before it has not gone. A scanline is given four times, each time with
+    another attribute's plane.
 
     Parameters
     ----------
@@ -97,18 +97,21 @@ class SpanAttributesUnit(wiring.Component):
         row, planes = self.i.payload.row, self.i.payload.planes
         first, drawn = Signal(name="first", init=1), Signal(name="drawn")
         busy, accept, loads = (Signal(name=name) for name in ("busy", "accept", "loads"))
-        piece, tag = Signal.like(planes.piece, name="piece"), Signal(_tag_shape(), name="tag")
+        mask, tag = Signal(PIXEL_BITS, name="whole_piece"), Signal(_tag_shape(), name="tag")
         pace = _Pace(m, self.i, busy, self.serial)
-        m.d.comb += [accept.eq(self.i.valid & self.i.ready), loads.eq(accept & (row.length != 0))]
-        with m.If(accept & pace.ends):
-            m.d.sync += [first.eq(row.last), drawn.eq((row.length != 0) | (drawn & ~first))]
-            with m.If(first):
-                m.d.sync += piece.eq(planes.piece)
-        with m.If(loads & pace.ends):
+        m.d.comb += [accept.eq(pace.accepts), loads.eq(accept & row.covered)]
+        with m.If(pace.goes & pace.loads):
             m.d.sync += [tag[name].eq(row[name]) for name in ("y", "right", "flip", "material")]
 
-        most = Mux(first, planes.piece, piece)
-        along = _Along(m, row, tag, most, piece, loads, busy, pace)
+        most = Mux(first, _mask(planes.piece), mask)
+        along = _Along(m, row, tag, most, mask, loads, busy, pace)
+        with m.If(pace.goes & pace.takes):
+            m.d.sync += [first.eq(row.last), drawn.eq(row.covered | (drawn & ~first))]
+            with m.If(first):
+                m.d.sync += [mask.eq(most), along.single.eq(planes.piece == 0)]
+                if self.serial:
+                    # The last of a whole piece's steps is of one bit, or of two.
+                    m.d.sync += along.double.eq(~planes.piece[0] & (planes.piece != 0))
         count = 1 if self.serial else ATTRIBUTES
         found = Signal(self._found_shape(count), name="found")
         for k in range(count):
@@ -119,19 +122,23 @@ class SpanAttributesUnit(wiring.Component):
             )
             with m.If(pace.advance):
                 m.d.sync += [found.near[k].eq(near), found.far[k].eq(far), found.step[k].eq(inward)]
-        with m.If(pace.ends):
-            with m.If(loads):
-                m.d.sync += busy.eq(1)
-            with m.Elif(along.leaves):
-                m.d.sync += busy.eq(0)
+        with m.If(pace.goes):
+            m.d.sync += busy.eq((pace.loads) | (busy & ~pace.leaves))
 
         valid, result, result_valid = (
             Signal(name="found_valid"),
             Signal(self.o.payload.shape(), name="result"),
             Signal(name="result_valid"),
         )
-        drive = hold_output if self.serial else skid_buffer
-        m.d.comb += pace.advance.eq(drive(m, self.o, result_valid, result))
+        if self.serial:
+            # The result is made anew by what is found, and must have gone by then.
+            m.d.comb += [self.o.valid.eq(result_valid), self.o.payload.eq(result)]
+            stands = Mux(result_valid, ~self.o.ready, valid & found.ends)
+            m.d.comb += pace.advances.eq(Mux(pace.advance, ~(stands & along.gives), self.o.ready))
+            with m.If(self.o.ready):
+                m.d.sync += result_valid.eq(0)
+        else:
+            m.d.comb += pace.advance.eq(skid_buffer(m, self.o, result_valid, result))
         m.d.comb += self.idle.eq(~(busy | valid | self.o.valid | pace.lane.any()))
         with m.If(pace.advance):
             m.d.sync += [
@@ -140,14 +147,15 @@ class SpanAttributesUnit(wiring.Component):
                 found.length.eq(along.pixels + 1),
                 found.tag.eq(tag),
                 found.ends.eq(pace.ends),
-                result_valid.eq(valid & found.ends),
             ]
+        with m.If(valid & ~result_valid if self.serial else pace.advance):
+            m.d.sync += result_valid.eq(valid & found.ends)
             self._convert(m, valid, found, result)
         count_events(
             m,
             self.status,
-            empty=accept & pace.ends & row.last & (row.length == 0) & (first | ~drawn),
-            cut=along.cuts & pace.ends,
+            empty=pace.goes & pace.takes & row.last & ~row.covered & (first | ~drawn),
+            cut=along.cuts,
         )
         return m
 
@@ -221,22 +229,38 @@ class _Pace:
 
     def __init__(self, m: Module, rows: stream.Interface, busy: Signal, serial: bool):
         self.serial, self.given = serial, rows.valid
-        self.advance, self.leaves = Signal(name="advance"), Signal(name="would_leave")
+        self.advance, self.leaves = Signal(name="advance", init=serial), Signal(name="would_leave")
         self.lane, self.ends, self.steps = Signal(2, name="lane"), Signal(name="ends"), Signal(name="steps")
-        free, accepts = Signal(name="free"), Signal(name="accepts")
-        m.d.comb += free.eq((~busy | self.leaves) & (~busy | self.advance))
+        # Whether a scanline comes in, of each attribute if there is a step; then, whether the control moves
+        # on, has taken a scanline, and one with pixels.
+        self.accepts, self.goes, self.takes = (Signal(name=name) for name in ("accepts", "goes", "takes"))
+        self.loads, covered = Signal(name="loads_walk"), rows.payload.row.covered
+        opens = ~busy | self.leaves
         if not serial:
-            m.d.comb += [self.ends.eq(1), self.steps.eq(1), rows.ready.eq(free)]
+            moves = ~busy | self.advance
+            m.d.comb += [self.ends.eq(1), self.steps.eq(1), rows.ready.eq(opens & moves)]
+            m.d.comb += [self.accepts.eq(rows.valid & rows.ready), self.takes.eq(self.accepts)]
+            m.d.comb += self.goes.eq(self.accepts | (busy & self.advance))
+            m.d.comb += self.loads.eq(self.takes & covered)
             return
-        taken, first = Signal(name="taken"), self.lane == 0
+        first, taken, moves = self.lane == 0, Signal(name="taken"), Signal(name="moves", init=1)
         m.d.comb += [
-            rows.ready.eq((first | taken) & free),
-            accepts.eq(Mux(first, rows.valid & (~busy | self.leaves), taken)),
-            self.steps.eq((~busy | self.advance) & (busy | accepts) & (~accepts | rows.valid)),
+            rows.ready.eq(Mux(first, opens, taken) & moves),
+            self.accepts.eq(Mux(first, rows.valid & opens, taken)),
+            self.steps.eq(moves & Mux(first, busy | self.accepts, ~taken | rows.valid)),
             self.ends.eq(self.lane == ATTRIBUTES - 1),
+            self.goes.eq(self.ends & moves & (~taken | rows.valid)),
+            self.takes.eq(taken),
+            self.loads.eq(taken & (has_pixels := Signal(name="has_pixels"))),
         ]
+        with m.If(rows.valid):
+            m.d.sync += has_pixels.eq(covered)
+        stays, advances = Signal(name="stays_busy"), Signal(name="advances")
+        self.advances = advances
+        m.d.comb += stays.eq(Mux(self.goes, self.loads | (busy & ~self.leaves), busy))
+        m.d.sync += [self.advance.eq(advances), moves.eq(~stays | advances)]
         with m.If(self.steps):
-            m.d.sync += [self.lane.eq(self.lane + 1), taken.eq(accepts)]
+            m.d.sync += [self.lane.eq(self.lane + 1), taken.eq(self.accepts)]
 
 
 class _Kept:
@@ -262,64 +286,88 @@ class _Kept:
 class _Along:
     """Control of the walk along a scanline: pixels to skip, then pieces, a bit of each number a cycle."""
 
-    def __init__(self, m: Module, row, tag, most: Value, piece: Signal, loads: Signal, busy: Signal, pace):
+    def __init__(self, m: Module, row, tag, most: Value, mask: Signal, loads: Signal, busy: Signal, pace):
         # What is left of the span less one pixel, of which a piece takes part; bits of the walk.
         left, bits = Signal(PIXEL_BITS, name="left"), Signal(PIXEL_BITS, name="bits")
         self.pixels, begin = Signal(PIXEL_BITS, name="pixels"), Signal(PIXEL_BITS, name="begin")
         self.pace = pace
-        self.emits, self.leaves, self.cuts = (Signal(name=name) for name in ("emits", "leaves", "cuts"))
+        self.emits, self.gives, self.cuts = (Signal(name=name) for name in ("emits", "gives", "cuts"))
         self.skipping, whole = Signal(name="skipping"), Signal(name="whole")
         self.moves, self.ends = (Signal(name=name) for name in ("moves", "ends"))
         radix = 2 if pace.serial else 1
         self.digit = Signal(radix, name="digit")
-        self.single, self.double = Signal(name="single"), Signal(name="double")
+        self.single, self.double = Signal(name="single"), Signal(name="double") if pace.serial else Const(0)
         m.d.comb += [
             self.digit.eq(bits[:radix]),
-            self.ends.eq(~bits[radix:].any()),
-            self.moves.eq(busy & pace.advance & pace.steps),
-            pace.leaves.eq(self.ends & ~self.skipping & ~whole),
-            self.emits.eq(self.moves & self.ends & ~self.skipping),
-            self.leaves.eq(self.emits & ~whole),
-            self.single.eq(piece == 0),
-            # The last of a whole piece's steps is of one bit, or of two.
-            self.double.eq(~piece[0] & (piece != 0) if pace.serial else 0),
+            self.moves.eq(busy if pace.serial else busy & pace.advance),
+            self.gives.eq(busy & self.ends & ~self.skipping),
+            self.emits.eq(self.gives & pace.advance & pace.steps),
         ]
-        # A piece that is whole and not the last has 2^piece pixels.
-        after = (left - (1 << piece))[:PIXEL_BITS]
-        count, size = row.length - 1, Mux(self.skipping, left, after)
-        its = _piece(size, piece)
+        # A piece that is whole and not the last has a pixel more than the mask.
+        after = (left + ~mask)[:PIXEL_BITS]
+        count = row.length - 1
         if pace.serial:
-            # The scanline comes three times before it is taken.
-            waiting, size = Signal(PIXEL_BITS, name="waiting"), Signal(len(most), name="waiting_piece")
-            length, more = Signal(PIXEL_BITS, name="waiting_pixels"), Signal(name="waiting_more")
+            # The scanline comes three times before it is taken, and a step takes four cycles: each of the
+            # numbers that follow from it has one.
+            def kept(value, name):
+                register = Signal.like(value, name=name)
+                m.d.sync += register.eq(value)
+                return register
+
+            waiting, whole_piece = (Signal(PIXEL_BITS, name=name) for name in ("waiting", "waiting_mask"))
+            skip_ends = Signal(name="skip_ends")
             with m.If(pace.given):
-                m.d.sync += [waiting.eq(count), size.eq(most)]
-            mine = _piece(waiting, size)
-            m.d.sync += [length.eq(mine[0]), more.eq(mine[1])]
-            count, mine = waiting, (length, more)
+                m.d.sync += [waiting.eq(count), whole_piece.eq(most), skip_ends.eq(~row.skip[radix:].any())]
+            pixels, more = _piece(waiting, whole_piece)
+            count, mine = waiting, (kept(pixels, "waiting_pixels"), kept(more, "waiting_more"))
+            after = kept(Mux(self.skipping, left, after), "after")
+            pixels, more = _piece(after, mask)
+            its = kept(pixels, "next_pixels"), kept(more, "next_more")
+            mine_ends, its_ends = (kept(~words[0][radix:].any(), "ends") for words in (mine, its))
+            shift_ends = kept(~bits[2 * radix :].any(), "shift_ends")
+            with m.If(pace.goes):
+                with m.If(pace.loads):
+                    m.d.sync += [
+                        self.ends.eq(Mux(row.skips, skip_ends, mine_ends)),
+                        pace.leaves.eq(~row.skips & mine_ends & ~mine[1]),
+                    ]
+                with m.Else():
+                    m.d.sync += [
+                        self.ends.eq(Mux(self.ends, its_ends, shift_ends)),
+                        pace.leaves.eq(
+                            Mux(self.ends, its_ends & ~its[1], shift_ends & ~self.skipping & ~whole)
+                        ),
+                    ]
         else:
             mine = _piece(count[:PIXEL_BITS], most)
-        first = Signal(name="first_piece")
-        m.d.comb += self.cuts.eq(self.emits & whole & first)
-        with m.If(loads & pace.ends):
-            m.d.sync += [
-                left.eq(count),
-                begin.eq(row.x),
-                self.skipping.eq(row.skip != 0),
-                bits.eq(Mux(row.skip != 0, row.skip, mine[0])),
-                self.pixels.eq(mine[0]),
-                whole.eq(mine[1]),
-                first.eq(1),
+            its = _piece(Mux(self.skipping, left, after), mask)
+            m.d.comb += [
+                self.ends.eq(~bits[radix:].any()),
+                pace.leaves.eq(self.ends & ~self.skipping & ~whole),
             ]
-        with m.Elif(self.moves & pace.ends):
-            with m.If(~self.ends):
+        first = Signal(name="first_piece")
+        m.d.comb += self.cuts.eq(pace.goes & busy & self.ends & ~self.skipping & whole & first)
+        with m.If(pace.goes):
+            with m.If(pace.loads):
+                m.d.sync += [
+                    left.eq(count),
+                    self.skipping.eq(row.skips),
+                    bits.eq(Mux(row.skips, row.skip, mine[0])),
+                    self.pixels.eq(mine[0]),
+                    whole.eq(mine[1]),
+                    first.eq(1),
+                ]
+            with m.Elif(~self.ends):
                 m.d.sync += bits.eq(bits >> radix)
             with m.Else():
                 m.d.sync += [bits.eq(its[0]), self.pixels.eq(its[0]), whole.eq(its[1]), self.skipping.eq(0)]
                 with m.If(~self.skipping):
                     m.d.sync += [left.eq(after), first.eq(0)]
-                    with m.If(~tag.right):
-                        m.d.sync += begin.eq(begin + self.pixels + 1)
+        slides = self.gives & ~tag.right
+        if pace.serial:
+            slides = kept(slides, "slides")
+        with m.If(pace.goes & (pace.loads | slides)):
+            m.d.sync += begin.eq(Mux(pace.loads, row.x, begin + self.pixels + 1))
         self.x = Mux(tag.right, begin + left - self.pixels, begin)[:PIXEL_BITS]
 
     def values(self, m: Module, name: str, loads, base, inward, kept) -> tuple[Value, Value]:
@@ -358,8 +406,12 @@ def _code(value) -> Value:
     return Value.cast(value).as_unsigned()
 
 
-def _piece(left: Value, piece: Value) -> tuple[Value, Value]:
+def _mask(piece: Value) -> Value:
+    """Pixels of a whole piece less one."""
+    return Cat(piece > k for k in range(PIXEL_BITS))
+
+
+def _piece(left: Value, mask: Value) -> tuple[Value, Value]:
     """Pixels of the next piece less one, and whether others follow it."""
-    mask = ((1 << piece) - 1)[:PIXEL_BITS]
     more = (left & ~mask).any()
     return Mux(more, mask, left), more

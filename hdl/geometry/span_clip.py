@@ -12,15 +12,21 @@ __all__ = ["SpanClipUnit", "clipped_rows_shape"]
 
 
 def clipped_rows_shape() -> data.StructLayout:
-    """Shape of `ClippedRows.beats`: pixels of a scanline in the picture, and what is cut off."""
+    """Shape of `ClippedRows.beats`: pixels of a scanline in the picture, what is cut off, and whether any."""
     words = {name: unsigned(PIXEL_BITS) for name in ("x", "y", "length", "skip")}
-    return data.StructLayout(words | {"carry": unsigned(1), "last": unsigned(1)} | tag_shape())
+    flags = {name: unsigned(1) for name in ("covered", "skips", "carry", "last")}
+    return data.StructLayout(words | flags | tag_shape())
 
 
 class SpanClipUnit(PipelinedUnit):
     """Scanlines cut to the picture: those of `SpanClip`, the bit-accurate model.
 
     The latency is 2 cycles (borders, differences) and the initiation interval is 1. No multipliers.
+
+    Parameters
+    ----------
+    skid : bool
+        As `PipelinedUnit` has it.
 
     Members
     -------
@@ -34,8 +40,8 @@ class SpanClipUnit(PipelinedUnit):
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """
 
-    def __init__(self):
-        super().__init__(rows_shape(), clipped_rows_shape(), latency=2, constants=frame_shape())
+    def __init__(self, skid: bool = True):
+        super().__init__(rows_shape(), clipped_rows_shape(), latency=2, constants=frame_shape(), skid=skid)
 
     def datapath(self, m, operands):
         """Borders first, then what is between them."""
@@ -56,12 +62,13 @@ class SpanClipUnit(PipelinedUnit):
         rest = {name: operands[name] for name in ("carry", "last", *tag_shape())}
         for name, value in rest.items():
             m.d.sync += result[name].eq(self.register(m, value, name))
-        pixels = (end - begin).as_signed()
-        covered = inside & (pixels > 0)
+        pixels, covered = end - begin, inside & (begin < end)
         m.d.sync += [
             result.x.eq(Mux(covered, begin - frame.left, 0)),
             result.y.eq(Mux(covered, y, 0)),
             result.length.eq(Mux(covered, pixels, 0)),
             result.skip.eq(Mux(covered, cut, 0)),
+            result.covered.eq(covered),
+            result.skips.eq(covered & cut.any()),
         ]
         return result

@@ -83,7 +83,9 @@ class VectorNormaliserUnit(PipelinedUnit):
             product = self.register(m, self.register(m, e * word, f"product_{k}"), f"scaled_{k}")
             word = self._delay(m, word, f"late_{k}", 2)
             total = self.register(m, word + product, f"total_{k}")
-            m.d.comb += Value.cast(result.normal[k]).eq(self.register(m, _turned(total, flip), f"normal_{k}"))
+            m.d.comb += Value.cast(result.normal[k]).eq(
+                self.register(m, _clipped(_turned(total, flip)), f"normal_{k}")
+            )
         return result
 
     def _delay(self, m: Module, value, name: str, cycles: int):
@@ -240,21 +242,20 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
             found = [code[:bits] ^ code[-1].replicate(bits) for code in codes]
             return found[0] | found[1] | found[2]
 
-        def moved(word, steps):
-            empties = []
-            for step in steps:
-                empty = ~word[-step:].any()
-                word = Mux(empty, word << step, word)[:bits]
-                empties.append(empty)
-            return word, empties
+        def moved(word, step):
+            # By no, one, two or three steps: both places from the word as it is.
+            empties = [~word[bits - (k + 1) * step : bits - k * step].any() for k in range(3)]
+            two = empties[0] & empties[1]
+            one = Mux(two, empties[2], empties[0])
+            places = Mux(two, Mux(one, word << 3 * step, word << 2 * step), Mux(one, word << step, word))
+            return places[:bits], one, two
 
         def coarse(word):
-            word, (eight, four) = moved(word, (8, 4))
-            return Cat(word, four, eight)
+            return Cat(*moved(word, 4))
 
         def fine(word):
             word, above = word[:bits], word[bits:]
-            word, (two, one) = moved(word, (2, 1))
+            word, one, two = moved(word, 1)
             return Cat(one, two, above, word[-1])
 
         return g.register("places", fine, g.register("coarse_ones", coarse, g.register("ones", ones, vector)))
@@ -272,14 +273,15 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
         return self._graph.share("shifter", (signed(width), unsigned(4)), 3, shift)
 
     def _last(self, format):
-        """``v + e v``, negated or not, rounded: two registers."""
+        """``v + e v``, negated or not, rounded: three registers."""
 
         def last(register, product, word, flip):
             total = register(FixedValue(COMPONENT, word) + FixedValue(format, product), "total")
-            return register(_turned(total, register(flip, "flip")), "normal")
+            turned = register(_turned(total, register(flip, "flip")), "turned")
+            return register(_clipped(turned), "normal")
 
         operands = signed(format.width), signed(MULTIPLIER_BITS), unsigned(1)
-        return self._graph.share("last", operands, 2, last)
+        return self._graph.share("last", operands, 3, last)
 
     def datapath(self, m, operands):
         """The graph, read at the age of its last words."""
@@ -332,12 +334,12 @@ def _excess(p: VectorNormaliser, f: Value, large: Value) -> FixedValue:
     """``e``, of f in steps of 2^-21: it is halved with all its bits."""
     one = 1 << p.C0_FORMAT.fraction_bits
     e = FixedValue(SQ(2, 21), Mux(large, f - 2 * one, (f - one) << 1)[:23].as_signed())
-    return e.round_half_up(17).saturate(p.FACTOR_FORMAT)
+    return e.round_half_up(17).wrap(p.FACTOR_FORMAT)
 
 
 def _turned(total: FixedValue, flip: Value) -> Value:
-    """A component of the result, negated where ``flip``, rounded half up."""
+    """A component of the result before it is clipped, negated where ``flip``, rounded half up."""
     code = Value.cast(total)
     half = Value.cast(FixedValue.constant(SQ(2, 34), 0.5 * COMPONENT.step))
     turned = (code[:] ^ flip.replicate(len(code))).as_signed() + flip + half
-    return _clipped(turned >> (total.format.fraction_bits - COMPONENT.fraction_bits))
+    return turned >> (total.format.fraction_bits - COMPONENT.fraction_bits)

@@ -7,7 +7,6 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import GRID, Grid
 from blysk.golden.reference.scene import BACK_FACES
-from blysk.hdl.geometry.booth import booth_term
 from blysk.hdl.geometry.triangles import (
     corners_shape,
     count_events,
@@ -42,7 +41,7 @@ class VertexSortUnit(wiring.Component):
     A drawn triangle is offered n + 7 cycles after it was taken in.
 
     In the *compact* style one triangle is inside, whose corners stand where they were sorted: 5 cycles if its
-    box is empty, else n + 8, or n + 8 and those that it waits to be taken if it is drawn.
+    box is empty, else n + 9, or n + 9 and those that it waits to be taken if it is drawn.
 
     Parameters
     ----------
@@ -99,7 +98,7 @@ class VertexSortUnit(wiring.Component):
             with m.Case(4):
                 m.d.sync += step.eq(Mux(covered, 5, 0))
             with m.Case(5):
-                m.d.comb += leaves.eq(free)
+                m.d.comb += leaves.eq(1 if self.compact else free)
                 with m.If(leaves):
                     m.d.sync += step.eq(6 if self.compact else 0)
             with m.Case(6), m.If(ends):
@@ -123,19 +122,25 @@ class VertexSortUnit(wiring.Component):
     def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal, takes: Value) -> None:
         """Take corners in, and exchange neighbours where they are the wrong way round.
 
-        The first two, the last two, the first two. A comparison is a register, and its exchange takes
-        place on the next cycle; the comparison of that cycle takes corners from where they are before it.
+        The first two, the last two, the first two. All pairs are compared on the first cycle; which of the
+        comparisons a later exchange goes by follows from those before it.
         """
-        turn = Signal(name="turn")
+        turn, same, other = (Signal(name=name) for name in ("turn", "same", "other"))
         # x counts from the lowest one, so that y and x are one signed number.
         columns = [Value.cast(corner.x) for corner in corners]
         key = [
             Cat(x[:-1], ~x[-1], Value.cast(corner.y)).as_signed()
             for x, corner in zip(columns, corners, strict=True)
         ]
-        upper = Mux((step == 2) & ~turn, key[1], key[0])
-        lower = Mux((step == 2) | ((step == 3) & turn), key[2], key[1])
-        m.d.sync += turn.eq(upper > lower)
+        # Of the last corner with the one that is second, and with the other one.
+        with m.If(step == 1):
+            # By a carry: of a comparison the mapper makes look-up tables.
+            for flag, (upper, lower) in ((turn, (0, 1)), (same, (1, 2)), (other, (0, 2))):
+                m.d.sync += flag.eq((key[lower] - key[upper])[-1])
+        with m.Elif(step == 2):
+            m.d.sync += [turn.eq(Mux(turn, other, same)), other.eq(Mux(turn, same, other))]
+        with m.Else():
+            m.d.sync += turn.eq(turn & other)
         outer, inner = (step == 2) | (step == 4), step == 3
         with m.If(turn & (outer | inner)):
             m.d.sync += odd.eq(~odd)
@@ -156,8 +161,11 @@ class VertexSortUnit(wiring.Component):
             a, b, c = (first_centre(corner[name], self.grid) for corner in corners)
             with m.If(step == 1):
                 m.d.sync += [low.eq(Mux(a < b, a, b)), high.eq(Mux(a < b, b, a))]
+            # Exchanges begin on the second cycle.
+            third = Signal.like(c, name=f"third_{name}")
+            m.d.sync += third.eq(c)
             with m.If(step == 2):
-                m.d.sync += [low.eq(Mux(c < low, c, low)), high.eq(Mux(c > high, c, high))]
+                m.d.sync += [low.eq(Mux(third < low, third, low)), high.eq(Mux(third > high, third, high))]
             inside += [low < high, low < end, first < high]
         rows = high - low
         with m.If(step == 3):
@@ -191,10 +199,15 @@ class VertexSortUnit(wiring.Component):
                         m.d.sync += rest.eq(Cat(Const(0, 1 + DIGIT_BITS * (most - count)), down))
             with m.Else():
                 m.d.sync += rest.eq(rest << DIGIT_BITS)
-            high, low = (booth_term(width, rest[-size:][:3]) for size in (3, 5))
+            # The second product is subtracted: its digits have the other sign. The 1 of each negation is
+            # added with the term, in bits of the total that are 0.
+            (high, high_minus), (low, low_minus) = (
+                _booth_digit(width, rest[-size:][:3], bool(k)) for size in (3, 5)
+            )
             term = Signal(signed(grid.bits + DIGIT_BITS + 1), name=f"term_{k}")
-            m.d.sync += term.eq((high << 2) + low)
-            terms.append(term)
+            minus = Signal(2, name=f"minus_{k}")
+            m.d.sync += [term.eq((high << 2) + low), minus.eq(Cat(low_minus, high_minus))]
+            terms.append((term, minus))
 
         sums, drops = Signal(name="sums"), Signal(name="drops")
         m.d.sync += sums.eq(busy)
@@ -212,22 +225,32 @@ class VertexSortUnit(wiring.Component):
             with m.If(leaves):
                 m.d.sync += kept
         with m.If(sums):
-            m.d.sync += total.eq((total << DIGIT_BITS) + terms[0] - terms[1])
-        m.d.sync += done.eq(sums & ~busy)
+            (first, a), (second, b) = terms
+            ones = Cat(
+                bit for pair in zip(a, b, strict=True) for bit in (pair[0] ^ pair[1], pair[0] & pair[1])
+            )
+            m.d.sync += total.eq(Cat(ones, total) + first + second)
+        found, positive, zero = (Signal(name=name) for name in ("found", "positive", "zero"))
+        flags = [positive.eq(~total[-1]), zero.eq(~total.any())]
+        if self.compact:
+            # What the area is like is a register.
+            m.d.sync += [found.eq(sums & ~busy), done.eq(found), *flags]
+        else:
+            m.d.sync += done.eq(sums & ~busy)
+            m.d.comb += flags
 
-        back = (total > 0) ^ odd_area
-        zero = total == 0
+        back = (positive & ~zero) ^ odd_area
         culls, flips = (self.constants.back_faces == BACK_FACES.index(name) for name in ("cull", "flip"))
         culled = back & culls & ~two_sided
         valid = Signal(name="valid")
-        m.d.comb += [drops.eq(zero | culled), free.eq(~(busy | sums | done | valid))]
+        m.d.comb += [drops.eq(zero | culled), free.eq(~(busy | sums | found | done | valid))]
         m.d.comb += ends.eq((done & drops) | (valid & self.o.ready))
         area, right, flip = (Signal.like(result[name], name=name) for name in ("area", "right", "flip"))
         with m.If(done):
             m.d.sync += [
                 valid.eq(~drops),
-                area.eq(Mux(total < 0, -total, total)),
-                right.eq(total < 0),
+                area.eq(Mux(positive, total, -total)),
+                right.eq(~positive),
                 flip.eq(back & (flips | culls)),
             ]
         with m.Elif(self.o.ready):
@@ -244,6 +267,18 @@ class VertexSortUnit(wiring.Component):
         for k, corner in enumerate(corners):
             for name in corner.shape().members:
                 yield result[name][k].eq(corner[name])
+
+
+def _booth_digit(value: Value, bits: Value, negative: bool) -> tuple[Value, Value]:
+    """Value times a Booth digit, of three bits as for `booth_term`, or its opposite: less 1 where told.
+
+    A negative product is the complement, and lacks 1: there is no carry.
+    """
+    low, middle, high = bits
+    one, two = low ^ middle, (low == middle) & (middle != high)
+    minus = ~high if negative else high
+    size = Mux(two, value << 1, Mux(one, value, 0))
+    return (size[:] ^ minus.replicate(len(size))).as_signed(), minus
 
 
 def _corner_shape(grid: Grid) -> data.StructLayout:

@@ -246,26 +246,39 @@ class CompactIntensityUnit(wiring.Component):
         # The lowest term that is left is multiplied; a channel without any takes a cycle, too.
         chosen, rest = Signal(len(terms), name="chosen"), Signal(len(terms), name="rest")
         ends_channel, ends_pixel = Signal(name="ends_channel"), Signal(name="ends_pixel")
+        # Not busy, or on the pixel's last cycle; and the output moves: registers, worked out a cycle ahead.
+        free, ready = (Signal(name=name, init=1) for name in ("free", "ready"))
+        following = Signal(name="following")
+        m.d.sync += [free.eq(following), ready.eq(following & ~(self.o.valid & ~self.o.ready))]
         m.d.comb += [
             chosen.eq(left & -left),
             rest.eq(left & ~chosen),
             ends_channel.eq(~rest.any()),
             ends_pixel.eq(ends_channel & (channel == self.parameters.channels - 1)),
-            self.i.ready.eq(advance & (~busy | ends_pixel)),
+            self.i.ready.eq(ready),
+            following.eq(free),
             accept.eq(self.i.valid & self.i.ready),
         ]
-        nonzero = Cat(Value.cast(term).any() for term in terms)
+        nonzero, last_channel = Cat(Value.cast(term).any() for term in terms), self.parameters.channels - 1
         with m.If(accept):
             m.d.sync += [busy.eq(1), channel.eq(0), used.eq(nonzero), left.eq(nonzero)]
+            m.d.comb += following.eq(_one_at_most(nonzero) if last_channel == 0 else 0)
             m.d.sync += [register.eq(Value.cast(term)) for register, term in zip(held, terms, strict=True)]
         with m.Elif(advance & busy):
-            m.d.sync += left.eq(Mux(ends_channel, used, rest))
+            remain = Mux(ends_channel, used, rest)
+            m.d.sync += left.eq(remain)
+            ends = _one_at_most(remain) & (channel + ends_channel == last_channel)
+            m.d.comb += following.eq(ends_pixel | ends)
             with m.If(ends_channel):
                 m.d.sync += channel.eq(channel + 1)
             with m.If(ends_pixel):
                 m.d.sync += busy.eq(0)
         of_channel = [_of_channel(color, channel) for color in colors]
         return busy, channel, (_selected(chosen, held), _selected(chosen, of_channel)), first, ends_channel
+
+
+def _one_at_most(bits: Value) -> Value:
+    return ~(bits & (bits - 1)[: len(bits)]).any()
 
 
 def _selected(one_hot: Value, words: Sequence[Value]) -> Value:

@@ -77,11 +77,12 @@ class LightUnit(wiring.Component):
 
     With an initiation interval of 1 the diffuse and the specular unit run in lockstep: their latencies are
     equal, and they accept and give the same beats on the same cycles, so that one handshake serves both. With
-    a longer one, dark beats bypass the specular unit: they wait beside it in order, and take a cycle each.
+    a longer one, dark beats bypass the specular unit: they wait beside it in order, and take two cycles
+    each.
 
     The latency, the initiation interval and the multipliers are those of the specular unit, for beats that
-    are not dark. Of a light that fades a `FactorUnit` follows, two cycles and a multiplier more; the factor
-    passes beside the units before it.
+    are not dark; with a longer interval there is a cycle of latency more. Of a light that fades a
+    `FactorUnit` follows, two cycles and a multiplier more; the factor passes beside the units before it.
 
     Parameters
     ----------
@@ -137,6 +138,7 @@ class LightUnit(wiring.Component):
         self.latency = self._specular.latency + (self._factor.latency if self._factor else 0)
         self.initiation_interval = self._specular.initiation_interval
         self.skips_dark = self.initiation_interval > 1
+        self.latency += self.skips_dark
         self._diffuse = DiffuseUnit(diffuse, latency=2 if self.skips_dark else self._specular.latency)
         operands = {
             "cosine": FixedShape(self._diffuse.parameters.operand_format),
@@ -172,14 +174,17 @@ class LightUnit(wiring.Component):
         o = self.o if self._factor is None else self._apply_factor(m)
         m.submodules.diffuse = diffuse = self._diffuse
         m.submodules.specular = specular = self._specular
+        given = self.i.payload
+        if self.skips_dark:
+            given = Signal(given.shape(), name="given", reset_less=True)
         cosine = Value.cast(self.i.payload.cosine)
         dark = Signal()
         is_gated = self.i.payload.gated if "gated" in self.i.payload.shape().members else 0
         m.d.comb += [
             dark.eq(is_gated | cosine[-1] | ~cosine.any()),
-            diffuse.i.payload.eq(self.i.payload.cosine),
-            specular.i.payload.operand.eq(self.i.payload.highlight),
-            specular.i.payload.dark.eq(dark),
+            diffuse.i.payload.eq(given.cosine),
+            specular.i.payload.operand.eq(given.highlight),
+            specular.i.payload.dark.eq(0 if self.skips_dark else dark),
         ]
         for name in self._forwarded:
             wiring.connect(m, wiring.flipped(getattr(self, name)), getattr(specular, name))
@@ -189,7 +194,7 @@ class LightUnit(wiring.Component):
         elif "constants" in self.signature.members:
             m.d.comb += Value.cast(specular.constants).eq(Value.cast(self.constants))
         if self.skips_dark:
-            self._skip(m, diffuse, specular, dark, o)
+            self._skip(m, diffuse, specular, given, dark, o)
             return m
         m.d.comb += [
             self.i.ready.eq(diffuse.i.ready),
@@ -208,7 +213,7 @@ class LightUnit(wiring.Component):
         if self.fades:
             accepted, taken = self.i.valid & self.i.ready, factor.i.valid & factor.i.ready
             # As many as the units have inside, their outputs included.
-            most = self._depth + self._diffuse.latency if self.skips_dark else self._specular.latency + 1
+            most = self._depth + self._diffuse.latency + 1 if self.skips_dark else self._specular.latency + 1
             word = pass_beside(m, "factors", self.i.payload.factor, accepted, taken, most)
             m.d.comb += Value.cast(factor.i.payload.factor).eq(word)
         return factor.i
@@ -222,7 +227,13 @@ class LightUnit(wiring.Component):
         return max(self._specular.latency // self._specular.initiation_interval + 2, 3)
 
     def _skip(
-        self, m: Module, diffuse: DiffuseUnit, specular: PipelinedUnit, dark: Value, o: stream.Interface
+        self,
+        m: Module,
+        diffuse: DiffuseUnit,
+        specular: PipelinedUnit,
+        given: data.View,
+        dark: Value,
+        o: stream.Interface,
     ) -> None:
         """Diffuse terms wait for the specular ones, which not all have."""
         depth = self._depth
@@ -231,12 +242,20 @@ class LightUnit(wiring.Component):
         terms = diffuse.o.signature.create(path=("terms",))
         connect_fifo(m, "waiting", diffuse.o, terms, depth)
         takes, gives, skip = Signal(), Signal(), skips.r_data
+        # A beat waits in a register, and with it whether it is dark.
+        full, was_dark, taken = Signal(name="full"), Signal(name="was_dark"), Signal(name="taken")
+        with m.If(~full):
+            m.d.sync += [full.eq(self.i.valid), given.eq(self.i.payload), was_dark.eq(dark)]
+        with m.Elif(taken):
+            m.d.sync += full.eq(0)
+        dark = was_dark
         m.d.comb += [
+            self.i.ready.eq(~full),
             takes.eq(diffuse.i.ready & skips.w_rdy),
-            self.i.ready.eq(takes & (dark | specular.i.ready)),
-            specular.i.valid.eq(self.i.valid & takes & ~dark),
-            diffuse.i.valid.eq(self.i.valid & skips.w_rdy & (dark | specular.i.ready)),
-            skips.w_en.eq(self.i.valid & self.i.ready),
+            taken.eq(full & takes & (dark | specular.i.ready)),
+            specular.i.valid.eq(full & takes & ~dark),
+            diffuse.i.valid.eq(full & skips.w_rdy & (dark | specular.i.ready)),
+            skips.w_en.eq(taken),
             skips.w_data.eq(dark),
             o.valid.eq(terms.valid & skips.r_rdy & (skip | specular.o.valid)),
             gives.eq(o.valid & o.ready),

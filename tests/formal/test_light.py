@@ -68,16 +68,17 @@ def test_dark_beats_keep_their_places(prove, make, interval):
 BUGS = {
     "a dark beat takes a term": ("specular.o.ready.eq(gives & ~skip)", "specular.o.ready.eq(gives)"),
     "a lit beat is not given": (
-        "specular.i.valid.eq(self.i.valid & takes & ~dark)",
+        "specular.i.valid.eq(full & takes & ~dark)",
         "specular.i.valid.eq(0)",
     ),
-    "a dark beat is given": ("self.i.valid & takes & ~dark", "self.i.valid & takes"),
+    "a dark beat is given": ("full & takes & ~dark", "full & takes"),
     "it leaves before its term is there": ("(skip | specular.o.valid)", "1"),
     "a term is lost while the light is stalled": (
         "specular.o.ready.eq(gives & ~skip)",
         "specular.o.ready.eq(1)",
     ),
     "what waits beside it is lost": ("terms.ready.eq(gives)", "terms.ready.eq(1)"),
+    "a beat that comes is lost": ("m.Elif(taken)", "m.If(taken)"),
     "the term of a dark beat is kept": ("Mux(skip, 0, ", "Mux(0, 0, "),
 }
 

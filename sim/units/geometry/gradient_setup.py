@@ -63,7 +63,7 @@ RECORD = Record(
         "interval 4": Variant(
             GradientSetupUnit, _measure, "triangles over 2 pixels wide", note="of the step times the width"
         ),
-        "interval 12": Variant(partial(GradientSetupUnit, 12, skid=False)),
+        "interval 12": Variant(partial(GradientSetupUnit, 12)),
         "interval 6": Variant(partial(GradientSetupUnit, 6), long=True),
     },
     expect=_expect,

@@ -1,5 +1,6 @@
 """Record of the span attributes."""
 
+from dataclasses import fields
 from functools import partial
 
 import numpy as np
@@ -23,7 +24,8 @@ def _firsts(last):
 
 
 def _pieces(beats):
-    rows, at = ClippedRows(**beats["row"]), _firsts(beats["row"]["last"])
+    words = {field.name: beats["row"][field.name] for field in fields(ClippedRows)}
+    rows, at = ClippedRows(**words), _firsts(words["last"])
     planes = {name: value[at] for name, value in beats["planes"].items()}
     formats = {"start": GradientSetup.START_FORMAT} | dict.fromkeys(
         ("short", "long", "inward"), GradientSetup.FORMAT
@@ -97,17 +99,17 @@ def _any(unit, rng, count):
     length = (4095 >> rng.integers(0, 13, total)) - rng.integers(0, 2, total)
     skip = rng.integers(0, 4096 - length)
     covered = (length > 0) & (rng.random(total) < 0.9)
-    row = {
-        "x": np.where(covered, rng.integers(0, 4096 - length), 0),
-        "y": np.where(covered, rng.integers(0, 4096, total), 0),
-        "length": np.where(covered, length, 0),
-        "skip": np.where(covered & (rng.random(total) < 0.3), skip, 0),
-        "carry": flags[0],
-        "last": last,
-        "right": flags[1],
-        "flip": flags[2],
-        "material": rng.integers(0, 1024, total),
-    }
+    rows = ClippedRows(
+        x=np.where(covered, rng.integers(0, 4096 - length), 0),
+        y=np.where(covered, rng.integers(0, 4096, total), 0),
+        length=np.where(covered, length, 0),
+        skip=np.where(covered & (rng.random(total) < 0.3), skip, 0),
+        carry=flags[0],
+        last=last,
+        right=flags[1],
+        flip=flags[2],
+        material=rng.integers(0, 1024, total),
+    )
     # Long spans of short pieces are many.
     least = np.maximum(np.ceil(np.log2(np.maximum(length, 1))).astype(np.int64) - 3, 0)
     words = {"start": GradientSetup.START_FORMAT} | dict.fromkeys(
@@ -118,7 +120,7 @@ def _any(unit, rng, count):
     largest = np.zeros(count, dtype=np.int64)
     np.maximum.at(largest, at, least)
     planes["piece"] = np.minimum(largest + rng.integers(0, 4, count), 12)[at]
-    return Case(_beats_of(unit, planes, row))
+    return Case(_beats_of(unit, planes, rows.beats))
 
 
 RECORD = Record(

@@ -102,7 +102,6 @@ RECORD = Record(
         "ties": Stimulus(_deciding, 2_000_000, stalled=False),
     },
     axis="log2 of the vector's length",
-    waivers={"e": "No squared length has a factor that its word cannot hold."},
     still={
         "u is in halves of a step, odd": "u[0]",
         "pairs of Booth digits weigh 16 and 256 times as much": "pair_2[0-3] pair_4[0-7]",
