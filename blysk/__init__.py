@@ -42,7 +42,7 @@ __all__ = [
     "verilog",
 ]
 
-# Imported when asked for: the simulators take a second.
+# Imported at first use: importing the simulators takes a second.
 _MODULES = {
     "Camera": "golden.reference.camera",
     "CompilerMissing": "sim.engines.engine",

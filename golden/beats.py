@@ -21,10 +21,10 @@ class Spans:
     x, y : int arrays, shape (spans,)
         First pixel of each span, 0 to 4095, or the largest coordinate of the pipeline.
     length : int array, shape (spans,)
-        Pixels, 0 to 4095. A span of length 0 gives no pixel; past the largest x, x goes on from 0.
+        Number of pixels, 0 to 4095. A span of length 0 gives no pixel; after the largest x, x goes on from 0.
     normal_left, normal_right : int arrays, shape (spans, 3)
-        Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``; or what the method takes, in
-        its `Interpolator.END_FORMAT`.
+        Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``; or the vectors that the
+        method takes, codes of its `Interpolator.END_FORMAT`.
     material : int array, shape (spans,), optional
         Index of the material; ``None``: 0 for all.
     values : SpanValues, optional
@@ -33,7 +33,7 @@ class Spans:
         Unit normals in the middle of each span, for methods with `Interpolator.TAKES_MIDDLE`; ``None``: the
         bisectors of the two ends.
     factors : int64 array, shape (spans, factors, 3), optional
-        Beside values: codes of the factors of the lights that a design has a factor for, as those of N·L.
+        With values: codes of the factors, in the format of N·L, of the lights in `Design.factors`.
     """
 
     x: np.ndarray
@@ -52,7 +52,7 @@ class Spans:
 
     @cached_property
     def middle(self) -> np.ndarray:
-        """`normal_middle`, or the bisectors; of opposite ends, the left one."""
+        """`normal_middle`, or the bisectors of the two ends; the left end where the ends are opposite."""
         if self.normal_middle is not None:
             return self.normal_middle
         total = np.add(self.normal_left, self.normal_right)
@@ -84,9 +84,10 @@ class Pixels:
     last : bool array, shape (pixels,)
         Whether a pixel is the last of its span.
     out_of_range_spans : int
-        Spans of a larger angle than the method serves, whose pixels have no error bound.
+        Number of spans with a larger angle than the method serves; their pixels have no error bound.
     wide_spans : int
-        Spans of a larger angle than the method's error bound allows at the exponent; see `SpanLimit`.
+        Number of spans with a larger angle than the method's error bound allows at the exponent; see
+        `SpanLimit`.
     """
 
     x: np.ndarray

@@ -1,4 +1,4 @@
-"""Frame constants: what the pipeline is told before a frame, and the addresses of its write port."""
+"""Frame constants: the words that a pipeline is given before a frame, and their addresses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,25 +28,25 @@ __all__ = [
 ]
 
 FIELDS_OF_A_FRAME = {"exponent": (0, 1), "ambient": (1, 3)}
-"""First address and number of words of what a frame has once."""
+"""First address and number of words of each field that a frame has once."""
 
 FIELDS_OF_A_LIGHT = {"direction": (0, 3), "halfway": (3, 3), "diffuse": (6, 3), "specular": (9, 3)}
-"""The same of what it has for each light, from ``(light + 1) * LIGHT_STRIDE`` on."""
+"""First address, from ``(light + 1) * LIGHT_STRIDE`` on, and number of words of each field of a light."""
 
 MATERIAL_ADDRESS = 4
-"""Address of the index of the material that the constants written next belong to, where there are several."""
+"""Address of the index of a material, in a pipeline with several; the constants written next belong to it."""
 
 LOBE_ADDRESS = 5
-"""Address of writes that load tables of lobes, see `LobeTable.writes`; ``begins`` is bit 17."""
+"""Address by which tables of lobes are loaded, see `LobeTable.writes`; bit 17 of the data is ``begins``."""
 
 THRESHOLD_ADDRESS = 6
-"""Address of a material's threshold, from which on there is no highlight, where tables are loaded."""
+"""Address of a material's threshold, see `Design.threshold_of`, in a pipeline that loads tables."""
 
 BANK_ADDRESS = 7
-"""Address of the bank of a material's table, where there are several."""
+"""Address of the bank of a material's table, in a pipeline with several banks."""
 
 MAX_MATERIALS = 1024
-"""Most materials of a pipeline."""
+"""Largest number of materials of a pipeline."""
 
 LIGHT_STRIDE = 16
 """Addresses from one light to the next."""
@@ -62,20 +62,21 @@ class FrameConstants:
     Parameters
     ----------
     exponent : int
-        Specular exponent, 1 to 1000; of a lobe the one of Blinn's power that is as steep, which decides how
-        wide spans may be.
+        Specular exponent, 1 to 1000. With a lobe: the exponent at which Blinn's power is as steep as the
+        lobe; it decides how wide spans may be.
     ambient : int array, shape (3,)
         Ambient colour operand, ``UQ(11, 6)`` in LSB.
     direction, halfway : int arrays, shape (lights, 3)
         Unit vectors to each light, and half-way to the viewer, ``SQ(1, 17)``.
     diffuse, specular : int arrays, shape (lights, 3)
-        Colour operands of each light.
+        Colour operands of each light, ``UQ(11, 6)`` in LSB.
     lobe : LobeTable, optional
-        Table of the highlight, of a design whose specular unit has one; see `prepare.constants_of`.
+        Table of the lobe, for a design whose specular unit has tables; see `prepare.constants_of`.
     bank : int
         Bank of that table.
     threshold : int, optional
-        Of that table, see `Design.threshold_of`, where a gate or a span limit needs it.
+        Threshold of that table, see `Design.threshold_of`, for a design in which a gate or a span limit needs
+        it.
     """
 
     exponent: int
@@ -90,7 +91,7 @@ class FrameConstants:
 
     @property
     def highlight(self) -> int | LobeTable:
-        """What the specular unit works with: the exponent, or the table."""
+        """Parameter of the specular unit: the exponent, or the table."""
         return self.exponent if self.lobe is None else self.lobe
 
     @classmethod
@@ -101,15 +102,15 @@ class FrameConstants:
 
         Lights that the scene does not have are black. A light straight behind the surface that faces the
         viewer (``L = -V``) has no half-way vector, and no specular light. With point lights or a near viewer
-        there are no vectors of a frame: they are 0. So they are for a light that is off, whose colour is 0:
+        L and H are not constants of a frame: both are 0. A light that is off has vectors and colours of 0:
         its terms are 0, and the compact style spends no cycle on them. Fresnel's reflection of a distant
         light and viewer is a constant, and part of the specular colour.
 
         With ``energy`` the highlight is that of the energy-normalised form: the factor of
         `ReflectionModel.energy_factor` multiplies k_s here, once a frame, and the specular unit stays as it
-        is. Its error counts as many times. A colour operand holds ``k_s I_i`` times the factor up to 8, which
-        with ``k_s I_i = 1`` allows exponents up to 48 (``phong``), 195 (``blinn``) and 36 (``cosquad_lin``);
-        higher ones need a darker k_s.
+        is. The factor multiplies the unit's error, too. A colour operand holds ``k_s I_i`` times the factor
+        up to 8, which with ``k_s I_i = 1`` allows exponents up to 48 (``phong``), 195 (``blinn``) and 36
+        (``cosquad_lin``); higher ones need a darker k_s.
 
         Parameters
         ----------
@@ -118,9 +119,10 @@ class FrameConstants:
         lights : int, optional
             Lights of the pipeline; by default as many as the scene has, at least 1.
         energy : ReflectionModel, optional
-            Model whose factor it is: one that has one. An approximation of Blinn's power may take Blinn's.
+            Model that has an energy factor. For an approximation of Blinn's power, Blinn's model may be
+            given.
         index : int
-            Of the material.
+            Index of the material.
 
         Raises
         ------
@@ -169,7 +171,7 @@ class FrameConstants:
         Parameters
         ----------
         index : int, optional
-            Of the material, for a pipeline with several.
+            Index of the material, for a pipeline with several.
         loads : bool
             Whether the table of a lobe is loaded, unless it is fixed at build time.
         """
@@ -196,7 +198,7 @@ class FrameConstants:
 
 
 def writes_of(constants: Sequence[FrameConstants]) -> dict[str, np.ndarray]:
-    """Beats for the write port of a pipeline with so many materials, see `FrameConstants.writes`.
+    """Beats for the write port, from the constants of each material; see `FrameConstants.writes`.
 
     A table that several materials have is loaded once.
     """
@@ -228,16 +230,16 @@ def address_table(
     threshold: Format | None = None,
     loads_tables: bool = False,
 ) -> list[str]:
-    """Lines that tell the address of every constant of a pipeline with so many lights and materials.
+    """Lines of text with the address and format of every frame constant of a pipeline.
 
     Parameters
     ----------
     lights, materials : int
-        Their numbers.
+        Numbers of lights and materials.
     banks : int
         Number of tables of lobes.
     threshold : Format or None
-        Format of a threshold for each table, where there is one.
+        Format of the threshold of each table; ``None``: tables have none.
     loads_tables : bool
         Whether tables are loaded.
     """

@@ -1,4 +1,4 @@
-"""A mesh in memory to the frames of a monitor, and their bit-accurate model."""
+"""From a mesh in memory to the frames of a monitor: the bit-accurate model."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -13,19 +13,19 @@ __all__ = ["Gpu"]
 
 @dataclass(frozen=True)
 class Gpu:
-    """Bit-accurate model of a drawing on a display.
+    """Bit-accurate model of a GPU: a drawing, shown on a display through a band buffer.
 
     Parameters
     ----------
     drawing : Drawing
-        What is drawn; its picture is the display's.
+        What is drawn; its picture has the size of the display.
     buffer : BandBuffer
-        Bands of as many lines, colours, the background.
+        Band buffer: display mode, lines of a band, as many as of the drawing, colours, background.
 
     Raises
     ------
     ValueError
-        If sizes or lines differ.
+        If drawing and buffer differ in the size of the picture or in the lines of a band.
 
     Source: docs/theory/video.md#bands.
     """
@@ -41,7 +41,7 @@ class Gpu:
             )
 
     def frames(self, count: int) -> np.ndarray:
-        """Frames from power-up, without a button pressed and none late; shape (count, height, width, 3)."""
+        """Frames from power-up, without pressed buttons or late bands; shape (count, height, width, 3)."""
         controls, result = self.drawing.controls, []
         state = controls.start
         for _ in range(count):

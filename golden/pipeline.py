@@ -30,7 +30,7 @@ __all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]
 
 
 STYLES = ("throughput", "compact")
-"""One pixel a cycle, or few multipliers."""
+"""Styles of a design: one pixel a cycle, or few multipliers."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,10 @@ class Build:
     style : {"throughput", "compact"}
         One pixel a cycle, or few multipliers.
     setup_interval : int or None
-        Least cycles from a span to the next, where the method has that choice: a smaller number needs more
-        multipliers. ``None``: 4, or in the compact style the largest.
+        Least number of cycles from a span to the next, for methods with that choice: a smaller number needs
+        more multipliers. ``None``: 4, or the largest in the compact style.
     exponent : int or None
-        The specular exponent, fixed at build time; ``None``: that of the frame constants.
+        Specular exponent, fixed at build time; ``None``: the exponent is a frame constant.
 
     Raises
     ------
@@ -68,39 +68,42 @@ class Build:
 class Design:
     """A shading pipeline: an interpolator, diffuse and specular terms of each light, and the intensity.
 
-    `presets.preset` makes one by names. The bit-accurate model, `compute`, composes those of the units, whose
-    formats and error bounds hold; nothing is rounded in between.
+    `presets.preset` makes a design by names. `compute`, the bit-accurate model, composes the models of the
+    units, with their formats and error bounds; nothing is rounded between units.
 
     Parameters
     ----------
     interpolator : Interpolator
         The method.
     specular : Specular or Power or Lobe or None
-        Specular term, of the operand that the interpolator gives. ``None``: no specular light.
+        Specular unit; it takes the operand that the interpolator gives. ``None``: no specular light.
     lights : int
         Number of lights, 0 to 16. With none there is ambient light alone, and no method.
     materials : int
         Number of materials, 1 to `frame_constants.MAX_MATERIALS`.
     gate : bool
-        Whether a gate decides which spans have no highlight, which changes no pixel: a `ValueGate` of the
-        chord methods, else a `HighlightGate`, for unit normals.
+        Whether a gate decides which spans have no highlight; it changes no pixel. Chord methods have a
+        `ValueGate`, other methods of unit normals a `HighlightGate`.
     grey : bool
-        One channel in place of three: it has red's colour operands, and the pixel has it three times.
+        Whether there is one channel in place of three: it uses the colour operands of red, and the pixel
+        repeats it three times.
     x_bits, y_bits, length_bits : int
         Bits of the coordinates, 1 to 12, and of a span's length, 2 to 12.
     factors : tuple of int
-        Indices, in ascending order, of the lights that fade by their distance or as a spot: each has a
-        factor of its specular term, of a method that takes values. Other lights pay nothing for it; without
-        specular light none does.
+        Indices, in ascending order, of the lights that fade by their distance or as a spot: the specular term
+        of each is multiplied by a factor. For methods that take values, with specular light. Other lights
+        need no hardware for it.
     build : Build
         How it is built.
 
     Raises
     ------
     ValueError
-        If the number of lights or materials or a number of bits is out of range, a gate is asked for
-        without specular light or with a method that has no error bound or no normals, or an exponent is fixed
-        where a lobe has tables; or factors are no lights, or without specular light or values.
+        If the number of lights or materials or a number of bits is out of range; a gate is asked for without
+        specular light, or with a method that has no error bound or no normals; an exponent is fixed
+        with a lobe, or a lobe takes 1 - N·H with other than 25 fraction bits; the method has a scale and
+        there is no lobe; or factors are not different lights in order, or lack specular light or a method
+        that takes values.
 
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
@@ -148,14 +151,14 @@ class Design:
             object.__setattr__(self, "specular", replace(cast(Lobe, self.specular), scale=scale))
 
     def _check_factors(self) -> None:
-        """Refuse factors of lights that there are not, or that nothing takes."""
+        """Refuse factors of lights that do not exist, and factors that no unit of the design takes."""
         if not (self.takes_values and self.specular):
             raise ValueError("factors of lights need values of spans, of chord-local, and specular light")
         if list(self.factors) != sorted(set(self.factors) & set(range(self.lights))):
             raise ValueError(f"factors must be different lights of {self.lights}, in order")
 
     def _check_lobe(self) -> None:
-        """Refuse what a lobe's tables do not serve."""
+        """Refuse options that do not go with the tables of a lobe."""
         if self.build.exponent is not None:
             raise ValueError("a lobe has tables and no exponent; fix its tables")
         lobe = cast(Lobe, self.specular)
@@ -164,11 +167,11 @@ class Design:
 
     @property
     def loads_tables(self) -> bool:
-        """Whether the specular unit has tables of a lobe, so that frame constants need theirs."""
+        """Whether the specular unit has tables of a lobe, so that the frame constants need tables."""
         return self.specular is not None and self.specular.has_table
 
     def highlight_parameter(self, material: Material) -> float | None:
-        """Exponent or roughness of a material, as the reflection model takes it; without one the exponent."""
+        """Exponent or roughness of a material, as the model takes it; the exponent without a model."""
         return material.parameter(self.specular.model) if self.specular else material.exponent
 
     def steepness(self, material: Material) -> float:
@@ -178,14 +181,16 @@ class Design:
         return self.specular.model.steepness(self.highlight_parameter(material))
 
     def for_materials(self, materials: Sequence[Material], scaled: bool = True) -> "Design":
-        """The same design for materials: a bank for each of their lobes, at most `Lobe.MAX_BANKS`; its steps.
+        """The same design for the materials of a scene.
+
+        The lobe has a bank for each different table, at most `Lobe.MAX_BANKS`, and the steps for them.
 
         Parameters
         ----------
         materials : sequence of Material
-            Of the scene.
+            Materials of the scene.
         scaled : bool
-            Whether the chord methods may have a scale for sharp lobes, see `Lobe.scale_of`: of spans that are
+            Whether a chord method may have a scale for sharp lobes, see `Lobe.scale_of`: for spans that are
             cut for the design.
         """
         specular, interpolator = self.specular, self.interpolator
@@ -217,7 +222,7 @@ class Design:
 
     @cached_property
     def span_limit(self) -> SpanLimit | None:
-        """Model of the unit that flags wide spans; ``None`` of methods without one."""
+        """Bit-accurate model of the unit that flags wide spans; ``None`` for methods without one."""
         return SpanLimit() if self.lights and self.interpolator.TAKES_MIDDLE else None
 
     @cached_property
@@ -230,17 +235,17 @@ class Design:
 
     @property
     def has_threshold(self) -> bool:
-        """Whether frame constants have a threshold: for a gate or a span limit, where tables are loaded."""
+        """Whether frame constants have a threshold: tables are loaded, and gate or span limit needs it."""
         return self.loads_tables and (self.gate or self.span_limit is not None)
 
     @property
     def banks(self) -> int:
-        """Number of tables of lobes; 0 without."""
+        """Number of tables of lobes; 0 without a lobe."""
         return cast(Lobe, self.specular).banks if self.loads_tables else 0
 
     @property
     def threshold_format(self) -> Format | None:
-        """Format of the threshold among the frame constants; ``None`` without."""
+        """Format of the threshold in the frame constants; ``None`` without a threshold."""
         if not self.has_threshold:
             return None
         gate = self.highlight_gate
@@ -251,7 +256,7 @@ class Design:
         return self.highlight_gate.thresholds_of(np.array([table.last_lit_argument]))[0]
 
     def _thresholds(self, constants: Sequence[FrameConstants]) -> Fixed:
-        """Those of the tables of materials."""
+        """Thresholds of the materials' tables, see `threshold_of`."""
         tables = [cast(LobeTable, of_material.lobe) for of_material in constants]
         return self.highlight_gate.thresholds_of(np.array([table.last_lit_argument for table in tables]))
 
@@ -275,7 +280,7 @@ class Design:
         if isinstance(gate, ValueGate):
             highlight = self._values(spans, constants[0]).highlight.astype(np.int64)
             short = np.asarray(spans.length) < 3
-            # Of two pixels there is none in the middle.
+            # A span of two pixels has no pixel in the middle.
             highlight[short, :, 1] = highlight[short][:, :, ::2].min(axis=-1)
             one = np.asarray(spans.length) == 1
             highlight[one] = highlight[one][:, :, :1]
@@ -298,7 +303,7 @@ class Design:
         spans : Spans
             Spans to shade.
         constants : FrameConstants or sequence of FrameConstants
-            Of the material, or of each; L and H are those of the first.
+            Constants of the only material, or of each material; L and H of the first one are used.
 
         Raises
         ------
@@ -341,7 +346,7 @@ class Design:
         )
 
     def _values(self, spans: Spans, constants: FrameConstants) -> SpanValues:
-        """Values of spans for a chord method; u is 0 where there is no specular light to be out of range."""
+        """Values of spans for a chord method; u is 0 without specular light, so that no u is out of range."""
         if self.takes_values:
             values = cast(SpanValues, spans.values)
         else:
@@ -351,7 +356,7 @@ class Design:
         return values if self.specular else values._replace(highlight=np.zeros_like(values.highlight))
 
     def _wide_spans(self, spans: Spans, constants: Sequence[FrameConstants]) -> int:
-        """How many spans the span limit flags."""
+        """Number of spans that the span limit flags."""
         if self.span_limit is None:
             return 0
         exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
@@ -426,7 +431,7 @@ class Design:
         constants: FrameConstants,
         factor: Fixed | None = None,
     ) -> np.ndarray:
-        """Colours of pixels of one material, shape (pixels, 3); of the operands, shape (pixels, lights)."""
+        """Colours of pixels of one material, shape (pixels, 3), from operands of shape (pixels, lights)."""
         diffuse_unit = Diffuse(cosine.format)
         dark = dark | diffuse_unit.dark(cosine)
         diffuse = diffuse_unit.compute(cosine)

@@ -11,27 +11,27 @@ from blysk.golden.pipeline import Design, Pixels, Spans
 __all__ = ["PIPES", "PixelPipelines"]
 
 PIPES = (1, 2, 4, 8)
-"""How many pipelines there may be."""
+"""Allowed numbers of pipelines."""
 
 
 @dataclass(frozen=True)
 class PixelPipelines:
     """Shading pipelines of one design, of which pipeline k takes the scanlines y with ``y mod pipes = k``.
 
-    The pixels are those of one pipeline. Those of a scanline come from one pipeline, so that their order
-    is that of its spans; of different scanlines any may come first.
+    The pixels are the same as with one pipeline. All pixels of a scanline come from one pipeline, in the
+    order of its spans; pixels of different scanlines may come in any order.
 
     Parameters
     ----------
     design : Design
-        Of every pipeline.
+        Design of every pipeline.
     pipes : int
         Number of pipelines: one of `PIPES`, at most the scanlines that the design has.
 
     Raises
     ------
     ValueError
-        If there cannot be so many.
+        If the number of pipelines is not allowed.
 
     Source: docs/theory/units.md#pipeline.
     """
@@ -51,7 +51,7 @@ class PixelPipelines:
         return np.asarray(y) % self.pipes
 
     def compute(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> Pixels:
-        """Bit-accurate pixels in the order of the spans: those of the merged stream; see `Design.compute`."""
+        """Bit-accurate pixels of the merged stream, in the order of the spans; see `Design.compute`."""
         return self.design.compute(spans, constants)
 
     def compute_each(

@@ -32,21 +32,21 @@ _MODULES = (
     chord_interpolator,
     local_chord_interpolator,
 )
-"""Modules of the methods, in the order of tables, with their ``METHODS`` and perhaps ``PUBLISHED``."""
+"""Modules with lists ``METHODS``, and some with ``PUBLISHED``; in the order in which tables show methods."""
 
 METHODS: dict[str, Interpolator] = {method.name: method for module in _MODULES for method in module.METHODS}
-"""Interpolation methods."""
+"""Interpolation methods by name."""
 
 PUBLISHED: dict[str, Interpolator] = {
     method.name: method for module in _MODULES for method in getattr(module, "PUBLISHED", ())
 }
-"""Methods with the coefficients or in the form that the documents print, to be compared with the others.
+"""Methods as published, by name: with the coefficients or in the form of the documents, for comparison.
 They have no error bound for a highlight gate."""
 
 MODELS: dict[str, Specular | Power] = {
     model.name: Specular(model) for model in REFLECTION_MODELS.values() if isinstance(model, Specular.SERVED)
 } | {"blinn_product": Power()}
-"""Specular units of the reflection models; every method serves each."""
+"""Specular units of the reflection models, by name; every method serves each."""
 
 LOBES: dict[str, Lobe] = {
     lobe.name: lobe
@@ -58,9 +58,9 @@ LOBES: dict[str, Lobe] = {
         Lobe(GGX),
     )
 }
-"""Specular units by a table, which is written for each frame; every method serves each. Tables have the size
-at which they are within 0.06 LSB of their model at every exponent (704 words of ``phong_coplanar``, 336 of
-the others; for roughness see `Lobe`)."""
+"""Specular units with a table that is written for each frame, by name; every method serves each. At their
+size (704 words for ``phong_coplanar``, 336 for the others) tables are within 0.06 LSB of their model at every
+exponent; for roughness see `Lobe`."""
 
 
 def preset(
@@ -75,26 +75,26 @@ def preset(
     roughness: float | None = None,
     **options,
 ) -> Design:
-    """A design by names.
+    """Make a design by names.
 
     Parameters
     ----------
     method : str
         One of `METHODS` or `PUBLISHED`.
     model : str or ReflectionModel or None
-        One of `MODELS` or `LOBES`; or a curve of N·H, such as a `TabulatedModel`, which a table serves;
-        ``None``: no specular light.
+        One of `MODELS` or `LOBES`; or a reflection model of N·H, such as a `TabulatedModel`, for which the
+        design has a table; ``None``: no specular light.
     lights : int
         Number of lights, 0 to 16.
     operand : {"cosine", "one_minus_cosine"}, optional
-        Operand of the specular unit, of a method that finds normals; by default that of the method.
+        Operand of the specular unit, for a method that finds normals; by default the operand of the method.
     style, setup_interval
         See `Build`.
     exponent, roughness : optional
         Fixed at build time: `Build.exponent`, or that of a lobe's table (`Lobe.fixed`).
     **options
-        Further fields of `Design`, of the lobe, or of the method; ``None``: its own value. A lobe has as many
-        ``banks`` as materials, at most `Lobe.MAX_BANKS`.
+        Further fields of `Design`, of the lobe, or of the method; ``None``: the default. A lobe has as many
+        ``banks`` as there are materials, at most `Lobe.MAX_BANKS`.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def _specular(model: str | ReflectionModel | None) -> Specular | Power | Lobe | 
 
 
 def _with_fixed_table(lobe: Lobe, exponent: int | None, roughness: float | None) -> Lobe:
-    """The lobe, of whose table the parameter is fixed where one is given."""
+    """The lobe with a table fixed at build time for the exponent or roughness, if one is given."""
     for name, value in (("exponent", exponent), ("roughness", roughness)):
         if value is not None and name != lobe.model.PARAMETER:
             raise ValueError(f"model {lobe.name} has no {name} to fix")

@@ -1,4 +1,4 @@
-"""Triangles to pixels: geometry, shading and depth test, and their bit-accurate model."""
+"""From triangles to pixels: the bit-accurate model of geometry, shading and depth test."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -19,12 +19,12 @@ __all__ = ["DrawnPixels", "Renderer"]
 
 @dataclass(frozen=True)
 class DrawnPixels:
-    """Pixels in the order in which they are drawn, those of which that something nearer follows included.
+    """Pixels in the order in which they are drawn, with those that a nearer pixel overwrites later.
 
     Parameters
     ----------
     x, y : int64 arrays, shape (P,)
-        Place, counted from the picture's top left pixel.
+        Column and row, counted from the picture's top left pixel.
     color : uint8 array, shape (P, 3)
         Red, green, blue.
     depth : int64 array, shape (P,)
@@ -34,12 +34,13 @@ class DrawnPixels:
     spans : TrueSpans or LineSpans
         What was shaded.
     counts : dict of str to int
-        `COUNTERS` of geometry; ``spans`` and ``pixels`` shaded and how many of them were ``hidden``; pixels
-        of spans that were ``dropped`` before.
+        `COUNTERS` of geometry; numbers of ``spans`` and ``pixels`` that were shaded; number of these pixels
+        that were ``hidden``; number of pixels of spans that were ``dropped`` before shading.
     out_of_range_spans : int
-        Spans of a larger angle than the method serves.
+        Number of spans with a larger angle than the method serves.
     wide_spans : int
-        Spans of a larger angle than the method's error bound allows at the exponent; see `SpanLimit`.
+        Number of spans with a larger angle than the method's error bound allows at the exponent; see
+        `SpanLimit`.
     """
 
     x: np.ndarray
@@ -54,29 +55,30 @@ class DrawnPixels:
 
     @property
     def beats(self) -> dict:
-        """What the hardware gives."""
+        """Output beats of the hardware: the fields of each pixel."""
         colors = dict(zip("rgb", self.color.T, strict=True))
         return {"x": self.x, "y": self.y, **colors, "depth": self.depth}
 
 
 @dataclass(frozen=True)
 class Renderer:
-    """Bit-accurate model of triangles to pixels.
+    """Bit-accurate model of the way from triangles to pixels.
 
     Parameters
     ----------
     design : Design
         The shading pipeline, of a method that takes normals.
     geometry : Geometry
-        Triangles to spans; of a method that takes the true line with ``lines``. ``None``: as the method has
-        it.
+        The part that makes spans of triangles, with ``lines`` for a method that takes true lines. ``None``:
+        the geometry that suits the method.
     coarse : CoarseDepth, optional
-        Drops spans that are hidden for their whole length before they are shaded; the picture is the same.
+        Depth test that drops spans, before they are shaded, if all of their pixels are hidden; the picture is
+        the same.
 
     Raises
     ------
     ValueError
-        If the method takes values, or something other than the geometry gives.
+        If the method takes values, or other normals than the geometry gives.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """

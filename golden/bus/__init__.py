@@ -1,1 +1,1 @@
-"""Buses: layouts of bytes, frames of streams, and the map of the registers."""
+"""Buses: layouts of bytes, framing of streams, and the map of the registers."""

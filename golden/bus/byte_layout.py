@@ -20,7 +20,7 @@ class Field:
     width : int
         Bits of a number, 1 to 64.
     signed : bool
-        Whether it is in two's complement.
+        Whether the number is in two's complement.
     shape : tuple of int
         Sizes of the array, the outer one first; empty for a single number.
     format : str
@@ -49,7 +49,7 @@ class Field:
 
     @property
     def count(self) -> int:
-        """Numbers of the array."""
+        """How many numbers the field has."""
         return prod(self.shape)
 
     @property
@@ -63,9 +63,9 @@ class ByteLayout:
     """Bytes of a payload, little endian: each number in 1, 2, 4 or 8 bytes at a multiple of its size.
 
     A number is extended to its bytes, by its sign if it has one. Fields follow in the order of the payload;
-    the whole is a multiple of the largest number's size. Bytes between are 0. So the layout is that of a C
-    structure of ``c_type`` members on every processor whose integers are aligned to their size, and a DMA
-    controller can send an array of such structures as it is.
+    the size of the payload is a multiple of the largest number's size. Bytes between numbers are 0. So the
+    layout is that of a C structure of ``c_type`` members on every processor whose integers are aligned to
+    their size, and a DMA controller can send an array of such structures as it is.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class ByteLayout:
 
     @property
     def offsets(self) -> tuple[int, ...]:
-        """First byte of each field."""
+        """Offset of each field in bytes."""
         return tuple(self.dtype.fields[field.name][1] for field in self.fields)
 
     def pack(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -122,7 +122,7 @@ class ByteLayout:
         return words.view(np.uint8).reshape(len(words), self.size)
 
     def unpack(self, data: np.ndarray) -> dict[str, np.ndarray]:
-        """Codes of each field, int64 of shape (N, *shape), of uint8 of shape (N, size): their low bits."""
+        """Codes of each field, int64 of shape (N, *shape), from the low bits of uint8 (N, size)."""
         found = {}
         for name, (field, codes) in self._numbers(data).items():
             low = codes & ((1 << field.width) - 1)
@@ -140,6 +140,6 @@ class ByteLayout:
         return np.logical_and.reduce(fit)
 
     def _numbers(self, data: np.ndarray) -> dict[str, tuple[Field, np.ndarray]]:
-        """Each field, and its numbers as they stand on the bus."""
+        """Each field with its numbers as on the bus, not cut to the field's width."""
         words = np.ascontiguousarray(data, dtype=np.uint8).view(self.dtype)[:, 0]
         return {field.name: (field, words[field.name].astype(np.int64)) for field in self.fields}

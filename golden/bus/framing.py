@@ -1,4 +1,4 @@
-"""Frames of streams: which beats of a core's output are the first and the last of a frame or a packet."""
+"""Framing of streams: which beats of a core's output are the first and the last of a frame or a packet."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from blysk.golden.bus.byte_layout import ByteLayout
 __all__ = ["PACKETS", "Framing"]
 
 PACKETS = {"shader": "span", "geometry": "frame", "render": "run"}
-"""Cores, and what ends with TLAST: a span, a frame, or a run of pixels each right of the one before."""
+"""What ends with TLAST, by core: a span, a frame, or a run of pixels, each one right of the one before."""
 
 
 @dataclass(frozen=True)
@@ -20,11 +20,16 @@ class Framing:
     Parameters
     ----------
     given : ByteLayout
-        What goes in.
+        Layout of the input payload.
     made : ByteLayout
-        What comes out.
+        Layout of the output payload.
     packets : str
-        One of the values of `PACKETS`.
+        What a packet is: one of the values of `PACKETS`.
+
+    Raises
+    ------
+    ValueError
+        If ``packets`` is unknown.
 
     Source: docs/theory/bus.md#streams.
     """
@@ -38,14 +43,14 @@ class Framing:
             raise ValueError(f"packets must be one of {', '.join(PACKETS.values())}, not {self.packets!r}")
 
     def compute(self, beats: Mapping[str, np.ndarray], frame: np.ndarray) -> dict[str, np.ndarray]:
-        """Output beats: ``data``, ``last``, and ``first`` and ``end`` of a frame.
+        """Output beats: ``data``, ``last`` of a packet, and ``first`` and ``end`` of a frame.
 
         Parameters
         ----------
         beats : mapping of str to int array
-            What the core gives, by field; with ``last`` where packets are spans.
+            Output beats of the core, by field; with ``last`` if packets are spans.
         frame : int array, shape (N,)
-            Number of each beat's frame, rising.
+            Number of each beat's frame, in ascending order.
         """
         border = np.diff(frame) != 0
         first, end = np.r_[True, border][: len(frame)], np.r_[border, True][: len(frame)]

@@ -1,4 +1,4 @@
-"""The map of a core's registers on a bus, from one table, and the bit-accurate model of their file."""
+"""The map of a core's registers on a bus, and the bit-accurate model of the register file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -37,16 +37,16 @@ __all__ = [
 ]
 
 BUSES = ("axi", "wishbone")
-"""Buses in front of the registers."""
+"""Buses by which the registers can be accessed."""
 
 ADDRESS_BITS = 12
-"""Bits of an address of a byte."""
+"""Number of bits of a byte address."""
 
 WORD_BITS = 32
 """Bits of a register."""
 
 IDENTITY = int.from_bytes(b"BLSK", "big")
-"""What the first register reads."""
+"""Value of the first register."""
 
 VERSION = 1
 """Version of the map."""
@@ -62,7 +62,7 @@ ERRORS = {
     "strobe": "a write of some bytes of a word",
     "busy": "a write of a frame register or constant while a frame is inside",
 }
-"""Why an access is refused; bits of the register ``errors``, the first one bit 0."""
+"""Causes for which an access is refused: the bits of the register ``errors``, from bit 0 on."""
 
 
 @dataclass(frozen=True)
@@ -74,20 +74,20 @@ class Register:
     name : str
         A C identifier in lower case.
     address : int
-        Of its first byte, a multiple of 4.
+        Address of its first byte, a multiple of 4.
     access : str
         ``"read-only"``, ``"read-write"`` (reset to 0), ``"write-only"``, or ``"clear"``: a 1 written clears
         the bit.
     width : int
         Bits of its value.
     signed : bool
-        Whether it is in two's complement, and extended by its sign to 32 bits.
+        Whether the value is in two's complement; it is then sign-extended to 32 bits.
     text : str
-        What it is.
+        Description.
     format : str
         Number format.
     bits : tuple of (str, int, int, str)
-        Parts: name, first bit, bits, what it is.
+        Parts of the value: name, first bit, number of bits, description.
     """
 
     name: str
@@ -100,11 +100,11 @@ class Register:
     bits: tuple[tuple[str, int, int, str], ...] = ()
 
     def holds(self, data: int) -> bool:
-        """Whether the register takes a word of 32 bits that is written."""
+        """Whether a written word of 32 bits is a value that the register can hold."""
         return data == self.extended(data)
 
     def extended(self, code: int) -> int:
-        """The word of 32 bits of a code."""
+        """The word of 32 bits that holds a code."""
         code &= (1 << self.width) - 1
         negative = self.signed and code >> (self.width - 1)
         return code | ((1 << WORD_BITS) - (1 << self.width) if negative else 0)
@@ -116,7 +116,7 @@ def frame_registers(picture: bool = False) -> list[Register]:
     Parameters
     ----------
     picture : bool
-        Whether there is a bit that changes with each picture, of a core with a coarse depth test.
+        Whether the core has a coarse depth test, which needs a bit that changes with each picture.
     """
     borders = {
         "left": "first column of the picture on the grid",
@@ -151,7 +151,7 @@ _OF_A_LIGHT = {
 
 
 def constant_registers(design: Design) -> list[Register]:
-    """Registers of the frame constants: those of the write port, four bytes each from `CONSTANTS` on.
+    """Registers of the frame constants: one for each address of the write port, from `CONSTANTS` on.
 
     Parameters
     ----------
@@ -200,13 +200,13 @@ class RegisterMap:
     Parameters
     ----------
     core : str
-        Word for the core, for people.
+        Name of the core, for people.
     counters : sequence of (str, int, str)
         Counters since the reset: name, bits, what is counted.
     picture : sequence of Register
-        Those of the picture, if it has some.
+        Registers of the picture, if the core has some.
     constants : sequence of Register
-        Frame constants, if it has some.
+        Registers of the frame constants, if the core has some.
 
     Source: docs/theory/bus.md#registers.
     """
@@ -218,7 +218,7 @@ class RegisterMap:
 
     @cached_property
     def registers(self) -> tuple[Register, ...]:
-        """All of them, by rising address."""
+        """All registers, by ascending address."""
         causes = tuple((name, k, 1, text) for k, (name, text) in enumerate(ERRORS.items()))
         state = (("busy", 0, 1, "a frame is inside, from its first beat in to its last beat out"),)
         control = [
@@ -242,7 +242,7 @@ class RegisterMap:
         return (*control, *self.picture, *counters, *self.constants)
 
     def __getitem__(self, name: str) -> Register:
-        """The register of a name."""
+        """The register with this name."""
         return self.by_name[name]
 
     @cached_property
@@ -265,7 +265,7 @@ class RegisterFile:
     map : RegisterMap
         The registers.
     values : dict of str to int
-        What registers hold, and what the core says in those that are read-only; 0 where none is given.
+        Values of the registers by name, read-only ones included, which the core sets; 0 if not given.
     """
 
     map: RegisterMap
@@ -274,18 +274,18 @@ class RegisterFile:
     def access(
         self, address: int, data: int | None = None, strobe: int = 15, busy: bool = False
     ) -> tuple[int, str]:
-        """The word read, 0 of a write, and why the access is refused, if it is.
+        """The word that is read, 0 for a write, and the cause if the access is refused, else an empty text.
 
         Parameters
         ----------
         address : int
-            Of a byte, 12 bits.
+            Byte address, 12 bits.
         data : int, optional
-            The word to write; ``None`` reads.
+            The word to write; ``None``: a read.
         strobe : int
-            A bit for each byte that is written.
+            One bit for each byte: whether it is written.
         busy : bool
-            Whether a frame is inside.
+            Whether the core is working on a frame.
         """
         register = self.map.by_address.get(address)
         cause = self._refusal(register, data, strobe, busy)
@@ -304,7 +304,7 @@ class RegisterFile:
 
     @staticmethod
     def _refusal(register: Register | None, data: int | None, strobe: int, busy: bool) -> str:
-        """The first cause in the order of `ERRORS` that fits."""
+        """The first cause, in the order of `ERRORS`, for which the access is refused."""
         if register is None:
             return "unmapped"
         if data is None:
