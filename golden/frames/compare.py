@@ -25,14 +25,14 @@ __all__ = ["Comparison", "compare", "compare_image", "method_in_float64"]
 class Comparison:
     """Errors of a frame over the pixels that show the surface.
 
-    They are in proportion to the brightness c of the light: the largest channel of all terms together,
-    each light's colour times the sum of diffuse and specular reflection, 1 for the full channel. With the
-    methods ``chord``, ``chord-local`` and ``renormalise`` and where N·L is not within rounding of 0::
+    Errors are in proportion to the brightness c of the light: the sum over the lights of colour times diffuse
+    and specular reflection, in the largest channel, where 1 is the full channel. With the methods ``chord``,
+    ``chord-local`` and ``renormalise``, and where N·L is not within rounding of 0::
 
         arithmetic_error <= 1/2 + c/16        method_error <= 1/2 + c/16 + c/4       (LSB)
 
-    The half is the rounding of the pixel, the quarter what spans are cut by; a sixteenth holds the rounding
-    of operands and terms.
+    The half is the rounding of the pixel, the quarter is the tolerance by which spans are cut, and the
+    sixteenth holds the rounding of operands and terms.
 
     Parameters
     ----------
@@ -44,15 +44,15 @@ class Comparison:
     method_error : ErrorFigures
         Against ``golden``.
     total_error : ErrorFigures
-        Against the exact frame with Blinn's model, or that of a lobe's table.
+        Against the exact frame with Blinn's model, or with the model of a lobe's table.
     visible_pixels : int
         Pixels that show the surface.
     nmse : float
-        Against the exact frame.
+        Normalised mean squared error against the exact frame.
     mnse_published, mnse_published_share : float
         MNSE as published in [T], against the exact frame, and the share of values where it is defined.
     seconds : float
-        Time of the three golden frames.
+        Time to compute the three golden frames.
     """
 
     golden: np.ndarray
@@ -72,7 +72,7 @@ def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarra
     Parameters
     ----------
     scene, design
-        What is drawn, and by what.
+        What is drawn, and by which pipeline.
     raster : Raster
         The spans, wide ones cut.
 
@@ -106,14 +106,14 @@ def _model_of(design: Design) -> ReflectionModel:
 
 
 def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
-    """Errors of a frame against three frames of the golden renderer; all NaN if it shows no surface.
+    """Errors of a frame against three frames of the golden renderer; NaN if the frame shows no surface.
 
     Parameters
     ----------
     scene, design
-        What was drawn, and by what pipeline; of a specialised one the full scene and pipeline.
+        What was drawn, and by which pipeline; after a specialisation the full scene and pipeline.
     frame : Frame
-        Its frame.
+        The frame of that pipeline.
     """
     return _compare(scene, design, frame.image, frame.raster, frame.cut_raster)
 
@@ -134,7 +134,7 @@ def compare_image(scene: Scene, design: Design, image: np.ndarray) -> Comparison
 def _compare(
     scene: Scene, design: Design, image: np.ndarray, raster: Raster, cut_raster: Raster | None
 ) -> Comparison:
-    """One float64 frame after the other, as the largest have 400 MB; without spans one less."""
+    """Comparison by float64 frames, one at a time, as a large frame has 400 MB."""
     nothing = ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))
     mask, model = visible_mask(scene, raster), _model_of(design)
     target = model if design.loads_tables else BLINN
@@ -171,7 +171,7 @@ def _compare(
 
 
 def _mean_squares(image: np.ndarray, exact: np.ndarray) -> dict[str, float]:
-    """Normalised squared errors against pixels of the frame that is aimed at, which are used up."""
+    """Normalised mean squared errors against pixels of the model that is approximated, which are overwritten."""
     exact *= 255
     published, share = mnse_published(image, exact)
     return {

@@ -22,11 +22,11 @@ __all__ = ["cut_by_angle", "cut_by_error", "cut_spans", "missed_spans"]
 
 
 def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int]:
-    """Spans cut as the method of a pipeline needs them, and how many of the given ones were cut.
+    """Spans cut as the method of a pipeline needs them, and how many of the given spans were cut.
 
-    Every normal at a cut is the surface's own there, ``normalise((1-t) m_l N_l + t m_r N_r)`` of the span
-    that was cut, with the magnitudes of the rasteriser. A pixel more than half goes to the
-    right. The fragments stay as they are, in their order.
+    The normal at a cut is the true normal of the surface, ``normalise((1-t) m_l N_l + t m_r N_r)`` along the
+    span that was cut, with the lengths m of the rasteriser. An odd pixel goes to the right half. The
+    fragments and their order do not change.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int
     Returns
     -------
     raster : Raster
-        The same fragments in narrower spans, with the weights and magnitudes of their ends.
+        The same fragments in narrower spans, with the weights and lengths m of their ends.
     cut : int
         How many of the given spans were cut.
     """
@@ -51,14 +51,14 @@ def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int
 
 
 def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
-    """Halve spans of more than two pixels while the normals at their ends are over an angle apart.
+    """Halve spans of more than two pixels until the angle between their end normals is at most a given one.
 
     Parameters
     ----------
     raster : Raster
         Spans.
     largest_angle : float
-        Degrees, over 0.
+        In degrees, over 0.
 
     Returns
     -------
@@ -75,14 +75,14 @@ def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
 
 
 def _normals(raster: Raster, span: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """True unit normals at pixels of spans, which need not be whole."""
+    """True unit normals at places of spans, in pixels, fractions included."""
     line = lines_along(raster, span, place / np.maximum(raster.length[span] - 1, 1))
-    # Between opposite normals the line passes through 0, where any normal is as good.
+    # Between opposite normals the line passes through 0, where no normal is better than another.
     return np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left[span])
 
 
 def _halve(raster: Raster, is_wide: Callable[..., np.ndarray]) -> tuple[Raster, int]:
-    """Spans, halved while ``is_wide(span, first pixel, last pixel)``; and how many were."""
+    """Spans, halved while ``is_wide(span, first pixel, last pixel)``; and how many spans were halved."""
     origin = np.arange(len(raster.length))
     first = np.zeros(len(origin), dtype=np.int64)
     last = raster.length.astype(np.int64) - 1
@@ -103,7 +103,7 @@ def _halve(raster: Raster, is_wide: Callable[..., np.ndarray]) -> tuple[Raster, 
 
 
 def _parts(raster, origin, first, last) -> Raster:
-    """Parts of spans, each of pixels first to last of its origin, in place of the spans."""
+    """Raster of parts of spans: each part has the pixels ``first`` to ``last`` of the span ``origin``."""
     order = np.lexsort((first, origin))
     origin, first, last = (field[order] for field in (origin, first, last))
     length = (last - first + 1).astype(np.int32)
@@ -136,24 +136,25 @@ def _parts(raster, origin, first, last) -> Raster:
 def cut_by_error(
     scene: Scene, raster: Raster, interpolator: Interpolator, limits: HighlightLimits | None = None
 ) -> tuple[Raster, int]:
-    """Halve spans until the method's own curve is near the exact one for every light.
+    """Halve spans until the method's curve is near enough to the exact one for every light.
 
-    N·L and u along a span are those of its true normals and of the places on the surface,
-    perspective-correct. A span is halved where
+    Exact N·L and u along a span are computed from its true normals and from the points of the surface,
+    perspective-correct. A span is halved if
 
     - its angle is over the method's `Interpolator.widest_span`;
-    - the chord method would flag it: a word of `ChordSetup` would not hold its value, or it is wide, as
-      `SpanLimit` has it;
-    - it has pixels between those that the method's curve goes through, and vectors turn farther along it than
-      `ChordInterpolator` allows, or the curve misses the exact N·L or u by more than its tolerances, that of
-      the highlight by the exponent of the span's material and the least u on the span, as it may be coarse
-      where it is dark;
-    - a light's N·L changes its sign, or nearly, where its highlight shows, and the pixels might not have the
-      sign of the exact value at every one of them, unless that is within 2^-25 of 0;
-    - a light that fades has a pixel, whatever lies between the places above, that misses what
-      `LocalChordInterpolator` allows; N·L is then times the factor.
+    - the chord method would flag it: a word of `ChordSetup` would overflow, or the span is wide by
+      `SpanLimit`;
+    - it has pixels between those through which the method's curve is put, and vectors turn farther along it
+      than `ChordInterpolator` allows, or the error of N·L or u is over its tolerance. The tolerance of u
+      depends on the exponent of the span's material and on the least u of the span, as dark spans may have
+      larger errors;
+    - N·L of a light changes its sign, or nearly, where its highlight shows, and N·L of a pixel might have
+      another sign than the exact value, unless the exact value is within 2^-25 of 0;
+    - the errors of a light that fades, with N·L times its factor, are over the budgets of
+      `LocalChordInterpolator` at any pixel: here every pixel is checked.
 
-    Of lights that are behind the surface along all of a span only the turn counts; those that are off do not.
+    For a light that is behind the surface along the whole span only the turn counts; a light that is off
+    has no effect.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ def cut_by_error(
     interpolator : Interpolator
         The method.
     limits : HighlightLimits, optional
-        What the materials' highlights ask. By default those of their exponents.
+        Tolerances of the materials' highlights; by default those of their exponents.
 
     Returns
     -------
@@ -189,7 +190,7 @@ def cut_by_error(
 def missed_spans(
     scene: Scene, raster: Raster, interpolator: Interpolator, limits: HighlightLimits | None = None
 ) -> int:
-    """How many spans of a raster the method's own curve misses by more than its tolerances.
+    """Number of spans of a raster in which the method's curve is off by more than the tolerances.
 
     Parameters
     ----------
@@ -209,7 +210,7 @@ def missed_spans(
 
 @dataclass(frozen=True)
 class _Pieces:
-    """Pixels ``first`` to ``last`` of spans ``origin``, three or more, and what the surface has there."""
+    """Pixels ``first`` to ``last``, three or more, of spans ``origin``, with points of the surface."""
 
     scene: Scene
     raster: Raster
@@ -217,11 +218,11 @@ class _Pieces:
     first: np.ndarray
     last: np.ndarray
     places: tuple[SurfacePoints, ...]
-    """At t = 0, 1/4, 1/2, 3/4 and 1."""
+    """Points of each piece at t = 0, 1/4, 1/2, 3/4 and 1."""
 
     @classmethod
     def of(cls, scene, raster, origin, first, last) -> "_Pieces":
-        """Pieces and their places."""
+        """Pieces with their points of the surface."""
         steps = raster.length[origin] - 1
         at = [(first + (last - first) * k / 4) / steps for k in range(5)]
         places = tuple(SurfacePoints.at(scene, raster, origin, t) for t in at)
@@ -235,10 +236,10 @@ class _Pieces:
         return self._miss(interpolator, limits, material)
 
     def _miss(self, interpolator, limits, material) -> np.ndarray:
-        """The same, of places with u as the method's words have it."""
+        """Result of `miss`; u of the places has the scale of the method's words."""
         pixels = (self.last - self.first + 1)[:, np.newaxis]
         chord = isinstance(interpolator, ChordInterpolator)
-        # A curve through three values, or through two, has pixels between them from so many on.
+        # From so many pixels on there are pixels between the three, or two, values of the curve.
         between = pixels > (3 if chord else 2)
         fading = np.array([light.fades for light in self.scene.lights], dtype=bool)
         names = ("diffuse", "highlight", "factor") if fading.any() else ("diffuse", "highlight")
@@ -261,7 +262,7 @@ class _Pieces:
         least = np.maximum(highlight.least - margin / ChordInterpolator.MARGIN * misses["highlight"], 0)
         too_far = errors["diffuse"] > ChordInterpolator().diffuse_tolerance
         tolerance, lit = limits.tolerance(material, least), limits.is_lit(material, least)
-        # Of a light that fades every pixel is looked at, below.
+        # For a light that fades every pixel is checked, below.
         too_far |= (errors["highlight"] > tolerance) & ~fading
         wrong |= (too_far & in_front & between).any(axis=1)
         if fading.any():
@@ -287,7 +288,7 @@ class _Pieces:
         chosen : int array
             Pieces.
         curves : dict of _Quadratic
-            Those of ``diffuse`` and ``factor``, of all pieces.
+            Curves ``diffuse`` and ``factor`` of all pieces.
         highlight_share : float64 array, shape (chosen, lights)
             Error of u as a share of its tolerance.
         lit : bool array, shape (chosen, lights)
@@ -311,10 +312,10 @@ class _Pieces:
         return wrong | ((factor > method.FACTOR_BUDGET) | (total > method.HIGHLIGHT_BUDGET)) & (largest > 0)
 
     def _margin(self) -> np.ndarray:
-        """Bound of the largest error on each piece, in multiples of that at its quarters.
+        """Bound of the largest error on each piece, as a multiple of the error at its quarters.
 
-        `ChordInterpolator.MARGIN`, and no less than the ratio of the lengths that the interpolated normals
-        have at the two ends, or of the weights: the larger it is, the nearer to one end lies all change.
+        The largest of `ChordInterpolator.MARGIN`, the ratio of the interpolated normals' lengths at the two
+        ends, and the ratio of the weights there: a large ratio moves all change near to one end.
         """
         ends = []
         for place in (self.first, self.last):
@@ -327,14 +328,14 @@ class _Pieces:
     def _flagged(
         self, interpolator: ChordInterpolator, limits: HighlightLimits, material, curves
     ) -> np.ndarray:
-        """Whether the chord method flags a piece, for certain not if this says no."""
+        """Whether the chord method may flag a piece; if ``False``, it does not."""
         setup, limit, one = interpolator.setup, SpanLimit(), float(ONE_SQUARED.values)
         formats = {"diffuse": setup.DIFFUSE_SLOPE_FORMAT, "highlight": setup.SLOPE_FORMAT}
         formats["factor"] = setup.DIFFUSE_SLOPE_FORMAT
         flagged = np.zeros(len(self.origin), dtype=bool)
         for name, curve in curves.items():
             slope, curvature = (one * size for size in curve.sizes)
-            # A step of the rounding words less than they hold.
+            # One rounding step less than the words hold.
             flagged |= (curvature > 2.0 ** (setup.CURVATURE_FORMAT.integer_bits - 1) - 2.0**-19).any(axis=1)
             flagged |= (slope > 2.0 ** (formats[name].integer_bits - 1) - 2.0**-17).any(axis=1)
         if interpolator.TAKES_VALUES:
@@ -354,7 +355,7 @@ class _Pieces:
         return flagged | (wide & (self.last - self.first + 1 >= limit.SHORTEST))
 
     def _misses_of_normals(self, interpolator: Interpolator) -> dict[str, np.ndarray]:
-        """Largest distance of N·L and of u of a method's normals from the exact ones, where it is checked."""
+        """Largest errors of N·L and u of a method's normals, at the places `Interpolator.CHECKED_AT`."""
         left, right = self.places[0].normal, self.places[-1].normal
         misses = {"diffuse": 0.0, "highlight": 0.0}
         known = {k / 4: place for k, place in enumerate(self.places)}
@@ -394,7 +395,7 @@ class _Quadratic:
         return cls(left, slope, curvature, np.minimum.reduce(three), np.maximum.reduce(three))
 
     def part(self, chosen: np.ndarray) -> "_Quadratic":
-        """Those of some pieces."""
+        """The quadratics of some pieces."""
         kept = self.left, self.slope, self.curvature, self.least, self.largest
         return _Quadratic(*(field[chosen] for field in kept))
 
@@ -405,7 +406,7 @@ class _Quadratic:
 
     @property
     def sizes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Absolute values of P and G."""
+        """Absolute values of the slope and curvature terms P and G."""
         return np.abs(self.slope), np.abs(self.curvature)
 
     def miss(self, places: Sequence[SurfacePoints], name: str) -> np.ndarray:
@@ -419,7 +420,7 @@ class _Quadratic:
 
 
 def _pixels_of(scene, raster, origin, first, last) -> Iterator[tuple[np.ndarray, SurfacePoints, np.ndarray]]:
-    """Piece, exact values and t on the piece of every pixel of pieces, some at a time."""
+    """Index of the piece, exact values and t for every pixel of pieces, in chunks."""
     for run in runs_of(last - first + 1, CHUNK):
         span, step = pixels_of((last - first + 1)[run])
         of_pixel = run.start + span
@@ -434,9 +435,10 @@ def _misses_of_pixels(scene, raster, origin, first, last, curves) -> tuple[dict[
     Returns
     -------
     misses : dict of float64 array, shape (pieces, lights)
-        Of ``diffuse``, where values under 0 count as 0, and of ``factor`` where the light is not behind.
+        Errors of ``diffuse``, where values under 0 count as 0, and of ``factor`` at pixels where the light is
+        not behind the surface.
     largest : float64 array, shape (pieces, lights)
-        Largest factor where it is not behind; else 0.
+        Largest factor at such pixels; 0 without any.
     """
     shape = len(origin), len(scene.lights)
     misses, largest = {name: np.zeros(shape) for name in curves}, np.zeros(shape)
@@ -455,14 +457,14 @@ def _misses_of_pixels(scene, raster, origin, first, last, curves) -> tuple[dict[
 
 
 def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, curvature) -> np.ndarray:
-    """Whether N·L of a pixel of a span might have the wrong sign, for the lights that are told."""
+    """Whether N·L of a pixel of a span might have the wrong sign, for the lights in ``lights``."""
     result = np.zeros(len(origin), dtype=bool)
     bound = ChordSetup().diffuse_error(np.abs(slope), np.abs(curvature))
     for of_pixel, exact, t in _pixels_of(scene, raster, origin, first, last):
         t = t[:, np.newaxis]
         fit = left[of_pixel] + t * (slope[of_pixel] + t * curvature[of_pixel])
         wrong = np.where(exact.diffuse > 0, fit <= bound[of_pixel], fit > -bound[of_pixel])
-        # Nearer to 0 no word tells the sign; and what a light that fades has left may be had or lost.
+        # Nearer to 0 no word tells the sign; the little light of one that fades may be shown or not.
         wrong &= np.abs(exact.diffuse) > ChordSetup.DIFFUSE_FORMAT.step
         wrong &= (exact.factor > ChordInterpolator.FACTOR_BUDGET / 255) & lights[of_pixel]
         result |= np.bincount(of_pixel, wrong.any(axis=1), len(origin)) > 0

@@ -15,7 +15,7 @@ __all__ = ["Frame", "frame_buffer", "model_frame"]
 
 @dataclass(frozen=True)
 class Frame:
-    """A scene's picture by the pixels of a pipeline.
+    """A scene's picture, made of the pixels of a pipeline.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Frame:
     wide_spans : int
         Spans that the pipeline reports as wider than the error bound of the exponent allows.
     seconds : dict
-        Of ``raster`` (rasterise, cut, quantise) and of the pixels.
+        Time by step: ``raster`` (rasterise, cut, quantise), and ``model`` or ``simulate`` for the pixels.
     """
 
     image: np.ndarray
@@ -64,11 +64,11 @@ def frame_buffer(scene: Scene, raster: Raster, colors: np.ndarray) -> np.ndarray
     Parameters
     ----------
     scene : Scene
-        Size and background; this is rounded to the nearest code, half up.
+        Size and background; the background colour is rounded to the nearest code, half up.
     raster : Raster
         Fragments, and which of them are visible.
     colors : uint8 array, shape (fragments, 3)
-        Red, green, blue of each.
+        Red, green, blue of each fragment.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def frame_buffer(scene: Scene, raster: Raster, colors: np.ndarray) -> np.ndarray
 
 
 def model_frame(scene: Scene, design: Design) -> Frame:
-    """Frame by a pipeline's bit-accurate model: the image of the simulated one to the bit.
+    """Frame by a pipeline's bit-accurate model: bit for bit the image of the simulated pipeline.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Highlight limits: how far operands of a scene's highlights may be off, and where there is no highlight."""
+"""Highlight limits: tolerances of u for a scene's highlights, and where there is no highlight."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ __all__ = ["HighlightLimits"]
 
 @dataclass(frozen=True)
 class _Curve:
-    """The same from the curve S(u) of a lobe, for one parameter; u = 1 - N·H."""
+    """Highlight limits from the curve S(u) of a lobe, for one parameter; u = 1 - N·H."""
 
     model: ReflectionModel
     parameter: float | None
@@ -47,17 +47,17 @@ class _Curve:
 
 @dataclass(frozen=True)
 class HighlightLimits:
-    """What the highlights of materials ask of spans.
+    """Tolerances of u = 1 - N·H for the highlights of materials.
 
-    Of a polynomial or a power it follows from the exponent, as `ChordInterpolator` has it; of a lobe from its
-    curve: the error of u that keeps the budget is that budget over the steepest slope from u on.
+    For a polynomial or a power the tolerance follows from the exponent, as in `ChordInterpolator`; for a lobe
+    from its curve: it is `ChordInterpolator.HIGHLIGHT_BUDGET` over the steepest slope from u on.
 
     Parameters
     ----------
     exponents : float array, shape (materials,)
         Exponent, or `ReflectionModel.steepness`, of each material.
     curves : sequence of _Curve or None
-        Of each material that has a lobe.
+        Curve of each material; ``None`` for one without a lobe.
     least_dark : float array, shape (materials,)
         u from which on `SpanLimit` takes a span as not lit.
 
@@ -70,7 +70,7 @@ class HighlightLimits:
 
     @classmethod
     def of(cls, materials: Sequence[Material], design: Design | None = None) -> "HighlightLimits":
-        """Of materials, with the specular unit of a design; without one, of their exponents."""
+        """Limits of materials with the specular unit of a design; without a design by their exponents."""
         if design is None or design.specular is None:
             exponents = [material.exponent for material in materials]
         else:
@@ -93,7 +93,7 @@ class HighlightLimits:
 
     @property
     def words(self) -> np.ndarray:
-        """The exponents that `SpanLimit` takes: whole, 1 to 1000."""
+        """The exponents for `SpanLimit`: whole numbers, 1 to 1000."""
         return np.clip(np.ceil(self.exponents), 1, MAX_EXPONENT)
 
     def tolerance(self, material: np.ndarray, u: np.ndarray) -> np.ndarray:

@@ -25,24 +25,24 @@ __all__ = [
 ]
 
 CHUNK = 1 << 16
-"""Spans worked on at once; bounds the memory, changes no result."""
+"""Number of spans computed at once; it bounds the memory and changes no result."""
 
 
 def weights_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Weights of the triangle's corners at t of each span, where they are linear, (spans, 3)."""
+    """Weights of the triangle's corners at t of each span, shape (spans, 3); they are linear in t."""
     t = t[:, np.newaxis]
     return (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
 
 
 def lines_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Normals, not of unit length, at t of each span, where they are linear, (spans, 3)."""
+    """Normals, not of unit length, at t of each span, shape (spans, 3); they are linear in t."""
     t = t[:, np.newaxis]
     left, right = line_ends(raster, span)
     return (1 - t) * left + t * right
 
 
 def line_ends(raster: Raster, span: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
-    """Normals at the ends of spans, of all or some, with the lengths that they have there, (spans, 3)."""
+    """Normals, not of unit length, at the two ends of all or some spans, each of shape (spans, 3)."""
     return (
         raster.magnitude_left[span, np.newaxis] * raster.normal_left[span],
         raster.magnitude_right[span, np.newaxis] * raster.normal_right[span],
@@ -50,7 +50,7 @@ def line_ends(raster: Raster, span: np.ndarray | slice = slice(None)) -> tuple[n
 
 
 def middle_normals(raster: Raster) -> np.ndarray:
-    """True unit normals in the middle of spans, shape (spans, 3); between opposite ones, the left one."""
+    """True unit normals in the middle of spans, shape (spans, 3); the left one between opposite normals."""
     spans = np.arange(len(raster.length))
     line = lines_along(raster, spans, np.full(len(spans), 0.5))
     return np.where(any_component(line)[:, np.newaxis], normalise(line), raster.normal_left)
@@ -58,9 +58,10 @@ def middle_normals(raster: Raster) -> np.ndarray:
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """What places on the surface have: N and V (count, 3); f, u, a (count, lights); L (lights, count, 3).
+    """Exact values at points of the surface, for each light.
 
-    a is the factor of a light that fades, else 1; f is N·L times a.
+    Shapes: ``normal`` N and ``viewer`` V (count, 3), ``direction`` L (lights, count, 3); ``diffuse`` N·L
+    times a, ``highlight`` u, and ``factor`` a (count, lights), which is 1 for a light that does not fade.
     """
 
     normal: np.ndarray
@@ -72,9 +73,9 @@ class SurfacePoints:
 
     @classmethod
     def at(cls, scene: Scene, raster: Raster, span: np.ndarray, t: np.ndarray) -> "SurfacePoints":
-        """Those of spans, at t of each."""
+        """Points at t of each span."""
         line = lines_along(raster, span, t)
-        # Between opposite normals the line passes through 0, where any normal is as good.
+        # Between opposite normals the line passes through 0, where no normal is better than another.
         normal = np.where(any_component(line)[:, np.newaxis], normalise(line), raster.normal_left[span])
         points = None
         if scene.local:
@@ -98,11 +99,11 @@ class SurfacePoints:
         return cls(normal, viewer, direction, np.clip(diffuse, -1, 1), np.clip(highlight, 0, 2), factor)
 
     def scaled(self, scale: int) -> "SurfacePoints":
-        """The same places with ``min(2^s u, 1)`` in place of u."""
+        """The same points with ``min(2^s u, 1)`` in place of u."""
         return replace(self, highlight=np.minimum(np.ldexp(self.highlight, scale), 1)) if scale else self
 
     def with_normal(self, normal: np.ndarray, chord: bool) -> "SurfacePoints":
-        """The same places with other normals, shape (count, 3): f, and u as the squared chord or 1 - N·H."""
+        """The same points with other normals, shape (count, 3); u is half the squared chord, or 1 - N·H."""
         diffuse = np.einsum("sk,lsk->sl", normal, self.direction) * self.factor
         halfway = halfway_vector(self.direction, self.viewer)
         if chord:
@@ -113,7 +114,7 @@ class SurfacePoints:
         return replace(self, normal=normal, diffuse=diffuse, highlight=highlight)
 
     def turned(self, other: "SurfacePoints", method: ChordInterpolator) -> np.ndarray:
-        """Whether a vector turns by more than the method allows from here to there; bool, shape (count,)."""
+        """Whether N, V or an L changes by more than the method allows from here to ``other``; (count,)."""
         least = np.cos(np.radians(method.MAX_VECTOR_ANGLE))
         result = np.einsum("sk,sk->s", self.normal, other.normal) < least
         result |= np.einsum("sk,sk->s", self.viewer, other.viewer) < least
@@ -131,11 +132,11 @@ def chunks(count: int) -> Iterator[slice]:
 
 
 def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> SpanValues:
-    """What the chord methods need of each span: exact values of N·L and u at three places, as codes.
+    """Input of the chord methods for each span: exact values of N·L and u at three places, as codes.
 
-    N, L and H are of unit length at each of the three. Where a point light is on the surface itself N·L is 0;
-    where there is no half-way vector (``L = -V``) u is 2. A span of two pixels has nothing in the middle: it
-    gets the mean. N·L of a light that fades is times its factor.
+    N, L and H are of unit length at each place. Where a point light is on the surface itself N·L is 0; where
+    there is no half-way vector (``L = -V``) u is 2. The middle values of a span of two pixels are means of
+    its ends. N·L of a light that fades is multiplied by its factor.
 
     Parameters
     ----------
@@ -144,8 +145,8 @@ def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> Spa
     raster : Raster
         Spans from `cut_spans`, in any order.
     lights : int, optional
-        Lights of the pipeline, by default those of the scene. Lights that the scene does not have have an
-        N·L of 0, and are dark; so have those that are off.
+        Number of lights of the pipeline, by default that of the scene. Lights that the scene does not have,
+        and lights that are off, are dark: their N·L is 0.
     """
     return local_operands(scene, raster, lights)[0]
 
@@ -166,20 +167,20 @@ def local_operands(
     factors : sequence of int
         Indices of the lights whose factors are wanted.
     scale : int
-        Of u, see `SpanValues.quantise`.
+        Scale of u, see `SpanValues.quantise`.
 
     Returns
     -------
     values : SpanValues
     factors : int64 array, shape (spans, len(factors), 3), or None
-        In the format of N·L; ``None`` if none is wanted.
+        In the format of N·L; ``None`` without ``factors``.
     """
     count = len(scene.lights) if lights is None else lights
     given = len(scene.lights)
     on = np.array([light.is_on for light in scene.lights], dtype=bool)
     spans = np.arange(len(raster.length))
     operands = np.zeros((3, len(spans), count, 3))
-    # Of a span of one pixel the first value is all three; of two, there is none in the middle.
+    # In a span of one pixel all three values are the first; a span of two pixels has none in the middle.
     for place, t, pixels in ((0, 0.0, 1), (2, 1.0, 2), (1, 0.5, 3)):
         has = spans[raster.length >= pixels]
         lacks = spans[raster.length < pixels]

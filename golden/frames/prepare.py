@@ -1,4 +1,4 @@
-"""The input of a pipeline for a frame: spans, cut, ordered and quantised, and frame constants."""
+"""The input of a pipeline for a frame: spans that are cut, ordered and quantised, and frame constants."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -42,8 +42,8 @@ class PreparedFrame:
     spans : Spans
         Spans of ``cut_raster``, quantised: the pipeline's input.
     missed_spans : int
-        Of a method whose spans are not cut by its error: those that its curve misses by more than a quarter
-        of an LSB.
+        For a method whose spans are not cut by error: number of spans in which its curve is off by more than
+        a quarter of an LSB.
     """
 
     raster: Raster
@@ -113,8 +113,8 @@ def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
     Raises
     ------
     ValueError
-        If the scene has more lights or other materials than the design, or other lobes than its banks hold,
-        or a term is brighter than 8.
+        If the scene has more lights, another number of materials, or more lobes than the design has banks, or
+        a term is brighter than 8.
     """
     if len(scene.materials) != design.materials:
         raise ValueError(f"the pipeline has {design.materials} materials, the scene {len(scene.materials)}")
@@ -125,7 +125,7 @@ def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
 
 
 def _halfway_directions(scene: Scene, codes: np.ndarray) -> np.ndarray:
-    """Codes of half-way vectors by `quantise_direction`; those that are 0 stay."""
+    """Codes of half-way vectors by `quantise_direction`; vectors of 0 stay 0."""
     result = codes.copy()
     for index, light in enumerate(scene.lights):
         if codes[index].any():
@@ -142,16 +142,17 @@ def with_tables(
     Parameters
     ----------
     constants : sequence of FrameConstants
-        Of each material.
+        Constants of each material.
     materials : sequence of Material
-        As many.
+        The materials, in the same order.
     design : Design
         Pipeline whose specular unit is a `Lobe`.
 
     Raises
     ------
     ValueError
-        If the materials have more lobes than there are banks, or one that is not fixed where others are.
+        If the materials have more lobes than there are banks, or a lobe that is not among those fixed at
+        build time.
     """
     lobe = design.specular
     parameters = [material.parameter(lobe.model) for material in materials]

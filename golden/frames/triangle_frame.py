@@ -1,4 +1,4 @@
-"""A frame by triangles: what the bit-accurate models of geometry, shading and depth test make of a scene."""
+"""A frame by triangles: a scene drawn by the bit-accurate models of geometry, shading and depth test."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ from blysk.golden.render import Renderer
 __all__ = ["TriangleFrame", "frame_of_pixels", "sent_triangles", "span_angle", "triangle_frame"]
 
 _SPAN_ANGLE = 5.0
-"""Widest piece of a span in degrees, of methods without a `SpanLimit`."""
+"""Widest piece of a span in degrees, for methods without a `SpanLimit`."""
 
 
 @dataclass(frozen=True)
 class TriangleFrame:
-    """A scene's picture from triangles.
+    """A scene's picture, drawn from triangles.
 
     Parameters
     ----------
     image : uint8 array, shape (height, width, 3)
         The frame buffer.
     sent : SceneTriangles
-        What was drawn.
+        The triangles that were drawn.
     owner : int64 array, shape (height, width)
         Face of the mesh that each pixel shows, -1 for the background.
     counts : mapping of str to int
@@ -42,7 +42,7 @@ class TriangleFrame:
 
 
 def span_angle(scene: Scene, design: Design) -> float:
-    """Widest piece of a span in degrees: `SpanLimit.angle` of the steepest highlight, or without one 5."""
+    """Widest piece of a span in degrees: `SpanLimit.angle` of the steepest highlight, else 5."""
     limit = design.span_limit
     if limit is None:
         return _SPAN_ANGLE
@@ -73,14 +73,14 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
 
 
 def frame_of_pixels(scene: Scene, x: np.ndarray, y: np.ndarray, color: np.ndarray) -> np.ndarray:
-    """Frame buffer after writes in their order, over the background.
+    """Frame buffer after pixels are written in their order over the background.
 
     Parameters
     ----------
     scene : Scene
-        Size and background; this is rounded to the nearest code, half up.
+        Size and background; the background colour is rounded to the nearest code, half up.
     x, y : int arrays, shape (P,)
-        Places.
+        Column and row of each pixel.
     color : uint8 array, shape (P, 3)
         Red, green, blue.
 
@@ -96,7 +96,7 @@ def frame_of_pixels(scene: Scene, x: np.ndarray, y: np.ndarray, color: np.ndarra
 
 
 def triangle_frame(scene: Scene, renderer: Renderer, angle: float | None = None) -> TriangleFrame:
-    """Frame by the bit-accurate models: the image of the simulated hardware to the bit.
+    """Frame by the bit-accurate models: bit for bit the image of the simulated hardware.
 
     Parameters
     ----------

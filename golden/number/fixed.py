@@ -77,7 +77,7 @@ class Format:
         return 2.0**-self.fraction_bits
 
     def wrap(self, codes: np.ndarray) -> np.ndarray:
-        """Codes of the same low bits, for integers of any size; sums of int64 may have overflowed."""
+        """Codes with the same low bits as integers of any size; int64 sums may have overflowed."""
         low = codes & ((1 << self.width) - 1)
         return low - ((low >> (self.width - 1)) << self.width) if self.signed else low
 
@@ -112,7 +112,7 @@ class Format:
 
     def __sub__(self, other: "Format") -> "Format":
         """Format of a difference, always signed."""
-        # Of two unsigned numbers the difference needs the sign bit alone.
+        # The difference of two unsigned numbers needs one more bit, for the sign.
         if not (self.signed or other.signed):
             return Format(
                 True,
@@ -134,7 +134,7 @@ class Format:
         return Format(True, self.integer_bits + 1, self.fraction_bits)
 
     def scaled(self, exponent: int) -> "Format":
-        """Format of the same code for a number ``2**exponent`` times as large: a wired shift."""
+        """Format in which the same code stands for ``2**exponent`` times the number: a wired shift."""
         return Format(self.signed, self.integer_bits + exponent, self.fraction_bits - exponent)
 
     def truncated(self, fraction_bits: int) -> "Format":
@@ -304,7 +304,7 @@ class Fixed:
         dropped = self.format.fraction_bits - fraction_bits
         if dropped == 0:
             return self
-        # The half is added after a shift by one less, so that no intermediate outgrows an int64.
+        # One bit less is shifted out before the half is added, so that no intermediate outgrows an int64.
         return Fixed._exact(format, ((self.codes >> (dropped - 1)) + 1) >> 1)
 
     def saturate(self, format: Format) -> "Fixed":
@@ -319,7 +319,7 @@ class Fixed:
         return Fixed._exact(format, np.clip(self.codes, format.min_code, format.max_code))
 
     def wrap(self, format: Format) -> "Fixed":
-        """Keep the low bits: the value modulo ``2**integer_bits`` of ``format``, of equal fraction bits.
+        """Keep the low bits: the value modulo ``2**integer_bits`` of a format with the same fraction bits.
 
         Raises
         ------

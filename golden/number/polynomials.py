@@ -1,4 +1,4 @@
-"""Minimax polynomial fits; coefficients may be given, or be numbers of a hardware format.
+"""Minimax polynomial fits, with some coefficients given, or with coefficients in a hardware format.
 
 Source: docs/theory/interpolation.md#bisection.
 """
@@ -12,7 +12,7 @@ from blysk.golden.number.fixed import Format
 __all__ = ["half_angle_factor", "largest_error", "minimax", "minimax_quantised", "reciprocal_root"]
 
 GRID = 4001
-"""Points of a domain on which a fit is found and judged."""
+"""Number of points of a domain on which a fit is found and its error measured."""
 
 
 def half_angle_factor(u: np.ndarray) -> np.ndarray:
@@ -102,7 +102,7 @@ def minimax_quantised(
     formats: Mapping[int, Format],
     held: Mapping[int, float] | None = None,
 ) -> np.ndarray:
-    """Minimax coefficients that are numbers of a hardware format, refitted one after the other.
+    """Minimax coefficients in hardware formats, rounded and fitted again one after the other.
 
     Each coefficient, lowest power first, is rounded to its format and held; the others are fitted again and
     compensate most of its rounding error.

@@ -17,13 +17,14 @@ RECIPROCAL_FORMAT = UQ(0, 17)
 def reciprocal_table(format: Format = RECIPROCAL_FORMAT) -> Fixed:
     """Table of ``1/f``, f in [1, 2): ``1/(1 + k/2048)`` at address k, rounded half up.
 
-    At address 0 it holds 1/2, as no format here holds 1; `reciprocal_address` shifts by one less there. A
-    word is off by at most half a step of the format: with F fraction bits by at most a relative ``2^-F``.
+    The word at address 0 is 1/2, as the format does not hold 1; `reciprocal_address` shifts it by one bit
+    less. The error of a word is at most half a step of the format, with F fraction bits at most a relative
+    ``2^-F``.
 
     Parameters
     ----------
     format : Format
-        Of a word, unsigned and under 1.
+        Format of a word, unsigned, for numbers under 1.
 
     Returns
     -------
@@ -41,8 +42,8 @@ def reciprocal_table(format: Format = RECIPROCAL_FORMAT) -> Fixed:
 def reciprocal_address(steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Address in `reciprocal_table`, and the shift s of ``1/steps = 2 reciprocal 2^-s``.
 
-    ``steps`` is ``f 2^p`` with f in [1, 2); the address is the fraction of f, and s is p + 1, but p where f
-    is 1.
+    ``steps`` is ``f 2^p`` with f in [1, 2); the address is the fraction of f, and s is p if f is 1, else
+    p + 1.
 
     Parameters
     ----------
@@ -65,8 +66,8 @@ def reciprocal_address(steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def step_words(length: np.ndarray) -> tuple[Fixed, np.ndarray, Fixed, np.ndarray]:
     """Bit-accurate ``dt = 1/(m - 1) = 2 reciprocal 2^-shift`` and ``dt^2 = 4 square 2^-square_shift``.
 
-    The square is that of the reciprocal, shifted up by one where it is under 1/2, and rounded half up. dt is
-    off by a relative 2^-17 at most, dt^2 by ``2^-16 + 2^-17 + 2^-34``.
+    The square of the reciprocal is shifted up by one bit where it is under 1/2, and rounded half up. The
+    relative error of dt is at most 2^-17, that of dt^2 at most ``2^-16 + 2^-17 + 2^-34``.
 
     Parameters
     ----------

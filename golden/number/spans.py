@@ -1,4 +1,4 @@
-"""Spans: how long they are, and which pixel belongs to which."""
+"""Lengths of spans, and which pixel belongs to which span."""
 
 from collections.abc import Iterator
 
@@ -11,7 +11,7 @@ LENGTH_BITS = 12
 
 
 def checked_lengths(length: np.ndarray, least: int = 1) -> np.ndarray:
-    """Lengths of spans as int64.
+    """Lengths of spans as int64, checked.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def checked_lengths(length: np.ndarray, least: int = 1) -> np.ndarray:
     Raises
     ------
     ValueError
-        If one is out of range.
+        If a length is under ``least`` or over 4095.
     """
     length = np.asarray(length, dtype=np.int64)
     if length.size and not least <= length.min() <= length.max() < 1 << LENGTH_BITS:
@@ -32,7 +32,7 @@ def checked_lengths(length: np.ndarray, least: int = 1) -> np.ndarray:
 
 
 def pixels_of(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Span of each pixel, and its index in the span from 0 on, for spans of so many pixels each.
+    """Index of the span of each pixel, and index of the pixel in its span, both from 0 on.
 
     Parameters
     ----------
@@ -49,14 +49,14 @@ def pixels_of(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def runs_of(length: np.ndarray, most: int = 1 << 18) -> Iterator[slice]:
-    """Runs of spans with so many pixels or fewer, or of one span: a bound for the memory of a step.
+    """Slices of consecutive spans with at most ``most`` pixels, or of one longer span; this bounds memory.
 
     Parameters
     ----------
     length : int array, shape (spans,)
-        Pixels of each.
+        Number of pixels of each span.
     most : int
-        Pixels of a run.
+        Largest number of pixels of a slice.
     """
     ends = np.cumsum(length)
     start = 0

@@ -39,8 +39,8 @@ def quantise(vectors: np.ndarray) -> np.ndarray:
     """Codes of unit vectors, whose length is closer to 1 than that of rounded components.
 
     Of the eight neighbours of a vector on the grid of codes, the one whose length is nearest to 1 is taken:
-    an error of the normal's length changes the specular term at first order, one of its direction near the
-    highlight's peak at second order only. A component is off by less than one step, ``2**-17``.
+    near the peak of a highlight an error of the normal's length changes the specular term at first order, an
+    error of its direction at second order only. The error of a component is under one step, ``2**-17``.
 
     Parameters
     ----------
@@ -79,11 +79,11 @@ def quantise(vectors: np.ndarray) -> np.ndarray:
 
 
 def quantise_direction(vectors: np.ndarray) -> np.ndarray:
-    """Codes of unit vectors whose direction is closer than that of `quantise`, their length not.
+    """Codes of unit vectors with a more exact direction, and a less exact length, than those of `quantise`.
 
-    Of the 27 codes about the nearest one, that of the least error of direction, with a length within
-    `CODE_LENGTH_ERROR`. It is for squared chords with sharp lobes: they feel the length at second order only.
-    What it takes, gives and refuses is as for `quantise`.
+    Of the 27 codes around the nearest one with a length error within `CODE_LENGTH_ERROR`, the one with the
+    least error of direction is taken. It is for squared chords with sharp lobes: an error of length changes
+    them at second order only. Parameters, result and errors are those of `quantise`.
     """
     best = quantise(vectors)
     scaled = np.asarray(vectors, dtype=np.float64) * ONE
