@@ -20,13 +20,13 @@ __all__ = ["METHODS", "PUBLISHED", "AngularInterpolator"]
 class AngularInterpolator(Interpolator):
     """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, for L and H of each light.
 
-    Formats and error bounds are those of `AngularSetup` and `HighlightCosine`. N·L is 1 less the result,
-    ``SQ(2, 25)``. Spans over 150 degrees are flagged.
+    Formats and error bounds are those of `AngularSetup` and `HighlightCosine`. N·L is 1 minus the
+    result, ``SQ(2, 25)``. Spans over 150 degrees are flagged.
 
     Parameters
     ----------
     setup : AngularSetup
-        Model of the unit that finds the angles.
+        Bit-accurate model of the unit that computes the angles.
 
     Source: docs/theory/interpolation.md#angular-method; [T] 3.1, 3.2.
     """
@@ -50,18 +50,18 @@ class AngularInterpolator(Interpolator):
 
     @property
     def serves_gate(self):
-        """Not with an arccosine."""
+        """Whether a highlight gate can be used: not with an arccosine."""
         return self.setup.angle == "half_chord"
 
     @property
     def highlight_excess(self):
-        """Errors of the setup, of the cosine and of its cut: ``cos gamma(t)`` is the great circle's."""
+        """Sum of the errors of setup, cosine and its cut, as ``cos gamma(t)`` is that of the great circle."""
         angles = np.linspace(1e-4, self.gate_angle, 1000)
         setup = AngularSetup.error(angles).max()
         return float(setup) + HighlightCosine.ERROR + HighlightCosine.RESULT_FORMAT.step
 
     def operand_error(self, length, degrees):
-        """Errors of setup and cosine; the code of length 1, where the setup has 1; half a last step."""
+        """Sum of the errors of setup and cosine, of the code of length 1 in place of 1, and half a step."""
         return float(AngularSetup.error(degrees)) + HighlightCosine.ERROR + 2.0**-16 + 2.0**-26
 
     def compute(self, normal_left, normal_right, length, direction, halfway):
@@ -86,10 +86,10 @@ class AngularInterpolator(Interpolator):
 
 
 METHODS = (AngularInterpolator(),)
-"""Its method."""
+"""The method of this module."""
 
 PUBLISHED = (
     AngularInterpolator(AngularSetup("arccos", Arccos("as_published"))),
     AngularInterpolator(AngularSetup("arccos", Arccos("corrected"))),
 )
-"""The arccosine of table 3.1, with its misprint and without."""
+"""The method with the arccosine of table 3.1, as printed and with its misprint corrected."""

@@ -17,7 +17,7 @@ __all__ = ["METHODS", "PUBLISHED", "BisectionInterpolator"]
 
 @dataclass(frozen=True)
 class BisectionInterpolator(NormalInterpolator):
-    """Normals on straight lines over ``2^k`` arcs of the great circle, with the least k that serves.
+    """Normals on straight lines over ``2^k`` arcs of the great circle, with the least k within the threshold.
 
     Formats and error bounds are those of `AdaptiveNormaliser`, for spans to 90 degrees.
 
@@ -28,7 +28,7 @@ class BisectionInterpolator(NormalInterpolator):
     threshold : float
         Largest length error of a normal.
     bisection : Bisection
-        Factor of the bisection unit.
+        Bit-accurate model of the bisection unit, with its factor.
 
     Raises
     ------
@@ -42,7 +42,7 @@ class BisectionInterpolator(NormalInterpolator):
     bisection: Bisection = field(default_factory=Bisection)
 
     MAX_ANGLE = 90.0
-    # At no end of a straight line, which are at multiples of 1/2^k.
+    # None of these is an end of a straight line, which lie at multiples of 1/2^k.
     CHECKED_AT = (0.09, 0.31, 0.45, 0.64, 0.82)
 
     def __post_init__(self):
@@ -56,7 +56,7 @@ class BisectionInterpolator(NormalInterpolator):
 
     @property
     def serves_gate(self):
-        """Not with the published polynomials."""
+        """Whether a highlight gate can be used: not with the published polynomials."""
         return not self.bisection.as_published
 
     @property
@@ -66,17 +66,17 @@ class BisectionInterpolator(NormalInterpolator):
 
     @property
     def normal_error(self):
-        """That of three components, at the largest depth, and the lengths of the codes."""
+        """Error of the normaliser at the largest depth, in three components, plus `CODE_LENGTH_ERROR`."""
         normaliser = self.normaliser
         return float(np.sqrt(3) * normaliser.error(normaliser.depth, False)) + CODE_LENGTH_ERROR
 
     @property
     def shortest_length(self):
-        """One less the threshold and the rounding of the error block."""
+        """1 minus the threshold and the rounding error of the error block."""
         return 1 - self.threshold - 2.0**-18
 
     def operand_error(self, length, degrees):
-        """Error of the normaliser at any depth, and what a straight line is off the great circle by."""
+        """Error of the normaliser at any depth plus the distance of a straight line from the great circle."""
         return _operand_error(self.normaliser, degrees > MAX_SPAN_ANGLE)
 
     def normals(self, normal_left, normal_right, length):
@@ -99,7 +99,7 @@ class BisectionInterpolator(NormalInterpolator):
 
 @cache
 def _normaliser(threshold: float, bisection: Bisection) -> AdaptiveNormaliser:
-    """The model, whose polynomials take half a second to fit."""
+    """The bit-accurate model, kept because fitting its polynomials takes half a second."""
     return AdaptiveNormaliser(threshold, bisection)
 
 
@@ -107,12 +107,12 @@ def _normaliser(threshold: float, bisection: Bisection) -> AdaptiveNormaliser:
 def _operand_error(normaliser: AdaptiveNormaliser, beyond_45_degrees: bool) -> float:
     threshold = normaliser.threshold
     error = max(normaliser.error(depth, beyond_45_degrees) for depth in range(normaliser.depth + 1))
-    # A line leaves the great circle by the threshold in length, and by 0.017 psi^3 of its angle in direction.
+    # A line of angle psi is off the great circle by the threshold in length and by 0.017 psi^3 in direction.
     return float(np.sqrt(3) * error + threshold + 2.0**-19 + 0.017 * (8.1 * threshold) ** 1.5)
 
 
 METHODS = (BisectionInterpolator(),)
-"""Its method."""
+"""The method of this module."""
 
 PUBLISHED = (BisectionInterpolator(bisection=Bisection(as_published=True)),)
-"""The polynomials of [T] 2.1."""
+"""The method with the polynomials of [T] 2.1."""

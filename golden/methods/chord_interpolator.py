@@ -25,26 +25,26 @@ class ChordInterpolator(Interpolator):
     """``N . L`` and ``u = |N - H|^2 / 2`` of each pixel by two additions each, without a normal.
 
     A span brings its true normals at the first pixel centre, in the middle and at the last pixel centre.
-    `ChordValues` finds N·L and u of the three, `ChordSetup` the quadratics through them; sums of 49 bits
-    follow, with the drift that is bounded there. The specular unit takes u as its ``1 - cos gamma``. Pixels
-    of a span of one or two have their own values, and need no setup.
+    `ChordValues` computes N·L and u at the three, `ChordSetup` the quadratics through them, with a bound of
+    the drift, and accumulators of 49 bits the pixels. The specular unit takes u as its ``1 - cos gamma``. In
+    a span of one or two pixels each pixel has its own values, and needs no setup.
 
     The quadratic is good for short spans only. Spans should be cut until
 
     - they are not wide, as `SpanLimit` has it;
     - N, V and each light's L change by at most `MAX_VECTOR_ANGLE` degrees from end to end, and ``|dV| +
       |dL|`` is at most `MAX_HALFWAY_CHANGE` of ``|L + V|``: where L is nearly -V, H changes fast;
-    - the quadratics are as near to the values at t = 1/4 and 3/4 as `highlight_tolerance` and
-      `diffuse_tolerance` allow, less the bounds of the arithmetic; an error there counts `MARGIN` times, for
-      the positions between, or as often as the normals' lengths at the two ends differ, if that is more. The
-      factor is found by search: with equal lengths the largest distance at any t was 1.31 times that at 1/4
-      and 3/4, and with lengths of g to 1 up to ``1.03 max(4/3, g)`` times.
+    - the errors of the quadratics at t = 1/4 and 3/4, times `MARGIN` for the positions between, are within
+      `highlight_tolerance` and `diffuse_tolerance` minus the bounds of the arithmetic. In place of `MARGIN`
+      stands the ratio of the normals' lengths at the two ends, if it is larger. These factors were found by
+      search: with equal lengths the largest error at any t was 1.31 times that at 1/4 and 3/4, and with
+      lengths in the ratio g up to ``1.03 max(4/3, g)`` times.
 
-    Fit and arithmetic then are within 0.4 LSB of exactly normalised interpolation in the specular term and
-    0.12 in the diffuse one, at full reflection.
+    The errors of fit and arithmetic together are then within 0.4 LSB of exactly normalised interpolation in
+    the specular term and 0.12 in the diffuse one, at full reflection.
 
-    Where N·L changes its sign the highlight ends, however bright it is. A pixel whose N·L is within the error
-    of 0 may have it or not; a span with such pixels, where `is_lit`, should be cut further.
+    Where N·L changes its sign the highlight ends, however bright it is. A pixel whose N·L is as near to 0 as
+    the error may have the highlight or not; a span with such pixels where `is_lit` should be cut further.
 
     ========== ========== ========================================
     word       format     why
@@ -57,7 +57,7 @@ class ChordInterpolator(Interpolator):
     Parameters
     ----------
     fraction_bits : int
-        Of the setup.
+        Fraction bits of the setup's words.
     scale : int
         s: the words of u are ``min(2^s u, 1)``, for a lobe that is 0 from ``2^-s`` on; see `ChordValues` and
         `Lobe.scale_of`.
@@ -65,7 +65,7 @@ class ChordInterpolator(Interpolator):
     Raises
     ------
     ValueError
-        If it is out of range.
+        If a parameter is out of range.
 
     Source: docs/theory/chord.md#differences.
     """
@@ -100,7 +100,7 @@ class ChordInterpolator(Interpolator):
 
     @property
     def accumulators(self) -> dict[str, DifferenceAccumulator]:
-        """Models of the accumulators, ``diffuse`` of N·L, ``highlight`` of u, ``factor`` of a."""
+        """Models of the accumulators: ``diffuse`` for N·L, ``highlight`` for u, ``factor`` for a."""
         format, difference = SQ(3, self.fraction_bits), self.setup.format
         starts = {"diffuse": ChordSetup.DIFFUSE_FORMAT, "highlight": ChordSetup.HIGHLIGHT_FORMAT}
         starts["factor"] = ChordSetup.DIFFUSE_FORMAT
@@ -116,7 +116,7 @@ class ChordInterpolator(Interpolator):
         return SpanLimit.WIDEST
 
     def operand_error(self, length, degrees):
-        """Those of the values, times 1.25, and of the setup at the largest words; the cut of the results."""
+        """1.25 times the error of the values, plus that of the setup at its largest words, plus the cut."""
         chord = 2 * np.sin(np.radians(degrees) / 2)
         words = chord + chord**2, chord**2
         values, setup = ChordValues, self.setup
@@ -127,7 +127,7 @@ class ChordInterpolator(Interpolator):
         return float(max(errors)) + Specular.ARGUMENT_FORMAT.step
 
     def compute(self, normal_left, normal_right, length, direction, halfway, normal_middle=None) -> Operands:
-        """Bit-accurate operands; the middle normal matters from 3 pixels on."""
+        """Bit-accurate operands; the middle normal, which is required, has an effect from 3 pixels on."""
         if normal_middle is None:
             raise ValueError("the chord method takes spans with a middle normal")
         values = self.values(normal_left, normal_middle, normal_right, direction, halfway)
@@ -158,11 +158,12 @@ class ChordInterpolator(Interpolator):
         Parameters
         ----------
         values : SpanValues
-            Of each span and light; those in the middle matter from 3 pixels on, those at the end from 2.
+            Values of each span and light; those in the middle have an effect from 3 pixels on, those at the
+            end from 2.
         length : int array, shape (spans,)
             Pixels, 1 to 4095.
         factors : int64 array, shape (spans, fading lights, 3), optional
-            Codes of the factors of lights that fade, as those of N·L.
+            Codes of the factors of lights that fade, in the format of N·L.
 
         Raises
         ------
@@ -177,7 +178,7 @@ class ChordInterpolator(Interpolator):
             length,
             None if factors is None else Fixed(ChordSetup.DIFFUSE_FORMAT, factors),
         )
-        # A pixel of a span of one or two is a span of its own.
+        # Each pixel of a span of one or two pixels is treated as a span of its own.
         short = length < 3
         pieces, place = pixels_of(np.where(short, length, 1))
         pieces_short = short[pieces]
@@ -195,23 +196,23 @@ class ChordInterpolator(Interpolator):
     def exact_operands(
         self, values: SpanValues, length: np.ndarray, factors: np.ndarray | None = None
     ) -> tuple[np.ndarray, ...]:
-        """The quadratics through the values in float64, in units of 1.
+        """Values at every pixel of the quadratics through the values of spans, in float64, in units of 1.
 
         Parameters
         ----------
         values : SpanValues
-            Of each span and light.
+            Values of each span and light.
         length : int array, shape (spans,)
             Pixels.
         factors : int64 array, shape (spans, fading lights, 3), optional
-            Those of `compute_values`.
+            As for `compute_values`.
 
         Returns
         -------
         cosine, one_minus_cosine : float64 arrays, shape (pixels, lights)
-            The latter without the scale, but up to ``2^-s`` alone.
+            1 - N·H without the scale; because of the scale it is good up to ``2^-s`` only.
         factor : float64 array, shape (pixels, fading lights)
-            Only where it is given.
+            Only if ``factors`` are given.
         """
         span, step = pixels_of(length)
         t = (step / np.maximum(length - 1, 1)[span])[:, np.newaxis]
@@ -230,10 +231,10 @@ class ChordInterpolator(Interpolator):
     def highlight_tolerance(self, exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Largest error of u that keeps `HIGHLIGHT_BUDGET`, where no smaller u occurs.
 
-        The derivative of a term to u is about n at the peak, and smaller farther off: ``n (1 - n u/2)`` of
-        the cosine-quadratic one, ``n (1 - u)^(n-1)`` of Blinn's power. With ``x = (n - 1) u`` neither is more
-        than ``n / (1 + x/2 + x^2/4 + x^3/8)``, and those of the pipeline's other models not more than 1.25 of
-        it, for n = 1 1.6.
+        The slope of a term over u is about n at the peak, and smaller farther off: ``n (1 - n u/2)`` for the
+        cosine-quadratic term, ``n (1 - u)^(n-1)`` for Blinn's power. With ``x = (n - 1) u`` neither is more
+        than ``n / (1 + x/2 + x^2/4 + x^3/8)``. Slopes of the pipeline's other models are at most 1.25 times
+        this bound, and 1.6 times for n = 1.
 
         Parameters
         ----------
@@ -249,8 +250,8 @@ class ChordInterpolator(Interpolator):
     def is_lit(exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Whether a highlight may be over a quarter of an LSB, where no smaller u occurs.
 
-        Blinn's power, at most ``e^-x`` with ``x = (n - 1) u``, is not from ``x = 7`` on; the others reach 0
-        earlier, or decrease as fast.
+        Blinn's power is at most ``e^-x`` with ``x = (n - 1) u``, which is under a quarter of an LSB from
+        ``x = 7`` on; the other models reach 0 earlier, or decrease as fast.
 
         Parameters
         ----------
@@ -268,4 +269,4 @@ class ChordInterpolator(Interpolator):
 
 
 METHODS = (ChordInterpolator(),)
-"""Its method."""
+"""The method of this module."""

@@ -1,4 +1,4 @@
-"""Interpolators: models of the methods that take a span to the operands of its pixels."""
+"""Interpolators: models of the methods that compute the operands of the pixels of a span."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple
@@ -20,14 +20,14 @@ Operand = Literal["cosine", "one_minus_cosine"]
 
 
 def difference_rounding(pixel: int) -> float:
-    """Bound of the rounding of a normal by forward differences: that of the result, and of both differences.
+    """Bound of the rounding error of a normal by forward differences: of the result and of both differences.
 
     ``sqrt(3) (2^-18 + 2^-42 (k + k^2/2))`` at pixel k, as derived in `DifferenceSetup`.
 
     Parameters
     ----------
     pixel : int
-        k, 0 for the first.
+        Index k of the pixel, from 0 on.
     """
     return float(np.sqrt(3) * (2.0**-18 + 2.0**-42 * (pixel + pixel**2 / 2)))
 
@@ -55,7 +55,7 @@ class Operands(NamedTuple):
 
 @dataclass(frozen=True)
 class Interpolator:
-    """A method that takes spans to the operands of their pixels; each method is a subclass.
+    """A method that computes the operands of the pixels of spans; each method is a subclass.
 
     A subclass states its formats; `compute` is its bit-accurate model, `exact_normals` its curve in float64.
 
@@ -64,14 +64,14 @@ class Interpolator:
     operand : str
         ``"cosine"`` or ``"one_minus_cosine"``: operand of the specular unit.
     COSINE_FORMAT : Format
-        Of N·L.
+        Format of N·L.
     COSINE_OF_ZERO : float
         N·L of equal unit vectors in exact arithmetic: 1, or `ONE_SQUARED`, the product of the codes of length
         1.
     MAX_ANGLE : float
-        Largest angle in degrees of the spans that the method serves. It flags those of a larger angle, most
-        of them from there on; straight lines where a component of ``N_r - N_l`` is 1 or more, which takes 60
-        degrees and happens to half of the spans at 75.
+        Largest angle, in degrees, of a span that the method serves. Most methods flag every span over it. The
+        linear method flags a span in which a component of ``N_r - N_l`` is 1 or more: none under 60 degrees,
+        half of the spans at 75.
     CURVE : str
         The curve of `CURVES` on which the method's normals lie in exact arithmetic.
     TAKES_VALUES : bool
@@ -81,12 +81,13 @@ class Interpolator:
         Whether spans are cut until the method's curve is within a quarter of an LSB of exact normals; else
         they are cut by their angle alone.
     END_FORMAT : Format
-        Of the normals at a span's ends: unit normals in ``SQ(1, 17)``; else ends of the true line, which have
-        lengths, in proportion to the larger one.
+        Format of the normals at a span's ends: ``SQ(1, 17)`` for unit normals; another format for ends of the
+        true line, which have lengths, relative to the larger one.
     TAKES_MIDDLE : bool
         Whether spans carry the true normal in their middle besides those at their ends.
     CHECKED_AT : tuple of float
-        Shares of a span at which its curve is held against exact normals, to decide whether it is cut.
+        Places t in a span at which the method's curve is compared with exact normals, to decide whether the
+        span is cut.
     """
 
     COSINE_FORMAT: ClassVar[Format] = DotProduct().result_format
@@ -111,7 +112,7 @@ class Interpolator:
 
     @property
     def takes_line(self) -> bool:
-        """Whether the ends of a span have lengths."""
+        """Whether a span carries the ends of the true line, which have lengths, in place of unit normals."""
         return self.END_FORMAT != COMPONENT
 
     @property
@@ -121,7 +122,7 @@ class Interpolator:
 
     @property
     def highlight_excess(self) -> float:
-        """Bound of how much brighter a highlight is than the great circle's, for spans to `gate_angle`.
+        """Bound of the excess of N·H over that of the great circle, for spans up to `gate_angle`.
 
         With c the largest cosine to H on the arc of the great circle from N_l to N_r, in units of
         `ONE_SQUARED`, no pixel has an N·H over ``c + highlight_excess``, or a 1 - N·H under ``shortest_normal
@@ -131,7 +132,7 @@ class Interpolator:
 
     @property
     def shortest_normal(self) -> float:
-        """Least length of a normal of the curve, for spans to `gate_angle`, where its chord to H is taken."""
+        """Least length of a normal on the curve, for spans up to `gate_angle`; 1 without chords to H."""
         return 1.0
 
     @property
@@ -191,7 +192,7 @@ class Interpolator:
 
 @dataclass(frozen=True)
 class NormalInterpolator(Interpolator):
-    """A method that finds normals; their products with L and H follow.
+    """A method that computes normals, and the products of these with L and H.
 
     Parameters
     ----------
@@ -213,12 +214,12 @@ class NormalInterpolator(Interpolator):
 
     @property
     def uses_chord(self):
-        """With ``operand="one_minus_cosine"``."""
+        """Whether ``operand`` is ``"one_minus_cosine"``."""
         return self.operand == "one_minus_cosine"
 
     @property
     def normal_error(self) -> float:
-        """Largest distance of a normal from the method's curve, which stays inside the unit circle."""
+        """Largest distance of a normal from the method's curve; the curve stays inside the unit circle."""
         raise NotImplementedError
 
     @property
@@ -228,7 +229,7 @@ class NormalInterpolator(Interpolator):
 
     @property
     def highlight_excess(self):
-        """`normal_error` towards H; of the chord, ``|N - H| <= 2``, twice that and its cut.
+        """`normal_error`; with half the squared chord, as ``|N - H| <= 2``, twice the error, and the cut.
 
         On a curve of length r, where c is the cosine to H, half the squared chord is ``(1 - r)^2/2 + r (1 -
         c)``, which is at least ``r (1 - c)``. The lengths of the codes of N_l and H differ from 1.
@@ -239,7 +240,7 @@ class NormalInterpolator(Interpolator):
 
     @property
     def shortest_normal(self):
-        """`shortest_length`, of the chord."""
+        """`shortest_length` if the operand is half the squared chord, else 1."""
         return self.shortest_length if self.uses_chord else 1.0
 
     def normals(
@@ -260,7 +261,9 @@ class NormalInterpolator(Interpolator):
         raise NotImplementedError
 
     def products(self, normals: Fixed, direction: Fixed, halfway: Fixed) -> tuple[Fixed, Fixed]:
-        """N·L, exact, and N·H, exact, or half the squared chord, cut to 25 fraction bits.
+        """N·L, exact, and the operand of the specular unit.
+
+        This is N·H, exact, or half the squared chord, cut to 25 fraction bits.
 
         Parameters
         ----------

@@ -19,8 +19,8 @@ __all__ = ["METHODS", "LinearInterpolator"]
 class LinearInterpolator(NormalInterpolator):
     """``(1-t) N_l + t N_r`` by a first difference.
 
-    A normal is too short, by ``1 - cos(psi/2)`` in the middle of the span. ``N_r - N_l`` saturates at 1 in a
-    component, over 60 degrees; such a span is flagged.
+    A normal is too short, by ``1 - cos(psi/2)`` in the middle of the span. Components of ``N_r - N_l``
+    saturate at 1, which can happen over 60 degrees; such a span is flagged.
 
     Parameters
     ----------
@@ -45,17 +45,17 @@ class LinearInterpolator(NormalInterpolator):
 
     @property
     def normal_error(self):
-        """Error of the differences, ``|P| <= 0.766``."""
+        """Error of the forward differences, with ``|P| <= 0.766``."""
         chord = 2 * np.sin(np.radians(self.gate_angle / 2)) + 4 * CODE_LENGTH_ERROR
         return float(COMPONENT.step * chord + difference_rounding((1 << LENGTH_BITS) - 2))
 
     @property
     def shortest_length(self):
-        """In the middle of a span of the largest angle."""
+        """Length in the middle of a span of the largest angle."""
         return float(np.cos(np.radians(self.gate_angle / 2))) - CODE_LENGTH_ERROR
 
     def operand_error(self, length, degrees):
-        """`difference_rounding`; P times 2^-17 for ``1/(m-1)``."""
+        """`difference_rounding`, plus ``2^-17 |P|`` for the error of ``1/(m-1)``."""
         half = np.radians(degrees) / 2
         return float(difference_rounding(length) + COMPONENT.step * (2 * np.sin(half) + COMPONENT.step))
 
@@ -71,4 +71,4 @@ class LinearInterpolator(NormalInterpolator):
 
 
 METHODS = (LinearInterpolator(),)
-"""Its method."""
+"""The method of this module."""

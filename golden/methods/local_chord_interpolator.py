@@ -10,17 +10,18 @@ __all__ = ["METHODS", "LocalChordInterpolator"]
 
 @dataclass(frozen=True)
 class LocalChordInterpolator(ChordInterpolator):
-    """``N . L`` and ``u = |N - H|^2 / 2`` of each pixel by two additions each, L and H of the pixel's own.
+    """``N . L`` and ``u = |N - H|^2 / 2`` of each pixel by two additions each, with L and H of the pixel.
 
-    A span carries three values of each, computed where positions are known; everything else is that of
-    `ChordInterpolator`.
+    A span carries three values of N·L and three of u, computed where positions are known; everything else is
+    as in `ChordInterpolator`.
 
-    A light that fades, by its distance or as a spot, has a factor a. Its N·L comes with it, ``a N·L``; the
-    specular term is multiplied by a itself, a third quadratic of the light with the words of N·L, at each
-    pixel (`Factor`). Spans are cut until, at every pixel that such a light reaches, a N·L is within
-    `DIFFUSE_BUDGET`; and the errors of a, at most `FACTOR_BUDGET` where the highlight shows, and of u, times
-    the largest a of the span, are within `HIGHLIGHT_BUDGET` together. All of them count times the largest
-    channel of the light's colour, where that is over 1, as a light that fades may be brighter than white.
+    A light that fades, by its distance or as a spot, has a factor a. Its values of N·L are multiplied by a
+    before, ``a N·L``; its specular term is multiplied by a at each pixel (`Factor`), where a is a third
+    quadratic of the light, in the formats of N·L. Spans are cut until three conditions hold at every pixel
+    that such a light reaches: the error of ``a N·L`` is within `DIFFUSE_BUDGET`; where the highlight shows,
+    the error of a is within `FACTOR_BUDGET`; and the errors of a, and of u times the largest a of the span,
+    are together within `HIGHLIGHT_BUDGET`. A light that fades may be brighter than white: all errors are
+    multiplied by the largest channel of its colour, if that is over 1.
 
     Parameters
     ----------
@@ -39,14 +40,14 @@ class LocalChordInterpolator(ChordInterpolator):
         return "chord-local"
 
     def compute(self, normal_left, normal_right, length, direction, halfway, normal_middle=None):
-        """Refused: the normals of a span do not give its position."""
+        """Raise `ValueError`: the normals of a span do not give its position."""
         raise ValueError("the local chord method takes values of its spans, not normals; see compute_values")
 
     def operand_error(self, length, degrees):
-        """That of the setup, for slopes up to 1/2 and squares up to 1/8, and the cut of the results."""
+        """Error of the setup, for slopes up to 1/2 and squares up to 1/8, plus the cut of the results."""
         errors = (f(0.5, 0.125) for f in (self.setup.highlight_error, self.setup.diffuse_error))
         return float(max(errors)) + Specular.ARGUMENT_FORMAT.step
 
 
 METHODS = (LocalChordInterpolator(),)
-"""Its method."""
+"""The method of this module."""

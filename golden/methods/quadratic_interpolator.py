@@ -20,9 +20,9 @@ __all__ = ["METHODS", "PUBLISHED", "QuadraticInterpolator"]
 class QuadraticInterpolator(NormalInterpolator):
     """Normals on a quadratic through the exactly normalised middle normal, for spans to 45 degrees.
 
-    Middle normal, G/P/Q, and then by ``form``: forward differences (setup and accumulator, figures 2.11 and
-    2.10), or the evaluator of figure 2.9 a (``direct``) or b (``horner``). Formats and error bounds are those
-    of the units; nothing is rounded in between.
+    The units are the middle normal, G/P/Q, and, by ``form``, forward differences (setup and accumulator,
+    figures 2.11 and 2.10) or the evaluator of figure 2.9 a (``direct``) or b (``horner``). Formats and error
+    bounds are those of the units; nothing is rounded in between.
 
     Ends must be of unit length to 1/256; longer ones may saturate without a flag.
 
@@ -64,16 +64,16 @@ class QuadraticInterpolator(NormalInterpolator):
 
     @property
     def serves_gate(self):
-        """Not with another fit of the middle normal."""
+        """Whether a highlight gate can be used: only with the default fit of the middle normal."""
         return self.middle_normal == MiddleNormal()
 
     @property
     def normal_error(self):
         """Errors of the middle normal, of the form that evaluates the curve, and of the last rounding.
 
-        For differences: ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|`` for the reciprocal of the length, with
-        |P| <= 0.83 and |G| <= 0.305, and `difference_rounding` at pixel 4094. 4.4 steps of 2^-17 in all with
-        the default middle normal.
+        With forward differences the form adds ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|`` for the reciprocal
+        of the length, with |P| <= 0.83 and |G| <= 0.305, and `difference_rounding` at pixel 4094. The sum is
+        4.4 steps of 2^-17 with the default middle normal.
         """
         middle = np.sqrt(3) * self.middle_normal.error
         if self.form != "differences":
@@ -84,16 +84,16 @@ class QuadraticInterpolator(NormalInterpolator):
 
     @staticmethod
     def _reciprocal_error(p: float, g: float) -> float:
-        """Error from that of ``1/(m-1)``, with P and G of such lengths."""
+        """Error of a normal by the error of ``1/(m-1)``, for lengths p of P and g of G."""
         return 2.0**-17 * p + (2.0**-16 + 2.0**-17 + 2.0**-34) * g
 
     @property
     def shortest_length(self):
-        """``1 - (1-c)^2 s^2 (1 - s^2)`` squared, ``c = cos(psi/2)``: least at ``s^2 = 1/2``."""
+        """Root of the least ``1 - (1-c)^2 s^2 (1 - s^2)``, which is at ``s^2 = 1/2``; ``c = cos(psi/2)``."""
         return float(np.sqrt(1 - (1 - np.cos(np.radians(self.gate_angle / 2))) ** 2 / 4))
 
     def operand_error(self, length, degrees):
-        """As `normal_error`, at the last pixel of the span."""
+        """The sum of `normal_error`, at the last pixel of the span."""
         middle = np.sqrt(3) * self.middle_normal.error
         if self.form != "differences":
             return float(middle + np.sqrt(3) * QuadraticEvaluator(self.form).error)
@@ -116,7 +116,7 @@ METHODS = (
     QuadraticInterpolator(form="direct"),
     QuadraticInterpolator(form="horner"),
 )
-"""Its methods."""
+"""The methods of this module."""
 
 PUBLISHED = (QuadraticInterpolator(middle_normal=MiddleNormal("as_published")),)
-"""The polynomial of [T] 2.2."""
+"""The method with the polynomial of [T] 2.2."""

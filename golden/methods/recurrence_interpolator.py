@@ -1,4 +1,4 @@
-"""The recurrence method ([T] 3.3): cosines of equal steps on the great circle, one product each."""
+"""The recurrence method ([T] 3.3): cosines of equal steps on the great circle, by one product each."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,15 +22,16 @@ class RecurrenceInterpolator(Interpolator):
     """``cos gamma(t) = cos beta cos(lambda - t psi)`` by the recurrence, for L and H of each light.
 
     Formats and error bounds are those of `RecurrenceSetup` and `Recurrence`, whose results have 25 fraction
-    bits here: N·L as it is, ``SQ(2, 25)``, and ``1 - N·H``, ``UQ(1, 25)``, saturated. The error is absolute,
-    whatever the size of 1 - N·H, so an exponent n makes about ``n e`` of an error e at the peak: 3e-7 at 1
-    degree is 0.08 steps of an 8-bit channel at n = 1000, 1.2e-5 at 45 degrees is 3. Spans over 90 degrees are
-    flagged.
+    bits here: N·L unchanged, ``SQ(2, 25)``, and ``1 - N·H``, ``UQ(1, 25)``, saturated. The error e of 1 - N·H
+    does not depend on its size, so that the error of the specular term is about ``n e`` at the peak: at
+    n = 1000, 0.08 LSB for spans of 1 degree (e = 3e-7) and 3 LSB for spans of 45 degrees (e = 1.2e-5). Spans
+    over 90 degrees are flagged.
 
     Parameters
     ----------
     form : str
-        Of the recurrence: ``"reinsch"``, or ``"direct"``, as drawn, which is unstable: see `Recurrence`.
+        Form of the recurrence: ``"reinsch"``, or ``"direct"`` as published, which is unstable; see
+        `Recurrence`.
 
     Source: docs/theory/interpolation.md#recurrence; [T] 3.1, 3.3, figure 3.5.
     """
@@ -53,17 +54,17 @@ class RecurrenceInterpolator(Interpolator):
 
     @property
     def serves_gate(self):
-        """Not with the direct form, which is unstable."""
+        """Whether a highlight gate can be used: not with the direct form, which is unstable."""
         return self.form == "reinsch"
 
     @cached_property
     def setup(self) -> RecurrenceSetup:
-        """Model of the setup, with that of the recurrence."""
+        """Model of the setup; it contains the model of the recurrence."""
         return RecurrenceSetup(Recurrence(self.form, interleave=4, result_format=self.COSINE_FORMAT))
 
     @property
     def highlight_excess(self):
-        """Error of the setup and the recurrence, largest for spans of two pixels; lengths of the codes."""
+        """Error of setup and recurrence, largest for spans of two pixels, plus length errors and cut."""
         if self.form == "direct":
             return 2.0
         length = np.arange(2, 1 << LENGTH_BITS)
@@ -71,7 +72,7 @@ class RecurrenceInterpolator(Interpolator):
         return float(error.max()) + 2 * CODE_LENGTH_ERROR + Specular.ARGUMENT_FORMAT.step
 
     def operand_error(self, length, degrees):
-        """That of the setup and the recurrence."""
+        """Sum of the errors of setup and recurrence."""
         return float(self.setup.error(length, np.radians(degrees)))
 
     def compute(self, normal_left, normal_right, length, direction, halfway):
@@ -80,7 +81,7 @@ class RecurrenceInterpolator(Interpolator):
         shape = (len(span), len(direction.codes))
         results = np.zeros((2, *shape), dtype=np.int64)
         out_of_range = np.zeros(len(length), dtype=bool)
-        # All spans of a call take as many steps as the longest, so those of similar length go together.
+        # A call takes as many steps as its longest span, so spans of similar length are computed together.
         size = np.frexp(length)[1]
         for group in np.unique(size):
             inside = size == group
@@ -99,7 +100,7 @@ class RecurrenceInterpolator(Interpolator):
 
 
 METHODS = (RecurrenceInterpolator(),)
-"""Its method."""
+"""The method of this module."""
 
 PUBLISHED = (RecurrenceInterpolator("direct"),)
-"""Formula 3.3 as it is."""
+"""The method with formula 3.3 as published."""

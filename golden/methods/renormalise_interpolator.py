@@ -16,15 +16,15 @@ __all__ = ["METHODS", "RenormaliseInterpolator"]
 
 @dataclass(frozen=True)
 class RenormaliseInterpolator(NormalInterpolator):
-    """``(1-t) m_l N_l + t m_r N_r``, divided by its length at every pixel: the method the others approximate.
+    """``(1-t) m_l N_l + t m_r N_r``, divided by its length at every pixel: the baseline.
 
-    A span carries the two ends with their lengths, ``1/W`` included, in proportion to the larger one, so that
-    the line between them is the true one on the screen: no span is ever cut. Line setup, accumulator and
+    A span carries the two ends with their lengths, which include ``1/W``, relative to the larger one, so that
+    the line between them is the true one on the screen: no span is cut. Line setup, accumulator and
     renormaliser follow; the specular operand is half the squared chord, in which an error of the normal's
     length counts at second order only.
 
-    A span is flagged where a pixel's vector is under 1/256 of the larger end in every component, which takes
-    nearly opposite ends.
+    A span is flagged if every component of a pixel's vector is under 1/256 of the larger end, which happens
+    only with nearly opposite ends.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class RenormaliseInterpolator(NormalInterpolator):
 
     @property
     def serves_gate(self):
-        """No: a gate takes unit normals."""
+        """``False``: a gate takes unit normals."""
         return False
 
     @property
@@ -63,14 +63,14 @@ class RenormaliseInterpolator(NormalInterpolator):
         return DifferenceAccumulator(self.END_FORMAT, format, format, self.END_FORMAT)
 
     def operand_error(self, length, degrees):
-        """For ends of unit length: the line's error over its length, and that of the renormaliser."""
+        """For ends of unit length: the error of the line over its length, plus that of the renormaliser."""
         shortest = np.cos(np.radians(min(degrees, 170.0)) / 2)
         line = LineSetup.ERROR + np.sqrt(3) * self.END_FORMAT.step
         own = Renormaliser.DIRECTION_ERROR + Renormaliser.LENGTH_ERROR
         return float(2 * (line / shortest + own))
 
     def normals(self, normal_left, normal_right, length):
-        """Bit-accurate normals; of ends in ``SQ(1, 22)``."""
+        """Bit-accurate normals, from ends in ``SQ(1, 22)``."""
         first = LineSetup().compute(normal_left, normal_right, length)
         span, step = pixels_of(length)
         zero = Fixed(first.format, np.zeros_like(first.codes))
@@ -80,4 +80,4 @@ class RenormaliseInterpolator(NormalInterpolator):
 
 
 METHODS = (RenormaliseInterpolator(),)
-"""Its method."""
+"""The method of this module."""
