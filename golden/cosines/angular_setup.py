@@ -19,37 +19,37 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 __all__ = ["SPAN_ANGLES", "AngularSetup"]
 
 SPAN_ANGLES = ("half_chord", "arccos")
-"""Units that may give psi."""
+"""Units that can compute psi."""
 
 
 @dataclass(frozen=True)
 class AngularSetup:
-    """Angles ``psi``, ``lambda``, ``psi/(m-1)`` and ``cos beta`` from ``N_l``, ``N_r`` and a fixed vector H.
+    """``psi``, ``lambda``, ``psi/(m-1)`` and ``cos beta`` from ``N_l``, ``N_r`` and a fixed vector H.
 
-    [T] 3.1 takes psi from arccos and ``tan lambda = (N_r.H - cos psi N_l.H)/(sin psi N_l.H)``. That is 0/0
-    as psi tends to 0, and most spans are narrow. Here, with ``a = N_l.H``, ``b = N_r.H`` and the angle
+    [T] 3.1 takes psi from arccos and ``tan lambda = (N_r.H - cos psi N_l.H)/(sin psi N_l.H)``. This becomes
+    0/0 as psi tends to 0, and most spans are narrow. Here, with ``a = N_l.H``, ``b = N_r.H`` and the angle
     counted from the middle of the span,
 
     - ``cos gamma(t) = x cos((t - 1/2) psi) + y sin((t - 1/2) psi)``,
     - ``x = (a + b)/(2 cos(psi/2))`` and ``y = (b - a)/(2 sin(psi/2))``,
     - ``cos beta = sqrt(x^2 + y^2)``, ``lambda = atan2(y, x) + psi/2``.
 
-    The curve goes through a and b whatever psi is, so an error of y counts times ``sin(psi/2)``: it is small
-    for narrow spans, for which y is inaccurate. Differences of nearly equal numbers are exact, because dot
+    The curve goes through a and b for any psi, so an error of y is multiplied by ``sin(psi/2)``, which is
+    small for narrow spans, where y is inaccurate. Differences of nearly equal numbers are exact, because dot
     products of codes are exact: ``w = |N_r - N_l|^2 = N_l.N_l + N_r.N_r - 2 N_l.N_r`` and ``b - a``. Both
     half-angle functions follow from ``z = w/4 = sin^2(psi/2)``: ``1/(2 cos(psi/2)) = 1/2 + e(z)/2`` with e, a
     small correction, from a table; ``1/(2 sin(psi/2)) = 2^j T(v)`` with T from a table on ``v = z 4^j`` in
-    [1/4, 1), and ``b - a`` shifted by j. psi is that of `HalfChord`; no arccos is needed.
+    [1/4, 1), and ``b - a`` shifted by j. psi comes from `HalfChord`; no arccos is needed.
 
     Beyond 90 degrees ``|N_r + N_l|^2`` takes the role of w, and x and y are exchanged, so that angles from 0
-    to 180 degrees are possible. Opposite normals alone have no plane; the curve then goes through the pole
+    to 180 degrees are possible. Only opposite normals have no plane; the curve then goes through the pole
     ``x = 0``. The closer the angle is to 180 degrees, the more the rounding of the normals rotates the plane,
     in proportion to ``1/sin psi``: spans over 150 degrees are flagged, by the comparison
     ``|N_r + N_l|^2 < 4 cos^2(75 degrees)``. Its limit is lowered by the largest error of rounding, so that
     all spans from 150.01 degrees on are flagged.
 
-    Polar coordinates come from 22 steps of CORDIC; shifts and additions divide by its gain. A span of one
-    pixel gets ``psi/(m-1) = psi``, which no unit reads.
+    Polar coordinates come from 22 steps of CORDIC, whose gain is divided out by shifts and additions. A span
+    of one pixel gets ``psi/(m-1) = psi``, which no unit reads.
 
     ============ ============ ====================================================================
     word         format       why
@@ -66,15 +66,15 @@ class AngularSetup:
     cos beta     UQ(1, 25)    over 1 only where normals of unequal length are few steps apart
     ============ ============ ====================================================================
 
-    Error of cos gamma(t) at any pixel: `error`. It compares the exact cosine of the angles that the setup
-    gives with the formula above in exact arithmetic on the same codes. Largest found: 5e-7 up to 0.1
-    degrees, 9e-7 at 1, 3e-6 at 10, 1.3e-5 at 45, 3.3e-5 from 90 degrees on.
+    `error` bounds the error of cos gamma(t) at any pixel: the exact cosine of the setup's angles, against the
+    formula above in exact arithmetic on the same codes. The largest errors found are 5e-7 up to 0.1 degrees,
+    9e-7 at 1, 3e-6 at 10, 1.3e-5 at 45, 3.3e-5 from 90 degrees on.
 
     **By arccos**, as published: ``angle="arccos"`` takes psi from `Arccos` of ``r = N_l.N_r``, divided by
     `ONE_SQUARED` as ``r + r/2^16`` and rounded to SQ(2, 16). psi is rounded to UQ(2, 15) radians and
-    converted to turns by a product with ``1/(2 pi)`` in UQ(-2, 19), of which ``psi/(m-1)`` reads the first 17
-    bits. x and y are those above (the published ``tan lambda`` is 0/0 for equal normals), so that the only
-    further error is that of arccos: `arccos_error`. Largest error of cos gamma found, by the span angle in
+    converted to turns by a product with ``1/(2 pi)`` in UQ(-2, 19); ``psi/(m-1)`` reads the first 17 bits of
+    the product. x and y are those above (the published ``tan lambda`` is 0/0 for equal normals), so that only
+    the error of arccos is added: `arccos_error`. Largest error of cos gamma found, by the span angle in
     degrees:
 
     ==================== ====== ====== ====== ======
@@ -86,12 +86,12 @@ class AngularSetup:
     arccos, as published 0.088  0.078  0.045  5.0e-4
     ==================== ====== ====== ====== ======
 
-    The vectors must be of unit length but for their rounding; words of other vectors saturate or wrap.
+    The vectors must be of unit length, except for rounding; words of other vectors saturate or wrap.
 
     Parameters
     ----------
     angle : str
-        Unit that gives psi, one of `SPAN_ANGLES`.
+        Unit that computes psi, one of `SPAN_ANGLES`.
     arccos : Arccos
         Arccos unit for ``angle="arccos"``.
 
@@ -143,6 +143,8 @@ class AngularSetup:
     def error(angle: np.ndarray) -> np.ndarray:
         """Bound of the error of cos gamma with the half chord, by the span angle in degrees.
 
+        It is the sum of these errors:
+
         - x: the errors of the correction (fit 2.5e-7, table 2^-22, rounding 2^-19), times at most 1, and the
           cut of its factor, 2^-18 times 0.42.
         - y: the rounding of its factor, 2^-17, and twice the errors of T (fit 2.9e-6, table 2^-22, rounding
@@ -169,12 +171,12 @@ class AngularSetup:
     def arccos_error(self, angle: float) -> float:
         """Bound of the error of cos gamma with ``angle="arccos"``, for one span angle in degrees.
 
-        The sum of `error`; half the error of psi at either end, times cos beta; and the rounding of psi for
-        its step, 2^-19 turns. cos beta is at most 1, plus, for lengths that differ by 2^-17, that difference
-        over the chord, in all up to sqrt 2. The cosine is off by 2^-17, its rounding, and by 2^-18 for either
-        length. psi is off by the difference that this makes in arccos; by the largest model error of the
-        segments that such a cosine may belong to, and their arithmetic error; by 2^-16 for its last rounding;
-        and by a relative ``2^-20 2 pi`` for the rounding of ``1/(2 pi)``.
+        It is the sum of `error`; half the error of psi at either end, times cos beta; and the rounding of psi
+        for its step, 2^-19 turns. cos beta is at most 1 plus the difference of the lengths, 2^-17, over the
+        chord, and at most sqrt 2. The error of the cosine is 2^-17 by its rounding plus 2^-18 by each length.
+        The error of psi is the sum of the change that this makes in arccos; the largest model error and
+        arithmetic error of the segments in which the cosine may be; 2^-16 by the last rounding; and a
+        relative ``2^-20 2 pi`` by the rounding of ``1/(2 pi)``.
 
         Parameters
         ----------
@@ -210,7 +212,7 @@ class AngularSetup:
     def reciprocals(self) -> tuple[Fixed, Fixed]:
         """Table of T for v from 0 to 1, ``1/(2 sqrt(v one))``, with the fall to the next word.
 
-        Only ``w = 0`` reads the words for v below 1/4; they are 0.
+        Words for v below 1/4 are 0; they are read only if ``w = 0``.
         """
         one = float(ONE_SQUARED.values)
         start = np.arange(1 << self.ADDRESS_BITS) / (1 << self.ADDRESS_BITS)
@@ -233,7 +235,7 @@ class AngularSetup:
         value_format: Format,
         change_format: Format,
     ) -> tuple[Fixed, Fixed]:
-        """Lines of nearly least maximum error: chords of a convex function, lowered by half the sagitta."""
+        """Lines of nearly least maximum error, start and change: chords, lowered by half the sagitta."""
         low, middle, high = (function(start + width * part) for part in (0, 0.5, 1))
         value = np.clip(low - ((low + high) / 2 - middle) / 2, 0, value_format.max_code * value_format.step)
         return Fixed.round(value_format, value), Fixed.round(change_format, np.abs(high - low))
@@ -315,7 +317,7 @@ class AngularSetup:
         return angle, phase, step, cos_beta, out_of_range
 
     def _by_arccos(self, cross: Fixed) -> Fixed:
-        """Psi in turns by arccos, from the exact dot product of the normals."""
+        """Angle psi in turns by arccos, from the exact dot product of the normals."""
         cosine = Fixed(cross.format, cross.codes + (cross.codes >> 16)).round_half_up(16)
         radians, _ = self.arccos.compute(cosine.saturate(Arccos.OPERAND_FORMAT))
         radians = radians.round_half_up(15).saturate(self.RADIANS_FORMAT)

@@ -29,7 +29,7 @@ PUBLISHED_COEFFICIENTS = np.array(
 )
 """[T] table 3.1 as published: ``c0, c1, c2`` of ``arccos x = c0 + c1 x + c2 x^2``, one row a segment.
 
-There the columns are headed A, B, C; 74.547 is a misprint of 74.457.
+The published columns are A, B, C; 74.547 is a misprint of 74.457.
 """
 
 
@@ -62,9 +62,9 @@ class Arccos:
     [0.96, 1]    0.174         0.084      0.019
     ============ ============= ========== =========
 
-    Near x = 1, where the normals of a smooth mesh are, arccos behaves like a square root, and no polynomial
-    in x follows it. Besides, rounding x to 16 bits costs 2.5 % of an angle of 1 degree before the unit
-    begins. `HalfChord` avoids both, and `AngularSetup` uses it.
+    Near x = 1, the usual case in a smooth mesh, arccos behaves like a square root, and no polynomial in x
+    fits it. Besides, the rounding of x to 16 bits alone is an error of 2.5 % for an angle of 1 degree.
+    `HalfChord` avoids both, and `AngularSetup` uses it.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class Arccos:
         )
         coefficients = self.coefficients.copy()
         if self.table == "refitted":
-            # The coarsest word first: the following fits compensate its rounding error.
+            # The coarsest word is rounded first: the following fits compensate its rounding error.
             for segment in range(5):
                 held = {}
                 for power in (2, 1, 0):

@@ -15,20 +15,20 @@ __all__ = ["Chord"]
 class Chord:
     """Half the squared chord ``u = |a - b|^2 / 2``; for unit vectors ``1 - a . b``.
 
-    If the length of a vector is off by e, the dot product is off by e, the chord by ``e^2/2 + e u`` only.
-    Near u = 0 the chord is not a difference of nearly equal numbers.
+    A length error e of a vector is an error e of the dot product, but of u only ``e^2/2 + e u``. Near u = 0
+    the formula is not a difference of nearly equal numbers.
 
     ========== ========== =======================================================================
     word       format     why
     ========== ========== =======================================================================
     a - b      SQ(1, 17)  multiplier operand; where a component is 1 or more all three are halved
     u          UQ(2, 35)  saturates
-    operand    UQ(1, 25)  of the specular unit; cut, saturates
+    operand    UQ(1, 25)  operand of the specular unit; cut, saturates
     ========== ========== =======================================================================
 
-    u is exact where all components of ``a - b`` are under 1, which is always so for u < 1/2. Elsewhere
-    halving cuts up to half a step of each component, and u is off by at most
-    ``sqrt(3) 2^-17 |a - b| + 3 * 2^-35``, 2.7e-5 for unit vectors.
+    u is exact if all components of ``a - b`` are under 1, which always holds for u < 1/2. Else halving cuts
+    up to half a step of each component, and the error of u is at most ``sqrt(3) 2^-17 |a - b| + 3 * 2^-35``,
+    2.7e-5 for unit vectors.
 
     Source: docs/theory/chord.md#the-chord; [Lyon93].
     """

@@ -14,11 +14,11 @@ __all__ = ["ChordSetup", "Differences", "SpanValues", "largest_span_angle"]
 
 
 def largest_span_angle(exponent: int) -> float:
-    """Widest span, in degrees, that the quadratic fit shades well: ``min(15, 20 n^(-1/6))``.
+    """Widest span, in degrees, for which the quadratic fit is good: ``min(15, 20 n^(-1/6))``.
 
-    The fit differs from exactly normalised interpolation by about ``c sqrt(n) psi^3`` LSB in the specular
-    term, at most 0.25 LSB at this angle, and by at most 0.12 LSB in the diffuse term, at full reflection,
-    where the lengths of the two normals, before they are normalised, are nearly equal.
+    At full reflection the fit differs from exactly normalised interpolation by about ``c sqrt(n) psi^3`` LSB
+    in the specular term, at most 0.25 LSB at this angle, and by at most 0.12 LSB in the diffuse term. This
+    holds if the lengths of the two normals, before they are normalised, are nearly equal.
 
     Parameters
     ----------
@@ -36,8 +36,7 @@ class SpanValues(NamedTuple):
     Parameters
     ----------
     diffuse, highlight : int64 arrays, shape (spans, lights, 3)
-        Codes of N·L and of ``u = |N - H|^2 / 2`` in the formats of `ChordSetup`, in units of `ONE_SQUARED`,
-        as in all units.
+        Codes of N·L, ``SQ(1, 25)``, and of ``u = |N - H|^2 / 2``, ``UQ(1, 26)``, in units of `ONE_SQUARED`.
     """
 
     diffuse: np.ndarray
@@ -52,7 +51,7 @@ class SpanValues(NamedTuple):
         diffuse, highlight : float64 arrays, shape (spans, lights, 3)
             N·L, -1 to 1, and u, 0 to 2.
         scale : int
-            s: over 0, the words of u are ``min(2^s u, 1)``; see `ChordValues`.
+            s: if over 0, the words of u are ``min(2^s u, 1)``; see `ChordValues`.
 
         Raises
         ------
@@ -69,7 +68,7 @@ class SpanValues(NamedTuple):
 
 
 class Differences(NamedTuple):
-    """Start value and first two differences of a quadratic, each a Fixed of shape (spans, lights)."""
+    """Start value, first and second difference of a quadratic, each a Fixed of shape (spans, lights)."""
 
     start: Fixed
     first: Fixed
@@ -87,15 +86,15 @@ class ChordSetup:
     ``G = 2 (v_l + v_r - 2 v_m)`` and ``P = v_r - v_l - G``.
 
     P is the *slope* at t = 0 and G the *curvature*, half the second derivative. The first difference is
-    ``P dt + G dt^2``, the second ``2 G dt^2``, with dt and dt^2 of `step_words`. Five products a light and
-    one a span, all of 18 bits or less.
+    ``P dt + G dt^2``, the second ``2 G dt^2``, with dt and dt^2 from `step_words`. This takes five products a
+    light and one a span, all of 18 bits or less.
 
     ============ ============ =====================================================================
     word         format       why
     ============ ============ =====================================================================
     u            UQ(1, 26)    given; half a step costs ``1.25 n 255 2^-27``, 0.0024 LSB at n = 1000
     f            SQ(1, 25)    given; as many fraction bits as the N·L of a pixel
-    a            SQ(1, 25)    given, of lights that fade; all its words are those of f
+    a            SQ(1, 25)    given, for lights that fade; all formats of f hold for a
     G            SQ(-2, 20)   multiplier operand; saturates
     P of u       SQ(0, 26)    exact, two words of 18 and 8 bits: every bit counts at the end of a span;
                               saturates
@@ -108,8 +107,8 @@ class ChordSetup:
     wraps: u_l is in [0, 2), f_l in [-1, 1), and the curve of any span, flagged or not, is at most
     ``|P| + |G|``, 5/8, away from its start; the sums hold -4 to 4.
 
-    Error of u at any pixel against the quadratic through the exact values: `highlight_error`; of f:
-    `diffuse_error`.
+    `highlight_error` and `diffuse_error` bound the errors of u and f at any pixel against the quadratic
+    through the exact values.
 
     Parameters
     ----------
@@ -142,7 +141,7 @@ class ChordSetup:
         Raises
         ------
         ValueError
-            If it is not 0 to `MOST_SCALE`.
+            If the scale is not 0 to `MOST_SCALE`.
         """
         if scale not in range(cls.MOST_SCALE + 1):
             raise ValueError(f"scale must be 0 to {cls.MOST_SCALE}, not {scale}")
@@ -191,9 +190,9 @@ class ChordSetup:
         Returns
         -------
         diffuse, highlight : Differences
-            Of f and of u.
+            Differences of f and of u.
         factor : Differences
-            Of a, where it is given.
+            Differences of a, only if ``factor`` is given.
         out_of_range : bool array, shape (spans,)
             Whether P or G of the span does not fit its word; the differences are then invalid.
 
@@ -231,9 +230,9 @@ class ChordSetup:
     def highlight_error(self, slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
         """Largest error of u at any pixel of a span that is not flagged, against the exact quadratic.
 
-        In units of `ONE_SQUARED`, as u is. The three values are off by half a step, which the quadratic
-        multiplies by at most 1.25. The rounding of G, 2^-21, does not move the ends and counts as
-        ``t (1 - t)``, at most a quarter of it. The rest is `walk_error`.
+        In units of `ONE_SQUARED`, like u. The error of the three values is half a step, which the quadratic
+        multiplies by at most 1.25. The rounding of G, 2^-21, does not move the ends and is multiplied by
+        ``t (1 - t)``, at most 1/4. The rest is `walk_error`.
 
         Parameters
         ----------
@@ -243,7 +242,7 @@ class ChordSetup:
         return 1.25 * self.HIGHLIGHT_FORMAT.step / 2 + 2.0**-23 + self.walk_error(slope, curvature)
 
     def diffuse_error(self, slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
-        """Largest error of f, as `highlight_error` of u; the rounding of P adds 2^-19.
+        """Largest error of f, like `highlight_error` for u; the rounding of P adds 2^-19.
 
         Parameters
         ----------
@@ -254,9 +253,9 @@ class ChordSetup:
         return rounding + self.walk_error(slope, curvature)
 
     def walk_error(self, slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
-        """Error at the end of a span that dt and the rounding of the differences cause, for `longest` pixels.
+        """Error at the end of a span of `longest` pixels by dt and by the rounding of the differences.
 
-        ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|`` for dt, ``2^-fraction_bits (k + k^2/2)`` for the drift.
+        It is ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|`` by dt and ``2^-fraction_bits (k + k^2/2)`` by drift.
 
         Parameters
         ----------
@@ -269,7 +268,7 @@ class ChordSetup:
 
     @staticmethod
     def steps(length: np.ndarray) -> tuple[Fixed, np.ndarray, Fixed, np.ndarray]:
-        """Words of ``dt = 2 reciprocal 2^-shift`` and ``dt^2 = 4 square 2^-square_shift`` for all lights.
+        """Words of `step_words` for dt and dt^2, with an axis for the lights.
 
         Parameters
         ----------
@@ -282,7 +281,7 @@ class ChordSetup:
         shift : int64 array
         square : Fixed
         square_shift : int64 array
-            Of `step_words`, in shape (spans, 1).
+            As by `step_words`, each of shape (spans, 1).
         """
         reciprocal, shift, square, square_shift = step_words(length)
         return (
@@ -310,7 +309,7 @@ class ChordSetup:
             Value at t = 0, in any format; P in `SLOPE_FORMAT` or `DIFFUSE_SLOPE_FORMAT`; G in
             `CURVATURE_FORMAT`.
         reciprocal, shift, square, square_shift
-            As `steps` gives them.
+            Results of `steps`.
         """
         first_order = slope * reciprocal
         if slope.format.width > self.HIGH_FORMAT.width:

@@ -1,4 +1,4 @@
-"""Chord values: N·L and half the squared chord from N to H of a normal, for every light."""
+"""Chord values: N·L and half the squared chord from a normal N to H, for every light."""
 
 from dataclasses import dataclass
 
@@ -17,8 +17,8 @@ __all__ = ["ChordValues"]
 class ChordValues:
     """``f = N·L`` and ``u = |N - H|^2 / 2`` of a unit normal, in the formats of `ChordSetup`.
 
-    f is the exact dot product and u that of `Chord`; both are rounded half up, and saturate. Six products a
-    light, three without highlights.
+    f is the exact dot product and u comes from `Chord`; both are rounded half up, and saturate. This takes
+    six products a light, three without highlights.
 
     ====== ========== ==========================================
     word   format     why
@@ -27,14 +27,14 @@ class ChordValues:
     u      UQ(1, 26)  rounded from 35 fraction bits; 2 saturates
     ====== ========== ==========================================
 
-    Against the exact values of the vectors' directions, in units of `ONE_SQUARED`: `diffuse_error` and
-    `highlight_error`.
+    `diffuse_error` and `highlight_error` bound the errors against the exact values of the vectors'
+    directions, in units of `ONE_SQUARED`.
 
     Parameters
     ----------
     scale : int
-        s, 0 to `ChordSetup.MOST_SCALE`. Over 0, the word of u is ``min(2^s u, 1)``, for lobes that are 0 from
-        ``u = 2^-s`` on: it has s bits more of a small u, for wires.
+        s, 0 to `ChordSetup.MOST_SCALE`. If over 0, the word of u is ``min(2^s u, 1)``, for lobes that are 0
+        from ``u = 2^-s`` on: a small u keeps s bits more, at the cost of wires alone.
 
     Raises
     ------
@@ -84,16 +84,16 @@ class ChordValues:
 
     @classmethod
     def diffuse_error(cls) -> float:
-        """Largest error of f: with d for that of a vector's length, ``2 d + d^2``, and half a step."""
+        """Largest error of f: ``2 d + d^2`` by the length error d of a vector, plus half a step."""
         d = CODE_LENGTH_ERROR
         return 2 * d + d**2 + cls.DIFFUSE_FORMAT.step / 2
 
     @classmethod
     def highlight_error(cls, u: float) -> float:
-        """Largest error of u near a value.
+        """Largest error of u up to a value.
 
-        ``(d_N - d_H)^2 / 2 + (d_N + d_H) u`` of the lengths, half a step, and from ``u = 1/2`` on the cut of
-        `Chord`; 2 itself saturates, which costs a step more.
+        It is ``(d_N - d_H)^2 / 2 + (d_N + d_H) u`` by the length errors of N and H, plus half a step, plus a
+        step for u = 2, which saturates, plus from ``u = 1/2`` on the cut of `Chord`.
 
         Parameters
         ----------

@@ -16,17 +16,17 @@ __all__ = ["HalfChord"]
 class HalfChord:
     """Angle ``psi = 2 arcsin(|N_r - N_l|/2)`` in turns, from the squared chord ``w = |N_r - N_l|^2``.
 
-    The well-conditioned form of arccos. ``sqrt(1 - x) poly(x)`` is well-conditioned, too, but loses the
-    precision of its input: at 1 degree ``1 - x`` is 1.5e-4, and the length of either quantised normal moves
-    ``x = N_l . N_r`` by up to 2^-18, the two together by 5 % of ``1 - x``. The chord only moves by the
+    This is the well-conditioned form of arccos. ``sqrt(1 - x) poly(x)`` is well-conditioned, too, but its
+    input is imprecise: at 1 degree ``1 - x`` is 1.5e-4, and the length error of each quantised normal changes
+    ``x = N_l . N_r`` by up to 2^-18, both together by 5 % of ``1 - x``. The chord changes only by the
     rounding of the components, and ``w = N_l . N_l + N_r . N_r - 2 N_l . N_r`` is exact.
 
     ``z = w/4`` is shifted by an even number of bits to ``v = z 4^j`` in [1/4, 1). ``s = sqrt(v)`` is read
     from a table of 512 words with linear interpolation, and ``psi = 2^-(j+1) s g(z)`` with
     ``g(z) = 2 arcsin(sqrt z)/(pi sqrt z) = 2/pi + z (c1 + z (c2 + z (c3 + z c4)))``, exact at angle 0 and
     fitted up to 90 degrees. For larger angles the caller gives the squared chord to the opposite vector,
-    ``|N_r + N_l|^2``, and sets ``supplement``: the result is then half a turn less the angle. So angles from
-    0 to 180 degrees are possible, and the result is well-conditioned at both ends.
+    ``|N_r + N_l|^2``, and sets ``supplement``: the result is then half a turn minus the angle of that chord.
+    So angles from 0 to 180 degrees are possible, and the result is well-conditioned at both ends.
 
     ============ ============ ==================================================================
     word         format       why
@@ -81,7 +81,7 @@ class HalfChord:
     def roots(self) -> tuple[Fixed, Fixed]:
         """Table of the square root: value at the start of each of 512 segments of [0, 1), and slope.
 
-        Each line is the one of least maximum error. Only ``w = 0`` reads the first 128 words; they are 0.
+        Each line has the least maximum error. The first 128 words are 0; they are read only if ``w = 0``.
         """
         size = 1 << self.ADDRESS_BITS
         start = np.arange(size) / size

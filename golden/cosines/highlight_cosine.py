@@ -17,12 +17,12 @@ class HighlightCosine:
     N(t) moves along a great circle. beta is the angle between the plane of this circle and H, and lambda the
     angle from N_l to the projection of H onto the plane. One signed accumulator counts
     ``theta = lambda - t psi`` down in turns. It passes through zero if the highlight is inside the span, so
-    that one pass is enough; [T] has two. With the light vector for H the unit gives the diffuse term.
+    that one pass is enough; [T] has two. With the light vector L in place of H the result is ``1 - N·L``.
 
     The table holds ``v = 1 - cos`` for a quarter of the wave. With theta folded into the quarter,
     ``1 - cos gamma = (1 - cos beta) + cos beta v`` in the half turn about the highlight and
-    ``(1 + cos beta) - cos beta v`` in the other half. So the result is most accurate where it is small, which
-    matters for high exponents: below ``v = 1/32`` (14 degrees) the multiplier gets all bits of v.
+    ``(1 + cos beta) - cos beta v`` in the other half turn. So the result is most accurate where it is small,
+    which high exponents need: below ``v = 1/32`` (14 degrees) the multiplier gets all bits of v.
 
     ============== ============= ====================================================================
     word           format        why
@@ -37,19 +37,20 @@ class HighlightCosine:
     result         UQ(1, 25)     ``1 - cos gamma`` for the specular unit; saturates
     ============== ============= ====================================================================
 
-    Arithmetic error of the result for exact operands and cos beta up to 1: `NEAR_ERROR` where v is under
-    1/32, else `ERROR`. Both include the fit of the table (``0.0858 h^2`` in its first segment, ``h^2/16`` in
-    the others, with ``h = pi/1024``), three roundings of 2^-23 (value, rise, their sum), the cut of theta to
-    2^-25 turns, and the last rounding, 2^-26. Below 1/32 the rounding of cos beta, 2^-17, counts times 1/32.
-    Above it counts times v, and v itself is rounded by 2^-18, or by 2^-17 where it would round up to 1.
+    The arithmetic error of the result, for exact operands and cos beta up to 1, is at most `NEAR_ERROR` if v
+    is under 1/32, else `ERROR`. Both include the fit of the table (``0.0858 h^2`` in its first segment,
+    ``h^2/16`` in the others, with ``h = pi/1024``), three roundings of 2^-23 (value, rise, their sum), the
+    cut of theta to 2^-25 turns, and the last rounding, 2^-26. The rounding of cos beta, 2^-17, is multiplied
+    by at most 1/32 below v = 1/32, and by v above, where v itself is rounded by 2^-18, or by 2^-17 where it
+    would round up to 1.
 
     Parameters
     ----------
     address_bits : int
         Address bits of the table, 4 to 12: it has ``2**address_bits`` words.
     interpolated : bool
-        Linear interpolation between the words. Without it, as published, the table is off by ``h/2``, 0.0015
-        with 512 words; the bounds above are those of 512 words with interpolation.
+        Whether there is linear interpolation between the words. Without it, as published, the error of the
+        table is ``h/2``, 0.0015 with 512 words. The bounds above are those of 512 words with interpolation.
 
     Raises
     ------
@@ -104,7 +105,7 @@ class HighlightCosine:
         steepest = np.arcsin(rise / width)
         sagitta = low + (steepest - start) * rise / width - (1 - np.cos(steepest))
         value = low - sagitta / 2
-        # Of the lines through 0, the one with 2 (sqrt 2 - 1) of the chord's rise has the least maximum error.
+        # The line through 0 of least maximum error has 2 (sqrt 2 - 1) times the rise of the chord.
         value[0], rise[0] = 0, rise[0] * 2 * (np.sqrt(2) - 1)
         return Fixed.round(self.TABLE_VALUE_FORMAT, value), Fixed.round(self.rise_format, rise)
 
@@ -142,7 +143,7 @@ class HighlightCosine:
                 f"not {phase.format}, {step.format}, {cos_beta.format}"
             )
         theta = phase.codes[span] - np.asarray(index, dtype=np.int64) * step.codes[span]
-        # Inverted bits take the place of the negative, which needs a carry: 2^-40 turns off.
+        # Inverted bits stand for the negative, which would need a carry: an error of 2^-40 turns.
         bits = theta & ((1 << 40) - 1)
         magnitude = np.where(bits >> 39 > 0, ~bits, bits) & ((1 << 39) - 1)
         back = magnitude >> 38 > 0

@@ -24,7 +24,7 @@ def shortcut_cosine(angle: np.ndarray, steps: np.ndarray) -> np.ndarray:
     angle : array
         psi in radians.
     steps : array
-        m.
+        Number of steps m.
 
     Source: docs/theory/interpolation.md#recurrence; [T] 3.3.
     """
@@ -36,12 +36,12 @@ class Recurrence:
     """Cosines ``x(k) = A cos(phase - k d)`` for k = 0 ... m - 1, by one product a pixel.
 
     ``direct``, as published: ``x(k+1) = 2 cos(d) x(k) - x(k-1)``. The coefficient is near 2, so its rounding
-    is large against ``2 - 2 cos d``, the small number that gives the curve its curvature: the form is
+    error is large compared with ``2 - 2 cos d``, the small number that is the curvature: the form is
     **unstable** in short words.
 
     ``reinsch``: ``D(k) = D(k-1) - K 2^(2-s) x(k)``, ``x(k+1) = x(k) + D(k)``, from ``D(0) = x(1) - x(0)``,
-    with ``K 2^(2-s) = 4 sin^2(d/2)``. The small number has a floating scale of its own, and the state has
-    guard bits, which cost adders but no multiplier.
+    with ``K 2^(2-s) = 4 sin^2(d/2)``. The small number has its own shift s, and the state has guard bits,
+    which cost adders but no multiplier.
 
     F is ``fraction_bits`` and E ``guard_bits``; with the defaults multiplier operands have 18 bits:
 
@@ -63,15 +63,16 @@ class Recurrence:
     With shorter words the cuts add up: with 8 and 10 bits, spans of very small steps wrap after about 1300
     pixels.
 
-    Error of the result, at most `error`. An error e of one step is ``e sin(j d)/sin d`` after j more steps,
-    at most ``j e``, so that the errors of a span of m pixels add up to ``(m-1)(m-2)/2`` times the largest
-    one.
+    The error of the result is at most `error`. An error e of one step becomes ``e sin(j d)/sin d`` after j
+    more steps, at most ``j e``, so that the errors of a span of m pixels add up to at most ``(m-1)(m-2)/2``
+    times the largest one.
 
-    - In ``reinsch`` one step is off by ``4 sin^2(d/2) 2^-F`` (K by a relative 2^-(F+1), the operand by
+    - In ``reinsch`` the error of a step is ``4 sin^2(d/2) 2^-F`` (by K a relative 2^-(F+1), by the operand
       2^-(F+1)). These errors add up to at most ``psi^2/2 2^-F``, psi = (m - 1) d, **for any length**. The
-      cut, 2^-(F+E), adds up to 4.8e-7 in 4095 pixels.
-    - In ``direct`` one step is off by 2^-F for the cut coefficient and 2^-(F+1) for the rounding, however
-      small d is: 0.05 after 64 pixels; from 300 pixels on there is no bound below 3, that of the words.
+      cuts, 2^-(F+E) each, add up to 4.8e-7 in 4095 pixels.
+    - In ``direct`` the error of a step is 2^-F by the cut coefficient plus 2^-(F+1) by the rounding, even if
+      d is small. This adds up to 0.05 after 64 pixels; from 300 pixels on the only bound is 3, by the range
+      of the words.
 
     With the peak at 0.79 of the span, the largest errors of ``direct`` (with its coefficient cut) in the four
     published cases are 0.015, 0.40, 0.40 and 1.5e-3; those of ``reinsch`` with 20 guard bits are at most
@@ -81,17 +82,17 @@ class Recurrence:
     **Interleaved**, for one pixel a cycle: the product in the loop takes several cycles, so that four
     recurrences share the loop. Phase j has the pixels j, j + 4, j + 8, ...:
     ``x(k+4) = 2 cos(4d) x(k) - x(k-4)``, the same recurrence with a step of 4d and its own start values. A
-    phase has ``ceil(m/4)`` pixels, 4d apart, and `error` is the bound of these: the same ``psi^2/2 2^-F``, a
-    sixteenth of the drift by cuts (3.0e-8), and a sixteenth of the growth of ``direct``. The coefficient is
-    read from pixel 8 on and the second values from pixel 4 on, so 4d is limited to 90 degrees: in a span of
-    up to 90 degrees a larger 4d is never read. In wider spans of more than 4 pixels d must be at most 22.5
-    degrees.
+    phase has ``ceil(m/4)`` pixels, 4d apart, and `error` bounds their error: the same ``psi^2/2 2^-F``, a
+    sixteenth of the drift by cuts (3.0e-8), and a sixteenth of the growth of ``direct``. 4d is limited to 90
+    degrees. In spans of up to 90 degrees this has no effect, as the coefficient is read from pixel 8 on and
+    the second values from pixel 4 on, where 4d is at most 90 degrees. In wider spans of more than 4 pixels d
+    must be at most 22.5 degrees.
 
-    A setup has two ways to the start values. From x(0), D(0) and the coefficient of d, by seven steps of the
-    recurrence itself (`prologue`), in the loop of ``interleave`` 1; these steps add at most `prologue_error`,
-    no part of which grows with the square of the length. Or from 17-bit cosines and sines, as the
-    highlight-cosine unit gives them: ``D = 2 sin(2d) A sin(phase - (j+2) d)`` is a small number times a
-    sine, so that an error e of the sine counts as ``psi e`` at the end of the span.
+    A setup can compute the start values in two ways. One takes x(0), D(0) and the coefficient of d, and seven
+    steps of the recurrence with ``interleave`` 1 (`prologue`); these steps add at most `prologue_error`, of
+    which no part grows with the square of the length. The other takes 17-bit cosines and sines, such as those
+    of the highlight-cosine unit: ``D = 2 sin(2d) A sin(phase - (j+2) d)`` is a small number times a sine, so
+    that an error e of the sine becomes ``psi e`` at the end of the span.
 
     Parameters
     ----------
@@ -102,8 +103,8 @@ class Recurrence:
     guard_bits : int
         E, 10 to 28, in ``reinsch`` only.
     interleave : int
-        Phases: 1, as published, or 4. With 1 a span has two start values for each cosine instead of eight,
-        and there are registers for one phase only; 4 gives a pixel a cycle.
+        Number of phases: 1, as published, or 4. With 1 a span has two start values for each cosine in place
+        of eight, and there are registers for one phase only; with 4 there is a pixel a cycle.
     result_format : Format
         Format of the cosines; with 25 fraction bits the last rounding is negligible.
 
@@ -153,7 +154,7 @@ class Recurrence:
 
     @property
     def curvature_format(self) -> Format:
-        """Format of ``4 sin^2(d/2) x`` of ``reinsch`` before it is shifted right and while it is."""
+        """Format of ``4 sin^2(d/2) x`` in ``reinsch``, before and during the right shift."""
         state, product = self.state_format.fraction_bits, 2 * self.fraction_bits - 1
         return SQ(4, max(state, product))
 
@@ -170,7 +171,7 @@ class Recurrence:
         Returns
         -------
         float64 array
-            3 where the only bound of ``direct`` is that of its words.
+            3 if the range of the words is the only bound of ``direct``.
         """
         steps, angle = self._phase_span(length, angle)
         sums = steps * np.maximum(steps - 1, 0) / 2
@@ -197,9 +198,9 @@ class Recurrence:
         """Bound of the error that start values from `prologue` add to `error`, for spans up to 90 degrees.
 
         For ``reinsch``. A step adds at most ``b = 4 sin^2(d/2) 2^-F + 2^-(F+E)`` to the error of the
-        difference, whose first value is rounded by ``e = 2^-(F+E+1)``. So x(j) is off by
-        ``b j (j-1)/2 + (j+1) e``, and ``x(j+4) - x(j)``, a sum of four differences, by ``b (4j + 6) + 4 e``,
-        which counts once for every step of its phase.
+        difference, whose first value has a rounding error of ``e = 2^-(F+E+1)``. So the error of x(j) is
+        ``b j (j-1)/2 + (j+1) e``, and that of ``x(j+4) - x(j)``, a sum of four differences,
+        ``b (4j + 6) + 4 e``, which every step of the phase adds once more.
 
         Parameters
         ----------
@@ -214,7 +215,7 @@ class Recurrence:
         return 1.09 * (3 * error + 2 * cut) + steps * (18 * error + 2 * cut)
 
     def coefficient(self, step: np.ndarray) -> tuple[Fixed, np.ndarray]:
-        """Coefficient of a step, as the recurrence unit takes it.
+        """Coefficient for a step d, in the format of the recurrence unit.
 
         Parameters
         ----------
@@ -224,7 +225,7 @@ class Recurrence:
         Returns
         -------
         coefficient : Fixed, same shape, `coefficient_format`
-            K, or ``-2 cos d``; if interleaved, of 4d, up to 90 degrees.
+            K, or ``-2 cos d``; if interleaved, for 4d, up to 90 degrees.
         shift : int array, same shape
             s, 0 to 47; 0 in ``direct``.
 
@@ -249,7 +250,7 @@ class Recurrence:
         return Fixed(format, codes >> full), shift - full
 
     def start(self, amplitude: np.ndarray, phase: np.ndarray, step: np.ndarray) -> tuple[Fixed, Fixed]:
-        """First value, and second value or first difference, as the recurrence unit takes them.
+        """First value, and second value or first difference, in the format of the recurrence unit.
 
         Parameters
         ----------
@@ -259,8 +260,9 @@ class Recurrence:
         Returns
         -------
         first, second : Fixed, `state_format`
-            ``x(0)``; ``x(1)`` in ``direct``, ``x(1) - x(0)`` in ``reinsch``. If interleaved, with one more
-            axis for the four phases: ``x(j)``; ``x(j+4)``, or ``x(j+4) - x(j)``.
+            First is ``x(0)``; second is ``x(1)`` in ``direct``, ``x(1) - x(0)`` in ``reinsch``. If
+            interleaved, there is one more axis for the four phases: first is ``x(j)``, second ``x(j+4)`` or
+            ``x(j+4) - x(j)``.
         """
         if self.interleave > 1:
             amplitude, phase, step = (np.asarray(x)[..., np.newaxis] for x in (amplitude, phase, step))
@@ -279,7 +281,7 @@ class Recurrence:
     def prologue(
         self, first: Fixed, second: Fixed, coefficient: Fixed, shift: np.ndarray
     ) -> tuple[Fixed, Fixed]:
-        """Bit-accurate start values of the four phases, from those of the recurrence that is not interleaved.
+        """Bit-accurate start values of the four phases, from start values without interleaving.
 
         Parameters
         ----------
@@ -289,7 +291,7 @@ class Recurrence:
         Returns
         -------
         first, second : Fixed, shape (spans, 4), `state_format`
-            As `start` gives them. Second values after the last pixel may have wrapped.
+            In the form of `start`. Second values after the last pixel may have wrapped.
         """
         codes = replace(self, interleave=1).states(first, second, coefficient, shift, 8).codes.T
         start, following = codes[:, :4], codes[:, 4:]
@@ -322,7 +324,7 @@ class Recurrence:
         Returns
         -------
         Fixed, shape (steps, spans), `state_format`
-            In ``reinsch`` with half a step of the operand, 2^-(F+1), added, as in the register.
+            In ``reinsch`` half a step of the operand, 2^-(F+1), is added, as in the register.
 
         Raises
         ------
@@ -397,7 +399,7 @@ class Recurrence:
         Raises
         ------
         ValueError
-            As `states`.
+            As for `states`.
         """
         index = np.asarray(index, dtype=np.int64)
         steps = int(index.max()) + 1 if index.size else 0

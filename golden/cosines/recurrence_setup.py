@@ -27,8 +27,8 @@ class RecurrenceSetup:
     - ``x(0) = a``,
     - ``x(1) - x(0) = rho (b - a + a q) - a K/2``, ``rho = sin d/sin psi``, ``K = 4 sin^2(d/2)``.
 
-    This needs neither lambda nor A, neither an arctangent nor a root. Both functions of the span are even in
-    psi and therefore smooth in q. Equal normals are no special case: ``rho = 1/(m-1)`` and ``K = 0``, so that
+    This needs neither lambda nor A, neither an arctangent nor a root. rho and K are even in psi and therefore
+    smooth in q. Equal normals are no special case: ``rho = 1/(m-1)`` and ``K = 0``, so that
     every x is exactly a. All but 16 products are the same for every H:
 
     - ``psi^2 = 2 q p(q)``, ``d^2 = Q = psi^2/(m-1)^2``, ``K = Q k(Q)`` and, for the coefficient of four
@@ -57,9 +57,9 @@ class RecurrenceSetup:
     results         SQ(2, 44)    `Recurrence.state_format`; SQ(2, 16) in ``direct``
     =============== ============ =================================================================
 
-    Error of x at any pixel, for unit vectors: `error`. At pixel k an error e of the first difference counts
-    as ``k e``, and a relative error f of K as ``(k d)^2/2 f``. Largest error found, with the bound, in units
-    of 1e-6, by the angle of the span in degrees:
+    `error` bounds the error of x at any pixel, for unit vectors. At pixel k an error e of the first
+    difference becomes ``k e``, and a relative error f of K becomes ``(k d)^2/2 f``. Largest error found, and
+    the bound, in units of 1e-6, by the angle of the span in degrees:
 
     ======= ===== ===== ===== ===== =====
     angle   0     1     10    45    90
@@ -69,18 +69,19 @@ class RecurrenceSetup:
     ======= ===== ===== ===== ===== =====
 
     Up to 90 degrees ``|b - a + a q| = |A sin lambda sin psi|`` is at most 1, and a first difference at most
-    sqrt 2, so that no word wraps but x(j+4) - x(j) of two pixels more than 90 degrees apart, of which the
-    second is after the end of the span. Spans over 90 degrees are flagged (from a q of ``1 + 2^-13`` on;
-    rounding of the normals and of q moves q by at most 6.4e-5); their words are invalid. A span of one pixel
-    gets ``m - 1 = 1``, which no unit reads. The coefficient is that of a step 4d up to 90 degrees. In spans
-    of up to 4 pixels 4d may be larger; the coefficient is then arbitrary, and it is not read.
+    sqrt 2, so that no word that is used wraps: only x(j+4) - x(j) may wrap, if the two pixels are over 90
+    degrees apart and the second one is after the end of the span. Spans over 90 degrees are flagged (from
+    ``q = 1 + 2^-13`` on; the rounding of the normals and of q changes q by at most 6.4e-5); their words are
+    invalid. A span of one pixel is computed with ``m - 1 = 1``, but these words are not read. The coefficient
+    is that of a step 4d up to 90 degrees. In spans of up to 4 pixels 4d may be larger; the coefficient is
+    then arbitrary, and it is not read.
 
     Parameters
     ----------
     recurrence : Recurrence
-        Recurrence that gets the start values: interleaved, 16 fraction bits. The start values of ``direct``
-        are made from those of ``reinsch``: ``x(j+4)`` is rounded half up, ``-2 cos 4d = K 2^(2-s) - 2`` is
-        rounded up.
+        Recurrence that takes the start values: interleaved, 16 fraction bits. The start values of ``direct``
+        are computed from those of ``reinsch``: ``x(j+4)`` is rounded half up, ``-2 cos 4d = K 2^(2-s) - 2``
+        is rounded up.
 
     Raises
     ------
@@ -119,21 +120,24 @@ class RecurrenceSetup:
         return replace(self.recurrence, form="reinsch")
 
     def error(self, length: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """Bound of the error of every pixel, setup and recurrence together, for unit vectors.
+        """Bound of the error of every pixel by setup and recurrence together, for unit vectors.
 
-        Against the curve above for the same codes, for ``reinsch``. With ``e = 2^-18``, half a step of the
-        17-bit words, and ``t = TABLE_ERROR``, the error of the tables before they are rounded:
+        The error is that against the curve above for the same codes, for ``reinsch``. With ``e = 2^-18``,
+        half a step of the 17-bit words, and ``t = TABLE_ERROR``, the error of the tables before they are
+        rounded:
 
-        - K is off by a relative ``(2 + 1 + 2 + 2 + 2) e + t`` for Q (words of q, p, psi^2, square and Q, each
-          1/2 or more except p), by ``(e + t)/0.81`` for k and by ``e/0.40`` for its own rounding. Each step
-          of the recurrence has this relative error, which counts once for every following step: ``psi^2/2``
-          times it in sum.
-        - rho is off by a relative 2 e for 1/(m-1), ``2.6 (e + t)`` for i and s, 3 e for c and its own
-          rounding, and ``d^2/4`` times the relative error of Q, on which sin d/d depends. This counts psi
-          times.
-        - ``b - a + a q`` is off by ``4 e q`` for the words of q and a, and a few cuts, times ``psi/sin psi``.
-        - From q = 1/2 on `Chord` cuts half a step of each difference. q is then off by at most 2.7e-5, and
-          the curve by 0.65 times that (``tan(psi/2)/(2 sin psi)`` in its middle, plus the odd part).
+        - The relative error of K is ``(2 + 1 + 2 + 2 + 2) e + t`` by Q (words of q, p, psi^2, square and Q,
+          each 1/2 or more except p), plus ``(e + t)/0.81`` by k, plus ``e/0.40`` by its own rounding. Each
+          step of the recurrence has this relative error, and every following step adds it again: the sum is
+          ``psi^2/2`` times the error.
+        - The relative error of rho is 2 e by 1/(m-1), plus ``2.6 (e + t)`` by i and s, plus 3 e by c and its
+          own rounding, plus ``d^2/4`` times the relative error of Q, on which sin d/d depends. It is
+          multiplied by psi.
+        - The error of ``b - a + a q`` is ``4 e q`` by the words of q and a, plus a few cuts. It is multiplied
+          by ``psi/sin psi``.
+        - From q = 1/2 on `Chord` cuts half a step of each difference. The error of q is then at most 2.7e-5,
+          and that of the curve 0.65 times as much (``tan(psi/2)/(2 sin psi)`` in its middle, plus the odd
+          part).
 
         `Recurrence.error` and `Recurrence.prologue_error` are added.
 
@@ -187,7 +191,7 @@ class RecurrenceSetup:
         return self._lines(one_minus_k, start), self._lines(sine, start)
 
     def _lines(self, function: Callable, start: np.ndarray) -> tuple[Fixed, Fixed]:
-        """Start values and changes of lines of nearly least maximum error; the function is 0 at 0."""
+        """Lines of nearly least maximum error, start and change, for a function that is 0 at 0."""
         width = start[1]
         low, middle, high = (function(np.maximum(start + width * part, 1e-12)) for part in (0, 0.5, 1))
         value = np.maximum(low - ((low + high) / 2 - middle) / 2, 0)
@@ -221,7 +225,7 @@ class RecurrenceSetup:
         Returns
         -------
         first, second : Fixed, shape (spans, 4), `Recurrence.state_format`
-            See `Recurrence.start`.
+            Start values, see `Recurrence.start`.
         coefficient : Fixed, shape (spans,), `Recurrence.coefficient_format`
             Coefficient of a step of four pixels.
         shift : int array, shape (spans,)
@@ -292,7 +296,7 @@ class RecurrenceSetup:
         return (cosine + cosine.scale(-16).truncate(34)).saturate(self.COSINE_FORMAT)
 
     def _normalised(self, chord: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Word in [1/2, 1), or 0, and its left shift."""
+        """Word of q in [1/2, 1), or 0, and its left shift."""
         shift = np.full_like(chord.codes, self.CHORD_SHIFT)
         for j in range(self.CHORD_SHIFT - 1, -1, -1):
             shift[chord.codes >> (34 - j) > 0] = j
@@ -300,13 +304,13 @@ class RecurrenceSetup:
         return word.round_half_up(17).saturate(self.WORD_FORMAT), shift
 
     def _under_one(self, value: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Word under 1 of a value under 2, and whether it is half of the value."""
+        """Word under 1 for a value under 2, and whether the word is half of the value."""
         over = value >= Fixed(UQ(1, 0), 1)
         halved = Fixed(value.format, np.where(over, value.codes, value.codes << 1)).scale(-1)
         return halved.round_half_up(17).saturate(self.WORD_FORMAT), over.astype(np.int64)
 
     def _over_half(self, value: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Word of 1/2 or more of a value of 1/4 or more, and whether it is twice the value."""
+        """Word of 1/2 or more for a value of 1/4 or more, and whether the word is twice the value."""
         under = value < Fixed(UQ(0, 1), 1)
         doubled = Fixed(value.format, value.codes << under)
         return doubled.round_half_up(17).saturate(self.WORD_FORMAT), under.astype(np.int64)

@@ -16,19 +16,20 @@ __all__ = ["SpanLimit"]
 
 @dataclass(frozen=True)
 class SpanLimit:
-    """Whether a span of four pixels or more is *wide*: its quadratics may leave the exact curve too far.
+    """Whether a span of four pixels or more is *wide*: the error of its quadratics may be too large.
 
     With psi for the angle between the normals at its ends, a span is wide where
 
-    - psi is over `WIDEST`, whatever the light; or
-    - psi is over `angle` of the exponent, and a light that is not behind the span may have a highlight there:
+    - psi is over `WIDEST`, with any light; or
+    - psi is over `angle` of the exponent, and a light that is not behind the span may have a highlight on it:
       ``2 min(u_l, u_r) - max(u_l + u_r - 2 u_m, 0)``, twice the least u of the quadratic or less, is under
       twice `lit` of the exponent.
 
-    Both limits are by octaves, from ``2^k`` to ``2^(k+1) - 1`` the safer of the two ends, so that a small
-    table holds them. A light is behind if N·L is under `BEHIND` at all three places. psi is compared by half
-    the squared chord of the two normals, with `SLACK` steps for their rounding: a span that is cut at the
-    limit and then quantised is not wide. Three products a span.
+    Both limits have one value for all exponents from ``2^k`` to ``2^(k+1) - 1``, the safer of those at the
+    two ends, so that a small table holds them. A light is behind if N·L is under `BEHIND` at all three
+    places. psi is compared as half the squared chord of the two normals, with `SLACK` steps for their
+    rounding: a span that is cut at the limit and then quantised is not wide. This takes three products a
+    span.
 
     Source: docs/theory/chord.md#where-spans-are-cut.
     """
@@ -42,7 +43,7 @@ class SpanLimit:
 
     @staticmethod
     def angle(exponent: int) -> float:
-        """Widest lit span in degrees, `largest_span_angle` of the largest exponent of the octave.
+        """Widest lit span in degrees: `largest_span_angle` of the largest exponent of the octave.
 
         Parameters
         ----------
@@ -53,7 +54,7 @@ class SpanLimit:
 
     @staticmethod
     def lit(exponent: int) -> float:
-        """Least u from which a highlight is under a quarter of an LSB: ``7 / (n - 1)`` of the least n.
+        """Least u from which a highlight is under 1/4 LSB: ``7 / (n - 1)`` with the least n of the octave.
 
         Parameters
         ----------
@@ -102,7 +103,7 @@ class SpanLimit:
         normal_left, normal_right : Fixed, shape (spans, 3), SQ(1, 17)
             Unit normals of the ends.
         values : SpanValues
-            Of the spans and lights.
+            Values of the spans and lights.
         length : int array, shape (spans,)
             Pixels.
         exponent : int array, shape (spans,)
@@ -110,7 +111,7 @@ class SpanLimit:
         highlights : bool
             Whether there is specular light.
         threshold : Fixed, shape (spans,), UQ(3, 15), optional
-            In place of twice `lit` of the exponent: `ValueGate.thresholds_of` of a lobe's table.
+            Threshold in place of twice `lit` of the exponent: `ValueGate.thresholds_of` a lobe's table.
 
         Raises
         ------
@@ -148,6 +149,6 @@ class SpanLimit:
 
     @staticmethod
     def least(highlight: np.ndarray) -> np.ndarray:
-        """``2 min(u_l, u_r) - max(u_l + u_r - 2 u_m, 0)``, of values along the last axis."""
+        """``2 min(u_l, u_r) - max(u_l + u_r - 2 u_m, 0)``, from the three values along the last axis."""
         left, middle, right = np.moveaxis(highlight, -1, 0)
         return 2 * np.minimum(left, right) - np.maximum(left + right - 2 * middle, 0)
