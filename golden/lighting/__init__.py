@@ -1,1 +1,1 @@
-"""Bit-accurate models of the units that turn cosines into light."""
+"""Bit-accurate models of the units from cosines to colours: terms, gates, intensity."""

@@ -14,14 +14,14 @@ __all__ = ["Diffuse"]
 class Diffuse:
     """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated to ``1 - 2^-17``.
 
-    The result has 17 bits, as the operands of the colour multipliers. Codes of unit vectors have the length
+    The result has 17 bits, like the operands of the colour multipliers. Codes of unit vectors have the length
     ``ONE / 2^17``, so the term is too small by a relative 2^-16 (0.004 LSB of a full channel); the rounding
     adds at most 2^-18.
 
     Parameters
     ----------
     operand_format : Format
-        Of ``N . L``, signed.
+        Format of ``N . L``, signed.
 
     Source: docs/theory/models.md#lighting; [B] 4, [T] 6.
     """

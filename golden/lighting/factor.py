@@ -9,19 +9,19 @@ __all__ = ["Factor"]
 
 @dataclass(frozen=True)
 class Factor:
-    """``a S`` of a specular term S and the factor a of distance and spot, cut to 17 fraction bits.
+    """``a S``: specular term S times the factor a of distance and spot, cut to 17 fraction bits.
 
-    The diffuse term needs no product here: the N·L of a light that fades comes with its factor.
+    The diffuse term needs no product here: N·L of a light that fades is multiplied by a before.
 
     ====== ========= =============================================
     word   format    why
     ====== ========= =============================================
     a      UQ(0, 17) multiplier operand; 1 is ``1 - 2^-17``
-    S      UQ(0, 17) multiplier operand, as the specular units have it
+    S      UQ(0, 17) multiplier operand, result of a specular unit
     a S    UQ(0, 17) cut: at most S and at most a
     ====== ========= =============================================
 
-    The result is less than the exact product by under 2^-17, 0.002 LSB of a full channel, and never larger.
+    The result is at most the exact product, and less by under 2^-17, 0.002 LSB of a full channel.
 
     Source: docs/theory/chord.md#local-lights.
     """

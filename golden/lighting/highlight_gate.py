@@ -19,16 +19,18 @@ __all__ = ["HighlightGate"]
 class HighlightGate:
     """Whether a span may be lit, from ``a = N_l . H``, ``b = N_r . H`` and ``u = 1 - N_l . N_r``.
 
-    Along the great circle from ``N_l`` to ``N_r``, psi apart, the largest ``N . H`` is at an end, or inside
-    where ``b > a cos psi`` and ``a > b cos psi``, and then ``M = sqrt(a^2 + b^2 - 2 a b cos psi) / sin psi``.
-    With ``cos psi = 1 - u`` and d = a - b that is ``M^2 = (d^2 + 2 a b u) / (u (2 - u))``, in which nothing
-    cancels for psi tending to 0, and inside is ``max(a, b) u > |d|``. A span is lit where
+    Along the great circle from ``N_l`` to ``N_r``, psi apart, the largest ``N . H`` is inside the arc if
+    ``b > a cos psi`` and ``a > b cos psi``, else at an end. Inside it is
+    ``M = sqrt(a^2 + b^2 - 2 a b cos psi) / sin psi``. With ``cos psi = 1 - u`` and d = a - b this is
+    ``M^2 = (d^2 + 2 a b u) / (u (2 - u))``, in which nothing cancels for psi tending to 0, and the condition
+    is ``max(a, b) u > |d|``. A span is lit if
 
-    - it is wider than 45 degrees, or than the method is meant for, or
+    - it is wider than 45 degrees or than the method's `Interpolator.MAX_ANGLE`, or
     - ``max(a, b)^2 >= T``, or
     - ``max(a, b) u > |d|`` and ``d^2 >= u w``, with ``w = 2 T - 2 a b - T u``: that is ``M^2 >= T``.
 
-    T is the square of a threshold on N·H, from a PROM addressed by the exponent. No root, no division.
+    T is the square of a threshold on N·H, from a PROM addressed by the exponent. The unit needs no root and
+    no division.
 
     ======== ============= ===============================================================================
     word     format        why
@@ -36,8 +38,8 @@ class HighlightGate:
     a, b     UQ(0, F)      cut, one step added; 0 where negative, saturated at the top
     u        UQ(-1, F+1)   cut, three steps added
     T        UQ(0, F)      cut; 0: every span is lit
-    w        UQ(1, F-1)    cut; where it is not positive, ``d^2 >= u w`` holds
-    products F + F bits    exact, as are the comparisons
+    w        UQ(1, F-1)    cut; if it is not positive, ``d^2 >= u w`` holds
+    products F + F bits    exact, like the comparisons
     ======== ============= ===============================================================================
 
     F is 17; smaller words serve to check the decision exhaustively.
@@ -58,33 +60,33 @@ class HighlightGate:
        plane for which ``p.e_l = a'``, ``p.e_r = b'``:
        ``alpha a' + beta b' = p.(alpha e_l + beta e_r) <= max(0, m)``, m the maximum of p·e over the arc.
        This holds whatever the lengths of the codes.
-    3. *The arc.* At a share x of it, ``p.e = (a' sin((1-x) psi) + b' sin(x psi)) / sin psi``. For a' and b'
-       not negative that is at least 0 and grows with a', with b', and with psi, as ``sin(x psi)/sin psi``
-       does on (0, pi). So m of the words is at least that of the exact values if every word is at least its
-       value.
-       a and b: a cut takes off less than the step that is added; where the top saturates, the word's square
-       is over every T. u: the cut takes off less than one step, and ``u/omega`` exceeds u by under 1.2 steps;
-       three are added. The maximum of p·e over the whole circle is ``|p| = M``; it is on the arc where
-       ``max(a', b') u > |d|``.
-    4. *The comparison.* T and w are cut, everything else is exact, so not lit gives ``m^2 < T``, also where m
-       is at an end. T is at most ``tau^2``, so ``m < tau`` and ``N(t).H < tau`` on the exact curve.
-    5. *The pipeline.* Each method states how far its pixels may be brighter than m
+    3. *The arc.* At a share x of the arc, ``p.e = (a' sin((1-x) psi) + b' sin(x psi)) / sin psi``. If a' and
+       b' are not negative, this is at least 0 and grows with a', with b', and with psi, as
+       ``sin(x psi)/sin psi`` does on (0, pi). So m computed from the words is at least m of the exact values
+       if every word is at least its exact value.
+       This holds for a and b: a cut takes off less than the step that is added; if a word saturates, its
+       square is over every T. It holds for u: the cut takes off less than one step, ``u/omega`` exceeds u by
+       under 1.2 steps, and three steps are added. The maximum of p·e over the whole circle is ``|p| = M``; it
+       is on the arc where ``max(a', b') u > |d|``.
+    4. *The comparison.* T and w are cut, everything else is exact, so a span that is not lit has ``m^2 < T``,
+       also if m is at an end. T is at most ``tau^2``, so ``m < tau`` and ``N(t).H < tau`` on the exact curve.
+    5. *The pipeline.* Each method states a bound by which its pixels may exceed m
        (`Interpolator.highlight_excess`, from the errors of its units; 4.4 steps of 2^-17 for quadratic
-       normals): it has no N·H over ``m + excess``, no 1 - N·H under ``shortest (1 - m) - excess``. Let x be
+       normals): no N·H is over ``m + excess``, no 1 - N·H is under ``shortest (1 - m) - excess``. Let x be
        the largest argument for which the specular unit may give a term over 0, in steps of 2^-25; it follows
-       from the PROM in integers (`HighlightOperand.last_lit_arguments`). tau is such that
-       ``shortest (1 - tau) - excess`` is x and a step more, the excess rounded up to whole steps (`margin`).
-       The argument falls with N·H, and beyond x the term is 0. ∎
+       from the PROM in integers (`HighlightOperand.last_lit_arguments`). tau is chosen so that
+       ``shortest (1 - tau) - excess`` is one step more than x, with the excess rounded up to whole steps
+       (`margin`). The argument falls as N·H rises, and beyond x the term is 0. ∎
 
     The margins cost little: for quadratic normals, a span is let through only if
     ``M^2 >= tau^2 - 10 * 2^-17``.
 
-    Ends must be unit vectors as `quantise` makes them. With N·H of straight or quadratic normals a search
-    over all models lost no highlight for ends that were up to 1/128 too long or too short; other methods lose
-    some where ends are 8 to 128 steps of 2^-17 too short or too long.
+    Ends must be unit vectors from `quantise`. A search over all models found no lost highlight with N·H of
+    linear or quadratic normals whose ends were up to 1/128 too long or too short; other methods lose some if
+    ends are 8 to 128 steps of 2^-17 too short or too long.
 
-    T is 0 for an exponent with which terms over 0 reach down to N·H = tau <= 0: 1, and 2 and 3 of models with
-    wide highlights.
+    T is 0, so that every span is lit, for exponents with terms over 0 down to N·H = tau <= 0: for 1, and for
+    2 and 3 with models of wide highlights.
 
     Parameters
     ----------
@@ -144,7 +146,7 @@ class HighlightGate:
 
     @property
     def widest(self) -> Fixed:
-        """Largest cut ``u`` for which the exact one is surely less than that of the method's `gate_angle`."""
+        """Largest cut ``u`` for which the exact u is surely less than u of the method's `gate_angle`."""
         limit = self.one_squared.values * (1 - np.cos(np.radians(self.interpolator.gate_angle)))
         return Fixed(self.angle_format, int(limit / self.angle_format.step) - 1)
 
@@ -154,7 +156,7 @@ class HighlightGate:
         return self.thresholds_of(self.specular.last_lit_arguments)
 
     def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
-        """T by the largest argument whose term is over 0, in steps of 2^-25, as `LobeTable` has it, too."""
+        """T from the largest arguments with a term over 0, in steps of 2^-25; see `LobeTable`, too."""
         nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25
         level = float(ONE_SQUARED.values) - (nearest + self.margin) / self.interpolator.shortest_normal
         # In steps of 2^-34; one less, as the quotient is not exact.
@@ -164,7 +166,7 @@ class HighlightGate:
         return Fixed(self.level_format, codes)
 
     def decide(self, a: Fixed, b: Fixed, u: Fixed, threshold: Fixed) -> np.ndarray:
-        """The comparisons alone: whether the maximum over the arc may reach the threshold.
+        """Whether the maximum over the arc may reach the threshold: the comparisons alone.
 
         Parameters
         ----------
@@ -220,7 +222,7 @@ class HighlightGate:
     def compute_by(
         self, normal_left: Fixed, normal_right: Fixed, halfway: Fixed, threshold: Fixed
     ) -> np.ndarray:
-        """The same by thresholds T in place of exponents, of shape () or (spans,)."""
+        """Decisions as by `compute`, from thresholds T in place of exponents, of shape () or (spans,)."""
         dot, angle = self.dot_product, self.angle_format
         difference = self.one_squared - dot.compute(normal_left, normal_right)
         cut = difference.truncate(angle.fraction_bits).saturate(angle)

@@ -1,4 +1,4 @@
-"""Lobe unit: any curve of 1 - N·H from one small table, addressed by octaves; one multiplier interpolates."""
+"""Bit-accurate model of the lobe unit: any curve of 1 - N·H by one small table and one multiplier."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -18,15 +18,15 @@ __all__ = ["Lobe", "LobeTable"]
 
 @dataclass(frozen=True)
 class Lobe(HighlightOperand):
-    """Any highlight of ``u = 1 - N·H`` from a table that is denser the smaller u is, linear between entries.
+    """Any lobe of ``u = 1 - N·H`` from a table, linear between entries, which are denser where u is small.
 
-    *Address.* The range [0, 1) of u is cut into E octaves, ``[2^-j, 2^(1-j))`` with j = 1 to E, and the rest,
-    ``[0, 2^-E)``. These are the E + 1 *rows* of the table: row 0 is the rest, row E the octave from 1/2. A
-    row has M equal steps. So the distance of two entries is between 1/(2M) and 1/M of u, whatever u is, and
-    ``2^-E / M`` in row 0. The row follows from the position of u's leading one, the step from the m = log2(M)
-    bits after it, and the share f of the step that u has gone from the bits after those.
+    *Address.* The range [0, 1) of u is divided into E octaves, ``[2^-j, 2^(1-j))`` with j = 1 to E, and the
+    rest, ``[0, 2^-E)``. These are the E + 1 *rows* of the table: row 0 is the rest, row E the octave from
+    1/2. A row has M equal steps. So the distance of two entries is between 1/(2M) and 1/M of u in every
+    octave, and ``2^-E / M`` in row 0. The row follows from the position of u's leading one, the step from the
+    m = log2(M) bits after it, and f, the position of u within the step, 0 to 1, from the bits after those.
 
-    *Entries.* There are (E + 1) M of them, and one for the end, u = 1. A word of the memory holds an entry v
+    *Entries.* There are (E + 1) M entries, and one for the end, u = 1. A word of the memory holds an entry v
     and its difference D to the next entry, of either sign: 35 bits. A block RAM of 512 by 36 holds 512 words.
     The term is ``v + D f``, with one product.
 
@@ -45,20 +45,20 @@ class Lobe(HighlightOperand):
     vectors longer than 1 give, counts as 0.
 
     *Monotone.* Within a word the terms fall with f if D is negative, and rise if it is positive, as a cut
-    keeps the order. As f < 1, ``D f`` is between 0 and D, and so is what the cut to a code makes of it. So no
-    term of a word passes the next entry: over the whole range the term falls where the entries fall. `table`
-    makes entries that fall from every curve that falls.
+    keeps the order. As f < 1, ``D f`` is between 0 and D, and so is ``D f`` after its cut. So no term of a
+    word passes the next entry: over the whole range the term falls where the entries fall. `table` makes
+    falling entries from every falling curve.
 
     *Arithmetic error*, against straight lines between entries that are not rounded: at most 2^-17 from the
     entries (2^-18 by rounding, 2^-17 for an entry of 1), ``|D| 2^-17`` from the cut of f, 2^-17 from the cut
     of the product; together at most `ERROR`, 0.006 LSB of an 8-bit channel at intensity 1.
 
-    *Error of the lines.* A line over a step h is off by at most ``h^2/8 max |S''|``, S the curve. In an
-    octave that begins at b, ``h = b/M``: from ``b^2 |S''| <= C`` follows ``C / (8 M^2)``. C is 4/e^2 = 0.54
-    for Blinn's power with a large exponent, 0.5 for the exponent 2, and 3/8 for ``ggx``. Entries are moved
-    towards the curve's other side, which halves the error (`table`). In row 0 ``h = 2^-E/M`` must be small
-    beside the lobe's width: ``ggx`` has ``|S''| <= 24/alpha^4``, which with M = 16 gives an error of 0.035
-    LSB if ``2^-E <= 0.15 alpha^2``. Measured, in LSB, the entries included:
+    *Error of the lines.* The error of a line over a step h is at most ``h^2/8 max |S''|``, where S is the
+    curve. In an octave that begins at b, ``h = b/M``: if ``b^2 |S''| <= C``, the error is at most
+    ``C / (8 M^2)``. C is 4/e^2 = 0.54 for Blinn's power with a large exponent, 0.5 for the exponent 2, and
+    3/8 for ``ggx``. Entries are moved to the other side of the curve, which halves the error (`table`). In
+    row 0 ``h = 2^-E/M`` must be small compared with the lobe's width: ``ggx`` has ``|S''| <= 24/alpha^4``,
+    which with M = 16 gives an error of 0.035 LSB if ``2^-E <= 0.15 alpha^2``. Measured in LSB, with rounding:
 
     == == ===== ======================== ======================== =======================================
     E  M  words ``blinn``, n =           ``beckmann``, alpha =    ``ggx``, alpha =
@@ -73,35 +73,36 @@ class Lobe(HighlightOperand):
     20 16 336   0.00 0.05 0.03 0.03 0.03 0.03 0.03 0.04 0.06 0.55 0.03 0.02 0.02 0.02 0.02 0.02 0.02
     == == ===== ======================== ======================== =======================================
 
-    The default has at most 0.05 LSB for every exponent from 1 to 1000 and for ``ggx`` from alpha = 0.0025
-    (roughness 0.05) on, of the table alone: the error of u is not in it. Beckmann's distribution with a large
+    The error of the default table is at most 0.05 LSB for every exponent from 1 to 1000 and for ``ggx`` from
+    alpha = 0.0025 (roughness 0.05) on, without the error of u. Beckmann's distribution with a large
     alpha falls to 0 just before u = 1, where steps are long: 0.55 LSB at alpha = 1.
 
-    *Error of u.* It comes on top, times the slope of the lobe: n for Blinn's power, ``4/alpha^2`` for
-    ``ggx``. A step of 2^-25 is 0.008 LSB for n = 1000, and for ``ggx`` 0.3 LSB at alpha = 0.01, 4.9 at
-    0.0025: there B is 30, or `scale` 6. With the operand ``cosine``, u is in units of `ONE_SQUARED`, and so
-    too small by ``2^-16 u``: under 0.002 LSB for either lobe. It is cut to B bits, another step. But a cosine
-    also feels the length of the normal: a code that is off by 2^-18 in length moves u by as much, which is 1
-    LSB for n = 1000. The chord form (operand ``one_minus_cosine``) feels that length at second order only.
+    *Error of u.* It is multiplied by the slope of the lobe and added: the slope is n for Blinn's power,
+    ``4/alpha^2`` for ``ggx``. A step of 2^-25 is 0.008 LSB for n = 1000, and for ``ggx`` 0.3 LSB at
+    alpha = 0.01 and 4.9 LSB at 0.0025: such lobes need B = 30 or `scale` 6. With the operand ``cosine``, u is
+    in units of `ONE_SQUARED`, and so too small by ``2^-16 u``: under 0.002 LSB for either lobe. The cut to B
+    bits adds another step. A cosine also depends on the length of the normal: a length error of 2^-18 changes
+    u by as much, which is 1 LSB for n = 1000. The chord form (operand ``one_minus_cosine``) depends on that
+    length at second order only.
 
-    *Gate.* A highlight gate passes over arguments whose term is 0, so that the picture is the same to the bit
-    with and without a gate. The largest argument with a term over 0 follows from the table
+    *Gate.* A highlight gate leaves out terms that are 0, so that the picture is the same to the bit with and
+    without a gate. The largest argument with a term over 0 follows from the table
     (`LobeTable.last_lit_argument`). A lobe with a long tail may have terms over 0 up to u = 1: ``ggx`` from
-    alpha = 0.044 on. Its gate passes over what faces away from H, and nothing else. For a gate that passes
-    over more, `table` ends the lobe early: entries under a ``cutoff`` are 0. The picture then differs from
-    the model's, with and without a gate alike, by at most the cutoff times the intensity I; with ``cutoff =
-    1/(510 I)`` by half an LSB. A gate that leaves out terms of less than half an LSB that the unit without a
-    gate does not leave out would not be exact: they may change the rounding of a sum.
+    alpha = 0.044 on. Its gate leaves out only spans that face away from H. For a gate that leaves out more,
+    `table` ends the lobe early: entries under a ``cutoff`` are 0. The picture then differs from the model's,
+    with and without a gate alike, by at most the cutoff times the intensity I; with ``cutoff = 1/(510 I)`` by
+    half an LSB. A gate that leaves out terms over 0 would not be exact, even if they are under half an LSB:
+    they may change the rounding of a sum.
 
-    *Loading.* A write of 18 bits loads an entry; entries come in order, and the unit works out differences
-    (`LobeTable.writes`). That is (E + 1) M + 2 writes for a table, 338 by default; words of 35 bits would
-    take twice as many. There may be several *banks*, a table each, for materials: then a span of another
-    material takes no write. The memory's word ``(bank (E + 1) + row) M + step`` is of a bank.
+    *Loading.* A write of 18 bits loads an entry; entries come in order, and the unit computes the differences
+    (`LobeTable.writes`). A table takes (E + 1) M + 2 writes, 338 by default; words of 35 bits would take
+    twice as many. Several *banks* hold a table each for several materials: a change of the material takes no
+    write. The word at address ``(bank (E + 1) + row) M + step`` belongs to a bank.
 
     Parameters
     ----------
     model : ReflectionModel
-        Model of which `table` makes tables, of N·H. The hardware does not depend on it.
+        Model of N·H for which `table` makes tables. The hardware does not depend on it.
     operand : str
         ``"cosine"`` or ``"one_minus_cosine"``; see `HighlightOperand`.
     octaves : int
@@ -113,13 +114,13 @@ class Lobe(HighlightOperand):
     fraction_bits : int
         B, 20 to 34.
     cutoff : float
-        Entries of a table under it are 0; at least 0, under 1.
+        Entries of a table under this value are 0; at least 0, under 1.
     scale : int
-        s: the operand is ``min(2^s u, 1)``, of chord methods with that scale, for lobes that are 0 from ``u =
-        2^-s`` on. The hardware does not depend on it.
+        s: the operand is ``min(2^s u, 1)``, from chord methods with the same scale, for lobes that are 0 from
+        ``u = 2^-s`` on. The hardware does not depend on it.
     fixed : tuple of float or None
-        Parameters of the tables that are fixed at build time, one for each bank (``None`` where the model has
-        no parameter). ``None``: the tables are written.
+        Parameters of the tables that are fixed at build time, one for each bank (``None`` for a model without
+        a parameter). ``None``: tables are loaded by writes.
 
     Raises
     ------
@@ -179,7 +180,7 @@ class Lobe(HighlightOperand):
 
     @property
     def has_table(self) -> bool:
-        """True."""
+        """``True``: the unit computes by tables."""
         return True
 
     @property
@@ -231,11 +232,11 @@ class Lobe(HighlightOperand):
         return np.ldexp((start + step) / self.steps, np.maximum(row, 1) - 1 - self.octaves)
 
     def table(self, parameter: float | None = None) -> "LobeTable":
-        """Table of the model.
+        """Table of the model for one parameter.
 
-        Entries are values of the curve, moved against the error of the lines: by half of what the line is too
-        high in the middle of the step before or after, whichever is more, but by at most twice the smaller.
-        Where one line is too high and the other too low the entry is not moved.
+        An entry is the value of the curve, moved against the error of the two lines that meet there, as
+        measured in the middle of each: by half of the larger error, but at most twice the smaller one. If one
+        line is too high and the other too low, the entry is not moved.
 
         Parameters
         ----------
@@ -245,7 +246,7 @@ class Lobe(HighlightOperand):
         Raises
         ------
         ValueError
-            If the parameter is not one of the model.
+            If the model has a parameter and none is given, or it is out of the model's range.
         """
         if parameter is None and self.model.PARAMETER is not None:
             raise ValueError(f"a table of {self.name} needs its {self.model.PARAMETER}")
@@ -254,7 +255,7 @@ class Lobe(HighlightOperand):
         def curve(cosine):
             return reflect(1 - np.ldexp(1 - cosine, -self.scale)) if self.scale else reflect(cosine)
 
-        # At the end the value that the curve tends to: at a right angle itself it is 0.
+        # The entry at the end is the limit of the curve: at the right angle itself the curve is 0.
         knots = np.minimum(self.knots, 1 - 2.0**-40)
         value = curve(1 - knots)
         high = (value[1:] + value[:-1]) / 2 - curve(1 - (knots[1:] + knots[:-1]) / 2)
@@ -270,10 +271,10 @@ class Lobe(HighlightOperand):
         return LobeTable(self, values, parameter)
 
     def scale_of(self, parameters: Sequence[float | None]) -> int:
-        """Largest scale, up to `MOST_SCALE`, that serves lobes of which one is so sharp as to need it.
+        """Largest scale, up to `MOST_SCALE`, that serves all lobes; 0 if no lobe needs one.
 
-        A lobe needs it if its slope is over `SHARP`, where a step of 2^-25 of u is over 0.1 LSB. It is served
-        by s if it is under a quarter of the least entry from ``u = 2^-s`` on.
+        A lobe needs a scale if its slope is over `SHARP`, so that a step of 2^-25 of u is over 0.1 LSB. Scale
+        s serves a lobe that is under a quarter of the least entry from ``u = 2^-s`` on.
 
         Parameters
         ----------
@@ -287,10 +288,10 @@ class Lobe(HighlightOperand):
         return int(np.clip(np.floor(-np.log2(dark)), 0, self.MOST_SCALE))
 
     def for_parameters(self, parameters: Sequence[float | None]) -> "Lobe":
-        """The unit with `FINER` steps in place of the default ones, if a lobe's table is off by over 1/4 LSB.
+        """The unit with `FINER` steps in place of the default ones, if the error of a table is over 1/4 LSB.
 
-        That is one with a steep end near a right angle, such as Beckmann's of roughness 1. Both are one block
-        RAM for one bank. A sharp lobe, which needs the octaves, keeps them.
+        This happens for lobes with a steep end near a right angle, such as Beckmann's with roughness 1. With
+        one bank either size takes one block RAM. If a sharp lobe needs the default octaves, they stay.
 
         Parameters
         ----------
@@ -304,7 +305,7 @@ class Lobe(HighlightOperand):
         return finer if errors[0] > 1 / 1020 and errors[1] < errors[0] else self
 
     def _line_error(self, parameter: float | None) -> float:
-        """Largest error of the lines between a table's entries, without that of the arithmetic."""
+        """Largest error of the lines between a table's entries, without arithmetic error."""
         values, knots = self.table(parameter).values.values, self.knots
         share = np.arange(1, 8) / 8
         u = (knots[:-1] + np.diff(knots) * share[:, np.newaxis]).ravel()
@@ -313,7 +314,7 @@ class Lobe(HighlightOperand):
 
     @property
     def last_lit_arguments(self):
-        """Of the model's table at each exponent, see `LobeTable.last_lit_argument`; that of 1 at exponent 0.
+        """`LobeTable.last_lit_argument` of the model's table at each exponent; exponent 0 counts as 1.
 
         Raises
         ------
@@ -339,7 +340,7 @@ class Lobe(HighlightOperand):
         return exact.truncate(self.fraction_bits).saturate(self.argument_format)
 
     def address(self, argument: Fixed) -> tuple[np.ndarray, Fixed]:
-        """Where an argument under 1 stands in a table.
+        """Word of a table, and position within its step, for arguments under 1.
 
         Parameters
         ----------
@@ -354,7 +355,7 @@ class Lobe(HighlightOperand):
             f.
         """
         code, top = argument.codes, self.fraction_bits - 1
-        # Of a code under 2^34 float64 knows the leading one exactly; frexp counts it from 1, and 0 has 0.
+        # float64 has the exact leading one of a code under 2^34; frexp counts it from 1, and gives 0 for 0.
         _, length = np.frexp(code.astype(np.float64))
         row = np.maximum(length - self.fraction_bits + self.octaves, 0)
         normal = code << (self.octaves - np.maximum(row, 1))
@@ -373,7 +374,7 @@ class Lobe(HighlightOperand):
         dark : bool array, same shape
             Whether the light is behind the surface: the result is 0.
         table : LobeTable
-            Table, of as many octaves and steps.
+            Table with the unit's numbers of octaves and steps.
 
         Returns
         -------
@@ -382,7 +383,7 @@ class Lobe(HighlightOperand):
         Raises
         ------
         ValueError
-            If the operand has another format, there is no table, or it has another size.
+            If the operand has another format, ``table`` is no table, or has another size or scale.
         """
         self.check(table)
         u = self.argument(operand)
@@ -394,12 +395,12 @@ class Lobe(HighlightOperand):
         return Fixed(self.RESULT_FORMAT, np.where(lit, term, 0))
 
     def check(self, table: "LobeTable") -> None:
-        """Refuse what is no table, or a table of another size or scale.
+        """Refuse an object that is no table, or a table of another size or scale.
 
         Raises
         ------
         ValueError
-            If it is.
+            If ``table`` is refused.
         """
         if not isinstance(table, LobeTable):
             raise ValueError("a lobe needs a table; constants_of gives the constants of a scene theirs")
@@ -417,16 +418,16 @@ class LobeTable:
     Parameters
     ----------
     lobe : Lobe
-        Size and model.
+        Unit with the size and model of the table.
     values : Fixed, shape (entries + 1,), UQ(0, 17)
         Entries, and the value at the end.
     parameter : float, optional
-        Exponent or roughness that they are of.
+        Exponent or roughness of the lobe.
 
     Raises
     ------
     ValueError
-        If there are more entries or fewer, or their format is another.
+        If the number of entries or their format is wrong.
 
     Source: docs/theory/units.md#lobe.
     """
@@ -460,7 +461,7 @@ class LobeTable:
         Parameters
         ----------
         bank : int
-            Where to.
+            Bank to load.
 
         Returns
         -------
@@ -482,7 +483,7 @@ class LobeTable:
     def last_lit_argument(self) -> int:
         """Largest u, in steps of 2^-25, whose term is over 0; -1 if there is none. Exact, in integers.
 
-        Of an argument with more fraction bits, it is what is left of it at 25.
+        An argument with more fraction bits is cut to 25.
         """
         lobe, values = self.lobe, self.values.codes
         lit = np.flatnonzero((values[:-1] > 0) | (values[1:] > 0))

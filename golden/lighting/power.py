@@ -16,25 +16,26 @@ __all__ = ["Power"]
 class Power(HighlightOperand):
     """``max(cos gamma, 0)^n`` for n of 10 bits, by squares and products over the bits of n.
 
-    Computed on complements, ``x = 1 - c``: near the peak, where c^n turns a relative error of c into n times
-    as much, x keeps its digits. Square and product are one operation, ``1 - (1-p)(1-q) = p + q - p q``: for
-    every bit of n from the lowest, ``s <- s + x - s x`` where it is set, then ``x <- 2 x - x^2``. The term is
-    ``1 - s``.
+    The unit computes with complements, ``x = 1 - c``: near the peak c^n multiplies a relative error of c by
+    n, and x keeps its digits there. Square and product are one operation, ``1 - (1-p)(1-q) = p + q - p q``:
+    for every bit of n from the lowest, ``s <- s + x - s x`` if it is set, then ``x <- 2 x - x^2``. The term
+    is ``1 - s``.
 
     ======= ========= ====================================================================
     word    format    why
     ======= ========= ====================================================================
-    x, s    UQ(0, 34) exact sums; saturate: c <= 0, and a light that is behind, have x = 1
+    x, s    UQ(0, 34) exact sums; saturate: x = 1 for c <= 0 and for a light that is behind
     factors UQ(0, 17) multiplier operands; cut from x and s
     result  UQ(0, 17) operand of the colour multipliers; cut
     ======= ========= ====================================================================
 
-    The arithmetic error of the result for an exact argument is at most `ERROR`. A product of cut factors is
-    off by less than ``2^-17 (p + q)``, and that error reaches the result multiplied by the derivative of the
-    operations that follow. With the final cut, the sum is largest at n = 513: ``5.96 * 2^-17``. It only makes
-    the result smaller. As it depends on the factors' low bits, the term may rise where the cosine falls, by 5
-    steps of 2^-17 at most, 0.01 LSB at intensity 1. With the operand ``cosine`` and n = 1 the term is one
-    step up to 2^-17 past the right angle, as 1 is 2^-16 more than the square of a code's length.
+    The arithmetic error of the result for an exact argument is at most `ERROR`. The error of a product of cut
+    factors is less than ``2^-17 (p + q)``; in the result it is multiplied by the derivative of the operations
+    that follow. With the final cut, the sum of the errors is largest at n = 513: ``5.96 * 2^-17``. It only
+    makes the result smaller. As it depends on the factors' low bits, the term may rise where the cosine
+    falls, by 5 steps of 2^-17 at most, 0.01 LSB at intensity 1. With the operand ``cosine`` and n = 1 the
+    term is one step, not 0, up to 2^-17 past the right angle, as 1 is 2^-16 more than the square of a code's
+    length.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ class Power(HighlightOperand):
 
     @property
     def name(self) -> str:
-        """Name among the specular units: that of the reflection model is the unit's by a table."""
+        """Name of the unit; that of the reflection model is the name of its unit with a table."""
         return f"{self.model.name}_product"
 
     @property

@@ -48,7 +48,7 @@ class HighlightOperand:
         return DotProduct().result_format if self.operand == "cosine" else self.ARGUMENT_FORMAT
 
     def one_minus(self, operand: Fixed, exponent: int) -> Fixed:
-        """One minus the cosine, exact, of an operand and an exponent that are in range.
+        """One minus the cosine of an operand, exact, after a check of operand and exponent.
 
         Raises
         ------
@@ -63,7 +63,7 @@ class HighlightOperand:
 
     @property
     def has_table(self) -> bool:
-        """Whether each frame loads a table for each material: a `Lobe`."""
+        """Whether the unit computes by a table for each material, as a `Lobe` does."""
         return False
 
     @property
@@ -77,7 +77,7 @@ class HighlightOperand:
 
 @dataclass(frozen=True)
 class Chords:
-    """A monotone function by chords: a table of starts and steps; 11 bits interpolate within a chord.
+    """A monotone function by chords: a table of starts and steps, with 11 bits to interpolate within a chord.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Chords:
         )
 
     def compute(self, code: np.ndarray) -> Fixed:
-        """Bit-accurate values: the low 11 bits of the code interpolate, those above are the address."""
+        """Bit-accurate values: the low 11 bits of the code interpolate, the bits above are the address."""
         format = self.INTERPOLATION_FORMAT
         address = code >> format.width
         way = self.step[address] * Fixed(format, code & format.max_code)
@@ -115,7 +115,7 @@ class Chords:
 
 
 def _lowered(function, entries: int) -> np.ndarray:
-    """Ends of chords of a convex function on [0, 1], lowered by half of the largest error of the chords."""
+    """Values at the ends of chords of a convex function on [0, 1], lowered by half of the largest error."""
     ends = function(np.arange(entries + 1) / entries)
     high = (ends[1:] + ends[:-1]) / 2 - function((np.arange(entries) + 0.5) / entries)
     return np.maximum(ends - (np.r_[high[0], high] + np.r_[high, high[-1]]) / 4, 0)
@@ -125,17 +125,17 @@ def _lowered(function, entries: int) -> np.ndarray:
 class Specular(HighlightOperand):
     """``max(1 - k (1 - cos gamma), 0)^p`` with ``k = a n + b`` and p = 2, 4 or 8, by model and exponent n.
 
-    ``cosquad_q`` reads k from a table of 1024 words; the models of Lyon square once, twice or three times.
+    ``cosquad_q`` reads k from a table of 1024 words; models of [Lyon93] square once, twice or three times.
     ``exp`` is ``exp(-n (1 - cos gamma)) = 2^(-16 p)`` with ``p = k (1 - cos gamma)``, ``k = n log2(e)/16``:
     the whole part of 16 p is a shift, its fraction addresses a table of 64 values of ``2^-f`` between
     which 11 bits interpolate.
 
-    ``coscos2`` and ``coscos4`` are ``cos^k(a gamma)``, of a base ``cos(a gamma) = cos(pi/2 sqrt w)`` with
-    ``w = (2 a gamma / pi)^2``: no root and no arccos, because both the square of gamma and the cosine of a
-    root are smooth. ``gamma^2 = 2 x (1 + e)`` with ``x = 1 - cos gamma``, and e, 0 at the peak, comes from a
-    table of 128 chords over x in [0, 2). So ``w = p + p e`` with ``p = k x``, ``k = 8 a^2 / pi^2``: by
-    Taylor's rule ``4 n / pi^2`` and ``2 n / pi^2``, by equal integrals from a table of 1024 words. The base
-    comes from 64 chords over w in [0, 1); from w = 1 on the term is 0.
+    ``coscos2`` and ``coscos4`` are ``cos^k(a gamma)``, powers of a base ``cos(a gamma) = cos(pi/2 sqrt w)``
+    with ``w = (2 a gamma / pi)^2``. They need no root and no arccos, because gamma^2 is smooth in cos gamma,
+    and the cosine of a root is smooth in w. ``gamma^2 = 2 x (1 + e)`` with ``x = 1 - cos gamma``; e, which is
+    0 at the peak, comes from a table of 128 chords over x in [0, 2). So ``w = p + p e`` with ``p = k x``,
+    ``k = 8 a^2 / pi^2``. By Taylor's rule k is ``4 n / pi^2`` or ``2 n / pi^2``; by equal integrals it comes
+    from a table of 1024 words. The base comes from 64 chords over w in [0, 1); from w = 1 on the term is 0.
 
     The slope is normalised to ``k = K 2^s`` with K in [1/2, 1), and ``1 - cos gamma`` shifted by s before
     the multiplier, so that both its operands keep their 17 bits at every exponent.
@@ -156,28 +156,28 @@ class Specular(HighlightOperand):
     result        UQ(0, 17)  operand of the colour multipliers; cut
     ============= ========== ===================================================================
 
-    The PROM holds for each exponent the largest shifted argument whose base reaches the cutoff: `CUTOFF`
-    where the base is squared once; for the other models the base whose term is 2^-14, too. A lit base has
-    ``p < 1`` and ``w < 1``, so that nothing wraps. The comparison is made before the square, never on it, so
-    the parabola's second lobe cannot come through. The terms that it drops are less than
+    The PROM holds for each exponent the largest shifted argument whose base reaches the cutoff. The cutoff is
+    the base with a term of 2^-14: `CUTOFF` if the base is squared once, another base for other models. A lit
+    base has ``p < 1`` and ``w < 1``, so that nothing wraps. The comparison is made before the square, never
+    on it, so the parabola's second lobe cannot come through. The terms that it drops are less than
     ``CUTOFF^2 = 2^-14``: 1/64 LSB at intensity 1, 1/8 LSB at the largest, 8.
 
-    Arithmetic error of the result for an exact argument, at most `ERROR`: the base is off by 2^-16 each from
-    the argument, its shift and K, and by 2^-17 from the product; the square doubles that error; the result
-    adds 2^-17. Each further square doubles the error and adds 2^-17: at most `error`, 2^-12 and 2^-11.
+    The arithmetic error of the result for an exact argument is at most `ERROR`: the argument, its shift and K
+    each add 2^-16 to the error of the base, the product adds 2^-17; the square doubles this error; the result
+    adds 2^-17. Each further square doubles the error and adds 2^-17: `error` is at most 2^-12 and 2^-11.
 
-    Error of ``exp``: errors relative to p (of K and the slope) are multiplied by ``p 2^(-16 p) <= 0.034``;
-    the cuts of the argument and its shift, under ``2^-16 + 2^-18``, times ``16 ln 2``, are 2.2e-4; the chords
-    add 7.3e-6, roundings and the rest under 2e-5: at most ``2^-12 + 2^-15``.
+    The error of ``exp`` is at most ``2^-12 + 2^-15``: errors relative to p (of K and the slope) are
+    multiplied by ``p 2^(-16 p) <= 0.034``; the cuts of the argument and its shift, under ``2^-16 + 2^-18``,
+    times ``16 ln 2``, add 2.2e-4; the chords add 7.3e-6, all others together under 2e-5.
 
-    Error of ``coscos``: every cut makes w smaller, together by less than ``2^-16 K (1 + e) + 2^-17 (1 + e) +
-    2^-17 w / K + 2^-16 p + 2^-17`` and the error of the slope, which is 2^-15 at the peak. There the term
-    falls fastest with w, by 2.47 (k = 2) or 4.93 (k = 4); the chords of the base are too high by at most
-    1.11e-5, which counts two or four times. The sum is largest next to the peak, 9.8e-5 and 2.0e-4: at most
-    2^-13 and 2^-12. The chords of e make w larger, by less than 1.1e-5 up to a right angle and 8e-5 up to
-    x = 1.7, where the term falls slowly. Towards x = 2 they fail, as the derivative of e has no bound there;
-    only n = 1 with k = 4 has light beyond 1.7, under 0.03, and the fourth power makes the error small again:
-    measured, 8e-6.
+    The error of ``coscos`` is at most 2^-13 for k = 2 and 2^-12 for k = 4: every cut makes w smaller,
+    together by less than ``2^-16 K (1 + e) + 2^-17 (1 + e) + 2^-17 w / K + 2^-16 p + 2^-17`` and the error of
+    the slope, which is 2^-15 at the peak. There the term falls fastest with w, by 2.47 (k = 2) or 4.93 (k =
+    4); the chords of the base are too high by at most 1.11e-5, which counts two or four times. The sum is
+    largest next to the peak, 9.8e-5 and 2.0e-4. The chords of e make w larger, by less than 1.1e-5 up to a
+    right angle and 8e-5 up to x = 1.7, where the term falls slowly. Near x = 2 the chords are useless, as the
+    derivative of e has no bound there; only n = 1 with k = 4 has light beyond 1.7, under 0.03, and the fourth
+    power makes the error small again: 8e-6 as measured.
 
     Parameters
     ----------
@@ -186,16 +186,16 @@ class Specular(HighlightOperand):
     operand : str
         ``"cosine"`` or ``"one_minus_cosine"``; see `HighlightOperand`.
     as_published : bool
-        The comparator of figure 3.6 as published, for polynomials that are squared once: it compares the
-        *square*, with 2^-14 at every exponent. Up to the base's zero the terms are those of the default to
-        the bit. Past it the parabola rises again and its second lobe comes through; squares over 1 saturate,
-        so that from ``k (1 - cos gamma) = 2`` on the surface is as bright as at the peak: at n = 20 from 37
-        degrees on. A highlight gate for such a unit lets every span through.
+        Whether the unit has the comparator of figure 3.6 as published, for polynomials that are squared once:
+        it compares the *square*, with 2^-14 at every exponent. Up to the base's zero the terms are those of
+        the default to the bit. Past it the parabola rises again and its second lobe comes through; squares
+        over 1 saturate, so that from ``k (1 - cos gamma) = 2`` on the surface is as bright as at the peak: at
+        n = 20 from 37 degrees on. A highlight gate for such a unit lets every span through.
 
     Raises
     ------
     ValueError
-        If the model is none of those, ``as_published`` does not exist for it, or the operand is unknown.
+        If the model is not one of `SERVED`, has no form as published, or the operand is unknown.
 
     Source: docs/theory/units.md#specular-unit; [T] 3.1 and 3.4, figures 3.6 and 3.7; [C] for ``cosquad_lin``
     and ``cosquad_q``; [Lyon93].
@@ -250,7 +250,7 @@ class Specular(HighlightOperand):
 
     @property
     def error(self) -> float:
-        """Largest arithmetic error of the model."""
+        """Bound of the arithmetic error for the model."""
         return (2.0**-12 + 2.0**-15, self.ERROR, 2.0**-12, 2.0**-11)[self.squarings]
 
     @property
@@ -277,7 +277,7 @@ class Specular(HighlightOperand):
 
     @cached_property
     def slopes(self) -> Fixed:
-        """Slope k for exponents 0 to 1023; 0 at 0 where a table holds it."""
+        """Slope k for exponents 0 to 1023; if a table holds k, it is 0 at exponent 0."""
         exponents = np.arange(1 << self.EXPONENT_BITS)
         if self.slope_terms is None:
             return Fixed.round(self.SLOPE_FORMAT, [0.0, *map(self._slope, exponents[1:].tolist())])
@@ -323,7 +323,7 @@ class Specular(HighlightOperand):
     def boundaries(self) -> Fixed:
         """The PROM: largest shifted argument that is not cut off, for exponents 0 to 1023.
 
-        As published no argument is surely cut off, and the unit has no PROM.
+        The unit as published has no PROM: every word here is the largest argument.
         """
         format = self.SHIFTED_FORMAT
         exponent = np.arange(1 << self.EXPONENT_BITS)
@@ -345,7 +345,7 @@ class Specular(HighlightOperand):
 
     @property
     def last_lit_arguments(self):
-        """Computed from the PROM, in integers."""
+        """Last lit arguments, computed from the PROM in integers."""
         _, shift = self.scale(np.arange(1 << self.EXPONENT_BITS))
         boundary = self.boundaries.codes
         arguments = (((boundary + 1) << 10) - 1) >> (shift + 1)
@@ -394,7 +394,7 @@ class Specular(HighlightOperand):
         return base
 
     def _as_published(self, product: Fixed, lit: np.ndarray) -> Fixed:
-        """Square of a base of either sign; 0 where it is less than the cutoff's."""
+        """Square of a base of either sign; 0 if it is less than the square of `CUTOFF`."""
         p, largest = product.truncate(17).codes, self.BASE_FORMAT.max_code
         base = np.where(p <= largest, largest - p, np.minimum(p - largest - 1, largest))
         base = Fixed(self.BASE_FORMAT, np.where(lit, base, 0))
@@ -402,7 +402,7 @@ class Specular(HighlightOperand):
         return Fixed(self.RESULT_FORMAT, np.where(square.values >= self.CUTOFF**2, square.codes, 0))
 
     def _cosine(self, argument: Fixed, product: Fixed) -> np.ndarray:
-        """Codes of ``cos(a gamma)``, of ``w = p + p e`` saturated."""
+        """Codes of ``cos(a gamma)``, from ``w = p + p e``, saturated."""
         p = product.truncate(17).saturate(self.BASE_FORMAT)
         e = self.excess.compute(argument.codes >> 8).truncate(16)
         w = (p + p * e).truncate(17).saturate(self.BASE_FORMAT)

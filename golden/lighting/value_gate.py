@@ -17,27 +17,27 @@ __all__ = ["ValueGate"]
 class ValueGate:
     """Whether a span may be lit, from ``u = |N - H|^2 / 2`` at its first pixel, middle and last pixel.
 
-    The pixels' u lie on a quadratic, ``u_l + P t + G t^2`` with ``G = 2 (u_l + u_r - 2 u_m)``. It is the
-    straight line from u_l to u_r less ``G t (1 - t)``, hence at least ``min(u_l, u_r) - max(G, 0) / 4``;
-    twice that is `SpanLimit.least`. A span is lit unless
+    The u of the pixels lie on a quadratic, ``u_l + P t + G t^2`` with ``G = 2 (u_l + u_r - 2 u_m)``. It is
+    the straight line from u_l to u_r minus ``G t (1 - t)``, hence at least ``min(u_l, u_r) - max(G, 0) / 4``;
+    twice this bound is `SpanLimit.least`. A span is lit unless
 
-    - ``|u_l + u_r - 2 u_m| < 2^-5`` and ``|u_r - u_l| < 2^-3``, so that ``|G| < 1/16`` and ``|P| < 3/16``,
-      whose words hold them; and
+    - ``|u_l + u_r - 2 u_m| < 2^-5`` and ``|u_r - u_l| < 2^-3``, so that ``|G| < 1/16`` and ``|P| < 3/16`` fit
+      their words; and
     - `SpanLimit.least` is at least a threshold, from a PROM addressed by the exponent.
 
-    A pixel's u is off the quadratic through the values by less than ``2^-23 + ChordSetup.walk_error(3/16,
-    1/16) + 2^-26`` (`margin`): the rounding of G, the reciprocal of the length and the drift, and the
-    rounding of the result. The threshold is twice the largest argument to which the specular unit may give a
-    term
-    (`HighlightOperand.last_lit_arguments`), a step and the margin more. **So no pixel of a span that is not
-    lit has a specular term other than 0**, and the picture is the same to the bit. No multiplication.
+    The distance of a pixel's u from the quadratic through the values is less than
+    ``2^-23 + ChordSetup.walk_error(3/16, 1/16) + 2^-26`` (`margin`): the rounding of G, the reciprocal of the
+    length and the drift, and the rounding of the result. The threshold is twice the sum of the margin, one
+    step, and the largest argument with a term over 0 (`HighlightOperand.last_lit_arguments`). **So no pixel
+    of a span that is not lit has a specular term other than 0**, and the picture is the same to the bit. The
+    gate needs no multiplication.
 
-    Of a single pixel all three values are its own.
+    In a span of one pixel all three values are those of the pixel.
 
     Parameters
     ----------
     specular : Specular or Power
-        The unit that is gated; its operand is 1 - N·H.
+        Model of the unit that is gated; its operand is 1 - N·H.
 
     Source: docs/theory/units.md#highlight-gate.
     """
@@ -60,9 +60,9 @@ class ValueGate:
         return self.thresholds_of(self.specular.last_lit_arguments)
 
     def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
-        """Thresholds by the largest argument whose term is over 0, in steps of 2^-25; rounded up.
+        """Thresholds from the largest arguments with a term over 0, in steps of 2^-25; rounded up.
 
-        Where every argument may be lit it is over 4, which no least u twice is.
+        If every argument may be lit, the threshold is over 4, which is more than any `SpanLimit.least`.
         """
         format = self.THRESHOLD_FORMAT
         nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25 + self.margin
@@ -95,7 +95,7 @@ class ValueGate:
         return self.compute_by(highlight, self.thresholds[exponent])
 
     def compute_by(self, highlight: np.ndarray, threshold: Fixed) -> np.ndarray:
-        """The same by thresholds in place of exponents, UQ(3, 15)."""
+        """Decisions as by `compute`, from thresholds, UQ(3, 15), in place of exponents."""
         left, middle, right = np.moveaxis(highlight, -1, 0)
         held = (np.abs(left + right - 2 * middle) < self.LARGEST_BULGE) & (
             np.abs(right - left) < self.LARGEST_RISE
