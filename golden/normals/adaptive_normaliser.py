@@ -1,4 +1,4 @@
-"""Adaptive normaliser: a span bisected until straight lines will do ([T] figure 2.7)."""
+"""Adaptive normaliser: a span is bisected until straight lines are good enough ([T] figure 2.7)."""
 
 from dataclasses import dataclass, field
 
@@ -17,29 +17,30 @@ __all__ = ["AdaptiveNormaliser"]
 class AdaptiveNormaliser:
     """Normals of a span of m pixels, by linear interpolation over ``2^k`` equal arcs of its great circle.
 
-    **Number of levels.** Over an arc a chord is too short by its sagitta at most:
-    ``d_k = 1 - cos(psi/2^(k+1))`` for ``2^k`` segments, and ``d_(k+1) = d_k/4`` nearly. With
-    ``q = (1 - cos psi)/4``, which the bisection unit gives, ``d_k <= (q + q^2) / 4^k``: one square, then
+    **Number of levels.** Points of a chord are too short by at most its sagitta,
+    ``d_k = 1 - cos(psi/2^(k+1))`` for ``2^k`` segments, where ``d_(k+1)`` is about ``d_k/4``. With
+    ``q = (1 - cos psi)/4`` from the bisection unit, ``d_k <= (q + q^2) / 4^k``: this takes one square and
     wired shifts. The right side is too large by at most 6.7 % (k = 0 at 90 degrees), and never too small. k
-    is the first with ``(q + q^2) / 4^k <= threshold``; `depth` is that of 90 degrees.
+    is the least with ``(q + q^2) / 4^k <= threshold``; `depth` is k at 90 degrees.
 
     **Segment ends** ``E_j`` at ``psi j / 2^k``, from the bisection unit, level by level.
 
     **Linear interpolators.** Pixel i lies at ``i 2^k / (m - 1)`` of a segment's length. The integer part is
     its segment j, exact by integer arithmetic for every m. The first pixel of a segment starts at
-    ``E_j + phi (E_(j+1) - E_j)``, phi its fractional part, and every further one adds
+    ``E_j + phi (E_(j+1) - E_j)``, where phi is the fractional part, and every further pixel adds
     ``(E_(j+1) - E_j) 2^k/(m - 1)``. The last pixel is a segment of its own, so that both ends are exact.
 
     The published design extrapolates instead: ``N_l + g (N_r - N_l)`` is the normal of the pixel at the next
-    power of two, ``g = 2^p/(m - 1)``, so that segments are whole pixels and divisions are shifts. It is no
-    variant here, for these reasons. The new end is not of unit length (up to 1.03 for 10 degrees, 1.47 for
-    45), so the word of a component does not hold it; a `Renormaliser` has eight multipliers, this whole unit
-    three. 90 degrees become up to 116, out of the bisection's range. Even normalised, the new end lies on the
-    continuation of the chord, not at its pixel's position on the great circle: the last pixel misses N_r, by
-    up to 0.00015 degrees for 1, 0.15 for 10 and 8.2 for 45. Here it misses by nothing.
+    power of two, ``g = 2^p/(m - 1)``, so that segments are whole pixels and divisions are shifts. This is not
+    a variant here, for three reasons. The new end is not of unit length (up to 1.03 for 10 degrees, 1.47 for
+    45), so the word of a component does not hold it, and a `Renormaliser` for it would take eight
+    multipliers, where this whole unit takes three. A span of 90 degrees becomes one of up to 116, out of the
+    bisection's range. Even normalised, the new end lies on the continuation of the chord, not at its pixel's
+    position on the great circle: the last pixel misses N_r, by up to 0.00015 degrees for spans of 1 degree,
+    0.15 for 10 and 8.2 for 45. Here the last pixel is exactly N_r.
 
     A span wider than the bisection's `max_angle` is flagged and not divided: its normals lie on the straight
-    line between its ends (for ends further apart than 1 in a component, near the left one), and only its
+    line between its ends (near the left end, if the ends differ by more than 1 in a component), and only its
     first and last pixel are defined. Ends must be of unit length, to 1/256 or so: a middle normal is made as
     long as one, so that the normals between other ends are off by as much. An end of length 0 counts as 90
     degrees away, and is not flagged.
@@ -49,7 +50,7 @@ class AdaptiveNormaliser:
     ================ ========== ==================================================================
     q + q^2          SQ(2, 20)  a threshold of 2^-14 has 6 bits
     E_j              SQ(1, 17)  the bisection's results
-    E_(j+1) - E_j    SQ(1, 17)  operand; saturates; with a threshold up to 1/8 it never has to
+    E_(j+1) - E_j    SQ(1, 17)  operand; saturates, but never with a threshold up to 1/8
     1/(m - 1)        UQ(0, 17)  table, with the shift of `reciprocal_address`
     phi              UQ(0, 17)  operand; cut
     N                SQ(2, 32)  cut; half a step of the result is added at the start; never wraps
@@ -57,16 +58,16 @@ class AdaptiveNormaliser:
     normal           SQ(1, 17)  rounded half up, saturates
     ================ ========== ==================================================================
 
-    Arithmetic error of a component against straight lines between the exact ends, at most `error`: that of
-    the ends (`end_error`); a difference of ends, at most ``sqrt(8.1 threshold)`` and 0.77, times the 2^-17 of
-    phi and of the reciprocal; drift; the last rounding. Of the ends: the bisection's model error makes them
-    too long or too short, and the next level, which reads their dot product, keeps ``1/(1 + cos)`` of that,
-    at most 0.586; its arithmetic errors add up, in all levels by a factor of at most 1.12. The first and the
-    last normal of a span are exact.
+    The arithmetic error of a component, against straight lines between the exact ends, is at most `error`. It
+    is the sum of the error of the ends (`end_error`); a difference of ends, at most ``sqrt(8.1 threshold)``
+    and 0.77, times 2^-17 for phi and for the reciprocal; the drift; and the last rounding. The model error of
+    the bisection makes ends too long or too short, and the next level, which reads their dot product, keeps
+    ``1/(1 + cos)`` of it, at most 0.586; its arithmetic errors add up, with a factor of at most 1.12 over all
+    levels. The first and the last normal of a span are exact.
 
-    Model error against the great circle: the length is short by at most ``threshold`` (and the 2^-19 of the
-    rounding of q), never long; the direction is off by at most ``0.017 theta^3`` for a segment of angle
-    theta, ``theta^2 <= 8.1 threshold``.
+    The model error is that against the great circle: a normal is too short by at most ``threshold`` (plus
+    2^-19 by the rounding of q), and never too long; its direction is off by at most ``0.017 theta^3`` for a
+    segment of angle theta, ``theta^2 <= 8.1 threshold``.
 
     Parameters
     ----------
@@ -98,7 +99,7 @@ class AdaptiveNormaliser:
 
     @property
     def limits(self) -> Fixed:
-        """Limits ``threshold 4^k``, k under `depth`; each that ``q + q^2`` exceeds asks for a level."""
+        """Limits ``threshold 4^k``, k under `depth`; a span has a level for each that ``q + q^2`` exceeds."""
         code = int(np.floor(np.ldexp(self.threshold, self.SAGITTA_FORMAT.fraction_bits)))
         q = (1 - np.cos(np.radians(self.bisection.max_angle))) / 4
         largest = (q + q * q) / self.SAGITTA_FORMAT.step
@@ -113,7 +114,7 @@ class AdaptiveNormaliser:
         return len(self.limits.codes)
 
     def end_error(self, levels: int, first_step: bool) -> float:
-        """Bound on the error of a component of a segment end, in a span of so many levels."""
+        """Bound of the error of a component of a segment end, in a span with ``levels`` levels."""
         p = self.bisection
         length = 0.0
         for level in range(1, levels + 1):
@@ -133,7 +134,7 @@ class AdaptiveNormaliser:
         return self.end_error(levels, first_step) + difference * 2.0**-16 + 4096 * 2.0**-32 + 2.0**-18
 
     def levels(self, one_minus_cosine: Fixed, out_of_range: np.ndarray) -> np.ndarray:
-        """Number of levels k of spans, from the bisection unit's results for their ends.
+        """Number of levels k of spans, from results of the bisection unit.
 
         Parameters
         ----------
@@ -172,7 +173,7 @@ class AdaptiveNormaliser:
         out_of_range : bool array, shape (spans,)
             Whether the span is wider than the bisection's `max_angle`.
         levels : int array, shape (spans,)
-            k.
+            Number of levels k.
 
         Raises
         ------
@@ -242,12 +243,12 @@ class AdaptiveNormaliser:
         left, difference : Fixed, shape (pixels, components), SQ(1, 17)
             ``E_j``, and ``E_(j+1) - E_j``.
         length, levels, span, offset, index
-            As for `positions`, and its results.
+            Parameters and results of `positions`.
 
         Returns
         -------
         Fixed, shape (pixels, components), SQ(2, 32)
-            With half a step of the result added.
+            Values before the last cut, with half a step of the result added.
         """
         reciprocal, shift = (x[span] for x in self.reciprocal(np.maximum(length - 1, 1)))
         phi = Fixed(COMPONENT, ((offset * reciprocal) << 1 >> shift)[:, np.newaxis])
@@ -259,10 +260,10 @@ class AdaptiveNormaliser:
 
     @property
     def half_step(self) -> Fixed:
-        """Half a step of the result: rounding half up is then a cut."""
+        """Half a step of the result; with it added, a cut rounds half up."""
         return Fixed.round(self.ACCUMULATOR_FORMAT, COMPONENT.step / 2)
 
     def reciprocal(self, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Code of the table and shift s of ``1/steps = 2 reciprocal 2^-s``, for 1 to 4094 steps."""
+        """Code of the reciprocal and shift s in ``1/steps = 2 reciprocal 2^-s``, for 1 to 4094 steps."""
         address, shift = reciprocal_address(steps)
         return reciprocal_table().codes[address], shift

@@ -23,29 +23,29 @@ _PUBLISHED_FIRST_STEP = (0.707, -0.341, 0.193, -0.059)
 class Bisection:
     """Normal half-way between two: ``N = (N_a + N_b) / sqrt(2 + z)``, ``z = 2 r``, ``r = N_a . N_b``.
 
-    Computed as ``N = (N_a + N_b)/2 + e (N_a + N_b)`` with ``e = 1/sqrt(2 + z) - 1/2``, so that a word of e
-    holds its small part alone. ``u = 1 - r`` chooses between two polynomials for e, in Horner's form:
+    It is computed as ``N = (N_a + N_b)/2 + e (N_a + N_b)`` with ``e = 1/sqrt(2 + z) - 1/2``, so that the word
+    of e holds a small number. ``u = 1 - r`` chooses between two polynomials for e, in Horner's form:
 
     - up to 45 degrees (z in [sqrt 2, 2]) of degree 1 or 2 in u, without a constant: exact at angle 0;
     - from 45 to 90 degrees, the first step of a wide span, a cubic in r for the same function, written
       ``h(r) = 1/sqrt(2 (1 + r))``.
 
-    With ``as_published`` both are polynomials in r with the published coefficients (those of z doubled once
-    for every power of it).
+    With ``as_published`` both are polynomials in r with the published coefficients (as z = 2 r, a coefficient
+    of z^i is multiplied by 2^i).
 
     A span wider than `max_angle` by more than the rounding of its normals is flagged; its result is
     undefined.
 
-    Ends of another length: of length ``1 + x`` they give a middle of length ``1 + x/(1 + r)``, so up to 45
-    degrees 0.5 to 0.59 of the error remains. An end of length 0 counts as one at 90 degrees: flagged where
-    `max_angle` is 45; else the result is 0.7071 times the other end.
+    Ends of length ``1 + x`` have a middle normal of length ``1 + x/(1 + r)``, so up to 45 degrees 0.5 to 0.59
+    of the length error remains. An end of length 0 counts as one at 90 degrees: it is flagged if `max_angle`
+    is 45; else the result is 0.7071 times the other end.
 
     ============= ========== ================================================================
     word          format     why
     ============= ========== ================================================================
     u             SQ(2, 17)  up to 2, for opposite normals
     u or r        SQ(1, 17)  operand of the multiplier, 18 bits
-    c, sums       SQ(0, 18)  18 bits; under 0.35 where nothing is flagged; wrap
+    c, sums       SQ(0, 18)  18 bits; under 0.35 if the span is not flagged; wrap
     e             SQ(-1, 19) 18 bits; at most 0.0412 at 45 degrees, 0.2072 at 90; wraps
     N             SQ(1, 17)  so that the unit can bisect its own results; saturates
     ============= ========== ================================================================
@@ -53,8 +53,8 @@ class Bisection:
     One factor scales both ends. Its error changes the length of N and not its direction, unless a component
     saturates at 1.
 
-    Model error of the factor, with the coefficients in the words above (`model_error`), and the same as a
-    relative error of the length:
+    The table has the model error of the factor, with the coefficients in the words above (`model_error`), and
+    the relative error of the length that it causes:
 
     ====================== ================ ==================== ================ ====================
     variant                to 45 degrees    relative             45 to 90 degrees relative
@@ -65,11 +65,12 @@ class Bisection:
     degree 2, as published 1.0e-3           0.20 %, 0.20 % at 0  6.2e-4           0.09 %
     ====================== ================ ==================== ================ ====================
 
-    Arithmetic error of a component against the same polynomial (`arithmetic_error`): a component of
-    ``N_a + N_b``, at most 2, times the error of e; the half sum, cut by up to 2^-18, times 2 e; the product,
-    cut (2^-21); the result, rounded (2^-18). The error of e is that of u, rounded to 17 bits (2^-18, and as
-    much again for r, which is taken from it), times the slope of e (0.1585 at 45 degrees, 0.3536 at 90); the
-    roundings of the sums (2^-19 times u, or times r + r^2); and its own (2^-20).
+    The arithmetic error of a component against the same polynomial (`arithmetic_error`) is the sum of the
+    error of e times a component of ``N_a + N_b``, at most 2; the cut of the half sum, up to 2^-18, times 2 e;
+    the cut of the product, 2^-21; and the rounding of the result, 2^-18. The error of e is the sum of the
+    rounding of u to 17 bits (2^-18, and twice as much for r, which is computed from it) times the slope of e
+    (0.1585 at 45 degrees, 0.3536 at 90); the roundings of the sums (2^-19 times u, or times r + r^2); and its
+    own (2^-20).
 
     Parameters
     ----------
@@ -78,12 +79,12 @@ class Bisection:
     max_angle : int
         90, or 45 for a unit without the first step, which saves its multiplications.
     as_published : bool
-        Take the coefficients of [T].
+        Whether the coefficients are those of [T].
 
     Raises
     ------
     ValueError
-        If a parameter is none of those.
+        If ``degree`` or ``max_angle`` is another number.
 
     Source: docs/theory/interpolation.md#bisection; [T] 2.1, figure 2.6.
     """
@@ -113,7 +114,7 @@ class Bisection:
 
     @staticmethod
     def _limit(angle: float) -> Fixed:
-        """``u`` at an angle, with room for the rounding of two normals."""
+        """``u`` at an angle, plus a margin for the rounding of two normals."""
         return Fixed.round(Bisection.ANGLE_FORMAT, 1 - np.cos(np.radians(angle)) + 4 * COMPONENT.step)
 
     @cached_property
@@ -136,22 +137,20 @@ class Bisection:
         Parameters
         ----------
         first_step : bool
-            Whether of the polynomial for 45 to 90 degrees, or of that for spans up to 45 degrees.
+            Whether the polynomial is that for 45 to 90 degrees; else it is that for spans up to 45 degrees.
 
         Returns
         -------
         constant : Fixed, shape (), SQ(-1, 19)
             Coefficient of power 0.
         rest : Fixed, shape (steps,), SQ(0, 18)
-            Coefficients of the powers 1, 2, ... of u or r (`reads_cosine`), filled up with 0.
+            Coefficients of the powers 1, 2, ... of u or r (see `reads_cosine`), padded with 0.
         """
         constant, rest = _polynomials(self)[first_step]
         return constant, rest[: self.steps]
 
     def model_error(self, first_step: bool, widest: float = 90.0) -> float:
-        """Largest error of the factor ``1/2 + e`` as a polynomial in exact arithmetic.
-
-        Over the polynomial's domain, or its part up to ``widest`` degrees.
+        """Largest error of the factor ``1/2 + e`` as a polynomial in exact arithmetic, up to an angle.
 
         Parameters
         ----------
@@ -249,8 +248,8 @@ class Bisection:
 
 @cache
 def _polynomials(bisection: Bisection) -> tuple[tuple[Fixed, Fixed], tuple[Fixed, Fixed]]:
-    """Coefficients of e of narrow spans and of the first step, as `Bisection.polynomial` has them."""
-    # The words of u and r are u and r times `ONE_SQUARED`.
+    """Results of `Bisection.polynomial` for narrow spans and for the first step."""
+    # The words of u and r hold u and r times `ONE_SQUARED`.
     one = ONE_SQUARED.values
     narrow, widest = bisection.widest_narrow.values, bisection._limit(90).values
     if bisection.as_published:

@@ -21,7 +21,7 @@ class BisectionChain:
     2^k, so the unit holds the weights themselves, ``l = L/M`` and ``m = 1/M``. With
     ``f_k = 1 / (2 cos(psi/2^k)) = 1/2 + e``, the factor of `Bisection`,
 
-    ``l_k = (l_(k-1) + 1) f_k``, ``m_k = m_(k-1) f_k``: no division, and both stay in [0, 1].
+    ``l_k = (l_(k-1) + 1) f_k``, ``m_k = m_(k-1) f_k``. This takes no division, and both stay in [0, 1].
 
     The cosine of half the angle comes from the same factor: with ``u = 1 - cos``,
     ``u_(k+1) = u_k/2 - (1 + cos) e``. One dot product of the two normals is needed at the start, and six
@@ -36,10 +36,10 @@ class BisectionChain:
     N             SQ(1, 17)  rounded, saturates
     ============= ========== ================================================================
 
-    Error bound (`error`): an error of f_k is multiplied by ``l + 1 <= 2`` in l_k and by m in m_k, and every
-    further step multiplies it by f, 1/2 to 0.54 after the first step: errors do not grow along the chain.
-    `error` follows the recursion with every rounding at its worst. The error of u is halved by each step
-    too, and adds that of e twice at most; the next factor has it times the slope 0.1585. Unlike one
+    `error` bounds the error: it follows the recursion with every rounding at its worst. An error of f_k is
+    multiplied by ``l + 1 <= 2`` in l_k and by m in m_k, and every further step multiplies it by f, 1/2 to
+    0.54 after the first step: errors do not grow along the chain. Each step also halves the error of u and
+    adds at most twice the error of e; the next factor has the error of u times the slope 0.1585. Unlike one
     bisection, the chain can also change the direction of its result, as the errors of l and m differ.
 
     ===== ============================ ============================
@@ -52,8 +52,8 @@ class BisectionChain:
     15    3.8e-5                       3.9e-5
     ===== ============================ ============================
 
-    With the published coefficients of degree 2 the errors stay: every factor of a small angle is 0.2 % too
-    small, and l tends to 0.9973 in place of 1.
+    With the published coefficients of degree 2 the errors do not become small: every factor of a small angle
+    is 0.2 % too small, and l tends to 0.9973 in place of 1.
 
     Ends of length ``1 + x`` give normals whose length is off by x/2 to x. An end of length 0 counts as one at
     90 degrees, as in `Bisection`.
@@ -61,7 +61,7 @@ class BisectionChain:
     Parameters
     ----------
     bisection : Bisection
-        The factor: degree, widest span, coefficients.
+        Bisection unit with the factor: degree, widest span, coefficients.
 
     Source: docs/theory/interpolation.md#bisection; [T] 2.1.
     """
@@ -80,7 +80,7 @@ class BisectionChain:
         level : int
             k, 1 to 15.
         first_step : bool
-            Whether for spans of 45 to 90 degrees, or for spans up to 45 degrees.
+            Whether spans are 45 to 90 degrees wide; else they are up to 45 degrees wide.
         """
         p = self.bisection
         one = ONE_SQUARED.values.item()

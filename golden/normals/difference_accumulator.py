@@ -18,7 +18,7 @@ class DifferenceAccumulator:
     ====== ============ =====================================================================
     word   format       why
     ====== ============ =====================================================================
-    N, W   SQ(2, 42)    adders are cheap: an error e of the second difference grows to e m^2/2
+    N, W   SQ(2, 42)    as an error e of the second difference grows to e m^2/2; adders are cheap
     normal SQ(1, 17)    18 bits for the multipliers that follow
     ====== ============ =====================================================================
 
@@ -28,19 +28,19 @@ class DifferenceAccumulator:
     end of ``SQ(1, 17)`` saturates. The sums themselves are exact. Up to 45 degrees no value that is used
     leaves ``SQ(2, 42)``; in a wider span, which the middle normal flags, sums may wrap.
 
-    Error of a normal against ``Q + k W_0 + k (k - 1)/2 (2 G dt^2)``: the last rounding, 2^-18, alone, unless
-    it saturates. `DifferenceSetup` bounds the drift from the rounding of the differences.
+    The error of a normal against ``Q + k W_0 + k (k - 1)/2 (2 G dt^2)`` is that of the last rounding, 2^-18,
+    unless it saturates. `DifferenceSetup` bounds the drift from the rounding of the differences.
 
     Parameters
     ----------
     start_format : Format
-        Of the first value Q.
+        Format of the first value Q.
     format : Format
-        Of the sum N.
+        Format of the sum N.
     difference_format : Format
-        Of W and the second difference.
+        Format of W and the second difference.
     result_format : Format
-        Of a pixel's value.
+        Format of a pixel's value.
 
     Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.10.
     """
@@ -60,7 +60,7 @@ class DifferenceAccumulator:
         start : Fixed, shape (spans, components), `start_format`
             Values at the first pixel.
         first, second : Fixed, shape (spans, components), `difference_format`
-            Differences.
+            First and second differences.
         span : int array, shape (pixels,)
             Span of each pixel.
         index : int array, shape (pixels,)

@@ -1,4 +1,4 @@
-"""Line setup: the step from pixel to pixel of a straight line between two vectors."""
+"""Line setup: the difference from pixel to pixel along a straight line between two vectors."""
 
 from dataclasses import dataclass
 
@@ -13,12 +13,12 @@ __all__ = ["LineSetup", "quantise_line"]
 
 
 def quantise_line(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of the ends of straight lines, in ``SQ(1, 22)``, with the larger of the two at length 1.
+    """Codes of the ends of straight lines, in ``SQ(1, 22)``, scaled so that the longer end has length 1.
 
     Parameters
     ----------
     left, right : float64 arrays, shape (spans, 3)
-        Vectors; not both 0.
+        Vectors at the two ends; not both 0.
     """
     length = np.maximum(np.linalg.norm(left, axis=1), np.linalg.norm(right, axis=1))[:, np.newaxis]
     one = Renormaliser.VECTOR_FORMAT.max_code
@@ -29,20 +29,20 @@ def quantise_line(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.n
 class LineSetup:
     """First difference ``W = P dt``, ``P = N_r - N_l``, of vectors in ``SQ(1, 22)``; ``dt = 1/(m - 1)``.
 
-    The line may be short at its end, where a renormaliser magnifies every error, so P and dt have more bits
-    than a multiplier's operand: three products a component, nine a span.
+    The vector may be short at one end of the line, where a renormaliser magnifies every error, so P and dt
+    have more bits than a multiplier's operand. This takes three products a component, nine a span.
 
     ========== ============ ============================================================
     word       format       why
     ========== ============ ============================================================
     P          SQ(2, 22)    exact; two words, SQ(2, 15) and UQ(-15, 22)
-    reciprocal UQ(0, 24)    of ``dt = 2 reciprocal 2^-shift``; two words of 17 and 7 bits
+    reciprocal UQ(0, 24)    r in ``dt = 2 r 2^-shift``; two words of 17 and 7 bits
     P r        SQ(2, 39)    without the product of the two lower words, under 2^-32
     W          SQ(2, 40)    at pixel k its rounding adds up to ``k 2^-41``
     ========== ============ ============================================================
 
-    Error of a point of the line at any pixel: `ERROR`, for P up to 2 in a component: ``2^-24 |P|`` of the
-    reciprocal, 2^-31 of the product that is left out, and the drift, ``4094 2^-41``.
+    The error of a point of the line at any pixel is at most `ERROR`, for P up to 2 in a component: the sum of
+    ``2^-24 |P|`` by the reciprocal, 2^-31 by the product that is left out, and the drift, ``4094 2^-41``.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """
@@ -58,7 +58,7 @@ class LineSetup:
     ERROR = float(np.sqrt(3) * (2.0**-23 + 2.0**-31 + 4094 * 2.0**-41))
 
     def compute(self, left: Fixed, right: Fixed, length: np.ndarray) -> Fixed:
-        """Bit-accurate W.
+        """Bit-accurate first difference W.
 
         Parameters
         ----------

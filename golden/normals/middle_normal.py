@@ -26,7 +26,7 @@ MAX_SPAN_ANGLE = 45.0
 class MiddleNormal:
     """Middle normal ``N_c = h(r) (N_l + N_r)``, ``h = 1/sqrt(2 (1 + r))``, ``r = N_l . N_r``.
 
-    Computed as ``N_c = (N_l + N_r)/2 + e(u) (N_l + N_r)`` with ``u = 1 - r``. The polynomial
+    It is computed as ``N_c = (N_l + N_r)/2 + e(u) (N_l + N_r)`` with ``u = 1 - r``. The polynomial
     ``e = h - 1/2 = u (c1 + u (c2 + u c3))`` is exact at angle 0, as most spans of a mesh are narrow, and
     fitted up to `MAX_SPAN_ANGLE`.
 
@@ -39,23 +39,23 @@ class MiddleNormal:
     N_c      SQ(1, 19)     ``4 N_c`` has 17 fraction bits, exactly
     ======== ============= ==========================================================
 
-    Error of a component of ``N_c`` against the exact function of the same two code vectors, for angles up to
-    45 degrees, at most `ERROR`. The error of e has four parts: the fit (8.3e-7); u, cut to 18 fraction bits,
-    times the slope 0.18; two roundings of sums (2^-20 u and 2^-20 u^2); its own rounding (2^-22). It is
-    multiplied by a component of ``N_l + N_r``, at most 2. ``(N_l + N_r)/2`` is cut by up to 2^-18, which is
-    multiplied by 2 e <= 0.0824; the last rounding adds 2^-20.
+    The error of a component of ``N_c``, against the exact function of the same two code vectors, is at most
+    `ERROR` for angles up to 45 degrees. The error of e has four parts: the fit (8.3e-7); the cut of u to 18
+    fraction bits, times the slope 0.18; two roundings of sums (2^-20 u and 2^-20 u^2); its own rounding
+    (2^-22). It is multiplied by a component of ``N_l + N_r``, at most 2. The cut of ``(N_l + N_r)/2``, up to
+    2^-18, is multiplied by 2 e <= 0.0824; the last rounding adds 2^-20.
 
     A wider span is flagged; u and N_c then saturate.
 
-    Ends of another length: of length ``1 + x`` they give a middle of length ``1 + x/(1 + r)``; where u would
-    be negative, half their sum, which is no longer than they are. A span with an end of length 0 is flagged.
+    Ends of length ``1 + x`` have a middle normal of length ``1 + x/(1 + r)``; if u would be negative, it is
+    half their sum, which is not longer than the ends. A span with an end of length 0 is flagged.
 
     The other fits are for comparison. They need the same hardware, as their polynomials in r, rewritten in u,
-    have the same form. That of [T] has the constant 1/2 exactly: ``e = u (0.132 + u (0.016 + 0.059 u))``. A
-    plain minimax fit over r in [0, 1] has another constant, and makes every normal of a flat face too short
-    or too long by twice its error; e is then ``SQ(-3, 21)``, 18 bits. The table has `model_error` of h, with
-    the coefficients in the words above; the same as a relative error of the length; the relative error at
-    angle 0; and the first two over all r in [0, 1]:
+    have the same form. The fit of [T] has the constant 1/2 exactly: ``e = u (0.132 + u (0.016 + 0.059 u))``.
+    A plain minimax fit over r in [0, 1] has another constant, so that every normal of a flat face is too
+    short or too long by twice the error at angle 0; e is then ``SQ(-3, 21)``, 18 bits. The columns of the
+    table are `model_error` of h, with the coefficients in the words above; the relative error of the length
+    that it causes; the relative error at angle 0; and the first two for all r in [0, 1]:
 
     ================ ============= ======== ============= ===============
     fit              to 45 degrees relative at angle 0    over [0, 1]
@@ -75,7 +75,7 @@ class MiddleNormal:
     Raises
     ------
     ValueError
-        If `fit` is none of those.
+        If ``fit`` is unknown.
 
     Source: docs/theory/interpolation.md#middle-normal; [T] 2.2.
     """
@@ -104,7 +104,7 @@ class MiddleNormal:
 
     @property
     def constant(self) -> Fixed:
-        """Constant of ``e``, its value at angle 0: not 0 for the plain minimax fits alone."""
+        """Constant of ``e``, its value at angle 0; it is 0 except for the plain minimax fits."""
         return Fixed(self.factor_format, _coefficients(self.fit)[0])
 
     @property
@@ -128,7 +128,7 @@ class MiddleNormal:
 
     @cached_property
     def widest(self) -> Fixed:
-        """Largest ``u`` that is not flagged: that of `MAX_SPAN_ANGLE` and the rounding of two normals."""
+        """Largest ``u`` that is not flagged: u at `MAX_SPAN_ANGLE`, plus a margin for rounded normals."""
         limit = 1 - np.cos(np.radians(MAX_SPAN_ANGLE)) + 4 * COMPONENT.step
         return Fixed.round(self.ANGLE_FORMAT, limit)
 

@@ -1,4 +1,4 @@
-"""Renormaliser: a vector of any length divided by its length, each pixel by itself."""
+"""Renormaliser: the vector of each pixel, divided by its length."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,12 +15,13 @@ __all__ = ["Renormaliser"]
 
 @dataclass(frozen=True)
 class Renormaliser:
-    """Unit vector ``N = v / |v|`` of lengths from 2^-8 to 1: the exact normal, whatever the span.
+    """Unit vector ``N = v / |v|``, for lengths of v from 2^-8 to 1: the exact normal in any span.
 
-    v is shifted left until its largest component is 1/2 or more, and rounded: ``w``. With ``s = w . w``, from
-    1/4 to 3, ``N = r w``, ``r = (ONE/2^17) / sqrt(s)``, as `unit_vector` has it. With q for the octave of s
-    and ``m = s 2^-q`` from 1 to 2, r is a quadratic ``c0 - x (c1 - x c2)`` in each of 16 segments of m in
-    each of the four octaves, x from the start of the segment.
+    v is shifted left until its largest component is 1/2 or more, and rounded to ``w``. With ``s = w . w``,
+    1/4 to 3, the result is ``N = r w`` with ``r = (ONE/2^17) / sqrt(s)``, where ``ONE/2^17`` is the length 1
+    of `unit_vector`. Let q be the octave of s, and ``m = s 2^-q``, 1 to 2. r is a quadratic
+    ``c0 - x (c1 - x c2)`` in each of 16 segments of m in each of the four octaves, with x from the start of
+    the segment on.
 
     ============ ========== =================================================================
     word         format     why
@@ -29,18 +30,18 @@ class Renormaliser:
     w            SQ(1, 17)  multiplier operand; rounded; saturates
     s            SQ(4, 34)  exact
     x            UQ(-4, 21) 17 bits for the multipliers; cut
-    c0           UQ(1, 18)  fitted last, for what the others' rounding leaves
-    c1           UQ(1, 16)  its error counts 1/16
-    c2           UQ(1, 11)  its error counts 1/256
+    c0           UQ(1, 18)  fitted last, to compensate the rounding of c1 and c2
+    c1           UQ(1, 16)  its error is multiplied by 1/16
+    c2           UQ(1, 11)  its error is multiplied by 1/256
     c1 - x c2    UQ(1, 16)  17 bits for the multiplier; rounded
     r            UQ(1, 16)  17 bits for the multipliers; 0.577 to 2; rounded
     N            SQ(1, 17)  rounded; saturates
     ============ ========== =================================================================
 
-    A vector whose components are all from -`SHORTEST` to under `SHORTEST` is flagged; its N means nothing.
-    Else the direction of N is off by at most `DIRECTION_ERROR` radians, besides what the rounding of v itself
-    does: ``sqrt(3) 2^-18`` by the rounding of w, of length 1/2 or more, and as much by that of N. Its length
-    is off by at most `LENGTH_ERROR`: that of r, times |w| up to sqrt(3), and the rounding of N.
+    A vector with all components from -`SHORTEST` to under `SHORTEST` is flagged; its N is invalid. For other
+    vectors the error of direction is at most `DIRECTION_ERROR` radians, without that of the rounding of v:
+    ``sqrt(3) 2^-18`` by the rounding of w, of length 1/2 or more, and as much by that of N. The length error
+    is at most `LENGTH_ERROR`: the error of r times |w|, up to sqrt(3), plus the rounding of N.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """
@@ -64,8 +65,8 @@ class Renormaliser:
     def coefficients(self) -> tuple[Fixed, Fixed, Fixed]:
         """Coefficients ``c0, c1, c2`` of every segment, shape (64,) each, by octave and segment.
 
-        The Chebyshev series of a segment, nearly a minimax fit as the segment is short, gives c2; c1 follows
-        from its linear term and the rounded c2, and c0 is the middle of the error that is left.
+        c2 comes from the Chebyshev series of a segment, which is nearly a minimax fit, as the segment is
+        short; c1 follows from the linear term and the rounded c2, and c0 centres the remaining error.
         """
         width = 2.0**-self.SEGMENT_BITS
         x = chebyshev.chebpts2(33)
@@ -81,12 +82,12 @@ class Renormaliser:
         return Fixed.round(self.C0_FORMAT, (rest.min(axis=0) + rest.max(axis=0)) / 2), c1, c2
 
     def scaled(self, vector: Fixed) -> tuple[Fixed, np.ndarray]:
-        """w, and whether a vector is too short.
+        """The scaled vector w, and whether a vector is too short.
 
         Parameters
         ----------
         vector : Fixed, shape (..., 3), SQ(1, 22)
-            v.
+            Vectors v.
         """
         if vector.format != self.VECTOR_FORMAT:
             raise ValueError(f"operand must be {self.VECTOR_FORMAT}, not {vector.format}")
@@ -104,7 +105,7 @@ class Renormaliser:
         Parameters
         ----------
         square : Fixed, any shape, SQ(4, 34)
-            s; under 1/4 it counts as if its octave began there, and r means nothing.
+            s; under 1/4 it counts as a value of the lowest octave, and r is invalid.
         """
         codes = square.codes
         octave = sum((codes >> (33 + k)) > 0 for k in range(self.OCTAVES - 1))
