@@ -1,1 +1,1 @@
-"""The float64 truth: camera, scene, reflection models, rasteriser, renderer, metrics."""
+"""The golden renderer in float64: camera, scene, reflection models, rasteriser, renderer, metrics."""

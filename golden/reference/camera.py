@@ -1,4 +1,4 @@
-"""A camera: from world to pixels, by orthographic or perspective projection, in float64."""
+"""The camera: orthographic or perspective projection from world to pixels, in float64."""
 
 import math
 from collections.abc import Sequence
@@ -17,15 +17,15 @@ PROJECTIONS = ("orthographic", "perspective")
 
 @dataclass(frozen=True)
 class Camera:
-    """Where the viewer stands, where they look, and how the world is projected.
+    """A camera: position, direction of view, and projection of the world.
 
     Parameters
     ----------
     position, target : three floats
-        The camera, and the point in the middle of its picture; they must differ.
+        Positions of the camera, and of the point in the middle of its picture; they must differ.
     up : three floats
-        The direction that is upright in the picture, not 0. Where it is parallel to the line of sight, the
-        axis that is furthest from that line takes its place.
+        Direction that is upright in the picture, not 0. If it is parallel to the line of sight, the axis with
+        the largest angle to that line is used.
     projection : {"orthographic", "perspective"}
         Kind of projection.
     height : float
@@ -93,14 +93,14 @@ class Camera:
         return _rotate(np.asarray(points, dtype=np.float64) - self.position, self.axes)
 
     def homogeneous(self, points: np.ndarray, width: int, height: int) -> np.ndarray:
-        """Homogeneous pixel coordinates, which hold in front of the camera and behind it.
+        """Homogeneous pixel coordinates, defined for points in front of the camera and behind it.
 
         Parameters
         ----------
         points : array, shape (..., 3)
             World coordinates.
         width, height : int
-            The picture in pixels; pixels are square.
+            Size of the picture in pixels; pixels are square.
 
         Returns
         -------
@@ -128,7 +128,7 @@ class Camera:
         points : array, shape (..., 3)
             World coordinates.
         width, height : int
-            The picture in pixels.
+            Size of the picture in pixels.
 
         Returns
         -------
@@ -157,14 +157,14 @@ class Camera:
         margin: float = 0.05,
         up: Sequence[float] = (0.0, 1.0, 0.0),
     ) -> "Camera":
-        """A camera that looks along ``-direction`` at the middle of the vertices' box and shows them all.
+        """A camera that looks along ``-direction`` at the middle of the vertices' box and shows all vertices.
 
         Parameters
         ----------
         vertices : array, shape (V, 3)
             Points that must be in the picture, not all in one place.
         direction : three floats
-            From the target to the camera, any length but 0.
+            Direction from the target to the camera, of any length but 0.
         projection : {"orthographic", "perspective"}
             Kind of projection.
         aspect : float
@@ -214,7 +214,7 @@ class Camera:
             distance = max(distance, nearest + 0.1 * radius)
         else:
             distance = nearest + radius
-        # A flat sheet seen edge-on needs no height at all; its own extent is a sensible picture then.
+        # A flat sheet seen edge-on needs no height at all; the picture then has the sheet's extent.
         height = 2 * float(needed.max()) or 2 * radius
         return cls(
             position=tuple(centre + distance * viewer),
@@ -239,7 +239,7 @@ def _axes(viewer: np.ndarray, up: Sequence[float]) -> np.ndarray:
 
 
 def _rotate(vectors: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    # Term by term, not by a matrix product: equal points must give equal bits wherever they stand in the
+    # Term by term, not by a matrix product: equal points must give equal bits at any place in the
     # array, or two vertices in one place could open a crack.
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack([x * axis[0] + y * axis[1] + z * axis[2] for axis in axes], axis=-1)

@@ -11,9 +11,9 @@ __all__ = ["Mesh", "any_component", "normalise", "sum_of_components"]
 
 @dataclass(frozen=True)
 class Mesh:
-    """A triangle mesh with one unit normal a corner vertex.
+    """A triangle mesh with one unit normal for each vertex.
 
-    A vertex that needs two normals (a crease) stands twice in ``vertices``.
+    A vertex that needs two normals (at a crease) is in ``vertices`` twice.
 
     Parameters
     ----------

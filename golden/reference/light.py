@@ -14,16 +14,16 @@ Triple = tuple[float, float, float]
 
 
 def triple(name: str, value: Sequence[float], least: float = -math.inf, most: float = math.inf) -> Triple:
-    """Three finite floats in [least, most], or a ValueError that names the thing.
+    """Three numbers as finite floats in [least, most]; else a `ValueError` that names them.
 
     Parameters
     ----------
     name : str
-        What the numbers are, for the error's text.
+        Name of the three numbers, for the error's text.
     value : sequence of three numbers
         The numbers.
     least, most : float
-        The range.
+        Ends of the range.
 
     Raises
     ------
@@ -41,16 +41,16 @@ def triple(name: str, value: Sequence[float], least: float = -math.inf, most: fl
 
 @dataclass(frozen=True)
 class Light:
-    """A directional light, or a point light, whose light may fade with the distance and outside a cone.
+    """A directional light, or a point light, which may fade with the distance and outside a cone.
 
     Parameters
     ----------
     direction : three floats, optional
         Vector *to* the light, any length but 0; stored as a unit vector.
     color : three floats
-        Intensity I_i a channel, at least 0.
+        Intensity I_i of each channel, at least 0.
     position : three floats, optional
-        In place of the direction: where a point light is, in the mesh's units.
+        Position of a point light, in the mesh's units, in place of ``direction``.
     attenuation : three floats
         ``(k_0, k_1, k_2)`` of a point light, at least 0, see `factor`; ``(1, 0, 0)``: as bright at every
         distance.
@@ -58,8 +58,8 @@ class Light:
         Axis of a spot light's cone, from the light, any length but 0; stored as a unit vector. ``None``: the
         light shines to all sides.
     cone : two floats, optional
-        Angles from the axis in degrees, inner and outer: full light up to the first, none from the second on.
-        With a spot by default 20 and 30.
+        Inner and outer angle from the axis, in degrees: full light up to the inner angle, none from the outer
+        angle on. The default for a spot is 20 and 30.
 
     Raises
     ------
@@ -98,7 +98,7 @@ class Light:
             raise ValueError("a directional light has no distance, attenuation or spot; give it a position")
 
     def _check_spot(self) -> None:
-        """Axis and angles of a cone."""
+        """Check and store the axis and angles of a cone."""
         if self.spot is None:
             if self.cone is not None:
                 raise ValueError("a light's cone needs the direction of a spot")
@@ -117,14 +117,15 @@ class Light:
 
     @property
     def fades(self) -> bool:
-        """Whether its light depends on the place: its attenuation is not 1, or it is a spot."""
+        """Whether the light's factor depends on the place: it has an attenuation, or it is a spot."""
         return self.spot is not None or self.attenuation != (1.0, 0.0, 0.0)
 
     def factor(self, points: np.ndarray | None = None) -> np.ndarray | np.float64:
-        """Factor a of the light that reaches points, 0 to 1: of the distance d times that of the cone.
+        """Factor a of the light that reaches points, 0 to 1: the product of those of distance and cone.
 
-        ``min(1 / (k_0 + k_1 d + k_2 d^2), 1) s^2 (3 - 2 s)``, with s = 0 at the cone's outer angle and 1 at
-        its inner one, linear in the cosine of the angle between, and limited to 0 to 1.
+        ``a = min(1 / (k_0 + k_1 d + k_2 d^2), 1) s^2 (3 - 2 s)`` with the distance d; s is linear in the
+        cosine of the angle from the axis, 0 at the outer angle of the cone, 1 at the inner one, and limited
+        to 0 to 1.
 
         Parameters
         ----------
@@ -134,7 +135,7 @@ class Light:
         Returns
         -------
         float64 array
-            Shape () of a light that does not fade, else (...).
+            Shape () for a light that does not fade, else (...).
 
         Raises
         ------
@@ -144,7 +145,7 @@ class Light:
         if not self.fades:
             return np.float64(1)
         towards = self.towards(points)
-        # No distance that matters overflows.
+        # The limit keeps huge distances from overflow.
         distance = np.linalg.norm(np.clip(np.asarray(self.position) - points, -1e100, 1e100), axis=-1)
         k_0, k_1, k_2 = self.attenuation
         with np.errstate(over="ignore"):
@@ -157,7 +158,7 @@ class Light:
 
     @property
     def is_on(self) -> bool:
-        """Whether its colour is not 0."""
+        """Whether the light's colour is not 0."""
         return any(self.color)
 
     def towards(self, points: np.ndarray | None = None) -> np.ndarray:
@@ -171,7 +172,7 @@ class Light:
         Returns
         -------
         float64 array
-            Shape (3,) of a directional light, else that of the points.
+            Shape (3,) for a directional light, else the shape of the points.
 
         Raises
         ------

@@ -43,7 +43,7 @@ def schlick(f0: ArrayLike, cosine: ArrayLike) -> np.ndarray:
     Returns
     -------
     float64 array
-        Shape of both, broadcast.
+        F, in the broadcast shape of both.
 
     Notes
     -----
@@ -60,16 +60,16 @@ class Material:
     Parameters
     ----------
     ambient, diffuse, specular : three floats each
-        k_a, k_d, k_s a channel, at least 0. Their sum may exceed 1: the intensity saturates.
+        k_a, k_d, k_s of each channel, at least 0. Their sum may exceed 1: the intensity saturates.
     exponent : int
         Exponent n of the highlight, 1 to 1000.
     roughness : float, optional
-        Roughness r of microfacets, greater than 0 and at most 1. By default that of the exponent, see
+        Roughness r of microfacets, greater than 0 and at most 1. By default it follows from the exponent, see
         `lobes.roughness_of_exponent`.
     fresnel : three floats, optional
-        F_0 a channel, 0 to 1: k_s counts times `schlick`, see `reflection`. ``None``: k_s as it is.
+        F_0 of each channel, 0 to 1: k_s is multiplied by `schlick`, see `reflection`. ``None``: it is not.
     two_sided : bool
-        Whether a scene that leaves out back faces draws those of this material, with their normals turned.
+        Whether a scene that leaves out back faces draws those of this material, with negated normals.
 
     Raises
     ------
@@ -104,21 +104,21 @@ class Material:
     ) -> "Material":
         """Material of glTF's base colour, metallic and roughness factors.
 
-        ``k_d = (1 - metallic) base``; ``F_0 = 0.04 (1 - metallic) + metallic base``, of `schlick`; the
-        exponent is that of the roughness, rounded, in 1 to 1000. A roughness under `LEAST_ROUGHNESS`, of
-        which the table of a lobe keeps its error, counts as that.
+        ``k_d = (1 - metallic) base``; ``F_0 = 0.04 (1 - metallic) + metallic base`` for `schlick`; the
+        exponent is that of the roughness, rounded and limited to 1 to 1000. A roughness under
+        `LEAST_ROUGHNESS` is replaced by it, so that the error of a lobe's table stays small.
 
-        With ``alpha = roughness^2``, k_s is ``1/(4 alpha^2)``: what the peak of glTF's specular term,
-        ``F D / 4`` with ``D = 1/(pi alpha^2)``, is over its diffuse term, ``k_d / pi``. A highlight that is
-        brighter than the picture's white only grows wider, and its errors with it: k_s is at most 1 over the
-        largest channel of F_0, and at most 4.
+        With ``alpha = roughness^2``, k_s is ``1/(4 alpha^2)``. This is the factor of F in the ratio of glTF's
+        specular term at its peak, ``F D / 4`` with ``D = 1/(pi alpha^2)``, and diffuse term, ``k_d / pi``. A
+        highlight brighter than the picture's white would only become wider, and its errors larger: k_s is at
+        most 1 over the largest channel of F_0, and at most 4.
 
         Parameters
         ----------
         base : three floats
             Linear base colour, 0 to 1 a channel.
         metallic, roughness : float
-            0 to 1.
+            Factors, 0 to 1.
         ambient : float
             k_a, as a share of the base colour.
 
@@ -149,15 +149,15 @@ class Material:
         Parameters
         ----------
         cosine : float, optional
-            V·H of a light: a constant of the frame, where light and viewer are distant. ``None``: it changes
-            from point to point, and F_0 stands for F, which it is at V·H = 1.
+            V·H of a light, a constant of the frame if light and viewer are distant. ``None``: it changes from
+            point to point, and F_0, the value of F at V·H = 1, is used for F.
         """
         if self.fresnel is None:
             return np.array(self.specular)
         return np.array(self.specular) * schlick(self.fresnel, 1.0 if cosine is None else cosine)
 
     def parameter(self, model: ReflectionModel) -> float | None:
-        """Exponent or roughness, as `ReflectionModel.PARAMETER` of a model says, or ``None``."""
+        """Exponent or roughness, by `ReflectionModel.PARAMETER` of a model; ``None`` without a parameter."""
         if model.PARAMETER == "roughness" and self.roughness is None:
             return roughness_of_exponent(self.exponent)
         return None if model.PARAMETER is None else getattr(self, model.PARAMETER)
@@ -228,32 +228,31 @@ def intensity(
 ) -> np.ndarray:
     """Intensity of every normal, not saturated.
 
-    ``I = k_a I_a + sum_i a_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6), with the
-    `Light.factor` a_i of a light that fades, else 1. The cosine of a
-    mirror model, such as Phong's, is R·V with ``R = 2 (N·L) N - L``, that of the others N·H. A light with
-    ``N·L <= 0`` gives neither diffuse nor specular; one with ``L = -V`` has no half-way vector and gives no
-    specular. A point light gives nothing to the point where it is. k_s is that of `Material.reflection` at
-    the V·H of a distant light and viewer.
+    ``I = k_a I_a + sum_i a_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6), where a_i is
+    `Light.factor`. The cosine of a mirror model, such as Phong's, is R·V with ``R = 2 (N·L) N - L``, that of
+    the other models N·H. A light with ``N·L <= 0`` has neither diffuse nor specular term; a light with
+    ``L = -V`` has no half-way vector and no specular term. A point light has no terms at the point where it
+    is. k_s is `Material.reflection` at the V·H of a distant light and viewer.
 
     Parameters
     ----------
     normals : array, shape (..., 3)
-        Normals, used as given: a method's nearly-unit vectors keep their length.
+        Normals, used as given: they are not normalised.
     material : Material
         The coefficients.
     lights : sequence of Light
-        Any number.
+        Any number of lights.
     ambient_light : three floats
-        I_a a channel.
+        I_a of each channel.
     viewer : array, shape (3,) or (..., 3)
         Unit vector V to the viewer, constant over the frame or for each normal.
     model : ReflectionModel
-        The highlight.
+        Reflection model.
     chord : bool
         Whether ``1 - |N - H|^2 / 2`` takes the place of N·H, which it equals for unit normals
         (docs/theory/chord.md#the-chord).
     points : array, shape (..., 3), optional
-        Where each normal stands; only point lights read it.
+        Position of each normal; needed for point lights only.
 
     Returns
     -------
@@ -298,14 +297,14 @@ def intensity_of_cosines(
     viewer: ArrayLike | None = None,
     factor: np.ndarray | None = None,
 ) -> np.ndarray:
-    """The same, from what a method gives instead of a normal.
+    """Intensity as by `intensity`, from the cosines of a method without normals.
 
     Parameters
     ----------
     material, lights, ambient_light, model
-        As for `intensity`; of the lights only the colours are read, and for Fresnel's reflection directions.
+        As for `intensity`; only colours of lights are read, and directions for Fresnel's reflection.
     cosine, highlight_cosine : arrays, shape (..., lights)
-        N·L, of a light that fades times its factor; and N·H.
+        N·L, times its factor for a light that fades; and N·H.
     viewer : array, shape (3,), optional
         Unit vector V to a distant viewer, for Fresnel's reflection.
     factor : array, shape (..., lights), optional
@@ -332,9 +331,9 @@ def _dot(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
 def _add_light(
     total, material, light, specular, cosine, highlight_cosine, factor, has_halfway, model
 ) -> None:
-    """Both terms of a light, added in place; without a cosine of the highlight, the diffuse one alone.
+    """Add both terms of a light in place; without a cosine of the highlight, the diffuse term alone.
 
-    The factor is that of the specular term; N·L has it already.
+    The factor multiplies the specular term; N·L is multiplied by it before.
     """
     color = np.asarray(light.color)
     total += np.maximum(cosine, 0.0)[..., np.newaxis] * (color * material.diffuse)

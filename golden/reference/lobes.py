@@ -1,4 +1,4 @@
-"""Lobes of N·H that only a table serves: microfacets, Phong's as far as it goes, any curve; in float64."""
+"""Lobes of N·H that only a table serves: microfacets, coplanar Phong, and any curve; in float64."""
 
 import math
 from collections.abc import Callable
@@ -32,18 +32,18 @@ __all__ = [
 
 
 MAX_POINTS = 100_000
-"""Most points of a curve in a file."""
+"""Largest number of points of a curve in a file."""
 
 LEAST_ROUGHNESS = 0.05
-"""Least roughness that a mesh file's material gets: for less, errors of u by a step of its word show."""
+"""Least roughness of a mesh file's material; below it the error of one step of u's word is visible."""
 
 STEEPEST = 10_000.0
-"""Largest steepness of a curve: one that jumps has no larger one."""
+"""Largest steepness of a curve, and steepness of a curve that jumps."""
 
 
 @dataclass(frozen=True, repr=False)
 class CoplanarPhong(ReflectionModel):
-    """``max(2 c^2 - 1, 0)^p``: what a lobe of c = N·H can be of Phong's model, with Phong's exponent p.
+    """``max(2 c^2 - 1, 0)^p``: Phong's model with exponent p as a lobe of c = N·H, for coplanar vectors.
 
     Where N, L and V are coplanar, the angle between R and V is twice the angle between N and H. Then
     ``R·V = 2 c^2 - 1``, and this is Phong's model. Near its peak it is Blinn's model with an exponent of 4 p
@@ -70,11 +70,12 @@ class MicrofacetModel(ReflectionModel):
     """A distribution D of the normals of microfacets, divided by its largest value: ``S = D / peak``.
 
     The parameter is the roughness r of glTF, greater than 0 and at most 1; the formulas have ``alpha = r^2``.
-    D has ``integral D(c) c = 1`` over the hemisphere, with c = N·H, and is 0 for c <= 0. S is D alone: the
+    ``integral D(c) c = 1`` over the hemisphere, with c = N·H, and D is 0 for c <= 0. S is D alone: the
     other factors of a microfacet model (Fresnel, masking and shadowing) are not in it.
 
-    The energy factor is 1 over ``integral S(cos(t/2)) cos t`` over the hemisphere, the viewer along the
-    normal, as for ``blinn``. With ``w = c^2`` the integral is ``4 pi integral_{1/2}^1 S (2 w - 1) dw``.
+    The energy factor is 1 divided by ``integral S(cos(t/2)) cos t`` over the hemisphere, with the viewer
+    along the normal, as for ``blinn``. With ``w = c^2`` the integral is
+    ``4 pi integral_{1/2}^1 S (2 w - 1) dw``.
 
     Source: docs/theory/models.md#reflection-models; B. Walter and others, *Microfacet models for refraction
     through rough surfaces*, 2007; glTF 2.0, appendix B.
@@ -124,9 +125,9 @@ class TrowbridgeReitz(MicrofacetModel):
 class Beckmann(MicrofacetModel):
     """``D = exp(-tan^2 gamma / alpha^2) / (pi alpha^2 c^4)``, with ``c = cos gamma``.
 
-    Up to ``alpha = 1/sqrt 2`` (roughness 0.84) it is largest at c = 1, and falls from there on. For a larger
-    alpha it is largest at ``c^2 = 1/(2 alpha^2)``, with ``4 alpha^2 exp(1/alpha^2 - 2) / pi``: up to 1.47
-    times its value at c = 1.
+    Up to ``alpha = 1/sqrt 2`` (roughness 0.84) D is largest at c = 1, and falls with c. For a larger alpha D
+    is largest at ``c^2 = 1/(2 alpha^2)``, where it is ``4 alpha^2 exp(1/alpha^2 - 2) / pi``, up to 1.47 times
+    its value at c = 1.
 
     Source: docs/theory/models.md#reflection-models; P. Beckmann and A. Spizzichino, *The scattering of
     electromagnetic waves from rough surfaces*, 1963; R. Cook and K. Torrance, *A reflectance model for
@@ -156,7 +157,8 @@ class TabulatedModel(ReflectionModel):
     Parameters
     ----------
     function : callable
-        The curve: of a float64 array of cosines, greater than 0 and at most 1, as many values from 0 to 1.
+        The curve: it takes a float64 array of cosines, greater than 0 and at most 1, and returns as many
+        values from 0 to 1.
 
     Raises
     ------
@@ -172,23 +174,23 @@ class TabulatedModel(ReflectionModel):
     def of_points(
         cls, name: str, cosines: np.ndarray, values: np.ndarray, source: str = ""
     ) -> "TabulatedModel":
-        """Straight lines between points.
+        """Model of straight lines between points.
 
         Parameters
         ----------
         name, source : str
-            Of the model.
+            Name and source of the model.
         cosines : array, shape (points,)
             N·H, rising from 0 to 1.
         values : array, shape (points,)
-            Brightness at each, 0 to 1.
+            Brightness at each cosine, 0 to 1.
 
         Raises
         ------
         ValueError
-            If there are fewer than two points, a number is missing or not finite, a value is not 0 to 1, the
-            cosines do not rise, one comes twice, or they do not go from 0 to 1. The message names the first
-            such point, counted from 1.
+            If there are fewer than two points, a number is not finite, a value is not 0 to 1, a cosine is not
+            larger than the one before, or the cosines do not go from 0 to 1. The message names the first
+            wrong point, counted from 1.
         """
         cosines, values = (np.array(column, dtype=np.float64) for column in (cosines, values))
         if cosines.ndim != 1 or cosines.shape != values.shape:
@@ -212,21 +214,21 @@ class TabulatedModel(ReflectionModel):
 
     @classmethod
     def of_csv(cls, path: str | Path) -> "TabulatedModel":
-        """Straight lines between the points of a file of measured values; its name is the file's.
+        """Model of straight lines between the points of a CSV file; it has the name of the file.
 
-        A line holds a cosine and a value, a comma between them. Lines that are empty or begin with ``#`` are
-        passed over, and so is the first other line, where it holds no number.
+        A line holds a cosine, a comma, and a value. Lines that are empty or begin with ``#`` are ignored, and
+        so is the first other line if it holds no number.
 
         Parameters
         ----------
         path : str or Path
-            File of at most `MAX_POINTS` lines.
+            File with at most `MAX_POINTS` points.
 
         Raises
         ------
         ValueError
-            If a line does not hold two numbers, or as `of_points` does; the message names the file, and the
-            line or the point.
+            If the file is no text or has too many points, a line does not hold two numbers, or as for
+            `of_points`; the message names the file, and the line or the point.
         OSError
             If the file cannot be read.
         """
@@ -275,12 +277,12 @@ class TabulatedModel(ReflectionModel):
 
 
 def _steepness(model: ReflectionModel, parameter: float | None) -> float:
-    """Steepest of the lines of `curve_lines`."""
+    """Steepest slope of the lines of `curve_lines`, from 1 to `STEEPEST`."""
     return float(np.clip(curve_lines(model, parameter)[2].max(), 1.0, STEEPEST))
 
 
 def curve_lines(model: ReflectionModel, parameter: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A curve S(u), u = 1 - N·H, as 4,000 lines between its points, closer to each other towards the peak.
+    """A curve S(u), u = 1 - N·H, as 4,000 straight lines, which are shorter towards the peak.
 
     Parameters
     ----------
@@ -292,7 +294,7 @@ def curve_lines(model: ReflectionModel, parameter: float | None) -> tuple[np.nda
     Returns
     -------
     u, value, slope : float64 arrays, shape (4000,)
-        Where each line begins, S there, and ``|dS/du|`` of the line.
+        Start of each line, S at the start, and ``|dS/du|`` of the line.
     """
     u = np.r_[0, np.geomspace(1e-7, 1 - 1e-12, 4_000)]
     value = model.reflect(1 - u, parameter)
@@ -331,10 +333,11 @@ def _energy_of_ggx(roughness: float) -> float:
 
 
 def _energy_of_beckmann(roughness: float) -> float:
-    """1 over the integral of S, that of D over its peak.
+    """1 over the integral of S, which is the integral of D divided by its peak.
 
     With ``t = 1/w - 1`` and ``D = exp(-t/alpha^2) / (pi alpha^2 w^2)`` the integral of D is
-    ``4 / alpha^2 integral_0^1 exp(-t/alpha^2) (2/(1 + t) - 1) dt``. Beyond 40 alpha^2 it has under e^-40.
+    ``4 / alpha^2 integral_0^1 exp(-t/alpha^2) (2/(1 + t) - 1) dt``. The part with t over 40 alpha^2 is under
+    e^-40.
     """
     alpha = roughness**2
     half = min(1.0, 40 * alpha * alpha) / 2
@@ -362,8 +365,8 @@ TABLE_MODELS: dict[str, ReflectionModel] = {
 def exponent_of_roughness(roughness: float) -> float:
     """Exponent of Blinn's model for a roughness: ``n = 2 / alpha^2 - 2`` with ``alpha = roughness^2``.
 
-    So Blinn's power is ``exp(-gamma^2 / alpha^2)`` near the peak, but for terms of gamma^2, as Beckmann's
-    distribution is. At roughness 1 it is 0, which no exponent may be.
+    With it Blinn's power near the peak is ``exp(-gamma^2 / alpha^2)``, up to a factor ``1 + O(gamma^2)``,
+    like Beckmann's distribution. At roughness 1 the result is 0, which is not a valid exponent.
 
     Raises
     ------
@@ -378,7 +381,7 @@ def exponent_of_roughness(roughness: float) -> float:
 
 
 def roughness_of_exponent(exponent: float) -> float:
-    """Roughness for an exponent of Blinn's model, ``(2 / (n + 2))^(1/4)``: `exponent_of_roughness` reversed.
+    """Roughness for an exponent n of Blinn's model, ``(2 / (n + 2))^(1/4)``: inverse `exponent_of_roughness`.
 
     Raises
     ------

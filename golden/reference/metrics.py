@@ -1,4 +1,4 @@
-"""How far one image is from another."""
+"""Metrics: error figures of an image against a reference."""
 
 import math
 from collections.abc import Iterator
@@ -36,7 +36,7 @@ _CHUNK = 1 << 20
 
 
 def _pair(image: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The image as it is, and the reference in float64, so that their difference is, too."""
+    """The image unchanged, and the reference in float64, so that their difference is in float64."""
     image = np.asarray(image)
     reference = np.asarray(reference, dtype=np.float64)
     if image.shape != reference.shape:
@@ -65,7 +65,7 @@ def error_figures(
     mask : bool array, shape (height, width), optional
         The pixels that count; all by default.
     scale : float
-        LSB of the reference's unit, where that is another: 255 for a reference in [0, 1].
+        LSB in one unit of the reference: 1, or 255 for a reference in [0, 1].
 
     Raises
     ------
@@ -149,7 +149,7 @@ def mnse_published(image: np.ndarray, reference: np.ndarray) -> tuple[float, flo
     value : float
         The mean over the N values of the reference that differ from its mean; NaN when there is none.
     share : float
-        The share of those values, 0 to 1.
+        Share of such values, 0 to 1.
 
     Raises
     ------

@@ -13,7 +13,7 @@ from blysk.golden.reference.scene import Scene
 __all__ = ["SUBPIXELS", "Raster", "face_normals", "fragment_barycentrics", "fragment_normals", "rasterise"]
 
 SUBPIXELS = 256
-"""Steps of a pixel to which projected vertices are rounded."""
+"""Steps in a pixel; projected vertices are rounded to a step."""
 
 # Pixels beyond which a triangle is cut, so that edge functions stay within int64: coordinates within
 # 2^28 steps give products within 2^59.
@@ -26,10 +26,9 @@ _CHUNK = 1 << 20
 class Raster:
     """The spans and fragments of a scene.
 
-    Spans that no pixel of the picture shows are left out. Spans stand in the order of their triangles, and
-    within a triangle in that of y; fragments in the order of their spans, and within a span in that of x.
-    Every pixel of a span is a fragment, also where something nearer hides it, because hardware shades whole
-    spans.
+    Spans without a visible pixel are left out. Spans are sorted by triangle, and within a triangle by y;
+    fragments are sorted by span, and within a span by x. Every pixel of a span is a fragment, hidden pixels
+    included, because hardware shades whole spans.
 
     Parameters
     ----------
@@ -48,18 +47,19 @@ class Raster:
     weights_left, weights_right : float64 arrays, shape (S, 3)
         Barycentric coordinates of the two ends in the triangle, divided by W; linear along the span.
     back : bool array, shape (S,)
-        Where the triangle is seen from behind.
+        Whether the triangle is seen from behind.
     span : int32 array, shape (F,)
         Span of each fragment.
     offset : int16 array, shape (F,)
-        Its position in the span, 0 to length - 1.
+        Position of the fragment in its span, 0 to length - 1.
     pixel : int32 array, shape (F,)
         ``y * width + x``.
     visible : bool array, shape (F,)
-        The fragment is the nearest of its pixel; of several at one depth, that of the lowest triangle index.
+        Whether the fragment is the nearest of its pixel; at equal depth the lowest triangle index counts as
+        nearest.
     triangles : int
-        Triangles of the mesh. Each is either drawn (it gave spans before the depth test) or counted once in
-        one of the next four.
+        Number of triangles of the mesh. Each is either drawn (it has spans before the depth test) or counted
+        once in one of the next four counters.
     degenerate : int
         Triangles without area, in the world or after rounding to 1/256 pixel.
     culled : int
@@ -69,9 +69,9 @@ class Raster:
     uncovered : int
         Triangles that hold no pixel centre of the picture.
     hidden_spans : int
-        Spans left out because nothing of them is visible.
+        Spans that were left out because all of their pixels are hidden.
     repaired_normals : int
-        Ends of spans whose interpolated normal was 0 and that got the normal of the face instead.
+        Ends of spans whose interpolated normal was 0, so that the face's normal was taken.
     """
 
     x: np.ndarray
@@ -100,11 +100,11 @@ class Raster:
 
 @dataclass(frozen=True)
 class _Pieces:
-    """Triangles ready to be filled: what is left of the mesh's after clipping, all of one winding.
+    """Triangles ready to be filled: the mesh's triangles after clipping, all of one winding.
 
-    ``points`` (P, 3, 2) int64 in 1/256 pixel, with positive ``area``, twice the triangle's, (P,); ``weight``
-    (P, 3) is 1 / W, ``nearness`` (P, 3) is linear on the screen and larger when nearer; ``corner`` (P, 3, 3)
-    holds each corner's barycentric coordinates in the mesh's triangle ``triangle`` (P,).
+    ``points`` (P, 3, 2) are int64 in 1/256 pixel; ``area`` (P,) is twice the triangle's area, positive;
+    ``weight`` (P, 3) is 1 / W, ``nearness`` (P, 3) is linear on the screen and larger when nearer; ``corner``
+    (P, 3, 3) holds each corner's barycentric coordinates in the mesh's triangle ``triangle`` (P,).
     """
 
     points: np.ndarray
@@ -115,9 +115,10 @@ class _Pieces:
     triangle: np.ndarray
 
     def edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A, B and C of each edge function ``A x + B y + C`` (P, 3), x and y in pixels, counted from 0.
+        """A, B and C of each edge function ``A x + B y + C``, shape (P, 3), with x and y in whole pixels.
 
-        Edge i lies opposite corner i; inside, the function is positive and the three add up to the area.
+        Edge i lies opposite corner i; inside, each function is positive, and the sum of the three is the
+        area.
         """
         start = self.points[:, [1, 2, 0]]
         end = self.points[:, [2, 0, 1]]
@@ -176,7 +177,7 @@ def _clip(records: np.ndarray, source: np.ndarray, distance: np.ndarray) -> tupl
 
 
 def _assemble(scene: Scene, candidates: np.ndarray, corners: np.ndarray) -> tuple[_Pieces, np.ndarray]:
-    """Clip, divide, round. Also returns the mesh triangles of which anything is left after clipping."""
+    """Clip, divide and round triangles; also returns the mesh triangles with a part left after clipping."""
     near = scene.camera.near
     x, y, w, depth = np.moveaxis(corners, -1, 0)
     beyond = (np.maximum(np.abs(x), np.abs(y)) > _GUARD * w) | (depth < near)
@@ -227,7 +228,7 @@ def _counting(counts: np.ndarray) -> np.ndarray:
 def _spans(
     pieces: _Pieces, width: int, height: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Spans in chunks: piece, x, y, length, nearness at the first pixel, and its step a pixel."""
+    """Spans in chunks: piece, x, y, length, nearness at the first pixel, and its step from pixel to pixel."""
     a, b, c = pieces.edges()
     # A pixel centre exactly on an edge belongs to the triangle on whose left or top that edge is.
     top_left = (a > 0) | ((a == 0) & (b > 0))
@@ -265,8 +266,8 @@ def rasterise(scene: Scene) -> Raster:
     """Spans and fragments of a scene.
 
     Triangles are clipped against the near plane, projected, and rounded to 1/256 pixel. A pixel belongs to a
-    triangle when its centre lies inside, or exactly on a left or a top edge: with integer edge functions
-    this is exact, and no pixel of a shared edge is drawn twice or missed. Each scanline's interval comes from
+    triangle if its centre lies inside, or exactly on a left or top edge: with integer edge functions this is
+    exact, and no pixel of a shared edge is drawn twice or missed. Each scanline's interval comes from
     an exact floor division. Depth is interpolated in float64, linearly on the screen (1/W, or the depth
     itself in the orthographic projection).
 
@@ -317,9 +318,9 @@ def rasterise(scene: Scene) -> Raster:
             value = np.repeat(nearness[run], lengths) + np.repeat(step[run], lengths) * offset
             before = buffer[pixel]
             np.maximum.at(buffer, pixel, value)
-            # Strictly nearer than what was there: at one depth the lower triangle, drawn before, stays.
+            # Strictly nearer than the stored depth: at equal depth the lower triangle, drawn before, stays.
             winner = np.flatnonzero((value > before) & (value == buffer[pixel]))[::-1]
-            # Of equals in this chunk the last assignment counts, which the reversal makes the first span.
+            # The last of several assignments counts; reversed, that is the first span of the chunk.
             index = np.repeat(np.arange(count + run.start, count + run.stop, dtype=np.int32), lengths)
             owner[pixel[winner]] = index[winner]
         count += len(piece)
@@ -380,7 +381,7 @@ def rasterise(scene: Scene) -> Raster:
 
 
 class _End(NamedTuple):
-    """Ends of spans on one side: weights, unit normals, their lengths before; where a normal was lost."""
+    """Ends of spans on one side: weights, unit normals, their lengths before, whether one was lost."""
 
     weights: np.ndarray
     normal: np.ndarray
@@ -402,7 +403,7 @@ def _end(corners: np.ndarray, fallback: np.ndarray, weights: np.ndarray) -> _End
 
 
 def _weights(pieces: _Pieces, piece: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates in the mesh's triangle over W at pixel centres, shape (count, 3)."""
+    """Barycentric coordinates in the mesh's triangle, divided by W, at pixel centres; shape (count, 3)."""
     a, b, c = pieces.edges()
     result = np.zeros((len(piece), 3))
     for edge in range(3):
@@ -413,7 +414,7 @@ def _weights(pieces: _Pieces, piece: np.ndarray, x: np.ndarray, y: np.ndarray) -
 
 
 def _position(raster: Raster, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Span of the chosen fragments and their t in it, shape (count, 1)."""
+    """Span of chosen fragments, shape (count,), and t in it, shape (count, 1)."""
     span = raster.span[which]
     t = raster.offset[which] / np.maximum(raster.length[span] - 1, 1)
     return span, t[:, np.newaxis]
@@ -440,7 +441,7 @@ def fragment_barycentrics(raster: Raster, which: np.ndarray) -> np.ndarray:
 
 
 def fragment_normals(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray:
-    """Perspective-correct unit normals of fragments: what a GPU interpolates for Phong shading.
+    """Perspective-correct unit normals of fragments, as a GPU interpolates them for Phong shading.
 
     Parameters
     ----------
@@ -454,8 +455,8 @@ def fragment_normals(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndar
     Returns
     -------
     float64 array, shape (count, 3)
-        ``normalise((1-t) m_l N_l + t m_r N_r)``; where this is 0, the normal of the face, negated where the
-        scene asks for that.
+        ``normalise((1-t) m_l N_l + t m_r N_r)``; if this is 0, the normal of the face, negated if the scene
+        negates it.
     """
     span, t = _position(raster, which)
     left = (1 - t) * raster.magnitude_left[span][:, np.newaxis]

@@ -32,26 +32,26 @@ def _check_exponent(exponent: float) -> float:
 
 @dataclass(frozen=True)
 class ReflectionModel:
-    """A highlight: its brightness S, from 0 to 1, for every cosine and parameter. One subclass a family.
+    """A lobe: brightness S, 0 to 1, by cosine and parameter. Each family of models is a subclass.
 
-    The parameter is one number that says how wide the highlight is: an exponent, or the roughness of the
-    microfacets in `lobes`. A table has none.
+    The parameter is one number for the width of the highlight: an exponent, or the roughness of the
+    microfacets in `lobes`. A `lobes.TabulatedModel` has none.
 
     Parameters
     ----------
     name : str
         Name on the command line and in tables.
     source : str
-        Where the formula comes from; see docs/theory/models.md.
+        Source of the formula; see docs/theory/models.md.
     energy : callable, optional
-        Factor that normalises the reflected energy, by parameter; see `energy_factor`.
+        Function from the parameter to the factor that normalises the reflected energy; see `energy_factor`.
 
     Attributes
     ----------
     MIRROR : bool
-        Whether the cosine is R·V, of the mirror direction; else N·H, of the half-way vector.
+        Whether the cosine is R·V, with the mirror direction R; else it is N·H.
     PARAMETER : str or None
-        What the parameter is: ``"exponent"``, ``"roughness"``, or nothing.
+        Name of the parameter: ``"exponent"``, ``"roughness"``, or ``None`` without a parameter.
     """
 
     name: str
@@ -82,10 +82,11 @@ class ReflectionModel:
         Parameters
         ----------
         cosine : array
-            N·H, or R·V for a model of the mirror direction. Values above 1, which vectors that are not quite
-            of unit length give, count as 1.
+            N·H, or R·V for a model with `MIRROR`. Values above 1, from vectors that are not exactly of unit
+            length, count as 1.
         parameter : float
-            Exponent n of Blinn's model that is approximated, greater than 0; or what `PARAMETER` says.
+            Exponent n, greater than 0, that of Blinn's model for its approximations; or the roughness, see
+            `PARAMETER`.
 
         Returns
         -------
@@ -100,7 +101,7 @@ class ReflectionModel:
         return self._lobe(np.minimum(np.asarray(cosine, dtype=np.float64), 1.0), self._checked(parameter))
 
     def steepness(self, parameter: float | None) -> float:
-        """Exponent of Blinn's power that changes as fast with N·H, at its steepest: how fine spans must be.
+        """Exponent at which Blinn's power is as steep at its steepest: it decides how fine spans must be.
 
         It is the exponent itself; for the models of `lobes` the largest ``|dS/dc|``, from 1 to 10,000.
 
@@ -112,17 +113,17 @@ class ReflectionModel:
         return self._checked(parameter)
 
     def energy_factor(self, parameter: float) -> float:
-        """Factor of the energy-normalised form, which is factor times S ([C]).
+        """Factor of the energy-normalised form, which is this factor times S ([C]).
 
         =============== ==================================== ==============================================
         model           factor                               1 over
         =============== ==================================== ==============================================
         ``phong``       ``(n+2) / (2 pi)``                   ``2 pi integral_0^1 c^n c dc``
         ``blinn``       ``(n+2)(n+4) / (8 pi (2^(-n/2)+n))`` ``integral cos^n(t/2) cos t`` over the
-                                                             hemisphere: viewer along the normal
+                                                             hemisphere, viewer along the normal
         ``cosquad_lin`` ``0.214 (0.807 + n)``                a line through ``2 pi integral_0^1 S(c) c
                                                              dc``, off by at most 0.0533 for n >= 2
-        microfacets     see `MicrofacetModel`                that of ``blinn``
+        microfacets     see `MicrofacetModel`                integral of ``blinn`` with their S
         =============== ==================================== ==============================================
 
         [C] integrates ``cosquad_lin`` over the angle itself, as for ``phong``, not over the half angle; it
@@ -131,7 +132,7 @@ class ReflectionModel:
         Parameters
         ----------
         parameter : float
-            Exponent n, greater than 0; or what `PARAMETER` says.
+            Exponent n, greater than 0; or the roughness, see `PARAMETER`.
 
         Raises
         ------
@@ -146,7 +147,7 @@ class ReflectionModel:
 
 @dataclass(frozen=True, repr=False)
 class PowerModel(ReflectionModel):
-    """``max(c, 0)^n``: of N·H Blinn's model ([B] 3), of R·V Phong's ([T] 6, [B] 2)."""
+    """``max(c, 0)^n``: with c = N·H Blinn's model ([B] 3), with c = R·V Phong's ([T] 6, [B] 2)."""
 
     def _lobe(self, cosine, exponent):
         return np.maximum(cosine, 0.0) ** exponent
@@ -161,13 +162,14 @@ class _MirrorPowerModel(PowerModel):
 class PolynomialModel(ReflectionModel):
     """``max(k (c - 1) + 1, 0)^(2^squarings)``, slope k: the cosine-quadratic family and Lyon's.
 
-    The base is gated, never the power, so that the parabola's second lobe does not show. Lyon's model is
-    ``max(1 - x/2^j, 0)^(2^j)`` with ``x = n (1 - c)``, which tends to ``exp(-x)``; its first is ``cosquad``.
+    The base is compared with 0, never the power, so that the parabola's second lobe does not show. Lyon's
+    models are ``max(1 - x/2^j, 0)^(2^j)`` with ``x = n (1 - c)``, which tends to ``exp(-x)``; j = 1 is
+    ``cosquad``.
 
     Parameters
     ----------
     a, b : float
-        Of the slope ``k = a n + b``.
+        Coefficients of the slope ``k = a n + b``.
     squarings : int
         How often the base is squared, 1 to 3.
     curve : callable, optional
@@ -206,7 +208,7 @@ class AngleCosine(ReflectionModel):
     power : int
         Power k, 2 or 4.
     rule : str
-        By which `coscos_scale` finds a: ``"taylor"`` or ``"integral"``.
+        Rule by which `coscos_scale` computes a: ``"taylor"`` or ``"integral"``.
     """
 
     power: int = 2
@@ -223,7 +225,7 @@ class AngleCosine(ReflectionModel):
 
 @dataclass(frozen=True, repr=False)
 class Exponential(ReflectionModel):
-    """``exp(n (c - 1))``, to which Blinn's power tends."""
+    """``exp(n (c - 1))``, the limit of Blinn's power for large n."""
 
     def _lobe(self, cosine, exponent):
         return np.exp(exponent * (cosine - 1.0))
@@ -233,7 +235,7 @@ _gauss = cache(np.polynomial.legendre.leggauss)
 
 
 def coscos_scale(exponent: float, power: int, rule: str = "taylor") -> float:
-    """Scale a of the model ``cos^k(a gamma)``, which stands for ``cos^n gamma``.
+    """Scale a of the model ``cos^k(a gamma)``, which approximates ``cos^n gamma``.
 
     ============ ======================================================================================
     rule         a
@@ -289,7 +291,7 @@ def coscos_scale(exponent: float, power: int, rule: str = "taylor") -> float:
 
 
 def _level_slope(exponent: float, level: float = 0.64) -> float:
-    """Slope with which cosquad_q meets Blinn's power exactly at a level; 0.64 is the best of [C]."""
+    """Slope with which cosquad_q equals Blinn's power at a brightness; 0.64 is the best one of [C]."""
     return (math.sqrt(level) - 1) / math.expm1(math.log(level) / exponent)
 
 
@@ -297,7 +299,7 @@ PHONG = _MirrorPowerModel("phong", "[T] 6, [B] 2", lambda n: (n + 2) / (2 * math
 """Phong's model."""
 
 BLINN = PowerModel("blinn", "[B] 3", lambda n: (n + 2) * (n + 4) / (8 * math.pi * (2 ** (-n / 2) + n)))
-"""Blinn's model, which the approximations approximate."""
+"""Blinn's model, which other models approximate."""
 
 COSQUAD = PolynomialModel("cosquad", "[T] 3.4, figure 3.6", a=1 / 2)
 """The cosine-quadratic model f2."""
@@ -326,7 +328,7 @@ REFLECTION_MODELS: dict[str, ReflectionModel] = {
         Exponential("exp", "own"),
     )
 }
-"""Every reflection model, by name. A coefficient stands here and nowhere else."""
+"""Every reflection model, by name; the only place of their coefficients."""
 
 
 def _registered(name: str) -> ReflectionModel:

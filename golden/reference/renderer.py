@@ -42,10 +42,10 @@ NORMAL_THRESHOLD = 0.9
 """Threshold of ``adaptive`` for the normals of a triangle's vertices ([T] appendix В)."""
 
 HIGHLIGHT_THRESHOLD = 0.004
-"""The same for N·H."""
+"""Threshold of ``adaptive`` for N·H at a triangle's vertices."""
 
 DIFFUSE_THRESHOLD = 0.008
-"""The same for N·L."""
+"""Threshold of ``adaptive`` for N·L at a triangle's vertices."""
 
 Curve = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """A function of the normals at a span's ends and the place t between them."""
@@ -72,13 +72,13 @@ class Frame:
 
 @dataclass(frozen=True)
 class Thresholds:
-    """When ``adaptive`` shades a triangle by its vertices alone: where all three differences are smaller.
+    """Limits of ``adaptive``: a triangle is shaded by its vertices alone if all differences are smaller.
 
     Parameters
     ----------
     normal : float
-        Length of the difference of two vertex normals; 0.9 is an angle of 53.5 degrees. (Were the 0.9 of the
-        document meant as a least cosine, 25.8 degrees, the length would be 0.447.)
+        Length of the difference of two vertex normals; 0.9 is an angle of 53.5 degrees. (If the 0.9 of the
+        document means a least cosine, 25.8 degrees, the length is 0.447.)
     highlight : float
         Difference of N·H of two vertices, for every light.
     diffuse : float
@@ -106,24 +106,24 @@ class Thresholds:
 def gouraud_triangles(scene: Scene, thresholds: Thresholds | None = None) -> np.ndarray:
     """Triangles that ``adaptive`` shades by Gouraud's method; the mean is their share ([T] appendix В).
 
-    Those whose vertices, two by two, differ by less than each of the thresholds in N, N·H and N·L. A light
-    with ``L = -V`` has no H and no highlight, and only its N·L counts. A change of N·H by e changes
-    ``(N·H)^n`` by up to ``n e``: with large exponents the default lets visible errors through.
+    Every two vertices of such a triangle differ by less than the thresholds in N, N·H and N·L. A light with
+    ``L = -V`` has no H and no highlight, and only its N·L counts. A change of N·H by e changes ``(N·H)^n`` by
+    up to ``n e``: with large exponents the default thresholds allow visible errors.
 
-    The listing of [T] appendix В returns Phong where the normals are close; that test is inverted, and
-    mended here.
+    The listing of [T] appendix В has this test inverted: it returns Phong if the normals are close. It is
+    corrected here.
 
     Parameters
     ----------
     scene : Scene
         Mesh, lights and viewer.
     thresholds : Thresholds, optional
-        Those of the document by default.
+        Thresholds; by default those of the document.
 
     Returns
     -------
     bool array, shape (F,)
-        By face of the mesh, drawn or not.
+        For each face of the mesh, drawn or not.
     """
     thresholds = thresholds or Thresholds()
     normals = scene.mesh.normals
@@ -159,18 +159,18 @@ def render(
     - ``gouraud``: the intensity at the three vertices, saturated there, interpolated perspective-correctly;
     - ``quadratic_gouraud``: the second-degree polynomial through the intensities, saturated, at the three
       vertices and at the middles of the three edges ([T] appendix Д), where the normal is that of
-      ``phong``, ``(N_a + N_b)/|N_a + N_b|``. In the perspective-correct barycentric coordinates l it is
-      ``sum_i l_i (2 l_i - 1) I_i + sum_{i<j} 4 l_i l_j I_ij``. Two triangles that share an edge and its
-      normals agree along it. Between the six points it may leave their range by up to a third of it
-      (in the middle of the triangle), and is saturated again;
+      ``phong``, ``(N_a + N_b)/|N_a + N_b|``. In the perspective-correct barycentric coordinates l the
+      polynomial is ``sum_i l_i (2 l_i - 1) I_i + sum_{i<j} 4 l_i l_j I_ij``. Two triangles that share an edge
+      and its normals have equal intensities along it. Between the six points the polynomial may leave their
+      range by up to a third of it (in the middle of the triangle), and is saturated again;
     - ``adaptive``: ``gouraud`` in the triangles of `gouraud_triangles`, ``phong`` in the others ([T]
       appendix В);
     - ``phong``: the vertex normals interpolated perspective-correctly and normalised at every pixel, as a
       GPU does: the reference image;
     - ``slerp``: normals on the great circle between the ends of each span, linear in screen space ([T] 2.1).
 
-    Point lights and a near viewer have an L and V of their own at every point that is lit: a fragment's place
-    on the surface, a vertex, the middle of an edge.
+    With point lights or a near viewer L and V are those of the shaded point: of a fragment's point of the
+    surface, of a vertex, or of the middle of an edge.
 
     Parameters
     ----------
@@ -179,11 +179,11 @@ def render(
     shading : str
         One of `SHADINGS`.
     model : ReflectionModel
-        The highlight.
+        Reflection model.
     raster : Raster, optional
-        The scene's own raster, when it is at hand already.
+        Raster of the scene, if it exists already.
     thresholds : Thresholds, optional
-        Of ``adaptive``; the other methods do not read them.
+        Thresholds of ``adaptive``; other methods ignore them.
 
     Raises
     ------
@@ -273,7 +273,7 @@ class _NodeColors:
 def shade_spans(
     scene: Scene, raster: Raster, curve: str | Curve, model: ReflectionModel, chord: bool = False
 ) -> np.ndarray:
-    """Picture from spans alone, as the hardware sees them.
+    """Picture from spans alone, as in hardware.
 
     The normal of a fragment is the curve between its span's ends at ``t = offset / (length - 1)`` (0 for a
     span of one pixel), with the length that the curve gives it. With ``normalised`` this is the reference
@@ -282,16 +282,15 @@ def shade_spans(
     Parameters
     ----------
     scene : Scene
-        Size, background, materials, lights and viewer; of the mesh the materials of its faces.
+        Size, background, materials, lights and viewer; the mesh is read for the materials of its faces.
     raster : Raster
-        The spans. Only normal_left, normal_right, length, span, offset, pixel and visible are used (and
-        triangle, where there are several materials; and triangle, weights_left and weights_right, where there
-        are point lights or a near viewer), so that they may be replaced, with `dataclasses.replace`, by
-        quantised ones.
+        The spans. Only normal_left, normal_right, length, span, offset, pixel and visible are used, and
+        triangle with several materials, and triangle, weights_left and weights_right with point lights or a
+        near viewer. So the normals may be replaced by quantised ones, with `dataclasses.replace`.
     curve : str or callable
         One of `CURVES`, or a function of the normals at both ends and t.
     model : ReflectionModel
-        The highlight.
+        Reflection model.
     chord : bool
         See `intensity`.
 
@@ -326,18 +325,18 @@ def shade_operands(
     model: ReflectionModel,
     factor: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Picture from what a method without normals gives for every fragment.
+    """Picture from the operands of every fragment, for a method without normals.
 
     Parameters
     ----------
     scene : Scene
-        Size, background, materials and the lights' colours; of the mesh the materials of its faces.
+        Size, background, materials and the lights' colours; the mesh is read for the materials of its faces.
     raster : Raster
         The fragments; span, pixel, visible and triangle are used.
     cosine, highlight_cosine : arrays, shape (fragments, lights)
-        N·L, of a light that fades times its factor; and N·H.
+        N·L, times its factor for a light that fades; and N·H.
     model : ReflectionModel
-        The highlight.
+        Reflection model.
     factor : array, shape (fragments, lights), optional
         Factor of each light; ``None``: 1.
 
@@ -367,7 +366,7 @@ def shade_operands(
 
 
 def fragment_positions(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray:
-    """Where fragments lie on the surface, in the mesh's units: perspective-correct.
+    """Perspective-correct positions of fragments on the surface, in the mesh's units.
 
     Parameters
     ----------
@@ -421,7 +420,7 @@ def _shade(
     chord: bool = False,
     points: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Intensities of normals, whose first axis is that of ``triangles[which]``, the triangles they lie on."""
+    """Intensities of normals; the first axis is that of their triangles, ``triangles[which]``."""
 
     def shade(normals, material, points):
         viewer = scene.view_vectors(points)

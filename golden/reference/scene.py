@@ -1,4 +1,4 @@
-"""Everything that a picture depends on: mesh, camera, size, material and lights."""
+"""Scenes: mesh, camera, size, materials and lights of a picture."""
 
 import operator
 from dataclasses import dataclass, replace
@@ -13,10 +13,10 @@ from blysk.golden.reference.lighting import Material
 __all__ = ["BACK_FACES", "LARGEST_SIDE", "VIEWERS", "Scene"]
 
 BACK_FACES = ("flip", "show", "cull")
-"""What happens to a triangle seen from behind."""
+"""Ways to treat a triangle seen from behind."""
 
 VIEWERS = ("distant", "near")
-"""Where light is reflected to: one direction for the whole frame, or the camera."""
+"""Viewers for the lighting: one direction for the whole frame, or the position of the camera."""
 
 LARGEST_SIDE = 4095
 """Largest width and height: x, y and a span's length are 12 bits each."""
@@ -24,7 +24,7 @@ LARGEST_SIDE = 4095
 
 @dataclass(frozen=True)
 class Scene:
-    """A picture to be made.
+    """A scene: the surface and all that its picture depends on.
 
     Parameters
     ----------
@@ -35,26 +35,26 @@ class Scene:
     width, height : int
         Pixels, 1 to 4095 each.
     material : Material or sequence of Material
-        The surface's coefficients; several by the mesh's index of each face, stored as a tuple.
+        Coefficients of the surface: one material, or several, chosen by `Mesh.material`; stored as a tuple.
     lights : sequence of Light
         Any number, directional or point lights; stored as a tuple.
     ambient_light : three floats
-        I_a a channel, at least 0.
+        I_a of each channel, at least 0.
     background : three floats
         Color of the pixels that show no surface, in [0, 1].
     back_faces : {"flip", "show", "cull"}
-        A triangle seen from behind (its corners clockwise) is drawn with its normals negated, so that those
-        of an outer surface turn to the viewer's side, or with its normals as they are, or is left out. Where
-        its material is two-sided, ``"cull"`` negates the normals, too.
+        Treatment of a triangle seen from behind (its corners are clockwise). ``"flip"`` draws it with negated
+        normals, so that they point to the viewer's side; ``"show"`` draws it with its own normals; ``"cull"``
+        leaves it out, or negates the normals if its material is two-sided.
     viewer : {"distant", "near"}
-        The V of the lighting: `Camera.viewer` everywhere, or from each point of the surface to a perspective
-        camera.
+        Vector V for the lighting: `Camera.viewer` everywhere, or the direction from each point of the surface
+        to a perspective camera.
 
     Raises
     ------
     ValueError
-        If a value is out of range, the mesh has faces of a material that there is not, or a near viewer has
-        an orthographic camera.
+        If a value is out of range, a face has the index of a material that does not exist, or the viewer is
+        near and the camera orthographic.
     TypeError
         If a size is not an integer, a light is not a `Light` or a material is not a `Material`.
     """
@@ -99,12 +99,12 @@ class Scene:
 
     @property
     def local(self) -> bool:
-        """Whether L or H differ from point to point: there is a point light, or a near viewer."""
+        """Whether L or H differs from point to point: there is a point light or a near viewer."""
         return self.viewer == "near" or any(light.position is not None for light in self.lights)
 
     @property
     def lit(self) -> "Scene":
-        """The scene with the lights that are on."""
+        """The scene without the lights that are off."""
         on = tuple(light for light in self.lights if light.is_on)
         return self if len(on) == len(self.lights) else replace(self, lights=on)
 
@@ -115,7 +115,7 @@ class Scene:
 
     @property
     def flips(self) -> np.ndarray:
-        """Whether each triangle has its normals turned where it is seen from behind: bool array."""
+        """Whether each triangle has its normals negated if it is seen from behind: shape (faces,)."""
         return (self.back_faces == "flip") | (self.back_faces == "cull") & self.two_sided
 
     @property
@@ -139,7 +139,7 @@ class Scene:
         Returns
         -------
         float64 array
-            Shape (3,) of a distant viewer, else that of the points; 0 at the camera itself.
+            Shape (3,) for a distant viewer, else the shape of the points; 0 at the camera itself.
 
         Raises
         ------
@@ -154,5 +154,5 @@ class Scene:
 
     @property
     def materials(self) -> tuple[Material, ...]:
-        """The material, or all of them."""
+        """All materials, as a tuple."""
         return (self.material,) if isinstance(self.material, Material) else self.material
